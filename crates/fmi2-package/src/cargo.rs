@@ -1,0 +1,100 @@
+//! Compiles a model's library with cargo.
+
+use anyhow::{Context, Result, bail};
+use serde_json::Value;
+use std::ffi::OsString;
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+/// A run of cargo that makes a package's shared library.
+#[derive(Clone, Debug)]
+pub struct LibraryBuild<'a> {
+    /// The folder with the `Cargo.toml` of the package or its workspace.
+    pub folder: PathBuf,
+    /// The package.
+    pub package: &'a str,
+    /// The profile.
+    pub profile: &'a str,
+    /// The target; `None` for the machine this runs on.
+    pub target: Option<&'a str>,
+    /// Environment variables to set, or to remove where the value is `None`.
+    pub environment: Vec<(&'a str, Option<OsString>)>,
+}
+
+impl LibraryBuild<'_> {
+    /// Runs cargo, which shows its progress, and tells where the library is.
+    ///
+    /// The package is built without its default features and exactly as `Cargo.lock` says.
+    ///
+    /// # Errors
+    /// When cargo cannot be started or fails, or the package has no shared library.
+    pub fn run(&self) -> Result<PathBuf> {
+        // Inside `cargo run` this names the cargo that is running.
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        let mut command = Command::new(&cargo);
+        command
+            .args(["build", "--lib", "--locked", "--no-default-features"])
+            .args(["--message-format", "json-render-diagnostics"])
+            .args(["--profile", self.profile, "--package", self.package])
+            .current_dir(&self.folder)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped());
+        if let Some(target) = self.target {
+            command.args(["--target", target]);
+        }
+        for (name, value) in &self.environment {
+            match value {
+                Some(value) => command.env(name, value),
+                None => command.env_remove(name),
+            };
+        }
+        let mut child =
+            command.spawn().with_context(|| format!("cannot start cargo ({})", cargo.to_string_lossy()))?;
+        let stdout = child.stdout.take().context("cargo has no output")?;
+        let mut library = None;
+        for line in BufReader::new(stdout).lines() {
+            let line = line.context("cannot read what cargo says")?;
+            // A dependency may be a shared library, too; the package itself comes last.
+            library = library_in(&line).or(library);
+        }
+        let status = child.wait().context("cannot wait for cargo")?;
+        if !status.success() {
+            let target = self.target.map(|target| format!(" for {target}")).unwrap_or_default();
+            bail!("cargo could not build the library of {}{target}; its messages are above", self.package);
+        }
+        library.with_context(|| {
+            format!("{} has no shared library: crate-type must contain cdylib", self.package)
+        })
+    }
+}
+
+/// The shared library that this line of cargo's JSON is about, if any.
+fn library_in(line: &str) -> Option<PathBuf> {
+    let message: Value = serde_json::from_str(line).ok()?;
+    if message["reason"] != "compiler-artifact" {
+        return None;
+    }
+    let is_library =
+        |path: &PathBuf| path.extension().is_some_and(|e| e == "so" || e == "dll" || e == "dylib");
+    message["target"]["crate_types"].as_array()?.iter().find(|kind| *kind == "cdylib")?;
+    message["filenames"].as_array()?.iter().filter_map(Value::as_str).map(PathBuf::from).find(is_library)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::library_in;
+
+    #[test]
+    fn the_library_is_found_in_what_cargo_says() {
+        let line = |kind: &str| {
+            format!(
+                r#"{{"reason":"compiler-artifact","target":{{"name":"m","crate_types":["{kind}","rlib"]}},
+                    "filenames":["/t/libm.rlib","/t/libm.so"]}}"#
+            )
+        };
+        assert_eq!(library_in(&line("cdylib")), Some("/t/libm.so".into()));
+        assert_eq!(library_in(&line("proc-macro")), None);
+        assert_eq!(library_in("warning: no JSON"), None);
+    }
+}

@@ -1,0 +1,129 @@
+//! The FMU as a file.
+
+use anyhow::bail;
+use fmi2_package::{ContentFile, Library, Platform, pack, write_atomically};
+use std::fs;
+use std::io::{Cursor, Read, Write};
+use std::path::{Path, PathBuf};
+use zip::{CompressionMethod, ZipArchive};
+
+struct Sources {
+    folder: tempfile::TempDir,
+}
+
+impl Sources {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, content) in
+            [("lib.so", "machine code"), ("lib.dll", "other code"), ("index.html", "<html>")]
+        {
+            fs::write(folder.path().join(name), content).unwrap();
+        }
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn library(&self, platform: &str, name: &str) -> Library {
+        Library { platform: Platform::of_folder(platform).unwrap(), path: self.path(name) }
+    }
+
+    fn pack(&self, destination: &Path, libraries: &[Library]) -> anyhow::Result<u64> {
+        let content =
+            [ContentFile { name: "documentation/index.html".into(), path: self.path("index.html") }];
+        pack(destination, "toy", "<xml/>", libraries, &content)
+    }
+
+    fn pack_both(&self, destination: &Path) -> u64 {
+        let libraries = [self.library("win64", "lib.dll"), self.library("linux64", "lib.so")];
+        self.pack(destination, &libraries).unwrap()
+    }
+}
+
+#[test]
+fn it_is_the_zip_that_importers_want() {
+    let sources = Sources::new();
+    let fmu = sources.path("out/deep/toy.fmu");
+    let size = sources.pack_both(&fmu);
+    let bytes = fs::read(&fmu).unwrap();
+    assert_eq!(bytes.len() as u64, size);
+
+    let mut zip = ZipArchive::new(Cursor::new(&bytes)).unwrap();
+    let names: Vec<String> = zip.file_names().map(|name| name.unwrap().into_owned()).collect();
+    assert_eq!(
+        names,
+        [
+            "modelDescription.xml",
+            "binaries/linux64/toy.so",
+            "binaries/win64/toy.dll",
+            "documentation/index.html"
+        ]
+    );
+    for i in 0..zip.len() {
+        let file = zip.by_index(i).unwrap();
+        assert_eq!(file.compression(), CompressionMethod::Deflated);
+        assert_eq!(file.last_modified(), Some(zip::DateTime::default()));
+        assert_eq!(file.unix_mode(), Some(0o100_644));
+        // Version 2.0 at most, no flags, no extra fields: section 2.3, and no zip64.
+        let header = usize::try_from(file.header_start()).unwrap();
+        assert_eq!(bytes[header + 4..header + 8], [20, 0, 0, 0]);
+        assert_eq!(bytes[header + 28..header + 30], [0, 0]);
+    }
+    let mut text = String::new();
+    zip.by_name("binaries/win64/toy.dll").unwrap().read_to_string(&mut text).unwrap();
+    assert_eq!(text, "other code");
+}
+
+#[test]
+fn the_same_content_gives_the_same_bytes() {
+    let (one, other) = (Sources::new(), Sources::new());
+    let (a, b) = (one.path("a.fmu"), other.path("b.fmu"));
+    one.pack_both(&a);
+    other.pack_both(&b);
+    one.pack_both(&a);
+    assert_eq!(fs::read(a).unwrap(), fs::read(b).unwrap());
+}
+
+#[test]
+fn what_cannot_be_packed_is_named_and_leaves_nothing() {
+    let sources = Sources::new();
+    let fmu = sources.path("out/toy.fmu");
+    for (libraries, message) in [
+        (vec![], "at least one library"),
+        (vec![sources.library("linux64", "none.so")], "none.so"),
+        (
+            vec![sources.library("linux64", "lib.so"), sources.library("linux64", "lib.dll")],
+            "linux64/toy.so is there twice",
+        ),
+    ] {
+        let error = format!("{:#}", sources.pack(&fmu, &libraries).unwrap_err());
+        assert!(error.contains(message), "{error}");
+    }
+    assert!(!fmu.exists());
+
+    let blocked = sources.path("lib.so/toy.fmu");
+    let error = format!("{:#}", sources.pack(&blocked, &[sources.library("linux64", "lib.so")]).unwrap_err());
+    assert!(error.contains("cannot make the folder") && error.contains("lib.so"), "{error}");
+}
+
+#[test]
+fn an_interrupted_write_leaves_the_old_file_and_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("toy.fmu");
+    let interrupted = |path: &Path| {
+        write_atomically(path, |file| {
+            file.write_all(b"half")?;
+            bail!("no space left on device")
+        })
+    };
+    let error = format!("{:#}", interrupted(&path).unwrap_err());
+    assert!(error.contains("toy.fmu") && error.contains("no space"), "{error}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+
+    write_atomically(&path, |file| Ok(file.write_all(b"whole")?)).unwrap();
+    interrupted(&path).unwrap_err();
+    assert_eq!(fs::read(&path).unwrap(), b"whole");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
