@@ -1,0 +1,168 @@
+//! The same model split into pitch and roll.
+//!
+//! The testbed is mirror-symmetric, so the mean of its two sides and half their difference do not
+//! influence each other: the mean is the pitch subsystem, the half difference the roll subsystem. Both
+//! obey the same three equations, with the inertia and damping that the load has in that motion:
+//!
+//! ```text
+//! (c1 + c2) q_I' = c1 w + c2 v - k1 (q_I - u) - k2 (q_I - q_II)        massless shaft, eq. (8) row 1
+//! q_II'          = v
+//! J v'           = c2 (q_I' - v) + k2 (q_I - q_II) - c v               SECT input shaft, eq. (8) row 3
+//! ```
+//!
+//! where u and w are the mean (half difference) of the motor angles and rates. With `q_I'` inserted and
+//! the abbreviations [`stiffness_motor`](Side::stiffness_motor), [`stiffness_sect`](Side::stiffness_sect)
+//! and [`damping`](Side::damping) the differences of large terms disappear, which keeps extreme
+//! parameters accurate.
+
+use crate::motor::Motion;
+use crate::parameters::{InvalidParameter, Parameters};
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+/// The coupling pair of one side: motor - k1, c1 - massless shaft - k2, c2 - SECT.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Side {
+    /// `c1 / (c1 + c2)`: the share of a motor's motion that passes to the massless shaft at once.
+    pub motor_share: f64,
+    /// `c2 / (c1 + c2)`: the share of the SECT shaft's motion that does.
+    pub sect_share: f64,
+    /// `k1 / (c1 + c2)`, 1/s.
+    pub rate_motor: f64,
+    /// `k2 / (c1 + c2)`, 1/s.
+    pub rate_sect: f64,
+    /// `c2 k1 / (c1 + c2)`, N.m/rad.
+    pub stiffness_motor: f64,
+    /// `c1 k2 / (c1 + c2)`, N.m/rad.
+    pub stiffness_sect: f64,
+    /// `c1 c2 / (c1 + c2)`, N.m.s/rad.
+    pub damping: f64,
+}
+
+impl Side {
+    /// The side of a testbed with these parameters.
+    pub fn new(p: &Parameters) -> Self {
+        let c = p.c1 + p.c2;
+        Self {
+            motor_share: p.c1 / c,
+            sect_share: p.c2 / c,
+            rate_motor: p.k1 / c,
+            rate_sect: p.k2 / c,
+            stiffness_motor: p.c2 / c * p.k1,
+            stiffness_sect: p.c1 / c * p.k2,
+            damping: p.c1 / c * p.c2,
+        }
+    }
+
+    /// Rate of the massless shaft, the first row of eq. (8) solved for `q_I'`.
+    #[inline]
+    pub fn shaft_rate(&self, q_i: f64, q_ii: f64, v: f64, motor: Motion) -> f64 {
+        let Motion { angle: u, rate: w, .. } = motor;
+        self.motor_share * w + self.sect_share * v
+            - self.rate_motor * (q_i - u)
+            - self.rate_sect * (q_i - q_ii)
+    }
+
+    /// Sensor torque, eq. (9), with [`shaft_rate`](Self::shaft_rate) inserted.
+    #[inline]
+    pub fn torque(&self, q_i: f64, q_ii: f64, v: f64, motor: Motion) -> f64 {
+        let Motion { angle: u, rate: w, .. } = motor;
+        self.stiffness_motor * (q_i - u) - self.stiffness_sect * (q_i - q_ii) + self.damping * (v - w)
+    }
+}
+
+/// One of the two subsystems: `z = [q_I, q_II, v]`, `z' = A z + b_angle u + b_rate w`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Subsystem {
+    /// Inertia J: J2 + H3/2 in pitch, J2 + J3 N^2/2M^2 in roll, kg.m2.
+    pub inertia: f64,
+    /// Damping c of the load: c3/2 in pitch, c3 N^2/2M^2 in roll, N.m.s/rad.
+    pub load_damping: f64,
+    /// State matrix.
+    pub a: Matrix3<f64>,
+    /// Column of the motor angle. Equals `-a [1, 1, 0]`: a testbed turned as a whole stays at rest.
+    pub b_angle: Vector3<f64>,
+    /// Column of the motor rate; also the jump of z when the motor angle jumps by 1.
+    pub b_rate: Vector3<f64>,
+}
+
+impl Subsystem {
+    fn new(side: &Side, inertia: f64, load_damping: f64) -> Self {
+        let Side { motor_share, sect_share, rate_motor, rate_sect, stiffness_motor, stiffness_sect, damping } =
+            *side;
+        Self {
+            inertia,
+            load_damping,
+            a: Matrix3::new(
+                -(rate_motor + rate_sect),
+                rate_sect,
+                sect_share,
+                0.0,
+                0.0,
+                1.0,
+                (stiffness_sect - stiffness_motor) / inertia,
+                -stiffness_sect / inertia,
+                -(damping + load_damping) / inertia,
+            ),
+            b_angle: Vector3::new(rate_motor, 0.0, stiffness_motor / inertia),
+            b_rate: Vector3::new(motor_share, 0.0, damping / inertia),
+        }
+    }
+}
+
+/// A quantity of the pitch subsystem beside the same of the roll subsystem: both take every step of
+/// the calculation together.
+pub type PitchRoll = Vector2<f64>;
+
+/// Sum and difference of the two sides, twice the quantities of pitch and roll. The factor 1/2 is left
+/// to the matrices that they meet.
+#[inline]
+pub fn sum_difference(side1: f64, side2: f64) -> PitchRoll {
+    Vector2::new(side1 + side2, side1 - side2)
+}
+
+/// The two sides from the quantities of pitch and roll, their mean and half difference.
+#[inline]
+pub fn sides(z: PitchRoll) -> [f64; 2] {
+    [z.x + z.y, z.x - z.y]
+}
+
+/// The decoupled testbed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Decoupled {
+    /// The coupling pair, the same on both sides.
+    pub side: Side,
+    /// Mean of the sides.
+    pub pitch: Subsystem,
+    /// Half difference of the sides.
+    pub roll: Subsystem,
+    /// Half the jump of q_I and of v per jump of the motor angle (the rate columns; q_II does not jump).
+    pub half_jump: [PitchRoll; 2],
+    /// N / 2M of eq. (1).
+    pub roll_ratio: f64,
+}
+
+impl Decoupled {
+    /// The testbed with these parameters.
+    ///
+    /// # Errors
+    /// When a parameter is out of its range, or the parameters are so far apart that a coefficient is
+    /// no finite number.
+    pub fn new(p: &Parameters) -> Result<Self, InvalidParameter> {
+        p.check()?;
+        let side = Side::new(p);
+        let ratio = p.roll_ratio();
+        let roll_share = 2.0 * ratio * ratio;
+        let pitch = Subsystem::new(&side, p.J2 + 0.5 * p.H3, 0.5 * p.c3);
+        let roll = Subsystem::new(&side, p.J2 + roll_share * p.J3, roll_share * p.c3);
+        for subsystem in [&pitch, &roll] {
+            let coefficients = subsystem.a.iter().chain(&subsystem.b_angle).chain(&subsystem.b_rate);
+            if !coefficients.copied().all(f64::is_finite) {
+                return Err(InvalidParameter(
+                    "the parameters are too far apart: a coefficient of eq. (11) is no finite number".into(),
+                ));
+            }
+        }
+        let half_jump = [0, 2].map(|i| PitchRoll::new(pitch.b_rate[i], roll.b_rate[i]) * 0.5);
+        Ok(Self { side, pitch, roll, half_jump, roll_ratio: ratio })
+    }
+}

@@ -1,0 +1,60 @@
+//! Energies and power of the testbed, eqs. (1) to (7): what the whole model follows from.
+//!
+//! The stepping does not use this module. It is here for the reader, and for the tests, which check
+//! that the energy that the motors feed in is stored or dissipated and nothing else.
+
+use crate::parameters::Parameters;
+
+/// Angles of one instant, rad. Used for rates (rad/s) as well.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Angles {
+    /// Motors.
+    pub theta1: f64,
+    /// Motors.
+    pub theta2: f64,
+    /// Massless shaft between couplings 1 and 2.
+    pub theta3: f64,
+    /// Massless shaft between couplings 3 and 4.
+    pub theta4: f64,
+    /// SECT input shaft.
+    pub theta5: f64,
+    /// SECT input shaft.
+    pub theta6: f64,
+}
+
+/// Pitch theta7 and roll theta8 of the output shaft from theta5 and theta6, eq. (1):
+/// `theta7 = (theta5 + theta6) / 2`, `theta8 = N/2M (theta5 - theta6)`.
+///
+/// The paper's list of symbols calls theta7 "rolling"; eq. (1), the frame of eq. (4a) and Sec. 4
+/// agree that it is pitch.
+pub fn sect(p: &Parameters, theta5: f64, theta6: f64) -> (f64, f64) {
+    (0.5 * (theta5 + theta6), p.roll_ratio() * (theta5 - theta6))
+}
+
+/// Kinetic energy T, eq. (5), without the motors' own (their motion is given), J.
+pub fn kinetic_energy(p: &Parameters, rates: &Angles) -> f64 {
+    let (pitch_rate, roll_rate) = sect(p, rates.theta5, rates.theta6);
+    0.5 * p.J2 * (square(rates.theta5) + square(rates.theta6))
+        + 0.5 * p.H3 * square(pitch_rate)
+        + 0.5 * p.J3 * square(roll_rate)
+}
+
+/// Potential energy V of the couplings, eq. (6), J.
+///
+/// The paper prints k1 in the last term; it is k2, as in K of eq. (8) and by symmetry.
+pub fn potential_energy(p: &Parameters, q: &Angles) -> f64 {
+    0.5 * p.k1 * (square(q.theta1 - q.theta3) + square(q.theta2 - q.theta4))
+        + 0.5 * p.k2 * (square(q.theta3 - q.theta5) + square(q.theta4 - q.theta6))
+}
+
+/// Rayleigh's dissipation function, eq. (7), W; the power lost is twice this.
+pub fn dissipation(p: &Parameters, rates: &Angles) -> f64 {
+    let (pitch_rate, roll_rate) = sect(p, rates.theta5, rates.theta6);
+    0.5 * p.c1 * (square(rates.theta1 - rates.theta3) + square(rates.theta2 - rates.theta4))
+        + 0.5 * p.c2 * (square(rates.theta3 - rates.theta5) + square(rates.theta4 - rates.theta6))
+        + 0.5 * p.c3 * (square(pitch_rate) + square(roll_rate))
+}
+
+fn square(x: f64) -> f64 {
+    x * x
+}

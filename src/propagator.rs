@@ -1,0 +1,172 @@
+//! The exact step of a subsystem over which its motor angle moves on a straight line.
+//!
+//! With the motor angle `u0 + w s` for `0 <= s <= h`, the solution of `z' = A z + b_angle u + b_rate w` is
+//!
+//! ```text
+//! z(h) = z + growth (z - [1, 1, 0] u0) + ramp w
+//! growth = exp(A h) - 1
+//! ramp   = integral over 0..h of exp(A (h - s)) (b_angle s + b_rate) ds
+//! ```
+//!
+//! because `A [1, 1, 0] + b_angle = 0`. The step is an increment of z: a testbed at rest stays at rest to
+//! the last bit, and tiny steps lose nothing to `exp(A h)` being close to 1.
+
+use crate::decoupled::{Decoupled, PitchRoll, Subsystem};
+use nalgebra::{Matrix3, Vector3};
+
+/// `[1, 1, 0]`: both shafts turned, no velocity.
+const TURNED: Vector3<f64> = Vector3::new(1.0, 1.0, 0.0);
+
+/// The step matrices of one subsystem for one step size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Propagator {
+    /// `exp(A h) - 1`.
+    pub growth: Matrix3<f64>,
+    /// Increment per motor rate.
+    pub ramp: Vector3<f64>,
+}
+
+impl Propagator {
+    /// The propagator for step size `h` in s: a Taylor series over a fraction of the step in which it
+    /// converges quickly, then doubled until the step is full.
+    ///
+    /// Doubling follows from taking two steps: `growth(2h) = 2 growth + growth^2` and
+    /// `ramp(2h) = 2 ramp + growth (ramp - [1, 1, 0] h)`.
+    pub fn new(system: &Subsystem, h: f64) -> Self {
+        // Angles and velocities differ in magnitude; with the velocity in units of `scale` (a power of
+        // 2, so that nothing is rounded) the norm is smaller and the error of the doublings with it.
+        let scale = balance(&system.a);
+        let a = rescaled(&system.a, scale);
+        let to_scale = |z: Vector3<f64>| Vector3::new(z.x, z.y, z.z / scale);
+
+        let doublings = doublings(&a, h);
+        let mut h = h * 0.5_f64.powi(doublings);
+        let ah = a * h;
+        let mut growth_term = ah;
+        let mut growth = growth_term;
+        // ramp = b_rate h + (A b_rate + b_angle) h^2/2 + A (A b_rate + b_angle) h^3/6 + ...
+        let b_rate = to_scale(system.b_rate);
+        let b_angle = to_scale(system.b_angle);
+        let mut ramp_term = (ah * b_rate + b_angle * h) * (0.5 * h);
+        let mut ramp = b_rate * h + ramp_term;
+        for n in 2..=TAYLOR_ORDER {
+            growth_term = growth_term * ah / f64::from(n);
+            growth += growth_term;
+            ramp_term = ah * ramp_term / f64::from(n + 1);
+            ramp += ramp_term;
+        }
+        for _ in 0..doublings {
+            ramp = ramp * 2.0 + growth * (ramp - TURNED * h);
+            growth = growth * 2.0 + growth * growth;
+            h *= 2.0;
+        }
+        Self { growth: rescaled(&growth, 1.0 / scale), ramp: Vector3::new(ramp.x, ramp.y, ramp.z * scale) }
+    }
+}
+
+/// Terms of the series: `0.25^14 / 14!` is below 1e-19.
+const TAYLOR_ORDER: i32 = 13;
+const TAYLOR_RADIUS: f64 = 0.25;
+
+/// How often the step must be halved for the series to converge.
+fn doublings(a: &Matrix3<f64>, h: f64) -> i32 {
+    let norm = a.abs().row_sum().max() * h;
+    if norm <= TAYLOR_RADIUS { 0 } else { (norm / TAYLOR_RADIUS).log2().ceil() as i32 }
+}
+
+/// A power of 2 that brings the entries that couple angles and velocity to the same magnitude.
+fn balance(a: &Matrix3<f64>) -> f64 {
+    let into_velocity = a[(2, 0)].abs().max(a[(2, 1)].abs());
+    let from_velocity = a[(0, 2)].abs().max(a[(1, 2)].abs());
+    0.5_f64.powi((-0.5 * (into_velocity / from_velocity).log2()).round().clamp(-300.0, 300.0) as i32)
+}
+
+/// The matrix for a velocity in units of `scale`.
+fn rescaled(a: &Matrix3<f64>, scale: f64) -> Matrix3<f64> {
+    let mut b = *a;
+    b[(2, 0)] /= scale;
+    b[(2, 1)] /= scale;
+    b[(0, 2)] *= scale;
+    b[(1, 2)] *= scale;
+    b
+}
+
+/// The propagators of both subsystems for one step size, entry beside entry, halved because they meet
+/// sums and differences.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepMatrices {
+    /// Step size, s; 0 marks an unused entry.
+    h: f64,
+    half_growth: [[PitchRoll; 3]; 3],
+    half_ramp: [PitchRoll; 3],
+}
+
+impl StepMatrices {
+    const UNUSED: Self = Self { h: 0.0, half_growth: [[ZERO; 3]; 3], half_ramp: [ZERO; 3] };
+
+    /// The matrices for step size `h` in s.
+    pub fn new(system: &Decoupled, h: f64) -> Self {
+        let (pitch, roll) = (Propagator::new(&system.pitch, h), Propagator::new(&system.roll, h));
+        let growth = |i, j| PitchRoll::new(pitch.growth[(i, j)], roll.growth[(i, j)]) * 0.5;
+        Self {
+            h,
+            half_growth: std::array::from_fn(|i| std::array::from_fn(|j| growth(i, j))),
+            half_ramp: std::array::from_fn(|i| PitchRoll::new(pitch.ramp[i], roll.ramp[i]) * 0.5),
+        }
+    }
+
+    /// The change of `z = [q_I, q_II, v]` over the step, from sums and differences of the sides'
+    /// deviations `z - [1, 1, 0] u` from the motors at its begin, and of the motor rates w.
+    #[inline]
+    pub fn increment(&self, deviation: &[PitchRoll; 3], w: PitchRoll) -> [PitchRoll; 3] {
+        let row = |growth: &[PitchRoll; 3], ramp: &PitchRoll| {
+            (growth[0].component_mul(&deviation[0]) + growth[1].component_mul(&deviation[1]))
+                + (growth[2].component_mul(&deviation[2]) + ramp.component_mul(&w))
+        };
+        let (growth, ramp) = (&self.half_growth, &self.half_ramp);
+        [row(&growth[0], &ramp[0]), row(&growth[1], &ramp[1]), row(&growth[2], &ramp[2])]
+    }
+}
+
+const ZERO: PitchRoll = PitchRoll::new(0.0, 0.0);
+
+/// The step matrices of the step sizes used last. Masters use one step size or alternate among a few.
+#[derive(Clone, Debug)]
+pub struct StepCache {
+    entries: [StepMatrices; Self::SIZE],
+    current: usize,
+}
+
+impl StepCache {
+    const SIZE: usize = 8;
+
+    /// A cache without entries.
+    pub const fn new() -> Self {
+        Self { entries: [StepMatrices::UNUSED; Self::SIZE], current: 0 }
+    }
+
+    /// The matrices for step size `h > 0`, computed if they are not at hand.
+    #[inline]
+    pub fn get(&mut self, system: &Decoupled, h: f64) -> &StepMatrices {
+        if self.entries[self.current].h != h {
+            self.find_or_compute(system, h);
+        }
+        &self.entries[self.current]
+    }
+
+    #[cold]
+    fn find_or_compute(&mut self, system: &Decoupled, h: f64) {
+        if let Some(found) = self.entries.iter().position(|entry| entry.h == h) {
+            self.current = found;
+            return;
+        }
+        self.current = (self.current + 1) % Self::SIZE;
+        self.entries[self.current] = StepMatrices::new(system, h);
+    }
+}
+
+impl Default for StepCache {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,165 @@
+//! The model against the paper: its anchors, and each of its errors with the printed version shown to fail.
+
+use nalgebra::{Complex, Matrix2, Matrix4, Matrix6, Vector4};
+use prw_testbed::Parameters;
+use prw_testbed::energies::{Angles, kinetic_energy, potential_energy, sect};
+use prw_testbed::state_space::{
+    angle_transfer_matrix, damping_matrix, force, mass_matrix, state_space, stiffness_matrix, transfer_matrix,
+};
+
+const TABLE_1: Parameters = Parameters::TABLE_1;
+const DEG_PER_RAD: f64 = 180.0 / std::f64::consts::PI;
+
+fn sorted_eigenvalues(a: Matrix6<f64>) -> Vec<Complex<f64>> {
+    let mut eigenvalues: Vec<_> = a.complex_eigenvalues().iter().copied().collect();
+    eigenvalues.sort_by(|a, b| (a.re, a.im).partial_cmp(&(b.re, b.im)).unwrap());
+    eigenvalues
+}
+
+/// Eigenvalues of A with Table 1, to the digits they are known to, 1/s.
+const EIGENVALUES: [(f64, f64); 6] = [
+    (-174.87270665, 0.0),
+    (-174.36733032, 0.0),
+    (-18.94465405, -32.14568305),
+    (-18.94465405, 32.14568305),
+    (-9.68285129, -34.67786598),
+    (-9.68285129, 34.67786598),
+];
+
+fn has_the_known_eigenvalues(p: &Parameters) -> bool {
+    sorted_eigenvalues(state_space(p).A)
+        .iter()
+        .zip(EIGENVALUES)
+        .all(|(found, (re, im))| (found - Complex::new(re, im)).norm() < 2e-8)
+}
+
+#[test]
+fn eigenvalues_of_a() {
+    assert!(has_the_known_eigenvalues(&TABLE_1));
+}
+
+#[test]
+fn dc_gains() {
+    let zero = Complex::new(0.0, 0.0);
+    let h = angle_transfer_matrix(&TABLE_1, zero).unwrap();
+    let g = transfer_matrix(&TABLE_1, zero).unwrap();
+    for (row, expected) in [1.0, 0.0, 1.0, 0.0].into_iter().enumerate() {
+        assert!((h[(row, 0)] - expected).norm() < 1e-12, "theta1 -> q[{row}] is {}", h[(row, 0)]);
+    }
+    assert!((g[(0, 0)] - 1.0).norm() < 1e-12 && g[(1, 0)].norm() < 1e-12);
+}
+
+/// Eqs. (13) and (15) are two ways to the same gain from motor angles (whose rates are s times them).
+#[test]
+fn transfer_matrices_agree() {
+    for hertz in [0.1, 1.0, 5.0, 30.0, 500.0] {
+        let s = Complex::new(0.0, 2.0 * std::f64::consts::PI * hertz);
+        let h = angle_transfer_matrix(&TABLE_1, s).unwrap();
+        let g = transfer_matrix(&TABLE_1, s).unwrap();
+        for shaft in 0..2 {
+            for motor in 0..2 {
+                let from_g = g[(shaft, motor)] + s * g[(shaft, motor + 2)];
+                assert!((h[(shaft, motor)] - from_g).norm() < 1e-12 * (1.0 + from_g.norm()));
+            }
+        }
+    }
+}
+
+#[test]
+fn erratum_theta7_is_pitch_and_theta8_is_roll() {
+    // Sec. 4: with opposite motors the pitch rate is zero. As printed, theta7 would be roll.
+    let (pitch, roll) = sect(&TABLE_1, 0.3, -0.3);
+    assert_eq!(pitch, 0.0);
+    assert!((roll - 7.0 / 4.0 * 0.3).abs() < 1e-15);
+    // Eq. (4b): the inertia about the pitch axis is H3. Swapped as printed, H3 would go with roll.
+    let rates = Angles { theta5: 1.0, theta6: 1.0, ..Angles::default() };
+    assert!((kinetic_energy(&TABLE_1, &rates) - (TABLE_1.J2 + 0.5 * TABLE_1.H3)).abs() < 1e-15);
+}
+
+/// The Hessian of a quadratic form of theta3..theta6.
+fn hessian(form: impl Fn(&Angles) -> f64) -> Matrix4<f64> {
+    let at = |i: usize, j: usize, si: f64, sj: f64| {
+        let mut q = [0.0; 4];
+        q[i] += si;
+        q[j] += sj;
+        form(&Angles { theta3: q[0], theta4: q[1], theta5: q[2], theta6: q[3], ..Angles::default() })
+    };
+    Matrix4::from_fn(|i, j| {
+        0.25 * (at(i, j, 1., 1.) - at(i, j, 1., -1.) - at(i, j, -1., 1.) + at(i, j, -1., -1.))
+    })
+}
+
+#[test]
+fn erratum_last_term_of_eq_6_has_k2() {
+    let printed = |q: &Angles| {
+        let last = |k: f64| 0.5 * k * (q.theta4 - q.theta6) * (q.theta4 - q.theta6);
+        potential_energy(&TABLE_1, q) - last(TABLE_1.k2) + last(TABLE_1.k1)
+    };
+    let k = stiffness_matrix(&TABLE_1);
+    assert!((hessian(|q| potential_energy(&TABLE_1, q)) - k).norm() < 1e-12 * k.norm());
+    assert!((hessian(printed) - k).norm() > 0.1 * k.norm());
+}
+
+#[test]
+fn mass_and_damping_matrix_follow_from_the_energies() {
+    use prw_testbed::energies::dissipation;
+    let (m, d) = (mass_matrix(&TABLE_1), damping_matrix(&TABLE_1));
+    assert!((hessian(|rates| kinetic_energy(&TABLE_1, rates)) - m).norm() < 1e-14 * m.norm());
+    assert!((hessian(|rates| dissipation(&TABLE_1, rates)) - d).norm() < 1e-14 * d.norm());
+}
+
+#[test]
+fn erratum_signs_of_a11_a12_a13() {
+    let mut printed = state_space(&TABLE_1).A;
+    let negated = -printed.fixed_rows::<2>(0).into_owned();
+    printed.fixed_rows_mut::<2>(0).copy_from(&negated);
+    let largest = |a| sorted_eigenvalues(a).last().unwrap().re;
+    assert!(largest(state_space(&TABLE_1).A) < 0.0);
+    assert!((largest(printed) - 183.0).abs() < 1.0, "{}", largest(printed));
+}
+
+#[test]
+fn erratum_signs_of_d31_d32() {
+    let p = &TABLE_1;
+    let system = state_space(p);
+    let (theta, omega) = ([0.3, -0.7], [1.1, 0.4]);
+    let (q, v) = (Vector4::new(0.1, 0.2, -0.5, 0.6), Vector4::new(0.0, 0.0, 0.8, -0.9));
+    // q_I' from the first two rows of eq. (8), then eq. (10) as it stands.
+    let rest = force(p, theta, omega) - stiffness_matrix(p) * q - damping_matrix(p) * v;
+    let tau = |i: usize| {
+        let q_rate = rest[i] / (p.c1 + p.c2);
+        p.k1 * q[i] + p.c1 * q_rate - (p.k1 * theta[i] + p.c1 * omega[i])
+    };
+    let y = |d: &nalgebra::SMatrix<f64, 6, 4>| {
+        let x = nalgebra::Vector6::new(q[0], q[1], q[2], q[3], v[2], v[3]);
+        system.C * x + d * Vector4::new(theta[0], theta[1], omega[0], omega[1])
+    };
+    let mut printed = system.D;
+    let first_term = Matrix2::identity() * (p.c1 / (p.c1 + p.c2));
+    let correction = first_term * 2.0;
+    for (columns, coefficient) in [(0, p.k1), (2, p.c1)] {
+        let block = printed.fixed_view::<2, 2>(4, columns) - correction * coefficient;
+        printed.fixed_view_mut::<2, 2>(4, columns).copy_from(&block);
+    }
+    for i in 0..2 {
+        assert!((y(&system.D)[4 + i] - tau(i)).abs() < 1e-11);
+        assert!((y(&printed)[4 + i] - tau(i)).abs() > 1.0);
+    }
+}
+
+#[test]
+fn erratum_table_1_counts_in_degrees() {
+    let printed = Parameters { k1: 2.11, k2: 0.76, c1: 7.83e-3, c2: 8.35e-3, c3: 6.66e-3, ..TABLE_1 };
+    assert!((TABLE_1.k1 - 2.11 * DEG_PER_RAD).abs() < 1e-12);
+    assert!((TABLE_1.c3 - 6.66e-3 * DEG_PER_RAD).abs() < 1e-14);
+    assert!(!has_the_known_eigenvalues(&printed));
+}
+
+#[test]
+fn erratum_excitation_of_sec_4_has_a_time_in_it() {
+    // As printed, sin(10 pi), the motors would stand still.
+    let printed = (10.0 * std::f64::consts::PI).sin();
+    let meant = |t: f64| (10.0 * std::f64::consts::PI * t).sin();
+    assert!(printed.abs() < 1e-14);
+    assert!((meant(0.05) - 1.0).abs() < 1e-12);
+}

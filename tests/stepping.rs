@@ -1,0 +1,206 @@
+//! The exact step against independent derivations: eq. (11) instead of the decoupled equations,
+//! nalgebra's matrix exponential instead of the propagator, and the conservation of energy.
+
+use nalgebra::SMatrix;
+use proptest::prelude::*;
+use prw_testbed::energies::{Angles, dissipation, kinetic_energy, potential_energy};
+use prw_testbed::motor::{Motion, RateSource};
+use prw_testbed::state_space::state_space;
+use prw_testbed::{Parameters, Testbed};
+
+fn parameters() -> impl Strategy<Value = Parameters> {
+    // A factor of up to 5 around Table 1 for each.
+    (prop::array::uniform8(-1.6..1.6f64), 1..9i32, 1..15i32).prop_map(|(f, lobes, rollers)| {
+        let p = Parameters::TABLE_1;
+        Parameters {
+            J2: p.J2 * f[0].exp(),
+            J3: p.J3 * f[1].exp(),
+            H3: p.H3 * f[2].exp(),
+            k1: p.k1 * f[3].exp(),
+            k2: p.k2 * f[4].exp(),
+            c1: p.c1 * f[5].exp(),
+            c2: p.c2 * f[6].exp(),
+            c3: p.c3 * f[7].exp(),
+            M: lobes,
+            N: rollers,
+        }
+    })
+}
+
+/// Sets both motors' samples, with their rates as derivatives.
+fn sample(testbed: &mut Testbed, theta: [f64; 2], rates: [f64; 2]) {
+    for ((motor, theta), rate) in testbed.motors.iter_mut().zip(theta).zip(rates) {
+        motor.theta = theta;
+        motor.set_rate = Some(rate);
+        motor.is_sampled = true;
+    }
+}
+
+/// `[x, theta, omega]` after time h with constant omega, by the exponential of one large matrix.
+fn reference(p: &Parameters, x: [f64; 6], theta: [f64; 2], omega: [f64; 2], h: f64) -> [f64; 6] {
+    let system = state_space(p);
+    let mut generator = SMatrix::<f64, 10, 10>::zeros();
+    generator.fixed_view_mut::<6, 6>(0, 0).copy_from(&system.A);
+    generator.fixed_view_mut::<6, 4>(0, 6).copy_from(&system.B);
+    generator[(6, 8)] = 1.0;
+    generator[(7, 9)] = 1.0;
+    let start = SMatrix::<f64, 10, 1>::from_iterator(x.into_iter().chain(theta).chain(omega));
+    let end = (generator * h).exp() * start;
+    std::array::from_fn(|i| end[i])
+}
+
+proptest! {
+    #[test]
+    fn decoupled_equations_are_those_of_eq_11(p in parameters()) {
+        let system = state_space(&p);
+        let decoupled = *Testbed::new(p).unwrap().system();
+        let (pitch, roll) = (decoupled.pitch, decoupled.roll);
+        // Side i, side j of the full matrix: mean + half difference on the diagonal, minus beside it.
+        for row in 0..3 {
+            for column in 0..3 {
+                let expect = |sign: f64| 0.5 * (pitch.a[(row, column)] + sign * roll.a[(row, column)]);
+                let scale = pitch.a[(row, column)].abs() + roll.a[(row, column)].abs() + 1.0;
+                prop_assert!((system.A[(2 * row, 2 * column)] - expect(1.0)).abs() < 1e-12 * scale);
+                prop_assert!((system.A[(2 * row, 2 * column + 1)] - expect(-1.0)).abs() < 1e-12 * scale);
+            }
+            for (column, (b_pitch, b_roll)) in
+                [(pitch.b_angle, roll.b_angle), (pitch.b_rate, roll.b_rate)].into_iter().enumerate()
+            {
+                let expect = |sign: f64| 0.5 * (b_pitch[row] + sign * b_roll[row]);
+                let scale = b_pitch[row].abs() + b_roll[row].abs() + 1.0;
+                prop_assert!((system.B[(2 * row, 2 * column)] - expect(1.0)).abs() < 1e-12 * scale);
+                prop_assert!((system.B[(2 * row, 2 * column + 1)] - expect(-1.0)).abs() < 1e-12 * scale);
+            }
+        }
+    }
+
+    #[test]
+    fn steps_are_exact(
+        p in parameters(),
+        x in prop::array::uniform6(-1.0..1.0f64),
+        theta in prop::array::uniform2(-1.0..1.0f64),
+        omega in prop::array::uniform2(-10.0..10.0f64),
+        exponent in -6.0..0.3f64,
+    ) {
+        let h = 10f64.powf(exponent);
+        let mut testbed = Testbed::new(p).unwrap();
+        testbed.state = x;
+        sample(&mut testbed, theta, omega);
+        prop_assert!(testbed.step(h));
+        for (found, expected) in testbed.state.iter().zip(reference(&p, x, theta, omega, h)) {
+            let scale = expected.abs().max(30.0); // velocities reach tens of rad/s
+            prop_assert!((found - expected).abs() < 1e-11 * scale, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn two_steps_are_one(p in parameters(), split in 0.01..0.99f64) {
+        let (h, omega) = (0.02, [3.0, -1.0]);
+        let mut once = Testbed::new(p).unwrap();
+        sample(&mut once, [0.0; 2], omega);
+        let mut twice = once.clone();
+        prop_assert!(once.step(h) && twice.step(h * split));
+        sample(&mut twice, omega.map(|w| w * h * split), omega);
+        prop_assert!(twice.step(h - h * split));
+        for (a, b) in once.state.iter().zip(twice.state) {
+            prop_assert!((a - b).abs() < 1e-12 * (1.0 + a.abs()));
+        }
+    }
+}
+
+#[test]
+fn opposite_motors_leave_pitch_at_zero_and_equal_motors_roll() {
+    for sign in [-1.0, 1.0] {
+        let mut testbed = Testbed::new(Parameters::TABLE_1).unwrap();
+        for i in 0..2000 {
+            let t = f64::from(i) * 1e-3;
+            let angle = (1.0 - (31.4 * t).cos()) / 31.4;
+            sample(&mut testbed, [angle, sign * angle], [(31.4 * t).sin(), sign * (31.4 * t).sin()]);
+            assert!(testbed.step(1e-3));
+            let [.., theta5, theta6, _, _] = testbed.state;
+            assert_eq!(theta5, sign * theta6);
+        }
+        assert!(testbed.state[2].abs() > 1e-3);
+    }
+}
+
+#[test]
+fn a_testbed_at_rest_stays_at_rest() {
+    let mut testbed = Testbed::new(Parameters::TABLE_1).unwrap();
+    let start = [0.7, -0.4, 0.7, -0.4, 0.0, 0.0];
+    testbed.state = start;
+    (testbed.motors[0].theta, testbed.motors[1].theta) = (0.7, -0.4);
+    for i in 0..1000 {
+        assert!(testbed.step(1e-3 * f64::from(1 + i % 7)));
+    }
+    assert_eq!(testbed.state, start);
+}
+
+#[test]
+fn angle_jumps_pass_through_the_dampers() {
+    // omega = 0 makes a zero-order hold; the jump's impulse is B2 d.
+    let mut testbed = Testbed::new(Parameters::TABLE_1).unwrap();
+    testbed.rate_source = RateSource::Omega;
+    assert!(testbed.step(1e-3));
+    testbed.motors[0].theta = 0.1;
+    assert!(testbed.step(1e-12));
+    let b = state_space(&Parameters::TABLE_1).B;
+    for (state, row) in testbed.state.iter().zip(0..) {
+        assert!((state - 0.1 * b[(row, 2)]).abs() < 1e-9, "{state} {}", 0.1 * b[(row, 2)]);
+    }
+}
+
+/// Nodes and weights of Gauss's quadrature of order 10 on 0..1.
+const GAUSS: [(f64, f64); 5] = [
+    (0.046910077030668, 0.118463442528095),
+    (0.230765344947158, 0.239314335249683),
+    (0.5, 0.284444444444444),
+    (0.769234655052842, 0.239314335249683),
+    (0.953089922969332, 0.118463442528095),
+];
+
+#[test]
+fn the_motors_work_is_stored_or_dissipated() {
+    let p = Parameters::TABLE_1;
+    let mut testbed = Testbed::new(p).unwrap();
+    testbed.state = [0.1, -0.2, 0.15, 0.05, 1.0, -2.0];
+    let now = |testbed: &Testbed, theta: [f64; 2], omega: [f64; 2]| {
+        let [theta3, theta4, theta5, theta6, omega5, omega6] = testbed.state;
+        let side = testbed.system().side;
+        let motor = |i: usize| Motion { angle: theta[i], rate: omega[i], acceleration: 0.0 };
+        let angles = Angles { theta1: theta[0], theta2: theta[1], theta3, theta4, theta5, theta6 };
+        let rates = Angles {
+            theta1: omega[0],
+            theta2: omega[1],
+            theta3: side.shaft_rate(theta3, theta5, omega5, motor(0)),
+            theta4: side.shaft_rate(theta4, theta6, omega6, motor(1)),
+            theta5: omega5,
+            theta6: omega6,
+        };
+        // Eq. (9) as printed; the motors feel the sensor torques, so they deliver -tau omega.
+        let tau1 = p.k1 * (theta3 - theta[0]) + p.c1 * (rates.theta3 - omega[0]);
+        let tau2 = p.k1 * (theta4 - theta[1]) + p.c1 * (rates.theta4 - omega[1]);
+        let energy = kinetic_energy(&p, &rates) + potential_energy(&p, &angles);
+        (energy, -(tau1 * omega[0] + tau2 * omega[1]), 2.0 * dissipation(&p, &rates))
+    };
+    let (mut theta, panel) = ([0.0, 0.0], 2e-3);
+    let mut work = 0.0;
+    let mut loss = 0.0;
+    let start = now(&testbed, theta, [0.0, 0.0]).0;
+    for i in 0..400 {
+        let omega = [(f64::from(i) * 0.03).sin() * 4.0, (f64::from(i) * 0.05).cos() * 3.0];
+        let mut at = 0.0;
+        for (node, weight) in GAUSS.into_iter().chain([(1.0, 0.0)]) {
+            sample(&mut testbed, [theta[0] + omega[0] * at, theta[1] + omega[1] * at], omega);
+            assert!(testbed.step((node - at / panel) * panel));
+            at = node * panel;
+            let (_, power, lost) = now(&testbed, [theta[0] + omega[0] * at, theta[1] + omega[1] * at], omega);
+            work += power * weight * panel;
+            loss += lost * weight * panel;
+        }
+        theta = [theta[0] + omega[0] * panel, theta[1] + omega[1] * panel];
+    }
+    let end = now(&testbed, theta, [0.0, 0.0]).0;
+    assert!(work.abs() > 1.0 && loss > 1.0, "the test must move something: {work} {loss}");
+    assert!((start + work - end - loss).abs() < 1e-9, "{} J missing", start + work - end - loss);
+}
