@@ -1,0 +1,111 @@
+"""Figures of a simulation. Colours are from Okabe and Ito's set, told apart with any colour vision and in grey."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Dict, Sequence, Tuple
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from prw.files import replacing
+from prw.motion import Motion
+
+BLUE, VERMILION = "#0072B2", "#D55E00"
+STYLE = {
+    "font.size": 10,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "0.9",
+    "axes.axisbelow": True,
+    "lines.linewidth": 1.3,
+    "legend.frameon": False,
+}
+#: Time intervals a long curve is reduced to, each drawn by its extremes; more than the figure has pixels.
+INTERVALS = 4000
+#: A panel whose curves all stay below this shows zero, not rounding errors blown up to its full height.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One set of axes: title, y label with unit, and two curves as (legend entry, values (n,))."""
+
+    title: str
+    label: str
+    curves: Sequence[Tuple[str, np.ndarray]]
+
+
+def motion_panel(motion: Motion, angles: bool) -> Panel:
+    """What the motors do: their angles in degrees, or their velocities as in Fig. 4."""
+    if angles:
+        label, (y1, y2) = r"$\theta_1,\ \theta_2$  (deg)", np.rad2deg(motion.theta.T)
+        return Panel("Motor angles", label, [("motor 1", y1), ("motor 2", y2)])
+    label, (y1, y2) = r"$\dot\theta_1,\ \dot\theta_2$  (rad/s)", motion.omega.T
+    return Panel("Motor velocities", label, [("motor 1", y1), ("motor 2", y2)])
+
+
+def response_panels(response: Dict[str, np.ndarray], angles: bool) -> list:
+    """What the wrist does: pitch and roll (with `angles` in degrees as well as their rates), and the sensor torques."""
+    panels = []
+    if angles:
+        pitch, roll = np.rad2deg(response["pitch"]), np.rad2deg(response["roll"])
+        label = r"$\theta_7,\ \theta_8$  (deg)"
+        panels.append(Panel("Pitch and roll angles", label, [("pitch", pitch), ("roll", roll)]))
+    label = r"$\dot\theta_7,\ \dot\theta_8$  (rad/s)"
+    rates = [("pitch", response["pitch_rate"]), ("roll", response["roll_rate"])]
+    panels.append(Panel("Pitch and roll rates", label, rates))
+    torques = [("sensor 1", response["tau1"]), ("sensor 2", response["tau2"])]
+    panels.append(Panel("Sensor torques", r"$\tau_1,\ \tau_2$  (N m)", torques))
+    return panels
+
+
+def plot_response(path: Path, title: str, motion: Motion, response: Dict[str, np.ndarray], angles: bool) -> None:
+    """Draw motor motion, pitch and roll, and torques over time into the PNG `path`.
+
+    `angles`: show motor and output angles, as for a recording; otherwise motor velocities, as in Fig. 4.
+    """
+    panels = [motion_panel(motion, angles), *response_panels(response, angles)]
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(8, 0.8 + 2.1 * len(panels)), layout="constrained")
+        figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
+        axes = figure.subplots(len(panels), sharex=True)
+        for axis, panel in zip(axes, panels):
+            _draw(axis, motion.time, panel)
+        figure.align_ylabels(axes)
+        axes[-1].set_xlabel("time (s)")
+        axes[-1].set_xlim(motion.time[0], motion.time[-1])
+        with replacing(path) as temporary:
+            figure.savefig(temporary, dpi=150)
+
+
+def _draw(axis: Axes, time: np.ndarray, panel: Panel) -> None:
+    axis.set_title(panel.title)
+    axis.set_ylabel(panel.label)
+    # The second curve is dashed, so that two equal curves still show as two; a dense one is translucent instead.
+    dense = len(time) > 2 * INTERVALS
+    second = {"alpha": 0.6} if dense else {"dashes": (4, 2)}
+    for (name, y), colour, style in zip(panel.curves, (BLUE, VERMILION), ({}, second)):
+        axis.plot(*envelope(time, y), color=colour, label=name, **style)
+    axis.legend(loc="lower right", bbox_to_anchor=(1, 0.97), ncols=2, borderaxespad=0)
+    axis.margins(x=0, y=0.08)
+    if max(np.abs(y).max() for _, y in panel.curves) < ROUNDING:
+        axis.set_ylim(-1, 1)
+
+
+def envelope(time: np.ndarray, y: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """The curve y (n,) over time (n,) in at most 2 * INTERVALS points that draw the same: each interval's extremes."""
+    if len(time) <= 2 * INTERVALS:
+        return time, y
+    starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], INTERVALS, endpoint=False)))
+    keep = set()
+    for start, stop in zip(starts, [*starts[1:], len(time)]):
+        keep.update((start + int(y[start:stop].argmin()), start + int(y[start:stop].argmax())))
+    kept = sorted(keep)
+    return time[kept], y[kept]

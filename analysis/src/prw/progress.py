@@ -1,0 +1,41 @@
+"""Progress of long work, on stderr."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+QUIET_SECONDS = 2.0
+TERMINAL_PERIOD = 0.2
+LOG_PERIOD = 10.0
+
+
+class Progress:
+    """Says how far a piece of work has come, once it has taken longer than two seconds.
+
+    On a terminal one line is rewritten, and wiped on leaving the context; in a log a line is added every ten seconds.
+    """
+
+    def __init__(self, label: str, total: int):
+        """`label` names the work; `total` is the number of its units (rows, bytes)."""
+        self._label, self._total = label, max(total, 1)
+        self._terminal = sys.stderr.isatty()
+        self._next = time.monotonic() + QUIET_SECONDS
+        self._shown = False
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __call__(self, done: int) -> None:
+        """Report that `done` units are done; cheap enough for every thousand rows."""
+        now = time.monotonic()
+        if now < self._next:
+            return
+        self._next = now + (TERMINAL_PERIOD if self._terminal else LOG_PERIOD)
+        self._shown = True
+        text = f"{self._label} {min(done / self._total, 1):4.0%}"
+        print(f"\r{text}" if self._terminal else text, end="" if self._terminal else "\n", file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._shown and self._terminal:
+            print("\r\033[K", end="", file=sys.stderr, flush=True)

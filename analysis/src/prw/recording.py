@@ -1,0 +1,190 @@
+"""Reading a recorded motor motion from a CSV file. Every complaint names the file, the line and the column."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from array import array
+from pathlib import Path
+from typing import IO, Iterator, Sequence
+
+import numpy as np
+
+from prw.errors import UserError
+from prw.motion import Motion
+from prw.progress import Progress
+
+ANGLES = ("theta1", "theta2")
+RATES = ("omega1", "omega2")
+DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab"}
+
+#: Faster than the testbed's motors will turn on any wrist move, in rad/s; degrees taken for radians are beyond it.
+PLAUSIBLE_SPEED = 30.0
+#: More turns than a wrist move takes, in rad.
+PLAUSIBLE_ANGLE = 4 * np.pi
+#: A motor that moves less than this, in rad, says nothing about its rate.
+SMALL_MOVE = 0.02
+#: A motor this slow, in rad/s, is taken to stand still.
+SLOW = 0.1
+#: Names of the header that a complaint repeats.
+SHOWN_COLUMNS = 12
+#: Rows between two progress reports.
+REPORT_ROWS = 4096
+
+
+def read(path: Path, degrees: bool = False) -> Motion:
+    """Read columns time (s), theta1, theta2 (rad) and, where present, omega1, omega2 (rad/s) as a Motion.
+
+    The file is UTF-8 text with a header line; columns in any order, others ignored; separated by commas, semicolons or
+    tabs (with semicolons, a decimal comma is understood). `degrees`: angles and rates are in deg and deg/s. Time may be
+    uneven but must increase. Raises UserError naming file, line and column.
+    """
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            return _parse(path, file, degrees)
+    except UnicodeDecodeError:
+        raise UserError(
+            f"{_where(path, _undecodable_line(path))}: not UTF-8 text; save the file as UTF-8 CSV"
+        ) from None
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def _parse(path: Path, file: IO[str], degrees: bool) -> Motion:
+    first = file.readline()
+    while first and not first.strip():
+        first = file.readline()
+    if not first:
+        raise UserError(
+            f"{path}: the file is empty; a header with time, theta1, theta2 and at least two rows are needed"
+        )
+    delimiter = next((d for d in DELIMITERS if d in first), ",")
+    file.seek(0)
+    table = csv.reader(file, delimiter=delimiter, skipinitialspace=True)
+    try:
+        header, columns, notes = _header(path, table)
+        time, values = _rows(path, table, len(header), columns, delimiter == ";", os.fstat(file.fileno()).st_size)
+    except csv.Error as error:
+        raise UserError(f"{_where(path, table.line_num)}: not a readable CSV row ({error})") from None
+    if len(time) < 2:
+        rows = "no rows below the header" if len(time) == 0 else "only one row below the header"
+        raise UserError(f"{_where(path, table.line_num)}: {rows}; at least two are needed")
+    if degrees:
+        values = np.deg2rad(values)
+    theta, omega = values[:, :2], values[:, 2:] if values.shape[1] == 4 else None
+    notes += _doubts(time, theta, omega, degrees)
+    return Motion(Path(path).stem, time, np.ascontiguousarray(theta), omega, notes)
+
+
+def _header(path: Path, table: Iterator[Sequence[str]]) -> tuple:
+    """Names in the header, the columns to take as [(name, index)] with time first, and notes on the others."""
+    header = [name.strip() for name in next((row for row in table if row), [])]
+    line = table.line_num
+    for name in ("time", *ANGLES, *RATES):
+        if header.count(name) > 1:
+            raise UserError(f"{_where(path, line)}, column {name}: appears {header.count(name)} times in the header")
+    for name in ("time", *ANGLES):
+        if name not in header:
+            found = ", ".join(name or "(blank)" for name in header[:SHOWN_COLUMNS])
+            found += ", ..." if len(header) > SHOWN_COLUMNS else ""
+            raise UserError(f"{_where(path, line)}: column {name} is missing; the header has {found}")
+    rates = [name for name in RATES if name in header]
+    if len(rates) == 1:
+        other = RATES[1 - RATES.index(rates[0])]
+        raise UserError(f"{_where(path, line)}: column {other} is missing; give both {' and '.join(RATES)}, or neither")
+    taken = ("time", *ANGLES, *rates)
+    ignored = [name or "(blank)" for name in header if name not in taken]
+    notes = [f"columns ignored: {', '.join(ignored)}"] if ignored else []
+    return header, [(name, header.index(name)) for name in taken], notes
+
+
+def _rows(path: Path, table, width: int, columns, decimal_comma: bool, size: int) -> tuple:
+    """All rows below the header as time (n,) and values (n, len(columns) - 1), checked cell by cell."""
+    cells, previous, bytes_read = array("d"), -math.inf, 0
+    with Progress(f"reading {path}", size) as progress:
+        for count, row in enumerate(table):
+            if len(row) != width:
+                if not row:
+                    continue
+                raise UserError(f"{_where(path, table.line_num)}: {_cells(len(row))}, but the header has {width}")
+            for name, index in columns:
+                text = row[index]
+                try:
+                    value = float(text.replace(",", ".") if decimal_comma else text)
+                except ValueError:
+                    value = None
+                # float() would take 1_000 for a thousand
+                if value is None or "_" in text:
+                    shown = f"{text.strip()[:40]!r} is not a number" if text.strip() else "empty cell"
+                    raise UserError(f"{_where(path, table.line_num)}, column {name}: {shown}")
+                if not math.isfinite(value):
+                    raise UserError(f"{_where(path, table.line_num)}, column {name}: {text.strip()} is not finite")
+                cells.append(value)
+            time = cells[-len(columns)]
+            if time <= previous:
+                complaint = "is the time of the row before again" if time == previous else "runs backwards"
+                raise UserError(
+                    f"{_where(path, table.line_num)}, column time: {row[columns[0][1]].strip()} {complaint}"
+                    f" (after {previous!r}); time must increase from row to row"
+                )
+            previous = time
+            if count % REPORT_ROWS == 0:
+                progress(bytes_read)
+            bytes_read += sum(map(len, row)) + width
+    values = np.frombuffer(cells, dtype=float).reshape(-1, len(columns)) if cells else np.empty((0, len(columns)))
+    return values[:, 0].copy(), values[:, 1:].copy()
+
+
+def _doubts(time: np.ndarray, theta: np.ndarray, omega, degrees: bool) -> list:
+    """Notes on values that are legal and yet look like a slip of units."""
+    notes = []
+    for side, name in enumerate(ANGLES):
+        # A percentile, for a single step of a coarse encoder is no speed.
+        speed = np.percentile(np.abs(np.diff(theta[:, side]) / np.diff(time)), 99)
+        reach = np.abs(theta[:, side]).max()
+        hint = "are these radians?" if degrees else "if the angles are in degrees, add --degrees"
+        if speed > PLAUSIBLE_SPEED:
+            notes.append(f"{name} turns at {speed:.0f} rad/s ({speed * 30 / np.pi:.0f} rpm); {hint}")
+        elif reach > PLAUSIBLE_ANGLE:
+            notes.append(f"{name} reaches {reach:.0f} rad ({reach / (2 * np.pi):.1f} turns); {hint}")
+    if omega is None:
+        notes.append(
+            "no omega1, omega2: the rates come from the angles, and where these are quantised or noisy so are the "
+            "torques; record omega1 and omega2 too if you can"
+        )
+        return notes
+    if np.abs(omega[0]).max() > SLOW:
+        notes.append("the motors turn already in the first row; the testbed starts at rest and has to catch up")
+    notes += [note for side in (0, 1) if (note := _mismatch(time, theta[:, side], omega[:, side], side))]
+    return notes
+
+
+def _mismatch(time: np.ndarray, theta: np.ndarray, omega: np.ndarray, side: int) -> str:
+    """A note when the integral of the rate omega (n,) is not the angle theta (n,), else nothing."""
+    turned = theta - theta.mean()
+    if np.ptp(theta) < SMALL_MOVE:
+        return ""
+    by_rate = np.concatenate([[0], np.cumsum(np.diff(time) * (omega[1:] + omega[:-1]) / 2)])
+    ratio = turned @ by_rate / (turned @ turned)
+    if 0.8 < ratio < 1.25:
+        return ""
+    return f"{RATES[side]} adds up to {ratio:.3g} times the motion of {ANGLES[side]}; check units and sign"
+
+
+def _undecodable_line(path: Path) -> int:
+    with open(path, "rb") as file:
+        for number, line in enumerate(file, start=1):
+            try:
+                line.decode("utf-8-sig" if number == 1 else "utf-8")
+            except UnicodeDecodeError:
+                return number
+    return 1
+
+
+def _where(path: Path, line: int) -> str:
+    return f"{path}, row {line}"
+
+
+def _cells(count: int) -> str:
+    return "1 cell" if count == 1 else f"{count} cells"

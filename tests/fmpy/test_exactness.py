@@ -1,0 +1,161 @@
+"""Between communication points nothing is approximated: 1e-11 of the exact solution for any parameters and steps."""
+
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+import pytest
+
+from lagrange import OUTPUTS, linear_model, table_1
+from reference import backward_slope, follow
+from slave import assert_close
+
+REAL = ("J2", "J3", "H3", "k1", "k2", "c1", "c2", "c3")
+
+
+def random_case(seed: int, points: int, decades: float):
+    """Parameters within `decades` of Table 1, uneven times, a continuous piecewise-linear path from rest at any angle."""
+    rng = np.random.default_rng(seed)
+    spread = {name: 10 ** rng.uniform(-decades, decades) for name in REAL}
+    parameters = {name: value * spread[name] for name, value in table_1().items() if name in REAL}
+    parameters.update(M=int(rng.integers(1, 12)), N=int(rng.integers(1, 12)))
+    t = rng.uniform(-5, 5) + np.cumsum(10 ** rng.uniform(-4.5, -0.5, points))
+    theta = rng.uniform(-1, 1, 2) + np.cumsum(rng.normal(0, 0.1, (points, 2)), axis=0)
+    slope = np.vstack([np.diff(theta, axis=0) / np.diff(t)[:, None], [[0.0, 0.0]]])
+    return parameters, t, theta, slope
+
+
+def exact(parameters, t, theta, slope):
+    """The oracle with 40 digits, rounded to doubles at the end."""
+    with mpmath.workdps(40):
+        many = np.vectorize(mpmath.mpf, otypes=[object])
+        model = linear_model({name: mpmath.mpf(value) for name, value in parameters.items()})
+        at, after = follow(model, many(t), many(theta), many(slope))
+        return tuple({name: v.astype(float) for name, v in values.items()} for values in (at, after))
+
+
+def check(slave, parameters, t, theta, slope, expected):
+    slave.start(theta[0], time=t[0], **parameters)
+    found = slave.run(t, theta, derivative=slope)
+    for values, truth in zip(found, expected):
+        assert_close(values, truth, 1e-11)
+    assert not slave.complaints()
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_parameters_paths_and_steps(slave, seed):
+    # Further from Table 1 the oracle's own doubles wear thin; the next test goes there.
+    parameters, t, theta, slope = random_case(seed, points=200, decades=0.3)
+    model = linear_model({name: float(value) for name, value in parameters.items()})
+    check(slave, parameters, t, theta, slope, follow(model, t, theta, slope))
+
+
+@pytest.mark.parametrize("seed", range(100, 112))
+def test_against_many_digits(slave, seed):
+    case = random_case(seed, points=16, decades=1.5)
+    check(slave, *case, exact(*case))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"c3": 0.0},
+        {"c1": 0.0},
+        {"c2": 0.0},
+        {"c1": 0.0, "c3": 0.0},
+        {"J2": 1e-7},
+        {"k1": 1e5, "k2": 1e5},
+        {"c1": 1e3, "c2": 1e3},
+        {"c1": 1e-6, "c2": 1e-6, "c3": 0.0},
+        {"k2": 1e-3},
+        {"M": 1, "N": 50},
+    ],
+)
+def test_hard_parameters(slave, change):
+    _, t, theta, slope = random_case(7, points=10, decades=0)
+    case = {**table_1(), **change}
+    case.update(M=int(case["M"]), N=int(case["N"]))
+    check(slave, case, t, theta, slope, exact(case, t, theta, slope))
+
+
+@pytest.mark.parametrize("h", [1e-9, 1e-6, 1e-3, 1.0, 30.0])
+def test_any_step_size(slave, h):
+    t = h * np.arange(6)
+    theta = np.cumsum(
+        np.array([[0.2, -0.1], [0.05, 0.1], [0.1, 0.0], [-0.2, 0.1], [0.0, 0.3], [0.1, 0.1]]) * min(h, 1), axis=0
+    )
+    slope = np.vstack([np.diff(theta, axis=0) / np.diff(t)[:, None], [[0.0, 0.0]]])
+    parameters = {**table_1(), "M": 4, "N": 7}
+    check(slave, parameters, t, theta, slope, exact(parameters, t, theta, slope))
+
+
+def test_zero_order_hold(slave, model):
+    """use_omega with omega = 0 holds the angles; each change passes as an impulse through the dampers."""
+    rng = np.random.default_rng(5)
+    t = np.cumsum(10 ** rng.uniform(-3, -1, 100))
+    theta = np.cumsum(rng.normal(0, 0.1, (100, 2)), axis=0)
+    still = np.zeros_like(theta)
+    slave.start(theta[0], rate=still[0], time=t[0])
+    for values, truth in zip(slave.run(t, theta, rate=still), follow(model, t, theta, still)):
+        assert_close(values, truth, 1e-11)
+
+
+def test_rates_from_omega(slave, model):
+    """With use_omega the path follows the given rates, whatever the angles do next."""
+    rng = np.random.default_rng(6)
+    t = np.cumsum(10 ** rng.uniform(-3, -1, 100))
+    theta, omega = rng.normal(0, 0.1, (100, 2)), rng.normal(0, 1, (100, 2))
+    slave.start(theta[0], rate=omega[0], time=t[0])
+    for values, truth in zip(slave.run(t, theta, rate=omega), follow(model, t, theta, omega)):
+        assert_close(values, truth, 1e-11)
+
+
+def test_rates_from_angles(slave, model):
+    """By default the slope is that of the parabola through the last three samples, uneven or not."""
+    rng = np.random.default_rng(4)
+    t = np.cumsum(rng.uniform(0.002, 0.02, 100))
+    theta = np.cumsum(rng.normal(0, 0.02, (100, 2)), axis=0)
+    slave.start(theta[0], time=t[0])
+    at, after = slave.run(t, theta)
+    expected_at, expected_after = follow(model, t, theta, backward_slope(t, theta))
+    assert_close(at, expected_at, 1e-11)
+    # Right after a step the torques use the rate the parabola predicts; test_order.py judges them.
+    assert_close({**after, "tau1": expected_after["tau1"], "tau2": expected_after["tau2"]}, expected_after, 1e-11)
+
+
+def test_omega_is_not_heard_without_use_omega(make_slave):
+    rng = np.random.default_rng(8)
+    t, theta = 0.01 * np.arange(50), rng.normal(0, 0.1, (50, 2))
+    plain, disturbed = make_slave(), make_slave()
+    plain.start(theta[0])
+    disturbed.start(theta[0])
+    at, after = plain.run(t, theta)
+    at_disturbed, after_disturbed = disturbed.run(t, theta, rate=rng.normal(0, 5, (50, 2)))
+    for name in OUTPUTS:
+        np.testing.assert_array_equal(at[name], at_disturbed[name])
+        np.testing.assert_array_equal(after[name], after_disturbed[name])
+
+
+def test_input_derivatives_go_before_omega(slave, model):
+    rng = np.random.default_rng(9)
+    t, theta = 0.01 * np.arange(50), rng.normal(0, 0.1, (50, 2))
+    omega, derivative = rng.normal(0, 1, (50, 2)), rng.normal(0, 1, (50, 2))
+    slave.start(theta[0], rate=omega[0])
+    found = slave.run(t, theta, rate=omega, derivative=derivative)
+    for values, truth in zip(found, follow(model, t, theta, derivative)):
+        assert_close(values, truth, 1e-11)
+
+
+def test_starts_at_rest_at_forty_degrees(slave):
+    theta = np.full((200, 2), np.deg2rad(40.0))
+    slave.start(theta[0])
+    for values in slave.run(0.01 * np.arange(200), theta):
+        for name, expected in (
+            ("theta3", theta[0, 0]),
+            ("pitch", theta[0, 0]),
+            ("roll", 0),
+            ("tau1", 0),
+            ("roll_rate", 0),
+            ("pitch_rate", 0),
+        ):
+            np.testing.assert_allclose(values[name], expected, atol=1e-11, err_msg=name)
