@@ -12,16 +12,18 @@ PY   := $(VENV)/bin/python
 PIP_INSTALL := $(PY) -m pip install --progress-bar off
 FMU  := target/fmu/prw_testbed.fmu
 
-# rustup's default place, for shells that have not read its profile
-export PATH := $(PATH):$(HOME)/.cargo/bin
+# rustup's default place, before a cargo of the system that may be too old
+export PATH := $(HOME)/.cargo/bin:$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 CARGO ?= cargo
 # CI and users build what Cargo.lock says
 LOCKED ?= --locked
 
+stop = { echo '$(1)' >&2; exit 1; }
+
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-fmu fmu clean need-rust
+.PHONY: help demo test test-rust test-fmu fmu bench clean need-rust
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -30,6 +32,7 @@ help:
 	@echo '                             or add ARGS=--degrees)'
 	@echo 'make fmu                     build the FMU                          -> $(FMU)'
 	@echo 'make test                    check and test everything'
+	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
 	@echo 'make clean                   remove .venv, target and out'
 
 demo: need-rust $(VENV)/demo.stamp fmu
@@ -53,15 +56,22 @@ test-rust: need-rust
 test-fmu: $(VENV)/test.stamp fmu
 	$(PY) -m pytest -q -p no:cacheprovider tests/oracle tests/fmpy
 
+# Ratios of one run; quiet the machine first.
+bench: fmu
+	@benches/run $(FMU)
+
 clean:
 	rm -rf $(VENV) target out
 
 # The environment, made once; the stamps follow the requirement files.
 
 $(VENV)/made.stamp:
-	@command -v $(PYTHON) >/dev/null || { echo 'Python 3.9 or later is missing; on Debian: apt install python3 python3-venv' >&2; exit 1; }
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 9))' || { echo '$(PYTHON) is too old: Python 3.9 or later is needed (make PYTHON=...)' >&2; exit 1; }
-	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo '$(PYTHON) cannot make virtual environments; on Debian: apt install python3-venv' >&2; exit 1; }
+	@command -v $(PYTHON) >/dev/null || \
+	  $(call stop,Python 3.9 or later is missing; on Debian: apt install python3 python3-venv)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 9))' || \
+	  $(call stop,$(PYTHON) is too old: Python 3.9 or later is needed (make PYTHON=...))
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
+	  $(call stop,$(PYTHON) cannot make virtual environments; on Debian: apt install python3-venv)
 	@echo 'creating $(VENV) with $(PYTHON)'
 	@$(PYTHON) -m venv --clear $(VENV)
 	@touch $@
@@ -78,5 +88,7 @@ $(VENV)/test.stamp: $(VENV)/demo.stamp tests/requirements.txt
 	@touch $@
 
 need-rust:
-	@command -v $(CARGO) >/dev/null || { echo 'Rust is missing; install it with rustup (https://rustup.rs)' >&2; exit 1; }
-	@command -v cc >/dev/null || { echo 'a C compiler is missing, Rust links with it; on Debian: apt install gcc libc6-dev' >&2; exit 1; }
+	@command -v $(CARGO) >/dev/null || \
+	  $(call stop,Rust is missing; install it with rustup (https://rustup.rs))
+	@command -v cc >/dev/null || \
+	  $(call stop,the C compiler that Rust links with is missing; on Debian: apt install gcc libc6-dev)

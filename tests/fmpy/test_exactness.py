@@ -14,7 +14,7 @@ REAL = ("J2", "J3", "H3", "k1", "k2", "c1", "c2", "c3")
 
 
 def random_case(seed: int, points: int, decades: float):
-    """Parameters within `decades` of Table 1, uneven times, a continuous piecewise-linear path from rest at any angle."""
+    """Parameters within `decades` of Table 1, uneven times, a continuous piecewise-linear path from rest."""
     rng = np.random.default_rng(seed)
     spread = {name: 10 ** rng.uniform(-decades, decades) for name in REAL}
     parameters = {name: value * spread[name] for name, value in table_1().items() if name in REAL}

@@ -73,7 +73,8 @@ def _parse(path: Path, file: IO[str], degrees: bool) -> Motion:
     if degrees:
         values = np.deg2rad(values)
     theta, omega = values[:, :2], values[:, 2:] if values.shape[1] == 4 else None
-    notes += _doubts(time, theta, omega, degrees)
+    with np.errstate(all="ignore"):  # angles near the largest number are the FMU's to refuse
+        notes += _doubts(time, theta, omega, degrees)
     return Motion(Path(path).stem, time, np.ascontiguousarray(theta), omega, notes)
 
 

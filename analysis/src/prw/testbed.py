@@ -6,7 +6,7 @@ import shutil
 import sys
 from ctypes import c_double, c_uint32
 from pathlib import Path
-from typing import Dict, Mapping
+from typing import Dict, Mapping, Sequence
 
 import fmpy
 import numpy as np
@@ -64,23 +64,24 @@ class Testbed:
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
 
-    def respond(self, motion: Motion) -> Dict[str, np.ndarray]:
+    def respond(self, motion: Motion, outputs: Sequence[str] = OUTPUTS) -> Dict[str, np.ndarray]:
         """Response to `motion` from rest at its first angles; each sample is one communication point.
 
-        Returns the outputs by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is read at time[k] with
-        the motors' angles (and rates, where the motion has them) of sample k set, so a row belongs together.
+        Returns `outputs` (any Real variables) by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is read
+        at time[k] with the motors' angles (and rates, where the motion has them) of sample k set, so a row belongs
+        together.
         """
         rates = motion.omega is not None
         names = ("theta1", "theta2", "omega1", "omega2") if rates else ("theta1", "theta2")
         inputs = np.ascontiguousarray(np.hstack([motion.theta, motion.omega]) if rates else motion.theta)
-        outputs = np.empty((len(motion.time), len(OUTPUTS)))
+        table = np.empty((len(motion.time), len(outputs)))
         try:
             self._initialize(motion, rates)
-            self._step_through(motion, names, inputs, outputs)
+            self._step_through(motion, names, inputs, outputs, table)
             self._slave.terminate()
         except FMICallException as error:
             raise UserError(f"the FMU stopped: {self._why(error)}") from None
-        return dict(zip(OUTPUTS, np.ascontiguousarray(outputs.T)))
+        return dict(zip(outputs, np.ascontiguousarray(table.T)))
 
     def _initialize(self, motion: Motion, rates: bool) -> None:
         slave, (theta1, theta2) = self._slave, motion.theta[0]
@@ -93,22 +94,24 @@ class Testbed:
             self._set(dict(zip(("omega1", "omega2"), motion.omega[0])))
         slave.exitInitializationMode()
 
-    def _step_through(self, motion: Motion, names, inputs: np.ndarray, outputs: np.ndarray) -> None:
+    def _step_through(self, motion: Motion, names, inputs: np.ndarray, outputs, table: np.ndarray) -> None:
         # A recording may have a million rows: bare FMI calls, reading and writing the rows of the arrays in place.
         slave, component = self._slave, self._slave.component
-        n_in, n_out, time = len(names), len(OUTPUTS), motion.time.tolist()
+        n_in, n_out, time = len(names), len(outputs), motion.time.tolist()
         in_references = (c_uint32 * n_in)(*(self._references[name] for name in names))
-        out_references = (c_uint32 * n_out)(*(self._references[name] for name in OUTPUTS))
+        out_references = (c_uint32 * n_out)(*(self._references[name] for name in outputs))
         in_row, out_row = c_double * n_in, c_double * n_out
         last = len(time) - 1
         with Progress(f"simulating {motion.name}", last) as progress:
             for k, t in enumerate(time):
-                slave.fmi2SetReal(component, in_references, n_in, in_row.from_buffer(inputs, k * inputs.strides[0]))
-                slave.fmi2GetReal(
-                    component, out_references, n_out, out_row.from_buffer(outputs, k * outputs.strides[0])
-                )
-                if k < last:
-                    slave.fmi2DoStep(component, t, time[k + 1] - t, True)
+                in_place, out_place = k * inputs.strides[0], k * table.strides[0]
+                try:
+                    slave.fmi2SetReal(component, in_references, n_in, in_row.from_buffer(inputs, in_place))
+                    slave.fmi2GetReal(component, out_references, n_out, out_row.from_buffer(table, out_place))
+                    if k < last:
+                        slave.fmi2DoStep(component, t, time[k + 1] - t, True)
+                except FMICallException as error:
+                    raise UserError(f"the FMU stopped at time {t!r}: {self._why(error)}") from None
                 if k % REPORT_STEPS == 0:
                     progress(k)
 
