@@ -10,10 +10,21 @@ use fmi2_export::{
 };
 
 /// The testbed as FMI model.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct TestbedFmu {
     testbed: Testbed,
     interface: Interface,
+}
+
+impl Clone for TestbedFmu {
+    fn clone(&self) -> Self {
+        Self { testbed: self.testbed.clone(), interface: self.interface }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        self.testbed.clone_from(&source.testbed);
+        self.interface = source.interface;
+    }
 }
 
 /// What the linear equations read: the state x and input u of eq. (11), with the input's derivative.
@@ -203,11 +214,12 @@ impl Model for TestbedFmu {
     fn set_real(&mut self, variable: u32, value: f64) {
         match variable {
             vr::theta1 | vr::theta2 => {
-                let motor = &mut self.testbed.motors[(variable - vr::theta1) as usize];
-                motor.theta = value;
-                motor.is_sampled = true;
+                self.testbed.motors[(variable - vr::theta1) as usize].set_theta(value);
             }
-            vr::omega1 | vr::omega2 => self.testbed.motors[(variable - vr::omega1) as usize].omega = value,
+            vr::omega1 | vr::omega2 => {
+                let source = self.testbed.rate_source;
+                self.testbed.motors[(variable - vr::omega1) as usize].set_omega(value, source);
+            }
             vr::theta3..=vr::omega6 => self.testbed.state[(variable - vr::theta3) as usize] = value,
             parameter => *self.parameter(parameter) = value,
         }
@@ -252,7 +264,7 @@ impl Model for TestbedFmu {
     /// not needed: between communication points the motors move on straight lines.
     fn set_input_derivative(&mut self, variable: u32, order: u32, value: f64) {
         if let (vr::theta1 | vr::theta2, 1) = (variable, order) {
-            self.testbed.motors[(variable - vr::theta1) as usize].set_rate = Some(value);
+            self.testbed.motors[(variable - vr::theta1) as usize].set_rate(value);
         }
     }
 

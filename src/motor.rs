@@ -70,6 +70,29 @@ pub struct Motor {
 }
 
 impl Motor {
+    /// Takes a new angle.
+    #[inline]
+    pub fn set_theta(&mut self, theta: f64) {
+        self.theta = theta;
+        self.is_sampled = true;
+    }
+
+    /// Takes a new rate from the input omega. If rates come from there, it holds at once.
+    #[inline]
+    pub fn set_omega(&mut self, omega: f64, source: RateSource) {
+        self.omega = omega;
+        if source == RateSource::Omega {
+            self.path_end.rate = omega;
+        }
+    }
+
+    /// Takes the derivative of theta at the current communication point.
+    #[inline]
+    pub fn set_rate(&mut self, rate: f64) {
+        self.set_rate = Some(rate);
+        self.path_end.rate = rate;
+    }
+
     /// The motion at the current communication point, from the current sample and the rate's source:
     /// what the importer has set, or omega, or the parabola through the last three samples (a straight
     /// line through two; a motor with one sample rests).

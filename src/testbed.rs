@@ -9,7 +9,7 @@ use crate::propagator::StepCache;
 pub type State = [f64; 6];
 
 /// The testbed between two communication points.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Testbed {
     /// Parameters; call [`parameters_changed`](Self::parameters_changed) after a change.
     pub parameters: Parameters,
@@ -23,6 +23,23 @@ pub struct Testbed {
     pub times: SampleTimes,
     system: Decoupled,
     cache: StepCache,
+}
+
+impl Clone for Testbed {
+    fn clone(&self) -> Self {
+        Self { cache: self.cache.clone(), ..*self }
+    }
+
+    /// With the same parameters what follows from them stays good; the rest is little.
+    fn clone_from(&mut self, source: &Self) {
+        if self.parameters != source.parameters {
+            *self = source.clone();
+        }
+        self.rate_source = source.rate_source;
+        self.state = source.state;
+        self.motors = source.motors;
+        self.times = source.times;
+    }
 }
 
 impl Testbed {

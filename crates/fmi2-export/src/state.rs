@@ -23,13 +23,25 @@ pub trait StateVisitor {
 }
 
 /// Everything about an instance that a saved state brings back.
-#[derive(Clone)]
 pub(crate) struct InstanceState<M> {
     pub mode: Mode,
     pub time: f64,
     pub start_time: f64,
     pub stop_time: Option<f64>,
     pub model: M,
+}
+
+impl<M: Clone> Clone for InstanceState<M> {
+    fn clone(&self) -> Self {
+        Self { model: self.model.clone(), ..*self }
+    }
+
+    /// Passes on to the model, which may have a way to clone into what is there already.
+    fn clone_from(&mut self, source: &Self) {
+        let Self { mode, time, start_time, stop_time, model } = source;
+        (self.mode, self.time, self.start_time, self.stop_time) = (*mode, *time, *start_time, *stop_time);
+        self.model.clone_from(model);
+    }
 }
 
 impl<M: Model> InstanceState<M> {

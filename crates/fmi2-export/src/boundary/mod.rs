@@ -2,7 +2,7 @@
 //!
 //! Each function of the C interface exists here once, generic over the model and under its C name;
 //! [`export_fmi2!`](crate::export_fmi2) gives them their symbols. All do the same: check the pointers,
-//! ask the table of allowed calls, run the method of [`Instance`], and turn a refusal or a panic into a
+//! ask the table of allowed calls, run the method of `Instance`, and turn a refusal or a panic into a
 //! status and a log message. No panic leaves this module.
 //!
 //! # Safety

@@ -1,0 +1,249 @@
+/* Times whole steps through the C interface, of several libraries in turn, in one run.
+ *   whole GUID FMU.so BARE.so EULER.so
+ * Each figure is the smallest of several rounds; the rounds of the libraries alternate, so that a machine
+ * whose speed drifts treats them alike. Prints a Markdown table. */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+typedef void *Component;
+typedef void (*Logger)(void *, const char *, int, const char *, const char *, ...);
+typedef struct {
+    Logger logger;
+    void *allocate, *release, *finished, *environment;
+} Callbacks;
+
+typedef struct {
+    const char *name;
+    Component (*instantiate)(const char *, int, const char *, const char *, const Callbacks *, int, int);
+    void (*release)(Component);
+    int (*setup)(Component, int, double, double, int, double);
+    int (*enter)(Component), (*leave)(Component);
+    int (*set)(Component, const unsigned *, size_t, const double *);
+    int (*get)(Component, const unsigned *, size_t, double *);
+    int (*set_boolean)(Component, const unsigned *, size_t, const int *);
+    int (*set_rates)(Component, const unsigned *, size_t, const int *, const double *);
+    int (*step)(Component, double, double, int);
+    int (*get_state)(Component, void **), (*set_state)(Component, void *), (*free_state)(Component, void **);
+    int (*derivative)(Component, const unsigned *, size_t, const unsigned *, size_t, const double *, double *);
+} Library;
+
+static const char *guid;
+
+static void fail(const char *what) {
+    fprintf(stderr, "bench: %s\n", what);
+    exit(1);
+}
+static void logger(void *e, const char *n, int s, const char *c, const char *m, ...) {
+    (void)e, (void)n, (void)s, (void)c;
+    fprintf(stderr, "%s\n", m);
+}
+static const Callbacks CALLBACKS = {logger, 0, 0, 0, 0};
+
+static Library load(const char *name, const char *path) {
+    void *l = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    if (!l) fail(dlerror());
+    return (Library){name, dlsym(l, "fmi2Instantiate"), dlsym(l, "fmi2FreeInstance"), dlsym(l, "fmi2SetupExperiment"),
+                     dlsym(l, "fmi2EnterInitializationMode"), dlsym(l, "fmi2ExitInitializationMode"),
+                     dlsym(l, "fmi2SetReal"), dlsym(l, "fmi2GetReal"), dlsym(l, "fmi2SetBoolean"),
+                     dlsym(l, "fmi2SetRealInputDerivatives"), dlsym(l, "fmi2DoStep"), dlsym(l, "fmi2GetFMUstate"),
+                     dlsym(l, "fmi2SetFMUstate"), dlsym(l, "fmi2FreeFMUstate"),
+                     dlsym(l, "fmi2GetDirectionalDerivative")};
+}
+
+static double now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static const unsigned INPUTS[4] = {0, 1, 2, 3}, OUTPUTS[4] = {4, 5, 6, 7}, USE_OMEGA = 32;
+static const int ORDERS[2] = {1, 1};
+
+static Component start(const Library *l, int use_omega) {
+    Component c = l->instantiate("bench", 1, guid, "", &CALLBACKS, 0, 0);
+    if (!c) fail("fmi2Instantiate gave NULL");
+    l->set_boolean(c, &USE_OMEGA, 1, &use_omega);
+    l->setup(c, 0, 0, 0, 0, 0);
+    l->enter(c);
+    l->leave(c);
+    return c;
+}
+
+/* The inputs of step k, from a table: their calculation is no part of what is timed. */
+enum { PERIOD = 200 };
+static double motion[PERIOD][4];
+static void make_motion(void) {
+    const double pi = 3.14159265358979323846;
+    for (int k = 0; k < PERIOD; k++) {
+        double t = 1e-3 * k, angle = (1 - cos(10 * pi * t)) / (10 * pi), rate = sin(10 * pi * t);
+        motion[k][0] = angle, motion[k][1] = -angle, motion[k][2] = rate, motion[k][3] = -rate;
+    }
+}
+
+typedef enum { VECTORS, SCALARS, RATES, OMEGA, ALTERNATING, NEW_SIZES, STATES, DERIVATIVES } Way;
+static const char *WAYS[] = {
+    "angles set, step, 4 outputs, as vectors", "the same, one scalar a call",  "with input derivatives",
+    "with use_omega and rates set",            "step size alternating among 4", "a new step size every step",
+    "fmi2GetFMUstate and Set every step",      "8 x 10 directional derivatives",
+};
+static const double SIZES[4] = {1e-3, 5e-4, 2e-3, 1.5e-3};
+
+static double run(const Library *l, Way way, long steps) {
+    Component c = start(l, way == OMEGA);
+    double t = 0, y[8], sum = 0;
+    void *state = NULL;
+    static const unsigned known[10] = {0, 1, 2, 3, 10, 11, 12, 13, 14, 15}, unknown[8] = {4, 5, 6, 7, 8, 9, 10, 11};
+    static const double one = 1;
+    double begin = now();
+    for (long k = 0; k < steps; k++) {
+        const double *u = motion[k % PERIOD];
+        double h = way == ALTERNATING ? SIZES[k & 3] : way == NEW_SIZES ? 1e-3 + 1e-10 * (double)k : 1e-3;
+        if (way == DERIVATIVES) {
+            for (int j = 0; j < 10; j++) l->derivative(c, unknown, 8, known + j, 1, &one, y);
+            sum += y[0];
+            continue;
+        }
+        if (way == SCALARS) {
+            l->set(c, INPUTS, 1, u);
+            l->set(c, INPUTS + 1, 1, u + 1);
+        } else {
+            l->set(c, INPUTS, way == OMEGA ? 4 : 2, u);
+        }
+        if (way == RATES) l->set_rates(c, INPUTS, 2, ORDERS, u + 2);
+        if (way == STATES) l->get_state(c, &state), l->set_state(c, state);
+        if (l->step(c, t, h, 1) != 0) fail("fmi2DoStep failed");
+        t += h;
+        if (way == SCALARS)
+            for (int j = 0; j < 4; j++) l->get(c, OUTPUTS + j, 1, y + j);
+        else
+            l->get(c, OUTPUTS, 4, y);
+        sum += y[0];
+    }
+    double each = (now() - begin) / (double)steps;
+    if (!isfinite(sum)) fail("the outputs are not finite");
+    if (state) l->free_state(c, &state);
+    l->release(c);
+    return each;
+}
+
+static double run_life(const Library *l, long times) {
+    double begin = now();
+    for (long k = 0; k < times; k++) l->release(start(l, 0));
+    return (now() - begin) / (double)times;
+}
+
+static double run_many(const Library *l, int count, long rounds) {
+    Component *c = malloc((size_t)count * sizeof *c);
+    double y[4], t = 0;
+    for (int j = 0; j < count; j++) c[j] = start(l, 0);
+    double begin = now();
+    for (long k = 0; k < rounds; k++) {
+        for (int j = 0; j < count; j++) {
+            l->set(c[j], INPUTS, 2, motion[k % PERIOD]);
+            l->step(c[j], t, 1e-3, 1);
+            l->get(c[j], OUTPUTS, 4, y);
+        }
+        t += 1e-3;
+    }
+    double each = (now() - begin) / (double)(rounds * count);
+    for (int j = 0; j < count; j++) l->release(c[j]);
+    free(c);
+    return each;
+}
+
+typedef struct {
+    const Library *l;
+    long steps;
+} Job;
+static void *job(void *p) {
+    run(((Job *)p)->l, VECTORS, ((Job *)p)->steps);
+    return NULL;
+}
+static double run_threads(const Library *l, int threads, long steps) {
+    pthread_t ids[8];
+    Job j = {l, steps};
+    double begin = now();
+    for (int k = 0; k < threads; k++) pthread_create(ids + k, NULL, job, &j);
+    for (int k = 0; k < threads; k++) pthread_join(ids[k], NULL);
+    return (now() - begin) / (double)(steps * threads);
+}
+
+/* The yardstick must compute the same: the largest difference of any output over Fig. 4, angles alone. */
+static double difference(const Library *l, const Library *other) {
+    Component a = start(l, 0), b = start(other, 0);
+    double y[4], z[4], largest = 0;
+    for (int k = 0; k < 2000; k++) {
+        l->set(a, INPUTS, 2, motion[k % PERIOD]), other->set(b, INPUTS, 2, motion[k % PERIOD]);
+        l->step(a, 1e-3 * k, 1e-3, 1), other->step(b, 1e-3 * k, 1e-3, 1);
+        l->get(a, OUTPUTS, 4, y), other->get(b, OUTPUTS, 4, z);
+        for (int j = 0; j < 4; j++) largest = fmax(largest, fabs(y[j] - z[j]));
+    }
+    l->release(a), other->release(b);
+    return largest;
+}
+
+/* The largest error of roll and torque 1 over Fig. 4, against the FMU with the true slopes. */
+static void errors(const Library *fmu, const Library *l, double *roll, double *torque) {
+    Component a = start(fmu, 0), b = start(l, 1);
+    double y[4], z[4], peak_roll = 0, peak_torque = 0;
+    *roll = *torque = 0;
+    for (int k = 0; k < 2000; k++) {
+        const double *u = motion[k % PERIOD], *next = motion[(k + 1) % PERIOD];
+        double slope[2] = {(next[0] - u[0]) / 1e-3, (next[1] - u[1]) / 1e-3};
+        fmu->set(a, INPUTS, 2, u), l->set(b, INPUTS, 4, u);
+        fmu->set_rates(a, INPUTS, 2, ORDERS, slope);
+        fmu->step(a, 1e-3 * k, 1e-3, 1), l->step(b, 1e-3 * k, 1e-3, 1);
+        fmu->get(a, OUTPUTS, 4, y), l->get(b, OUTPUTS, 4, z);
+        *torque = fmax(*torque, fabs(y[0] - z[0])), peak_torque = fmax(peak_torque, fabs(y[0]));
+        *roll = fmax(*roll, fabs(y[3] - z[3])), peak_roll = fmax(peak_roll, fabs(y[3]));
+    }
+    *roll /= peak_roll, *torque /= peak_torque;
+    fmu->release(a), l->release(b);
+}
+
+int main(int argc, char **argv) {
+    if (argc != 5) fail("usage: whole GUID FMU.so BARE.so EULER.so");
+    guid = argv[1];
+    make_motion();
+    Library fmu = load("FMU", argv[2]), bare = load("bare C", argv[3]), euler = load("Euler", argv[4]);
+    enum { ROUNDS = 15 };
+    if (!(difference(&fmu, &bare) < 1e-10)) fail("the bare C version computes something else");
+    printf("| what | FMU / bare C |\n|---|---|\n");
+    double base = 0, base_sizes = 0;
+    for (Way way = VECTORS; way <= DERIVATIVES; way++) {
+        long steps = way == NEW_SIZES ? 4000 : way == DERIVATIVES ? 20000 : 200000;
+        double a = 1e9, b = 1e9;
+        for (int r = 0; r < ROUNDS; r++) a = fmin(a, run(&fmu, way, steps)), b = fmin(b, run(&bare, way, steps));
+        printf("| %s | %.2f |\n", WAYS[way], a / b);
+        fprintf(stderr, "%-42s FMU %8.1f ns, bare C %8.1f ns\n", WAYS[way], 1e9 * a, 1e9 * b);
+        if (way == VECTORS) base = a;
+        if (way == ALTERNATING) base_sizes = a;
+        if (way == NEW_SIZES) printf("\n| what | ratio |\n|---|---|\n| new step size / known one | %.1f |\n"
+                                     "| step size alternating among 4 / constant | %.2f |\n", a / base, base_sizes / base);
+        if (way == NEW_SIZES) printf("\n| what | FMU / bare C |\n|---|---|\n");
+    }
+    double life = 1e9, one = 1e9, many = 1e9, single = 1e9, two = 1e9, slow = 1e9;
+    for (int r = 0; r < ROUNDS; r++) {
+        life = fmin(life, run_life(&fmu, 20000));
+        one = fmin(one, run_many(&fmu, 1, 200000)), many = fmin(many, run_many(&fmu, 1000, 200));
+        single = fmin(single, run_threads(&fmu, 1, 400000)), two = fmin(two, run_threads(&fmu, 2, 400000));
+        slow = fmin(slow, run(&euler, OMEGA, 20000));
+    }
+    double roll, torque;
+    errors(&fmu, &euler, &roll, &torque);
+    printf("\n| what | ratio |\n|---|---|\n");
+    printf("| 1000 instances in turn / one, per step | %.2f |\n", many / one);
+    printf("| two threads / one, throughput | %.2f |\n", single / two);
+    printf("| instantiate, initialize and free / one step | %.1f |\n", life / base);
+    printf("| forward Euler in C, inner steps of 0.1 ms / FMU | %.1f |\n", slow / base);
+    printf("| its error in roll and in torque, of the peak | %.1f %%, %.1f %% |\n", 100 * roll, 100 * torque);
+    fprintf(stderr, "instantiate to free %.2f us\n", 1e6 * life);
+    return 0;
+}
