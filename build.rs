@@ -1,16 +1,15 @@
 //! Bakes the parameters and the guid into the library.
 //!
-//! `PRW_PARAMETERS` names another file than Table 1 (relative to this folder), `PRW_TUNABLE=1` makes the
+//! `PRW_PARAMETERS` names another file than Table 1 (relative to this folder), `FMU_TUNABLE=1` makes the
 //! variant with tunable parameters; `build_fmu` sets both.
 
-#[allow(dead_code, reason = "build_fmu needs the rest")]
 #[path = "src/fingerprint.rs"]
 mod fingerprint;
 #[allow(dead_code, reason = "build_fmu needs the rest")]
 #[path = "src/parameter_file.rs"]
 mod parameter_file;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use parameter_file::ParameterSet;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -24,11 +23,6 @@ fn main() {
 fn run() -> anyhow::Result<()> {
     let project = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").context("cargo sets CARGO_MANIFEST_DIR")?);
     println!("cargo::rerun-if-env-changed=PRW_PARAMETERS");
-    println!("cargo::rerun-if-env-changed=PRW_TUNABLE");
-    for path in fingerprint::watched(&project)? {
-        println!("cargo::rerun-if-changed={}", path.display());
-    }
-
     let file = match env::var_os("PRW_PARAMETERS") {
         Some(file) if !file.is_empty() => project.join(file),
         _ => project.join(fingerprint::PARAMETERS),
@@ -37,14 +31,5 @@ fn run() -> anyhow::Result<()> {
     let parameters = ParameterSet::read(&file)?;
     let table = Path::new(&env::var_os("OUT_DIR").context("cargo sets OUT_DIR")?).join("table_1.rs");
     fs::write(&table, parameters.to_string()).with_context(|| format!("cannot write {}", table.display()))?;
-
-    let tunable = match env::var("PRW_TUNABLE").as_deref() {
-        Ok("1") => true,
-        Ok("" | "0") | Err(_) => false,
-        Ok(other) => bail!("PRW_TUNABLE must be 1 or 0, it is '{other}'"),
-    };
-    let sources = fingerprint::sources(&project)?;
-    println!("cargo::rustc-env=PRW_SOURCES={sources}");
-    println!("cargo::rustc-env=PRW_GUID={}", fingerprint::guid(&sources, &parameters, tunable));
-    Ok(())
+    fmi2_package::build_script(&fingerprint::sources(project), fingerprint::start(&parameters))
 }

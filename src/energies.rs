@@ -1,4 +1,4 @@
-//! Energies and power of the testbed, eqs. (1) to (7): what the whole model follows from.
+//! Energies and power of the testbed, eqs. (1) and (3) to (7): what the whole model follows from.
 //!
 //! The stepping does not use this module. It is here for the reader, and for the tests, which check
 //! that the energy that the motors feed in is stored or dissipated and nothing else.
@@ -31,7 +31,10 @@ pub fn sect(p: &Parameters, theta5: f64, theta6: f64) -> (f64, f64) {
     (0.5 * (theta5 + theta6), p.roll_ratio() * (theta5 - theta6))
 }
 
-/// Kinetic energy T, eq. (5), without the motors' own (their motion is given), J.
+/// Kinetic energy `T = J2/2 (theta5'^2 + theta6'^2) + H3/2 theta7'^2 + J3/2 theta8'^2`, eq. (5), J.
+///
+/// Without the motors' own, `J1/2 (theta1'^2 + theta2'^2)`: their motion is given. Eqs. (3) and (4) have
+/// the load's inertia as a matrix in a frame with X along the pitch and Y along the roll axis.
 pub fn kinetic_energy(p: &Parameters, rates: &Angles) -> f64 {
     let (pitch_rate, roll_rate) = sect(p, rates.theta5, rates.theta6);
     0.5 * p.J2 * (square(rates.theta5) + square(rates.theta6))
@@ -39,7 +42,9 @@ pub fn kinetic_energy(p: &Parameters, rates: &Angles) -> f64 {
         + 0.5 * p.J3 * square(roll_rate)
 }
 
-/// Potential energy V of the couplings, eq. (6), J.
+/// Potential energy of the couplings,
+/// `V = k1/2 ((theta1 - theta3)^2 + (theta2 - theta4)^2) + k2/2 ((theta3 - theta5)^2 + (theta4 - theta6)^2)`,
+/// eq. (6), J.
 ///
 /// The paper prints k1 in the last term; it is k2, as in K of eq. (8) and by symmetry.
 pub fn potential_energy(p: &Parameters, q: &Angles) -> f64 {
@@ -47,7 +52,8 @@ pub fn potential_energy(p: &Parameters, q: &Angles) -> f64 {
         + 0.5 * p.k2 * (square(q.theta3 - q.theta5) + square(q.theta4 - q.theta6))
 }
 
-/// Rayleigh's dissipation function, eq. (7), W; the power lost is twice this.
+/// Rayleigh's dissipation function: like V of eq. (6) with rates for angles and c for k, plus
+/// `c3/2 (theta7'^2 + theta8'^2)`, eq. (7), W. The power lost is twice this.
 pub fn dissipation(p: &Parameters, rates: &Angles) -> f64 {
     let (pitch_rate, roll_rate) = sect(p, rates.theta5, rates.theta6);
     0.5 * p.c1 * (square(rates.theta1 - rates.theta3) + square(rates.theta2 - rates.theta4))

@@ -3,6 +3,7 @@
 use crate::decoupled::{PitchRoll, sides, sum_difference};
 use crate::motor::{Motion, Motor, RateSource};
 use crate::parameters::{InvalidParameter, Parameters};
+use crate::sensitivities::{self, Parameter};
 use crate::testbed::{State, Testbed};
 use crate::variables::{VARIABLES, vr};
 use fmi2_export::{
@@ -132,6 +133,26 @@ impl TestbedFmu {
         Some(point)
     }
 
+    /// The derivative of a calculated variable with respect to a parameter, now.
+    fn sensitivity(&self, unknown: u32, parameter: Parameter) -> f64 {
+        let Point { x, motors } = &self.now();
+        let testbed = &self.testbed;
+        match unknown {
+            vr::tau1 | vr::tau2 => {
+                sensitivities::torque(testbed, x, motors, (unknown - vr::tau1) as usize, parameter)
+            }
+            vr::der_theta3 | vr::der_theta4 => {
+                sensitivities::shaft_rate(testbed, x, motors, (unknown - vr::der_theta3) as usize, parameter)
+            }
+            vr::der_omega5 | vr::der_omega6 => {
+                let now = [vr::der_omega5, vr::der_omega6].map(|variable| self.real(variable));
+                sensitivities::accelerations(testbed, x, motors, now, parameter)
+                    [(unknown - vr::der_omega5) as usize]
+            }
+            _state_or_rate => 0.0,
+        }
+    }
+
     fn parameter(&mut self, variable: u32) -> &mut f64 {
         let p = &mut self.testbed.parameters;
         match variable {
@@ -148,6 +169,21 @@ impl TestbedFmu {
     }
 }
 
+/// The Real parameter behind a value reference.
+fn parameter(known: u32) -> Option<Parameter> {
+    Some(match known {
+        vr::J2 => Parameter::J2,
+        vr::J3 => Parameter::J3,
+        vr::H3 => Parameter::H3,
+        vr::k1 => Parameter::K1,
+        vr::k2 => Parameter::K2,
+        vr::c1 => Parameter::C1,
+        vr::c2 => Parameter::C2,
+        vr::c3 => Parameter::C3,
+        _ => return None,
+    })
+}
+
 impl From<InvalidParameter> for ModelError {
     fn from(error: InvalidParameter) -> Self {
         Self::new(error.to_string())
@@ -158,7 +194,7 @@ impl Model for TestbedFmu {
     const INFO: ModelInfo = ModelInfo {
         name: "PitchRollWristTestbed",
         identifier: "prw_testbed",
-        guid: env!("PRW_GUID"),
+        guid: env!("FMU_GUID"),
         description: "Testbed of the McGill pitch-roll wrist: a spherical epicyclic cam train driven by two \
                       motors through flexible couplings",
         author: env!("CARGO_PKG_AUTHORS"),
@@ -244,6 +280,9 @@ impl Model for TestbedFmu {
     }
 
     fn parameters_changed(&mut self) -> Result<(), ModelError> {
+        if !self.testbed.times.are_possible() {
+            return Err(ModelError::new("the steps between the samples of a saved state must be > 0"));
+        }
         Ok(self.testbed.parameters_changed()?)
     }
 
@@ -284,7 +323,10 @@ impl Model for TestbedFmu {
     }
 
     fn partial_derivative(&self, unknown: u32, known: u32) -> Option<f64> {
-        Some(self.calculated(unknown, &Self::unit_point(known)?))
+        match Self::unit_point(known) {
+            Some(point) => Some(self.calculated(unknown, &point)),
+            None => Some(self.sensitivity(unknown, parameter(known)?)),
+        }
     }
 
     fn visit_state(&mut self, visitor: &mut impl StateVisitor) {
@@ -302,6 +344,7 @@ impl Model for TestbedFmu {
             visitor.real(value);
         }
         visitor.integer(&mut times.count);
+        times.count = times.count.clamp(0, 2);
         visitor.real(&mut times.last_step);
         visitor.real(&mut times.step_before);
         times.update_inverses();

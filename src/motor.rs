@@ -35,6 +35,11 @@ impl SampleTimes {
         }
     }
 
+    /// Whether there was time between the samples.
+    pub fn are_possible(&self) -> bool {
+        (self.count < 1 || self.last_step > 0.0) && (self.count < 2 || self.step_before > 0.0)
+    }
+
     /// Brings what follows from the steps up to date.
     pub fn update_inverses(&mut self) {
         self.inverses = [self.last_step, self.step_before, self.last_step + self.step_before].map(f64::recip);

@@ -40,7 +40,8 @@ impl Propagator {
         let to_scale = |z: Vector3<f64>| Vector3::new(z.x, z.y, z.z / scale);
 
         let doublings = doublings(&a, h);
-        let mut h = h * 0.5_f64.powi(doublings);
+        // In two factors, because one would underflow for the longest steps.
+        let mut h = h * 0.5_f64.powi(doublings / 2) * 0.5_f64.powi(doublings - doublings / 2);
         let ah = a * h;
         let mut growth_term = ah;
         let mut growth = growth_term;
@@ -70,8 +71,9 @@ const TAYLOR_RADIUS: f64 = 0.25;
 
 /// How often the step must be halved for the series to converge.
 fn doublings(a: &Matrix3<f64>, h: f64) -> i32 {
-    let norm = a.abs().row_sum().max() * h;
-    if norm <= TAYLOR_RADIUS { 0 } else { (norm / TAYLOR_RADIUS).log2().ceil() as i32 }
+    // As logarithms: for a long step of a stiff system the product may be out of range.
+    let halvings = (a.abs().row_sum().max() / TAYLOR_RADIUS).log2() + h.log2();
+    halvings.ceil().clamp(0.0, 2100.0) as i32
 }
 
 /// A power of 2 that brings the entries that couple angles and velocity to the same magnitude.

@@ -7,24 +7,29 @@
 use crate::parameters::Parameters;
 use nalgebra::{Complex, Matrix2, Matrix4, Matrix4x2, SMatrix, Vector4};
 
-/// Mass matrix M of eq. (8), for `q = [theta3, theta4, theta5, theta6]`.
+/// Mass matrix M of eq. (8), `M q'' + Delta q' + K q = f` with `q = [theta3, theta4, theta5, theta6]`, kg.m2.
+///
+/// Zero but for M_II, which belongs to theta5 and theta6: `J2 + H3/4 + J3 N^2/4M^2` on the diagonal and
+/// `H3/4 - J3 N^2/4M^2` beside it.
 pub fn mass_matrix(p: &Parameters) -> Matrix4<f64> {
     let (same, other) = sect_terms(p.H3, p.J3, p);
     lower_block(Matrix2::new(p.J2 + same, other, other, p.J2 + same))
 }
 
-/// Damping matrix Delta of eq. (8).
+/// Damping matrix Delta of eq. (8), N.m.s/rad: c1 and c2 of the couplings and the load's c3, which adds
+/// `c3/4 + c3 N^2/4M^2` to the diagonal of theta5 and theta6 and `c3/4 - c3 N^2/4M^2` beside it.
 pub fn damping_matrix(p: &Parameters) -> Matrix4<f64> {
     let (same, other) = sect_terms(p.c3, p.c3, p);
     couplings(p.c1, p.c2) + lower_block(Matrix2::new(same, other, other, same))
 }
 
-/// Stiffness matrix K of eq. (8).
+/// Stiffness matrix K of eq. (8), N.m/rad: k1 and k2 of the couplings.
 pub fn stiffness_matrix(p: &Parameters) -> Matrix4<f64> {
     couplings(p.k1, p.k2)
 }
 
-/// Input force f of eq. (8) per motor angle and rate: `f = [K_1in C_1in; 0 0] u`.
+/// Generalized force f of eq. (8), N.m: `f = [c1 omega1 + k1 theta1, c1 omega2 + k1 theta2, 0, 0]`, for the
+/// motors' angles theta in rad and rates omega in rad/s.
 pub fn force(p: &Parameters, theta: [f64; 2], omega: [f64; 2]) -> Vector4<f64> {
     Vector4::new(p.c1 * omega[0] + p.k1 * theta[0], p.c1 * omega[1] + p.k1 * theta[1], 0.0, 0.0)
 }

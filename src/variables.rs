@@ -1,57 +1,26 @@
 //! The variables of the FMU: every name, unit, start value and range, written once.
 
 use crate::parameters::Parameters;
-use fmi2_export::{BaseUnit, DisplayUnit, Kind, RealType, Unit, Variable, variables};
-use std::f64::consts::PI;
+use fmi2_export::units::{KG_M2, N_M, N_M_PER_RAD, N_M_S_PER_RAD, RAD, RAD_PER_S, RAD_PER_S2};
+use fmi2_export::{Kind, RealType, Unit, Variable, variables};
 
-const DEG_PER_RAD: f64 = 180.0 / PI;
-const RAD_PER_DEG: f64 = PI / 180.0;
-
-const fn base(kg: i32, m: i32, s: i32, rad: i32) -> BaseUnit {
-    BaseUnit { kg, m, s, rad }
+const fn quantity(name: &'static str, unit: &'static Unit, nominal: f64) -> RealType {
+    RealType { nominal: Some(nominal), ..RealType::new(name, unit) }
 }
 
-const fn display(name: &'static str, factor: f64) -> Option<DisplayUnit> {
-    Some(DisplayUnit { name, factor })
-}
-
-const RAD: Unit = Unit { name: "rad", base: base(0, 0, 0, 1), display: display("deg", DEG_PER_RAD) };
-const RAD_PER_S: Unit =
-    Unit { name: "rad/s", base: base(0, 0, -1, 1), display: display("deg/s", DEG_PER_RAD) };
-const RAD_PER_S2: Unit =
-    Unit { name: "rad/s2", base: base(0, 0, -2, 1), display: display("deg/s2", DEG_PER_RAD) };
-const N_M: Unit = Unit { name: "N.m", base: base(1, 2, -2, 0), display: None };
-const KG_M2: Unit = Unit { name: "kg.m2", base: base(1, 2, 0, 0), display: None };
-const N_M_PER_RAD: Unit =
-    Unit { name: "N.m/rad", base: base(1, 2, -2, -1), display: display("N.m/deg", RAD_PER_DEG) };
-const N_M_S_PER_RAD: Unit =
-    Unit { name: "N.m.s/rad", base: base(1, 2, -1, -1), display: display("N.m.s/deg", RAD_PER_DEG) };
-
-const fn quantity(name: &'static str, quantity: &'static str, unit: &'static Unit, nominal: f64) -> RealType {
-    RealType { name, quantity, unit, min: None, max: None, nominal: Some(nominal) }
-}
-
-const ANGLE: RealType = quantity("Angle", "Angle", &RAD, 1.0);
-const ANGULAR_VELOCITY: RealType = quantity("AngularVelocity", "AngularVelocity", &RAD_PER_S, 1.0);
-const ANGULAR_ACCELERATION: RealType =
-    quantity("AngularAcceleration", "AngularAcceleration", &RAD_PER_S2, 100.0);
-const TORQUE: RealType = quantity("Torque", "Torque", &N_M, 1.0);
+const ANGLE: RealType = quantity("Angle", &RAD, 1.0);
+const ANGULAR_VELOCITY: RealType = quantity("AngularVelocity", &RAD_PER_S, 1.0);
+const ANGULAR_ACCELERATION: RealType = quantity("AngularAcceleration", &RAD_PER_S2, 100.0);
+const TORQUE: RealType = quantity("Torque", &N_M, 1.0);
 
 /// The ranges include 0, which FMI cannot exclude; [`Parameters::check`] does where it must.
-const fn parameter_type(
-    name: &'static str,
-    physical: &'static str,
-    unit: &'static Unit,
-    nominal: f64,
-) -> RealType {
-    RealType { min: Some(0.0), ..quantity(name, physical, unit, nominal) }
+const fn parameter_type(name: &'static str, unit: &'static Unit, nominal: f64) -> RealType {
+    RealType { min: Some(0.0), ..quantity(name, unit, nominal) }
 }
 
-const INERTIA: RealType = parameter_type("MomentOfInertia", "MomentOfInertia", &KG_M2, 0.01);
-const STIFFNESS: RealType =
-    parameter_type("RotationalSpringConstant", "RotationalSpringConstant", &N_M_PER_RAD, 100.0);
-const DAMPING: RealType =
-    parameter_type("RotationalDampingConstant", "RotationalDampingConstant", &N_M_S_PER_RAD, 1.0);
+const INERTIA: RealType = parameter_type("MomentOfInertia", &KG_M2, 0.01);
+const STIFFNESS: RealType = parameter_type("RotationalSpringConstant", &N_M_PER_RAD, 100.0);
+const DAMPING: RealType = parameter_type("RotationalDampingConstant", &N_M_S_PER_RAD, 1.0);
 
 const START: Parameters = Parameters::TABLE_1;
 

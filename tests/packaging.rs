@@ -50,7 +50,7 @@ fn the_committed_description_is_up_to_date() {
 #[test]
 fn it_reads_back_as_the_model_that_was_compiled() {
     let read = Fmi2ModelDescription::deserialize(&description(&[])).unwrap();
-    assert_eq!(read.guid, env!("PRW_GUID"));
+    assert_eq!(read.guid, env!("FMU_GUID"));
     assert_eq!(read.model_name, "PitchRollWristTestbed");
     assert_eq!(read.num_states(), 6);
     let names: Vec<&str> = read.get_model_variables().map(|variable| variable.name.as_str()).collect();
@@ -200,7 +200,7 @@ fn two_builds_give_the_same_fmu_with_the_committed_description() {
         let output = build_fmu(&[], &out);
         assert!(output.status.success(), "{output:?}");
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert!(text.contains(env!("PRW_GUID")) && text.contains("parameters.json"), "{text}");
+        assert!(text.contains(env!("FMU_GUID")) && text.contains("parameters.json"), "{text}");
         fs::read(out.join("prw_testbed.fmu")).unwrap()
     };
     let (one, other) = (build("one"), build("other"));

@@ -213,6 +213,7 @@ macro_rules! call_table {
 //
 // Tolerated:
 //   fmi2Terminate after an error (FMI Library calls it in a destructor),
+//   fmi2EnterInitializationMode without fmi2SetupExperiment before it: the start time is 0,
 //   fmi2SetTime while initializing and in event mode, fmi2SetContinuousStates in event mode
 //   (OpenModelica, on every run).
 call_table! {

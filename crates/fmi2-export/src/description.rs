@@ -237,6 +237,13 @@ pub struct DisplayUnit {
     pub factor: f64,
 }
 
+impl RealType {
+    /// A quantity of this name in this unit, without range and nominal value.
+    pub const fn new(name: &'static str, unit: &'static Unit) -> Self {
+        Self { name, quantity: name, unit, min: None, max: None, nominal: None }
+    }
+}
+
 impl Variable {
     const fn new(
         causality: Causality,
@@ -287,11 +294,16 @@ impl Variable {
     /// The variable, an output or local, as continuous-time state with an exact start value.
     pub const fn state(mut self, start: f64) -> Self {
         self.state = true;
+        self.starting_at(start)
+    }
+
+    /// The variable, an output or local, with an exact start value that the importer may set.
+    pub const fn starting_at(mut self, start: f64) -> Self {
         self.initial = Some(Initial::Exact);
         if let Kind::Real { of, .. } = self.kind {
             self.kind = Kind::Real { of, start };
         }
-        self.settable = settable(self.causality, self.variability, self.initial, true);
+        self.settable = settable(self.causality, self.variability, self.initial, self.state);
         self
     }
 

@@ -46,8 +46,8 @@ pub(crate) struct SavedState<M> {
 
 // --- Checks, log, life cycle (sections 2.1.5 and 2.1.6) ---
 impl<M: Model, S: Sink> Instance<M, S> {
-    pub fn new(interface: Interface, logger: Logger<S>) -> Self {
-        Self { interface, logger, state: InstanceState::new(interface) }
+    pub fn new(interface: Interface, logger: Logger<S>, state: InstanceState<M>) -> Self {
+        Self { interface, logger, state }
     }
 
     /// Refuses a call that the table of allowed calls does not have in the current mode.
@@ -465,7 +465,7 @@ impl<M: Model, S: Sink> Instance<M, S> {
             ));
         }
         if let Some(stop_time) = self.state.stop_time
-            && end > stop_time + rounding
+            && end > stop_time + rounding + STOP_TIME_ROUNDING * (stop_time - self.state.start_time)
         {
             return refuse(format!("the step would end at {end}, after the stop time {stop_time}"));
         }
@@ -619,6 +619,10 @@ fn check_count<M: Model>(count: usize) -> Outcome {
     }
     refuse(format!("the model has {states} continuous states, the array has {count} elements"))
 }
+
+/// How far the last step may end after the stop time, of the whole simulated time: masters that count in
+/// nanoseconds round a step of 1/60 s up, every time.
+const STOP_TIME_ROUNDING: f64 = 1e-7;
 
 /// How far a communication point may be off: masters count in nanoseconds, add up step sizes or
 /// multiply them, and lose the last digits each in their own way.

@@ -10,9 +10,7 @@
 //! ```
 //! use fmi2_export::*;
 //!
-//! const ONE: Unit = Unit { name: "1", base: BaseUnit { kg: 0, m: 0, s: 0, rad: 0 }, display: None };
-//! const NUMBER: RealType =
-//!     RealType { name: "Number", quantity: "Number", unit: &ONE, min: None, max: None, nominal: None };
+//! const NUMBER: RealType = RealType::new("Number", &units::ONE);
 //!
 //! variables! {
 //!     /// Input
@@ -62,6 +60,7 @@ mod macros;
 mod model;
 mod state;
 pub mod types;
+pub mod units;
 
 pub use call_table::Interface;
 pub use description::{

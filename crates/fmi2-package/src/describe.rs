@@ -2,6 +2,7 @@
 
 use crate::structure::{Dependency, ModelStructure};
 use crate::types::{type_definitions, type_name, unit_definitions};
+use crate::variant::{Start, Variant};
 use crate::xml;
 use anyhow::{Result, bail, ensure};
 use fmi_schema::fmi2::{
@@ -23,15 +24,10 @@ pub struct Changes {
     pub tunable_parameters: bool,
 }
 
-/// A start value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Start {
-    /// Of a Real variable.
-    Real(f64),
-    /// Of an Integer variable.
-    Integer(i32),
-    /// Of a Boolean variable.
-    Boolean(bool),
+impl From<&Variant> for Changes {
+    fn from(variant: &Variant) -> Self {
+        Self { guid: Some(variant.guid()), start: variant.start.clone(), tunable_parameters: variant.tunable }
+    }
 }
 
 /// The text of `modelDescription.xml` for a model.

@@ -9,9 +9,13 @@
 
 mod content;
 mod fingerprint;
+mod sources;
+mod variant;
 
 #[cfg(feature = "package")]
 mod cargo;
+#[cfg(feature = "command")]
+mod command;
 #[cfg(feature = "package")]
 mod describe;
 #[cfg(feature = "package")]
@@ -21,17 +25,24 @@ mod platform;
 #[cfg(feature = "package")]
 pub mod structure;
 #[cfg(feature = "package")]
+mod system;
+#[cfg(feature = "package")]
 mod types;
 #[cfg(feature = "package")]
 mod xml;
 
 pub use content::{ContentFile, content_files};
 pub use fingerprint::Fingerprint;
+pub use sources::Sources;
+pub use variant::{Start, Variant, build_script};
 
+#[cfg(feature = "command")]
+pub use command::{BuildOptions, Builder, exit, short};
 #[cfg(feature = "package")]
 pub use {
     cargo::LibraryBuild,
-    describe::{Changes, Start, describe},
+    describe::{Changes, describe},
     pack::{Library, pack, write_atomically},
     platform::Platform,
+    system::{CheckedSystem, System},
 };

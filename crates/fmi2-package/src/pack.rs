@@ -53,7 +53,8 @@ fn read(path: &Path) -> Result<Vec<u8>> {
     fs::read(path).with_context(|| format!("cannot read {}", path.display()))
 }
 
-fn zip(entries: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
+/// A zip file of these entries, in this order.
+pub(crate) fn zip(entries: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
     // Everything that would come from the clock or the machine is fixed here.
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)

@@ -1,4 +1,4 @@
-//! The text of `modelDescription.xml`.
+//! The text of XML files, above all of `modelDescription.xml`.
 //!
 //! fmi-schema writes one long line, the children of the root in an order that the schema does not allow,
 //! an empty list of dependencies as none at all (which means "depends on everything", section 2.2.8),
@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 use fmi_schema::fmi2::Fmi2ModelDescription;
 use fmi_schema::traits::FmiModelDescription;
 use quick_xml::XmlVersion;
-use quick_xml::events::{BytesDecl, BytesStart, Event};
+use quick_xml::events::{BytesDecl, BytesStart, BytesText, Event};
 use quick_xml::{Reader, Writer};
 use std::collections::HashMap;
 use std::io;
@@ -40,9 +40,14 @@ pub(crate) fn to_text(description: &Fmi2ModelDescription) -> Result<String> {
             state_dependencies(unknown);
         }
     }
+    document(&root)
+}
+
+/// An XML document of this element.
+pub(crate) fn document(root: &Element) -> Result<String> {
     let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
     writer.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
-    write_root(&mut writer, &root)?;
+    write_root(&mut writer, root)?;
     let mut text = String::from_utf8(writer.into_inner())?;
     text.push('\n');
     Ok(text)
@@ -76,20 +81,26 @@ fn state_dependencies(unknown: &mut Element) {
     }
 }
 
-#[derive(Debug)]
-struct Element {
-    name: String,
-    attributes: Vec<(String, String)>,
-    children: Vec<Self>,
+/// An element with children, or with text.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Element {
+    pub name: String,
+    pub attributes: Vec<(String, String)>,
+    pub children: Vec<Self>,
+    pub text: String,
 }
 
 impl Element {
-    fn attribute(&self, name: &str) -> Option<&str> {
+    pub fn new(name: &str, attributes: Vec<(String, String)>, children: Vec<Self>) -> Self {
+        Self { name: name.to_owned(), attributes, children, text: String::new() }
+    }
+
+    pub fn attribute(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(known, _)| known == name).map(|(_, value)| value.as_str())
     }
 
     /// The children of the children of this name.
-    fn children_of(&self, name: &str) -> impl Iterator<Item = &Self> {
+    pub fn children_of(&self, name: &str) -> impl Iterator<Item = &Self> {
         self.children.iter().filter(move |child| child.name == name).flat_map(|child| &child.children)
     }
 
@@ -99,7 +110,8 @@ impl Element {
     }
 }
 
-fn parse(text: &str) -> Result<Element> {
+/// Reads a document; text between elements is left out.
+pub(crate) fn parse(text: &str) -> Result<Element> {
     let mut reader = Reader::from_str(text);
     reader.config_mut().expand_empty_elements = true;
     let mut open: Vec<Element> = Vec::new();
@@ -126,7 +138,7 @@ fn element(start: &BytesStart) -> Result<Element> {
         let name = attribute.key.as_ref().to_owned();
         attributes.push((name, attribute.normalized_value(XmlVersion::Explicit1_0)?.into_owned()));
     }
-    Ok(Element { name: start.name().as_ref().to_owned(), attributes, children: Vec::new() })
+    Ok(Element::new(start.name().as_ref(), attributes, Vec::new()))
 }
 
 /// The root has many attributes: one on each line.
@@ -140,6 +152,10 @@ fn write_root(writer: &mut Writer<Vec<u8>>, root: &Element) -> io::Result<()> {
 }
 
 fn write(writer: &mut Writer<Vec<u8>>, element: &Element) -> io::Result<()> {
+    if !element.text.is_empty() {
+        writer.create_element(element.name.as_str()).write_text_content(BytesText::new(&element.text))?;
+        return Ok(());
+    }
     if element.children.is_empty() {
         return writer.write_event(Event::Empty(element.start()));
     }

@@ -4,6 +4,7 @@ use super::*;
 use crate::call_table::Interface;
 use crate::instance::SavedState;
 use crate::logger::{Category, Logger};
+use crate::state::InstanceState;
 
 /// `fmi2GetTypesPlatform`
 pub extern "C" fn fmi2GetTypesPlatform() -> fmi2String {
@@ -32,17 +33,19 @@ pub unsafe fn fmi2Instantiate<M: Model>(
         // SAFETY: by contract NULL or a string, both.
         let (instance_name, guid) = unsafe { (string(instance_name), string(guid)) };
         let logger = Logger::new(log, instance_name.unwrap_or(c""), logging_on != fmi2False);
-        match check_instantiation::<M>(instance_name, fmu_type, guid) {
-            Ok(interface) => {
-                let instance = Instance::<M>::new(interface, logger);
-                instance.log_event("instantiated");
-                Some(Box::new(instance))
-            }
-            Err(refusal) => {
-                logger.log(Status::Error, Category::Error, &format!("fmi2Instantiate: {}", refusal.message));
-                None
-            }
-        }
+        let refusal = match check_instantiation::<M>(instance_name, fmu_type, guid) {
+            Ok(interface) => match catch_unwind(|| InstanceState::<M>::new(interface)) {
+                Ok(state) => {
+                    let instance = Instance::<M>::new(interface, logger, state);
+                    instance.log_event("instantiated");
+                    return Some(Box::new(instance));
+                }
+                Err(panic) => format!("internal failure ({})", panic_message(&*panic)),
+            },
+            Err(refusal) => refusal.message,
+        };
+        logger.log(Status::Error, Category::Error, &format!("fmi2Instantiate: {refusal}"));
+        None
     };
     match catch_unwind(AssertUnwindSafe(instantiate)) {
         Ok(Some(instance)) => Box::into_raw(instance).cast(),

@@ -39,10 +39,16 @@ pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
 ) -> Status {
     let body = |_: &mut Instance<M>| {
         // SAFETY: by contract each NULL or a pointer to a value.
-        unsafe {
-            write(enter_event_mode, fmi2False, "enterEventMode")?;
-            write(terminate_simulation, fmi2False, "terminateSimulation")
+        let flags = unsafe {
+            [
+                slice_mut(enter_event_mode, 1, "enterEventMode")?,
+                slice_mut(terminate_simulation, 1, "terminateSimulation")?,
+            ]
+        };
+        for flag in flags {
+            flag[0] = fmi2False;
         }
+        Ok(())
     };
     // SAFETY: the module's contract.
     unsafe { call(c, Function::CompletedIntegratorStep, body) }

@@ -8,7 +8,7 @@
 
 use fmi2_export::types::*;
 use fmi2_export::{Category, Interface};
-use std::ffi::{CStr, CString};
+use std::ffi::CStr;
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;
 
@@ -310,9 +310,30 @@ pub fn assert_clean(message: &Message) {
     assert!(known.contains(&message.category.as_str()), "{message:?}");
 }
 
-/// A C string.
-pub fn c(text: &str) -> CString {
-    CString::new(text).unwrap()
+/// What needs no instance (section 2.1.4).
+pub fn version_and_platform() -> [&'static CStr; 2] {
+    use crate::fmi2_functions::{fmi2GetTypesPlatform, fmi2GetVersion};
+    // SAFETY: both are strings that the library keeps.
+    [fmi2GetVersion(), fmi2GetTypesPlatform()].map(|text| unsafe { CStr::from_ptr(text) })
+}
+
+/// 0, or NULL.
+trait Zero {
+    const ZERO: Self;
+}
+
+macro_rules! zero {
+    ($($type:ty: $zero:expr),+) => { $(impl Zero for $type { const ZERO: Self = $zero; })+ };
+}
+
+zero!(i32: 0, usize: 0, f64: 0.0);
+
+impl<T> Zero for *const T {
+    const ZERO: Self = null();
+}
+
+impl<T> Zero for *mut T {
+    const ZERO: Self = null_mut();
 }
 
 /// The functions that take a component, with their C arguments as sections 2.1, 3.2 and 4.2 have them.
@@ -328,6 +349,11 @@ macro_rules! functions {
 
         /// The names of the functions above.
         pub const FUNCTIONS_OF_COMPONENTS: &[&str] = &[$(stringify!($name)),+];
+
+        /// Calls each of them, with zeros and NULL for arguments.
+        pub fn call_all(fmu: &Fmu) -> Vec<(&'static str, Status)> {
+            vec![$((stringify!($name), fmu.$name($(<$type as Zero>::ZERO),*))),+]
+        }
     };
 }
 

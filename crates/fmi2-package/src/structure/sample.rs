@@ -1,6 +1,6 @@
 //! Points at which a model is asked.
 
-use crate::describe::Start;
+use crate::variant::Start;
 use anyhow::{Result, bail};
 use fmi2_export::{Causality, Initial, Interface, Kind, Model, ModelError, RealType, Variability, Variable};
 use std::marker::PhantomData;

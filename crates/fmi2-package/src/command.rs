@@ -1,0 +1,216 @@
+//! The command `build_fmu`, the same for every model.
+
+use crate::cargo::LibraryBuild;
+use crate::describe::{Changes, describe};
+use crate::pack::{Library, pack, write_atomically};
+use crate::platform::Platform;
+use crate::sources::Sources;
+use crate::variant::{Start, Variant};
+use anyhow::{Context, Result, bail, ensure};
+use fmi2_export::Model;
+use std::ffi::OsString;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::{env, fs};
+
+/// The options that every `build_fmu` has. A model with more flattens them into its own.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct BuildOptions {
+    /// Declare the parameters tunable instead of fixed (OpenModelica does not let users change those)
+    #[arg(long)]
+    pub tunable: bool,
+    /// Folder for what is made [default: target/fmu]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Write only modelDescription.xml, into the folder modelDescription of the sources or DIR
+    #[arg(long, conflicts_with_all = ["target", "binary"])]
+    pub describe: bool,
+    /// Compile for this Rust target instead of this machine; repeat it for several
+    #[arg(long, value_name = "TRIPLE")]
+    pub target: Vec<String>,
+    /// Put in this compiled library, for example win64=model.dll; repeat it for several
+    #[arg(long, value_name = "PLATFORM=PATH", value_parser = binary)]
+    pub binary: Vec<(String, PathBuf)>,
+}
+
+fn binary(text: &str) -> Result<(String, PathBuf), String> {
+    text.split_once('=')
+        .map(|(platform, path)| (platform.to_owned(), path.into()))
+        .ok_or_else(|| "write PLATFORM=PATH, for example linux64=libmodel.so".to_owned())
+}
+
+/// How a model's FMU is built. The crate must have a [`build_script`](crate::build_script).
+#[derive(Clone, Debug)]
+pub struct Builder {
+    /// The package of the model: `env!("CARGO_PKG_NAME")`.
+    pub package: &'static str,
+    /// The command that starts this program, for messages.
+    pub command: &'static str,
+    /// What the FMU is made from.
+    pub sources: Sources,
+    /// What this program was compiled from: `env!("FMU_SOURCES")`.
+    pub compiled_from: &'static str,
+    /// The cargo profile of the library.
+    pub profile: &'static str,
+    /// The folder of `target`.
+    pub workspace: PathBuf,
+    /// Start values that differ from the ones this program was compiled with.
+    pub start: Vec<(String, Start)>,
+    /// The file that those start values are from, for messages.
+    pub start_from: Option<PathBuf>,
+    /// Whether they are the ones of the description that is kept with the sources.
+    pub is_default: bool,
+    /// Environment variables that tell the build script of them; removed where the value is `None`.
+    pub environment: Vec<(&'static str, Option<OsString>)>,
+}
+
+/// The description of a model as it is built by default, where it is kept with the sources.
+const DESCRIPTION: &str = "modelDescription/modelDescription.xml";
+
+impl Builder {
+    /// For a package in the usual layout, started as `cargo run --release --bin build_fmu`.
+    ///
+    /// The arguments are `env!("CARGO_PKG_NAME")`, `env!("CARGO_MANIFEST_DIR")` and `env!("FMU_SOURCES")`.
+    pub fn new(package: &'static str, folder: &'static str, compiled_from: &'static str) -> Self {
+        Self {
+            package,
+            command: "cargo run --release --bin build_fmu",
+            sources: Sources::of_package(folder),
+            compiled_from,
+            profile: "release",
+            workspace: folder.into(),
+            start: Vec::new(),
+            start_from: None,
+            is_default: true,
+            environment: Vec::new(),
+        }
+    }
+
+    /// Does what the options say for model `M`, and says on stdout what was made.
+    ///
+    /// # Errors
+    /// When the sources have changed since this program was compiled, the model contradicts itself, the
+    /// library cannot be compiled or does not belong to it, or a file cannot be written.
+    pub fn run<M: Model>(&self, options: &BuildOptions) -> Result<()> {
+        let variant = self.variant(options.tunable)?;
+        let description = describe::<M>(&Changes::from(&variant))?;
+        let committed = self.sources.folder.join(DESCRIPTION);
+        let is_default = self.is_default && !options.tunable;
+        if options.describe {
+            let path = match &options.out {
+                Some(folder) => folder.join("modelDescription.xml"),
+                None if is_default => committed,
+                None => bail!("{DESCRIPTION} is for the defaults; name another folder with --out"),
+            };
+            return write_description(&path, &description);
+        }
+
+        let libraries = self.libraries(options)?;
+        let guid = variant.guid();
+        for Library { path, .. } in &libraries {
+            check_library(path, &guid)?;
+        }
+        let folder = options.out.clone().unwrap_or_else(|| self.workspace.join("target/fmu"));
+        let identifier = M::INFO.identifier;
+        let fmu = folder.join(format!("{identifier}.fmu"));
+        let size = pack(&fmu, identifier, &description, &libraries, &self.sources.content_files()?)?;
+
+        let mut platforms: Vec<String> =
+            libraries.iter().map(|library| library.platform.to_string()).collect();
+        platforms.sort();
+        println!("{}: {} kB, {}", short(&fmu), size.div_ceil(1000), platforms.join(", "));
+        let start = match &self.start_from {
+            Some(file) => format!(", parameters from {}", short(file)),
+            None => String::new(),
+        };
+        let tunable = if options.tunable { ", tunable" } else { "" };
+        println!("guid {guid}{start}{tunable}");
+        if is_default && fs::read(&committed).is_ok_and(|text| text != description.as_bytes()) {
+            eprintln!(
+                "note: {DESCRIPTION} in the sources is out of date; write it anew with\n      {} -- --describe",
+                self.command
+            );
+        }
+        Ok(())
+    }
+
+    fn variant(&self, tunable: bool) -> Result<Variant> {
+        let sources = self.sources.fingerprint()?;
+        ensure!(
+            sources == self.compiled_from,
+            "the sources have changed since this program was compiled; start it with `{}`, and if that does \
+             not help, touch build.rs",
+            self.command
+        );
+        Ok(Variant { sources, start: self.start.clone(), tunable })
+    }
+
+    fn libraries(&self, options: &BuildOptions) -> Result<Vec<Library>> {
+        let mut libraries = Vec::new();
+        for (platform, path) in &options.binary {
+            libraries.push(Library { platform: Platform::of_folder(platform)?, path: path.clone() });
+        }
+        for target in &options.target {
+            let platform = Platform::of_target(target)?;
+            libraries.push(Library { platform, path: self.compile(options.tunable, Some(target))? });
+        }
+        if libraries.is_empty() {
+            libraries
+                .push(Library { platform: Platform::host()?, path: self.compile(options.tunable, None)? });
+        }
+        Ok(libraries)
+    }
+
+    fn compile(&self, tunable: bool, target: Option<&str>) -> Result<PathBuf> {
+        let mut environment = self.environment.clone();
+        environment.push(("FMU_TUNABLE", tunable.then(|| OsString::from("1"))));
+        let build = LibraryBuild {
+            folder: self.sources.folder.clone(),
+            package: self.package,
+            profile: self.profile,
+            target,
+            environment,
+        };
+        build.run()
+    }
+}
+
+/// A library with another guid would refuse every instance.
+fn check_library(path: &Path, guid: &str) -> Result<()> {
+    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    ensure!(
+        bytes.windows(guid.len()).any(|window| window == guid.as_bytes()),
+        "{} was not compiled from these sources and parameters (the guid {guid} is not in it); compile it again",
+        path.display()
+    );
+    Ok(())
+}
+
+/// A file that is right already stays untouched, so that cargo sees no change.
+fn write_description(path: &Path, description: &str) -> Result<()> {
+    if fs::read(path).ok().as_deref() == Some(description.as_bytes()) {
+        println!("{} is up to date", short(path));
+        return Ok(());
+    }
+    write_atomically(path, |file| Ok(file.write_all(description.as_bytes())?))?;
+    println!("{} written", short(path));
+    Ok(())
+}
+
+/// The path as seen from where the user is.
+pub fn short(path: &Path) -> String {
+    let here = env::current_dir().unwrap_or_default();
+    path.strip_prefix(here).unwrap_or(path).display().to_string()
+}
+
+/// The end of `main`: an error becomes one line and the exit code of failure.
+pub fn exit(result: Result<()>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

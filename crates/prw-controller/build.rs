@@ -1,0 +1,10 @@
+//! Compiles the guid into the library.
+
+#[path = "src/sources.rs"]
+mod sources;
+
+fn main() {
+    if let Err(error) = fmi2_package::build_script(&sources::sources(), Vec::new()) {
+        println!("cargo::error={error:#}");
+    }
+}

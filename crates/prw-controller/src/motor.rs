@@ -1,0 +1,154 @@
+//! A motor's motion from sample to sample: as fast as its limits allow, without overshoot.
+//!
+//! Over a sample period the acceleration is constant, so the angle is a parabola, the rate a straight line
+//! and exactly the angle's derivative. At each sample the motor takes the highest rate from which it can
+//! still stop at its goal by braking at full strength *in whole samples*. Continuous-time formulas for the
+//! braking distance overshoot by a fraction of a sample and then hunt around the goal for ever; this rule
+//! reaches it exactly and stays.
+
+/// What a motor is able to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Highest rate, rad/s.
+    pub rate: f64,
+    /// Highest acceleration and deceleration, rad/s2.
+    pub acceleration: f64,
+}
+
+/// Angle and rate at a sample, and the acceleration from there to the next one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motor {
+    /// Angle, rad.
+    pub angle: f64,
+    /// Rate, rad/s.
+    pub rate: f64,
+    /// Acceleration, rad/s2.
+    pub acceleration: f64,
+}
+
+impl Motor {
+    /// The motion `time` s after the sample.
+    #[inline]
+    pub fn after(&self, time: f64) -> Self {
+        Self {
+            angle: self.angle + (self.rate + 0.5 * self.acceleration * time) * time,
+            rate: self.rate + self.acceleration * time,
+            acceleration: self.acceleration,
+        }
+    }
+
+    /// Chooses the acceleration for the next `period` s on the way to `goal` (rad; may be infinite).
+    ///
+    /// Within the limits it gets there in the least number of samples; a goal that lies behind, or nearer
+    /// than the motor can stop, is passed and returned to. Tells whether the motor is on its goal: there, or
+    /// there and at rest two samples from now.
+    pub fn head_for(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
+        let Limits { rate: max_rate, acceleration: max } = *limits;
+        // In units of what full acceleration makes of a rate and an angle within one period.
+        let (rate_unit, angle_unit) = (max * period, max * period * period);
+        let distance = (goal - self.angle - 0.5 * self.rate * period) / angle_unit;
+        let rate = rate_unit * fastest_rate(distance.abs(), max_rate / rate_unit).copysign(distance);
+        let rate = rate.clamp(-max_rate, max_rate);
+        let acceleration = (rate - self.rate) / period;
+        self.acceleration = acceleration.clamp(-max, max);
+        distance.abs() < 1.0 && acceleration == self.acceleration
+    }
+}
+
+/// The highest rate v, at most `limit`, such that the rest of this sample and braking from v take the
+/// distance q: v/2 + D(v) = q, in the units of [`Motor::head_for`].
+///
+/// Braking takes m = floor(v) whole samples and the rest v - m in one more: D(v) = (m + 1/2) v - m (m + 1)/2,
+/// and so q = (m + 1) v - m (m + 1)/2, which is m (m + 1)/2 at v = m.
+fn fastest_rate(q: f64, limit: f64) -> f64 {
+    // v <= sqrt(2 q) always; beyond that the limit decides, also where q is infinite.
+    if q > 0.5 * (limit + 1.0) * (limit + 2.0) {
+        return limit;
+    }
+    let m = (((1.0 + 8.0 * q).sqrt() - 1.0) * 0.5).floor();
+    q / (m + 1.0) + 0.5 * m
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Limits, Motor};
+
+    const PERIOD: f64 = 1e-3;
+
+    /// Goes to `goal` and tells the samples it took and the largest angle in the goal's direction.
+    fn go(mut motor: Motor, goal: f64, limits: &Limits) -> (usize, f64, Motor) {
+        let direction = (goal - motor.angle).signum();
+        let mut farthest = motor.angle;
+        for samples in 0..100_000 {
+            if motor.angle == goal && motor.rate == 0.0 {
+                return (samples, farthest, motor);
+            }
+            motor.head_for(goal, limits, PERIOD);
+            assert!(motor.acceleration.abs() <= limits.acceleration);
+            motor = motor.after(PERIOD);
+            assert!(motor.rate.abs() <= limits.rate * (1.0 + 1e-12), "{}", motor.rate);
+            if (motor.angle - farthest) * direction > 0.0 {
+                farthest = motor.angle;
+            }
+            let settled = (motor.angle - goal).abs() < 1e-12 && motor.rate.abs() < 1e-9;
+            if settled {
+                return (samples + 1, farthest, motor);
+            }
+        }
+        panic!("the motor has not arrived at {goal}: {motor:?}");
+    }
+
+    #[test]
+    fn it_arrives_in_the_shortest_time_and_never_beyond_the_goal() {
+        for (rate, acceleration) in [(3.0, 30.0), (2.345, 17.89), (0.5, 1e3), (100.0, 30.0), (0.02, 30.0)] {
+            let limits = Limits { rate, acceleration };
+            for goal in [1.1220, -0.5, 1e-3, 3.3e-5, 1e-5, -1e-7, 0.022_2] {
+                let (samples, farthest, _) = go(Motor::default(), goal, &limits);
+                assert!((farthest - goal) * f64::signum(goal) <= 1e-12, "{goal}: {farthest}");
+                // Bang-bang in continuous time, rounded up to whole samples; at most two more.
+                let distance = goal.abs();
+                let peak = (distance * acceleration).sqrt().min(rate);
+                let shortest = distance / peak + peak / acceleration;
+                let expected = (shortest / PERIOD).floor();
+                assert!(
+                    (expected..=expected + 3.0).contains(&(samples as f64)),
+                    "{goal} {limits:?}: {samples} {expected}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn it_stays_where_it_has_arrived() {
+        let limits = Limits { rate: 3.0, acceleration: 30.0 };
+        let (_, _, mut motor) = go(Motor::default(), 0.7, &limits);
+        for _ in 0..1000 {
+            motor.head_for(0.7, &limits, PERIOD);
+            motor = motor.after(PERIOD);
+            assert!((motor.angle - 0.7).abs() < 1e-12 && motor.rate.abs() < 1e-9, "{motor:?}");
+        }
+    }
+
+    #[test]
+    fn a_goal_that_comes_too_near_is_passed_once() {
+        let limits = Limits { rate: 3.0, acceleration: 30.0 };
+        let fast = Motor { angle: 0.0, rate: 3.0, acceleration: 0.0 };
+        let (_, farthest, motor) = go(fast, 0.05, &limits);
+        // It cannot stop before 3^2 / 60 = 0.15.
+        assert!((farthest - 0.15).abs() < 1e-9, "{farthest}");
+        assert!((motor.angle - 0.05).abs() < 1e-12);
+    }
+
+    #[test]
+    fn extreme_goals_give_finite_motion() {
+        let limits = Limits { rate: 3.0, acceleration: 30.0 };
+        for goal in [f64::INFINITY, f64::NEG_INFINITY, f64::MAX, -f64::MAX, 5e-324] {
+            let mut motor = Motor::default();
+            for _ in 0..1000 {
+                motor.head_for(goal, &limits, PERIOD);
+                motor = motor.after(PERIOD);
+            }
+            assert!(motor.angle.is_finite() && motor.rate.abs() <= 3.0, "{motor:?}");
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! How the motors move between communication points in Co-Simulation, as far as an importer can tell.
+
+use crate::exact::{Random, STATES, advanced, distance, jumped, parameters, set_parameters};
+use crate::support::Fmu;
+use fmi2_export::Interface::CoSimulation;
+use prw_testbed::variables::vr;
+use prw_testbed::{Parameters, state_space::state_space};
+
+const THETA: [u32; 2] = [vr::theta1, vr::theta2];
+const OMEGA: [u32; 2] = [vr::omega1, vr::omega2];
+
+fn slave(p: &Parameters, use_omega: bool) -> Fmu {
+    let fmu = Fmu::new(CoSimulation);
+    set_parameters(&fmu, p);
+    fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &use_omega.into()));
+    fmu.initialize(0.0);
+    fmu
+}
+
+/// One step with known angles and rates, compared with the exact solution after the jump from where
+/// the motors were expected.
+struct Follower<'a> {
+    p: &'a Parameters,
+    x: [f64; 6],
+    expected_angles: Option<[f64; 2]>,
+    time: f64,
+}
+
+impl<'a> Follower<'a> {
+    fn new(p: &'a Parameters) -> Self {
+        Self { p, x: [0.0; 6], expected_angles: None, time: 0.0 }
+    }
+
+    #[track_caller]
+    fn step(&mut self, fmu: &Fmu, theta: [f64; 2], rates: [f64; 2], h: f64) {
+        fmu.step(self.time, h);
+        let jump = self
+            .expected_angles
+            .map_or([0.0; 2], |expected| [theta[0] - expected[0], theta[1] - expected[1]]);
+        let (x, angles) = advanced(self.p, jumped(self.p, self.x, jump), theta, rates, h);
+        let found = fmu.get(STATES);
+        assert!(
+            distance(&found, &x) < 1e-11 * (1.0 + distance(&x, &[0.0; 6])),
+            "{found:?}\n{x:?} at {}",
+            self.time
+        );
+        (self.x, self.expected_angles, self.time) = (found, Some(angles), self.time + h);
+    }
+}
+
+/// The slope that fmi2SetRealInputDerivatives sets wins over omega and samples, for the next step only.
+#[test]
+fn set_derivatives_come_first() {
+    for use_omega in [false, true] {
+        let p = parameters(1);
+        let fmu = slave(&p, use_omega);
+        let mut follower = Follower::new(&p);
+        let mut random = Random(2);
+        for _ in 0..20 {
+            let [theta, omega, rates] =
+                [(); 3].map(|()| [random.between(-1.0, 1.0), random.between(-1.0, 1.0)]);
+            fmu.set(&THETA, &theta);
+            fmu.set(&OMEGA, &omega);
+            fmu.set_rates(THETA, rates);
+            assert_eq!(fmu.rates(THETA), rates);
+            follower.step(&fmu, theta, rates, random.between(0.001, 0.05));
+        }
+        // Not set again: the source that the parameter names is back.
+        fmu.set(&THETA, &[0.1, 0.2]);
+        fmu.set(&OMEGA, &[3.0, 4.0]);
+        assert_eq!(fmu.rates(THETA) == [3.0, 4.0], use_omega);
+    }
+}
+
+/// With use_omega the slope is omega; omega = 0 is an exact zero-order hold, jumps included.
+#[test]
+fn omega_is_the_slope() {
+    let p = parameters(3);
+    let fmu = slave(&p, true);
+    let mut follower = Follower::new(&p);
+    let mut random = Random(4);
+    for i in 0..20 {
+        let theta = [random.between(-1.0, 1.0), random.between(-1.0, 1.0)];
+        let omega = if i < 10 { [0.0; 2] } else { [random.between(-9.0, 9.0), random.between(-9.0, 9.0)] };
+        fmu.set(&[THETA, OMEGA].concat(), &[theta, omega].concat());
+        follower.step(&fmu, theta, omega, random.between(0.001, 0.05));
+    }
+}
+
+/// The slope of the parabola through the last three samples at the newest, by Lagrange's formula.
+fn parabola_slope(t: [f64; 3], y: [f64; 3]) -> f64 {
+    y[0] * (t[2] - t[1]) / ((t[0] - t[1]) * (t[0] - t[2]))
+        + y[1] * (t[2] - t[0]) / ((t[1] - t[0]) * (t[1] - t[2]))
+        + y[2] * (2.0 * t[2] - t[0] - t[1]) / ((t[2] - t[0]) * (t[2] - t[1]))
+}
+
+/// Without omega and derivatives: 0 on the first sample, a first-order difference on the second, a
+/// second-order one from the third on, steps uneven. And the step follows that slope.
+#[test]
+fn samples_are_differentiated() {
+    let p = parameters(5);
+    let fmu = slave(&p, false);
+    fmu.set(&OMEGA, &[77.0, 88.0]); // of no use here
+    let mut follower = Follower::new(&p);
+    let mut random = Random(6);
+    let (mut times, mut samples) = (vec![0.0_f64], Vec::<[f64; 2]>::new());
+    for i in 0..30 {
+        samples.push([random.between(-0.1, 0.1), (3.0 * times[i]).sin()]);
+        fmu.set(&THETA, &samples[i]);
+        let expected: [f64; 2] = std::array::from_fn(|motor| match i {
+            0 => 0.0,
+            1 => (samples[1][motor] - samples[0][motor]) / times[1],
+            _ => parabola_slope(
+                [times[i - 2], times[i - 1], times[i]],
+                [2, 1, 0].map(|back| samples[i - back][motor]),
+            ),
+        });
+        let found = fmu.rates(THETA);
+        assert!(distance(&found, &expected) < 1e-10, "sample {i}: {found:?} instead of {expected:?}");
+        let h = random.between(0.002, 0.04);
+        follower.step(&fmu, samples[i], found, h);
+        times.push(times[i] + h);
+    }
+}
+
+/// A parabola is differentiated exactly, and so are the torques on it.
+#[test]
+fn parabolas_have_exact_slopes() {
+    let p = Parameters::TABLE_1;
+    let fmu = slave(&p, false);
+    let mut random = Random(8);
+    let mut t = 0.0;
+    for i in 0..12 {
+        let (angle, rate) = (0.1 + 0.5 * t - 2.0 * t * t, 0.5 - 4.0 * t);
+        fmu.set(&THETA, &[angle, -angle]);
+        if i >= 2 {
+            assert!(distance(&fmu.rates(THETA), &[rate, -rate]) < 1e-11, "at {t}");
+            let (x, system) = (fmu.get(STATES), state_space(&p));
+            let u = [angle, -angle, rate, -rate];
+            let torque = |row| {
+                let from_states: f64 = (0..6).map(|i| system.C[(row, i)] * x[i]).sum();
+                from_states + (0..4).map(|i| system.D[(row, i)] * u[i]).sum::<f64>()
+            };
+            assert!(distance(&fmu.get([vr::tau1, vr::tau2]), &[torque(4), torque(5)]) < 1e-11, "at {t}");
+        }
+        let h = random.between(0.005, 0.02);
+        fmu.step(t, h);
+        t += h;
+    }
+}
+
+/// The first sample jumps from nowhere: a testbed that is initialized at the motors' angles rests.
+#[test]
+fn rest_at_an_angle() {
+    for use_omega in [false, true] {
+        let fmu = Fmu::new(CoSimulation);
+        fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &use_omega.into()));
+        let start = [0.7, -0.4, 0.7, -0.4, 0.0, 0.0];
+        fmu.set(&STATES, &start);
+        fmu.enter_initialization(0.0, None);
+        fmu.set(&THETA, &start[..2]);
+        fmu.ok(fmu.fmi2ExitInitializationMode());
+        for i in 0..100 {
+            fmu.set(&THETA, &start[..2]);
+            fmu.step(f64::from(i) * 0.01, 0.01);
+        }
+        assert_eq!(fmu.get(STATES), start);
+        assert_eq!(fmu.get([vr::tau1, vr::tau2]), [0.0, 0.0]);
+    }
+}
+
+/// A master that sets an input once and never again: the motor stands still from the third step on.
+#[test]
+fn inputs_that_are_not_set_stay() {
+    let fmu = slave(&Parameters::TABLE_1, false);
+    fmu.set(&THETA, &[0.3, 0.3]);
+    for i in 0..300 {
+        fmu.step(f64::from(i) * 0.01, 0.01);
+    }
+    assert!(distance(&fmu.get([vr::theta3, vr::pitch]), &[0.3, 0.3]) < 1e-9);
+}
+
+/// Higher orders are accepted, alone and together with order 1, and change nothing.
+#[test]
+fn higher_orders_are_harmless() {
+    let [plain, rich] = [(); 2].map(|()| slave(&Parameters::TABLE_1, false));
+    for i in 0..20 {
+        let t = f64::from(i) * 0.02;
+        for fmu in [&plain, &rich] {
+            fmu.set(&THETA, &[t.sin(), t.cos()]);
+            if i % 4 < 2 {
+                fmu.set_rates(THETA, [t.cos(), -t.sin()]);
+            }
+        }
+        let (vr, orders) = ([vr::theta1, vr::theta2, vr::omega1, vr::theta1], [2, 7, 1, i32::MAX]);
+        rich.ok(rich.fmi2SetRealInputDerivatives(
+            vr.as_ptr(),
+            4,
+            orders.as_ptr(),
+            [5.0, 6.0, 7.0, 8.0].as_ptr(),
+        ));
+        plain.step(t, 0.02);
+        rich.step(t, 0.02);
+        assert_eq!(plain.get(STATES), rich.get(STATES), "step {i}");
+        assert_eq!(plain.get([vr::tau1, vr::tau2]), rich.get([vr::tau1, vr::tau2]), "step {i}");
+    }
+}

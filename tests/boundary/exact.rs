@@ -1,0 +1,110 @@
+//! The model without the FMU: eq. (11) from [`prw_testbed::state_space`], values by matrix products,
+//! motion by the exponential of one large matrix.
+
+#![allow(non_snake_case, reason = "the paper's symbols")]
+
+use crate::support::Fmu;
+use nalgebra::SMatrix;
+use prw_testbed::Parameters;
+use prw_testbed::state_space::state_space;
+use prw_testbed::variables::vr;
+
+pub const INPUTS: [u32; 4] = [vr::theta1, vr::theta2, vr::omega1, vr::omega2];
+pub const STATES: [u32; 6] = [vr::theta3, vr::theta4, vr::theta5, vr::theta6, vr::omega5, vr::omega6];
+/// The derivatives, then the outputs.
+pub const UNKNOWNS: [u32; 14] = [
+    vr::der_theta3,
+    vr::der_theta4,
+    vr::der_theta5,
+    vr::der_theta6,
+    vr::der_omega5,
+    vr::der_omega6,
+    vr::tau1,
+    vr::tau2,
+    vr::pitch,
+    vr::roll,
+    vr::pitch_rate,
+    vr::roll_rate,
+    vr::theta3,
+    vr::theta4,
+];
+
+/// The partial derivatives of [`UNKNOWNS`] with respect to [`STATES`], then [`INPUTS`]: A and B, the torque
+/// rows of C and D, and eq. (1).
+pub fn jacobian(p: &Parameters) -> SMatrix<f64, 14, 10> {
+    let system = state_space(p);
+    let mut jacobian = SMatrix::<f64, 14, 10>::zeros();
+    jacobian.fixed_view_mut::<6, 6>(0, 0).copy_from(&system.A);
+    jacobian.fixed_view_mut::<6, 4>(0, 6).copy_from(&system.B);
+    jacobian.fixed_view_mut::<2, 6>(6, 0).copy_from(&system.C.fixed_rows::<2>(4));
+    jacobian.fixed_view_mut::<2, 4>(6, 6).copy_from(&system.D.fixed_rows::<2>(4));
+    let ratio = f64::from(p.N) / (2.0 * f64::from(p.M));
+    for (row, first) in [(8, 2), (10, 4)] {
+        jacobian.fixed_view_mut::<2, 2>(row, first).copy_from_slice(&[0.5, ratio, 0.5, -ratio]);
+    }
+    (jacobian[(12, 0)], jacobian[(13, 1)]) = (1.0, 1.0);
+    jacobian
+}
+
+/// The state and the motor angles after time h, while the motors turn at constant rates.
+pub fn advanced(
+    p: &Parameters,
+    x: [f64; 6],
+    theta: [f64; 2],
+    rates: [f64; 2],
+    h: f64,
+) -> ([f64; 6], [f64; 2]) {
+    let system = state_space(p);
+    let mut generator = SMatrix::<f64, 10, 10>::zeros();
+    generator.fixed_view_mut::<6, 6>(0, 0).copy_from(&system.A);
+    generator.fixed_view_mut::<6, 4>(0, 6).copy_from(&system.B);
+    (generator[(6, 8)], generator[(7, 9)]) = (1.0, 1.0);
+    let start = SMatrix::<f64, 10, 1>::from_iterator(x.into_iter().chain(theta).chain(rates));
+    let end = (generator * h).exp() * start;
+    (std::array::from_fn(|i| end[i]), [end[6], end[7]])
+}
+
+/// The state after the jump that a step of the motor angles by `d` causes: x jumps by B2 d.
+pub fn jumped(p: &Parameters, x: [f64; 6], d: [f64; 2]) -> [f64; 6] {
+    let b = state_space(p).B;
+    std::array::from_fn(|i| x[i] + b[(i, 2)] * d[0] + b[(i, 3)] * d[1])
+}
+
+/// The largest difference.
+pub fn distance(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// Sets all parameters that eq. (11) has.
+pub fn set_parameters(fmu: &Fmu, p: &Parameters) {
+    let real = [vr::J2, vr::J3, vr::H3, vr::k1, vr::k2, vr::c1, vr::c2, vr::c3];
+    fmu.set(&real, &[p.J2, p.J3, p.H3, p.k1, p.k2, p.c1, p.c2, p.c3]);
+    fmu.ok(fmu.fmi2SetInteger([vr::M, vr::N].as_ptr(), 2, [p.M, p.N].as_ptr()));
+}
+
+/// A testbed unlike that of Table 1, another for each seed.
+pub fn parameters(seed: u64) -> Parameters {
+    let mut random = Random(seed);
+    let mut near = |value: f64| value * random.between(-1.5, 1.5).exp();
+    let p = Parameters::TABLE_1;
+    let (J2, J3, H3, k1, k2) = (near(p.J2), near(p.J3), near(p.H3), near(p.k1), near(p.k2));
+    let (c1, c2, c3) = (near(p.c1), near(p.c2), near(p.c3));
+    let [M, N] = [8.0, 14.0].map(|end| random.between(1.0, end) as i32);
+    Parameters { J2, J3, H3, k1, k2, c1, c2, c3, M, N }
+}
+
+/// A sequence of numbers, the same in every run.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn bits(&mut self) -> u64 {
+        // Knuth's multiplier; the high bits are the good ones.
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 ^ (self.0 >> 33)
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * ((self.bits() >> 11) as f64 / (1_u64 << 53) as f64)
+    }
+}

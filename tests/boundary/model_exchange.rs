@@ -1,0 +1,170 @@
+//! Model Exchange (section 3.2): eq. (11) for an importer's integrator.
+
+use crate::exact::{INPUTS, Random, STATES, UNKNOWNS, distance, jacobian, parameters, set_parameters};
+use crate::modes::{enter_continuous_time, in_mode};
+use crate::support::Fmu;
+use fmi2_export::Interface::{CoSimulation, ModelExchange};
+use fmi2_export::call_table::Mode::*;
+use nalgebra::SVector;
+use prw_testbed::Parameters;
+use prw_testbed::variables::vr;
+
+fn states(fmu: &Fmu) -> [f64; 6] {
+    let mut x = [f64::NAN; 6];
+    fmu.ok(fmu.fmi2GetContinuousStates(x.as_mut_ptr(), 6));
+    x
+}
+
+fn derivatives(fmu: &Fmu) -> [f64; 6] {
+    let mut rates = [f64::NAN; 6];
+    fmu.ok(fmu.fmi2GetDerivatives(rates.as_mut_ptr(), 6));
+    rates
+}
+
+fn set_states(fmu: &Fmu, x: [f64; 6]) {
+    fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), 6));
+}
+
+/// Derivatives and outputs at random points with random parameters, whatever use_omega says.
+#[test]
+fn equations() {
+    let mut random = Random(3);
+    for seed in 0..20 {
+        let p = parameters(seed);
+        let fmu = Fmu::new(ModelExchange);
+        set_parameters(&fmu, &p);
+        fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &i32::from(seed % 2 == 0)));
+        fmu.initialize(0.0);
+        enter_continuous_time(&fmu);
+        for _ in 0..5 {
+            let point = SVector::<f64, 10>::from_fn(|_, _| random.between(-1.0, 1.0));
+            set_states(&fmu, std::array::from_fn(|i| point[i]));
+            fmu.set(&INPUTS, &point.as_slice()[6..]);
+            let jacobian = jacobian(&p);
+            let expected = jacobian * point;
+            let found = fmu.get(UNKNOWNS);
+            for row in 0..14 {
+                let tolerance = 1e-13 * jacobian.row(row).abs().sum();
+                assert!((found[row] - expected[row]).abs() < tolerance, "row {row}: {found:?} {expected:?}");
+            }
+            assert_eq!(derivatives(&fmu), found[..6]);
+            assert_eq!(states(&fmu), fmu.get(STATES));
+        }
+    }
+}
+
+#[test]
+fn start_values_are_the_first_states() {
+    let start = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
+    let fmu = in_mode(ModelExchange, Instantiated);
+    fmu.set(&STATES, &start);
+    fmu.initialize(0.0);
+    assert_eq!(states(&fmu), start);
+    enter_continuous_time(&fmu);
+    assert_eq!(states(&fmu), start);
+}
+
+#[test]
+fn nominals_are_positive_from_the_beginning() {
+    let fmu = in_mode(ModelExchange, Instantiated);
+    let mut nominals = [0.0; 6];
+    fmu.ok(fmu.fmi2GetNominalsOfContinuousStates(nominals.as_mut_ptr(), 6));
+    assert!(nominals.iter().all(|nominal| *nominal > 0.0), "{nominals:?}");
+}
+
+/// A state can be set as variable or among all, with the same effect.
+#[test]
+fn both_ways_to_set_a_state() {
+    let fmu = in_mode(ModelExchange, ContinuousTime);
+    set_states(&fmu, [0.0, 0.0, 0.25, 0.0, 0.0, 0.0]);
+    let by_array = (states(&fmu), derivatives(&fmu));
+    set_states(&fmu, [0.0; 6]);
+    fmu.set(&[vr::theta5], &[0.25]);
+    assert_eq!((states(&fmu), derivatives(&fmu)), by_array);
+}
+
+#[test]
+fn steps_end_without_events() {
+    let fmu = in_mode(ModelExchange, ContinuousTime);
+    let (mut enter_event_mode, mut terminate) = (7, 7);
+    for no_set_state_prior in [0, 1] {
+        fmu.ok(fmu.fmi2CompletedIntegratorStep(no_set_state_prior, &mut enter_event_mode, &mut terminate));
+        assert_eq!((enter_event_mode, terminate), (0, 0));
+    }
+    // An importer's own events, one after the other, and settling more than once.
+    for _ in 0..3 {
+        fmu.ok(fmu.fmi2EnterEventMode());
+        fmu.ok(fmu.fmi2EnterEventMode());
+        fmu.ok(fmu.fmi2NewDiscreteStates(&mut Default::default()));
+        enter_continuous_time(&fmu);
+    }
+}
+
+/// Motors that start smoothly from rest: angle and rate.
+fn motors(t: f64) -> ([f64; 2], [f64; 2]) {
+    ([(2.0 * t).cos() - 1.0, 0.5 * t * t], [-2.0 * (2.0 * t).sin(), t])
+}
+
+const END: f64 = 0.5;
+
+/// Model Exchange with the classical Runge-Kutta method.
+fn integrated(p: &Parameters, steps: i32) -> [f64; 14] {
+    let fmu = Fmu::new(ModelExchange);
+    set_parameters(&fmu, p);
+    fmu.initialize(0.0);
+    enter_continuous_time(&fmu);
+    let h = END / f64::from(steps);
+    let slope = |t: f64, x: [f64; 6]| {
+        let (theta, omega) = motors(t);
+        fmu.ok(fmu.fmi2SetTime(t));
+        fmu.set(&INPUTS, &[theta, omega].concat());
+        set_states(&fmu, x);
+        derivatives(&fmu)
+    };
+    let add = |x: [f64; 6], h: f64, k: [f64; 6]| std::array::from_fn(|i| x[i] + h * k[i]);
+    for step in 0..steps {
+        let (t, x) = (f64::from(step) * h, states(&fmu));
+        let k1 = slope(t, x);
+        let k2 = slope(t + 0.5 * h, add(x, 0.5 * h, k1));
+        let k3 = slope(t + 0.5 * h, add(x, 0.5 * h, k2));
+        let k4 = slope(t + h, add(x, h, k3));
+        let next = std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
+        slope(t + h, next);
+        fmu.ok(fmu.fmi2CompletedIntegratorStep(1, &mut 0, &mut 0));
+    }
+    fmu.get(UNKNOWNS)
+}
+
+/// Co-Simulation of the same motion, from samples and with the rates given.
+fn simulated(p: &Parameters, steps: i32, use_omega: bool) -> [f64; 14] {
+    let fmu = Fmu::new(CoSimulation);
+    set_parameters(&fmu, p);
+    fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &use_omega.into()));
+    fmu.initialize(0.0);
+    let h = END / f64::from(steps);
+    for step in 0..=steps {
+        let (theta, omega) = motors(f64::from(step) * h);
+        fmu.set(&INPUTS, &[theta, omega].concat());
+        if step < steps {
+            fmu.step(f64::from(step) * h, h);
+        }
+    }
+    fmu.get(UNKNOWNS)
+}
+
+/// The same motion through both interface types. States wait for the jump of the last sample in
+/// Co-Simulation, which is of second order in h like the rest.
+#[test]
+fn same_motion_as_co_simulation() {
+    for p in [Parameters::TABLE_1, parameters(4)] {
+        let reference = integrated(&p, 4000);
+        let scale = 1.0 + distance(&reference, &[0.0; 14]);
+        assert!(distance(&integrated(&p, 2000), &reference) < 1e-8 * scale, "the integrator has converged");
+        for use_omega in [false, true] {
+            let [coarse, fine] =
+                [1000, 4000].map(|steps| distance(&simulated(&p, steps, use_omega), &reference));
+            assert!(fine < 1e-5 * scale, "{fine:e} with {scale}");
+            assert!((10.0..24.0).contains(&(coarse / fine)), "second order: {coarse:e}, {fine:e}");
+        }
+    }
+}
