@@ -28,8 +28,9 @@ class Motion:
     notes: list = field(default_factory=list)
 
 
-def fig4(step: float = 1e-3) -> Motion:
+def fig4(step: float = 1e-3, opposite: bool = True) -> Motion:
     """The paper's experiment (Sec. 4, Fig. 4), sampled every `step` seconds: theta1' = sin(10 pi t) = -theta2'.
+    With `opposite` false its counterpart, in which theta2' equals theta1'.
 
     The angles are the integrals from zero, (1 - cos(10 pi t)) / (10 pi). Angle and rate are both the true values at the
     communication point: the torque there is then the true one, and the path in between is second-order accurate.
@@ -38,4 +39,5 @@ def fig4(step: float = 1e-3) -> Motion:
     # 1 - cos as 2 sin^2, which does not cancel near t = 0
     theta1 = 2 * np.sin(FIG4_FREQUENCY * time / 2) ** 2 / FIG4_FREQUENCY
     omega1 = np.sin(FIG4_FREQUENCY * time)
-    return Motion("fig4", time, np.column_stack([theta1, -theta1]), np.column_stack([omega1, -omega1]))
+    sides = np.array([1, -1 if opposite else 1])
+    return Motion("fig4" if opposite else "fig4_equal", time, np.outer(theta1, sides), np.outer(omega1, sides))

@@ -16,6 +16,7 @@ from prw.motion import Motion
 
 BLUE, VERMILION = "#0072B2", "#D55E00"
 STYLE = {
+    "font.family": "DejaVu Sans",  # matplotlib brings it along
     "font.size": 10,
     "axes.titlesize": 10,
     "axes.titlelocation": "left",
@@ -26,7 +27,12 @@ STYLE = {
     "axes.axisbelow": True,
     "lines.linewidth": 1.3,
     "legend.frameon": False,
+    # Text stays text, and the same figure is the same file.
+    "svg.fonttype": "none",
+    "svg.hashsalt": "prw",
 }
+#: The same for figures a column wide.
+PAGE_STYLE = {**STYLE, "font.size": 9, "axes.titlesize": 9, "axes.labelsize": 9, "xtick.labelsize": 8, "ytick.labelsize": 8}
 #: Time intervals a long curve is reduced to, each drawn by its extremes; more than the figure has pixels.
 INTERVALS = 4000
 #: A panel whose curves all stay below this shows zero, not rounding errors blown up to its full height.
@@ -45,9 +51,9 @@ class Panel:
 def motion_panel(motion: Motion, angles: bool) -> Panel:
     """What the motors do: their angles in degrees, or their velocities as in Fig. 4."""
     if angles:
-        label, (y1, y2) = r"$\theta_1,\ \theta_2$  (deg)", np.rad2deg(motion.theta.T)
+        label, (y1, y2) = "θ₁, θ₂  (deg)", np.rad2deg(motion.theta.T)
         return Panel("Motor angles", label, [("motor 1", y1), ("motor 2", y2)])
-    label, (y1, y2) = r"$\dot\theta_1,\ \dot\theta_2$  (rad/s)", motion.omega.T
+    label, (y1, y2) = "θ₁′, θ₂′  (rad/s)", motion.omega.T
     return Panel("Motor velocities", label, [("motor 1", y1), ("motor 2", y2)])
 
 
@@ -56,13 +62,13 @@ def response_panels(response: Dict[str, np.ndarray], angles: bool) -> list:
     panels = []
     if angles:
         pitch, roll = np.rad2deg(response["pitch"]), np.rad2deg(response["roll"])
-        label = r"$\theta_7,\ \theta_8$  (deg)"
+        label = "θ₇, θ₈  (deg)"
         panels.append(Panel("Pitch and roll angles", label, [("pitch", pitch), ("roll", roll)]))
-    label = r"$\dot\theta_7,\ \dot\theta_8$  (rad/s)"
+    label = "θ₇′, θ₈′  (rad/s)"
     rates = [("pitch", response["pitch_rate"]), ("roll", response["roll_rate"])]
     panels.append(Panel("Pitch and roll rates", label, rates))
     torques = [("sensor 1", response["tau1"]), ("sensor 2", response["tau2"])]
-    panels.append(Panel("Sensor torques", r"$\tau_1,\ \tau_2$  (N m)", torques))
+    panels.append(Panel("Sensor torques", "τ₁, τ₂  (N m)", torques))
     return panels
 
 
@@ -77,7 +83,7 @@ def plot_response(path: Path, title: str, motion: Motion, response: Dict[str, np
         figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
         axes = figure.subplots(len(panels), sharex=True)
         for axis, panel in zip(axes, panels):
-            _draw(axis, motion.time, panel)
+            draw_panel(axis, motion.time, panel)
         figure.align_ylabels(axes)
         axes[-1].set_xlabel("time (s)")
         axes[-1].set_xlim(motion.time[0], motion.time[-1])
@@ -85,7 +91,8 @@ def plot_response(path: Path, title: str, motion: Motion, response: Dict[str, np
             figure.savefig(temporary, dpi=150)
 
 
-def _draw(axis: Axes, time: np.ndarray, panel: Panel) -> None:
+def draw_panel(axis: Axes, time: np.ndarray, panel: Panel) -> None:
+    """Draw the panel's two curves over time (n,) in s, with a legend at the right end of the title's line."""
     axis.set_title(panel.title)
     axis.set_ylabel(panel.label)
     # The second curve is dashed, so that two equal curves still show as two; a dense one is translucent instead.
@@ -99,11 +106,11 @@ def _draw(axis: Axes, time: np.ndarray, panel: Panel) -> None:
         axis.set_ylim(-1, 1)
 
 
-def envelope(time: np.ndarray, y: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """The curve y (n,) over time (n,) in at most 2 * INTERVALS points that draw the same: each interval's extremes."""
-    if len(time) <= 2 * INTERVALS:
+def envelope(time: np.ndarray, y: np.ndarray, intervals: int = INTERVALS) -> Tuple[np.ndarray, np.ndarray]:
+    """The curve y (n,) over time (n,) in at most 2 * intervals points that draw the same: each interval's extremes."""
+    if len(time) <= 2 * intervals:
         return time, y
-    starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], INTERVALS, endpoint=False)))
+    starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], intervals, endpoint=False)))
     keep = set()
     for start, stop in zip(starts, [*starts[1:], len(time)]):
         keep.update((start + int(y[start:stop].argmin()), start + int(y[start:stop].argmax())))
