@@ -56,7 +56,7 @@ def test_cvode_meets_its_tolerance(fmu, model, tolerance):
 
 def test_euler_is_of_first_order(fmu, model):
     def euler(step):
-        result = let_go(fmu, fmi_type="ModelExchange", solver="Euler", interval=step)
+        result = let_go(fmu, fmi_type="ModelExchange", solver="Euler", step_size=step, interval=step)
         return error(result, true(model, step))
 
     coarse, fine = euler(1e-4), euler(5e-5)
