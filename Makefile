@@ -8,6 +8,7 @@ INPUT  ?=
 ARGS   ?=
 
 VENV := .venv
+DIST_VENV := .venv-dist
 PY   := $(VENV)/bin/python
 PIP_INSTALL := $(PY) -m pip install --progress-bar off
 FMU  := target/fmu/prw_testbed.fmu
@@ -23,7 +24,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-fmu fmu bench clean need-rust
+.PHONY: help demo test test-rust test-fmu fmu bench figures docs closed-loop closed-loop-fmus test-closed-loop dist test-platforms test-reproducible clean need-rust
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -33,7 +34,13 @@ help:
 	@echo 'make fmu                     build the FMU                          -> $(FMU)'
 	@echo 'make test                    check and test everything'
 	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
-	@echo 'make clean                   remove .venv, target and out'
+	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
+	@echo 'make docs                    write the documentation in the FMU anew'
+	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
+	@echo 'make dist                    the FMU for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
+	@echo 'make test-platforms          run what is in dist/ on Linux, Windows (Wine) and ARM (QEMU), check the rest'
+	@echo 'make test-reproducible       make dist/ again elsewhere and compare every byte'
+	@echo 'make clean                   remove .venv, .venv-dist, target, out and dist'
 
 demo: need-rust $(VENV)/demo.stamp fmu
 	@$(VENV)/bin/prw simulate --fmu $(FMU) $(if $(INPUT),--input "$(INPUT)") $(ARGS)
@@ -41,7 +48,7 @@ demo: need-rust $(VENV)/demo.stamp fmu
 fmu: need-rust
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu
 
-test: test-rust test-fmu
+test: test-rust test-fmu test-closed-loop
 
 test-rust: need-rust
 	$(CARGO) fmt --all --check
@@ -54,26 +61,59 @@ test-rust: need-rust
 	fi
 
 test-fmu: $(VENV)/test.stamp fmu
+	$(PY) platforms/bill_of_materials.py --check
 	$(PY) -m pytest -q -p no:cacheprovider tests/oracle tests/fmpy
 
 # Ratios of one run; quiet the machine first.
 bench: fmu
 	@benches/run $(FMU)
 
+# The figures and their copies for documentation and README.
+figures: need-rust $(VENV)/demo.stamp fmu
+	@$(VENV)/bin/prw figures --fmu $(FMU) --commit
+
+# The page is part of the FMU, and so of the guid in the model description.
+docs: need-rust $(VENV)/test.stamp
+	@$(VENV)/bin/prw docs
+	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe
+
+# A controller FMU, the system of both, and the example FMU to copy.
+closed-loop-fmus: fmu
+	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller
+	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_closed_loop
+	@$(CARGO) run $(LOCKED) --release -p lag_fmu -- --out target/fmu
+
+closed-loop: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
+	@$(VENV)/bin/prw closed-loop $(ARGS)
+
+test-closed-loop: $(VENV)/closed-loop.stamp closed-loop-fmus
+	$(PY) -m pytest -q -p no:cacheprovider tests/closed_loop
+
+# The tools for other platforms have an environment of their own. What is not a Python package is installed
+# where that is possible, else named. BUILD_STD=1 compiles std with Debian's Rust, as is done without rustup.
+dist: need-rust $(DIST_VENV)/dist.stamp
+	@$(DIST_VENV)/bin/python platforms/dist.py
+
+test-platforms: dist $(DIST_VENV)/test.stamp
+	$(DIST_VENV)/bin/python -m pytest -q -p no:cacheprovider tests/platforms
+
+test-reproducible: dist
+	@$(DIST_VENV)/bin/python platforms/rebuild.py
+
 clean:
-	rm -rf $(VENV) target out
+	rm -rf $(VENV) $(DIST_VENV) target out dist
 
-# The environment, made once; the stamps follow the requirement files.
+# The environments, made once; the stamps follow the requirement files.
 
-$(VENV)/made.stamp:
+$(VENV)/made.stamp $(DIST_VENV)/made.stamp:
 	@command -v $(PYTHON) >/dev/null || \
 	  $(call stop,Python 3.9 or later is missing; on Debian: apt install python3 python3-venv)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 9))' || \
 	  $(call stop,$(PYTHON) is too old: Python 3.9 or later is needed (make PYTHON=...))
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
 	  $(call stop,$(PYTHON) cannot make virtual environments; on Debian: apt install python3-venv)
-	@echo 'creating $(VENV) with $(PYTHON)'
-	@$(PYTHON) -m venv --clear $(VENV)
+	@echo 'creating $(@D) with $(PYTHON)'
+	@$(PYTHON) -m venv --clear $(@D)
 	@touch $@
 
 $(VENV)/demo.stamp: $(VENV)/made.stamp analysis/requirements.txt analysis/pyproject.toml
@@ -85,6 +125,21 @@ $(VENV)/demo.stamp: $(VENV)/made.stamp analysis/requirements.txt analysis/pyproj
 $(VENV)/test.stamp: $(VENV)/demo.stamp tests/requirements.txt
 	@echo 'installing the Python packages of the tests (once)'
 	@$(PIP_INSTALL) -r tests/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@touch $@
+
+$(VENV)/closed-loop.stamp: $(VENV)/test.stamp tests/closed_loop/requirements.txt
+	@echo 'installing the co-simulation masters of the closed loop (once)'
+	@$(PIP_INSTALL) -r tests/closed_loop/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@touch $@
+
+$(DIST_VENV)/dist.stamp: $(DIST_VENV)/made.stamp platforms/requirements.txt
+	@echo 'installing the tools for other platforms (once)'
+	@$(@D)/bin/pip install --progress-bar off -r platforms/requirements.txt
+	@touch $@
+
+$(DIST_VENV)/test.stamp: $(DIST_VENV)/dist.stamp tests/platforms/requirements.txt
+	@echo 'installing the Python packages of the tests for other platforms (once)'
+	@$(@D)/bin/pip install --progress-bar off -r tests/platforms/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
 need-rust:

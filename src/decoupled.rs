@@ -16,43 +16,47 @@
 //! parameters accurate.
 
 use crate::motor::Motion;
+use crate::number::Number;
 use crate::parameters::{InvalidParameter, Parameters};
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// The coupling pair of one side: motor - k1, c1 - massless shaft - k2, c2 - SECT.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Side {
+pub struct Side<T = f64> {
     /// `c1 / (c1 + c2)`: the share of a motor's motion that passes to the massless shaft at once.
-    pub motor_share: f64,
+    pub motor_share: T,
     /// `c2 / (c1 + c2)`: the share of the SECT shaft's motion that does.
-    pub sect_share: f64,
+    pub sect_share: T,
     /// `k1 / (c1 + c2)`, 1/s.
-    pub rate_motor: f64,
+    pub rate_motor: T,
     /// `k2 / (c1 + c2)`, 1/s.
-    pub rate_sect: f64,
+    pub rate_sect: T,
     /// `c2 k1 / (c1 + c2)`, N.m/rad.
-    pub stiffness_motor: f64,
+    pub stiffness_motor: T,
     /// `c1 k2 / (c1 + c2)`, N.m/rad.
-    pub stiffness_sect: f64,
+    pub stiffness_sect: T,
     /// `c1 c2 / (c1 + c2)`, N.m.s/rad.
-    pub damping: f64,
+    pub damping: T,
+}
+
+impl<T: Number> Side<T> {
+    /// The side of a testbed with these parameters.
+    pub fn new(p: &Parameters) -> Self {
+        let [k1, k2, c1, c2] = [p.k1, p.k2, p.c1, p.c2].map(T::from);
+        let c = c1 + c2;
+        Self {
+            motor_share: c1 / c,
+            sect_share: c2 / c,
+            rate_motor: k1 / c,
+            rate_sect: k2 / c,
+            stiffness_motor: c2 / c * k1,
+            stiffness_sect: c1 / c * k2,
+            damping: c1 / c * c2,
+        }
+    }
 }
 
 impl Side {
-    /// The side of a testbed with these parameters.
-    pub fn new(p: &Parameters) -> Self {
-        let c = p.c1 + p.c2;
-        Self {
-            motor_share: p.c1 / c,
-            sect_share: p.c2 / c,
-            rate_motor: p.k1 / c,
-            rate_sect: p.k2 / c,
-            stiffness_motor: p.c2 / c * p.k1,
-            stiffness_sect: p.c1 / c * p.k2,
-            damping: p.c1 / c * p.c2,
-        }
-    }
-
     /// Rate of the massless shaft, the first row of eq. (8) solved for `q_I'`.
     #[inline]
     pub fn shaft_rate(&self, q_i: f64, q_ii: f64, v: f64, motor: Motion) -> f64 {
@@ -72,21 +76,31 @@ impl Side {
 
 /// One of the two subsystems: `z = [q_I, q_II, v]`, `z' = A z + b_angle u + b_rate w`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Subsystem {
+pub struct Subsystem<T = f64> {
     /// Inertia J: J2 + H3/2 in pitch, J2 + J3 N^2/2M^2 in roll, kg.m2.
-    pub inertia: f64,
+    pub inertia: T,
     /// Damping c of the load: c3/2 in pitch, c3 N^2/2M^2 in roll, N.m.s/rad.
-    pub load_damping: f64,
+    pub load_damping: T,
     /// State matrix.
-    pub a: Matrix3<f64>,
+    pub a: Matrix3<T>,
     /// Column of the motor angle. Equals `-a [1, 1, 0]`: a testbed turned as a whole stays at rest.
-    pub b_angle: Vector3<f64>,
+    pub b_angle: Vector3<T>,
     /// Column of the motor rate; also the jump of z when the motor angle jumps by 1.
-    pub b_rate: Vector3<f64>,
+    pub b_rate: Vector3<T>,
 }
 
-impl Subsystem {
-    fn new(side: &Side, inertia: f64, load_damping: f64) -> Self {
+impl<T: Number> Subsystem<T> {
+    /// The pitch and the roll subsystem of a testbed with these parameters.
+    pub fn pitch_and_roll(p: &Parameters) -> [Self; 2] {
+        let side = Side::new(p);
+        let [j2, j3, h3, c3, half] = [p.J2, p.J3, p.H3, p.c3, 0.5].map(T::from);
+        let [lobes, rollers] = [p.M, p.N].map(|count| T::from(count.into()));
+        let ratio = rollers / lobes;
+        let roll_share = half * ratio * ratio;
+        [Self::new(&side, j2 + half * h3, half * c3), Self::new(&side, j2 + roll_share * j3, roll_share * c3)]
+    }
+
+    fn new(side: &Side<T>, inertia: T, load_damping: T) -> Self {
         let Side { motor_share, sect_share, rate_motor, rate_sect, stiffness_motor, stiffness_sect, damping } =
             *side;
         Self {
@@ -96,15 +110,15 @@ impl Subsystem {
                 -(rate_motor + rate_sect),
                 rate_sect,
                 sect_share,
-                0.0,
-                0.0,
-                1.0,
+                T::zero(),
+                T::zero(),
+                T::one(),
                 (stiffness_sect - stiffness_motor) / inertia,
                 -stiffness_sect / inertia,
                 -(damping + load_damping) / inertia,
             ),
-            b_angle: Vector3::new(rate_motor, 0.0, stiffness_motor / inertia),
-            b_rate: Vector3::new(motor_share, 0.0, damping / inertia),
+            b_angle: Vector3::new(rate_motor, T::zero(), stiffness_motor / inertia),
+            b_rate: Vector3::new(motor_share, T::zero(), damping / inertia),
         }
     }
 }
@@ -129,6 +143,8 @@ pub fn sides(z: PitchRoll) -> [f64; 2] {
 /// The decoupled testbed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decoupled {
+    /// What it was made from.
+    pub parameters: Parameters,
     /// The coupling pair, the same on both sides.
     pub side: Side,
     /// Mean of the sides.
@@ -149,11 +165,7 @@ impl Decoupled {
     /// no finite number.
     pub fn new(p: &Parameters) -> Result<Self, InvalidParameter> {
         p.check()?;
-        let side = Side::new(p);
-        let ratio = p.roll_ratio();
-        let roll_share = 2.0 * ratio * ratio;
-        let pitch = Subsystem::new(&side, p.J2 + 0.5 * p.H3, 0.5 * p.c3);
-        let roll = Subsystem::new(&side, p.J2 + roll_share * p.J3, roll_share * p.c3);
+        let [pitch, roll] = Subsystem::pitch_and_roll(p);
         for subsystem in [&pitch, &roll] {
             let coefficients = subsystem.a.iter().chain(&subsystem.b_angle).chain(&subsystem.b_rate);
             if !coefficients.copied().all(f64::is_finite) {
@@ -163,6 +175,6 @@ impl Decoupled {
             }
         }
         let half_jump = [0, 2].map(|i| PitchRoll::new(pitch.b_rate[i], roll.b_rate[i]) * 0.5);
-        Ok(Self { side, pitch, roll, half_jump, roll_ratio: ratio })
+        Ok(Self { parameters: *p, side: Side::new(p), pitch, roll, half_jump, roll_ratio: p.roll_ratio() })
     }
 }

@@ -48,6 +48,7 @@ pub mod energies;
 pub mod fingerprint;
 mod fmu;
 pub mod motor;
+pub mod number;
 #[cfg(feature = "packaging")]
 pub mod parameter_file;
 pub mod parameters;

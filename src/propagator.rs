@@ -12,85 +12,132 @@
 //! the last bit, and tiny steps lose nothing to `exp(A h)` being close to 1.
 
 use crate::decoupled::{Decoupled, PitchRoll, Subsystem};
+use crate::number::{DoubleDouble, Number};
 use nalgebra::{Matrix3, Vector3};
-
-/// `[1, 1, 0]`: both shafts turned, no velocity.
-const TURNED: Vector3<f64> = Vector3::new(1.0, 1.0, 0.0);
 
 /// The step matrices of one subsystem for one step size.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Propagator {
+pub struct Propagator<T = f64> {
     /// `exp(A h) - 1`.
-    pub growth: Matrix3<f64>,
+    pub growth: Matrix3<T>,
     /// Increment per motor rate.
-    pub ramp: Vector3<f64>,
+    pub ramp: Vector3<T>,
 }
 
-impl Propagator {
+impl<T: Number> Propagator<T> {
     /// The propagator for step size `h` in s: a Taylor series over a fraction of the step in which it
     /// converges quickly, then doubled until the step is full.
     ///
     /// Doubling follows from taking two steps: `growth(2h) = 2 growth + growth^2` and
     /// `ramp(2h) = 2 ramp + growth (ramp - [1, 1, 0] h)`.
-    pub fn new(system: &Subsystem, h: f64) -> Self {
-        // Angles and velocities differ in magnitude; with the velocity in units of `scale` (a power of
-        // 2, so that nothing is rounded) the norm is smaller and the error of the doublings with it.
+    pub fn new(system: &Subsystem<T>, h: f64) -> Self {
         let scale = balance(&system.a);
         let a = rescaled(&system.a, scale);
-        let to_scale = |z: Vector3<f64>| Vector3::new(z.x, z.y, z.z / scale);
-
+        let to_scale = |z: Vector3<T>| Vector3::new(z.x, z.y, z.z / scale.into());
         let doublings = doublings(&a, h);
         // In two factors, because one would underflow for the longest steps.
-        let mut h = h * 0.5_f64.powi(doublings / 2) * 0.5_f64.powi(doublings - doublings / 2);
+        let mut h = T::from(h * 0.5_f64.powi(doublings / 2) * 0.5_f64.powi(doublings - doublings / 2));
         let ah = a * h;
         let mut growth_term = ah;
         let mut growth = growth_term;
         // ramp = b_rate h + (A b_rate + b_angle) h^2/2 + A (A b_rate + b_angle) h^3/6 + ...
         let b_rate = to_scale(system.b_rate);
         let b_angle = to_scale(system.b_angle);
-        let mut ramp_term = (ah * b_rate + b_angle * h) * (0.5 * h);
+        let mut ramp_term = (ah * b_rate + b_angle * h) * (h * T::from(0.5));
         let mut ramp = b_rate * h + ramp_term;
-        for n in 2..=TAYLOR_ORDER {
-            growth_term = growth_term * ah / f64::from(n);
+        for n in 2..=T::TAYLOR_ORDER {
+            growth_term = growth_term * ah / T::from(n.into());
             growth += growth_term;
-            ramp_term = ah * ramp_term / f64::from(n + 1);
+            ramp_term = ah * ramp_term / T::from((n + 1).into());
             ramp += ramp_term;
         }
+        // Both shafts turned, no velocity.
+        let turned = Vector3::new(T::one(), T::one(), T::zero());
+        let two = T::from(2.0);
         for _ in 0..doublings {
-            ramp = ramp * 2.0 + growth * (ramp - TURNED * h);
-            growth = growth * 2.0 + growth * growth;
-            h *= 2.0;
+            ramp = ramp * two + growth * (ramp - turned * h);
+            growth = growth * two + growth * growth;
+            h *= two;
         }
-        Self { growth: rescaled(&growth, 1.0 / scale), ramp: Vector3::new(ramp.x, ramp.y, ramp.z * scale) }
+        Self {
+            growth: rescaled(&growth, 1.0 / scale),
+            ramp: Vector3::new(ramp.x, ramp.y, ramp.z * scale.into()),
+        }
     }
 }
 
-/// Terms of the series: `0.25^14 / 14!` is below 1e-19.
-const TAYLOR_ORDER: i32 = 13;
-const TAYLOR_RADIUS: f64 = 0.25;
-
 /// How often the step must be halved for the series to converge.
-fn doublings(a: &Matrix3<f64>, h: f64) -> i32 {
+fn doublings<T: Number>(balanced: &Matrix3<T>, h: f64) -> i32 {
     // As logarithms: for a long step of a stiff system the product may be out of range.
-    let halvings = (a.abs().row_sum().max() / TAYLOR_RADIUS).log2() + h.log2();
+    let halvings = (balanced.map(T::rounded).abs().row_sum().max() / 0.25).log2() + h.log2();
     halvings.ceil().clamp(0.0, 2100.0) as i32
 }
 
-/// A power of 2 that brings the entries that couple angles and velocity to the same magnitude.
-fn balance(a: &Matrix3<f64>) -> f64 {
+/// Angles and velocities differ in magnitude. With the velocity in these units (a power of 2, so that
+/// nothing is rounded) the entries that couple them have the same magnitude: the norm is smaller, and the
+/// error of the doublings with it.
+fn balance<T: Number>(a: &Matrix3<T>) -> f64 {
+    let a = a.map(T::rounded);
     let into_velocity = a[(2, 0)].abs().max(a[(2, 1)].abs());
     let from_velocity = a[(0, 2)].abs().max(a[(1, 2)].abs());
     0.5_f64.powi((-0.5 * (into_velocity / from_velocity).log2()).round().clamp(-300.0, 300.0) as i32)
 }
 
 /// The matrix for a velocity in units of `scale`.
-fn rescaled(a: &Matrix3<f64>, scale: f64) -> Matrix3<f64> {
-    let mut b = *a;
+fn rescaled<T: Number>(a: &Matrix3<T>, scale: f64) -> Matrix3<T> {
+    let (mut b, scale) = (*a, T::from(scale));
     b[(2, 0)] /= scale;
     b[(2, 1)] /= scale;
     b[(0, 2)] *= scale;
     b[(1, 2)] *= scale;
     b
+}
+
+/// A propagator to step with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rounded {
+    growth: Matrix3<f64>,
+    ramp: Vector3<f64>,
+    /// 1, or 0 if little is left of the velocity: then the step does not add to it, but replaces it, for
+    /// the sum would only keep the digits that the old velocity had.
+    keeps_velocity: f64,
+}
+
+impl Rounded {
+    fn new<T: Number>(exact: &Propagator<T>) -> Self {
+        let mut growth = exact.growth.map(T::rounded);
+        let left = (exact.growth[(2, 2)] + T::one()).rounded();
+        let keeps = left > 0.5;
+        if !keeps {
+            growth[(2, 2)] = left;
+        }
+        Self { growth, ramp: exact.ramp.map(T::rounded), keeps_velocity: f64::from(u8::from(keeps)) }
+    }
+
+    /// For the pitch and the roll subsystem.
+    ///
+    /// Up to 8 doublings cost an `f64` 3 digits at most. More may cost all of them: stiff testbeds have
+    /// motions of very different rates, and what is left after the fast one is a small difference. So is
+    /// what is left of a velocity that damping has used up. Both need twice the digits.
+    fn pitch_and_roll(system: &Decoupled, h: f64) -> [Self; 2] {
+        let subsystems = [system.pitch, system.roll];
+        let stiff = |s: &Subsystem| {
+            doublings(&rescaled(&s.a, balance(&s.a)), h) > 8 || -s.a[(2, 2)] * h > std::f64::consts::LN_2
+        };
+        if subsystems.iter().any(stiff) {
+            let exact = Subsystem::<DoubleDouble>::pitch_and_roll(&system.parameters);
+            let rounded = exact.map(|subsystem| Self::new(&Propagator::new(&subsystem, h)));
+            // Above 1e300 a DoubleDouble is no number.
+            if rounded.iter().all(Self::is_finite) {
+                return rounded;
+            }
+        }
+        subsystems.map(|subsystem| Self::new(&Propagator::new(&subsystem, h)))
+    }
+
+    fn is_finite(&self) -> bool {
+        self.growth.iter().chain(&self.ramp).all(|entry| entry.is_finite())
+    }
 }
 
 /// The propagators of both subsystems for one step size, entry beside entry, halved because they meet
@@ -101,20 +148,39 @@ pub struct StepMatrices {
     h: f64,
     half_growth: [[PitchRoll; 3]; 3],
     half_ramp: [PitchRoll; 3],
+    /// See [`Rounded`]; halved like the rest, and whether both are kept whole.
+    half_kept: PitchRoll,
+    keeps_velocities: bool,
 }
 
 impl StepMatrices {
-    const UNUSED: Self = Self { h: 0.0, half_growth: [[ZERO; 3]; 3], half_ramp: [ZERO; 3] };
+    const UNUSED: Self = Self {
+        h: 0.0,
+        half_growth: [[ZERO; 3]; 3],
+        half_ramp: [ZERO; 3],
+        half_kept: ZERO,
+        keeps_velocities: true,
+    };
 
     /// The matrices for step size `h` in s.
     pub fn new(system: &Decoupled, h: f64) -> Self {
-        let (pitch, roll) = (Propagator::new(&system.pitch, h), Propagator::new(&system.roll, h));
+        let [pitch, roll] = Rounded::pitch_and_roll(system, h);
+        let half_kept = PitchRoll::new(pitch.keeps_velocity, roll.keeps_velocity) * 0.5;
         let growth = |i, j| PitchRoll::new(pitch.growth[(i, j)], roll.growth[(i, j)]) * 0.5;
         Self {
             h,
             half_growth: std::array::from_fn(|i| std::array::from_fn(|j| growth(i, j))),
             half_ramp: std::array::from_fn(|i| PitchRoll::new(pitch.ramp[i], roll.ramp[i]) * 0.5),
+            half_kept,
+            keeps_velocities: half_kept == PitchRoll::new(0.5, 0.5),
         }
+    }
+
+    /// What is left of the sides' velocities, if that is not all of them: what the velocity's increment
+    /// adds to, from the sum and difference at the begin.
+    #[inline]
+    pub fn left_velocity(&self, v: PitchRoll) -> Option<PitchRoll> {
+        (!self.keeps_velocities).then(|| self.half_kept.component_mul(&v))
     }
 
     /// The change of `z = [q_I, q_II, v]` over the step, from sums and differences of the sides'

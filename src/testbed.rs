@@ -116,11 +116,18 @@ impl Testbed {
             sum_difference(theta5, theta6) - u,
             sum_difference(omega5, omega6) + jump_v * 2.0,
         ];
-        let [d_i, d_ii, d_v] = self.cache.get(&self.system, h).increment(&deviation, w);
+        let matrices = self.cache.get(&self.system, h);
+        let [d_i, d_ii, d_v] = matrices.increment(&deviation, w);
         let [d3, d4] = sides(d_i + jump_i);
         let [d5, d6] = sides(d_ii);
-        let [dv5, dv6] = sides(d_v + jump_v);
-        let next = [theta3 + d3, theta4 + d4, theta5 + d5, theta6 + d6, omega5 + dv5, omega6 + dv6];
+        let [v5, v6] = match matrices.left_velocity(deviation[2]) {
+            None => {
+                let [dv5, dv6] = sides(d_v + jump_v);
+                [omega5 + dv5, omega6 + dv6]
+            }
+            Some(left) => sides(left + d_v),
+        };
+        let next = [theta3 + d3, theta4 + d4, theta5 + d5, theta6 + d6, v5, v6];
 
         // A sum is finite only if all its terms are.
         let path_ends = (motion1.angle + motion1.rate * h) + (motion2.angle + motion2.rate * h);

@@ -7,13 +7,12 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// The workspace.
-const PROJECT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
 
 /// Wires the FMUs of controller and testbed to a closed loop: prw_closed_loop.ssp, and the folder
 /// prw_closed_loop with OspSystemStructure.xml.
 #[derive(Parser)]
-#[command(override_usage = "cargo run --release --bin build_closed_loop [-- OPTIONS]")]
+#[command(override_usage = "cargo run --release -p prw_controller --bin build_closed_loop [-- OPTIONS]")]
 struct Options {
     /// The testbed [default: target/fmu/prw_testbed.fmu]
     #[arg(long, value_name = "FMU")]
@@ -30,7 +29,7 @@ struct Options {
     #[arg(long, value_name = "S", default_value_t = 1e-3)]
     step_size: f64,
     /// End of the experiment in s
-    #[arg(long, value_name = "S", default_value_t = 2.0)]
+    #[arg(long, value_name = "S", default_value_t = 1.0)]
     stop_time: f64,
     /// Folder for what is made [default: target/fmu]
     #[arg(long, value_name = "DIR")]
@@ -45,7 +44,9 @@ fn run(options: &Options) -> Result<()> {
     for (name, value) in [("step-size", options.step_size), ("stop-time", options.stop_time)] {
         ensure!(value.is_finite() && value > 0.0, "--{name} must be > 0, it is {value}");
     }
-    let folder = Path::new(PROJECT).canonicalize().context("the project is gone")?.join("target/fmu");
+    let workspace =
+        Path::new(FOLDER).ancestors().nth(2).context("this program was moved out of its workspace")?;
+    let folder = workspace.join("target/fmu");
     let fmu = |option: &Option<PathBuf>, name: &str| option.clone().unwrap_or_else(|| folder.join(name));
     let [pitch, roll] = [0, 1].map(|axis| options.go_to[axis] * PI / 180.0);
     let system = System {

@@ -10,7 +10,7 @@ const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
 
 /// Builds the FMU of the wrist's controller, target/fmu/prw_controller.fmu.
 #[derive(Parser)]
-#[command(override_usage = "cargo run --release --bin build_controller [-- OPTIONS]")]
+#[command(override_usage = "cargo run --release -p prw_controller --bin build_controller [-- OPTIONS]")]
 struct Options {
     #[command(flatten)]
     build: BuildOptions,
@@ -18,10 +18,10 @@ struct Options {
 
 fn main() -> ExitCode {
     let builder = Builder {
-        command: "cargo run --release --bin build_controller",
+        command: "cargo run --release -p prw_controller --bin build_controller",
         sources: sources(),
         profile: "library",
-        workspace: Path::new(FOLDER).join("../.."),
+        workspace: Path::new(FOLDER).ancestors().nth(2).expect("it is in crates/ of a workspace").to_owned(),
         ..Builder::new(env!("CARGO_PKG_NAME"), FOLDER, env!("FMU_SOURCES"))
     };
     fmi2_package::exit(builder.run::<ControllerFmu>(&Options::parse().build))

@@ -1,6 +1,7 @@
 //! C programs that load the shared library as importers do.
 #![cfg(unix)]
 
+use crate::c::{library, output, program};
 use crate::exact::INPUTS;
 use crate::modes::{enter_continuous_time, in_mode};
 use crate::support::FUNCTIONS_OF_COMPONENTS;
@@ -9,44 +10,13 @@ use fmi2_export::call_table::Mode::*;
 use fmi2_export::types::*;
 use prw_testbed::variables::vr;
 use std::collections::{BTreeMap, BTreeSet};
-use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::mem::offset_of;
-use std::path::{Path, PathBuf};
 use std::process::Command;
-
-/// The shared library of this build: Cargo puts it beside the test, or one folder up.
-fn library() -> PathBuf {
-    let test = std::env::current_exe().unwrap();
-    let name = format!("{DLL_PREFIX}prw_testbed{DLL_SUFFIX}");
-    test.ancestors()
-        .skip(1)
-        .take(2)
-        .map(|folder| folder.join(&name))
-        .find(|path| path.exists())
-        .unwrap_or_else(|| panic!("there is no {name} near {}", test.display()))
-}
-
-/// The output of a program.
-fn output(command: &mut Command, missing: &str) -> String {
-    let output = command.output().unwrap_or_else(|error| panic!("{missing}: {command:?}: {error}"));
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{command:?}: {}\n{stderr}", output.status);
-    String::from_utf8(output.stdout).unwrap()
-}
 
 /// Compiles tests/c/NAME.c and runs it with the library and its guid.
 fn run(name: &str) -> String {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/c").join(name).with_extension("c");
-    let program = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
-    output(
-        Command::new(compiler)
-            .args(["-std=c11", "-D_GNU_SOURCE", "-Wall", "-Wextra", "-Werror", "-g", "-o"])
-            .args([&program, &source])
-            .arg("-ldl"),
-        "these tests need a C compiler (cc, or set CC)",
-    );
-    output(Command::new(program).arg(library()).arg(crate::GUID_TEXT), "the compiled program does not run")
+    let mut command = Command::new(program(name));
+    output(command.arg(library("prw_testbed")).arg(crate::GUID_TEXT), "the compiled program does not run")
 }
 
 /// What the FMU writes in C is what it writes in Rust, and the types have the same layout.
@@ -121,7 +91,7 @@ fn loggers() {
 #[test]
 fn exported_symbols() {
     let flags: &[&str] = if cfg!(target_os = "macos") { &["-gU"] } else { &["-D", "--defined-only"] };
-    let printed = output(Command::new("nm").args(flags).arg(library()), "this test needs nm (binutils)");
+    let printed = output(Command::new("nm").args(flags).arg(library("prw_testbed")), "this test needs nm (binutils)");
     let symbol = |line: &str| line.rsplit(' ').next().unwrap().trim_start_matches('_').to_owned();
     let exported: BTreeSet<_> = printed.lines().map(symbol).collect();
     let without_component = ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instantiate", "fmi2FreeInstance"];

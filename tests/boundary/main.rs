@@ -4,6 +4,9 @@
 #[path = "../../crates/fmi2-export/tests/support/mod.rs"]
 mod support;
 
+#[path = "../c/mod.rs"]
+mod c;
+
 mod c_programs;
 mod call_table;
 mod co_simulation;

@@ -7,11 +7,11 @@ import os
 import sys
 from typing import Optional, Sequence
 
-from prw import simulate
+from prw import closed_loop, documentation, excite, figures, identify, simulate, sweep
 from prw.errors import UserError
 
 #: Each subcommand is a module with add_parser(subparsers); the parser's default `run` takes the parsed arguments.
-COMMANDS = (simulate,)
+COMMANDS = (simulate, figures, documentation, closed_loop, identify, excite, sweep)
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:

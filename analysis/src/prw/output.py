@@ -15,7 +15,12 @@ from prw.testbed import OUTPUTS
 BLOCK = 8192
 
 
-def write_table(path: Path, motion: Motion, response: Dict[str, np.ndarray]) -> None:
+def write_motion(path: Path, motion: Motion) -> None:
+    """Write time (s), motor angles (rad) and rates (rad/s), where known, to `path`: a recording for `prw simulate`."""
+    write_table(path, motion, {}, ())
+
+
+def write_table(path: Path, motion: Motion, response: Dict[str, np.ndarray], outputs=OUTPUTS) -> None:
     """Write time (s), the inputs given (rad, rad/s) and the outputs (N.m, rad, rad/s) to `path`, one row per sample.
 
     Time and inputs keep all their digits, so that they can be read back unchanged; outputs have twelve.
@@ -24,11 +29,11 @@ def write_table(path: Path, motion: Motion, response: Dict[str, np.ndarray]) -> 
     if motion.omega is not None:
         inputs.update(omega1=motion.omega[:, 0], omega2=motion.omega[:, 1])
     # + 0.0 turns -0.0, which reads oddly, into 0.0
-    table = np.column_stack([*inputs.values(), *(response[name] for name in OUTPUTS)]) + 0.0
-    row_format = ",".join(["%r"] * len(inputs) + ["%.12g"] * len(OUTPUTS)) + "\n"
+    table = np.column_stack([*inputs.values(), *(response[name] for name in outputs)]) + 0.0
+    row_format = ",".join(["%r"] * len(inputs) + ["%.12g"] * len(outputs)) + "\n"
     with replacing(path) as temporary, Progress(f"writing {path}", len(table)) as progress:
         with open(temporary, "w", encoding="ascii", newline="") as file:
-            file.write(",".join([*inputs, *OUTPUTS]) + "\n")
+            file.write(",".join([*inputs, *outputs]) + "\n")
             for start in range(0, len(table), BLOCK):
                 file.writelines(row_format % tuple(row) for row in table[start : start + BLOCK].tolist())
                 progress(start)

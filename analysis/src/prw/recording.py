@@ -7,7 +7,7 @@ import math
 import os
 from array import array
 from pathlib import Path
-from typing import IO, Iterator, Sequence
+from typing import IO, Callable, Container, Sequence
 
 import numpy as np
 
@@ -40,9 +40,24 @@ def read(path: Path, degrees: bool = False) -> Motion:
     tabs (with semicolons, a decimal comma is understood). `degrees`: angles and rates are in deg and deg/s. Time may be
     uneven but must increase. Raises UserError naming file, line and column.
     """
+    names, time, values, notes = read_columns(path, _header)
+    if degrees:
+        values = np.deg2rad(values)
+    theta, omega = values[:, :2], values[:, 2:] if "omega1" in names else None
+    with np.errstate(all="ignore"):  # angles near the largest number are the FMU's to refuse
+        notes += doubts(time, theta, omega, degrees)
+    return Motion(Path(path).stem, time, np.ascontiguousarray(theta), omega, notes)
+
+
+def read_columns(path: Path, choose: Callable, may_be_empty: Container[str] = ()) -> tuple:
+    """Read numbers from a CSV file like `read` does: (names, time (n,), values (n, len(names)), notes).
+
+    choose(path, header, line) returns the columns to take as [(name, index)] with time first, and notes. An empty cell
+    in a column of `may_be_empty` becomes NaN. Raises UserError naming file, line and column.
+    """
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
-            return _parse(path, file, degrees)
+            return _parse(path, file, choose, may_be_empty)
     except UnicodeDecodeError:
         raise UserError(
             f"{_where(path, _undecodable_line(path))}: not UTF-8 text; save the file as UTF-8 CSV"
@@ -51,7 +66,7 @@ def read(path: Path, degrees: bool = False) -> Motion:
         raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
 
 
-def _parse(path: Path, file: IO[str], degrees: bool) -> Motion:
+def _parse(path: Path, file: IO[str], choose: Callable, may_be_empty: Container[str]) -> tuple:
     first = file.readline()
     while first and not first.strip():
         first = file.readline()
@@ -63,25 +78,20 @@ def _parse(path: Path, file: IO[str], degrees: bool) -> Motion:
     file.seek(0)
     table = csv.reader(file, delimiter=delimiter, skipinitialspace=True)
     try:
-        header, columns, notes = _header(path, table)
-        time, values = _rows(path, table, len(header), columns, delimiter == ";", os.fstat(file.fileno()).st_size)
+        header = [name.strip() for name in next((row for row in table if row), [])]
+        columns, notes = choose(path, header, table.line_num)
+        size = os.fstat(file.fileno()).st_size
+        time, values = _rows(path, table, len(header), columns, delimiter == ";", size, may_be_empty)
     except csv.Error as error:
         raise UserError(f"{_where(path, table.line_num)}: not a readable CSV row ({error})") from None
     if len(time) < 2:
         rows = "no rows below the header" if len(time) == 0 else "only one row below the header"
         raise UserError(f"{_where(path, table.line_num)}: {rows}; at least two are needed")
-    if degrees:
-        values = np.deg2rad(values)
-    theta, omega = values[:, :2], values[:, 2:] if values.shape[1] == 4 else None
-    with np.errstate(all="ignore"):  # angles near the largest number are the FMU's to refuse
-        notes += _doubts(time, theta, omega, degrees)
-    return Motion(Path(path).stem, time, np.ascontiguousarray(theta), omega, notes)
+    return [name for name, _ in columns[1:]], time, values, notes
 
 
-def _header(path: Path, table: Iterator[Sequence[str]]) -> tuple:
-    """Names in the header, the columns to take as [(name, index)] with time first, and notes on the others."""
-    header = [name.strip() for name in next((row for row in table if row), [])]
-    line = table.line_num
+def _header(path: Path, header: Sequence[str], line: int) -> tuple:
+    """The columns to take as [(name, index)] with time first, and notes on the others."""
     for name in ("time", *ANGLES, *RATES):
         if header.count(name) > 1:
             raise UserError(f"{_where(path, line)}, column {name}: appears {header.count(name)} times in the header")
@@ -97,10 +107,12 @@ def _header(path: Path, table: Iterator[Sequence[str]]) -> tuple:
     taken = ("time", *ANGLES, *rates)
     ignored = [name or "(blank)" for name in header if name not in taken]
     notes = [f"columns ignored: {', '.join(ignored)}"] if ignored else []
-    return header, [(name, header.index(name)) for name in taken], notes
+    return [(name, header.index(name)) for name in taken], notes
 
 
-def _rows(path: Path, table, width: int, columns, decimal_comma: bool, size: int) -> tuple:
+def _rows(
+    path: Path, table, width: int, columns, decimal_comma: bool, size: int, may_be_empty: Container[str]
+) -> tuple:
     """All rows below the header as time (n,) and values (n, len(columns) - 1), checked cell by cell."""
     cells, previous, bytes_read = array("d"), -math.inf, 0
     with Progress(f"reading {path}", size) as progress:
@@ -116,10 +128,12 @@ def _rows(path: Path, table, width: int, columns, decimal_comma: bool, size: int
                 except ValueError:
                     value = None
                 # float() would take 1_000 for a thousand
-                if value is None or "_" in text:
+                if name in may_be_empty and text.strip().lower() in ("", "nan"):
+                    value = math.nan
+                elif value is None or "_" in text:
                     shown = f"{text.strip()[:40]!r} is not a number" if text.strip() else "empty cell"
                     raise UserError(f"{_where(path, table.line_num)}, column {name}: {shown}")
-                if not math.isfinite(value):
+                elif not math.isfinite(value):
                     raise UserError(f"{_where(path, table.line_num)}, column {name}: {text.strip()} is not finite")
                 cells.append(value)
             time = cells[-len(columns)]
@@ -137,7 +151,7 @@ def _rows(path: Path, table, width: int, columns, decimal_comma: bool, size: int
     return values[:, 0].copy(), values[:, 1:].copy()
 
 
-def _doubts(time: np.ndarray, theta: np.ndarray, omega, degrees: bool) -> list:
+def doubts(time: np.ndarray, theta: np.ndarray, omega, degrees: bool) -> list:
     """Notes on values that are legal and yet look like a slip of units."""
     notes = []
     for side, name in enumerate(ANGLES):

@@ -114,6 +114,19 @@ macro_rules! export_fmi2 {
     };
 }
 
+/// The guid for [`ModelInfo`](crate::ModelInfo), as fmi2-package's `build_script` has made it: a hash of the model's sources.
+///
+/// Without that build script it is all zeros; fmi2-package does not pack such a library.
+#[macro_export]
+macro_rules! guid {
+    () => {
+        match option_env!("FMU_GUID") {
+            Some(guid) => guid,
+            None => "{00000000-0000-0000-0000-000000000000}",
+        }
+    };
+}
+
 /// The functions that take a component and answer a status.
 #[doc(hidden)]
 #[macro_export]

@@ -34,7 +34,8 @@ impl LibraryBuild<'_> {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let mut command = Command::new(&cargo);
         command
-            .args(["build", "--lib", "--locked", "--no-default-features"])
+            // Where a package makes an rlib, too, cargo leaves link-time optimization out.
+            .args(["rustc", "--lib", "--crate-type", "cdylib", "--locked", "--no-default-features"])
             .args(["--message-format", "json-render-diagnostics"])
             .args(["--profile", self.profile, "--package", self.package])
             .current_dir(&self.folder)

@@ -1,11 +1,15 @@
-//! Turns a [`Model`](fmi2_export::Model) of fmi2-export into a file that importers take: describes it in
-//! `modelDescription.xml`, compiles its library, packs both into an FMU.
+#![doc = include_str!("../README.md")]
 //!
-//! * [`describe`] writes the description from the model's own table of variables. Which variable depends
-//!   on which ([`structure`]) is found by asking a live model, so it cannot contradict the equations.
-//! * [`LibraryBuild`] compiles the library with cargo.
-//! * [`pack`] makes the FMU; the same content gives the same bytes.
-//! * [`Fingerprint`] is for the guid; it is all there is without the feature `package`, for build scripts.
+//! ## Inside
+//!
+//! * [`describe`] writes the description; [`structure`] finds the dependencies.
+//! * [`LibraryBuild`] compiles the library with cargo, [`pack`] makes the FMU, [`Builder`] does all of it.
+//! * [`System`] wires FMUs.
+//! * [`Fingerprint`], [`Sources`] and [`build_script`] are for the guid; they are all there is without the
+//!   feature `package`, for build scripts.
+
+#![deny(missing_docs)]
+#![cfg_attr(not(feature = "command"), allow(rustdoc::broken_intra_doc_links))]
 
 mod content;
 mod fingerprint;

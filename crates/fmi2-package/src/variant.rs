@@ -50,11 +50,9 @@ impl Variant {
 /// `start` are start values that the build script itself has baked in; most models have none.
 ///
 /// ```no_run
-/// // build.rs
-/// fn main() {
-///     let sources = fmi2_package::Sources::of_package(env!("CARGO_MANIFEST_DIR"));
-///     fmi2_package::build_script(&sources, vec![]).unwrap();
-/// }
+/// // in main of build.rs
+/// let sources = fmi2_package::Sources::of_package(env!("CARGO_MANIFEST_DIR"));
+/// fmi2_package::build_script(&sources, vec![]).unwrap();
 /// ```
 ///
 /// # Errors

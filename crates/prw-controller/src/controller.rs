@@ -4,8 +4,9 @@
 //!
 //! ```text
 //! windup     = rigid - measured          rigid: eq. (1) of the motors' angles as they are
-//! correction = b windup + (1 - b) I - Kd rate         b = Kp / (1 + Kp)
+//! correction = b windup + (1 - b) I - D               b = Kp / (1 + Kp)
 //! I'         = Ki (1 - b) (windup - I)
+//! D          = Kd rate, filtered with the time constant 2 Kd
 //! goal       = inverse of eq. (1) of (reference + correction)
 //! ```
 //!
@@ -13,6 +14,10 @@
 //! windup - correction is the error e = reference - measured, correction = Kp e + I, and I' = Ki e. Written
 //! like this, only what the couplings take counts as error, not the way that is still to go. I waits while a
 //! motor is under way or backs off (anti-windup), so that the drag of a move leaves nothing to be undone.
+//!
+//! D damps the vibration of the couplings, where the wrist follows its motors late. A stiff wrist follows at
+//! once, and without the filter the motors' own rate would come back at them with the gain Kd / sample_time,
+//! far above 1, and set up a limit cycle; with it the gain at high frequencies is 1/2.
 //!
 //! A motor backs off from torque: it may head no farther than where, with a wrist that is stuck, the
 //! couplings would reach the torque limit; beyond the limit that goal lies behind it. As the motor never
@@ -79,6 +84,8 @@ pub struct Controller {
     pub motors: [Motor; 2],
     /// I of pitch and roll, rad.
     pub integral: PitchRoll,
+    /// D of pitch and roll, rad.
+    pub damping: PitchRoll,
     /// The last correction of pitch and roll, rad.
     pub correction: PitchRoll,
     /// Whether both motors were on their goals at the last sample.
@@ -109,6 +116,7 @@ impl Controller {
             slopes: Inputs::default(),
             motors: [Motor::default(); 2],
             integral: [0.0; 2],
+            damping: [0.0; 2],
             correction: [0.0; 2],
             on_goal: false,
             schedule: Schedule { epoch: 0.0, period: parameters.sample_time, next: 0.0 },
@@ -180,14 +188,17 @@ impl Controller {
         let rigid = kinematics.wrist(self.motors.map(|motor| motor.angle));
         let share = p.Kp / (1.0 + p.Kp);
         let gain = p.Ki * (1.0 - share) * p.sample_time;
+        let smoothing = p.sample_time / (2.0 * p.Kd + p.sample_time);
         let bounded = |correction: f64| correction.clamp(-p.max_correction, p.max_correction);
-        for axis in 0..2 {
-            let windup = rigid[axis] - inputs.angle[axis];
+        for (axis, rigid) in rigid.into_iter().enumerate() {
+            let windup = rigid - inputs.angle[axis];
             let integral = &mut self.integral[axis];
             if self.on_goal {
                 *integral = bounded(*integral + gain * (windup - *integral));
             }
-            let correction = share * windup + (1.0 - share) * *integral - p.Kd * inputs.rate[axis];
+            let damping = &mut self.damping[axis];
+            *damping += smoothing * (bounded(p.Kd * inputs.rate[axis]) - *damping);
+            let correction = share * windup + (1.0 - share) * *integral - *damping;
             self.correction[axis] = bounded(correction);
         }
         let goals = kinematics.motors(from_fn(|axis| inputs.reference[axis] + self.correction[axis]));

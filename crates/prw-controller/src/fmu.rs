@@ -159,6 +159,7 @@ impl Model for ControllerFmu {
             slopes,
             motors,
             integral,
+            damping,
             correction,
             on_goal,
             schedule,
@@ -179,7 +180,7 @@ impl Model for ControllerFmu {
                 visitor.real(value);
             }
         }
-        for value in integral.iter_mut().chain(correction) {
+        for value in integral.iter_mut().chain(damping).chain(correction) {
             visitor.real(value);
         }
         visitor.boolean(on_goal);

@@ -1,0 +1,148 @@
+//! Systems of FMUs: what is wired wrongly is named; what is right comes out as the standards want it.
+
+use fmi2_package::{Start, System};
+use std::fs;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use zip::ZipArchive;
+
+const UNITS: &str = r#"<UnitDefinitions><Unit name="rad"><BaseUnit rad="1"/></Unit><Unit name="s"><BaseUnit s="1"/></Unit></UnitDefinitions>
+<TypeDefinitions><SimpleType name="Angle"><Real unit="rad"/></SimpleType></TypeDefinitions>"#;
+
+fn fmu(folder: &Path, name: &str, variables: &str) -> PathBuf {
+    let path = folder.join(name);
+    let mut zip = zip::ZipWriter::new(fs::File::create(&path).unwrap());
+    zip.start_file("modelDescription.xml", zip::write::SimpleFileOptions::default()).unwrap();
+    let text = format!(
+        "<fmiModelDescription>{UNITS}<ModelVariables>{variables}</ModelVariables></fmiModelDescription>"
+    );
+    zip.write_all(text.as_bytes()).unwrap();
+    zip.finish().unwrap();
+    path
+}
+
+fn variable(name: &str, causality: &str, kind: &str) -> String {
+    format!(r#"<ScalarVariable name="{name}" causality="{causality}"><{kind}/></ScalarVariable>"#)
+}
+
+/// Two FMUs: the unit of an angle once at the variable, once by its type.
+fn fmus(folder: &Path) -> Vec<(&'static str, PathBuf)> {
+    let plant = [
+        variable("u", "input", r#"Real unit="rad""#),
+        variable("y", "output", r#"Real declaredType="Angle""#),
+        variable("delay", "output", r#"Real unit="s""#),
+        variable("bare", "output", "Real"),
+        variable("on", "parameter", "Boolean"),
+    ];
+    let law = [
+        variable("r", "input", r#"Real unit="rad""#),
+        variable("y", "input", r#"Real declaredType="Angle""#),
+        variable("n", "input", "Integer"),
+        variable("u", "output", r#"Real unit="rad""#),
+    ];
+    vec![("law", fmu(folder, "law.fmu", &law.concat())), ("plant", fmu(folder, "plant.fmu", &plant.concat()))]
+}
+
+fn system<'a>(folder: &Path) -> System<'a> {
+    System {
+        name: "loop",
+        description: "A loop",
+        components: fmus(folder),
+        inputs: vec![("reference", "law.r", 0.5)],
+        outputs: vec![("angle", "plant.y")],
+        connections: vec![("law.u", "plant.u"), ("plant.y", "law.y")],
+        start: vec![("plant.on", Start::Boolean(true))],
+        stop_time: 2.0,
+        step_size: 0.001,
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let refusal = |change: fn(&mut System)| {
+        let mut system = system(folder.path());
+        change(&mut system);
+        format!("{:#}", system.check().err().expect("it does not fit"))
+    };
+    for (change, message) in [
+        ((|s| s.connections.push(("plant.y", "law.x"))) as fn(&mut System), "no FMU has a variable law.x"),
+        (|s| s.connections.push(("plant.u", "law.y")), "plant.u is input, not output"),
+        (|s| s.connections.push(("plant.delay", "law.r")), "plant.delay is in s, law.r in rad"),
+        (|s| s.connections.push(("plant.y", "law.n")), "plant.y is Real, law.n is Integer"),
+        (|s| s.connections.push(("plant.y", "law.r")), "law.r is fed twice"),
+        (|s| s.outputs.push(("x", "plant.on")), "plant.on is parameter, not output"),
+        (|s| s.start.push(("plant.y", Start::Real(0.0))), "plant.y is output, not parameter or input"),
+        (|s| s.start.push(("plant.on", Start::Real(0.0))), "plant.on is Boolean, its start value is Real"),
+        (|s| s.components[0].1 = "none.fmu".into(), "none.fmu is no usable FMU: it cannot be read"),
+    ] {
+        assert_eq!(refusal(change).split(": No such file").next(), Some(message));
+    }
+    // A unit that nobody tells cannot be wrong.
+    let mut untold = system(folder.path());
+    untold.connections[1].0 = "plant.bare";
+    untold.check().unwrap();
+}
+
+#[test]
+fn the_ssp_has_everything_and_is_the_same_every_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let system = system(folder.path());
+    let checked = system.check().unwrap();
+    let (one, other) = (folder.path().join("one.ssp"), folder.path().join("other.ssp"));
+    checked.write_ssp(&one).unwrap();
+    system.check().unwrap().write_ssp(&other).unwrap();
+    assert!(fs::read(&one).unwrap() == fs::read(&other).unwrap());
+
+    let mut zip = ZipArchive::new(fs::File::open(&one).unwrap()).unwrap();
+    let names: Vec<String> = zip.file_names().map(|name| name.unwrap().into_owned()).collect();
+    assert_eq!(
+        names,
+        [
+            "SystemStructure.ssd",
+            "resources/experiment.ssv",
+            "resources/law.fmu",
+            "resources/plant.fmu",
+            "resources/plant.ssv"
+        ]
+    );
+    let mut read = |name: &str| {
+        let mut text = String::new();
+        zip.by_name(name).unwrap().read_to_string(&mut text).unwrap();
+        text
+    };
+    let ssd = read("SystemStructure.ssd");
+    for part in [
+        r#"<ssd:Component name="law" type="application/x-fmu-sharedlibrary" source="resources/law.fmu">"#,
+        r#"<ssd:Connection startConnector="reference" endElement="law" endConnector="r"/>"#,
+        r#"<ssd:Connection startElement="law" startConnector="u" endElement="plant" endConnector="u"/>"#,
+        r#"<ssd:Connection startElement="plant" startConnector="y" endConnector="angle"/>"#,
+        r#"<ssd:DefaultExperiment startTime="0" stopTime="2"/>"#,
+    ] {
+        assert_eq!(ssd.matches(part).count(), 1, "{part}\n{ssd}");
+    }
+    // Units that are used, and no others.
+    assert!(ssd.contains(r#"<ssc:Unit name="rad">"#) && !ssd.contains(r#"<ssc:Unit name="s">"#), "{ssd}");
+    assert!(read("resources/plant.ssv").contains(r#"<ssv:Boolean value="true"/>"#));
+    assert!(read("resources/experiment.ssv").contains(r#"<ssv:Real value="0.5" unit="rad"/>"#));
+}
+
+#[test]
+fn the_folder_for_libcosim_has_the_fmus_and_the_start_values() {
+    let folder = tempfile::tempdir().unwrap();
+    let system = system(folder.path());
+    let out = folder.path().join("osp");
+    system.check().unwrap().write_osp(&out).unwrap();
+    let text = fs::read_to_string(out.join("OspSystemStructure.xml")).unwrap();
+    for part in [
+        "<BaseStepSize>0.001</BaseStepSize>",
+        r#"<Simulator name="law" source="law.fmu">"#,
+        r#"<InitialValue variable="r">"#,
+        r#"<Variable simulator="plant" name="y"/>"#,
+    ] {
+        assert_eq!(text.matches(part).count(), 1, "{part}\n{text}");
+    }
+    for name in ["law.fmu", "plant.fmu"] {
+        assert_eq!(fs::read(out.join(name)).unwrap(), fs::read(folder.path().join(name)).unwrap());
+    }
+}

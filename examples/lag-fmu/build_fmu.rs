@@ -1,0 +1,20 @@
+//! Builds target/fmu/lag.fmu. See `--help`.
+
+use clap::Parser;
+use fmi2_package::{BuildOptions, Builder};
+use std::process::ExitCode;
+
+/// Builds the FMU of a first-order lag.
+#[derive(Parser)]
+struct Options {
+    #[command(flatten)]
+    build: BuildOptions,
+}
+
+fn main() -> ExitCode {
+    let builder = Builder {
+        command: "cargo run --release -p lag_fmu",
+        ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"), env!("FMU_SOURCES"))
+    };
+    fmi2_package::exit(builder.run::<lag_fmu::Lag>(&Options::parse().build))
+}

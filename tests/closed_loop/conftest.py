@@ -1,0 +1,43 @@
+"""Fixtures: the FMUs, the closed loop made of them, and its runs under the masters that are installed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from prw.closed_loop import masters, system
+
+ROOT = Path(__file__).resolve().parents[2]
+FMUS = ROOT / "target" / "fmu"
+
+
+def built(name: str) -> Path:
+    path = FMUS / name
+    if not path.exists():
+        pytest.exit(f"{path} is missing; build it with `make closed-loop-fmus`", returncode=1)
+    return path
+
+
+@pytest.fixture(scope="session")
+def testbed_fmu() -> Path:
+    return built("prw_testbed.fmu")
+
+
+@pytest.fixture(scope="session")
+def controller_fmu() -> Path:
+    return built("prw_controller.fmu")
+
+
+@pytest.fixture(scope="session")
+def closed_loop() -> system.System:
+    """The closed loop as build_closed_loop has written it."""
+    return system.read(built("prw_closed_loop.ssp"), built("prw_closed_loop"))
+
+
+@pytest.fixture(scope="session", params=masters.MASTERS, ids=lambda master: master.name)
+def master(request) -> masters.Master:
+    """Every master in turn, as far as it is installed."""
+    if request.param.version() is None:
+        pytest.skip(f"{request.param.package} is not installed")
+    return request.param

@@ -1,0 +1,225 @@
+"""prw_controller.fmu at the FMI boundary, and with a testbed whose sensors or references are out of order."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.validation import validate_fmu
+
+from conftest import ROOT
+
+sys.path[:0] = [str(ROOT / "tests" / "oracle"), str(ROOT / "tests" / "fmpy")]
+
+from slave import Slave  # noqa: E402
+
+MEASURED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
+MOTORS = ("theta1", "theta2", "omega1", "omega2")
+STEP = 1e-3
+
+
+@pytest.fixture(scope="module")
+def folders(testbed_fmu, controller_fmu):
+    unpacked = {fmu.stem: fmpy.extract(str(fmu)) for fmu in (testbed_fmu, controller_fmu)}
+    yield unpacked
+    for folder in unpacked.values():
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture
+def make(folders):
+    slaves = []
+
+    def make(name: str) -> Slave:
+        slaves.append(Slave(folders[name], fmpy.read_model_description(folders[name]), name))
+        return slaves[-1]
+
+    yield make
+    for slave in slaves:
+        slave.free()
+
+
+@pytest.fixture
+def controller(make):
+    return make("prw_controller")
+
+
+def start(slave: Slave, **values) -> None:
+    slave.fmi.setupExperiment(startTime=0.0)
+    slave.set(**values)
+    slave.fmi.enterInitializationMode()
+    slave.fmi.exitInitializationMode()
+
+
+def run(make, duration: float, reference, measure=lambda t, values: values, **parameters):
+    """Controller and testbed, step by step. reference(t): (2,) rad; measure(t, values) may spoil what the testbed says.
+    Returns time (n,), pitch and roll (n, 2) rad, motors (n, 4)."""
+    testbed, controller = make("prw_testbed"), make("prw_controller")
+    start(testbed, use_omega=True)
+    start(controller, **parameters)
+    wrist, motors, n = [], [], round(duration / STEP)
+    for k in range(n):
+        t = k * STEP
+        values = dict(zip(MEASURED, testbed.get(*MEASURED)))
+        motion = dict(zip(MOTORS, controller.get(*MOTORS)))
+        controller.set(**dict(zip(("pitch_ref", "roll_ref"), reference(t))), **measure(t, values))
+        testbed.set(**motion)
+        controller.step(t, STEP)
+        testbed.step(t, STEP)
+        wrist.append(testbed.get("pitch", "roll"))
+        motors.append(controller.get(*MOTORS))
+    assert not testbed.complaints() and not controller.complaints()
+    return STEP * np.arange(1, n + 1), np.array(wrist), np.array(motors)
+
+
+def test_the_validator_has_nothing_to_say(controller_fmu):
+    assert validate_fmu(str(controller_fmu)) == []
+    fmpy.read_model_description(str(controller_fmu), validate=True)
+
+
+def test_a_reference_that_jumps_to_and_fro_is_followed_within_limits(make):
+    goals = np.deg2rad([[30, 60], [-30, 60], [0, -90], [10, 0]])
+    time, wrist, motors = run(make, 4.0, lambda t: goals[int(t)])
+    for k, goal in enumerate(goals):
+        end = (time > k + 0.9) & (time < k + 1.0)
+        assert np.max(np.abs(np.rad2deg(wrist[end] - goal))) < 0.1
+    assert np.max(np.abs(motors[:, 2:])) <= 3 + 1e-9
+    assert np.max(np.abs(np.diff(motors[:, 2:], axis=0))) <= 30 * STEP * (1 + 1e-6)
+    # omega is the derivative of theta: between samples, which are a step apart, exactly.
+    moved, mean = np.diff(motors[:, :2], axis=0), STEP * (motors[1:, 2:] + motors[:-1, 2:]) / 2
+    np.testing.assert_allclose(moved, mean, atol=1e-14)
+
+
+def test_it_finds_its_way_with_wrong_gear_numbers_in_the_controller(make):
+    """M = 5 instead of 4: feed-forward alone would be off by a quarter of the roll."""
+    goal = np.deg2rad([5, 20])
+    _, wrist, _ = run(make, 6.0, lambda t: goal, M=5)
+    assert np.max(np.abs(np.rad2deg(wrist[-1] - goal))) < 0.1
+
+
+@pytest.mark.parametrize("stuck", MEASURED)
+def test_a_stuck_sensor_leaves_everything_bounded(make, stuck):
+    """The sensor stands still from 0.2 s on, in full motion. The wrist ends within the bounds of the correction: 0.2 rad."""
+    goal, held = np.deg2rad([30, 60]), {}
+
+    def measure(t, values):
+        if t >= 0.2:
+            values[stuck] = held.setdefault(stuck, values[stuck])
+        return values
+
+    _, wrist, motors = run(make, 3.0, lambda t: goal, measure)
+    assert np.all(np.isfinite(wrist)) and np.all(np.isfinite(motors))
+    assert np.max(np.abs(wrist - goal)[-500:]) < 0.2 + 0.02
+    assert np.max(np.abs(motors[-500:, 2:])) < 0.1
+    assert np.max(np.abs(motors[:, 2:])) <= 3 + 1e-9
+
+
+@pytest.mark.parametrize("steps", [[1e-3], [1 / 60], [0.7e-3, 0.1e-3, 1.9e-3], [1e-3 + 3e-13], [0.0125]])
+def test_samples_keep_their_times_whatever_the_communication_step(controller, steps):
+    """Free of feedback: motors at any time are those of a run with steps of the sample time."""
+    start(controller, pitch_ref=0.5, roll_ref=-0.3, Kp=0.0, Ki=0.0, Kd=0.0, max_torque=1e3)
+    names = ("theta1", "theta2", "omega1", "omega2")
+    t, k, found = 0.0, 0, []
+    while t < 0.6:
+        h = steps[k % len(steps)]
+        controller.step(t, h)
+        t, k = t + h, k + 1
+        found.append((t, *controller.get(*names)))
+    found = np.array(found)
+    controller.fmi.reset()
+    start(controller, pitch_ref=0.5, roll_ref=-0.3, Kp=0.0, Ki=0.0, Kd=0.0, max_torque=1e3)
+    samples = [controller.get(*names)]
+    for k in range(700):
+        controller.step(k * 1e-3, 1e-3)
+        samples.append(controller.get(*names))
+    samples = np.array(samples)
+    # Between samples theta is a parabola with the rates at its ends.
+    index = np.minimum((found[:, 0] / 1e-3).astype(int), 699)
+    into = found[:, :1] - index[:, None] * 1e-3
+    slope = (samples[index + 1, 2:] - samples[index, 2:]) / 1e-3
+    theta = samples[index, :2] + samples[index, 2:] * into + slope * into**2 / 2
+    np.testing.assert_allclose(found[:, 1:3], theta, atol=1e-12)
+    # A point up to 1e-9 s behind a sample still counts as the sample's, and rates bend there by up to 60 rad/s2.
+    np.testing.assert_allclose(found[:, 3:], samples[index, 2:] + slope * into, atol=1e-7)
+
+
+def test_states_bring_everything_back(controller):
+    """Saved, serialized into another instance's life, restored: the same bits."""
+    start(controller, pitch_ref=0.4)
+    rng = np.random.default_rng(7)
+
+    def go(begin: int):
+        generator, rows = np.random.default_rng(begin), []
+        for k in range(begin, begin + 200):
+            controller.set(**dict(zip(MEASURED, generator.normal(0, 0.1, 6))))
+            if k % 3 == 0:
+                controller.fmi.setRealInputDerivatives([controller.variables["pitch"].valueReference], [1], [1.0])
+            controller.step(k * 0.7e-3, 0.7e-3)
+            rows.append(controller.get(*MOTORS, "pitch_correction", "roll_correction"))
+        return np.array(rows)
+
+    go(0)
+    controller.set(pitch=rng.normal())
+    saved = controller.fmi.getFMUstate()
+    data = controller.fmi.serializeFMUstate(saved)
+    after = go(200)
+    controller.fmi.setFMUstate(saved)
+    np.testing.assert_array_equal(go(200), after)
+    controller.fmi.freeFMUstate(saved)
+    controller.fmi.reset()
+    restored = controller.fmi.deSerializeFMUstate(data)
+    controller.fmi.setFMUstate(restored)
+    np.testing.assert_array_equal(go(200), after)
+    controller.fmi.freeFMUstate(restored)
+
+
+def test_no_output_feels_an_input_before_its_sample(controller):
+    start(controller)
+    references = [controller.variables[name].valueReference for name in (*MOTORS, "pitch_correction")]
+    before = controller.get(*MOTORS)
+    controller.set(pitch_ref=1.0, pitch=0.3, tau1=4.0)
+    np.testing.assert_array_equal(controller.get(*MOTORS), before)
+    known = [controller.variables[name].valueReference for name in ("pitch_ref", *MEASURED)]
+    assert controller.fmi.getDirectionalDerivative(references, known, [1.0] * len(known)) == [0.0] * len(references)
+    controller.step(0.0, STEP)
+    assert controller.get("omega1")[0] > before[2]
+
+
+def test_output_derivatives_are_those_of_the_motion(controller):
+    start(controller, pitch_ref=0.5)
+    controller.step(0.0, 2.5e-3)
+    references = [controller.variables[name].valueReference for name in MOTORS]
+    first = controller.fmi.getRealOutputDerivatives(references, [1] * 4)
+    np.testing.assert_allclose(first, [*controller.get("omega1", "omega2"), 30.0, 30.0])
+    second = controller.fmi.getRealOutputDerivatives(references[:2], [2, 2])
+    np.testing.assert_allclose(second, [30.0, 30.0])
+
+
+@pytest.mark.parametrize(
+    "name, value, message",
+    [
+        ("sample_time", 0.0, "sample_time must not be below 0.000000001, it is 0"),
+        ("Ki", 2000.0, "Ki * sample_time must not exceed 1"),
+        ("max_rate", -3.0, "max_rate must not be below"),
+        ("pitch", float("nan"), "pitch must be a finite number"),
+    ],
+)
+def test_nonsense_is_refused_with_a_reason(controller, name, value, message):
+    controller.fmi.setupExperiment(startTime=0.0)
+    controller.fmi.enterInitializationMode()
+    old = controller.get(name)[0]
+    with pytest.raises(FMICallException):
+        controller.set(**{name: value})
+    assert controller.get(name)[0] == old
+    assert message in controller.complaints()[-1][2]
+
+
+def test_motors_start_where_they_stand(controller):
+    start(controller, theta1=0.7, theta2=0.7, pitch_ref=0.7, pitch=0.7)
+    for k in range(100):
+        controller.step(k * STEP, STEP)
+    np.testing.assert_array_equal(controller.get(*MOTORS), [0.7, 0.7, 0.0, 0.0])
