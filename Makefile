@@ -6,6 +6,7 @@ SHELL := /bin/bash
 PYTHON ?= python3
 INPUT  ?=
 ARGS   ?=
+FUZZ_SECONDS ?= 600
 
 VENV := .venv
 DIST_VENV := .venv-dist
@@ -24,7 +25,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-fmu fmu bench figures docs closed-loop closed-loop-fmus test-closed-loop dist test-platforms test-reproducible clean need-rust
+.PHONY: help demo test test-rust test-fmu fmu bench figures docs closed-loop closed-loop-fmus test-closed-loop dist test-platforms test-reproducible study monte-carlo fuzz sanitize clean need-rust need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -40,6 +41,10 @@ help:
 	@echo 'make dist                    the FMU for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
 	@echo 'make test-platforms          run what is in dist/ on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make dist/ again elsewhere and compare every byte'
+	@echo 'make study                   set up prw identify, excite and sweep  (see analysis/tutorial.md)'
+	@echo 'make monte-carlo             200 identifications of simulated rigs -> out/monte_carlo.json'
+	@echo 'make fuzz                    look for calls that break the FMU, for 10 minutes (FUZZ_SECONDS=600)'
+	@echo 'make sanitize                the tests under address, leak, thread and real-time sanitizers and valgrind'
 	@echo 'make clean                   remove .venv, .venv-dist, target, out and dist'
 
 demo: need-rust $(VENV)/demo.stamp fmu
@@ -62,7 +67,7 @@ test-rust: need-rust
 
 test-fmu: $(VENV)/test.stamp fmu
 	$(PY) platforms/bill_of_materials.py --check
-	$(PY) -m pytest -q -p no:cacheprovider tests/oracle tests/fmpy
+	$(PY) -m pytest -q -p no:cacheprovider tests/oracle tests/fmpy tests/analysis
 
 # Ratios of one run; quiet the machine first.
 bench: fmu
@@ -100,6 +105,25 @@ test-platforms: dist $(DIST_VENV)/test.stamp
 test-reproducible: dist
 	@$(DIST_VENV)/bin/python platforms/rebuild.py
 
+study: $(VENV)/study.stamp fmu
+	@echo 'ready: $(VENV)/bin/prw identify --help, excite --help, sweep --help; analysis/tutorial.md shows how'
+
+# Takes minutes; `make test` has the short version.
+monte-carlo: $(VENV)/study.stamp fmu
+	$(PY) tests/analysis/monte_carlo.py $(FMU) --out out/monte_carlo.json
+
+# libFuzzer keeps what is new in target/fuzz/corpus; fuzz/corpus has the committed beginnings.
+fuzz: need-rust need-nightly
+	@$(CARGO) fuzz --version >/dev/null 2>&1 || \
+	  $(call stop,cargo-fuzz is missing; install it with: cargo install --locked cargo-fuzz)
+	@mkdir -p target/fuzz/corpus
+	$(CARGO) +nightly fuzz run --fuzz-dir fuzz --target-dir target/fuzz calls target/fuzz/corpus fuzz/corpus/calls \
+	  -- -max_len=4096 -max_total_time=$(FUZZ_SECONDS) -print_final_stats=1
+
+sanitize: need-rust need-nightly
+	@command -v valgrind >/dev/null || $(call stop,valgrind is missing; on Debian: apt install valgrind)
+	@tests/robustness/sanitize
+
 clean:
 	rm -rf $(VENV) $(DIST_VENV) target out dist
 
@@ -122,7 +146,12 @@ $(VENV)/demo.stamp: $(VENV)/made.stamp analysis/requirements.txt analysis/pyproj
 	@$(PIP_INSTALL) --quiet --no-deps --editable analysis
 	@touch $@
 
-$(VENV)/test.stamp: $(VENV)/demo.stamp tests/requirements.txt
+$(VENV)/study.stamp: $(VENV)/demo.stamp analysis/requirements-study.txt
+	@echo 'installing the Python packages of identification and sweeps (once)'
+	@$(PIP_INSTALL) -r analysis/requirements-study.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@touch $@
+
+$(VENV)/test.stamp: $(VENV)/study.stamp tests/requirements.txt
 	@echo 'installing the Python packages of the tests (once)'
 	@$(PIP_INSTALL) -r tests/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
@@ -147,3 +176,7 @@ need-rust:
 	  $(call stop,Rust is missing; install it with rustup (https://rustup.rs))
 	@command -v cc >/dev/null || \
 	  $(call stop,the C compiler that Rust links with is missing; on Debian: apt install gcc libc6-dev)
+
+need-nightly:
+	@$(CARGO) +nightly --version >/dev/null 2>&1 || \
+	  $(call stop,a nightly toolchain is missing; install it with: rustup toolchain install nightly)

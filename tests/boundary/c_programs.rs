@@ -1,7 +1,7 @@
 //! C programs that load the shared library as importers do.
 #![cfg(unix)]
 
-use crate::c::{library, output, program};
+use crate::c::{command, library, output, program};
 use crate::exact::INPUTS;
 use crate::modes::{enter_continuous_time, in_mode};
 use crate::support::FUNCTIONS_OF_COMPONENTS;
@@ -15,7 +15,7 @@ use std::process::Command;
 
 /// Compiles tests/c/NAME.c and runs it with the library and its guid.
 fn run(name: &str) -> String {
-    let mut command = Command::new(program(name));
+    let mut command = command(&program(name));
     output(command.arg(library("prw_testbed")).arg(crate::GUID_TEXT), "the compiled program does not run")
 }
 
@@ -91,7 +91,8 @@ fn loggers() {
 #[test]
 fn exported_symbols() {
     let flags: &[&str] = if cfg!(target_os = "macos") { &["-gU"] } else { &["-D", "--defined-only"] };
-    let printed = output(Command::new("nm").args(flags).arg(library("prw_testbed")), "this test needs nm (binutils)");
+    let printed =
+        output(Command::new("nm").args(flags).arg(library("prw_testbed")), "this test needs nm (binutils)");
     let symbol = |line: &str| line.rsplit(' ').next().unwrap().trim_start_matches('_').to_owned();
     let exported: BTreeSet<_> = printed.lines().map(symbol).collect();
     let without_component = ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instantiate", "fmi2FreeInstance"];

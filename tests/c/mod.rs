@@ -1,6 +1,7 @@
 //! C programs of tests/c, compiled and run beside the libraries of this build.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -37,4 +38,13 @@ pub fn program(name: &str) -> PathBuf {
         "these tests need a C compiler (cc, or set CC)",
     );
     program
+}
+
+/// Runs a program, under what `C_RUNNER` says (`make sanitize`: valgrind).
+pub fn command(program: &Path) -> Command {
+    let runner = std::env::var("C_RUNNER").unwrap_or_default();
+    let mut words = runner.split_whitespace().map(OsStr::new).chain([program.as_os_str()]);
+    let mut command = Command::new(words.next().expect("the program at least"));
+    command.args(words);
+    command
 }

@@ -1,0 +1,141 @@
+"""The testbed FMU as a function of its parameters: one instance, reset and run again, or asked for its linear model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Dict, Mapping, NamedTuple, Sequence
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+
+from prw.errors import UserError
+from prw.motion import Motion
+from prw.testbed import OUTPUTS, Testbed
+
+STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
+INPUTS = ("theta1", "theta2", "omega1", "omega2")
+
+
+class Parameter(NamedTuple):
+    """A parameter as the FMU declares it. start: its start value in SI. shown, factor: the unit it is shown in, and what
+    a value in that unit is multiplied with to be in SI. meaning: its description."""
+
+    name: str
+    start: float
+    unit: str
+    shown: str
+    factor: float
+    meaning: str
+
+
+class Matrices(NamedTuple):
+    """x' = A x + B u, y = C x + D u of eq. (11), with the FMU's states and inputs in the order of STATES and INPUTS and
+    its outputs in the order of OUTPUTS: A (6, 6), B (6, 4), C (8, 6), D (8, 4). Or m of them stacked: A (m, 6, 6) ..."""
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+
+
+class Model(Testbed):
+    """One instance of the testbed FMU for many runs. Between runs it is reset, not loaded again.
+
+    A context manager like Testbed; raises UserError as it does.
+    """
+
+    def __init__(self, fmu: Path):
+        """Unpack, load and instantiate the FMU file `fmu`."""
+        super().__init__(fmu)
+        self.fmu = fmu
+        self._values: Mapping[str, float] = {}
+        self.parameters: Dict[str, Parameter] = {}
+        self.counts: Dict[str, int] = {}
+        shown = {
+            (unit.name, display.name): 1 / display.factor
+            for unit in self._description.unitDefinitions
+            for display in unit.displayUnits
+        }
+        for v in self._description.modelVariables:
+            if v.causality != "parameter":
+                continue
+            if v.type == "Real":
+                unit, display = v.unit, v.displayUnit or v.unit
+                factor = shown.get((unit, display), 1.0)
+                self.parameters[v.name] = Parameter(v.name, float(v.start), unit, display, factor, v.description or "")
+            elif v.type == "Integer":
+                self.counts[v.name] = int(v.start)
+        if self._description.coSimulation.providesDirectionalDerivative is not True:
+            self.close()
+            raise UserError(f"{fmu}: offers no directional derivatives of FMI 2.0 for Co-Simulation")
+
+    @property
+    def guid(self) -> str:
+        """The guid of the FMU: a hash of its sources and start values."""
+        return self._description.guid
+
+    @property
+    def units(self) -> list:
+        """The FMU's unit definitions, as FMPy has them."""
+        return self._description.unitDefinitions
+
+    def meaning(self, name: str) -> str:
+        """The description of the variable `name`."""
+        return next(v.description or "" for v in self._description.modelVariables if v.name == name)
+
+    @property
+    def starts(self) -> Dict[str, float]:
+        """The start values of the Real parameters in SI, by name."""
+        return {name: parameter.start for name, parameter in self.parameters.items()}
+
+    def run(
+        self, motion: Motion, values: Mapping[str, float], outputs: Sequence[str] = OUTPUTS, state=None
+    ) -> Dict[str, np.ndarray]:
+        """Reset the FMU, give it the parameters `values` (SI, by name; others keep their start values) and let it follow
+        `motion`, as Testbed.respond does. state: (6,) initial x; default: at rest at the motors' first angles."""
+        self._values = dict(values)
+        if state is not None:
+            self._values.update(zip(STATES, map(float, state)))
+        return self.respond(motion, outputs)
+
+    def matrices(self, values: Mapping[str, float]) -> Matrices:
+        """The FMU's linear model with the parameters `values` (SI, by name), from fmi2GetDirectionalDerivative."""
+        reference, slave = self._references, self._slave
+        rates = [reference[f"der({name})"] for name in STATES]
+        calculated = [name for name in OUTPUTS if name not in STATES]
+        unknowns = rates + [reference[name] for name in calculated]
+        try:
+            slave.reset()
+            slave.setupExperiment()
+            self._set(values)
+            slave.enterInitializationMode()
+            slave.exitInitializationMode()
+            columns = [slave.getDirectionalDerivative(unknowns, [reference[name]], [1.0]) for name in STATES + INPUTS]
+        except FMICallException as error:
+            raise UserError(f"{self.fmu}: {self._why(error)}") from None
+        table = np.array(columns).T
+        # A state is no unknown of FMI's directional derivatives, and its row of C needs none.
+        whole = np.zeros((len(OUTPUTS), table.shape[1]))
+        for row, name in enumerate(OUTPUTS):
+            if name in calculated:
+                whole[row] = table[len(STATES) + calculated.index(name)]
+            else:
+                whole[row, STATES.index(name)] = 1.0
+        n = len(STATES)
+        return Matrices(table[:n, :n], table[:n, n:], whole[:, :n], whole[:, n:])
+
+    def _initialize(self, motion: Motion, rates: bool) -> None:
+        self._refusals.clear()
+        self._slave.reset()
+        super()._initialize(motion, rates)
+
+    def _set(self, values: Mapping[str, float]) -> None:
+        # What rest is at the motors' angles comes from Testbed; parameters and another initial state go over it.
+        if "theta3" in values:
+            values = {**values, **self._values}
+        super()._set(values)
+
+
+def stack(matrices: Sequence[Matrices]) -> Matrices:
+    """Several linear models as one with a leading axis."""
+    return Matrices(*(np.stack(blocks) for blocks in zip(*matrices)))

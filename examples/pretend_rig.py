@@ -1,0 +1,59 @@
+"""A testbed to practise on: writes what sensors would say of a motion, for `prw identify`.
+
+    python examples/pretend_rig.py MOTION.csv RUN.csv [--seed N] [--measure tau1,tau2,theta3,theta4,pitch,roll]
+
+It runs the FMU with parameters of its own choice (a seed, a rig), and then spoils its answers: encoders of 10000 counts,
+torques with 20 mN.m of noise, an inertial sensor with 0.06 deg, and an unknown offset on each of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from prw import recording
+from prw.identify.model import Model
+
+ENCODER = 360 / 10_000
+CHOSEN = ("k1", "k2", "c1", "c2", "c3")
+
+
+def main() -> None:
+    """Read the motion, run the rig, write the measurements."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("motion", type=Path)
+    parser.add_argument("run", type=Path)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--measure", default="tau1,tau2,theta3,theta4,pitch,roll")
+    parser.add_argument("--fmu", type=Path, default=Path("target/fmu/prw_testbed.fmu"))
+    options = parser.parse_args()
+    rig, sensors = np.random.default_rng(options.seed), np.random.default_rng()
+    motion = recording.read(options.motion)
+    with Model(options.fmu) as model:
+        truth = {name: model.starts[name] * float(rig.uniform(0.75, 1.3)) for name in CHOSEN}
+        response = model.run(motion, truth)
+        shown = {name: f"{truth[name] / model.parameters[name].factor:.5g} {model.parameters[name].shown}" for name in CHOSEN}
+
+    def encoder(angle: np.ndarray) -> np.ndarray:
+        return np.round(np.degrees(angle) / ENCODER + sensors.uniform(-0.5, 0.5)) * ENCODER
+
+    columns = {"time [s]": motion.time}
+    for i in (0, 1):
+        columns[f"theta{i + 1} [deg]"] = encoder(motion.theta[:, i])
+    for name in options.measure.split(","):
+        if name.startswith("tau"):
+            noise = sensors.normal(0, 0.02, len(motion.time)) + sensors.uniform(-0.2, 0.2)
+            columns[f"{name} [N.m]"] = response[name] + noise
+        elif name in ("theta3", "theta4"):
+            columns[f"{name} [deg]"] = encoder(response[name]) + sensors.uniform(-5, 5)
+        else:
+            noise = sensors.normal(0, 0.06, len(motion.time)) + sensors.uniform(-1, 1)
+            columns[f"{name} [deg]"] = np.degrees(response[name]) + noise
+    np.savetxt(options.run, np.column_stack(list(columns.values())), "%.6f", ",", header=",".join(columns), comments="")
+    print(f"wrote {options.run}; the rig behind it: " + ", ".join(f"{name} {text}" for name, text in shown.items()))
+
+
+if __name__ == "__main__":
+    main()

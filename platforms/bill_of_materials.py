@@ -1,0 +1,174 @@
+"""Lists what is compiled into the libraries of the FMU, with versions and licences.
+
+    python platforms/bill_of_materials.py            writes the lists anew
+    python platforms/bill_of_materials.py --check    fails if they are out of date
+
+They are kept in modelDescription/licenses/ and go into the FMU: third-party.txt for people and
+bill-of-materials.cdx.json (CycloneDX 1.6) for tools. Needs cargo and nothing else.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import uuid
+from pathlib import Path
+
+from targets import MODEL, ROOT, TARGETS
+
+BILL = ROOT / "modelDescription" / "licenses" / "bill-of-materials.cdx.json"
+NOTICE = ROOT / "modelDescription" / "licenses" / "third-party.txt"
+
+#: Compiled in, but no packages of Cargo.lock: name, licence, copyright, where it is.
+BESIDE_CRATES = (
+    ("std", "MIT OR Apache-2.0", "The Rust Project Developers", "all, the Rust standard library"),
+    ("libunwind", "Apache-2.0 WITH LLVM-exception", "The LLVM Project contributors", "Linux, from zig"),
+    ("libgcc", "GPL-3.0-or-later WITH GCC-exception-3.1", "Free Software Foundation", "Windows, from MinGW"),
+    ("mingw-w64", "ZPL-2.1", "The mingw-w64 project", "Windows, start-up code"),
+)
+
+HEADER = """\
+Compiled into the libraries of this FMU. Where a package offers a choice of licences, the choice is shown;
+all those from crates.io are used under the Apache License, Version 2.0 (LICENSE-APACHE).
+Sources: https://crates.io/crates/PACKAGE/VERSION. For tools: bill-of-materials.cdx.json.
+
+"""
+
+FOOTER = """
+What the Rust standard library contains of others is listed in the file COPYRIGHT-library.html of every Rust
+distribution. libgcc is linked under the GCC Runtime Library Exception, which asks nothing of this FMU.
+"""
+
+
+def packages() -> list[dict]:
+    """The packages that are compiled into a library for any target, as cargo describes them."""
+    names = set()
+    for target in TARGETS:
+        # Without build scripts and procedural macros: they run, but nothing of them gets in.
+        command = ["cargo", "tree", "--locked", "--no-default-features", "--package", MODEL, "--target", target.triple]
+        lines = _cargo([*command, "--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"])
+        names.update(tuple(line.split()[:2]) for line in lines.splitlines() if line)
+    metadata = json.loads(_cargo(["cargo", "metadata", "--locked", "--format-version", "1"]))
+    found = [p for p in metadata["packages"] if (p["name"], f"v{p['version']}") in names]
+    return sorted(found, key=lambda package: (package["name"], package["version"]))
+
+
+def _cargo(command: list[str]) -> str:
+    process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8")
+    if process.returncode:
+        raise SystemExit(f"error: {' '.join(command)}: {process.stderr.strip()}")
+    return process.stdout
+
+
+def copyright_of(package: dict) -> str:
+    """The holders named in the package's licence files, else its authors."""
+    folder = Path(package["manifest_path"]).parent
+    lines = []
+    for path in sorted(folder.iterdir()):
+        if re.match(r"(licen[cs]e|copyright)", path.name, re.IGNORECASE) and path.is_file():
+            for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+                match = re.match(r"\s*Copyright\s+(?:\(c\)\s+|©\s+)?(?=[\dA-Z])(.+?)\.?\s*(?:\[.*\])?$", line)
+                if match and "owner" not in match[1] and match[1] not in lines and not re.fullmatch(r"[\d\s-]+", match[1]):
+                    lines.append(match[1])
+    authors = [re.sub(r"\s*<.*>", "", author) for author in package["authors"]]
+    return "; ".join(lines or authors) or "its authors"
+
+
+def licence_of(package: dict) -> str:
+    """The licence as an SPDX expression."""
+    return package["license"].replace("/", " OR ")
+
+
+def checksums() -> dict[tuple[str, str], str]:
+    """The SHA-256 of the packages in Cargo.lock."""
+    text = (ROOT / "Cargo.lock").read_text(encoding="utf-8")
+    pattern = r'name = "(.+)"\nversion = "(.+)"\nsource = .+\nchecksum = "(.+)"'
+    return {(name, version): checksum for name, version, checksum in re.findall(pattern, text)}
+
+
+def bill() -> str:
+    """The list for tools."""
+    sums = checksums()
+    model, components = None, []
+    for package in packages():
+        name, version = package["name"], package["version"]
+        component = {
+            "type": "library",
+            "bom-ref": f"pkg:cargo/{name}@{version}",
+            "name": name,
+            "version": version,
+            "licenses": [{"expression": licence_of(package)}],
+        }
+        if package["source"]:
+            component["copyright"] = copyright_of(package)
+            component["purl"] = component["bom-ref"]
+            component["hashes"] = [{"alg": "SHA-256", "content": sums[name, version]}]
+        if name == MODEL:
+            model = component
+        else:
+            components.append(component)
+    for name, licence, holder, where in BESIDE_CRATES:
+        components.append(
+            {
+                "type": "library",
+                "bom-ref": name,
+                "name": name,
+                "description": where,
+                "licenses": [{"expression": licence}],
+                "copyright": holder,
+            }
+        )
+    content = {"metadata": {"component": model}, "components": components}
+    # The serial number follows from the content, so that it stays when the content does.
+    serial = uuid.uuid5(uuid.NAMESPACE_URL, json.dumps(content, sort_keys=True))
+    head = {"bomFormat": "CycloneDX", "specVersion": "1.6", "serialNumber": f"urn:uuid:{serial}", "version": 1}
+    return json.dumps({**head, **content}, indent=2, ensure_ascii=False) + "\n"
+
+
+def notice() -> str:
+    """The list for people."""
+    rows = [("package", "version", "licence", "copyright")]
+    for package in packages():
+        if package["source"]:
+            rows.append((package["name"], package["version"], licence_of(package), copyright_of(package)))
+    table = [_row(rows, row) for row in rows]
+    beside = [("beside packages", "licence", "copyright", "in the libraries for")]
+    beside += [(name, licence, holder, where) for name, licence, holder, where in BESIDE_CRATES]
+    return HEADER + "".join(table) + "\n" + "".join(_row(beside, row) for row in beside) + FOOTER
+
+
+def _row(rows: list[tuple[str, ...]], row: tuple[str, ...]) -> str:
+    widths = [max(len(line[column]) for line in rows) for column in range(len(row))]
+    return "  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() + "\n"
+
+
+def check() -> None:
+    """Stops if a list is out of date."""
+    for path, text in ((BILL, bill()), (NOTICE, notice())):
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            name = path.relative_to(ROOT).as_posix()
+            raise SystemExit(f"error: {name} is out of date; write it anew: python3 platforms/bill_of_materials.py")
+
+
+def write() -> None:
+    """Writes both lists."""
+    for path, text in ((BILL, bill()), (NOTICE, notice())):
+        if path.is_file() and path.read_text(encoding="utf-8") == text:
+            print(f"{path.relative_to(ROOT)} is up to date")
+            continue
+        unfinished = path.with_name(f".{path.name}.unfinished")
+        unfinished.write_bytes(text.encode())
+        os.replace(unfinished, path)
+        print(f"{path.relative_to(ROOT)} written")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--check"]:
+        check()
+    elif not sys.argv[1:]:
+        write()
+    else:
+        raise SystemExit(__doc__)

@@ -1,0 +1,68 @@
+"""The platforms of the FMU: what is compiled for which, and where it goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+#: The package whose library goes into the FMU, and the modelIdentifier.
+MODEL = "prw_testbed"
+
+#: Enterprise Linux 7 and everything since.
+GLIBC = "2.17"
+
+
+@dataclass(frozen=True)
+class Target:
+    """A Rust target and how the libraries of its kind are called."""
+
+    triple: str
+    suffix: str
+    #: The oldest macOS that the library runs on.
+    macos: str = ""
+
+    @property
+    def library(self) -> str:
+        """The file that cargo makes."""
+        return f"{'' if 'windows' in self.triple else 'lib'}{MODEL}{self.suffix}"
+
+    @property
+    def environment(self) -> str:
+        """How cargo's environment variables for this target begin."""
+        return f"CARGO_TARGET_{self.triple.replace('-', '_').upper()}_"
+
+
+LINUX = Target("x86_64-unknown-linux-gnu", ".so")
+LINUX_ARM = Target("aarch64-unknown-linux-gnu", ".so")
+WINDOWS = Target("x86_64-pc-windows-gnu", ".dll")
+MAC = Target("x86_64-apple-darwin", ".dylib", macos="10.12")
+MAC_ARM = Target("aarch64-apple-darwin", ".dylib", macos="11.0")
+
+#: What `make dist` compiles.
+TARGETS = (LINUX, LINUX_ARM, WINDOWS, MAC, MAC_ARM)
+
+#: What a runner of its own kind compiles instead, see .github/workflows.
+NATIVE_WINDOWS = Target("x86_64-pc-windows-msvc", ".dll")
+
+#: The folders of `binaries/` and what each holds; two targets make a universal library. FMI 2.0.5 names
+#: the ARM folders as FMI 3.0 does; importers on ARM Macs look in darwin64.
+FOLDERS = {
+    "linux64": (LINUX,),
+    "win64": (WINDOWS,),
+    "darwin64": (MAC, MAC_ARM),
+    "aarch64-linux": (LINUX_ARM,),
+    "aarch64-darwin": (MAC_ARM,),
+}
+
+#: Importers on ARM Linux look in linux64, where an FMU for both cannot have it.
+ARM_FOLDERS = {"linux64": (LINUX_ARM,)}
+
+
+def target(triple: str) -> Target:
+    """The target of that name."""
+    for known in (*TARGETS, NATIVE_WINDOWS):
+        if known.triple == triple:
+            return known
+    raise SystemExit(f"error: '{triple}' is no target of this project; see {Path(__file__).name}")

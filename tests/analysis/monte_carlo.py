@@ -1,0 +1,95 @@
+"""Is `prw identify` unbiased, and are its intervals honest? Repetitions on simulated rigs; `make monte-carlo` runs it.
+
+    python tests/analysis/monte_carlo.py target/fmu/prw_testbed.fmu [--repetitions 200] [--sensors all|torque]
+        [--counts 10000] [--workers N] [--out out/monte_carlo.json]
+
+Every repetition has its own rig (parameters up to 30 % off Table 1, where the search starts), its own motion of 10 s at
+1 kHz, its own noise, encoder positions and sensor offsets; see rig.py. Exit status 1 if an estimate is biased by more than
+1 %, or a 95 % interval holds the truth in less than 92 % or more than 98 % of the repetitions.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracle"))
+
+import rig  # noqa: E402
+from threadpoolctl import threadpool_limits  # noqa: E402
+
+from prw.identify.experiment import prepare  # noqa: E402
+from prw.identify.fit import Task, fit  # noqa: E402
+from prw.identify.measurements import Measurements  # noqa: E402
+from prw.identify.model import Model  # noqa: E402
+from prw.identify.statistics import certainty  # noqa: E402
+
+SENSORS = {"all": rig.ALL, "torque": ("tau1", "tau2")}
+
+
+def repetition(fmu: str, seed: int, channels, counts: int) -> tuple:
+    """Logarithms of estimate over truth, and standard errors of the logarithms, both (5,), and the seconds it took."""
+    truth = rig.experiment(seed)
+    columns = rig.measure(truth, seed + 1_000_000, channels, counts)
+    theta = np.column_stack([columns["theta1"], columns["theta2"]])
+    values = np.column_stack([columns[name] for name in channels])
+    measured = Measurements("rig", Path("rig.csv"), truth.time, theta, None, tuple(channels), values, {})
+    with Model(Path(fmu)) as model, threadpool_limits(1):
+        begin = time.perf_counter()
+        bounds = {name: (value / 100, value * 100) for name, value in model.starts.items()}
+        solution = fit(model, [prepare(measured)], Task(rig.NAMES, model.starts, bounds, {}, {}), starts=1)
+        sure = certainty(solution)
+        seconds = time.perf_counter() - begin
+    return solution.logarithms - np.log([truth.parameters[n] for n in rig.NAMES]), sure.relative, seconds
+
+
+def main() -> int:
+    """Run the repetitions, print and write what came of them."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("fmu")
+    parser.add_argument("--repetitions", type=int, default=200)
+    parser.add_argument("--sensors", choices=SENSORS, default="all")
+    parser.add_argument("--counts", type=int, default=rig.COUNTS)
+    parser.add_argument("--workers", type=int, default=multiprocessing.cpu_count())
+    parser.add_argument("--out", type=Path)
+    options = parser.parse_args()
+    arguments = [
+        [options.fmu] * options.repetitions,
+        range(options.repetitions),
+        [SENSORS[options.sensors]] * options.repetitions,
+        [options.counts] * options.repetitions,
+    ]
+    with ProcessPoolExecutor(options.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        found = list(pool.map(repetition, *arguments))
+    errors, sigmas, seconds = (np.array([entry[i] for entry in found]) for i in range(3))
+    inside = np.abs(errors) < 1.959964 * sigmas
+    print(
+        f"{options.repetitions} repetitions, {', '.join(SENSORS[options.sensors])}, encoders of {options.counts} counts, "
+        f"{np.median(seconds):.1f} s each"
+    )
+    print(f"  {'':4}{'mean error':>12}{'its s.e.':>10}{'scatter':>10}{'claimed':>10}{'95 % intervals hold':>22}")
+    rows, good = {}, True
+    for i, name in enumerate(rig.NAMES):
+        bias, scatter, claimed = errors[:, i].mean(), errors[:, i].std(), np.sqrt(np.mean(sigmas[:, i] ** 2))
+        cover = inside[:, i].mean()
+        rows[name] = {"bias": bias, "scatter": scatter, "claimed": claimed, "coverage": cover}
+        good &= abs(bias) < 0.01 and 0.92 <= cover <= 0.98
+        print(
+            f"  {name:4}{bias:>12.4%}{scatter / np.sqrt(len(errors)):>10.4%}{scatter:>10.4%}{claimed:>10.4%}{cover:>22.1%}"
+        )
+    if options.out:
+        options.out.parent.mkdir(parents=True, exist_ok=True)
+        options.out.write_text(json.dumps({"repetitions": options.repetitions, "parameters": rows}, indent=2) + "\n")
+    print("unbiased, intervals honest" if good else "NOT within 1 % bias and 92 to 98 % coverage")
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

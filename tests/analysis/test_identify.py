@@ -1,0 +1,179 @@
+"""`prw identify` on a simulated rig whose equations, motion and sensors share nothing with the FMU."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+import rig
+from lxml import etree
+
+ROOT = Path(__file__).resolve().parents[2]
+DEGREES = {name: ("deg", np.pi / 180) for name in ("theta1", "theta2", "theta3", "theta4", "pitch", "roll")}
+
+
+def report(folder) -> dict:
+    return json.loads((folder / "report.json").read_text())
+
+
+def check_estimates(found: dict, truth: dict, sigmas: float = 4.5, worst: float = 0.02) -> None:
+    """All estimates within `sigmas` of their own standard errors of the truth, and none further than `worst` from it."""
+    for name in rig.NAMES:
+        entry = found["parameters"][name]
+        off = np.log(entry["value"] / truth[name])
+        assert abs(off) < sigmas * entry["relative_standard_error"], f"{name}: {off:+.3%}"
+        assert abs(off) < worst, f"{name}: {off:+.3%}"
+        assert entry["interval_95"][0] < entry["value"] < entry["interval_95"][1]
+
+
+def test_all_sensors(prw, tmp_path, experiment):
+    rig.write(tmp_path / "run.csv", rig.measure(experiment, 5), {**DEGREES, "tau1": ("mN.m", 1e-3)})
+    result = prw("identify", "run.csv")
+    assert result.returncode == 0, result.stderr
+    assert "k1" in result.stdout and "95 % interval" in result.stdout and "next" in result.stdout
+    out = tmp_path / "out" / "identified"
+    assert sorted(p.name for p in out.iterdir()) == ["identified.json", "identified.ssv", "report.html", "report.json"]
+    found = report(out)
+    check_estimates(found, experiment.parameters, worst=0.01)
+    assert found["identified"] and found["fmu_run_differs_by"] < 1e-10
+    noise = {channel["channel"]: channel["noise"] for channel in found["channels"]}
+    assert noise["tau1"] == pytest.approx(0.02, rel=0.4) and noise["pitch"] == pytest.approx(1e-3, rel=0.3)
+    assert found["motors"][0]["quantum"] == pytest.approx(2 * np.pi / rig.COUNTS, rel=1e-3)
+    correlation = np.array(found["correlation"]["matrix"])
+    np.testing.assert_allclose(np.diag(correlation), 1)
+    assert np.linalg.eigvalsh(correlation)[0] > 0
+
+
+def test_the_report_stands_alone(prw, tmp_path, experiment):
+    rig.write(tmp_path / "run.csv", rig.measure(experiment, 6, ("tau1", "tau2", "pitch")), rows=slice(2000, 5000))
+    assert prw("identify", "run.csv", "--starts", 1).returncode == 0
+    text = (tmp_path / "out" / "identified" / "report.html").read_text(encoding="utf-8")
+    assert text.count("<svg") == 3
+    assert not re.search(r'(src|href)="(?!#)', text), "nothing is loaded from elsewhere"
+    assert "prefers-color-scheme: dark" in text and "#010203" not in text
+    etree.HTML(text)
+
+
+def test_torques_alone_and_the_exchanged_couplings(prw, tmp_path, experiment):
+    """Torques see two couplings in series, which may change places: both answers fit, and the note says so."""
+    rig.write(tmp_path / "run.csv", rig.measure(experiment, 7, ("tau1", "tau2")))
+    result = prw("identify", "run.csv", "--starts", 2)
+    assert result.returncode == 0, result.stderr
+    assert "the couplings exchanged" in result.stdout and "theta3 and theta4 would tell" in result.stdout
+    check_estimates(report(tmp_path / "out" / "identified"), experiment.parameters)
+
+
+def test_several_experiments_in_motion_with_gaps_and_uneven_rows(prw, tmp_path, experiment):
+    """One recording is cut out of the motion, the other has lost rows; a slow camera sees pitch and roll."""
+    measured = rig.measure(experiment, 8, log_rates=True)
+    for name in ("pitch", "roll"):
+        measured[name] = np.where(np.arange(len(measured["time"])) % 10 == 0, measured[name], np.nan)
+    rig.write(tmp_path / "a.csv", measured, rows=slice(1234, 5234))
+    keep = np.sort(np.random.default_rng(0).choice(6001, 3000, replace=False))
+    rig.write(tmp_path / "b.csv", rig.measure(experiment, 9, ("tau1", "theta3", "theta4")), rows=keep)
+    result = prw("identify", "a.csv", "b.csv", "--starts", 1)
+    assert result.returncode == 0, result.stderr
+    found = report(tmp_path / "out" / "identified")
+    check_estimates(found, experiment.parameters)
+    assert {c["count"] for c in found["channels"] if c["channel"] == "pitch"} == {400}
+
+
+def test_build_fmu_takes_what_was_identified(prw, tmp_path, experiment, fmu):
+    if not shutil.which("cargo"):
+        pytest.skip("no cargo")
+    rig.write(tmp_path / "run.csv", rig.measure(experiment, 5, ("tau1", "theta3", "theta4")), rows=slice(0, 4000))
+    assert prw("identify", "run.csv", "--starts", 1).returncode == 0
+    out = tmp_path / "out" / "identified"
+    # The description alone: it is made of the parameters that were read, and nothing has to be compiled.
+    command = ["cargo", "run", "--quiet", "--locked", "--release", "--bin", "build_fmu", "--", "--describe"]
+    command += ["--parameters", str(out / "identified.json"), "--out", str(tmp_path / "mine")]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    start = _starts(tmp_path / "mine" / "modelDescription.xml")
+    for name, entry in report(out)["parameters"].items():
+        assert start[name] == pytest.approx(entry["value"], rel=1e-14), name
+    assert start["M"] == 4 and start["N"] == 7
+
+
+def _starts(path) -> dict:
+    found = {}
+    for variable in etree.parse(str(path)).iterfind(".//ScalarVariable[@causality='parameter']"):
+        if variable[0].tag in ("Real", "Integer"):
+            found[variable.get("name")] = float(variable[0].get("start"))
+    return found
+
+
+def test_the_parameter_set_is_ssp(prw, tmp_path, experiment):
+    rig.write(tmp_path / "run.csv", rig.measure(experiment, 5, ("tau1", "theta3", "theta4")), rows=slice(0, 4000))
+    assert prw("identify", "run.csv", "--starts", 1).returncode == 0
+    schema = Path(fmpy.__file__).parent / "ssp" / "schema" / "SystemStructureParameterValues.xsd"
+    document = etree.parse(str(tmp_path / "out" / "identified" / "identified.ssv"))
+    etree.XMLSchema(etree.parse(str(schema))).assertValid(document)
+    found = report(tmp_path / "out" / "identified")["parameters"]
+    name_space = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
+    for element in document.iterfind(".//ssv:Parameter[ssv:Real]", name_space):
+        entry = found[element.get("name")]
+        assert float(element[0].get("value")) == entry["value"] and element[0].get("unit") == entry["unit"]
+
+
+def test_equal_motors_say_nothing_of_the_roll_inertia(prw, tmp_path):
+    """What the data leave open is named, another motion is advised, and no parameters are left lying about."""
+    truth = rig.experiment(seed=3, duration=5, pattern="equal")
+    rig.write(tmp_path / "run.csv", rig.measure(truth, 1, ("tau1", "tau2")))
+    out = tmp_path / "out" / "identified"
+    out.mkdir(parents=True)
+    (out / "identified.json").write_text("of an earlier fit")
+    result = prw("identify", "run.csv", "--estimate", "k2,c3,J3", "--starts", 1)
+    assert result.returncode == 1
+    assert "J3 has hardly any effect on what was measured" in result.stderr
+    assert re.search(r"an experiment with (opposite motors|one motor alone|motors that move independently)", result.stderr)
+    assert "prw excite --measure tau1,tau2" in result.stderr
+    assert not (out / "identified.json").exists() and (out / "report.html").exists()
+    assert "do not determine all" in (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_inertias_that_only_occur_together_are_named_and_a_prior_settles_them(prw, tmp_path, experiment):
+    rig.write(tmp_path / "run.csv", rig.measure(experiment, 1, ("tau1", "tau2", "pitch")), rows=slice(0, 5000))
+    result = prw("identify", "run.csv", "--estimate", "J2,J3,H3", *_fixed(experiment), "--starts", 1)
+    assert result.returncode == 1
+    assert "J2, J3 and H3 cannot be told apart" in result.stderr and "--prior" in result.stderr
+    result = prw("identify", "run.csv", "--estimate", "J3,H3", "--prior", "J2=5%", *_fixed(experiment), "--starts", 1)
+    assert result.returncode == 0, result.stderr
+    found = report(tmp_path / "out" / "identified")["parameters"]
+    assert found["J2"]["relative_standard_error"] == pytest.approx(0.05, rel=0.05)
+    for name in ("J2", "J3", "H3"):
+        off = np.log(found[name]["value"] / experiment.parameters[name])
+        assert abs(off) < 4 * found[name]["relative_standard_error"]
+
+
+def _fixed(truth) -> list:
+    return [word for name in rig.NAMES for word in ("--set", f"{name}={truth.parameters[name]!r}")]
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["--estimate", "k1,k9"], "--estimate: k9 is not known; there are J2, J3, H3, k1"),
+        (["--estimate", "M"], "M, N are counted, not estimated"),
+        (["--prior", "J3=ten"], "--prior J3=ten: write J3=10%"),
+        (["--set", "k1=-4"], "--set k1: '-4' is not a positive number"),
+        (["--bounds", "k1=5:2"], "--bounds k1=5:2: the first must be below the second"),
+        (["--bounds", "k1=1:2"], "k1 starts at 120.894, outside of its bounds 1 to 2"),
+        (["--units", "torque=N.m"], "--units: torque is not known"),
+        (["--noise", "roll=0.1"], "--noise: roll is not known; there are tau1"),
+        (["--quantum", "1kg"], "theta1 cannot be in 'kg'"),
+        (["--starts", "0"], "--starts 0: at least 1 is needed"),
+    ],
+)
+def test_wrong_options(prw, tmp_path, experiment, arguments, message):
+    rig.write(tmp_path / "run.csv", rig.measure(experiment, 1, ("tau1",)), rows=slice(0, 200))
+    result = prw("identify", "run.csv", *arguments)
+    assert result.returncode == 1
+    assert message in result.stderr and result.stderr.count("\n") == 1, result.stderr
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,75 @@
+"""Reading measurements: units from header or option, gaps, and one clear line for everything that can be wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from prw.errors import UserError
+from prw.identify.measurements import read
+
+
+def lines(header: str, rows: int = 30, row: str = "{t},0.1,0.2,{x}") -> str:
+    return header + "\n" + "".join(row.format(t=k / 100, x=k % 7 / 10) + "\n" for k in range(rows))
+
+
+@pytest.fixture
+def file(tmp_path):
+    def write(text: str):
+        path = tmp_path / "run.csv"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def test_units_of_the_header_and_of_the_option(file):
+    path = file(lines("time [ms],theta1 (deg),theta2 [rev],pitch"))
+    measured = read(path, units={"pitch": "mrad"})
+    assert measured.time[-1] == pytest.approx(0.29e-3)
+    np.testing.assert_allclose(measured.theta[0], [np.deg2rad(0.1), 0.4 * np.pi])
+    assert measured.values[6, 0] == pytest.approx(0.6e-3)
+    assert measured.channels == ("pitch",)
+    assert read(path).values[6, 0] == pytest.approx(0.6)
+    assert read(path, degrees=True).values[6, 0] == pytest.approx(np.deg2rad(0.6))
+
+
+@pytest.mark.parametrize("unit, factor", [("N.m", 1), ("Nm", 1), ("N·m", 1), ("mN.m", 1e-3), ("N cm", 1e-2)])
+def test_torque_units(file, unit, factor):
+    measured = read(file(lines(f"time,theta1,theta2,tau1 [{unit}]")))
+    assert measured.values[6, 0] == pytest.approx(0.6 * factor)
+
+
+def test_a_slow_sensor_leaves_cells_empty(file):
+    text = lines("time,theta1,theta2,pitch,tau1", 60, "{t},0.1,0.2,,{x}").splitlines()
+    for k in range(1, 61, 2):
+        text[k] = text[k].replace(",,", f",{k / 100},")
+    measured = read(file("\n".join(text)))
+    assert measured.channels == ("tau1", "pitch")
+    assert np.isfinite(measured.values).sum(axis=0).tolist() == [60, 30]
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        (lines("time,theta1,theta2,x"), "run.csv, row 1: nothing measured; at least one column of tau1, tau2"),
+        (lines("time,theta1,pitch,x"), "row 1: column theta2 is missing; the header has time, theta1, pitch, x"),
+        (lines("time,theta1,theta2,tau1 [deg]"), "row 1, column tau1: tau1 cannot be in 'deg'; use N.m, mN.m"),
+        (lines("time [h],theta1,theta2,tau1"), "row 1, column time: time cannot be in 'h'; use s, ms"),
+        (lines("time,theta1,theta2,omega1"), "column omega2 is missing; give both omega1 and omega2"),
+        (lines("time,theta1,theta1 [deg],tau1"), "row 1, column theta1: appears twice in the header"),
+        (lines("time,theta1,theta2,tau1").replace("0.13,0.1,0.2,0.6", "0.13,0.1,0.2,oops"), "row 15, column tau1: 'oops'"),
+        (lines("time,theta1,theta2,tau1").replace("0.13,0.1,", "0.13,,"), "row 15, column theta1: empty cell"),
+        (lines("time,theta1,theta2,tau1").replace("0.13,0.1", "0.11,0.1"), "row 15, column time: 0.11 runs backwards"),
+        (lines("time,theta1,theta2,tau1", 10), "column tau1: 10 values; at least 20 are needed"),
+    ],
+)
+def test_what_is_wrong_is_said(file, text, message):
+    with pytest.raises(UserError) as error:
+        read(file(text))
+    assert message in str(error.value) and "\n" not in str(error.value)
+
+
+def test_units_that_contradict(file):
+    with pytest.raises(UserError, match="column pitch: in deg by its header, but in rad by --units"):
+        read(file(lines("time,theta1,theta2,pitch [deg]")), units={"pitch": "rad"})

@@ -1,0 +1,77 @@
+"""The motors' paths through quantised, noisy, uneven samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from prw.identify.path import quantum_of, smooth
+
+
+def wave(t):
+    """A motion of 0.3 rad up to 10 Hz: angle and rate."""
+    f, a = np.array([0.7, 3.1, 9.7]), np.array([0.25, 0.04, 0.01])
+    phase = 2 * np.pi * np.outer(t, f) + [0.1, 2.0, 4.0]
+    return np.sin(phase) @ a, np.cos(phase) @ (2 * np.pi * f * a)
+
+
+@pytest.mark.parametrize("counts", [1000, 10_000])
+def test_quantised_angles(counts):
+    t = np.arange(8001) * 1e-3
+    angle, rate = wave(t)
+    quantum = 2 * np.pi / counts
+    path = smooth(t, np.round(np.round(angle / quantum) * quantum, 6))
+    assert path.quantum == pytest.approx(quantum, rel=1e-3)
+    assert path.noise == pytest.approx(quantum / np.sqrt(12), rel=0.05)
+    assert np.std(path.angle(t) - angle) < 0.6 * quantum / np.sqrt(12)
+    raw = np.std(np.gradient(np.round(angle / quantum) * quantum, t) - rate)
+    assert np.std(path.angle.derivative()(t) - rate) < raw / 4
+    lines = np.exp(-2j * np.pi * np.outer([0.7, 3.1, 9.7], t[:7000]))
+    gain = (lines @ path.angle(t)[:7000]) / (lines @ angle[:7000])
+    np.testing.assert_allclose(np.abs(gain), 1, atol=0.01)
+
+
+def test_exact_angles_are_followed():
+    t = np.arange(4001) * 1e-3
+    angle, rate = wave(t)
+    path = smooth(t, angle)
+    assert path.quantum == 0
+    assert np.abs(path.angle(t) - angle).max() < 1e-9
+    assert np.abs(path.angle.derivative()(t) - rate)[5:-5].max() < 1e-4
+
+
+def test_logged_rates_help_and_their_noise_is_found():
+    t = np.arange(8001) * 1e-3
+    angle, rate = wave(t)
+    quantum = 2 * np.pi / 2000
+    coarse = np.round(angle / quantum) * quantum
+    random = np.random.default_rng(0)
+    alone = smooth(t, coarse)
+    both = smooth(t, coarse, rate + random.normal(0, 0.03, len(t)))
+    assert both.rate_noise == pytest.approx(0.03, rel=0.1)
+    errors = [np.std(path.angle.derivative()(t) - rate) for path in (alone, both)]
+    assert errors[1] < errors[0] / 3
+
+
+def test_uneven_samples_and_a_gap():
+    random = np.random.default_rng(3)
+    t = np.sort(random.uniform(0, 8, 5000))
+    t = t[(t < 3) | (t > 3.05)]
+    angle, rate = wave(t)
+    path = smooth(t, angle + random.normal(0, 1e-4, len(t)))
+    even = np.linspace(0.1, 7.9, 4000)
+    assert path.noise == pytest.approx(1e-4, rel=0.1)
+    assert np.std(path.angle(even) - wave(even)[0]) < 3e-4
+
+
+@pytest.mark.parametrize("values", [np.zeros(100), np.full(100, 0.3), np.linspace(0, 1, 100)])
+def test_a_motor_that_rests_or_turns_evenly(values):
+    path = smooth(np.arange(100) * 1e-2, values)
+    assert np.abs(path.angle(np.arange(100) * 1e-2) - values).max() < 1e-6
+
+
+def test_quanta():
+    random = np.random.default_rng(0)
+    assert quantum_of(random.normal(size=1000)) == 0
+    assert quantum_of(0.1 + 0.25 * random.integers(0, 40, 1000)) == pytest.approx(0.25)
+    assert quantum_of(np.round(0.000628 * random.integers(-500, 500, 5000), 6)) == pytest.approx(0.000628, rel=1e-3)

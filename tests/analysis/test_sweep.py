@@ -1,0 +1,107 @@
+"""`prw sweep`: the same numbers as single runs, whoever makes them, and after a kill."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from prw.motion import fig4
+from prw.sweep.study import Study, chunks
+from prw.sweep.workers import on_this_machine
+from prw.testbed import OUTPUTS
+
+
+def rows(folder):
+    return pq.read_table(folder / "runs.parquet").to_pylist()
+
+
+def test_grid_random_and_failures(prw, tmp_path, model):
+    result = prw("sweep", "--grid", "k1=-50:150:3", "--random", "c3=0.4:20%", "--runs", 4, "--workers", 2)
+    assert result.returncode == 0, result.stderr
+    assert "ran         12 runs on 2 processes" in result.stdout
+    assert "failed      4 runs; run 0: the FMU stopped: fmi2SetReal: k1 must not be below 0" in result.stdout
+    table = rows(tmp_path / "out" / "sweep")
+    assert [row["run"] for row in table] == list(range(12))
+    assert [row["status"] for row in table] == ["failed"] * 4 + ["done"] * 8
+    assert np.std(np.log([row["c3"] for row in table])) == pytest.approx(0.2, rel=0.6)
+    for row in (table[5], table[11]):
+        response = model.run(fig4(), {"k1": row["k1"], "c3": row["c3"]})
+        for name in OUTPUTS:
+            assert row[f"{name}_peak"] == np.abs(response[name]).max()
+            assert row[f"{name}_rms"] == pytest.approx(np.sqrt(np.mean(response[name] ** 2)), rel=1e-12)
+            assert row[f"{name}_end"] == response[name][-1]
+    assert all(value is None for key, value in table[0].items() if key.endswith(("_peak", "_rms", "_end")))
+    assert sorted(p.name for p in (tmp_path / "out" / "sweep").iterdir()) == ["runs.parquet", "study.json"]
+
+
+def test_goes_on_after_a_kill(prw, tmp_path, fmu):
+    arguments = ["sweep", "--random", "k1=10%", "--runs", "400", "--workers", "1", "--seed", "3", "--out", "study"]
+    command = [sys.executable, "-m", "prw", *arguments, "--fmu", str(fmu)]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    parts, patience = tmp_path / "study" / "parts", time.monotonic() + 120
+    while not list(parts.glob("[0-9]*.parquet")):
+        assert process.poll() is None and time.monotonic() < patience
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    kept = sum(pq.read_table(part).num_rows for part in parts.glob("[0-9]*.parquet"))
+    assert 0 < kept < 400
+    result = prw(*arguments)
+    assert result.returncode == 0, result.stderr
+    assert "were there already" in result.stdout
+    again = prw("sweep", "--random", "k1=10%", "--runs", 400, "--seed", 3, "--out", "other")
+    assert again.returncode == 0
+    assert rows(tmp_path / "study") == rows(tmp_path / "other"), "as if nothing had happened"
+    assert "nothing: all 400 runs were there already" in prw(*arguments).stdout
+    result = prw(*arguments[:3], "--runs", 401, "--out", "study")
+    assert result.returncode == 1 and "holds another study" in result.stderr
+
+
+def test_a_dying_worker_costs_no_run(fmu):
+    """A process is killed in the middle; its runs are made again."""
+    study = Study(fmu.read_bytes(), fig4(), ("k1",), np.linspace(60, 200, 120)[:, None])
+    results, found = on_this_machine(study, chunks(range(120), 4), 2), []
+    for part in results:
+        if not found:
+            os.kill(multiprocessing.active_children()[0].pid, signal.SIGKILL)
+        found += part
+    assert sorted(row["run"] for row in found) == list(range(120))
+    assert {row["status"] for row in found} == {"done"}
+
+
+def test_dask_cluster(prw, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        address = cluster.scheduler_address
+        result = prw("sweep", "--random", "k1=10%", "--runs", 60, "--scheduler", address, "--out", "remote")
+    assert result.returncode == 0, result.stderr
+    assert f"60 runs on {address}" in result.stdout
+    assert prw("sweep", "--random", "k1=10%", "--runs", 60, "--out", "local").returncode == 0
+    assert rows(tmp_path / "remote") == rows(tmp_path / "local")
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        ([], "nothing varies; add --grid"),
+        (["--grid", "k1=1:2"], "--grid k1=1:2: write k1=LOW:HIGH:N"),
+        (["--grid", "k9=1:2:3"], "--grid: k9 is not known"),
+        (["--grid", "k1=1:2:3", "--random", "k1=5%"], "k1 is in --grid and in --random"),
+        (["--random", "k1=5"], "--random k1=5: write k1=10%"),
+        (["--random", "k1=5%", "--runs", "0"], "--runs 0: at least 1"),
+        (["--random", "k1=5%", "--workers", "0"], "--workers 0: at least 1"),
+        (["--random", "k1=5%", "--input", "none.csv"], "none.csv: cannot be read"),
+    ],
+)
+def test_wrong_options(prw, tmp_path, arguments, message):
+    result = prw("sweep", *arguments)
+    assert result.returncode == 1 and message in result.stderr and result.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,148 @@
+"""Parameters a billion times smaller or larger than Table 1, steps from a nanosecond to hours, a million steps.
+
+PRW_EXTREME_CASES sets how many random testbeds are tried.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+
+import mpmath
+import numpy as np
+import pytest
+
+from lagrange import OUTPUTS, linear_model, table_1
+from reference import augmented, exponential
+
+REAL = ("J2", "J3", "H3", "k1", "k2", "c1", "c2", "c3")
+STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
+CASES = int(os.environ.get("PRW_EXTREME_CASES", "12"))
+#: Of the largest of these systems only 1 digit in 10^25 is left after scaling and squaring with as many.
+DIGITS = 120
+
+many = np.vectorize(mpmath.mpf, otypes=[object])
+
+
+def either_side(values):
+    """The larger of the two sides: (theta3, theta4, ...) -> the same for 3 and 4, and so on."""
+    pairs = np.asarray(values).reshape(-1, 2)
+    return np.repeat(pairs.max(axis=1), 2)
+
+
+class Exact:
+    """One testbed and step size, with so many digits that the matrix exponential is exact."""
+
+    def __init__(self, parameters, h):
+        self.model = linear_model({name: mpmath.mpf(value) for name, value in parameters.items()})
+        self.h = mpmath.mpf(h)
+        self.step_matrix = exponential(augmented(self.model) * self.h)[:6]
+
+    def step(self, x, theta, slope, jump=None):
+        """States and outputs (14,) after a step, and the size of error that rounding must be forgiven.
+
+        That is what one rounding of each number that goes in, state x (6,), motor angles theta (2,), slopes (2,) and
+        their jump (2,) at the begin, makes of the result if the worst comes together on both sides; relative to it an
+        error of 1e-16 could not be smaller. Neither side knows less than the other, for they are stepped as sum and
+        difference; and an angle cannot be better than the angle it is added to.
+        """
+        x, theta, slope = many(x), many(theta), many(slope)
+        model, size = self.model, np.abs(x)
+        if jump is not None:
+            before = theta - many(jump)
+            x = x + model.impulse(theta - before)
+            size = size + abs(np.stack([model.impulse(row) for row in np.eye(2, dtype=int) * many(1)]).T) @ abs(theta)
+        end = self.step_matrix @ np.concatenate([x, theta, slope])
+        size = abs(self.step_matrix) @ np.concatenate([size, abs(theta), abs(slope)])
+        size[:4] += abs(x[:4])
+        size = either_side(size)
+        theta = theta + slope * self.h
+        outputs = model.outputs(end, theta, slope)
+        ratio = model.parameters["N"] / (2 * model.parameters["M"])
+        torque = either_side(abs(model.c) @ size + abs(model.d_angle) @ abs(theta) + abs(model.d_rate) @ abs(slope))
+        sizes = {
+            "tau1": torque[0], "tau2": torque[0],
+            "pitch": size[2], "roll": 2 * ratio * size[2], "pitch_rate": size[4], "roll_rate": 2 * ratio * size[4],
+            "theta3": size[0], "theta4": size[0],
+        }  # fmt: skip
+        return np.concatenate([end, [outputs[n] for n in OUTPUTS]]), np.concatenate([size, [sizes[n] for n in OUTPUTS]])
+
+
+def check(slave, parameters, h, seed, steps=3):
+    """The largest error of any state or output after any of some steps with jumps of the motor angles between."""
+    rng = np.random.default_rng(seed)
+    slave.fmi.setupExperiment(startTime=0.0)
+    slave.set(**{name: int(value) if name in "MN" else float(value) for name, value in parameters.items()})
+    slave.set(**dict(zip(STATES, rng.uniform(-1, 1, 6))))
+    slave.fmi.enterInitializationMode()
+    slave.fmi.exitInitializationMode()
+    angles = [slave.variables[name].valueReference for name in ("theta1", "theta2")]
+    worst, path, exact = 0.0, None, Exact(parameters, h)
+    for k in range(steps):
+        x, theta, slope = slave.get(*STATES), rng.uniform(-1, 1, 2), rng.uniform(-5, 5, 2)
+        slave.fmi.setReal(angles, theta)
+        slave.fmi.setRealInputDerivatives(angles, [1, 1], slope)
+        slave.step(k * h, h)
+        truth, size = exact.step(x, theta, slope, None if path is None else many(theta) - path)
+        path = many(theta) + many(slope) * exact.h
+        found = slave.get(*STATES, *OUTPUTS)
+        assert np.all(np.isfinite(found))
+        worst = max(worst, float(max(abs(many(found) - truth) / size)))
+    assert not slave.complaints()
+    return worst
+
+
+def random_parameters(rng):
+    """Each parameter on its own, between a billionth and a billion times Table 1; one case in three at the ends."""
+    ends = rng.uniform() < 1 / 3
+    decades = rng.choice([-9, 0, 9], 8) if ends else rng.uniform(-9, 9, 8)
+    table = table_1()
+    return {**{name: table[name] * 10.0**d for name, d in zip(REAL, decades)}, "M": 4, "N": 7}
+
+
+@pytest.mark.parametrize("seed", range(CASES))
+def test_far_from_table_1(slave, seed):
+    rng = np.random.default_rng(seed)
+    parameters, h = random_parameters(rng), float(10 ** rng.uniform(-9, 4))
+    with mpmath.workdps(DIGITS):
+        error = check(slave, parameters, h, seed)
+    print(f"{error:.1e}, step {h:.1e} s, {parameters}")
+    assert error < 1e-13
+
+
+@pytest.mark.parametrize(
+    "factors",
+    [
+        {},
+        {"k1": 1e9, "k2": 1e-9, "J2": 1e9, "c2": 1e9},
+        # Next to no damping: what rounding does to a step, a million steps do to the end.
+        {"c1": 1e-9, "c2": 1e-9, "c3": 1e-9},
+    ],
+)
+def test_a_million_steps(slave, factors):
+    # A straight path whose points are exact in binary is, to the testbed, one long step.
+    steps, h, slope = 1_000_000, 2.0**-10, np.array([0.75, -0.5])
+    parameters = {name: value * factors.get(name, 1) for name, value in table_1().items()}
+    parameters.update(M=4, N=7)
+    slave.start((0.0, 0.0), rate=slope, **parameters)
+    names = ("theta1", "theta2")
+    references = (ctypes.c_uint * 2)(*(slave.variables[name].valueReference for name in names))
+    theta, component = (ctypes.c_double * 2)(), slave.fmi.component
+    set_real, do_step = slave.fmi.fmi2SetReal, slave.fmi.fmi2DoStep
+    for k in range(steps):
+        t = k * h
+        theta[0], theta[1] = t * slope[0], t * slope[1]
+        set_real(component, references, 2, theta)
+        do_step(component, t, h, 1)
+    found = slave.get(*STATES, *OUTPUTS)
+    assert not slave.complaints()
+    with mpmath.workdps(DIGITS):
+        exact = Exact(parameters, steps * h)
+        truth, size = exact.step(np.zeros(6), np.zeros(2), slope)
+        # Each of the steps rounds the angles, and the springs make velocities of that.
+        rate = mpmath.sqrt(abs(exact.model.a[4:, :4]).max())
+        for velocity, angle in (4, 2), (5, 3), (10, 8), (11, 9):
+            size[velocity] += rate * size[angle]
+        error = abs(many(found) - truth) / size
+    print([f"{float(e):.1e}" for e in error])
+    assert max(error) < 1e-11

@@ -1,0 +1,178 @@
+"""Fixtures: the FMUs in dist/, their libraries, and C programs that run on each platform."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import fmpy
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DIST = Path(os.environ.get("DIST", ROOT / "dist"))
+sys.path.insert(0, str(ROOT / "platforms"))
+
+import toolchain  # noqa: E402
+from targets import FOLDERS, MODEL  # noqa: E402
+
+#: Debian's package wine64 alone has it only there.
+WINE = "/usr/lib/wine/wine64"
+
+
+@dataclass(frozen=True)
+class Runner:
+    """How C programs are compiled and started for a platform."""
+
+    folder: str
+    compiler: tuple[str, ...]
+    start: tuple[str, ...] = ()
+    links: tuple[str, ...] = ()
+
+
+HERE = Path(__file__).parent
+WARNINGS = ("-std=c11", "-D_GNU_SOURCE", "-O2", "-Wall", "-Wextra", "-Werror", "-I", str(HERE.parent / "c"))
+RUNNERS = (
+    Runner("linux64", ("cc", *WARNINGS), links=("-ldl", "-lm")),
+    Runner(
+        "win64",
+        ("x86_64-w64-mingw32-gcc", *WARNINGS, "-D__USE_MINGW_ANSI_STDIO=1", "-I", str(HERE / "windows")),
+        start=(WINE,),
+    ),
+    Runner(
+        "aarch64-linux",
+        ("aarch64-linux-gnu-gcc", *WARNINGS),
+        start=("qemu-aarch64", "-L", "/usr/aarch64-linux-gnu"),
+        links=("-ldl", "-lm"),
+    ),
+)
+
+
+def pytest_configure():
+    """Stops early where something is missing."""
+    if not (DIST / f"{MODEL}.fmu").is_file():
+        pytest.exit(f"{DIST / MODEL}.fmu is missing; make it with `make dist`", returncode=1)
+    toolchain.need("x86_64-w64-mingw32-gcc", "aarch64-linux-gnu-gcc", "qemu-aarch64", WINE)
+
+
+@pytest.fixture(scope="session")
+def fmu() -> Path:
+    """The FMU for all platforms."""
+    return DIST / f"{MODEL}.fmu"
+
+
+@pytest.fixture(scope="session")
+def unpacked(fmu, tmp_path_factory) -> Path:
+    """The folder of the unpacked FMU."""
+    folder = tmp_path_factory.mktemp("fmu")
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def description(fmu):
+    """FMPy's model description, checked against the XSD as it is read."""
+    return fmpy.read_model_description(str(fmu), validate=True)
+
+
+def library(unpacked: Path, folder: str) -> Path:
+    """The library in a folder of `binaries/`."""
+    (path,) = (unpacked / "binaries" / folder).iterdir()
+    return path
+
+
+@pytest.fixture(scope="session")
+def wine(tmp_path_factory) -> dict[str, str]:
+    """The environment for Windows programs: a Windows of their own, without windows."""
+    prefix = tmp_path_factory.mktemp("wine")
+    environment = {**os.environ, "WINEPREFIX": str(prefix), "WINEDEBUG": "-all", "WINEARCH": "win64"}
+    environment["WINEDLLOVERRIDES"] = "mscoree,mshtml="
+    environment.pop("DISPLAY", None)
+    subprocess.run([WINE, "wineboot", "--init"], env=environment, capture_output=True, timeout=300)
+    return environment
+
+
+@pytest.fixture(params=RUNNERS[1:], ids=lambda runner: runner.folder)
+def foreign(request) -> Runner:
+    """Each platform but this one."""
+    return request.param
+
+
+@pytest.fixture(params=FOLDERS)
+def folder(request) -> str:
+    """Each folder of `binaries/` in turn."""
+    return request.param
+
+
+@pytest.fixture(scope="session")
+def include(description, tmp_path_factory) -> Path:
+    """A folder with variables.h: guid, value references, and what depends on what."""
+    by_name = {variable.name: variable for variable in description.modelVariables}
+    outputs = [unknown.variable for unknown in description.outputs]
+    derivatives = [unknown.variable for unknown in description.derivatives]
+    inputs = [variable for variable in by_name.values() if variable.causality == "input"]
+    lines = [f'#define GUID "{description.guid}"']
+    lines += [f"#define VR_{name} {variable.valueReference}" for name, variable in by_name.items() if name.isidentifier()]
+    for name, variables in (
+        ("outputs", outputs),
+        ("unknowns", outputs + derivatives),
+        ("knowns", inputs + [variable.derivative for variable in derivatives]),
+    ):
+        references = ", ".join(str(variable.valueReference) for variable in variables)
+        lines.append(f"#define {name.upper()} {{{references}}}")
+    folder = tmp_path_factory.mktemp("include")
+    (folder / "variables.h").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def run_c(include, wine, tmp_path_factory):
+    """Compiles a C file for a platform and runs it; gives what it prints."""
+    programs, outputs = {}, {}
+
+    def run(runner: Runner, source: Path, *arguments: str) -> str:
+        if (runner, source) not in programs:
+            program = tmp_path_factory.mktemp(runner.folder) / f"{source.stem}.exe"
+            subprocess.run([*runner.compiler, "-I", include, "-o", program, source, *runner.links], check=True)
+            programs[runner, source] = program
+        program = programs[runner, source]
+        if (program, arguments) not in outputs:
+            process = subprocess.run([*runner.start, program, *arguments], env=wine, capture_output=True, text=True)
+            assert process.returncode == 0, f"{runner.folder}: {process.stderr[-2000:]}{process.stdout[-2000:]}"
+            outputs[program, arguments] = process.stdout
+        return outputs[program, arguments]
+
+    return run
+
+
+def parse(text: str) -> list[tuple[str, list[float]]]:
+    """Lines of a name and numbers; a line of text is a name."""
+    lines = []
+    for line in text.splitlines():
+        name, *numbers = line.split(" ")
+        try:
+            lines.append((name, [float(number) for number in numbers]))
+        except ValueError:
+            lines.append((line, []))
+    return lines
+
+
+def disagreement(ours: str, theirs: str) -> tuple[float, int]:
+    """The largest difference, relative to the largest number under that name and column, and how many numbers."""
+    ours, theirs = parse(ours), parse(theirs)
+    assert [(name, len(numbers)) for name, numbers in ours] == [(name, len(numbers)) for name, numbers in theirs]
+    largest: dict[tuple[str, int], float] = {}
+    for name, numbers in theirs:
+        for column, number in enumerate(numbers):
+            largest[name, column] = max(largest.get((name, column), 0), abs(number))
+    differences = [
+        abs(a - b) / largest[name, column]
+        for (name, mine), (_, other) in zip(ours, theirs)
+        for column, (a, b) in enumerate(zip(mine, other))
+        if a != b
+    ]
+    return max(differences, default=0.0), sum(len(numbers) for _, numbers in ours)

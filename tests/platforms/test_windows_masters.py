@@ -1,0 +1,96 @@
+"""Programs that others wrote for Windows load the FMU there, under Wine.
+
+* libcosim for Windows (from libcosimpy's wheel), with FMI Library in it: unpacks the FMU and steps it. What runs
+  it is in C, because no Python for Windows is to be had as a package.
+* FMPy's program for Windows that loads an FMU and serves it to FMPy elsewhere (its "remoting").
+
+Both are compiled with Microsoft's compiler.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import zipfile
+
+import fmpy.util
+import numpy as np
+import pytest
+from conftest import HERE, ROOT, RUNNERS, WINE, disagreement
+
+
+@pytest.fixture
+def served(fmu, tmp_path):
+    """The FMU with nothing but its Windows library, and FMPy's program to serve it from Wine."""
+    path = tmp_path / "windows.fmu"
+    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(path, "w") as target:
+        for name in source.namelist():
+            if not name.startswith("binaries/") or name.startswith("binaries/win64/"):
+                target.writestr(name, source.read(name))
+    fmpy.util.add_remoting(str(path), "linux64", "win64")
+    return path
+
+
+@pytest.fixture
+def simulate(tmp_path, wine):
+    """Simulates an FMU with FMPy in a process of its own (its remoting cannot be loaded twice in one)."""
+    # The third argument names a file that FMPy keeps locked while it lives; Wine does not see Linux's locks.
+    (tmp_path / "wine64").write_text(f'#!/bin/sh\nexec {WINE} "$1" "$2"\n')
+    (tmp_path / "wine64").chmod(0o755)
+    environment = {**wine, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
+
+    def run(fmu, kind):
+        result = tmp_path / f"{fmu.stem}.csv"
+        command = [sys.executable, str(HERE / "fmpy_run.py"), str(fmu), kind, str(result)]
+        process = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
+        assert process.returncode == 0, process.stdout + process.stderr
+        return np.genfromtxt(result, delimiter=",", names=True), process.stdout
+
+    return run
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_fmpys_server_for_windows(kind, simulate, served, fmu, capsys):
+    (there, said), (here, _) = simulate(served, kind), simulate(fmu, kind)
+    assert "prw_testbed.dll" in said
+    assert there.dtype == here.dtype and len(there) == len(here) == 101
+    largest = max(np.abs(there[name] - here[name]).max() / max(np.abs(here[name]).max(), 1e-9) for name in here.dtype.names)
+    with capsys.disabled():
+        print(f"\n{kind} by FMPy's server for Windows: largest relative difference {largest:.2g} ", end="")
+    assert largest <= 1e-12
+    assert np.abs(here["roll"]).max() > 0.05
+
+
+@pytest.fixture
+def libcosim():
+    """libcosim for Linux and for Windows, from wheels of the version that the other tests use."""
+    (pinned,) = re.findall(r"^libcosimpy==[\d.]+", (ROOT / "tests" / "requirements.txt").read_text(), re.MULTILINE)
+    paths = {}
+    for name, platform, library in (
+        ("linux64", "manylinux_2_28_x86_64", "libcosimc.so"),
+        ("win64", "win_amd64", "cosimc.dll"),
+    ):
+        folder = ROOT / "target" / "libcosim" / name
+        if not list(folder.glob(f"{pinned.replace('==', '-')}*.whl")):
+            command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
+            command += ["--only-binary=:all:", "--python-version", "3.12", "--platform", platform]
+            subprocess.run([*command, "--dest", folder, pinned], check=True)
+        (wheel,) = folder.glob("*.whl")
+        with zipfile.ZipFile(wheel) as archive:
+            paths[name] = archive.extract(f"libcosimpy/libcosimc/{library}", folder)
+    return paths
+
+
+def test_libcosim_for_windows(libcosim, run_c, fmu, capsys):
+    def outputs(runner, path):
+        said = run_c(runner, HERE / "libcosim.c", libcosim[runner.folder], path)
+        assert f"Loading '{runner.folder}' binary" in said
+        return "\n".join(line for line in said.splitlines() if line.startswith("outputs "))
+
+    here, there = (runner for runner in RUNNERS if runner.folder in libcosim)
+    largest, count = disagreement(outputs(there, "Z:" + str(fmu).replace("/", "\\")), outputs(here, str(fmu)))
+    with capsys.disabled():
+        print(f"\nlibcosim for Windows: {count} numbers, largest relative difference {largest:.2g} ", end="")
+    assert count == 200 * 8 and largest <= 1e-12

@@ -1,0 +1,202 @@
+//! The arguments of a call, from bytes: mostly sensible ones, so that simulations get somewhere, and
+//! everything else that a C caller can pass.
+
+use crate::support::Status;
+use arbitrary::{Result, Unstructured};
+use fmi2_export::types::*;
+use prw_testbed::variables::VARIABLES;
+use std::ffi::CStr;
+use std::ptr::{null, null_mut};
+
+/// What is wrong with a pointer. Wrong pointers that the FMU cannot recognize are not passed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fault {
+    None,
+    Null,
+    Misaligned,
+}
+
+/// The arguments of any function; each takes what it has a use for.
+#[derive(Clone, Debug)]
+pub struct Arguments {
+    pub vr: Vec<u32>,
+    pub known: Vec<u32>,
+    pub orders: Vec<i32>,
+    pub reals: Vec<f64>,
+    pub integers: Vec<i32>,
+    pub categories: Vec<fmi2String>,
+    pub flags: [i32; 2],
+    pub kind: i32,
+    pub numbers: [f64; 3],
+    faults: [Fault; 4],
+    /// A length that no array can have.
+    endless: bool,
+}
+
+/// Real numbers to try at least.
+const SPECIAL: [f64; 20] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    1e-9,
+    1e9,
+    1e150,
+    -1e150,
+    1e308,
+    -1e308,
+    f64::MAX,
+    f64::MIN,
+    f64::EPSILON,
+    f64::MIN_POSITIVE,
+    5e-324,
+    -5e-324,
+    f64::NAN,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+    1e-300,
+];
+
+const CATEGORIES: [Option<&CStr>; 8] = [
+    Some(c"logEvents"),
+    Some(c"logStatusWarning"),
+    Some(c"logStatusError"),
+    Some(c"logStatusFatal"),
+    Some(c"logAll"),
+    Some(c"%s%n"),
+    Some(c""),
+    None,
+];
+
+const STEP_SIZES: [f64; 8] = [1e-3, 1e-3, 1e-2, 1.0 / 60.0, 0.1, 2.0, 1e-9, 1e4];
+
+/// Any number.
+fn wild(u: &mut Unstructured) -> Result<f64> {
+    Ok(if u.ratio(2, 3)? { *u.choose(&SPECIAL)? } else { f64::from_bits(u.arbitrary()?) })
+}
+
+/// An ordinary number.
+fn tame(u: &mut Unstructured) -> Result<f64> {
+    Ok(f64::from(u.arbitrary::<i16>()?) / 8192.0)
+}
+
+/// An array; a long one repeats itself.
+fn array<T: Clone>(count: usize, element: impl FnMut() -> Result<T>) -> Result<Vec<T>> {
+    let first: Vec<T> = std::iter::repeat_with(element).take(count.min(16)).collect::<Result<_>>()?;
+    Ok(first.into_iter().cycle().take(count).collect())
+}
+
+fn reals(u: &mut Unstructured, count: usize) -> Result<Vec<f64>> {
+    let is_tame = u.ratio(4, 5)?;
+    array(count, || if is_tame { tame(u) } else { wild(u) })
+}
+
+/// Value references, mostly of variables that the function can use.
+fn references(u: &mut Unstructured, count: usize, function: &str) -> Result<Vec<u32>> {
+    let all = VARIABLES.len() as u32;
+    let (first, last) = match function {
+        "fmi2SetReal" if u.ratio(1, 2)? => (0, 3),
+        "fmi2SetReal" if u.ratio(1, 3)? => (22, 29),
+        "fmi2SetReal" if u.ratio(1, 2)? => (10, 15),
+        "fmi2SetRealInputDerivatives" => (0, 3),
+        "fmi2GetDirectionalDerivative" => (4, 21),
+        name if name.ends_with("Real") || name.ends_with("Derivatives") => (0, 29),
+        name if name.ends_with("Integer") => (30, 31),
+        name if name.ends_with("Boolean") => (32, 32),
+        _ => (0, all - 1),
+    };
+    let fits = u.ratio(15, 16)?;
+    array(count, || {
+        if fits {
+            u.int_in_range(first..=last)
+        } else {
+            Ok(*u.choose(&[all, all + 1, u32::MAX, 1 << 31, all / 2, 0])?)
+        }
+    })
+}
+
+impl Arguments {
+    /// Decodes the arguments of a call at this time of the instance.
+    pub fn decode(u: &mut Unstructured, function: &str, time: f64) -> Result<Self> {
+        let count = match u.int_in_range(0..=63_u8)? {
+            0 => 5000,
+            n @ 1..=50 => usize::from(n % 5),
+            n => usize::from(n - 50),
+        };
+        let count = if function.contains("Continuous") || function == "fmi2GetDerivatives" {
+            if u.ratio(7, 8)? { 6 } else { count }
+        } else {
+            count
+        };
+        let mut fault = || -> Result<Fault> {
+            Ok(match u.int_in_range(0..=63_u8)? {
+                0 => Fault::Null,
+                1 => Fault::Misaligned,
+                _ => Fault::None,
+            })
+        };
+        let faults = [fault()?, fault()?, fault()?, fault()?];
+        let numbers = if function == "fmi2DoStep" {
+            let off = if u.ratio(1, 16)? { wild(u)? } else { *u.choose(&[0.0, 0.0, 1e-12, -1e-12])? };
+            let size = if u.ratio(1, 16)? { wild(u)? } else { *u.choose(&STEP_SIZES)? };
+            [time + off, size, 0.0]
+        } else if u.ratio(3, 4)? {
+            [tame(u)?.abs(), tame(u)?, 10.0 + tame(u)?]
+        } else {
+            [wild(u)?, wild(u)?, wild(u)?]
+        };
+        let known_count = if count > 100 { count } else { u.int_in_range(0..=6)? };
+        let small = |u: &mut Unstructured| -> Result<i32> {
+            Ok(if u.ratio(15, 16)? { u.int_in_range(0..=3)? } else { u.arbitrary()? })
+        };
+        let mut known = references(u, known_count, "fmi2SetReal")?;
+        if known_count == 0 && u.ratio(1, 8)? {
+            known.push(u.arbitrary()?);
+        }
+        Ok(Self {
+            vr: references(u, count, function)?,
+            orders: array(count, || if u.ratio(15, 16)? { Ok(1) } else { small(u) })?,
+            reals: reals(u, count.max(known.len()))?,
+            integers: array(count, || small(u))?,
+            categories: array(count, || Ok(u.choose(&CATEGORIES)?.map_or(null(), CStr::as_ptr)))?,
+            flags: [small(u)?, small(u)?],
+            kind: small(u)?,
+            numbers,
+            known,
+            faults,
+            endless: u.ratio(1, 64)?,
+        })
+    }
+
+    /// The length to pass for arrays of `count` values.
+    pub fn count(&self, count: usize) -> usize {
+        if self.endless { usize::MAX } else { count }
+    }
+
+    /// The pointer to pass for the array at this place of the function's arguments.
+    pub fn pointer<T>(&self, place: usize, values: &[T]) -> *const T {
+        match self.faults[place] {
+            Fault::None => values.as_ptr(),
+            Fault::Null => null(),
+            // Never followed: the FMU refuses it. For bytes it is not misaligned, but then there is no fault.
+            Fault::Misaligned if align_of::<T>() > 1 => values.as_ptr().wrapping_byte_add(1),
+            Fault::Misaligned => values.as_ptr(),
+        }
+    }
+
+    /// The pointer to pass for an array that the function writes.
+    pub fn output<T>(&self, place: usize, values: &mut [T]) -> *mut T {
+        match self.faults[place] {
+            Fault::Null => null_mut(),
+            Fault::Misaligned if align_of::<T>() > 1 => values.as_mut_ptr().wrapping_byte_add(1),
+            _ => values.as_mut_ptr(),
+        }
+    }
+}
+
+/// What a call answered, as bits: NaN compares too.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answer {
+    pub status: Status,
+    pub values: Vec<u64>,
+}
