@@ -14,6 +14,7 @@ mod instance;
 mod logger;
 mod macros;
 mod model;
+mod refusal;
 mod state;
 pub mod types;
 pub mod units;

@@ -27,9 +27,9 @@ pub use common::*;
 pub use model_exchange::*;
 
 use crate::call_table::Function;
-use crate::instance::{Outcome, refuse};
 use crate::logger::Sink;
 use crate::model::Model;
+use crate::refusal::{Outcome, Refusal, refuse};
 use crate::types::*;
 use std::any::Any;
 use std::ffi::CStr;
@@ -80,15 +80,23 @@ unsafe fn call<M: Model>(
     }));
     match outcome {
         Ok(Ok(())) => Status::Ok,
-        Ok(Err(refusal)) => {
-            let _ = catch_unwind(AssertUnwindSafe(|| instance.log_refusal(function, &refusal)));
-            refusal.status
-        }
-        Err(panic) => {
-            let _ = catch_unwind(AssertUnwindSafe(|| instance.break_down(function, panic_message(&*panic))));
-            Status::Fatal
-        }
+        Ok(Err(refusal)) => refused(instance, function, &refusal),
+        Err(panic) => broke_down(instance, function, &*panic),
     }
+}
+
+#[cold]
+#[inline(never)]
+fn refused<M: Model>(instance: &Instance<M>, function: Function, refusal: &Refusal) -> Status {
+    let _ = catch_unwind(AssertUnwindSafe(|| instance.log_refusal(function, refusal)));
+    refusal.status
+}
+
+#[cold]
+#[inline(never)]
+fn broke_down<M: Model>(instance: &mut Instance<M>, function: Function, panic: &(dyn Any + Send)) -> Status {
+    let _ = catch_unwind(AssertUnwindSafe(|| instance.break_down(function, panic_message(panic))));
+    Status::Fatal
 }
 
 fn panic_message(panic: &(dyn Any + Send)) -> &str {
