@@ -25,7 +25,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-fmu fmu bench figures docs closed-loop closed-loop-fmus test-closed-loop dist test-platforms test-reproducible study monte-carlo fuzz sanitize clean need-rust need-nightly
+.PHONY: help demo test test-rust test-fmu fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist test-platforms test-reproducible study monte-carlo fuzz sanitize clean need-rust need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -35,6 +35,7 @@ help:
 	@echo 'make fmu                     build the FMU                          -> $(FMU)'
 	@echo 'make test                    check and test everything'
 	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
+	@echo 'make profile                 count the instructions of a step, with callgrind'
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
 	@echo 'make docs                    write the documentation in the FMU anew'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
@@ -70,8 +71,12 @@ test-fmu: $(VENV)/test.stamp fmu
 	$(PY) -m pytest -q -p no:cacheprovider tests/oracle tests/fmpy tests/analysis
 
 # Ratios of one run; quiet the machine first.
-bench: fmu
-	@benches/run $(FMU)
+bench: $(VENV)/demo.stamp fmu
+	@benches/run $(FMU) $(PY)
+
+# Instructions of a step, counted by callgrind.
+profile: $(VENV)/demo.stamp fmu
+	@benches/profile $(FMU) $(PY)
 
 # The figures and their copies for documentation and README.
 figures: need-rust $(VENV)/demo.stamp fmu

@@ -1,9 +1,11 @@
 /* Times whole steps through the C interface, of several libraries in turn, in one run.
  *   whole GUID FMU.so BARE.so EULER.so
+ *   whole GUID LIBRARY.so WAY STEPS        one of the ways to step alone, for a profiler
  * Each figure is the smallest of several rounds; the rounds of the libraries alternate, so that a machine
  * whose speed drifts treats them alike. Prints a Markdown table. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
+#include <malloc.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdarg.h>
@@ -139,6 +141,17 @@ static double run_life(const Library *l, long times) {
     return (now() - begin) / (double)times;
 }
 
+/* Bytes on the heap per instance. */
+static double memory(const Library *l) {
+    enum { COUNT = 1000 };
+    static Component c[COUNT];
+    size_t before = mallinfo2().uordblks;
+    for (int j = 0; j < COUNT; j++) c[j] = start(l, 0);
+    size_t after = mallinfo2().uordblks;
+    for (int j = 0; j < COUNT; j++) l->release(c[j]);
+    return (double)(after - before) / COUNT;
+}
+
 static double run_many(const Library *l, int count, long rounds) {
     Component *c = malloc((size_t)count * sizeof *c);
     double y[4], t = 0;
@@ -209,9 +222,15 @@ static void errors(const Library *fmu, const Library *l, double *roll, double *t
 }
 
 int main(int argc, char **argv) {
-    if (argc != 5) fail("usage: whole GUID FMU.so BARE.so EULER.so");
+    if (argc != 5) fail("usage: whole GUID FMU.so BARE.so EULER.so, or whole GUID LIBRARY.so WAY STEPS");
     guid = argv[1];
     make_motion();
+    const long steps = strtol(argv[4], NULL, 10);
+    if (steps > 0) {
+        Library alone = load("alone", argv[2]);
+        run(&alone, (Way)strtol(argv[3], NULL, 10), steps);
+        return 0;
+    }
     Library fmu = load("FMU", argv[2]), bare = load("bare C", argv[3]), euler = load("Euler", argv[4]);
     enum { ROUNDS = 15 };
     if (!(difference(&fmu, &bare) < 1e-10)) fail("the bare C version computes something else");
@@ -242,6 +261,7 @@ int main(int argc, char **argv) {
     printf("| 1000 instances in turn / one, per step | %.2f |\n", many / one);
     printf("| two threads / one, throughput | %.2f |\n", single / two);
     printf("| instantiate, initialize and free / one step | %.1f |\n", life / base);
+    printf("| memory of an instance / 4 KiB | %.2f |\n", memory(&fmu) / 4096);
     printf("| forward Euler in C, inner steps of 0.1 ms / FMU | %.1f |\n", slow / base);
     printf("| its error in roll and in torque, of the peak | %.1f %%, %.1f %% |\n", 100 * roll, 100 * torque);
     fprintf(stderr, "instantiate to free %.2f us\n", 1e6 * life);
