@@ -2,8 +2,8 @@
 
     python examples/pretend_rig.py MOTION.csv RUN.csv [--seed N] [--measure tau1,tau2,theta3,theta4,pitch,roll]
 
-It runs the FMU with parameters of its own choice (a seed, a rig), and then spoils its answers: encoders of 10000 counts,
-torques with 20 mN.m of noise, an inertial sensor with 0.06 deg, and an unknown offset on each of them.
+It runs the FMU with parameters of its own choice (a seed, a rig), and then spoils its answers: encoders of 10000
+counts, torques with 20 mN.m of noise, an inertial sensor with 0.06 deg, and an unknown offset on each of them.
 """
 
 from __future__ import annotations
@@ -12,12 +12,27 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from prw import recording
 from prw.identify.model import Model
+from prw.motion import Motion
 
 ENCODER = 360 / 10_000
+#: Motors move smoothly between the rows of a file: the FMU is stepped this many times from one row to the next.
+STEPS = 20
 CHOSEN = ("k1", "k2", "c1", "c2", "c3")
+
+
+def smoothly(motion: Motion) -> Motion:
+    """The motion with STEPS communication points for each of its own."""
+    rows = np.arange(len(motion.time))
+    time = np.interp(np.arange(STEPS * (len(rows) - 1) + 1) / STEPS, rows, motion.time)
+    if motion.omega is None:
+        path = CubicSpline(motion.time, motion.theta)
+    else:
+        path = CubicHermiteSpline(motion.time, motion.theta, motion.omega)
+    return Motion(motion.name, time, path(time), path(time, 1))
 
 
 def main() -> None:
@@ -33,8 +48,11 @@ def main() -> None:
     motion = recording.read(options.motion)
     with Model(options.fmu) as model:
         truth = {name: model.starts[name] * float(rig.uniform(0.75, 1.3)) for name in CHOSEN}
-        response = model.run(motion, truth)
-        shown = {name: f"{truth[name] / model.parameters[name].factor:.5g} {model.parameters[name].shown}" for name in CHOSEN}
+        response = {name: values[::STEPS] for name, values in model.run(smoothly(motion), truth).items()}
+        shown = {
+            name: f"{truth[name] / model.parameters[name].factor:.5g} {model.parameters[name].shown}"
+            for name in CHOSEN
+        }
 
     def encoder(angle: np.ndarray) -> np.ndarray:
         return np.round(np.degrees(angle) / ENCODER + sensors.uniform(-0.5, 0.5)) * ENCODER
@@ -51,7 +69,9 @@ def main() -> None:
         else:
             noise = sensors.normal(0, 0.06, len(motion.time)) + sensors.uniform(-1, 1)
             columns[f"{name} [deg]"] = np.degrees(response[name]) + noise
-    np.savetxt(options.run, np.column_stack(list(columns.values())), "%.6f", ",", header=",".join(columns), comments="")
+    np.savetxt(
+        options.run, np.column_stack(list(columns.values())), "%.6f", ",", header=",".join(columns), comments=""
+    )
     print(f"wrote {options.run}; the rig behind it: " + ", ".join(f"{name} {text}" for name, text in shown.items()))
 
 

@@ -33,7 +33,8 @@ class Truth(NamedTuple):
 def experiment(
     seed: int, duration: float = 10.0, rate: float = 1000.0, pattern: str = "independent", spread: float = 0.3
 ) -> Truth:
-    """A random rig in a random motion: NAMES up to `spread` off Table 1, 40 sines from 0.1 to 20 Hz a motor, 30 deg."""
+    """A random rig in a random motion: NAMES up to `spread` off Table 1, 40 sines from 0.1 to 20 Hz a motor, 30
+    deg."""
     random = np.random.default_rng(seed)
     parameters = dict(table_1())
     for name in NAMES:
@@ -49,8 +50,8 @@ def experiment(
 
 
 def respond(parameters, time: np.ndarray, frequency: np.ndarray, waves: np.ndarray, reach: float = 0.52) -> Truth:
-    """What the rig does when motor i follows the real part of the sum of waves[i] exp(2 pi i f t), scaled to `reach` rad,
-    from rest at its first angle."""
+    """What the rig does when motor i follows the real part of the sum of waves[i] exp(2 pi i f t), scaled to `reach`
+    rad, from rest at its first angle."""
     s = 2j * np.pi * frequency
     turning = np.exp(np.outer(time, s))
     scale = reach / max(np.abs((turning @ wave).real).max() for wave in waves)
@@ -71,13 +72,21 @@ def respond(parameters, time: np.ndarray, frequency: np.ndarray, waves: np.ndarr
     x = steady + transient.real
     tau = x @ model.c.T + theta @ model.d_angle.T + omega @ model.d_rate.T
     pitch, roll = pitch_roll(x[:, 2], x[:, 3], parameters)
-    outputs = {"tau1": tau[:, 0], "tau2": tau[:, 1], "theta3": x[:, 0], "theta4": x[:, 1], "pitch": pitch, "roll": roll}
+    outputs = {
+        "tau1": tau[:, 0],
+        "tau2": tau[:, 1],
+        "theta3": x[:, 0],
+        "theta4": x[:, 1],
+        "pitch": pitch,
+        "roll": roll,
+    }
     return Truth(parameters, time, theta, omega, outputs)
 
 
 def measure(truth: Truth, seed: int, channels: Sequence[str] = ALL, counts: int = COUNTS, log_rates: bool = False):
-    """What the sensors say, by column in SI: encoders on motors and shafts, each with its own zero; torques with 20 mN.m
-    of noise, steps of 5 mN.m and an offset; an inertial sensor with 1 mrad of noise and an offset on pitch and roll."""
+    """What the sensors say, by column in SI: encoders on motors and shafts, each with its own zero; torques with 20
+    mN.m of noise, steps of 5 mN.m and an offset; an inertial sensor with 1 mrad of noise and an offset on pitch and
+    roll."""
     random = np.random.default_rng(seed)
     quantum = 2 * np.pi / counts
 

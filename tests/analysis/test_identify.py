@@ -23,7 +23,8 @@ def report(folder) -> dict:
 
 
 def check_estimates(found: dict, truth: dict, sigmas: float = 4.5, worst: float = 0.02) -> None:
-    """All estimates within `sigmas` of their own standard errors of the truth, and none further than `worst` from it."""
+    """All estimates within `sigmas` of their own standard errors of the truth, and none further than `worst` from
+    it."""
     for name in rig.NAMES:
         entry = found["parameters"][name]
         off = np.log(entry["value"] / truth[name])
@@ -38,7 +39,12 @@ def test_all_sensors(prw, tmp_path, experiment):
     assert result.returncode == 0, result.stderr
     assert "k1" in result.stdout and "95 % interval" in result.stdout and "next" in result.stdout
     out = tmp_path / "out" / "identified"
-    assert sorted(p.name for p in out.iterdir()) == ["identified.json", "identified.ssv", "report.html", "report.json"]
+    assert sorted(p.name for p in out.iterdir()) == [
+        "identified.json",
+        "identified.ssv",
+        "report.html",
+        "report.json",
+    ]
     found = report(out)
     check_estimates(found, experiment.parameters, worst=0.01)
     assert found["identified"] and found["fmu_run_differs_by"] < 1e-10
@@ -132,7 +138,9 @@ def test_equal_motors_say_nothing_of_the_roll_inertia(prw, tmp_path):
     result = prw("identify", "run.csv", "--estimate", "k2,c3,J3", "--starts", 1)
     assert result.returncode == 1
     assert "J3 has hardly any effect on what was measured" in result.stderr
-    assert re.search(r"an experiment with (opposite motors|one motor alone|motors that move independently)", result.stderr)
+    assert re.search(
+        r"an experiment with (opposite motors|one motor alone|motors that move independently)", result.stderr
+    )
     assert "prw excite --measure tau1,tau2" in result.stderr
     assert not (out / "identified.json").exists() and (out / "report.html").exists()
     assert "do not determine all" in (out / "report.html").read_text(encoding="utf-8")
@@ -177,3 +185,15 @@ def test_wrong_options(prw, tmp_path, experiment, arguments, message):
     assert result.returncode == 1
     assert message in result.stderr and result.stderr.count("\n") == 1, result.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_encoder_steps_are_not_taken_for_motion(prw, tmp_path):
+    """Equal motors: the difference of their encoders' steps rolls no wrist, however well J3 fits it. The others are
+    found all the same."""
+    truth = rig.experiment(seed=3, duration=5, pattern="equal")
+    rig.write(tmp_path / "run.csv", rig.measure(truth, 1, ("tau1", "tau2", "theta3", "theta4")))
+    result = prw("identify", "run.csv", "--estimate", "k1,k2,c1,c2,c3,J3", "--starts", 1)
+    assert result.returncode == 1 and "J3 has hardly any effect" in result.stderr
+    assert re.search(r"J3 .*not determined", result.stdout)
+    assert prw("identify", "run.csv", "--starts", 1).returncode == 0
+    check_estimates(report(tmp_path / "out" / "identified"), truth.parameters)

@@ -40,6 +40,23 @@ def test_torque_units(file, unit, factor):
     assert measured.values[6, 0] == pytest.approx(0.6 * factor)
 
 
+@pytest.mark.parametrize(
+    "header",
+    ["t_ms,theta1_deg,theta2/deg,tau1_Nm,pitch_rate_wanted", "# Time (ms),THETA1 deg,theta2 [°],Tau1/N.m,tau1_raw"],
+)
+def test_headers_as_others_write_them(file, header):
+    """Units after `_`, `/` or a space, capitals, numpy's `#` before the header; what is no unit is another thing."""
+    path = file("# rig 2; 13 May\n\n" + lines(header, row="{t},0.1,0.2,{x},0"))
+    measured = read(path)
+    assert measured.time[-1] == pytest.approx(0.29e-3)
+    np.testing.assert_allclose(measured.theta[0], np.deg2rad([0.1, 0.2]))
+    assert measured.channels == ("tau1",) and measured.values[6, 0] == pytest.approx(0.6)
+    assert measured.notes[0] == f"columns ignored: {header.rsplit(',', 1)[1]}"
+    path.write_text(path.read_text().replace("0.29,", "oops,"))
+    with pytest.raises(UserError, match="row 33, column time: 'oops' is not a number"):
+        read(path)
+
+
 def test_a_slow_sensor_leaves_cells_empty(file):
     text = lines("time,theta1,theta2,pitch,tau1", 60, "{t},0.1,0.2,,{x}").splitlines()
     for k in range(1, 61, 2):
@@ -58,9 +75,15 @@ def test_a_slow_sensor_leaves_cells_empty(file):
         (lines("time [h],theta1,theta2,tau1"), "row 1, column time: time cannot be in 'h'; use s, ms"),
         (lines("time,theta1,theta2,omega1"), "column omega2 is missing; give both omega1 and omega2"),
         (lines("time,theta1,theta1 [deg],tau1"), "row 1, column theta1: appears twice in the header"),
-        (lines("time,theta1,theta2,tau1").replace("0.13,0.1,0.2,0.6", "0.13,0.1,0.2,oops"), "row 15, column tau1: 'oops'"),
+        (
+            lines("time,theta1,theta2,tau1").replace("0.13,0.1,0.2,0.6", "0.13,0.1,0.2,oops"),
+            "row 15, column tau1: 'oops'",
+        ),
         (lines("time,theta1,theta2,tau1").replace("0.13,0.1,", "0.13,,"), "row 15, column theta1: empty cell"),
-        (lines("time,theta1,theta2,tau1").replace("0.13,0.1", "0.11,0.1"), "row 15, column time: 0.11 runs backwards"),
+        (
+            lines("time,theta1,theta2,tau1").replace("0.13,0.1", "0.11,0.1"),
+            "row 15, column time: 0.11 runs backwards",
+        ),
         (lines("time,theta1,theta2,tau1", 10), "column tau1: 10 values; at least 20 are needed"),
     ],
 )

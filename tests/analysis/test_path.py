@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from prw.identify.experiment import prepare
+from prw.identify.measurements import Measurements
 from prw.identify.path import quantum_of, smooth
 
 
@@ -75,3 +79,17 @@ def test_quanta():
     assert quantum_of(random.normal(size=1000)) == 0
     assert quantum_of(0.1 + 0.25 * random.integers(0, 40, 1000)) == pytest.approx(0.25)
     assert quantum_of(np.round(0.000628 * random.integers(-500, 500, 5000), 6)) == pytest.approx(0.000628, rel=1e-3)
+
+
+@pytest.mark.parametrize("counts", [4096, 65_536])
+def test_an_encoder_s_errors_in_every_period_are_no_motion(counts):
+    """In the motion of Fig. 4 all of the quantisation is at multiples of 5 Hz. The motor moves at 5 Hz and nowhere
+    else."""
+    t = np.arange(10_001) * 1e-3
+    quantum = 2 * np.pi / counts
+    angle = (1 - np.cos(10 * np.pi * t)) / (10 * np.pi)
+    theta = np.round(np.outer(angle, [1, -1]) / quantum + [0.3, 0.1]) * quantum
+    assert quantum_of(theta[:, 0]) == pytest.approx(quantum)
+    values = np.zeros((len(t), 1))
+    found = prepare(Measurements("run", Path("run.csv"), t, theta, None, ("tau1",), values, {}))
+    assert 5 < found.band < 8

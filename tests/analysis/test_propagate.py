@@ -29,7 +29,9 @@ def test_same_numbers_as_the_fmu(model, values, n, every):
     start = np.array([0.1, -0.2, 0.3, 0.05, 2.0, -1.0])
     for state in (None, start):
         expected = model.run(motion, values, state=state)
-        found = propagate.outputs(stack([model.matrices(values)] * 2), 2.5e-4, motion.theta, motion.omega, every, state)
+        found = propagate.outputs(
+            stack([model.matrices(values)] * 2), 2.5e-4, motion.theta, motion.omega, every, state
+        )
         for i, name in enumerate(OUTPUTS):
             scale = np.abs(expected[name]).max()
             assert np.abs(found[1, :, i] - expected[name][::every]).max() < 1e-12 * scale, name

@@ -98,7 +98,9 @@ BAD = {
         b"time,theta1,theta2,omega2\n0,1,1,1\n1,1,1,1\n",
         "row 1: column omega1 is missing; give both omega1 and omega2, or neither",
     ),
-    "duplicate column": (b"time,theta1,theta2,theta1\n0,1,1,1\n1,1,1,1\n", "row 1, column theta1: appears 2 times"),
+    "spaces": (b"time theta1 theta2\n0 1 1\n1 1 1\n", "separate columns by comma, semicolon or tab"),
+    "wrong unit": (b"time,theta1 [m],theta2\n0,1,1\n1,1,1\n", "row 1, column theta1: theta1 cannot be in 'm'"),
+    "duplicate column": (b"time,theta1,theta2,theta1\n0,1,1,1\n1,1,1,1\n", "row 1, column theta1: appears twice"),
     "short row": (b"time,theta1,theta2\n0,1,1\n1,1\n2,1,1\n", "row 3: 2 cells, but the header has 3"),
     "long row": (b"time,theta1,theta2\n0,1,1\n1,1,1,1\n", "row 3: 4 cells, but the header has 3"),
     "word": (b"time,theta1,theta2\n0,1,1\n1,1,fast\n", "row 3, column theta2: 'fast' is not a number"),
@@ -132,6 +134,29 @@ def test_bad_recordings(prw, tmp_path, case):
     assert complaint in result.stderr
     assert result.stderr.count("\n") == 1 and result.stdout == ""
     assert not (tmp_path / "out").exists()
+
+
+def test_units_in_the_header(tmp_path):
+    file = tmp_path / "run.csv"
+    file.write_text("time [ms],theta1 [deg],theta2 [deg],omega1_rpm,omega2_rpm,tau1 [N.m]\n0,180,90,30,0,1\n5,180,90,30,0,1\n")
+    motion = read(file)
+    np.testing.assert_allclose(motion.time, [0, 5e-3], rtol=1e-15)
+    np.testing.assert_allclose(motion.theta, [[np.pi, np.pi / 2]] * 2, rtol=1e-15)
+    np.testing.assert_allclose(motion.omega, [[np.pi, 0]] * 2, rtol=1e-15)
+    assert "columns ignored: tau1 [N.m]" in motion.notes
+
+
+@pytest.mark.parametrize(
+    ("rows", "note"),
+    [
+        ("0,3.1,0\n0.01,3.14,0\n0.02,-3.13,0\n0.03,-3.1,0\n", "theta1 jumps by 6.27 rad after 0.01 s; angles must run on"),
+        ("0,0,0\n10,0.1,0\n20,0.2,0\n", "a sample every 10 s; if time is in ms, call its column time [ms]"),
+    ],
+)
+def test_slips_are_noted(tmp_path, rows, note):
+    file = tmp_path / "run.csv"
+    file.write_text("time,theta1,theta2\n" + rows)
+    assert any(note in found for found in read(file).notes), read(file).notes
 
 
 def test_other_complaints(prw, tmp_path):

@@ -10,9 +10,9 @@ from prw.simulate import DEFAULT_FMU, DEFAULT_OUT
 
 DESCRIPTION = """\
 Proposes motor motions within the motors' limits and ranks them by what they tell about the parameters: the standard
-errors to be expected from measuring the given channels once, with unknown sensor offsets. Kinds: multisines (slow, wide,
-and one whose spectrum is optimal for the parameters), chirps; with equal, opposite, single and independent motors.
-Each motion becomes a CSV file for `prw simulate --input` or for your motor controller (s, rad, rad/s).
+errors to be expected from measuring the given channels once, with unknown sensor offsets. Kinds: multisines (slow,
+wide, and one whose spectrum is optimal for the parameters), chirps; with equal, opposite, single and independent
+motors. Each motion becomes a CSV file for `prw simulate --input` or for your motor controller (s, rad, rad/s).
 """
 
 EXAMPLES = """\
@@ -33,15 +33,25 @@ def add_parser(subparsers) -> None:
         epilog=EXAMPLES,
         formatter_class=FORMATTER,
     )
-    parser.add_argument("--measure", default="all", metavar="NAMES", help="channels that will be measured (default: all)")
-    parser.add_argument("--angle", type=float, default=40.0, metavar="DEG", help="motor limit, deg (default: %(default)g)")
+    parser.add_argument(
+        "--measure", default="all", metavar="NAMES", help="channels that will be measured (default: all)"
+    )
+    parser.add_argument(
+        "--angle", type=float, default=40.0, metavar="DEG", help="motor limit, deg (default: %(default)g)"
+    )
     parser.add_argument(
         "--speed", type=float, default=450.0, metavar="DEG/S", help="motor limit, deg/s (default: %(default)g)"
     )
     parser.add_argument(
-        "--acceleration", type=float, default=20000.0, metavar="DEG/S2", help="motor limit, deg/s2 (default: %(default)g)"
+        "--acceleration",
+        type=float,
+        default=20000.0,
+        metavar="DEG/S2",
+        help="motor limit, deg/s2 (default: %(default)g)",
     )
-    parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="of a motion (default: %(default)g)")
+    parser.add_argument(
+        "--duration", type=float, default=10.0, metavar="S", help="of a motion (default: %(default)g)"
+    )
     parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="of sampling (default: %(default)g)")
     add_task_options(parser)
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
@@ -63,7 +73,7 @@ def run(arguments: argparse.Namespace) -> None:
 
     from prw.errors import UserError
     from prw.identify import design
-    from prw.identify.channels import MEASURED
+    from prw.channels import MEASURED
     from prw.identify.command import task_of
     from prw.identify.exports import write_json
     from prw.identify.model import Model
@@ -75,10 +85,14 @@ def run(arguments: argparse.Namespace) -> None:
         for name in ("angle", "speed", "acceleration", "duration", "rate")
     )
     if duration < 4 * design.FADE or duration * rate > 2e6:
-        raise UserError(f"--duration {duration:g}: it must be {4 * design.FADE:g} s or more, and at most 2 million samples")
+        raise UserError(
+            f"--duration {duration:g}: it must be {4 * design.FADE:g} s or more, and at most 2 million samples"
+        )
     if rate < 50:
         raise UserError(f"--rate {rate:g}: the testbed moves at up to 30 Hz; sample with 50 Hz or more")
-    channels = tuple(MEASURED) if arguments.measure == "all" else names(arguments.measure, list(MEASURED), "--measure")
+    channels = (
+        tuple(MEASURED) if arguments.measure == "all" else names(arguments.measure, list(MEASURED), "--measure")
+    )
     noise = {**design.default_noise(), **numbers(arguments.noise, list(MEASURED), "--noise")}
     noise = {name: noise[name] for name in channels}
     limits = design.Limits(*np.deg2rad([angle, speed, acceleration]))
@@ -111,7 +125,9 @@ def run(arguments: argparse.Namespace) -> None:
             ],
         },
     )
-    print(f"expected standard errors of one experiment of {duration:g} s at {rate:g} Hz, measuring {', '.join(channels)}")
+    print(
+        f"expected standard errors of one experiment of {duration:g} s at {rate:g} Hz, measuring {', '.join(channels)}"
+    )
     print(f"  {'motion':<28}{'typical':>9}" + "".join(f"{name:>9}" for name in task.names))
     for typical, motion, errors, _ in ranking:
         print(f"  {motion.name:<28}{_percent(typical):>9}" + "".join(f"{_percent(e):>9}" for e in errors))

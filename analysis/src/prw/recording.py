@@ -5,18 +5,18 @@ from __future__ import annotations
 import csv
 import math
 import os
+import re
 from array import array
 from pathlib import Path
-from typing import IO, Callable, Container, Sequence
+from typing import IO, Callable, Container, Mapping
 
 import numpy as np
 
+from prw.columns import ANGLES, RATES, Columns, columns
 from prw.errors import UserError
 from prw.motion import Motion
 from prw.progress import Progress
 
-ANGLES = ("theta1", "theta2")
-RATES = ("omega1", "omega2")
 DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab"}
 
 #: Faster than the testbed's motors will turn on any wrist move, in rad/s; degrees taken for radians are beyond it.
@@ -27,8 +27,10 @@ PLAUSIBLE_ANGLE = 4 * np.pi
 SMALL_MOVE = 0.02
 #: A motor this slow, in rad/s, is taken to stand still.
 SLOW = 0.1
-#: Names of the header that a complaint repeats.
-SHOWN_COLUMNS = 12
+#: Longer between two samples, in s, than anyone lets a motor run unobserved; milliseconds taken for seconds are beyond.
+SLOW_SAMPLING = 0.5
+#: A motor does not turn this far, in rad, from sample to sample; angles that jump by a turn do.
+JUMP = 0.9 * np.pi
 #: Rows between two progress reports.
 REPORT_ROWS = 4096
 
@@ -36,24 +38,27 @@ REPORT_ROWS = 4096
 def read(path: Path, degrees: bool = False) -> Motion:
     """Read columns time (s), theta1, theta2 (rad) and, where present, omega1, omega2 (rad/s) as a Motion.
 
-    The file is UTF-8 text with a header line; columns in any order, others ignored; separated by commas, semicolons or
-    tabs (with semicolons, a decimal comma is understood). `degrees`: angles and rates are in deg and deg/s. Time may be
-    uneven but must increase. Raises UserError naming file, line and column.
+    The file is UTF-8 text with a header line, perhaps below comments after `#`; columns in any order, others ignored;
+    separated by commas, semicolons or tabs (with semicolons, a decimal comma is understood). A unit in the header
+    (`theta1 [deg]`) counts; without, `degrees` means deg and deg/s. Time may be uneven but must increase. Raises
+    UserError naming file, line and column.
     """
-    names, time, values, notes = read_columns(path, _header)
-    if degrees:
-        values = np.deg2rad(values)
-    theta, omega = values[:, :2], values[:, 2:] if "omega1" in names else None
+
+    def choose(path, header, line) -> Columns:
+        return columns(path, header, line, degrees=degrees)
+
+    found, time, values = read_columns(path, choose)
+    theta, omega = values[:, :2], values[:, 2:] if RATES[0] in found.units else None
     with np.errstate(all="ignore"):  # angles near the largest number are the FMU's to refuse
-        notes += doubts(time, theta, omega, degrees)
+        notes = found.notes + doubts(time, theta, omega, found.units)
     return Motion(Path(path).stem, time, np.ascontiguousarray(theta), omega, notes)
 
 
 def read_columns(path: Path, choose: Callable, may_be_empty: Container[str] = ()) -> tuple:
-    """Read numbers from a CSV file like `read` does: (names, time (n,), values (n, len(names)), notes).
+    """Read numbers from a CSV file like `read` does: (Columns, time (n,) in s, values (n, len(taken) - 1) in SI).
 
-    choose(path, header, line) returns the columns to take as [(name, index)] with time first, and notes. An empty cell
-    in a column of `may_be_empty` becomes NaN. Raises UserError naming file, line and column.
+    choose(path, header, line) returns the Columns to take. An empty cell in a column of `may_be_empty` becomes NaN.
+    Raises UserError naming file, line and column.
     """
     try:
         with open(path, encoding="utf-8-sig", newline="") as file:
@@ -67,9 +72,7 @@ def read_columns(path: Path, choose: Callable, may_be_empty: Container[str] = ()
 
 
 def _parse(path: Path, file: IO[str], choose: Callable, may_be_empty: Container[str]) -> tuple:
-    first = file.readline()
-    while first and not first.strip():
-        first = file.readline()
+    begin, first = _top(file)
     if not first:
         raise UserError(
             f"{path}: the file is empty; a header with time, theta1, theta2 and at least two rows are needed"
@@ -78,36 +81,30 @@ def _parse(path: Path, file: IO[str], choose: Callable, may_be_empty: Container[
     file.seek(0)
     table = csv.reader(file, delimiter=delimiter, skipinitialspace=True)
     try:
-        header = [name.strip() for name in next((row for row in table if row), [])]
-        columns, notes = choose(path, header, table.line_num)
+        header = [name.strip() for name in next(row for row in table if row and table.line_num > begin)]
+        header[0] = header[0].lstrip("# ")
+        found = choose(path, header, table.line_num)
         size = os.fstat(file.fileno()).st_size
-        time, values = _rows(path, table, len(header), columns, delimiter == ";", size, may_be_empty)
+        time, values = _rows(path, table, len(header), found.taken, delimiter == ";", size, may_be_empty)
     except csv.Error as error:
         raise UserError(f"{_where(path, table.line_num)}: not a readable CSV row ({error})") from None
     if len(time) < 2:
         rows = "no rows below the header" if len(time) == 0 else "only one row below the header"
         raise UserError(f"{_where(path, table.line_num)}: {rows}; at least two are needed")
-    return [name for name, _ in columns[1:]], time, values, notes
+    factors = found.factors()
+    scale = np.array([factors[name] for name, _ in found.taken])
+    return found, time * scale[0], values * scale[1:]
 
 
-def _header(path: Path, header: Sequence[str], line: int) -> tuple:
-    """The columns to take as [(name, index)] with time first, and notes on the others."""
-    for name in ("time", *ANGLES, *RATES):
-        if header.count(name) > 1:
-            raise UserError(f"{_where(path, line)}, column {name}: appears {header.count(name)} times in the header")
-    for name in ("time", *ANGLES):
-        if name not in header:
-            found = ", ".join(name or "(blank)" for name in header[:SHOWN_COLUMNS])
-            found += ", ..." if len(header) > SHOWN_COLUMNS else ""
-            raise UserError(f"{_where(path, line)}: column {name} is missing; the header has {found}")
-    rates = [name for name in RATES if name in header]
-    if len(rates) == 1:
-        other = RATES[1 - RATES.index(rates[0])]
-        raise UserError(f"{_where(path, line)}: column {other} is missing; give both {' and '.join(RATES)}, or neither")
-    taken = ("time", *ANGLES, *rates)
-    ignored = [name or "(blank)" for name in header if name not in taken]
-    notes = [f"columns ignored: {', '.join(ignored)}"] if ignored else []
-    return [(name, header.index(name)) for name in taken], notes
+def _top(file: IO[str]) -> tuple:
+    """How many lines stand above the header, blank or comments after `#`, and the header, "" if there is none. numpy
+    writes a `#` before the header as well: it is the last comment then, with numbers right below."""
+    count, comment, line = 0, "", file.readline()
+    while line and (not line.strip() or line.lstrip().startswith("#")):
+        count, comment, line = count + 1, line.strip() and line, file.readline()
+    if comment and line.strip() and re.match(r"[-+.\d]", line.lstrip()):
+        return count - 1, comment
+    return count, line
 
 
 def _rows(
@@ -151,14 +148,22 @@ def _rows(
     return values[:, 0].copy(), values[:, 1:].copy()
 
 
-def doubts(time: np.ndarray, theta: np.ndarray, omega, degrees: bool) -> list:
-    """Notes on values that are legal and yet look like a slip of units."""
+def doubts(time: np.ndarray, theta: np.ndarray, omega, units: Mapping[str, str]) -> list:
+    """Notes on values that are legal and yet look like a slip. units: of the columns in the file."""
     notes = []
+    if len(time) > 1 and (step := (time[-1] - time[0]) / (len(time) - 1)) > SLOW_SAMPLING:
+        notes.append(f"a sample every {step:.3g} s; if time is in ms, call its column time [ms]")
     for side, name in enumerate(ANGLES):
         # A percentile, for a single step of a coarse encoder is no speed.
         speed = np.percentile(np.abs(np.diff(theta[:, side]) / np.diff(time)), 99)
         reach = np.abs(theta[:, side]).max()
-        hint = "are these radians?" if degrees else "if the angles are in degrees, add --degrees"
+        hint = "if the angles are in degrees, add --degrees" if units[name] == "rad" else "are these the right units?"
+        steps = np.abs(np.diff(theta[:, side]))
+        if len(steps) and (jump := steps.max()) > JUMP:
+            notes.append(
+                f"{name} jumps by {jump:.3g} rad after {time[steps.argmax()]:.6g} s; angles must run on past a full turn "
+                "(numpy.unwrap makes them)"
+            )
         if speed > PLAUSIBLE_SPEED:
             notes.append(f"{name} turns at {speed:.0f} rad/s ({speed * 30 / np.pi:.0f} rpm); {hint}")
         elif reach > PLAUSIBLE_ANGLE:

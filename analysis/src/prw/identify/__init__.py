@@ -15,7 +15,8 @@ comes closest to what was measured. Sensor offsets and the state at the first ro
 Each FILE is one experiment, a CSV table with the columns
   time, theta1, theta2        and, if logged, the motors' rates omega1, omega2
   tau1 tau2 theta3 theta4 pitch roll pitch_rate roll_rate      any of these; cells may be empty
-Units stand in the header, as in `pitch [deg]` or `tau1 (mN.m)`, or in --units; otherwise SI: s, rad, rad/s, N.m.
+Units stand in the header, as in `pitch [deg]` or `tau1_mNm`, or in --units; otherwise SI: s, rad, rad/s, N.m. Rows may
+be uneven; lines above the header that start with # are comments.
 """
 
 EXAMPLES = """\
@@ -63,11 +64,15 @@ def add_parser(subparsers) -> None:
         help="resolution of the motors' encoders, as in 0.036deg or 0.000628rad (default: found in the data)",
     )
     parser.add_argument("--no-offsets", action="store_true", help="the sensors have no offsets")
-    parser.add_argument("--rest", action="store_true", help="every experiment starts at rest (default: unknown state)")
+    parser.add_argument(
+        "--rest", action="store_true", help="every experiment starts at rest (default: unknown state)"
+    )
     parser.add_argument(
         "--starts", type=int, default=6, metavar="N", help="places to start the search from (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the random places to start from (default: %(default)s)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="of the random places to start from (default: %(default)s)"
+    )
     parser.add_argument(
         "--step",
         type=float,

@@ -14,7 +14,11 @@ from prw.identify.model import Model
 from prw.identify.statistics import UNDETERMINED, covariance_of
 
 #: Sensors that come in pairs.
-SENSORS = {"tau1 and tau2": ("tau1", "tau2"), "theta3 and theta4": ("theta3", "theta4"), "pitch and roll": ("pitch", "roll")}
+SENSORS = {
+    "tau1 and tau2": ("tau1", "tau2"),
+    "theta3 and theta4": ("theta3", "theta4"),
+    "pitch and roll": ("pitch", "roll"),
+}
 #: Estimates that have run away are brought back to this factor of their start values.
 REACH = 10.0
 DURATION, RATE = 10.0, 1000.0
@@ -28,7 +32,7 @@ SAID = {
 
 
 def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) -> List[str]:
-    """Sentences on what would determine all parameters, each with the largest standard error to be expected; the best
+    """What would determine all parameters, each with the largest standard error to be expected; the best
     motion with the same sensors, and the best pair of sensors with the same motions. Only what helps is named."""
     task = solution.task
     first = np.log([task.start[name] for name in task.names])
@@ -43,27 +47,30 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
     for motion in candidates:
         more = design.information(model, [design.plan(motion, channels)], task, point, noise)
         trials.append((_worst(have + more), motion.name))
-    sentences = []
+    sentences: List[str] = []
     for error, name in sorted(trials)[:1]:
         if error < UNDETERMINED:
             pattern = name.rsplit("_", 1)[1]
             said = SAID.get(pattern, "a spectrum made for it")
             sentences.append(
-                f"an experiment with {said} would (worst standard error {error:.1%}); "
-                f"`prw excite --measure {','.join(channels)}` writes its motion as {name}.csv"
+                f"an experiment with {said} (worst standard error then {error:.1%}; "
+                f"`prw excite --measure {','.join(channels)}` writes its motion as {name}.csv)"
             )
     trials = []
     for name, pair in SENSORS.items():
         if set(pair) <= set(channels):
             continue
-        wider = [replace(e, channels=(*e.channels, *(c for c in pair if c not in e.channels)), values=None) for e in experiments]
+        wider = [
+            replace(e, channels=(*e.channels, *(c for c in pair if c not in e.channels)), values=None)
+            for e in experiments
+        ]
         found = design.with_priors(design.information(model, wider, task, point, noise), task)
         trials.append((_worst(found), name))
     for error, name in sorted(trials)[:1]:
         if error < UNDETERMINED:
-            sentences.append(f"measuring {name} as well in the same motion would (worst standard error {error:.1%})")
+            sentences.append(f"measuring {name} as well in the same motion (worst standard error then {error:.1%})")
     if not sentences:
-        sentences.append("no single motion or pair of sensors would; fix one of them or give it a --prior")
+        sentences.append("no single motion or pair of sensors; fix one of them or give it a --prior")
     return sentences
 
 

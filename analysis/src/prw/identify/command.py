@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from prw.errors import UserError
 from prw.identify import options
 from prw.identify.advice import advice
-from prw.identify.channels import MEASURED, QUANTITIES, factor, si_unit
+from prw.channels import MEASURED, QUANTITIES, factor, si_unit
 from prw.identify.experiment import LONGEST_STEP, Experiment, prepare
 from prw.identify.exports import write_json, write_parameters, write_ssv, write_text
 from prw.identify.fit import Prior, Solution, Task, fit
@@ -26,6 +26,8 @@ from prw.identify.statistics import certainty
 #: The FMU's own run and the recurrence that stands in for it agree to this fraction of a channel's range, or something
 #: is wrong.
 AGREEMENT = 1e-8
+#: From this standard error on, a number is no estimate.
+HOPELESS = 1.0
 
 
 def identify(arguments: argparse.Namespace) -> None:
@@ -53,7 +55,8 @@ def identify(arguments: argparse.Namespace) -> None:
     if sure.undetermined:
         what = "; ".join(str(combination) for combination in sure.undetermined)
         raise UserError(
-            f"{what}. {'; '.join(hints)}. {arguments.out / 'report.html'} has the rest; identified.json was not written"
+            f"{what}. What would settle it: {'; or '.join(hints)}. {arguments.out / 'report.html'} has the rest; "
+            "identified.json was not written"
         )
 
 
@@ -67,7 +70,9 @@ def task_of(arguments: argparse.Namespace, model: Model) -> Task:
     chosen = tuple(name for name in known if name in estimate or name in found)
     for name in chosen:
         if start[name] <= 0:
-            raise UserError(f"{name} starts at {start[name]:g} and cannot be estimated from there; add --set {name}=VALUE")
+            raise UserError(
+                f"{name} starts at {start[name]:g} and cannot be estimated from there; add --set {name}=VALUE"
+            )
     return Task(
         chosen,
         start,
@@ -80,8 +85,8 @@ def task_of(arguments: argparse.Namespace, model: Model) -> Task:
 
 
 def confirm(model: Model, experiments: Sequence[Experiment], solution: Solution) -> float:
-    """Run the FMU itself with the estimates, and compare with what the fit took it to answer: the largest difference in
-    terms of a channel's range. Raises UserError where that is not rounding."""
+    """Run the FMU itself with the estimates, and compare with what the fit took it to answer: the largest difference
+    in terms of a channel's range. Raises UserError where that is not rounding."""
     worst = 0.0
     for i, experiment in enumerate(experiments):
         state = experiment.rest() + solution.evaluation.states[i]
@@ -130,11 +135,13 @@ def _summary(arguments: argparse.Namespace, findings: Findings) -> List[str]:
         parameter = findings.model.parameters[name]
         value, low, high = (v / parameter.factor for v in (solution.values[name], sure.low[i], sure.high[i]))
         prior = ", prior" if name in solution.task.priors else ""
-        lines.append(
-            f"  {name:<9} {value:.5g} {parameter.shown}  +- {sure.relative[i]:.2%}   "
-            f"95 % interval {low:.5g} to {high:.5g}{prior}"
-        )
-    lines.append("noise       " + ", ".join(f"{name} {value:.2g} {si_unit(name)}" for name, value in solution.noise.items()))
+        sureness = f"+- {sure.relative[i]:.2%}   95 % interval {low:.5g} to {high:.5g}"
+        if sure.relative[i] > HOPELESS:
+            sureness = "not determined"
+        lines.append(f"  {name:<9} {value:.5g} {parameter.shown}  {sureness}{prior}")
+    lines.append(
+        "noise       " + ", ".join(f"{name} {value:.2g} {si_unit(name)}" for name, value in solution.noise.items())
+    )
     lines += [f"note        {note}" for note in findings.notes()]
     lines.append(
         f"checked     the FMU's own run agrees with the fit's to {findings.confirmed:.0e} of a channel's range"

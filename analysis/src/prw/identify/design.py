@@ -1,8 +1,8 @@
 """Motor motions that tell about the parameters, and how much each of them tells.
 
 The information about the logarithms of the parameters is that of the fit, F of `statistics`, with offsets and initial
-state unknown, for an experiment that is yet to be made. Multisines have harmonics of 1/duration with Schroeder's phases
-(IEEE Trans. Inf. Theory 16 (1970) 85), which keep their peaks low. All motions start and end at rest.
+state unknown, for an experiment that is yet to be made. Multisines have harmonics of 1/duration with Schroeder's
+phases (IEEE Trans. Inf. Theory 16 (1970) 85), which keep their peaks low. All motions start and end at rest.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from typing import Dict, Mapping, Sequence
 
 import numpy as np
 
-from prw.identify.channels import MEASURED
+from prw.channels import MEASURED
 from prw.identify.experiment import Experiment, planned
 from prw.identify.fit import Fitter, Task
 from prw.identify.model import Matrices, Model, stack
-from prw.identify.statistics import condition
+from prw.identify.statistics import condition, genuine
 from prw.motion import Motion
 from prw.testbed import OUTPUTS
 
@@ -72,16 +72,18 @@ PATTERNS = {
 def information(
     model: Model, experiments: Sequence[Experiment], task: Task, logarithms: np.ndarray, noise: Mapping[str, float]
 ) -> np.ndarray:
-    """What experiments that are yet to be made would tell about the logarithms of task.names: (p, p), without priors."""
+    """What experiments, made or yet to be made, would tell about the logarithms of task.names: (p, p), without
+    priors."""
     models = stack([model.matrices(task.values(logarithms))])
     ready = [replace(experiment, values=experiment.simulate(models)[0]) for experiment in experiments]
     fitter = Fitter(model, ready, task)
     fitter.noise = {name: noise[name] for name in fitter.channels}
+    logarithms = np.asarray(logarithms, dtype=float)
     total = np.zeros((len(task.names), len(task.names)))
-    for jacobian in fitter.jacobians(np.asarray(logarithms, dtype=float)):
+    for jacobian in fitter.jacobians(logarithms):
         flat = jacobian.reshape(-1, len(task.names))
         total += flat.T @ flat
-    return total
+    return genuine(total, fitter.spurious(logarithms))
 
 
 def plan(motion: Motion, channels: Sequence[str]) -> Experiment:
@@ -103,7 +105,8 @@ def _lines(duration: float, top: float) -> np.ndarray:
 
 
 def _natural(frequency: np.ndarray, limits: Limits) -> np.ndarray:
-    """Amplitudes that use the limits alike: of angle at low, of rate at middle, of acceleration at high frequencies."""
+    """Amplitudes that use the limits alike: of angle at low, of rate at middle, of acceleration at high
+    frequencies."""
     w = 2 * np.pi * frequency
     return np.minimum(np.minimum(limits.angle, limits.rate / w), limits.acceleration / w**2)
 
@@ -166,8 +169,8 @@ def _within(name: str, time: np.ndarray, motors, limits: Limits) -> Motion:
 
 def _optimal(model: Model, task: Task, time, frequency: np.ndarray, limits: Limits, noise) -> Motion:
     """The multisine whose power is spread over frequencies, equal and opposite motors such that the determinant of the
-    information is largest for what it costs of the limits (D-optimal; multiplicative algorithm, Silvey, Titterington and
-    Torsney, Comm. Stat. A 7 (1978) 1379)."""
+    information is largest for what it costs of the limits (D-optimal; multiplicative algorithm, Silvey, Titterington
+    and Torsney, Comm. Stat. A 7 (1978) 1379)."""
     share = 1e-4
     logarithms = np.log([task.start[name] for name in task.names])
     steps = share * np.vstack([np.eye(len(logarithms)), -np.eye(len(logarithms))])

@@ -22,6 +22,8 @@ LONGEST_STEP = 0.125e-3
 #: samples (power, averaged over neighbouring frequencies) and this much further.
 CLEAR, FURTHER = 10.0, 1.15
 NEIGHBOURS = 9
+#: Draws of the noise that this is judged by.
+DRAWS = 8
 #: Times are even if none is off by more than this fraction of a step.
 EVEN = 1e-3
 #: More communication points than this are not made for one experiment.
@@ -32,9 +34,10 @@ MOST_POINTS = 4_000_000
 class Experiment:
     """name: of the experiment. time: (n,) s, when samples were taken. channels: what was measured. values:
     (n, len(channels)) in SI with NaN for nothing, or None where it is only planned. start, step: first communication
-    point and step in s. theta, omega: (N, 2) rad, rad/s at the communication points. every: every how many of them there
-    is a sample; or 0, and `between` (n, N) interpolates. band: the highest frequency in Hz at which the motors move more
-    than the noise of their samples; the fit looks no further. paths: of the two motors, or None where they are known."""
+    point and step in s. theta, omega: (N, 2) rad, rad/s at the communication points. every: every how many of them
+    there is a sample; or 0, and `between` (n, N) interpolates. band: the highest frequency in Hz at which the motors
+    move more than the noise of their samples; the fit looks no further. paths: of the two motors, or None where they
+    are known."""
 
     name: str
     time: np.ndarray
@@ -73,6 +76,15 @@ class Experiment:
         """The same with the motors at other angles and rates (N, 2) at the communication points."""
         found = propagate.outputs(self._of(models), self.step, theta, omega, max(self.every, 1), state)
         return found if self.every else np.stack([self.between @ table for table in found])
+
+    def wander(self, random: np.random.Generator) -> tuple:
+        """Angles and rates (N, 2) that the noise of the motors' samples pretends while the motors rest."""
+        points = np.minimum(self.motion().time, self.time[-1])
+        drawn = [path.wander(random) for path in self.paths]
+        return (
+            np.column_stack([path(points) for path in drawn]),
+            np.column_stack([path.derivative()(points) for path in drawn]),
+        )
 
     def transients(self, models: Matrices) -> np.ndarray:
         """What the initial state adds to the channels, (n, len(channels), 6), for one stacked model."""
@@ -127,23 +139,33 @@ def prepare(measured: Measurements, quantum: float = 0.0, longest_step: float = 
 
 
 def _band(path: Path, time: np.ndarray, logged: bool) -> float:
-    """The highest frequency in Hz at which the path moves clearly more than the noise of its samples, with a margin."""
+    """The highest frequency in Hz at which the path moves clearly more than the noise of its samples, with a
+    margin."""
     n = len(time)
     even = np.linspace(time[0], time[-1], n)
-    rate = path.angle.derivative()(even)
     frequency = np.fft.rfftfreq(n, even[1] - even[0])
     window = np.hanning(n)
-    power = np.abs(np.fft.rfft((rate - rate.mean()) * window)) ** 2 / (window @ window)
-    power = np.convolve(power, np.ones(NEIGHBOURS) / NEIGHBOURS, mode="same")
+
+    def power(spline) -> np.ndarray:
+        rate = spline.derivative()(even)
+        found = np.abs(np.fft.rfft((rate - rate.mean()) * window)) ** 2 / (window @ window)
+        return np.convolve(found, np.ones(NEIGHBOURS) / NEIGHBOURS, mode="same")
+
     noise = (2 * np.pi * frequency * path.noise) ** 2
     if logged:
         noise = 1 / (1 / np.maximum(noise, 1e-300) + 1 / max(path.rate_noise, 1e-150) ** 2)
-    clear = np.flatnonzero(power[1:] > CLEAR * noise[1:])
-    return FURTHER * frequency[clear[-1] + 1] if len(clear) and np.ptp(rate) > 0 else 0.0
+    # In a periodic motion an encoder's errors are not white, but lines at multiples of the motion's frequency. They
+    # differ much from draw to draw, so the strongest counts; by half, which for white noise is less than its mean.
+    random = np.random.default_rng(0)
+    noise = np.maximum(noise, np.max([power(path.wander(random)) for _ in range(DRAWS)], axis=0) / 2)
+    moving = power(path.angle)
+    clear = np.flatnonzero(moving[1:] > CLEAR * noise[1:])
+    return FURTHER * frequency[clear[-1] + 1] if len(clear) and moving.max() > 0 else 0.0
 
 
 def planned(motion: Motion, channels: Sequence[str]) -> Experiment:
-    """An experiment that is yet to be made: the motors' motion is known, evenly sampled, and the channels have no values."""
+    """An experiment that is yet to be made: the motors' motion is known, evenly sampled, and the channels have no
+    values."""
     step = float(np.diff(motion.time).mean())
     return Experiment(
         motion.name, motion.time, tuple(channels), None, float(motion.time[0]), step, motion.theta, motion.omega, 1

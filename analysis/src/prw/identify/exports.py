@@ -47,7 +47,9 @@ def write_ssv(path: Path, model: Model, values: Mapping[str, float], name: str) 
     for unit in model.units:
         if unit.name in used:
             element = etree.SubElement(units, f"{{{SSC}}}Unit", name=unit.name)
-            exponents = {base: str(getattr(unit.baseUnit, base)) for base in BASE_UNITS if getattr(unit.baseUnit, base)}
+            exponents = {
+                base: str(getattr(unit.baseUnit, base)) for base in BASE_UNITS if getattr(unit.baseUnit, base)
+            }
             etree.SubElement(element, f"{{{SSC}}}BaseUnit", **exponents)
     text = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
     write_text(path, text.decode("utf-8"))

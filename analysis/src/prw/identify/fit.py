@@ -2,8 +2,8 @@
 
 Parameters are sought as logarithms, which keeps them positive and makes their errors relative. Sensor offsets and the
 initial state of each experiment enter linearly; they are eliminated in every evaluation by projection (variable
-projection in the form of Kaufman, BIT 15 (1975) 49), so that the search is over the parameters alone. The noise of each
-channel is that of its residuals, or given.
+projection in the form of Kaufman, BIT 15 (1975) 49), so that the search is over the parameters alone. The noise of
+each channel is that of its residuals, or given.
 
 What is compared are spectra, up to the frequency at which the motors' motion drowns in the noise of their samples. An
 encoder's steps above that band would pass through the model and be taken for motion, which biases damping most (errors
@@ -21,6 +21,8 @@ from scipy.optimize import least_squares
 from prw.errors import UserError
 from prw.identify.experiment import Experiment
 from prw.identify.model import Matrices, Model, stack
+from prw.identify.path import quantum_of, rounding
+from prw.progress import Progress
 
 #: Step of the logarithms for the central differences: errors of 1e-8 in the sensitivities.
 DIFFERENCE = 1e-4
@@ -45,9 +47,9 @@ class Prior(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """What to estimate. names: of the parameters. start: all parameters in SI by name. bounds: (least, greatest) by name,
-    SI. priors: by name. noise: given standard deviations by channel, SI. offsets: whether each channel has an unknown
-    one. initial: whether the initial states are unknown (else rest)."""
+    """What to estimate. names: of the parameters. start: all parameters in SI by name. bounds: (least, greatest) by
+    name, SI. priors: by name. noise: given standard deviations by channel, SI. offsets: whether each channel has an
+    unknown one. initial: whether the initial states are unknown (else rest)."""
 
     names: Tuple[str, ...]
     start: Mapping[str, float]
@@ -61,15 +63,20 @@ class Task:
         """All parameters in SI, with the estimated ones at these logarithms."""
         return {**self.start, **dict(zip(self.names, np.exp(logarithms).tolist()))}
 
+    def span(self) -> Tuple[np.ndarray, np.ndarray]:
+        """The bounds of the logarithms of `names`: least (p,) and greatest (p,)."""
+        low, high = np.log([self.bounds[name] for name in self.names]).T
+        return low, high
+
     def prior_information(self) -> np.ndarray:
         """What the priors know about the logarithms of `names`: (p, p)."""
         return np.diag([1 / self.priors[n].relative ** 2 if n in self.priors else 0.0 for n in self.names])
 
 
 class Evaluation(NamedTuple):
-    """The fit at one set of parameters, a list item for each experiment. residuals: (2 b, c) weighted spectra, real parts
-    above imaginary ones, nuisances taken out. offsets: (c,) SI. states: (6,) what is added to rest. modelled: (n, c) with
-    offsets, SI."""
+    """The fit at one set of parameters, a list item for each experiment. residuals: (2 b, c) weighted spectra, real
+    parts above imaginary ones, nuisances taken out. offsets: (c,) SI. states: (6,) what is added to rest. modelled:
+    (n, c) with offsets, SI."""
 
     residuals: List[np.ndarray]
     offsets: List[np.ndarray]
@@ -79,19 +86,23 @@ class Evaluation(NamedTuple):
 
 @dataclass(frozen=True)
 class Solution:
-    """What was found. logarithms: (p,) of the parameters. noise: by channel, SI; of white noise that is as strong in the band. jacobians: for each
-    experiment (2 b, c, p), weighted like the residuals, nuisances taken out. misfit: sum of squares of weighted residuals
-    and priors. rivals: other minima that fit as well, as (logarithms, misfit). evaluations: simulations that were made."""
+    """What was found. logarithms: (p,) of the parameters. noise: by channel, SI; of white noise that is as strong in
+    the band. jacobians: for each experiment (2 b, c, p), weighted like the residuals, nuisances taken out. spurious:
+    (p, p), information that is none, see Fitter.spurious. misfit: sum of squares of weighted residuals and priors.
+    rivals: other minima that fit as well, as (logarithms, misfit). evaluations: simulations that were made. fitter:
+    what found it, ready to compare at other parameters."""
 
     task: Task
     logarithms: np.ndarray
     noise: Dict[str, float]
     evaluation: Evaluation
     jacobians: List[np.ndarray]
+    spurious: np.ndarray
     misfit: float
     rivals: List[tuple]
     tried: int
     evaluations: int
+    fitter: Fitter
 
     @property
     def values(self) -> Dict[str, float]:
@@ -135,38 +146,72 @@ class Fitter:
 
     def jacobians(self, logarithms: np.ndarray) -> List[np.ndarray]:
         """Derivatives of the weighted model spectra by the logarithms, nuisances taken out: (2 b, c, p) each."""
-        evaluation = self.evaluate(logarithms)
-        count = len(logarithms)
-        steps = DIFFERENCE * np.vstack([np.eye(count), -np.eye(count)])
-        models = self._matrices(logarithms + steps)
+        evaluation, models = self.evaluate(logarithms), self._neighbours(logarithms)
         found = []
         for experiment, state, nuisance in zip(self.experiments, evaluation.states, self._projections):
             start = experiment.rest() + state if self.task.initial else None
-            table = experiment.simulate(models, start)
-            self.evaluations += len(steps)
-            slopes = np.moveaxis(table[:count] - table[count:], 0, -1) / (2 * DIFFERENCE)
-            found.append(nuisance.project(slopes))
+            found.append(nuisance.project(_slopes(experiment.simulate(models, start))))
+            self.evaluations += len(models.A)
         return found
+
+    def spurious(self, logarithms: np.ndarray, draws: int = 3) -> np.ndarray:
+        """The part (p, p) of the information that comes from the noise of the motors' samples passing for motion.
+
+        With equal motors, say, the difference of two encoders' steps seems to roll the wrist a little. It does not,
+        and what the fit concludes from it about J3 is wrong; here the same noise is drawn without any motion."""
+        self.evaluate(logarithms)
+        models, random = self._neighbours(logarithms), np.random.default_rng(0)
+        total = np.zeros((len(logarithms), len(logarithms)))
+        for experiment, nuisance in zip(self.experiments, self._projections):
+            for _ in range(draws if experiment.paths else 0):
+                table = experiment.follow(models, *experiment.wander(random))
+                flat = nuisance.project(_slopes(table)).reshape(-1, len(logarithms))
+                total += flat.T @ flat / draws
+        return total
+
+    def feigned(self, logarithms: np.ndarray, draws: int) -> List[List[np.ndarray]]:
+        """What noise like that of the motors' samples, and like the steps of quantised channels, does to the residuals:
+        for each draw, spectra (2 b, c) for each experiment, weighted, nuisances taken out."""
+        evaluation, random = self.evaluate(logarithms), np.random.default_rng(1)
+        models, found = self._matrices([logarithms]), []
+        for experiment, nuisance, modelled in zip(self.experiments, self._projections, evaluation.modelled):
+            quanta = self._quanta(experiment)
+            for draw in range(draws):
+                table = experiment.follow(models, *experiment.wander(random))[0]
+                for i, quantum in quanta.items():
+                    table[:, i] += rounding(modelled[:, i], quantum, random)
+                found.append((draw, nuisance.project(table)))
+        return [[spectra for draw, spectra in found if draw == wanted] for wanted in range(draws)]
+
+    def _quanta(self, experiment: Experiment) -> Dict[int, float]:
+        """The quantum of each channel, by column, where no other noise blurs it."""
+        found = {}
+        for i, name in enumerate(experiment.channels):
+            values = experiment.values[:, i]
+            quantum = quantum_of(values[np.isfinite(values)])
+            if quantum > self.noise[name]:
+                found[i] = quantum
+        return found
+
+    def residuals(self, logarithms: np.ndarray) -> np.ndarray:
+        """All weighted residuals in one row, and how far the parameters are off their priors: (r,)."""
+        centre, strength = self._priors()
+        weighted = (residual.ravel() for residual in self.evaluate(logarithms).residuals)
+        return np.concatenate([*weighted, strength * (centre - logarithms)])
+
+    def slopes(self, logarithms: np.ndarray) -> np.ndarray:
+        """Derivatives (r, p) of residuals() by the logarithms."""
+        rows = [-jacobian.reshape(-1, len(logarithms)) for jacobian in self.jacobians(logarithms)]
+        return np.vstack([*rows, -np.diag(self._priors()[1])])
 
     def search(self, start: np.ndarray, coarse: bool = False):
         """scipy's trust-region least squares from `start` at the present noise."""
-        task = self.task
-        centre = np.array([np.log(task.priors[n].value) if n in task.priors else 0.0 for n in task.names])
-        strength = np.array([1 / task.priors[n].relative if n in task.priors else 0.0 for n in task.names])
-        low, high = (np.log([task.bounds[n][i] for n in task.names]) for i in (0, 1))
-
-        def residuals(x) -> np.ndarray:
-            return np.concatenate([*(r.ravel() for r in self.evaluate(x).residuals), strength * (centre - x)])
-
-        def jacobian(x) -> np.ndarray:
-            rows = [-j.reshape(-1, len(x)) for j in self.jacobians(x)]
-            return np.vstack([*rows, -np.diag(strength)])
-
+        low, high = self.task.span()
         margin = 1e-6
         return least_squares(
-            residuals,
+            self.residuals,
             np.clip(start, low + margin, high - margin),
-            jacobian,
+            self.slopes,
             bounds=(low, high),
             method="trf",
             ftol=1e-5 if coarse else 1e-12,
@@ -175,9 +220,17 @@ class Fitter:
             max_nfev=25 if coarse else 100,
         )
 
+    def _priors(self) -> tuple:
+        """Logarithms (p,) of the priors' values, and 1/sigma (p,), 0 where there is none."""
+        priors = [self.task.priors.get(name) for name in self.task.names]
+        return (
+            np.array([np.log(prior.value) if prior else 0.0 for prior in priors]),
+            np.array([1 / prior.relative if prior else 0.0 for prior in priors]),
+        )
+
     def judge_noise(self, evaluation: Evaluation) -> Dict[str, float]:
-        """Strength of each channel's residuals in the band, over all experiments, as that of white noise in SI, where none
-        is given."""
+        """Strength of each channel's residuals in the band, over all experiments, as that of white noise in SI, where
+        none is given."""
         squares: Dict[str, float] = {}
         counts: Dict[str, float] = {}
         for experiment, residual in zip(self.experiments, evaluation.residuals):
@@ -209,15 +262,27 @@ class Fitter:
     def _weights(self, experiment: Experiment) -> np.ndarray:
         return np.isfinite(experiment.values) / np.array([self.noise[name] for name in experiment.channels])
 
+    def _neighbours(self, logarithms: np.ndarray) -> Matrices:
+        """The models a little further, and a little back, in the direction of each parameter: 2 p of them."""
+        steps = DIFFERENCE * np.eye(len(logarithms))
+        return self._matrices(np.vstack([logarithms + steps, logarithms - steps]))
+
     def _matrices(self, points) -> Matrices:
         return stack([self.model.matrices(self.task.values(x)) for x in points])
+
+
+def _slopes(table: np.ndarray) -> np.ndarray:
+    """Derivatives (n, c, p) from the outputs (2 p, n, c) of Fitter._neighbours."""
+    count = len(table) // 2
+    return np.moveaxis(table[:count] - table[count:], 0, -1) / (2 * DIFFERENCE)
 
 
 class _Nuisance:
     """Offsets and initial state of one experiment: solved for, and projected out of residuals and sensitivities."""
 
     def __init__(self, weights: np.ndarray, bins: int, transients: Optional[np.ndarray], offsets: bool):
-        """weights: (n, c), 1/noise or 0. bins: number of frequencies that are compared. transients: (n, c, 6) or None."""
+        """weights: (n, c), 1/noise or 0. bins: number of frequencies that are compared. transients: (n, c, 6) or
+        None."""
         self._weights, self._bins, channels = weights, bins, weights.shape[1]
         columns = [np.eye(channels)[None] * np.ones((len(weights), 1, 1))] if offsets else []
         columns += [transients] if transients is not None else []
@@ -280,20 +345,22 @@ def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int
     # Other minima, at the noise that the first one has.
     minima = [(point, 2 * fitter.search(point).cost)]
     others = _other_starts(task, fitter.channels, point, starts - 1, seed)
-    for start in others:
-        found = fitter.search(start, coarse=True)
-        better = 2 * found.cost < min(misfit for _, misfit in minima) + max(RIVAL, 0.05 * len(found.fun))
-        if not better or any(np.abs(found.x - x).max() < SAME for x, _ in minima):
-            continue
-        found = fitter.search(found.x)
-        if not any(np.abs(found.x - x).max() < SAME for x, _ in minima):
-            minima.append((found.x, 2 * found.cost))
+    with Progress("looking for other minima", len(others)) as progress:
+        for done, start in enumerate(others):
+            progress(done)
+            found = fitter.search(start, coarse=True)
+            better = 2 * found.cost < min(misfit for _, misfit in minima) + max(RIVAL, 0.05 * len(found.fun))
+            if not better or any(np.abs(found.x - x).max() < SAME for x, _ in minima):
+                continue
+            found = fitter.search(found.x)
+            if not any(np.abs(found.x - x).max() < SAME for x, _ in minima):
+                minima.append((found.x, 2 * found.cost))
     best = min(misfit for _, misfit in minima)
     alike = [minimum for minimum in minima if minimum[1] < best + RIVAL]
     alike.sort(key=lambda minimum: np.sum((minimum[0] - first) ** 2))
     point = _settle(fitter, alike[0][0])
     misfit = 2 * fitter.search(point).cost
-    evaluation, jacobians = fitter.evaluate(point), fitter.jacobians(point)
+    evaluation, jacobians, spurious = fitter.evaluate(point), fitter.jacobians(point), fitter.spurious(point)
     rivals = [(x, chi) for x, chi in alike[1:] if np.abs(x - point).max() > SAME]
     return Solution(
         task,
@@ -301,10 +368,12 @@ def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int
         fitter.noise,
         evaluation,
         jacobians,
+        spurious,
         misfit,
         rivals,
         len(others) + 1,
         fitter.evaluations,
+        fitter,
     )
 
 
@@ -332,7 +401,7 @@ def _other_starts(task: Task, channels, point: np.ndarray, count: int, seed: int
             mirrored[[place[a], place[b]]] = point[[place[b], place[a]]]
         starts.append(mirrored)
     random = np.random.default_rng(seed)
-    low, high = (np.log([task.bounds[n][i] for n in task.names]) for i in (0, 1))
+    low, high = task.span()
     first = np.log([task.start[name] for name in task.names])
     while len(starts) < count:
         starts.append(np.clip(first + random.uniform(-np.log(3), np.log(3), len(first)), low, high))

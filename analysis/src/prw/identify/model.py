@@ -1,4 +1,5 @@
-"""The testbed FMU as a function of its parameters: one instance, reset and run again, or asked for its linear model."""
+"""The testbed FMU as a function of its parameters: one instance, reset and run again, or asked for its linear
+model."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ INPUTS = ("theta1", "theta2", "omega1", "omega2")
 
 
 class Parameter(NamedTuple):
-    """A parameter as the FMU declares it. start: its start value in SI. shown, factor: the unit it is shown in, and what
-    a value in that unit is multiplied with to be in SI. meaning: its description."""
+    """A parameter as the FMU declares it. start: its start value in SI. shown, factor: the unit it is shown in, and
+    what a value in that unit is multiplied with to be in SI. meaning: its description."""
 
     name: str
     start: float
@@ -29,8 +30,9 @@ class Parameter(NamedTuple):
 
 
 class Matrices(NamedTuple):
-    """x' = A x + B u, y = C x + D u of eq. (11), with the FMU's states and inputs in the order of STATES and INPUTS and
-    its outputs in the order of OUTPUTS: A (6, 6), B (6, 4), C (8, 6), D (8, 4). Or m of them stacked: A (m, 6, 6) ..."""
+    """x' = A x + B u, y = C x + D u of eq. (11), with the FMU's states and inputs in the order of STATES and INPUTS
+    and its outputs in the order of OUTPUTS: A (6, 6), B (6, 4), C (8, 6), D (8, 4). Or m of them stacked: A (m, 6, 6)
+    ..."""
 
     A: np.ndarray
     B: np.ndarray
@@ -62,7 +64,9 @@ class Model(Testbed):
             if v.type == "Real":
                 unit, display = v.unit, v.displayUnit or v.unit
                 factor = shown.get((unit, display), 1.0)
-                self.parameters[v.name] = Parameter(v.name, float(v.start), unit, display, factor, v.description or "")
+                self.parameters[v.name] = Parameter(
+                    v.name, float(v.start), unit, display, factor, v.description or ""
+                )
             elif v.type == "Integer":
                 self.counts[v.name] = int(v.start)
         if self._description.coSimulation.providesDirectionalDerivative is not True:
@@ -91,8 +95,9 @@ class Model(Testbed):
     def run(
         self, motion: Motion, values: Mapping[str, float], outputs: Sequence[str] = OUTPUTS, state=None
     ) -> Dict[str, np.ndarray]:
-        """Reset the FMU, give it the parameters `values` (SI, by name; others keep their start values) and let it follow
-        `motion`, as Testbed.respond does. state: (6,) initial x; default: at rest at the motors' first angles."""
+        """Reset the FMU, give it the parameters `values` (SI, by name; others keep their start values) and let it
+        follow `motion`, as Testbed.respond does. state: (6,) initial x; default: at rest at the motors' first
+        angles."""
         self._values = dict(values)
         if state is not None:
             self._values.update(zip(STATES, map(float, state)))

@@ -8,7 +8,8 @@ is follows from the recording by maximum likelihood; an encoder's noise is at le
 
 from __future__ import annotations
 
-from typing import NamedTuple, Optional
+from functools import partial
+from typing import Callable, NamedTuple, Optional
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -29,36 +30,52 @@ GUESSES = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
 UNDERSMOOTHING = 16.0
 #: A column is a multiple of a quantum if all its values are, to this fraction of the quantum.
 ON_GRID = 0.05
+#: So many quanta at most lie between neighbouring values of a typical column.
+MOST_STEPS = 50
 #: Values that are looked at to find the quantum.
 QUANTUM_VALUES = 20000
 
 
 class Path(NamedTuple):
-    """The motion of one motor. angle: spline of the angle over time (rad, s); its derivative is the rate. noise: standard
-    deviation of the samples, rad. quantum: of the samples, rad, 0 if none. rate_noise: of the logged rates, rad/s, or
-    None. follows: frequency up to which the path follows the samples, Hz."""
+    """The motion of one motor. angle: spline of the angle over time (rad, s); its derivative is the rate. noise:
+    standard deviation of the samples, rad. quantum: of the samples, rad, 0 if none. rate_noise: of the logged rates,
+    rad/s, or None. follows: frequency up to which the path follows the samples, Hz. wander: draws what noise like
+    theirs, smoothed the same way, adds to the path."""
 
     angle: BSpline
     noise: float
     quantum: float
     rate_noise: Optional[float]
     follows: float
+    wander: Callable[[np.random.Generator], BSpline]
 
 
 def smooth(time: np.ndarray, theta: np.ndarray, omega: Optional[np.ndarray] = None, quantum: float = 0.0) -> Path:
     """The most probable path of a motor through the angles theta (n,) rad and, where logged, rates omega (n,) rad/s at
-    the times (n,) s, which may be uneven. quantum: of the angles in rad, where it is known to be coarser than it looks."""
+    the times (n,) s, which may be uneven. quantum: of the angles in rad, where it is known to be coarser than it
+    looks."""
     quantum = max(quantum, quantum_of(theta))
     spline = _Spline(time)
     angles = spline.rows(time, 0)
-    if omega is None:
-        coefficients, noise, penalty, _ = _fit(spline, [(angles, theta)], quantum)
-        rate_noise = None
-    else:
-        coefficients, noise, penalty, weight = _fit(spline, [(angles, theta), (spline.rows(time, 1), omega)], quantum)
-        rate_noise = noise / np.sqrt(weight)
+    blocks = [(angles, theta)] + ([(spline.rows(time, 1), omega)] if omega is not None else [])
+    coefficients, noise, penalty, weights, solve = _fit(spline, blocks, quantum)
+    strengths = noise / np.sqrt(weights)
+
+    path = spline.curve(coefficients)
+
+    def error(random: np.random.Generator) -> np.ndarray:
+        if noise >= quantum:
+            return random.normal(0, noise, len(time))
+        return rounding(path(time), quantum, random)
+
+    def wander(random: np.random.Generator) -> BSpline:
+        errors = [error(random)] + [random.normal(0, strength, len(time)) for strength in strengths[1:]]
+        drawn = (w * (rows.T @ values) for w, values, (rows, _) in zip(weights, errors, blocks))
+        return spline.curve(solve(sum(drawn)))
+
+    rate_noise = float(strengths[1]) if omega is not None else None
     follows = penalty ** (-1 / (2 * ORDER)) / (2 * np.pi * spline.spacing)
-    return Path(spline.curve(coefficients), noise, quantum, rate_noise, min(follows, 0.5 / spline.spacing))
+    return Path(path, noise, quantum, rate_noise, min(follows, 0.5 / spline.spacing), wander)
 
 
 def quantum_of(values: np.ndarray) -> float:
@@ -68,13 +85,20 @@ def quantum_of(values: np.ndarray) -> float:
         return 0.0
     gaps = np.diff(levels)
     # Digits cut off in the file make two values of one level; what is left of the gaps is one quantum or several.
-    gaps = gaps[gaps > 0.2 * np.median(gaps)]
+    gaps = gaps[gaps > np.median(gaps) / MOST_STEPS]
     quantum = gaps.min()
     for _ in range(3):
         multiples = np.rint(gaps / quantum)
         quantum = gaps.sum() / multiples.sum()
     off = np.abs(gaps / quantum - np.rint(gaps / quantum))
-    return float(quantum) if off.max() < ON_GRID and np.median(np.rint(gaps / quantum)) < 50 else 0.0
+    return float(quantum) if off.max() < ON_GRID and np.median(np.rint(gaps / quantum)) < MOST_STEPS else 0.0
+
+
+def rounding(values: np.ndarray, quantum: float, random: np.random.Generator) -> np.ndarray:
+    """The errors of an encoder with a random zero at the values (n,). It errs the same way at the same angle, and so
+    alike in every period of a motion."""
+    level = values / quantum + random.uniform()
+    return (np.rint(level) - level) * quantum
 
 
 class _Spline:
@@ -124,9 +148,12 @@ def _fit(spline: _Spline, blocks, quantum: float) -> tuple:
         normals.append(normal)
         rights.append(rows.T @ values)
 
-    def solve(penalty: float, weights) -> tuple:
+    def factorize(penalty: float, weights) -> np.ndarray:
         normal = penalty * spline.penalty + sum(w * n for w, n in zip(weights, normals))
-        factor = cholesky_banded(normal, overwrite_ab=True, check_finite=False)
+        return cholesky_banded(normal, overwrite_ab=True, check_finite=False)
+
+    def solve(penalty: float, weights) -> tuple:
+        factor = factorize(penalty, weights)
         right = sum(w * r for w, r in zip(weights, rights))
         coefficients = cho_solve_banded((factor, False), right, check_finite=False)
         misfit = sum(w * np.sum((values - rows @ coefficients) ** 2) for w, (rows, values) in zip(weights, blocks))
@@ -135,7 +162,8 @@ def _fit(spline: _Spline, blocks, quantum: float) -> tuple:
         return coefficients, misfit + penalty * (bend @ bend), spread
 
     def most_probable(variance: Optional[float]) -> tuple:
-        """Minus twice the logarithm of the likelihood at its minimum over penalty and weights, as (penalty, weights)."""
+        """Minus twice the logarithm of the likelihood at its minimum over penalty and weights, as (penalty,
+        weights)."""
 
         def unlikeliness(x) -> float:
             weights = _weights(x)
@@ -157,7 +185,8 @@ def _fit(spline: _Spline, blocks, quantum: float) -> tuple:
         variance = least
         penalty, weights = most_probable(variance)
     penalty = max(penalty / UNDERSMOOTHING, 10.0 ** STIFFNESS[0])
-    return solve(penalty, weights)[0], float(np.sqrt(variance)), penalty, weights[-1]
+    again = partial(cho_solve_banded, (factorize(penalty, weights), False), check_finite=False)
+    return solve(penalty, weights)[0], float(np.sqrt(variance)), penalty, weights, again
 
 
 def _weights(x) -> list:

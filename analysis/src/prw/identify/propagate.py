@@ -1,8 +1,8 @@
 """What the FMU answers, computed from its linear model for all samples at once.
 
 A run of the FMU through Python costs a few microseconds per communication point and call. The FMU is linear with known
-stepping rules (README, "What the motors do between communication points"), and it gives its A, B, C and D itself. So the
-same numbers follow from a linear recurrence, which numpy does in blocks: with use_omega, over a step from t to t + h
+stepping rules (README, "What the motors do between communication points"), and it gives its A, B, C and D itself. The
+same numbers follow from a linear recurrence, which numpy does in blocks: with use_omega, over a step of size h from t
 
     x <- x + B2 (theta(t) - end of the last line)       the jump, B2 being the rate columns of B; none at the start
     x(t + h) = exp(A h) x + integral of exp(A (h - s)) (B1 (theta + omega s) + B2 omega) ds
@@ -21,7 +21,12 @@ from prw.identify.model import Matrices
 
 
 def outputs(
-    model: Matrices, h: float, theta: np.ndarray, omega: np.ndarray, every: int = 1, state: Optional[np.ndarray] = None
+    model: Matrices,
+    h: float,
+    theta: np.ndarray,
+    omega: np.ndarray,
+    every: int = 1,
+    state: Optional[np.ndarray] = None,
 ) -> np.ndarray:
     """The outputs (m, k, 8) of m stacked linear models at every `every`-th of the communication points, k of them.
 

@@ -12,12 +12,13 @@ from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from prw.identify.channels import si_unit
+from prw.channels import si_unit
 from prw.identify.results import Findings
 from prw.plots import BLUE, PAGE_STYLE, VERMILION, envelope
 
-#: Stands in figures for the page's text colour, which depends on light or dark.
+#: Stands in figures for the page's text colour, which depends on light or dark, as those of the curves do.
 INK = "#010203"
+COLOURS = {INK: "currentColor", BLUE.lower(): "var(--blue)", VERMILION.lower(): "var(--red)"}
 #: Time intervals in which a curve is drawn by its extremes; about one for each point on the screen.
 INTERVALS = 500
 #: Shown in these units: more telling than radians.
@@ -25,6 +26,7 @@ SHOWN = {"rad": ("deg", np.degrees(1.0)), "rad/s": ("deg/s", np.degrees(1.0))}
 #: Seconds of the close-up.
 CLOSE = 1.0
 CORRELATION_LAGS = 200
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def page(findings: Findings) -> str:
@@ -112,7 +114,8 @@ def _figure(time: np.ndarray, measured: np.ndarray, modelled: np.ndarray, residu
         axes["residual"].set_ylabel(unit)
         axes["residual"].set_xlabel("time (s)")
         lags, correlation = _autocorrelation(residual)
-        axes["correlation"].axhspan(-2 / np.sqrt(len(residual)), 2 / np.sqrt(len(residual)), color=BLUE, alpha=0.2, lw=0)
+        chance = 2 / np.sqrt(len(residual))
+        axes["correlation"].axhspan(-chance, chance, color=BLUE, alpha=0.2, linewidth=0)
         axes["correlation"].plot(lags, correlation, color=BLUE)
         axes["correlation"].set_title("residual's autocorrelation (samples)")
         axes["correlation"].set_ylim(-0.3, 1.05)
@@ -121,7 +124,9 @@ def _figure(time: np.ndarray, measured: np.ndarray, modelled: np.ndarray, residu
         text = io.StringIO()
         figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
     svg = text.getvalue()
-    svg = svg[svg.index("<svg") :].replace(INK, "currentColor")
+    svg = svg[svg.index("<svg") :]
+    for drawn, shown in COLOURS.items():
+        svg = svg.replace(drawn, shown)
     return re.sub(r'width="[\d.]+pt" height="[\d.]+pt"', 'role="img"', svg, count=1)
 
 
@@ -146,7 +151,7 @@ def _digits(value: float, count: int = 4) -> str:
     text = f"{value:.{count}g}"
     if "e" in text:
         mantissa, exponent = text.split("e")
-        return f"{mantissa}·10{str(int(exponent)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
+        return f"{mantissa}·10{str(int(exponent)).translate(RAISED)}"
     return text.replace("-", "−")
 
 

@@ -8,7 +8,7 @@ from typing import Any, Dict, List, NamedTuple, Sequence
 
 import numpy as np
 
-from prw.identify.channels import MOTORS, si_unit
+from prw.channels import MOTORS, si_unit
 from prw.identify.experiment import Experiment
 from prw.identify.fit import Solution
 from prw.identify.measurements import Measurements
@@ -24,8 +24,8 @@ CONTRADICTION = 3.0
 
 
 class ChannelFit(NamedTuple):
-    """How one channel of one experiment came out. count: of values. noise: strength in the band, residual: rms over all
-    frequencies, offset: of the sensor, all SI. explained: share of its motion. band: Hz."""
+    """How one channel of one experiment came out. count: of values. noise: strength in the band, residual: rms over
+    all frequencies, offset: of the sensor, all SI. explained: share of its motion. band: Hz."""
 
     experiment: str
     channel: str
@@ -39,8 +39,8 @@ class ChannelFit(NamedTuple):
 
 @dataclass(frozen=True)
 class Findings:
-    """The fit of `files`, with what it was made of. confirmed: largest difference between the FMU's own run and the fit,
-    in terms of a channel's range. hints: what would settle open combinations."""
+    """The fit of `files`, with what it was made of. confirmed: largest difference between the FMU's own run and the
+    fit, in terms of a channel's range. hints: what would settle open combinations."""
 
     model: Model
     files: Sequence[Path]
@@ -111,9 +111,13 @@ class Findings:
         for name, prior in solution.task.priors.items():
             off = np.log(solution.values[name] / prior.value) / prior.relative
             if abs(off) > CONTRADICTION:
-                lines.append(f"{name} came out {abs(off):.1f} standard deviations off its prior; data and prior disagree")
+                lines.append(
+                    f"{name} came out {abs(off):.1f} standard deviations off its prior; data and prior disagree"
+                )
         if (sure.whiteness > UNLIKE).any() and not sure.undetermined:
-            lines.append("the noise is not white (quantised or smoothed angles do that); the standard errors take it into account")
+            lines.append(
+                "the noise is not white (quantised angles do that); the standard errors take it into account"
+            )
         return list(dict.fromkeys(lines))
 
     def _actual(self, name: str) -> float:

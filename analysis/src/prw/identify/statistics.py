@@ -1,9 +1,10 @@
 """How sure the estimates are, and which combination of parameters the data do not determine.
 
-Two information matrices. F = sum J'J, of the weighted sensitivities J, is the Fisher information if the noise is white;
-its inverse is the smallest covariance that any unbiased estimate can have. Real noise is not white: a smoothed encoder, a
-filtered sensor, a quantised angle. The covariance given is F^-1 S F^-1 with S = sum J' R J over frequencies and the
-residuals' auto- and cross-spectra R, estimated from the residuals (Ljung, System Identification, 2nd ed., Sec. 9.4-9.5).
+Two information matrices. F = sum J'J, of the weighted sensitivities J, is the Fisher information if the noise is
+white; its inverse is the smallest covariance that any unbiased estimate can have. Real noise is not white: a smoothed
+encoder, a filtered sensor, a quantised angle. The covariance given is F^-1 S F^-1 with S = sum J' R J over
+frequencies and the residuals' auto- and cross-spectra R, estimated from the residuals (Ljung, System Identification,
+2nd ed., Sec. 9.4-9.5). Encoders that repeat their errors add to it what residuals cannot show.
 """
 
 from __future__ import annotations
@@ -16,14 +17,16 @@ from scipy.signal.windows import hann
 from scipy.stats import norm
 
 from prw.identify.fit import Solution
+from prw.identify.profile import ends
 
 #: Neighbouring frequencies over which the residuals' spectrum is averaged.
-NEIGHBOURS = 41
+NEIGHBOURS = 121
 #: Beyond this, condition numbers are rounding.
 WORST_CONDITION = 1e15
 #: Exponents of intervals end here: a double can hold them.
 WIDEST = 600.0
-#: A frequency counts in proportion to this power of its leverage: fully, and the one strongest line would be all there is.
+#: A frequency counts in proportion to this power of its leverage: fully, and the one strongest line would be all
+#: there is.
 POWER = 0.5
 #: A frequency counts at least by this share of the one with the most leverage.
 LEAST_WEIGHT = 1e-6
@@ -31,6 +34,11 @@ LEAST_WEIGHT = 1e-6
 LEAST_FREEDOM = 0.1
 #: A combination of parameters that is uncertain by more than this fraction (one sigma) counts as not determined.
 UNDETERMINED = 0.3
+#: Information counts as far as it exceeds this many times what the noise of the motors' samples feigns.
+MARGIN = 3.0
+#: Draws of encoders' errors, and by how many times their effect must exceed what residuals show of it to be added. In
+#: motions that do not repeat themselves it is 1 to 2.5, and the intervals hold without.
+DRAWS, EXCESS = 16, 4.0
 #: Parameters that take less than this share in a combination are not named.
 SHARE = 0.15
 
@@ -47,14 +55,16 @@ class Combination(NamedTuple):
         if len(self.shares) == 1:
             return f"{next(iter(self.shares))} has hardly any effect on what was measured"
         names = list(self.shares)
-        return f"{', '.join(names[:-1])} and {names[-1]} cannot be told apart: {moves} together change next to nothing"
+        return (
+            f"{', '.join(names[:-1])} and {names[-1]} cannot be told apart: {moves} together change next to nothing"
+        )
 
 
 class Certainty(NamedTuple):
     """names: of the parameters (p). relative: (p,) standard errors as fractions. low, high: (p,) ends of the 95 %
-    intervals, SI. correlation: (p, p). information: (p, p) Fisher information of the logarithms, priors included.
-    condition: of its unit-diagonal form. whiteness: by how much the noise's correlation widens the errors, (p,).
-    undetermined: combinations that the data leave open."""
+    intervals, SI. correlation: (p, p). information: (p, p) Fisher information of the logarithms, priors included,
+    without what is feigned. condition: of its unit-diagonal form. whiteness: by how much the noise's correlation
+    widens the errors, (p,). undetermined: combinations that the data leave open."""
 
     names: Sequence[str]
     relative: np.ndarray
@@ -79,22 +89,48 @@ def certainty(solution: Solution, level: float = 0.95) -> Certainty:
     white = covariance_of(bread)
     for jacobian, residual in zip(solution.jacobians, solution.evaluation.residuals):
         meat += correlated(jacobian, residual, white)
-    covariance = white @ meat @ white
-    errors = np.sqrt(np.diag(covariance))
-    wide = np.minimum(norm.ppf(0.5 + level / 2) * errors, WIDEST)
-    unit = np.outer(errors, errors)
+    covariance = white @ meat @ white + np.diag(repeated(solution, white))
+    honest = genuine(bread, solution.spurious)
+    open_ones = undetermined(names, honest)
+    # Spectra from few frequencies scatter; no error is claimed to be smaller than white noise would make it.
+    variances = np.maximum(np.diag(covariance), np.diag(white))
+    errors = np.sqrt(variances)
+    whiteness = errors / np.sqrt(np.diag(white))
+    if open_ones:
+        errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(honest))))
+    low, high = ends(solution, white, errors, norm.ppf(0.5 + level / 2))
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    unit = np.outer(spread, spread)
     return Certainty(
         names,
         errors,
-        np.exp(solution.logarithms - wide),
-        np.exp(solution.logarithms + wide),
+        np.exp(np.maximum(low, solution.logarithms - WIDEST)),
+        np.exp(np.minimum(high, solution.logarithms + WIDEST)),
         covariance,
-        np.divide(covariance, unit, out=np.eye(len(names)), where=unit > 0),
-        bread,
-        condition(bread),
-        errors / np.sqrt(np.diag(white)),
-        undetermined(names, bread),
+        np.clip(np.divide(covariance, unit, out=np.eye(len(names)), where=unit > 0), -1, 1),
+        honest,
+        condition(honest),
+        whiteness,
+        open_ones,
     )
+
+
+def genuine(information: np.ndarray, spurious: np.ndarray) -> np.ndarray:
+    """Information (p, p) without what the noise of the motors' samples feigns, and something to be safe."""
+    values, vectors = np.linalg.eigh(information - MARGIN * spurious)
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T
+
+
+def repeated(solution: Solution, white: np.ndarray) -> np.ndarray:
+    """Variances (p,) that residuals do not show, because encoders repeat their errors with the motion: at the same
+    angles, in every period. Then the errors look like motion, and the fit takes them in."""
+    true, seen = np.zeros(len(white)), np.zeros(len(white))
+    for spectra in solution.fitter.feigned(solution.logarithms, DRAWS):
+        moved = white @ sum(np.einsum("fcp,fc->p", j, r) for j, r in zip(solution.jacobians, spectra))
+        left = [(j, r - j @ moved) for j, r in zip(solution.jacobians, spectra)]
+        true += moved**2 / DRAWS
+        seen += np.diag(white @ sum(correlated(j, r, white) for j, r in left) @ white) / DRAWS
+    return np.where(true > EXCESS * seen, true - seen, 0.0)
 
 
 def correlated(jacobian: np.ndarray, residual: np.ndarray, white: np.ndarray) -> np.ndarray:
@@ -106,7 +142,8 @@ def correlated(jacobian: np.ndarray, residual: np.ndarray, white: np.ndarray) ->
     """
     half = len(residual) // 2
     leverage = np.einsum("fcp,pq,fcq->fc", jacobian, white, jacobian, optimize=True)
-    residual = residual / np.sqrt(np.maximum(1 - leverage, LEAST_FREEDOM))
+    # What the parameters have taken of a residual is given back, as a jackknife would (HC3; MacKinnon and White 1985).
+    residual = residual / np.maximum(1 - leverage, LEAST_FREEDOM)
     weight = leverage.sum(axis=1)
     weight = (weight[:half] + weight[half:]) ** POWER
     weight += LEAST_WEIGHT * weight.max() + np.finfo(float).tiny

@@ -12,8 +12,8 @@ DESCRIPTION = """\
 Runs the FMU over and over with other parameters, on all cores of this machine or on a Dask cluster, and writes one row
 for each run into runs.parquet: its parameters and each output's peak, rms and value at the end (SI).
 
---grid parameters make all combinations; --random ones are drawn for each of --runs runs (per combination). What is done
-is kept: the same command goes on after an interruption. A run that fails is recorded with its message.
+--grid parameters make all combinations; --random ones are drawn for each of --runs runs (per combination). What is
+done is kept: the same command goes on after an interruption. A run that fails is recorded with its message.
 """
 
 EXAMPLES = """\
@@ -23,7 +23,7 @@ examples:
   prw sweep --random J3=5% --runs 2000 --input motors.csv     in your recorded motion
   prw sweep --random k1=10% --runs 100000 --scheduler tcp://head:8786      on a Dask cluster (prw installed there)
 then:
-  python -c "import pandas; print(pandas.read_parquet('out/sweep/runs.parquet').describe())"
+  python -c "import pyarrow.parquet as pq; print(pq.read_table('out/sweep/runs.parquet').column_names)"
 """
 
 
@@ -46,7 +46,9 @@ def add_parser(subparsers) -> None:
         metavar="NAME=[VALUE:]PERCENT%",
         help="log-normal about VALUE in SI (default: the start value). May be repeated",
     )
-    parser.add_argument("--runs", type=int, default=1000, metavar="N", help="draws of --random (default: %(default)s)")
+    parser.add_argument(
+        "--runs", type=int, default=1000, metavar="N", help="draws of --random (default: %(default)s)"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
     parser.add_argument(
         "--input", type=Path, metavar="FILE", help="motor recording, as for `prw simulate` (default: that of Fig. 4)"

@@ -62,7 +62,8 @@ def sweep(arguments: argparse.Namespace) -> None:
     where = arguments.scheduler or f"{workers} process{'es' if workers > 1 else ''}"
     if missing:
         again = f", {len(done)} were there already" if done else ""
-        print(f"ran         {len(missing)} runs on {where} in {seconds:.1f} s ({len(missing) / seconds:.0f} a second){again}")
+        pace = f"{seconds:.1f} s ({len(missing) / seconds:.0f} a second)"
+        print(f"ran         {len(missing)} runs on {where} in {pace}{again}")
     else:
         print(f"ran         nothing: all {total} runs were there already")
     if counts.get("failed"):
@@ -101,6 +102,8 @@ def _steps(name: str, text: str, starts: Dict[str, float]) -> np.ndarray:
         if len(parts) != 3 or count < 1 or not np.isfinite([low, high]).all():
             raise ValueError
     except (ValueError, IndexError):
-        raise UserError(f"--grid {name}={text}: write {name}=LOW:HIGH:N with a whole number N of at least 1") from None
+        raise UserError(
+            f"--grid {name}={text}: write {name}=LOW:HIGH:N with a whole number N of at least 1"
+        ) from None
     # Values that the FMU refuses are runs that fail, not a reason to stop.
     return np.linspace(low, high, count)

@@ -86,8 +86,8 @@ def _pool(study: Study, workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def on_cluster(study: Study, chunks: Sequence[Chunk], address: str) -> Iterator[List[Dict[str, Any]]]:
-    """Results of the chunks as they come from the Dask cluster at `address`. What fails as a whole there (its worker died
-    again and again) is recorded as failed, run by run."""
+    """Results of the chunks as they come from the Dask cluster at `address`. What fails as a whole there (its worker
+    died again and again) is recorded as failed, run by run."""
     client = _connect(address)
     try:
         remote = client.scatter(study, broadcast=True, hash=False)

@@ -15,12 +15,15 @@ UNITS: Dict[str, Dict[str, float]] = {
     "torque": {"N.m": 1.0, "mN.m": 1e-3, "N.cm": 1e-2, "N.mm": 1e-3, "kN.m": 1e3},
 }
 #: Other ways to write them.
-ALIASES = {"°": "deg", "°/s": "deg/s", "µs": "us", "turn": "rev", "turns": "rev", "sec": "s", "degree": "deg"}
+ALIASES = {
+    **{"sec": "s", "µs": "us", "°": "deg", "degree": "deg", "degrees": "deg", "turn": "rev", "turns": "rev"},
+    **{"°/s": "deg/s", "deg_s": "deg/s", "dps": "deg/s", "rad_s": "rad/s"},
+}
 
 
 class Channel(NamedTuple):
-    """A measured output. quantity: a key of UNITS. noise: the standard deviation assumed before anything is measured, in
-    SI: a torque sensor of 20 N.m with 0.1 %, an encoder or inertial sensor of 0.06 deg and 0.6 deg/s."""
+    """A measured output. quantity: a key of UNITS. noise: the standard deviation assumed before anything is measured,
+    in SI: a torque sensor of 20 N.m with 0.1 %, an encoder or inertial sensor of 0.06 deg and 0.6 deg/s."""
 
     quantity: str
     noise: float
@@ -42,8 +45,8 @@ QUANTITIES = {"time": "time", **MOTORS, **{name: channel.quantity for name, chan
 
 
 def factor(name: str, unit: str) -> float:
-    """What a value of column `name` in `unit` is multiplied with to be in SI. Raises UserError for a unit that does not
-    fit."""
+    """What a value of column `name` in `unit` is multiplied with to be in SI. Raises UserError for a unit that does
+    not fit."""
     known = UNITS[QUANTITIES[name]]
     text = unit.strip().replace("·", ".").replace("*", ".").replace(" ", ".")
     text = ALIASES.get(text, text)

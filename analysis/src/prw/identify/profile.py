@@ -1,0 +1,49 @@
+"""Ends of intervals where the model bends over the uncertainty: torques alone leave k1 open by several percent, and at
+the lower end of that range the same data would tell more about it than at the upper one.
+
+An interval ends where the least misfit, over all other parameters, has risen by the square of the quantile (profile
+likelihood; Meeker and Escobar, The American Statistician 49 (1995) 48); by more, where noise is not white.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from prw.identify.fit import Solution
+
+#: Below this standard error (of the logarithm) the model is as good as linear; above the other, there is no interval.
+LINEAR, HOPELESS = 0.01, 1.0
+#: Trials for an end, how close the rise of the misfit's root must come to what is wanted, and how far a trial may reach
+#: beyond the one before.
+TRIALS, CLOSE, FURTHER = 4, 0.02, 2.0
+
+
+def ends(solution: Solution, white: np.ndarray, errors: np.ndarray, quantile: float) -> tuple:
+    """Lower and upper ends (p,) of the logarithms' intervals. white: (p, p), the covariance for white noise. errors:
+    (p,) standard errors. quantile: of the normal distribution, 1.96 for 95 %."""
+    low, high = solution.logarithms - quantile * errors, solution.logarithms + quantile * errors
+    for i, error in enumerate(errors):
+        if LINEAR < error < HOPELESS:
+            # Where the others follow parameter i at the least cost.
+            step = quantile * error * white[:, i] / white[i, i]
+            rise = (quantile * error) ** 2 / white[i, i]
+            low[i], high[i] = _end(solution, i, -step, rise), _end(solution, i, step, rise)
+    return low, high
+
+
+def _end(solution: Solution, i: int, step: np.ndarray, wanted: float) -> float:
+    """Logarithm of parameter i at which the least misfit has risen by `wanted`. step: (p,), where to look first."""
+    centre, (low, high) = solution.logarithms, solution.task.span()
+    others = np.arange(len(centre)) != i
+    for _ in range(TRIALS):
+        point = np.clip(centre + step, low, high)
+        residuals, slopes = solution.fitter.residuals(point), solution.fitter.slopes(point)
+        move = np.linalg.lstsq(slopes[:, others], -residuals, rcond=None)[0]
+        rise = np.sum((residuals + slopes[:, others] @ move) ** 2) - solution.misfit
+        further = np.sqrt(wanted / rise) if rise > wanted / FURTHER**2 else FURTHER
+        if abs(further - 1) < CLOSE or (point[i] in (low[i], high[i]) and further > 1):
+            return float(point[i])
+        step = point - centre
+        step[others] += move
+        step *= max(further, 1 / FURTHER)
+    return float(np.clip(centre + step, low, high)[i])
