@@ -131,7 +131,8 @@ impl Testbed {
 
         // A sum is finite only if all its terms are.
         let path_ends = (motion1.angle + motion1.rate * h) + (motion2.angle + motion2.rate * h);
-        let sum = (next[0] + next[1]) + (next[2] + next[3]) + (next[4] + next[5]) + path_ends;
+        let end_rates = (motion1.rate + motion1.acceleration * h) + (motion2.rate + motion2.acceleration * h);
+        let sum = (next[0] + next[1]) + (next[2] + next[3]) + (next[4] + next[5]) + (path_ends + end_rates);
         if !sum.is_finite() {
             return false;
         }

@@ -194,6 +194,22 @@ fn steps_out_of_the_range_of_numbers() {
     fmu.step(0.0, 10.0);
 }
 
+/// The parabola through the samples may have an end in range and a rate there that is not: the next state
+/// could not be saved.
+#[test]
+fn motors_out_of_the_range_of_numbers() {
+    let fmu = in_mode(CoSimulation, StepComplete);
+    let h = 1.0 / 1024.0;
+    fmu.step(0.0, h);
+    fmu.step(h, h);
+    fmu.set(&[vr::theta1], &[1e302]);
+    let message = fmu.refused("a motor of infinite rate", |fmu| fmu.try_step(2.0 * h, 10.0));
+    assert!(message.contains("range of numbers"), "{message}");
+    fmu.restore(&fmu.bytes());
+    fmu.step(2.0 * h, h);
+    fmu.restore(&fmu.bytes());
+}
+
 /// Masters that wait for long take long steps. However long, an answer comes at once.
 #[test]
 fn steps_of_any_size() {

@@ -97,7 +97,8 @@ def random_parameters(rng):
     ends = rng.uniform() < 1 / 3
     decades = rng.choice([-9, 0, 9], 8) if ends else rng.uniform(-9, 9, 8)
     table = table_1()
-    return {**{name: table[name] * 10.0**d for name, d in zip(REAL, decades)}, "M": 4, "N": 7}
+    lobes, rollers = rng.choice([1, 4, 7, 1000, 2**31 - 1], 2)
+    return {**{name: table[name] * 10.0**d for name, d in zip(REAL, decades)}, "M": lobes, "N": rollers}
 
 
 @pytest.mark.parametrize("seed", range(CASES))

@@ -13,6 +13,7 @@ mod serialized;
 
 mod arguments;
 mod calls;
+mod files;
 mod lifecycle;
 mod realtime;
 mod sequences;

@@ -1,5 +1,5 @@
-//! What runs in a control loop neither allocates nor enters the kernel. `make sanitize` runs the same
-//! loop under the RealtimeSanitizer, which also knows locks.
+//! What runs in a control loop neither allocates nor enters the kernel nor locks. `make sanitize` runs the
+//! same loop under the RealtimeSanitizer.
 
 use crate::support::Fmu;
 use fmi2_export::Interface::CoSimulation;
@@ -166,6 +166,32 @@ fn the_loop_does_not_allocate() {
     let before = allocations();
     control.run();
     assert_eq!(allocations() - before, 0);
+}
+
+/// A Rust lock that is free is an atomic instruction, which no run shows, nor any sanitizer. Code that only
+/// sees its instance needs neither locks nor anything else that instances would share.
+#[test]
+fn the_library_has_nothing_to_lock() {
+    let shared = ["Mutex", "RwLock", "Condvar", "Once", "OnceLock", "LazyLock", "thread_local"];
+    let mut folders = vec!["src".to_owned(), "crates/fmi2-export/src".to_owned()];
+    let mut files = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("tests run in the package's folder") {
+            let path = entry.expect("a readable folder").path();
+            let name = path.to_str().expect("ASCII").to_owned();
+            if path.is_dir() {
+                folders.push(name);
+                continue;
+            }
+            files += 1;
+            let text = std::fs::read_to_string(&path).expect("a readable file");
+            for word in text.split(|c: char| !c.is_alphanumeric() && c != '_') {
+                assert!(!shared.contains(&word) && !word.starts_with("Atomic"), "{name} has {word}");
+            }
+            assert!(!text.contains("static mut"), "{name} has static mut");
+        }
+    }
+    assert!(files > 20, "{files} files");
 }
 
 /// The kernel ends the process at the first system call, so the loop runs in a copy of it.

@@ -223,19 +223,12 @@ impl Session<'_> {
         fmu.take_log();
         let state = &mut self.states[which];
         let (function, status) = match u.int_in_range(0..=7_u8)? {
-            0 | 1 => {
-                let pointer = if u.ratio(1, 16)? { null_mut() } else { state };
-                ("fmi2GetFMUstate", fmu.fmi2GetFMUstate(pointer))
-            }
+            0 | 1 => ("fmi2GetFMUstate", fmu.fmi2GetFMUstate(place(state, u)?)),
             2 | 3 => ("fmi2SetFMUstate", fmu.fmi2SetFMUstate(*state)),
-            4 => {
-                let pointer = if u.ratio(1, 4)? { null_mut() } else { state };
-                ("fmi2FreeFMUstate", fmu.fmi2FreeFMUstate(pointer))
-            }
+            4 => ("fmi2FreeFMUstate", fmu.fmi2FreeFMUstate(place(state, u)?)),
             5 => {
                 let mut size = 0;
-                let pointer = if u.ratio(1, 16)? { null_mut() } else { &raw mut size };
-                ("fmi2SerializedFMUstateSize", fmu.fmi2SerializedFMUstateSize(*state, pointer))
+                ("fmi2SerializedFMUstateSize", fmu.fmi2SerializedFMUstateSize(*state, place(&mut size, u)?))
             }
             6 => {
                 let size = if u.ratio(7, 8)? { before.len() } else { u.int_in_range(0..=1000)? };
@@ -251,7 +244,7 @@ impl Session<'_> {
                 damage(&mut self.saved, u)?;
                 let pointer = if u.ratio(1, 16)? { null() } else { self.saved.as_ptr().cast() };
                 let old = *state;
-                let status = fmu.fmi2DeSerializeFMUstate(pointer, self.saved.len(), state);
+                let status = fmu.fmi2DeSerializeFMUstate(pointer, self.saved.len(), place(state, u)?);
                 assert!(status == Status::Ok || *state == old, "a handle changed by a refused call");
                 ("fmi2DeSerializeFMUstate", status)
             }
@@ -286,6 +279,15 @@ impl Slot {
         self.saved = self.fmu.bytes();
         self.since.clear();
     }
+}
+
+/// The pointer to pass for one value; at times NULL or misaligned, which the FMU never follows.
+fn place<T>(value: &mut T, u: &mut Unstructured) -> Result<*mut T> {
+    Ok(match u.int_in_range(0..=15_u8)? {
+        0 => null_mut(),
+        1 => (&raw mut *value).wrapping_byte_add(1),
+        _ => value,
+    })
 }
 
 /// Bytes that were no serialized state, or not quite; with a checksum that fits, at times.

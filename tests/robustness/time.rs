@@ -4,6 +4,7 @@ use crate::support::{Fmu, Status};
 use fmi2_export::Interface::CoSimulation;
 use fmi2_export::types::{fmi2False, fmi2True};
 use prw_testbed::variables::vr;
+use std::ops::Range;
 
 /// `fmi2LastSuccessfulTime` of section 4.2.3.
 const LAST_SUCCESSFUL_TIME: i32 = 2;
@@ -16,17 +17,18 @@ fn time(fmu: &Fmu) -> f64 {
     time
 }
 
-/// Steps of 1 ms from `first * H` on, as a master that multiplies counts them; `sum` says where one that
-/// adds them up is then. Both must be let through, and the FMU's time is always theirs.
-fn run(first: u64, steps: u64, mut sum: f64) -> f64 {
+/// Steps of 1 ms, `range.start * H` being the first point of a master that multiplies, `sum` that of one
+/// that adds up. Both must be let through, and the FMU's time is always theirs, to the last bit. Returns
+/// where the one that adds up ends.
+fn run(range: Range<u64>, mut sum: f64) -> f64 {
     let multiplying = Fmu::new(CoSimulation);
     let adding = Fmu::new(CoSimulation);
-    multiplying.initialize(first as f64 * H);
+    multiplying.initialize(range.start as f64 * H);
     adding.initialize(sum);
     for fmu in [&multiplying, &adding] {
         fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &fmi2True));
     }
-    for step in first..first + steps {
+    for step in range {
         let point = step as f64 * H;
         multiplying.step(point, H);
         adding.step(sum, H);
@@ -37,28 +39,33 @@ fn run(first: u64, steps: u64, mut sum: f64) -> f64 {
     sum
 }
 
+const STEPS: u64 = 100_000_000;
+
+/// The clock of a master that adds up, after so many steps.
+fn added_up(steps: u64) -> f64 {
+    (0..steps).fold(0.0, |sum, _| sum + H)
+}
+
 /// The instance keeps no count of its own: the end of a step is the master's point plus the master's step
 /// size, and the next point may be off by what rounding can do to it. So the steps on the way to 10^8
 /// need not all be made; some at the begin and some at the end are, there also from where a master would
 /// be that adds up.
 #[test]
 fn time_does_not_drift() {
-    run(0, 50_000, 0.0);
+    run(0..50_000, 0.0);
     let first = STEPS - 10_000;
-    run(first, 10_000, first as f64 * H + DRIFT);
+    run(first..STEPS, added_up(first));
 }
-
-const STEPS: u64 = 100_000_000;
-/// How far off the sum of so many H is.
-const DRIFT: f64 = 0.0;
 
 /// All of them: seconds in a release build, minutes otherwise.
 #[test]
 #[ignore = "make sanitize runs it, with optimization"]
 fn a_hundred_million_steps() {
-    let end = run(0, STEPS, 0.0);
-    println!("adding up ends at {end:?}");
-    assert!((end - STEPS as f64 * H - DRIFT).abs() < 1e-9);
+    let end = run(0..STEPS, 0.0);
+    let drift = end - STEPS as f64 * H;
+    println!("adding up ends at {end:?}, {drift:.1e} s off");
+    // A clock of the FMU's own would have parted from one of the masters: rounding is forgiven up to 2e-10 s.
+    assert!(drift.abs() > 1e-5);
 }
 
 /// Points that are off by more than rounding are another matter.

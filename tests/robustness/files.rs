@@ -1,0 +1,120 @@
+//! `build_fmu` on a disk that is full, and ended while it writes: never half an FMU under the final name.
+#![cfg(unix)]
+#![allow(unsafe_code)]
+
+use crate::sequences::random_bytes;
+use std::fs;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::Instant;
+
+const OLD: &[u8] = b"the FMU of yesterday";
+
+const LIMIT: libc::rlim_t = 50_000;
+
+const ROUNDS: u32 = 20;
+
+/// The header of a universal library of macOS: number of parts, processor (x86_64) and its kind, place,
+/// length and alignment.
+const LIBRARY: [u32; 7] = [0xcafe_babe, 1, 0x0100_0007, 3, 0x1000, 0, 12];
+
+/// Packs a file that `build_fmu` takes for a library, because it begins like one and the guid is in it: with
+/// the limits of these tests none can be compiled. It does not become shorter by compression.
+fn build_fmu(out: &Path) -> Command {
+    let library = out.with_extension("dylib");
+    let mut bytes = LIBRARY.map(u32::to_be_bytes).concat();
+    bytes.extend(random_bytes(0, 2 * LIMIT as usize));
+    bytes.extend(crate::GUID.to_bytes());
+    fs::write(&library, bytes).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
+    command.arg("--binary").arg(format!("darwin64={}", library.display())).arg("--out").arg(out);
+    command
+}
+
+/// Runs the command with a limit on the size of files, which ends the process or, if that signal is
+/// ignored, makes writing fail as on a full disk.
+fn limited(mut command: Command, signal: libc::sighandler_t) -> Output {
+    let limit = libc::rlimit { rlim_cur: LIMIT, rlim_max: LIMIT };
+    let restrict = move || {
+        // SAFETY: both only concern the new process.
+        unsafe {
+            libc::signal(libc::SIGXFSZ, signal);
+            if libc::setrlimit(libc::RLIMIT_FSIZE, &raw const limit) != 0 {
+                return Err(std::io::Error::last_os_error());
+            }
+        }
+        Ok(())
+    };
+    // SAFETY: system calls and nothing else between fork and exec.
+    unsafe { command.pre_exec(restrict) };
+    command.output().unwrap()
+}
+
+/// One line on stderr.
+fn complaint(output: &Output) -> String {
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success() && text.starts_with("error: ") && text.lines().count() == 1, "{text}");
+    text
+}
+
+#[test]
+fn an_interrupted_write_leaves_the_old_fmu() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = &folder.path().join("out");
+    let fmu = out.join("prw_testbed.fmu");
+    fs::create_dir(out).unwrap();
+    fs::write(&fmu, OLD).unwrap();
+    let names = || -> Vec<_> {
+        let entries =
+            fs::read_dir(out).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        entries.filter(|name| name != "prw_testbed.fmu").collect()
+    };
+
+    let text = complaint(&limited(build_fmu(out), libc::SIG_IGN));
+    assert!(text.contains(&format!("cannot write {}", fmu.display())), "{text}");
+    assert_eq!(fs::read(&fmu).unwrap(), OLD);
+    assert_eq!(names(), [""; 0]);
+
+    let output = limited(build_fmu(out), libc::SIG_DFL);
+    assert_eq!(output.status.signal(), Some(libc::SIGXFSZ), "{output:?}");
+    assert_eq!(fs::read(&fmu).unwrap(), OLD);
+    let left = names();
+    assert!(left.len() == 1 && left[0].starts_with(".unfinished-"), "{left:?}");
+
+    let output = build_fmu(out).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    assert!(fs::read(&fmu).unwrap().starts_with(b"PK"));
+}
+
+/// Whenever `kill -9` comes, under the final name is the old FMU or the new one.
+#[test]
+fn killed_at_any_moment() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = &folder.path().join("out");
+    let fmu = out.join("prw_testbed.fmu");
+    fs::create_dir(out).unwrap();
+    let begin = Instant::now();
+    assert!(build_fmu(out).output().unwrap().status.success());
+    let whole = begin.elapsed();
+    let new = fs::read(&fmu).unwrap();
+    for round in 0..ROUNDS {
+        fs::write(&fmu, OLD).unwrap();
+        let mut process = build_fmu(out).stdout(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(whole * round / (ROUNDS - 1));
+        process.kill().unwrap();
+        process.wait().unwrap();
+        let found = fs::read(&fmu).unwrap();
+        assert!(found == OLD || found == new, "{} bytes after round {round}", found.len());
+    }
+}
+
+#[test]
+fn an_impossible_destination_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    fs::write(&out, "a file").unwrap();
+    let text = complaint(&build_fmu(&out).output().unwrap());
+    assert!(text.contains(&format!("cannot make the folder {}", out.display())), "{text}");
+    assert_eq!(fs::read(&out).unwrap(), b"a file");
+}
