@@ -33,7 +33,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    fmi2_package::exit(run(&Options::parse()))
+    fmi2_package::terminal::exit(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<()> {

@@ -13,16 +13,7 @@ pub const PARAMETERS: &str = "modelDescription/parameters.json";
 pub fn sources(project: impl Into<PathBuf>) -> Sources {
     Sources {
         folder: project.into(),
-        code: vec![
-            "Cargo.toml",
-            "build.rs",
-            "build_fmu.rs",
-            "crates/fmi2-export/Cargo.toml",
-            "crates/fmi2-export/src",
-            "crates/fmi2-package/Cargo.toml",
-            "crates/fmi2-package/src",
-            "src",
-        ],
+        code: vec!["Cargo.toml", "build.rs", "build_fmu.rs", "src"],
         content: Some("modelDescription"),
         // The description is written anew, the parameters are compiled in.
         not_content: vec!["modelDescription.xml", "parameters.json"],

@@ -216,10 +216,11 @@ impl Model for TestbedFmu {
             serializes_state: true,
         }),
         model_exchange: Some(ModelExchange { directional_derivative: true, serializes_state: true }),
+        smooth: true,
     };
 
     fn new(interface: Interface) -> Self {
-        let testbed = Testbed::new(Parameters::TABLE_1).expect("the build has checked the parameters");
+        let testbed = Testbed::new(Parameters::BUILT_IN).expect("the build has checked the parameters");
         Self { testbed, interface }
     }
 
@@ -276,7 +277,9 @@ impl Model for TestbedFmu {
     }
 
     fn set_boolean(&mut self, _use_omega: u32, value: bool) {
-        self.testbed.rate_source = if value { RateSource::Omega } else { RateSource::Samples };
+        let source = if value { RateSource::Omega } else { RateSource::Samples };
+        self.testbed.rate_source = source;
+        self.testbed.motors.iter_mut().for_each(|motor| motor.source_changed(source));
     }
 
     fn parameters_changed(&mut self) -> Result<(), ModelError> {

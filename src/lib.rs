@@ -28,7 +28,7 @@
 //! use prw_testbed::{Parameters, Testbed};
 //!
 //! // Both motors at 1 rad/s: the wrist pitches and does not roll.
-//! let mut testbed = Testbed::new(Parameters::TABLE_1)?;
+//! let mut testbed = Testbed::new(Parameters::BUILT_IN)?;
 //! for i in 0..2000 {
 //!     for motor in &mut testbed.motors {
 //!         motor.set_theta(1e-3 * f64::from(i));

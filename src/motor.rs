@@ -86,12 +86,19 @@ impl Motor {
     #[inline]
     pub fn set_omega(&mut self, omega: f64, source: RateSource) {
         self.omega = omega;
-        if source == RateSource::Omega {
-            self.path_end.rate = omega;
+        self.source_changed(source);
+    }
+
+    /// If rates come from omega now, its value holds at once, but for a derivative that is set.
+    #[inline]
+    pub fn source_changed(&mut self, source: RateSource) {
+        if source == RateSource::Omega && self.set_rate.is_none() {
+            self.path_end.rate = self.omega;
         }
     }
 
-    /// Takes the derivative of theta at the current communication point.
+    /// Takes the derivative of theta at the current communication point. It precedes omega, in whatever
+    /// order they are set.
     #[inline]
     pub fn set_rate(&mut self, rate: f64) {
         self.set_rate = Some(rate);

@@ -31,7 +31,7 @@ pub struct Parameters {
 impl Parameters {
     /// Table 1, or what the library was built with instead; read from `modelDescription/parameters.json`
     /// when it is compiled.
-    pub const TABLE_1: Self = include!(concat!(env!("OUT_DIR"), "/table_1.rs"));
+    pub const BUILT_IN: Self = include!(concat!(env!("OUT_DIR"), "/table_1.rs"));
 
     /// Transmission ratio from the motors' difference to roll: N / 2M of eq. (1).
     pub fn roll_ratio(&self) -> f64 {

@@ -79,7 +79,11 @@ pub struct StateSpace {
 /// The first block row of eq. (8), `C_I q_I' + K_I q_I + C_I,II v_II + K_I,II q_II = f_I`, solved for
 /// `q_I'` gives A11, A12 and A13 with **negative** signs (the paper prints positive ones, with which A
 /// has an eigenvalue at +183 1/s). Inserted into eq. (10) it makes the first terms of D31 and D32
-/// **positive** (printed negative). Parameters must pass [`Parameters::check`].
+/// **positive** (printed negative).
+///
+/// # Panics
+/// When the parameters do not pass [`Parameters::check`], or inertias are so far apart that `M_II` cannot be
+/// inverted in double precision.
 #[allow(non_snake_case, reason = "the paper's symbols")]
 pub fn state_space(p: &Parameters) -> StateSpace {
     let block = |matrix: &Matrix4<f64>, row, column| matrix.fixed_view::<2, 2>(row, column).into_owned();
@@ -90,7 +94,11 @@ pub fn state_space(p: &Parameters) -> StateSpace {
     let K_1in = Matrix2::identity() * p.k1;
     let C_1in = Matrix2::identity() * p.c1;
 
-    let invert = |matrix: Matrix2<f64>| matrix.try_inverse().expect("checked parameters give regular blocks");
+    // Scaled, because the determinant of very small or large entries is no number.
+    let invert = |matrix: Matrix2<f64>| {
+        let scale = matrix.amax();
+        (matrix / scale).try_inverse().expect("checked parameters give regular blocks") / scale
+    };
     let C_I_inv = invert(C_I);
     let M_II_inv = invert(M_II);
 

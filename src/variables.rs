@@ -22,7 +22,7 @@ const INERTIA: RealType = parameter_type("MomentOfInertia", &KG_M2, 0.01);
 const STIFFNESS: RealType = parameter_type("RotationalSpringConstant", &N_M_PER_RAD, 100.0);
 const DAMPING: RealType = parameter_type("RotationalDampingConstant", &N_M_S_PER_RAD, 1.0);
 
-const START: Parameters = Parameters::TABLE_1;
+const START: Parameters = Parameters::BUILT_IN;
 
 const fn inertia(start: f64) -> Variable {
     Variable::parameter(Kind::Real { of: &INERTIA, start })

@@ -54,7 +54,7 @@ fn it_reads_back_as_the_model_that_was_compiled() {
     assert_eq!(read.model_name, "PitchRollWristTestbed");
     assert_eq!(read.num_states(), 6);
     let names: Vec<&str> = read.get_model_variables().map(|variable| variable.name.as_str()).collect();
-    let table: Vec<&str> = prw_testbed::variables::VARIABLES.iter().map(|variable| variable.name).collect();
+    let table: Vec<&str> = prw_testbed::variables::VARIABLES.iter().map(|variable| variable.name()).collect();
     assert_eq!(names, table);
 }
 
@@ -80,7 +80,7 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
     };
     let inputs = ["theta1", "theta2", "omega1", "omega2"];
     let states = ["theta3", "theta4", "theta5", "theta6", "omega5", "omega6"];
-    let StateSpace { A, B, C, D } = state_space(&Parameters::TABLE_1);
+    let StateSpace { A, B, C, D } = state_space(&Parameters::BUILT_IN);
     let owned = |set: BTreeSet<&str>| set.into_iter().map(str::to_owned).collect::<BTreeSet<_>>();
 
     let structure = &read.model_structure;
@@ -174,12 +174,30 @@ fn wrong_requests_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let file = parameter_file(folder.path(), "\"value\": 2.11", "\"value\": -2.11");
+    let extreme = tempfile::tempdir().unwrap();
+    let extreme = parameter_file(extreme.path(), "\"value\": 2.11", "\"value\": 1e306");
+    // The header of a universal library of macOS, for Intel alone and without content.
+    let library = folder.path().join("a.dylib");
+    let header = [0xcafe_babe_u32, 1, 0x0100_0007, 3, 0x1000, 0, 12];
+    fs::write(&library, header.map(u32::to_be_bytes).concat()).unwrap();
+    let library = library.to_str().unwrap();
     for (arguments, message) in [
         (&["--parameters", file.as_str()][..], "mine.json: k1: the value must be > 0, it is -2.11"),
+        (
+            &["--parameters", extreme.as_str()],
+            "mine.json: these start values make no model: the parameters are too far",
+        ),
         (&["--parameters", "none.json"], "none.json: cannot be read"),
         (&["--binary", "linux65=a.so"], "'linux65' is no platform of FMI 2.0"),
-        (&["--binary", "linux64=none.so"], "cannot read none.so"),
-        (&["--binary", &format!("linux64={file}")], "was not compiled from these sources and parameters"),
+        (&["--binary", "linux64=none.so"], "cannot read none.so, the library for linux64"),
+        (&["--binary", &format!("linux64={file}")], "it is no shared library"),
+        (&["--binary", &format!("win64={library}")], "it is for darwin64, not for win64"),
+        (&["--binary", &format!("aarch64-darwin={library}")], "add --any-processor"),
+        (
+            &["--any-processor", "--binary", &format!("aarch64-darwin={library}")],
+            "was not compiled from these sources and parameters",
+        ),
+        (&["--binary", &format!("darwin64={library}")], "was not compiled from these sources and parameters"),
         (&["--target", "sparc"], "no FMU platform is known for the target 'sparc'"),
     ] {
         let text = errors(&build_fmu(arguments, &out));

@@ -11,7 +11,7 @@ use prw_testbed::{Parameters, Testbed};
 fn parameters() -> impl Strategy<Value = Parameters> {
     // A factor of up to 5 around Table 1 for each.
     (prop::array::uniform8(-1.6..1.6f64), 1..9i32, 1..15i32).prop_map(|(f, lobes, rollers)| {
-        let p = Parameters::TABLE_1;
+        let p = Parameters::BUILT_IN;
         Parameters {
             J2: p.J2 * f[0].exp(),
             J3: p.J3 * f[1].exp(),
@@ -111,7 +111,7 @@ proptest! {
 #[test]
 fn opposite_motors_leave_pitch_at_zero_and_equal_motors_roll() {
     for sign in [-1.0, 1.0] {
-        let mut testbed = Testbed::new(Parameters::TABLE_1).unwrap();
+        let mut testbed = Testbed::new(Parameters::BUILT_IN).unwrap();
         for i in 0..2000 {
             let t = f64::from(i) * 1e-3;
             let angle = (1.0 - (31.4 * t).cos()) / 31.4;
@@ -126,7 +126,7 @@ fn opposite_motors_leave_pitch_at_zero_and_equal_motors_roll() {
 
 #[test]
 fn a_testbed_at_rest_stays_at_rest() {
-    let mut testbed = Testbed::new(Parameters::TABLE_1).unwrap();
+    let mut testbed = Testbed::new(Parameters::BUILT_IN).unwrap();
     let start = [0.7, -0.4, 0.7, -0.4, 0.0, 0.0];
     testbed.state = start;
     (testbed.motors[0].theta, testbed.motors[1].theta) = (0.7, -0.4);
@@ -139,12 +139,12 @@ fn a_testbed_at_rest_stays_at_rest() {
 #[test]
 fn angle_jumps_pass_through_the_dampers() {
     // omega = 0 makes a zero-order hold; the jump's impulse is B2 d.
-    let mut testbed = Testbed::new(Parameters::TABLE_1).unwrap();
+    let mut testbed = Testbed::new(Parameters::BUILT_IN).unwrap();
     testbed.rate_source = RateSource::Omega;
     assert!(testbed.step(1e-3));
     testbed.motors[0].theta = 0.1;
     assert!(testbed.step(1e-12));
-    let b = state_space(&Parameters::TABLE_1).B;
+    let b = state_space(&Parameters::BUILT_IN).B;
     for (state, row) in testbed.state.iter().zip(0..) {
         assert!((state - 0.1 * b[(row, 2)]).abs() < 1e-9, "{state} {}", 0.1 * b[(row, 2)]);
     }
@@ -161,7 +161,7 @@ const GAUSS: [(f64, f64); 5] = [
 
 #[test]
 fn the_motors_work_is_stored_or_dissipated() {
-    let p = Parameters::TABLE_1;
+    let p = Parameters::BUILT_IN;
     let mut testbed = Testbed::new(p).unwrap();
     testbed.state = [0.1, -0.2, 0.15, 0.05, 1.0, -2.0];
     let now = |testbed: &Testbed, theta: [f64; 2], omega: [f64; 2]| {

@@ -2,7 +2,8 @@
 
 use anyhow::{Context, Result, ensure};
 use clap::Parser;
-use fmi2_package::{Start, System, exit, short};
+use fmi2_package::terminal::{exit, short};
+use fmi2_package::{Start, System};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -43,6 +44,9 @@ fn main() -> ExitCode {
 fn run(options: &Options) -> Result<()> {
     for (name, value) in [("step-size", options.step_size), ("stop-time", options.stop_time)] {
         ensure!(value.is_finite() && value > 0.0, "--{name} must be > 0, it is {value}");
+    }
+    for angle in &options.go_to {
+        ensure!(angle.is_finite(), "--go-to must have finite numbers, not {angle}");
     }
     let workspace =
         Path::new(FOLDER).ancestors().nth(2).context("this program was moved out of its workspace")?;

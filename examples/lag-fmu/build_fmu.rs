@@ -1,7 +1,7 @@
 //! Builds target/fmu/lag.fmu. See `--help`.
 
 use clap::Parser;
-use fmi2_package::{BuildOptions, Builder};
+use fmi2_package::{BuildOptions, Builder, terminal};
 use std::process::ExitCode;
 
 /// Builds the FMU of a first-order lag.
@@ -16,5 +16,5 @@ fn main() -> ExitCode {
         command: "cargo run --release -p lag_fmu",
         ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"), env!("FMU_SOURCES"))
     };
-    fmi2_package::exit(builder.run::<lag_fmu::Lag>(&Options::parse().build))
+    terminal::exit(builder.run::<lag_fmu::Lag>(&Options::parse().build))
 }

@@ -72,6 +72,33 @@ fn set_derivatives_come_first() {
     }
 }
 
+/// What is set in one go has no order: whatever comes first, the same rates and torques are read, before
+/// theta is set too.
+#[test]
+fn the_order_of_setting_does_not_matter() {
+    let p = parameters(7);
+    let after_a_step = |use_omega: bool, calls: &[&dyn Fn(&Fmu)]| {
+        let fmu = slave(&p, use_omega);
+        fmu.set(&THETA, &[0.1, -0.2]);
+        fmu.set(&OMEGA, &[1.0, 2.0]);
+        fmu.step(0.0, 0.01);
+        calls.iter().for_each(|call| call(&fmu));
+        (fmu.rates(THETA), fmu.get([vr::tau1, vr::tau2]))
+    };
+    let omega = |fmu: &Fmu| fmu.set(&OMEGA, &[5.0, -6.0]);
+    let derivative = |fmu: &Fmu| fmu.set_rates(THETA, [3.0, 4.0]);
+    let use_omega = |fmu: &Fmu| fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &1));
+
+    let one = after_a_step(true, &[&omega, &derivative]);
+    assert_eq!(one.0, [3.0, 4.0], "a derivative comes before omega");
+    assert_eq!(one, after_a_step(true, &[&derivative, &omega]));
+
+    let other = after_a_step(false, &[&omega, &use_omega]);
+    assert_eq!(other.0, [5.0, -6.0], "omega holds at once");
+    assert_eq!(other, after_a_step(false, &[&use_omega, &omega]));
+    assert_ne!(one.1, other.1);
+}
+
 /// With use_omega the slope is omega; omega = 0 is an exact zero-order hold, jumps included.
 #[test]
 fn omega_is_the_slope() {
@@ -126,7 +153,7 @@ fn samples_are_differentiated() {
 /// A parabola is differentiated exactly, and so are the torques on it.
 #[test]
 fn parabolas_have_exact_slopes() {
-    let p = Parameters::TABLE_1;
+    let p = Parameters::BUILT_IN;
     let fmu = slave(&p, false);
     let mut random = Random(8);
     let mut t = 0.0;
@@ -172,7 +199,7 @@ fn rest_at_an_angle() {
 /// A master that sets an input once and never again: the motor stands still from the third step on.
 #[test]
 fn inputs_that_are_not_set_stay() {
-    let fmu = slave(&Parameters::TABLE_1, false);
+    let fmu = slave(&Parameters::BUILT_IN, false);
     fmu.set(&THETA, &[0.3, 0.3]);
     for i in 0..300 {
         fmu.step(f64::from(i) * 0.01, 0.01);
@@ -183,7 +210,7 @@ fn inputs_that_are_not_set_stay() {
 /// Higher orders are accepted, alone and together with order 1, and change nothing.
 #[test]
 fn higher_orders_are_harmless() {
-    let [plain, rich] = [(); 2].map(|()| slave(&Parameters::TABLE_1, false));
+    let [plain, rich] = [(); 2].map(|()| slave(&Parameters::BUILT_IN, false));
     for i in 0..20 {
         let t = f64::from(i) * 0.02;
         for fmu in [&plain, &rich] {

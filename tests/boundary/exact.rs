@@ -87,7 +87,7 @@ pub fn set_parameters(fmu: &Fmu, p: &Parameters) {
 pub fn parameters(seed: u64) -> Parameters {
     let mut random = Random(seed);
     let mut near = |value: f64| value * random.between(-1.5, 1.5).exp();
-    let p = Parameters::TABLE_1;
+    let p = Parameters::BUILT_IN;
     let (J2, J3, H3, k1, k2) = (near(p.J2), near(p.J3), near(p.H3), near(p.k1), near(p.k2));
     let (c1, c2, c3) = (near(p.c1), near(p.c2), near(p.c3));
     let [M, N] = [8.0, 14.0].map(|end| random.between(1.0, end) as i32);

@@ -19,7 +19,7 @@ fn motors(t: f64) -> [f64; 4] {
 /// What OpenModelica reads at the end of a step: all outputs and locals in one call.
 fn outputs_and_locals() -> Vec<u32> {
     let exposed = |causality| matches!(causality, Causality::Output | Causality::Local);
-    (0..).zip(VARIABLES).filter(|(_, variable)| exposed(variable.causality)).map(|(vr, _)| vr).collect()
+    (0..).zip(VARIABLES).filter(|(_, variable)| exposed(variable.causality())).map(|(vr, _)| vr).collect()
 }
 
 /// Model Exchange only; fixed parameters after the initialization, states while in event mode.
@@ -66,7 +66,7 @@ fn read_all_one_by_one(fmu: &Fmu) -> Vec<f64> {
         .zip(VARIABLES)
         .map(|(vr, variable)| {
             let (mut real, mut integer) = (f64::NAN, -1);
-            match variable.kind.base_type() {
+            match variable.kind().base_type() {
                 BaseType::Real => fmu.ok(fmu.fmi2GetReal(&vr, 1, &mut real)),
                 BaseType::Integer => fmu.ok(fmu.fmi2GetInteger(&vr, 1, &mut integer)),
                 _ => fmu.ok(fmu.fmi2GetBoolean(&vr, 1, &mut integer)),

@@ -156,7 +156,7 @@ fn simulated(p: &Parameters, steps: i32, use_omega: bool) -> [f64; 14] {
 /// Co-Simulation, which is of second order in h like the rest.
 #[test]
 fn same_motion_as_co_simulation() {
-    for p in [Parameters::TABLE_1, parameters(4)] {
+    for p in [Parameters::BUILT_IN, parameters(4)] {
         let reference = integrated(&p, 4000);
         let scale = 1.0 + distance(&reference, &[0.0; 14]);
         assert!(distance(&integrated(&p, 2000), &reference) < 1e-8 * scale, "the integrator has converged");

@@ -21,7 +21,7 @@ enum Rates {
 /// Every Real variable to the last bit.
 fn observe(fmu: &Fmu) -> Vec<u64> {
     let vr: Vec<u32> = (0..vr::M).collect();
-    assert_eq!(VARIABLES[vr.len()].name, "M", "all before are Real");
+    assert_eq!(VARIABLES[vr.len()].name(), "M", "all before are Real");
     let mut values = vec![0.0; vr.len()];
     fmu.ok(fmu.fmi2GetReal(vr.as_ptr(), vr.len(), values.as_mut_ptr()));
     values.into_iter().map(f64::to_bits).collect()
@@ -366,7 +366,7 @@ fn impossible_contents() {
     }
     // The first parameter, J2, after mode, time, start time, and the stop time that may be missing.
     let j2 = 46..54;
-    assert_eq!(bytes[j2.clone()], prw_testbed::Parameters::TABLE_1.J2.to_le_bytes());
+    assert_eq!(bytes[j2.clone()], prw_testbed::Parameters::BUILT_IN.J2.to_le_bytes());
     let message = refused_bytes(&fmu, &with(bytes.clone(), j2, &(-1.0_f64).to_le_bytes()));
     assert!(message.contains("J2"), "{message}");
 }

@@ -1,13 +1,14 @@
 //! Which function may be called when: the tables of sections 3.2.3 and 4.2.4 as one table, and apart
 //! from it what is tolerated beyond the standard because importers do it.
 
-use crate::description::{Causality, Initial, Settable, Variability};
+use crate::variable::{Causality, Initial, Settable, Variability};
 use std::fmt;
 use std::ops::BitOr;
 
 /// The state of an instance in the sense of the standard's state machines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
+#[non_exhaustive]
 pub enum Mode {
     /// After `fmi2Instantiate` or `fmi2Reset`.
     Instantiated = 1,
@@ -23,7 +24,8 @@ pub enum Mode {
     ContinuousTime = 32,
     /// After `fmi2Terminate`.
     Terminated = 64,
-    /// After an error that a reset or a saved state mends.
+    /// The standard's state after fmi2Error. No call leads here, because a refused call changes nothing; a
+    /// serialized state may.
     Error = 128,
     /// After a panic.
     Fatal = 256,
@@ -191,6 +193,7 @@ macro_rules! call_table {
         /// The functions that work on an instance and have an order of calls.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[allow(missing_docs)]
+        #[non_exhaustive]
         pub enum Function { $($function),+ }
 
         /// The table of allowed calls, in the order of [`Function`].

@@ -9,11 +9,12 @@ use std::ffi::{CStr, CString};
 
 /// What a message is about; becomes `LogCategories` (section 2.2.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Category {
     /// The course of the simulation.
     Events,
-    /// Something odd that the simulation survives.
-    Warning,
+    /// A question that has no answer (fmi2Discard).
+    Discard,
     /// A call was refused.
     Error,
     /// The instance is broken.
@@ -24,13 +25,13 @@ pub enum Category {
 
 impl Category {
     /// All categories, for the model description.
-    pub const ALL: [Self; 5] = [Self::Events, Self::Warning, Self::Error, Self::Fatal, Self::All];
+    pub const ALL: [Self; 5] = [Self::Events, Self::Discard, Self::Error, Self::Fatal, Self::All];
 
     /// The name, as section 2.2.4 proposes it.
     pub const fn name(self) -> &'static CStr {
         match self {
             Self::Events => c"logEvents",
-            Self::Warning => c"logStatusWarning",
+            Self::Discard => c"logStatusDiscard",
             Self::Error => c"logStatusError",
             Self::Fatal => c"logStatusFatal",
             Self::All => c"logAll",
@@ -41,7 +42,7 @@ impl Category {
     pub const fn description(self) -> &'static str {
         match self {
             Self::Events => "The course of the simulation: instantiation, initialization, reset, termination",
-            Self::Warning => "Something is odd, but the simulation goes on",
+            Self::Discard => "A question about the step has no answer; the simulation goes on",
             Self::Error => "A call was refused; the message says why and what to do",
             Self::Fatal => "The instance is broken and can only be freed",
             Self::All => "All of the above",
@@ -70,7 +71,7 @@ pub(crate) struct Logger<S> {
 }
 
 impl<S: Sink> Logger<S> {
-    /// Errors are always shown (section 2.1.3 promises a message for each), the rest on demand.
+    /// Section 2.1.3: errors are always shown, the rest (fmi2Discard too) on demand.
     pub fn new(sink: S, instance_name: &CStr, logging_on: bool) -> Self {
         let mut logger = Self { sink, instance_name: instance_name.to_owned(), enabled: 0 };
         logger.set_all(logging_on);
@@ -79,7 +80,7 @@ impl<S: Sink> Logger<S> {
 
     /// `fmi2SetDebugLogging` without a list: everything, or errors only.
     pub fn set_all(&mut self, on: bool) {
-        let errors = Category::Error.bit() | Category::Fatal.bit() | Category::Warning.bit();
+        let errors = Category::Error.bit() | Category::Fatal.bit();
         self.enabled = if on { Category::All.bit() } else { errors };
     }
 
@@ -107,9 +108,10 @@ impl<S: Sink> Logger<S> {
     }
 }
 
-/// The text without what `printf`, FMI (section 2.1.5) or C strings give a meaning to.
+/// The text on one line, without what `printf`, FMI (section 2.1.5) or C strings give a meaning to.
 fn printable(message: &str) -> CString {
-    let safe: String = message.chars().map(|c| if matches!(c, '%' | '#' | '\0') { '_' } else { c }).collect();
+    let special = |c: char| matches!(c, '%' | '#') || c.is_control();
+    let safe: String = message.chars().map(|c| if special(c) { '_' } else { c }).collect();
     CString::new(safe).unwrap_or_default()
 }
 
@@ -119,6 +121,6 @@ mod tests {
 
     #[test]
     fn nothing_is_left_that_an_importer_would_expand() {
-        assert_eq!(printable("a%s#r1#\0b").to_str(), Ok("a_s_r1__b"));
+        assert_eq!(printable("a%s#r1#\0b\nc").to_str(), Ok("a_s_r1__b_c"));
     }
 }

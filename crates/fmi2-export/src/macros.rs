@@ -7,12 +7,20 @@
 #[macro_export]
 macro_rules! export_fmi2 {
     ($model:ty) => {
+        // All that the module below knows of the author's crate, where anything may be called like FMI's types.
+        #[doc(hidden)]
+        #[allow(non_camel_case_types)]
+        type __fmi2_model = $model;
+
         /// The C interface of the FMU.
         #[doc(hidden)]
         #[allow(unsafe_code, non_snake_case, missing_docs, clippy::missing_safety_doc)]
         pub mod fmi2_functions {
-            use super::*;
-            use $crate::types::*;
+            use super::__fmi2_model;
+            use $crate::types::{
+                Status, fmi2Boolean, fmi2Byte, fmi2CallbackFunctions, fmi2Component, fmi2EventInfo, fmi2FMUstate,
+                fmi2Integer, fmi2Real, fmi2StatusKind, fmi2String, fmi2Type, fmi2ValueReference,
+            };
 
             #[unsafe(no_mangle)]
             pub extern "C" fn fmi2GetTypesPlatform() -> fmi2String {
@@ -27,7 +35,7 @@ macro_rules! export_fmi2 {
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi2FreeInstance(c: fmi2Component) {
                 // SAFETY: the importer keeps the contract of fmi2_export::boundary.
-                unsafe { $crate::boundary::fmi2FreeInstance::<$model>(c) }
+                unsafe { $crate::boundary::fmi2FreeInstance::<__fmi2_model>(c) }
             }
 
             #[unsafe(no_mangle)]
@@ -42,7 +50,7 @@ macro_rules! export_fmi2 {
             ) -> fmi2Component {
                 // SAFETY: the importer keeps the contract of fmi2_export::boundary.
                 unsafe {
-                    $crate::boundary::fmi2Instantiate::<$model>(
+                    $crate::boundary::fmi2Instantiate::<__fmi2_model>(
                         instance_name,
                         fmu_type,
                         guid,
@@ -54,7 +62,7 @@ macro_rules! export_fmi2 {
                 }
             }
 
-            $crate::export_functions! { $model;
+            $crate::export_functions! { __fmi2_model;
                 fmi2SetDebugLogging(logging_on: fmi2Boolean, n: usize, categories: *const fmi2String);
                 fmi2SetupExperiment(
                     tolerance_defined: fmi2Boolean, tolerance: fmi2Real, start_time: fmi2Real,
@@ -120,9 +128,9 @@ macro_rules! export_fmi2 {
 #[macro_export]
 macro_rules! guid {
     () => {
-        match option_env!("FMU_GUID") {
-            Some(guid) => guid,
-            None => "{00000000-0000-0000-0000-000000000000}",
+        match ::core::option_env!("FMU_GUID") {
+            ::core::option::Option::Some(guid) => guid,
+            ::core::option::Option::None => "{00000000-0000-0000-0000-000000000000}",
         }
     };
 }

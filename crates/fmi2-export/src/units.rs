@@ -1,7 +1,40 @@
-//! Units of rotary mechanics, ready to use in a [`RealType`](crate::RealType). People see angles in degrees.
+//! Units (section 2.2.2), those of rotary mechanics ready to use in a [`RealType`](crate::RealType). People
+//! see angles in degrees.
 
-use crate::description::{BaseUnit, DisplayUnit, Unit};
 use std::f64::consts::PI;
+
+/// A unit (section 2.2.2).
+#[derive(Debug, PartialEq)]
+pub struct Unit {
+    /// Name, for example `N.m/rad`.
+    pub name: &'static str,
+    /// Exponents of kg, m, s and rad.
+    pub base: BaseUnit,
+    /// The unit a person prefers, with display value = factor * value.
+    pub display: Option<DisplayUnit>,
+}
+
+/// Exponents of the base units that mechanics needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaseUnit {
+    /// Exponent of kg.
+    pub kg: i32,
+    /// Exponent of m.
+    pub m: i32,
+    /// Exponent of s.
+    pub s: i32,
+    /// Exponent of rad.
+    pub rad: i32,
+}
+
+/// A unit to show values in: display value = factor * value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DisplayUnit {
+    /// Name, for example `deg`.
+    pub name: &'static str,
+    /// Multiplies the value.
+    pub factor: f64,
+}
 
 const DEG_PER_RAD: f64 = 180.0 / PI;
 const RAD_PER_DEG: f64 = PI / 180.0;

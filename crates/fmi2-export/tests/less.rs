@@ -6,16 +6,13 @@ mod support;
 use fmi2_export::Interface::{CoSimulation, ModelExchange};
 use fmi2_export::types::fmi2FMUstate;
 use fmi2_export::{
-    BaseUnit, DefaultExperiment, Interface, Kind, Model, ModelError, ModelInfo, RealType, Unit, Variable,
-    export_fmi2, variables,
+    Interface, Kind, Model, ModelError, ModelInfo, RealType, Variable, export_fmi2, units, variables,
 };
 use std::ffi::CStr;
 use std::ptr::null_mut;
 use support::{Arguments, Fmu, Status};
 
-const NO_UNIT: Unit = Unit { name: "1", base: BaseUnit { kg: 0, m: 0, s: 0, rad: 0 }, display: None };
-const NUMBER: RealType =
-    RealType { name: "Number", quantity: "", unit: &NO_UNIT, min: Some(0.0), max: Some(10.0), nominal: None };
+const NUMBER: RealType = RealType { min: Some(0.0), max: Some(10.0), ..RealType::new("Number", &units::ONE) };
 
 variables! {
     /// What comes in
@@ -36,21 +33,6 @@ struct Sum {
 
 impl Model for Sum {
     const INFO: ModelInfo = ModelInfo {
-        name: "Sum",
-        identifier: "sum",
-        guid: "{sum}",
-        description: "Sums up its input",
-        author: "",
-        version: "1",
-        license: "",
-        copyright: "",
-        default_experiment: DefaultExperiment {
-            start_time: 0.0,
-            stop_time: 1.0,
-            step_size: 0.1,
-            tolerance: 1e-6,
-        },
-        variables: VARIABLES,
         co_simulation: Some(fmi2_export::CoSimulation {
             variable_step_size: true,
             interpolates_inputs: false,
@@ -58,7 +40,7 @@ impl Model for Sum {
             directional_derivative: false,
             serializes_state: false,
         }),
-        model_exchange: None,
+        ..ModelInfo::new("Sum", "sum", "{sum}", VARIABLES)
     };
 
     fn new(_interface: Interface) -> Self {

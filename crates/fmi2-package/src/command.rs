@@ -2,17 +2,19 @@
 
 use crate::cargo::LibraryBuild;
 use crate::describe::{Changes, describe};
+use crate::library::check_platform;
 use crate::pack::{Library, pack, write_atomically};
+use crate::packages::Neighbourhood;
 use crate::platform::Platform;
 use crate::sources::Sources;
+use crate::terminal::short;
 use crate::variant::{Start, Variant};
 use anyhow::{Context, Result, bail, ensure};
 use fmi2_export::Model;
 use std::ffi::OsString;
+use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
-use std::{env, fs};
 
 /// The options that every `build_fmu` has. A model with more flattens them into its own.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -20,7 +22,7 @@ pub struct BuildOptions {
     /// Declare the parameters tunable instead of fixed (OpenModelica does not let users change those)
     #[arg(long)]
     pub tunable: bool,
-    /// Folder for what is made [default: target/fmu]
+    /// Folder for what is made [default: target/fmu of the workspace]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Write only modelDescription.xml, into the folder modelDescription of the sources or DIR
@@ -32,10 +34,14 @@ pub struct BuildOptions {
     /// Put in this compiled library, for example win64=model.dll; repeat it for several
     #[arg(long, value_name = "PLATFORM=PATH", value_parser = binary)]
     pub binary: Vec<(String, PathBuf)>,
+    /// Accept a library for another processor than its platform names (importers on ARM look in linux64)
+    #[arg(long, requires = "binary")]
+    pub any_processor: bool,
 }
 
 fn binary(text: &str) -> Result<(String, PathBuf), String> {
     text.split_once('=')
+        .filter(|(platform, path)| !platform.is_empty() && !path.is_empty())
         .map(|(platform, path)| (platform.to_owned(), path.into()))
         .ok_or_else(|| "write PLATFORM=PATH, for example linux64=libmodel.so".to_owned())
 }
@@ -53,8 +59,6 @@ pub struct Builder {
     pub compiled_from: &'static str,
     /// The cargo profile of the library.
     pub profile: &'static str,
-    /// The folder of `target`.
-    pub workspace: PathBuf,
     /// Start values that differ from the ones this program was compiled with.
     pub start: Vec<(String, Start)>,
     /// The file that those start values are from, for messages.
@@ -79,7 +83,6 @@ impl Builder {
             sources: Sources::of_package(folder),
             compiled_from,
             profile: "release",
-            workspace: folder.into(),
             start: Vec::new(),
             start_from: None,
             is_default: true,
@@ -94,7 +97,11 @@ impl Builder {
     /// library cannot be compiled or does not belong to it, or a file cannot be written.
     pub fn run<M: Model>(&self, options: &BuildOptions) -> Result<()> {
         let variant = self.variant(options.tunable)?;
-        let description = describe::<M>(&Changes::from(&variant))?;
+        let described = match &self.start_from {
+            Some(file) if !self.is_default => short(file),
+            _ => M::INFO.identifier.into(),
+        };
+        let description = describe::<M>(&Changes::from(&variant)).context(described)?;
         let committed = self.sources.folder.join(DESCRIPTION);
         let is_default = self.is_default && !options.tunable;
         if options.describe {
@@ -108,10 +115,13 @@ impl Builder {
 
         let libraries = self.libraries(options)?;
         let guid = variant.guid();
-        for Library { path, .. } in &libraries {
-            check_library(path, &guid)?;
+        for library in &libraries {
+            check_library(library, &guid, options.any_processor)?;
         }
-        let folder = options.out.clone().unwrap_or_else(|| self.workspace.join("target/fmu"));
+        let folder = match &options.out {
+            Some(folder) => folder.clone(),
+            None => Neighbourhood::of(&self.sources.folder)?.workspace.join("target/fmu"),
+        };
         let identifier = M::INFO.identifier;
         let fmu = folder.join(format!("{identifier}.fmu"));
         let size = pack(&fmu, identifier, &description, &libraries, &self.sources.content_files()?)?;
@@ -151,8 +161,10 @@ impl Builder {
         for (platform, path) in &options.binary {
             libraries.push(Library { platform: Platform::of_folder(platform)?, path: path.clone() });
         }
-        for target in &options.target {
-            let platform = Platform::of_target(target)?;
+        // What cannot be meant is said before anything is compiled.
+        let platforms: Vec<_> =
+            options.target.iter().map(|target| Platform::of_target(target)).collect::<Result<_>>()?;
+        for (platform, target) in platforms.into_iter().zip(&options.target) {
             libraries.push(Library { platform, path: self.compile(options.tunable, Some(target))? });
         }
         if libraries.is_empty() {
@@ -176,9 +188,12 @@ impl Builder {
     }
 }
 
-/// A library with another guid would refuse every instance.
-fn check_library(path: &Path, guid: &str) -> Result<()> {
-    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+/// A library for another machine would not load, one with another guid refuse every instance.
+fn check_library(library: &Library, guid: &str, any_processor: bool) -> Result<()> {
+    let Library { platform, path } = library;
+    let bytes = fs::read(path)
+        .with_context(|| format!("cannot read {}, the library for {platform}", path.display()))?;
+    check_platform(&bytes, *platform, any_processor).with_context(|| path.display().to_string())?;
     ensure!(
         bytes.windows(guid.len()).any(|window| window == guid.as_bytes()),
         "{} was not compiled from these sources and parameters (the guid {guid} is not in it); compile it again",
@@ -196,21 +211,4 @@ fn write_description(path: &Path, description: &str) -> Result<()> {
     write_atomically(path, |file| Ok(file.write_all(description.as_bytes())?))?;
     println!("{} written", short(path));
     Ok(())
-}
-
-/// The path as seen from where the user is.
-pub fn short(path: &Path) -> String {
-    let here = env::current_dir().unwrap_or_default();
-    path.strip_prefix(here).unwrap_or(path).display().to_string()
-}
-
-/// The end of `main`: an error becomes one line and the exit code of failure.
-pub fn exit(result: Result<()>) -> ExitCode {
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
 }

@@ -1,17 +1,17 @@
 //! Builds the model description (section 2.2).
 
+use crate::check::{check_changes, check_info, check_starts, has_start};
 use crate::structure::{Dependency, ModelStructure};
 use crate::types::{type_definitions, type_name, unit_definitions};
 use crate::variant::{Start, Variant};
 use crate::xml;
-use anyhow::{Result, bail, ensure};
+use anyhow::Result;
 use fmi_schema::fmi2::{
     self, Boolean, Category, DefaultExperiment, Derivatives, Fmi2ModelDescription, Fmi2VariableDependency,
     InitialUnknowns, Integer, LogCategories, ModelVariables, Outputs, Real, ScalarVariable,
     ScalarVariableElement,
 };
-use fmi2_export::{Causality, Initial, Interface, Kind, Model, ModelInfo, Variability, Variable};
-use std::collections::HashSet;
+use fmi2_export::{Causality, Initial, Model, ModelInfo, Variability, Variable};
 
 /// What differs from the model as it was compiled.
 #[derive(Clone, Debug, Default)]
@@ -33,19 +33,14 @@ impl From<&Variant> for Changes {
 /// The text of `modelDescription.xml` for a model.
 ///
 /// # Errors
-/// When the model contradicts itself (two variables of one name, a state without derivative, a start value
-/// that differs from the table's), or `changes` names a variable that is not there, has another type or
-/// has no start value.
+/// When the model contradicts itself (two variables of one name, a state without derivative, an empty range,
+/// a start value outside of it or other than the table's, a dependency that it has not declared), or `changes`
+/// has a start value that is impossible, or is for no variable that has one.
 pub fn describe<M: Model>(changes: &Changes) -> Result<String> {
     let info = M::INFO;
-    ensure!(
-        info.co_simulation.is_some() || info.model_exchange.is_some(),
-        "{} offers neither Co-Simulation nor Model Exchange",
-        info.name
-    );
-    check_names(info.variables)?;
+    check_info(&info)?;
     check_starts::<M>()?;
-    check_changes(info.variables, changes)?;
+    check_changes::<M>(changes)?;
     let structure = ModelStructure::of::<M>(changes.tunable_parameters)?;
     let variables =
         info.variables.iter().zip(0..).map(|(variable, vr)| scalar_variable(variable, vr, changes));
@@ -85,65 +80,6 @@ pub fn describe<M: Model>(changes: &Changes) -> Result<String> {
     xml::to_text(&description)
 }
 
-fn check_names(variables: &[Variable]) -> Result<()> {
-    let mut names = HashSet::new();
-    for Variable { name, .. } in variables {
-        ensure!(!name.is_empty(), "a variable has no name");
-        ensure!(names.insert(name), "there are two variables with the name {name}");
-    }
-    Ok(())
-}
-
-/// The model must start with what its table says, through each interface type.
-fn check_starts<M: Model>() -> Result<()> {
-    let offered = [
-        M::INFO.co_simulation.map(|_| Interface::CoSimulation),
-        M::INFO.model_exchange.map(|_| Interface::ModelExchange),
-    ];
-    for interface in offered.into_iter().flatten() {
-        let model = M::new(interface);
-        for (vr, variable) in (0..).zip(M::INFO.variables).filter(|(_, variable)| has_start(variable)) {
-            let (table, actual) = match variable.kind {
-                Kind::Real { start, .. } => (Start::Real(start), Start::Real(model.real(vr))),
-                Kind::Integer { start, .. } => (Start::Integer(start), Start::Integer(model.integer(vr))),
-                Kind::Boolean { start } => (Start::Boolean(start), Start::Boolean(model.boolean(vr))),
-            };
-            let name = variable.name;
-            ensure!(
-                table == actual,
-                "{name} starts with {table:?} in the table and with {actual:?} in the model"
-            );
-        }
-    }
-    Ok(())
-}
-
-fn check_changes(variables: &[Variable], changes: &Changes) -> Result<()> {
-    for (name, start) in &changes.start {
-        let Some(variable) = variables.iter().find(|variable| variable.name == name) else {
-            bail!("there is no variable {name} to give a start value to");
-        };
-        ensure!(has_start(variable), "{name} is calculated and has no start value");
-        match (variable.kind, start) {
-            (Kind::Real { of, .. }, Start::Real(value)) => {
-                ensure!(value.is_finite(), "{name} must be a finite number, it is {value}");
-                if let Some(min) = of.min {
-                    ensure!(*value >= min, "{name} must be >= {min}, it is {value}");
-                }
-                if let Some(max) = of.max {
-                    ensure!(*value <= max, "{name} must be <= {max}, it is {value}");
-                }
-            }
-            (Kind::Integer { min, max, .. }, Start::Integer(value)) => {
-                ensure!((min..=max).contains(value), "{name} must be between {min} and {max}, it is {value}");
-            }
-            (Kind::Boolean { .. }, Start::Boolean(_)) => {}
-            (kind, _) => bail!("{name} is {:?}, the start value {start:?} is not", kind.base_type()),
-        }
-    }
-    Ok(())
-}
-
 fn model_exchange(info: &ModelInfo) -> Option<fmi2::ModelExchange> {
     info.model_exchange.map(|offer| fmi2::ModelExchange {
         model_identifier: info.identifier.into(),
@@ -179,62 +115,51 @@ fn log_categories() -> LogCategories {
 }
 
 fn scalar_variable(variable: &Variable, vr: u32, changes: &Changes) -> ScalarVariable {
-    let changed = changes.start.iter().find(|(name, _)| name == variable.name).map(|(_, start)| *start);
-    let start = has_start(variable).then_some(changed.unwrap_or(table_start(&variable.kind)));
-    let declared_type = type_name(&variable.kind);
+    let changed = changes.start.iter().find(|(name, _)| name == variable.name()).map(|(_, start)| *start);
+    let own = Start::of(&variable.kind());
+    let start = has_start(variable).then_some(changed.unwrap_or(own));
+    let declared_type = type_name(&variable.kind());
     ScalarVariable {
-        name: variable.name.into(),
+        name: variable.name().into(),
         value_reference: vr,
-        description: (!variable.description.is_empty()).then(|| variable.description.into()),
-        causality: match variable.causality {
+        description: (!variable.description().is_empty()).then(|| variable.description().into()),
+        causality: match variable.causality() {
             Causality::Parameter => fmi2::Causality::Parameter,
             Causality::Input => fmi2::Causality::Input,
             Causality::Output => fmi2::Causality::Output,
-            Causality::Local => fmi2::Causality::Local,
+            // check_info has refused what is unknown.
+            _ => fmi2::Causality::Local,
         },
-        variability: Some(match (variable.causality, variable.variability) {
+        variability: Some(match (variable.causality(), variable.variability()) {
             (Causality::Parameter, _) if changes.tunable_parameters => fmi2::Variability::Tunable,
             (_, Variability::Fixed) => fmi2::Variability::Fixed,
             (_, Variability::Tunable) => fmi2::Variability::Tunable,
             (_, Variability::Discrete) => fmi2::Variability::Discrete,
-            (_, Variability::Continuous) => fmi2::Variability::Continuous,
+            _ => fmi2::Variability::Continuous,
         }),
-        initial: variable.initial.map(|initial| match initial {
+        initial: variable.initial().map(|initial| match initial {
             Initial::Exact => fmi2::Initial::Exact,
             Initial::Calculated => fmi2::Initial::Calculated,
         }),
-        elem: match variable.kind {
-            Kind::Real { .. } => ScalarVariableElement::Real(Real {
+        elem: match own {
+            Start::Real(_) => ScalarVariableElement::Real(Real {
                 declared_type,
                 start: start
                     .and_then(|start| if let Start::Real(value) = start { Some(value) } else { None }),
-                derivative: variable.derivative_of.map(index),
+                derivative: variable.differentiates().map(index),
                 reinit: None,
             }),
-            Kind::Integer { .. } => ScalarVariableElement::Integer(Integer {
+            Start::Integer(_) => ScalarVariableElement::Integer(Integer {
                 declared_type,
                 start: start
                     .and_then(|start| if let Start::Integer(value) = start { Some(value) } else { None }),
             }),
-            Kind::Boolean { .. } => ScalarVariableElement::Boolean(Boolean {
+            Start::Boolean(_) => ScalarVariableElement::Boolean(Boolean {
                 declared_type,
                 start: start
                     .and_then(|start| if let Start::Boolean(value) = start { Some(value) } else { None }),
             }),
         },
-    }
-}
-
-/// Inputs and what is `exact` start from a value, what is `calculated` does not (section 2.2.7).
-fn has_start(variable: &Variable) -> bool {
-    variable.initial != Some(Initial::Calculated)
-}
-
-fn table_start(kind: &Kind) -> Start {
-    match *kind {
-        Kind::Real { start, .. } => Start::Real(start),
-        Kind::Integer { start, .. } => Start::Integer(start),
-        Kind::Boolean { start } => Start::Boolean(start),
     }
 }
 

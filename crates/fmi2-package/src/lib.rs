@@ -2,7 +2,7 @@
 //!
 //! ## Inside
 //!
-//! * [`describe`] writes the description; [`structure`] finds the dependencies.
+//! * [`describe`] checks the model and writes the description; [`structure`] has the dependencies.
 //! * [`LibraryBuild`] compiles the library with cargo, [`pack`] makes the FMU, [`Builder`] does all of it.
 //! * [`System`] wires FMUs.
 //! * [`Fingerprint`], [`Sources`] and [`build_script`] are for the guid; they are all there is without the
@@ -13,15 +13,20 @@
 
 mod content;
 mod fingerprint;
+mod packages;
 mod sources;
 mod variant;
 
 #[cfg(feature = "package")]
 mod cargo;
+#[cfg(feature = "package")]
+mod check;
 #[cfg(feature = "command")]
 mod command;
 #[cfg(feature = "package")]
 mod describe;
+#[cfg(feature = "command")]
+mod library;
 #[cfg(feature = "package")]
 mod pack;
 #[cfg(feature = "package")]
@@ -30,6 +35,8 @@ mod platform;
 pub mod structure;
 #[cfg(feature = "package")]
 mod system;
+#[cfg(feature = "command")]
+pub mod terminal;
 #[cfg(feature = "package")]
 mod types;
 #[cfg(feature = "package")]
@@ -41,7 +48,7 @@ pub use sources::Sources;
 pub use variant::{Start, Variant, build_script};
 
 #[cfg(feature = "command")]
-pub use command::{BuildOptions, Builder, exit, short};
+pub use command::{BuildOptions, Builder};
 #[cfg(feature = "package")]
 pub use {
     cargo::LibraryBuild,

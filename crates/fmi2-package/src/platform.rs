@@ -6,21 +6,25 @@ use std::fmt;
 /// A platform that an FMU's library is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Platform {
+    /// Processor and operating system as Rust names them.
+    architecture: &'static str,
+    system: &'static str,
     folder: &'static str,
     library_suffix: &'static str,
 }
 
-/// Processor and operating system as Rust names them, folder, ending of the library. Section 2.3 has
-/// names for x86; for the rest it refers to the platform tuples of FMI 3.0, section 2.5.1.4.1.
-const PLATFORMS: [(&str, &str, &str, &str); 8] = [
-    ("x86_64", "linux", "linux64", ".so"),
-    ("x86", "linux", "linux32", ".so"),
-    ("aarch64", "linux", "aarch64-linux", ".so"),
-    ("x86_64", "windows", "win64", ".dll"),
-    ("x86", "windows", "win32", ".dll"),
-    ("aarch64", "windows", "aarch64-windows", ".dll"),
-    ("x86_64", "macos", "darwin64", ".dylib"),
-    ("aarch64", "macos", "aarch64-darwin", ".dylib"),
+/// Section 2.3 has names for x86; for the rest it refers to the platform tuples of FMI 3.0, section
+/// 2.5.1.4.1.
+#[rustfmt::skip]
+const PLATFORMS: [Platform; 8] = [
+    Platform { architecture: "x86_64", system: "linux", folder: "linux64", library_suffix: ".so" },
+    Platform { architecture: "x86", system: "linux", folder: "linux32", library_suffix: ".so" },
+    Platform { architecture: "aarch64", system: "linux", folder: "aarch64-linux", library_suffix: ".so" },
+    Platform { architecture: "x86_64", system: "windows", folder: "win64", library_suffix: ".dll" },
+    Platform { architecture: "x86", system: "windows", folder: "win32", library_suffix: ".dll" },
+    Platform { architecture: "aarch64", system: "windows", folder: "aarch64-windows", library_suffix: ".dll" },
+    Platform { architecture: "x86_64", system: "macos", folder: "darwin64", library_suffix: ".dylib" },
+    Platform { architecture: "aarch64", system: "macos", folder: "aarch64-darwin", library_suffix: ".dylib" },
 ];
 
 impl Platform {
@@ -61,8 +65,8 @@ impl Platform {
     /// # Errors
     /// When there is none; the message lists the names.
     pub fn of_folder(folder: &str) -> Result<Self> {
-        Self::find(|(_, _, name, _)| *name == folder).ok_or_else(|| {
-            let known = PLATFORMS.map(|(_, _, name, _)| name).join(", ");
+        Self::find(|platform| platform.folder == folder).ok_or_else(|| {
+            let known = PLATFORMS.map(|platform| platform.folder).join(", ");
             anyhow::anyhow!("'{folder}' is no platform of FMI 2.0; platforms are {known}")
         })
     }
@@ -72,16 +76,22 @@ impl Platform {
         format!("{model_identifier}{}", self.library_suffix)
     }
 
-    fn of(architecture: &str, system: &str) -> Result<Self> {
-        Self::find(|(a, s, _, _)| (*a, *s) == (architecture, system))
+    /// Whether both have the same operating system, on whatever processor.
+    pub fn same_system(self, other: Self) -> bool {
+        self.system == other.system
+    }
+
+    /// The platform of a processor and an operating system as Rust names them, such as `x86_64` and `macos`.
+    ///
+    /// # Errors
+    /// When FMI has no folder for them.
+    pub fn of(architecture: &str, system: &str) -> Result<Self> {
+        Self::find(|platform| (platform.architecture, platform.system) == (architecture, system))
             .ok_or_else(|| anyhow::anyhow!("no FMU platform is known for {architecture} with {system}"))
     }
 
-    fn find(is_it: impl Fn(&(&str, &str, &str, &str)) -> bool) -> Option<Self> {
-        PLATFORMS
-            .iter()
-            .find(|platform| is_it(platform))
-            .map(|&(_, _, folder, library_suffix)| Self { folder, library_suffix })
+    fn find(is_it: impl Fn(&Self) -> bool) -> Option<Self> {
+        PLATFORMS.into_iter().find(is_it)
     }
 }
 

@@ -2,17 +2,26 @@
 
 use crate::content::{ContentFile, content_files};
 use crate::fingerprint::Fingerprint;
+use crate::packages::Neighbourhood;
 use anyhow::{Context, Result};
 use std::fs;
 use std::path::{Path, PathBuf};
-use walkdir::WalkDir;
+use walkdir::{DirEntry, WalkDir};
 
-/// The files that an FMU follows from. Besides these, the `Cargo.lock` in force always counts.
+/// The files that an FMU follows from.
+///
+/// Besides the files that are named here, these always count: the `Cargo.lock` in force, the `Cargo.toml` of the
+/// workspace, and the packages that are used by path, directly or through each other, each with its
+/// `Cargo.toml`, its build script and the folder of its library's sources.
+///
+/// What does not count: the compiler, the target and the profile; flags and other variables of the environment;
+/// what `[patch]` puts in the place of a package; files that code includes from elsewhere. What of this makes
+/// a difference must be named here, or be in [`Variant::start`](crate::Variant::start).
 #[derive(Clone, Debug)]
 pub struct Sources {
     /// The folder of the model's `Cargo.toml`, to which the other paths are relative.
     pub folder: PathBuf,
-    /// Files, and folders of which all Rust files count. Crates that are used by path belong here.
+    /// Files, and folders of which all files count but hidden ones.
     pub code: Vec<&'static str>,
     /// The folder of what goes into the FMU as it is, see [`content_files`].
     pub content: Option<&'static str>,
@@ -56,7 +65,7 @@ impl Sources {
     /// A hash of all of it.
     ///
     /// # Errors
-    /// When a file cannot be read.
+    /// When a file cannot be read, or cargo does not say what the package is made of.
     pub fn fingerprint(&self) -> Result<String> {
         let mut fingerprint = Fingerprint::new();
         let mut add = |name: &str, path: &Path| {
@@ -68,18 +77,19 @@ impl Sources {
             add("Cargo.lock", &lock)?;
         }
         for source in &self.code {
-            let path = self.folder.join(source);
-            if !path.is_dir() {
-                add(source, &path)?;
-                continue;
+            for (inside, path) in files(&self.folder.join(source))? {
+                add(&format!("{source}{inside}"), &path)?;
             }
-            for entry in WalkDir::new(&path).sort_by_file_name() {
-                let entry = entry.with_context(|| format!("cannot read {}", path.display()))?;
-                if entry.file_type().is_file() && entry.path().extension().is_some_and(|e| e == "rs") {
-                    // The same name on every system.
-                    let inside = entry.path().strip_prefix(&path)?.iter();
-                    let inside: Vec<_> = inside.map(|part| part.to_string_lossy()).collect();
-                    add(&format!("{source}/{}", inside.join("/")), entry.path())?;
+        }
+        let Neighbourhood { workspace, used } = Neighbourhood::of(&self.folder)?;
+        if workspace != self.folder {
+            add("workspace/Cargo.toml", &workspace.join("Cargo.toml"))?;
+        }
+        for package in used {
+            add(&format!("{}/Cargo.toml", package.name), &package.folder.join("Cargo.toml"))?;
+            for (place, path) in package.code.iter().enumerate() {
+                for (inside, path) in files(path)? {
+                    add(&format!("{}/{place}{inside}", package.name), &path)?;
                 }
             }
         }
@@ -92,10 +102,16 @@ impl Sources {
     /// What a build script must watch to run again whenever the hash changes.
     ///
     /// # Errors
-    /// When the folder of the content cannot be read.
+    /// When the folder of the content cannot be read, or cargo does not say what the package is made of.
     pub fn watched(&self) -> Result<Vec<PathBuf>> {
         let listed = self.code.iter().chain(&self.licenses).map(|name| self.folder.join(name));
         let mut paths: Vec<PathBuf> = self.lock().into_iter().chain(listed).collect();
+        let Neighbourhood { workspace, used } = Neighbourhood::of(&self.folder)?;
+        paths.push(workspace.join("Cargo.toml"));
+        for package in used {
+            paths.push(package.folder.join("Cargo.toml"));
+            paths.extend(package.code);
+        }
         if let Some(content) = self.content {
             let folder = self.folder.join(content);
             for entry in fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))? {
@@ -106,6 +122,7 @@ impl Sources {
             }
         }
         paths.sort();
+        paths.dedup();
         Ok(paths)
     }
 
@@ -113,4 +130,23 @@ impl Sources {
     fn lock(&self) -> Option<PathBuf> {
         self.folder.ancestors().map(|folder| folder.join("Cargo.lock")).find(|lock| lock.is_file())
     }
+}
+
+/// The file itself, or all files of a folder but hidden ones: the name after the folder's, the same on every
+/// system, and the path.
+fn files(path: &Path) -> Result<Vec<(String, PathBuf)>> {
+    if !path.is_dir() {
+        return Ok(vec![(String::new(), path.to_owned())]);
+    }
+    let is_hidden = |entry: &DirEntry| entry.depth() > 0 && entry.file_name().as_encoded_bytes()[0] == b'.';
+    let mut files = Vec::new();
+    for entry in WalkDir::new(path).sort_by_file_name().into_iter().filter_entry(|entry| !is_hidden(entry)) {
+        let entry = entry.with_context(|| format!("cannot read {}", path.display()))?;
+        if entry.file_type().is_file() {
+            let inside = entry.path().strip_prefix(path)?.iter();
+            let inside: String = inside.map(|part| format!("/{}", part.to_string_lossy())).collect();
+            files.push((inside, entry.into_path()));
+        }
+    }
+    Ok(files)
 }

@@ -1,13 +1,16 @@
-//! Which variable depends on which, and how (section 2.2.8), found by asking a live model.
+//! Which variable depends on which, and how (section 2.2.8).
 //!
-//! The model is evaluated at points drawn around its start values, always the same ones. What does not
-//! react at any of them does not depend; a factor that never changes is constant.
+//! A live model is evaluated at points drawn around its start values, always the same ones. If its equations
+//! are [smooth](ModelInfo::smooth), what does not react at any of them does not depend, and a factor that never
+//! changes is constant. Of other models that proves nothing: there an unknown depends on what it
+//! [declares](Variable::depends_on), else on everything, and trying only finds wrong declarations.
 
 mod sample;
 
-use anyhow::{Result, ensure};
+use crate::check::{check_info, has_start};
+use anyhow::{Result, bail, ensure};
 use fmi_schema::fmi2::DependenciesKind;
-use fmi2_export::{Causality, Initial, Model, ModelInfo, Variable};
+use fmi2_export::{Causality, Model, ModelInfo, Variable};
 use sample::{Point, Sampler};
 
 /// The lists of unknowns, each unknown with what it depends on.
@@ -34,42 +37,64 @@ impl ModelStructure {
     /// The structure of a model whose parameters are `tunable`, or are what its table says.
     ///
     /// # Errors
-    /// When a state has no derivative, or the model refuses every set of parameters near its start values.
+    /// When the model contradicts itself, reacts to what it has not declared, or refuses every set of
+    /// parameters near its start values.
     pub fn of<M: Model>(tunable_parameters: bool) -> Result<Self> {
         let info = M::INFO;
-        check_states(&info)?;
+        check_info(&info)?;
         let has_states = info.model_exchange.is_some()
             || info.co_simulation.is_some_and(|offer| offer.directional_derivative);
-        let outputs = find(&info, |variable| variable.causality == Causality::Output);
+        let outputs = find(&info, |variable| variable.causality() == Causality::Output);
         let derivatives: Vec<u32> = if has_states { info.derivatives().collect() } else { Vec::new() };
-        let knowns =
-            find(&info, |variable| variable.causality == Causality::Input || (has_states && variable.state));
+        let knowns = find(&info, |variable| {
+            variable.causality() == Causality::Input || (has_states && variable.is_state())
+        });
         let mut initial_unknowns: Vec<u32> = outputs.iter().chain(&derivatives).copied().collect();
-        initial_unknowns.retain(|vr| info.variables[*vr as usize].initial == Some(Initial::Calculated));
+        initial_unknowns.retain(|vr| !has_start(&info.variables[*vr as usize]));
         initial_unknowns.sort_unstable();
         initial_unknowns.dedup();
-        let initial_knowns = find(&info, |variable| {
-            variable.causality == Causality::Input || variable.initial == Some(Initial::Exact)
-        });
+        let initial_knowns = find(&info, has_start);
 
         let mut sampler = Sampler::<M>::new(tunable_parameters);
+        let outputs = by_derivative(&mut sampler, &outputs, &knowns)?;
+        let derivatives = by_derivative(&mut sampler, &derivatives, &knowns)?;
+        let initial_unknowns = by_value(&mut sampler, &initial_unknowns, &initial_knowns)?;
         Ok(Self {
-            outputs: by_derivative(&mut sampler, &outputs, &knowns)?,
-            derivatives: by_derivative(&mut sampler, &derivatives, &knowns)?,
-            initial_unknowns: by_value(&mut sampler, &initial_unknowns, &initial_knowns)?,
+            outputs: with_declared(&info, outputs, &knowns)?,
+            derivatives: with_declared(&info, derivatives, &knowns)?,
+            initial_unknowns: with_declared(&info, initial_unknowns, &initial_knowns)?,
         })
     }
 }
 
-fn check_states(info: &ModelInfo) -> Result<()> {
-    for state in info.states() {
-        ensure!(
-            info.variables.iter().any(|v| v.is_state_derivative() && v.derivative_of == Some(state)),
-            "the state {} has no derivative among the variables",
-            info.variables[state as usize].name
-        );
-    }
-    Ok(())
+/// An unknown with what it depends on.
+type Dependencies = (u32, Vec<Dependency>);
+
+/// Adds to what was found by trying what the model declares, or what cannot be ruled out.
+fn with_declared(info: &ModelInfo, found: Vec<Dependencies>, knowns: &[u32]) -> Result<Vec<Dependencies>> {
+    let complete = |(unknown, found): Dependencies| {
+        let variable = &info.variables[unknown as usize];
+        if variable.is_state() {
+            // It is what was set.
+            let itself = knowns.iter().filter(|known| **known == unknown);
+            let itself = itself.map(|known| Dependency { known: *known, kind: DependenciesKind::Constant });
+            return Ok((unknown, itself.collect()));
+        }
+        let declared = variable.dependencies();
+        let is_declared = |known: u32| declared.is_none_or(|declared| declared.contains(&known));
+        if let Some(Dependency { known, .. }) = found.iter().find(|found| !is_declared(found.known)) {
+            let known = info.variables[*known as usize].name();
+            bail!("{} reacts to {known}, which its depends_on does not name", variable.name());
+        }
+        let kind = |known: u32| match found.iter().find(|found| found.known == known) {
+            Some(found) if info.smooth => Some(found.kind.clone()),
+            None if info.smooth && declared.is_none() => None,
+            _ => is_declared(known).then_some(DependenciesKind::Dependent),
+        };
+        let all = knowns.iter().filter_map(|&known| Some(Dependency { known, kind: kind(known)? }));
+        Ok((unknown, all.collect()))
+    };
+    found.into_iter().map(complete).collect()
 }
 
 fn find(info: &ModelInfo, is_it: impl Fn(&Variable) -> bool) -> Vec<u32> {
@@ -82,7 +107,7 @@ fn by_derivative<M: Model>(
     sampler: &mut Sampler<M>,
     unknowns: &[u32],
     knowns: &[u32],
-) -> Result<Vec<(u32, Vec<Dependency>)>> {
+) -> Result<Vec<Dependencies>> {
     let samples = sampler.factor_samples()?;
     let mut list = Vec::new();
     for &unknown in unknowns {
@@ -131,9 +156,8 @@ fn by_value<M: Model>(
     sampler: &mut Sampler<M>,
     unknowns: &[u32],
     knowns: &[u32],
-) -> Result<Vec<(u32, Vec<Dependency>)>> {
-    let mut list: Vec<(u32, Vec<Dependency>)> =
-        unknowns.iter().map(|unknown| (*unknown, Vec::new())).collect();
+) -> Result<Vec<Dependencies>> {
+    let mut list: Vec<Dependencies> = unknowns.iter().map(|unknown| (*unknown, Vec::new())).collect();
     for &known in knowns {
         let reactions = sampler.reactions(known, unknowns)?;
         for (place, (_, dependencies)) in list.iter_mut().enumerate() {
@@ -190,7 +214,7 @@ impl<M: Model> Sampler<M> {
             ensure!(
                 finite,
                 "{} is not finite near the start values",
-                M::INFO.variables[*unknown as usize].name
+                M::INFO.variables[*unknown as usize].name()
             );
         }
         Ok(reactions)

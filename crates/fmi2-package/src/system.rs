@@ -52,8 +52,9 @@ impl<'a> System<'a> {
     /// Reads the FMUs and checks the wiring against what they say of themselves.
     ///
     /// # Errors
-    /// When an FMU cannot be read, a variable is not there or has the wrong causality, two ends of a
-    /// connection differ in type or unit, or an input is fed twice.
+    /// When an FMU cannot be read, two components share a name or two different FMUs a file name, a variable is
+    /// not there or has the wrong causality, two ends of a connection differ in type or unit, an input is fed
+    /// twice, or a start value or time is no finite number.
     pub fn check(&'a self) -> Result<CheckedSystem<'a>> {
         let mut checked = CheckedSystem {
             system: self,
@@ -61,12 +62,26 @@ impl<'a> System<'a> {
             variables: BTreeMap::new(),
             units: BTreeMap::new(),
         };
-        for (component, path) in &self.components {
+        for (what, value) in [("stop time", self.stop_time), ("step size", self.step_size)] {
+            ensure!(value.is_finite() && value > 0.0, "the {what} must be > 0, it is {value}");
+        }
+        for (place, (component, path)) in self.components.iter().enumerate() {
+            ensure!(
+                !component.is_empty() && !component.contains(['.', '/', '\\']),
+                "'{component}' cannot name a component, because it is empty or has a dot or slash in it"
+            );
+            let before = &self.components[..place];
+            ensure!(
+                before.iter().all(|(other, _)| other != component),
+                "two components are named {component}"
+            );
             checked.read(component, path).with_context(|| format!("{} is no usable FMU", path.display()))?;
         }
+        checked.check_files()?;
         let mut fed = Vec::new();
-        for (_, to, _) in &self.inputs {
+        for (_, to, start) in &self.inputs {
             checked.find(to, &["input"])?;
+            check_finite(to, *start)?;
             fed.push(*to);
         }
         for (_, from) in &self.outputs {
@@ -87,7 +102,10 @@ impl<'a> System<'a> {
         for (name, start) in &self.start {
             let variable = checked.find(name, &["parameter", "input"])?;
             let kind = match start {
-                Start::Real(_) => "Real",
+                Start::Real(value) => {
+                    check_finite(name, *value)?;
+                    "Real"
+                }
                 Start::Integer(_) => "Integer",
                 Start::Boolean(_) => "Boolean",
             };
@@ -135,6 +153,27 @@ impl CheckedSystem<'_> {
         Ok(())
     }
 
+    /// Several components may be instances of one FMU; it is packed once.
+    fn check_files(&self) -> Result<()> {
+        let mut files = BTreeMap::new();
+        for ((_, path), bytes) in self.system.components.iter().zip(&self.fmus) {
+            let (first, content) = files.entry(file_name(path)?).or_insert((path, bytes));
+            ensure!(
+                *content == bytes,
+                "{} and {} are different and have the same file name; rename one of them",
+                first.display(),
+                path.display()
+            );
+        }
+        Ok(())
+    }
+
+    /// The FMUs, each once: file name and content.
+    fn files(&self) -> Result<BTreeMap<&str, &[u8]>> {
+        let fmus = self.system.components.iter().zip(&self.fmus);
+        fmus.map(|((_, path), bytes)| Ok((file_name(path)?, bytes.as_slice()))).collect()
+    }
+
     fn find(&self, name: &str, causalities: &[&str]) -> Result<&Variable> {
         let variable = self.variables.get(name).with_context(|| format!("no FMU has a variable {name}"))?;
         ensure!(
@@ -155,8 +194,10 @@ impl CheckedSystem<'_> {
     /// When the file cannot be written.
     pub fn write_ssp(&self, destination: &Path) -> Result<u64> {
         let mut entries = vec![("SystemStructure.ssd".to_owned(), self.ssd()?.into_bytes())];
-        for ((component, path), bytes) in self.system.components.iter().zip(&self.fmus) {
-            entries.push((format!("resources/{}", file_name(path)?), bytes.clone()));
+        for (name, bytes) in self.files()? {
+            entries.push((format!("resources/{name}"), bytes.to_vec()));
+        }
+        for (component, _) in &self.system.components {
             let own = self.own_start(component);
             if !own.is_empty() {
                 entries.push((format!("resources/{component}.ssv"), self.ssv(&own)?.into_bytes()));
@@ -180,8 +221,8 @@ impl CheckedSystem<'_> {
     /// # Errors
     /// When a file cannot be written.
     pub fn write_osp(&self, folder: &Path) -> Result<()> {
-        for ((_, path), bytes) in self.system.components.iter().zip(&self.fmus) {
-            write_atomically(&folder.join(file_name(path)?), |file| Ok(file.write_all(bytes)?))?;
+        for (name, bytes) in self.files()? {
+            write_atomically(&folder.join(name), |file| Ok(file.write_all(bytes)?))?;
         }
         let text = self.osp()?;
         write_atomically(
@@ -351,6 +392,11 @@ impl CheckedSystem<'_> {
         );
         xml::document(&root)
     }
+}
+
+fn check_finite(name: &str, start: f64) -> Result<()> {
+    ensure!(start.is_finite(), "the start value of {name} must be a finite number, it is {start}");
+    Ok(())
 }
 
 /// Component and variable.

@@ -16,11 +16,11 @@ use fmi2_export::{Kind, RealType, Unit, Variable};
 pub(crate) fn type_definitions(variables: &[Variable]) -> Result<Option<TypeDefinitions>> {
     let mut types: Vec<SimpleType> = Vec::new();
     for variable in variables {
-        let Some(name) = type_name(&variable.kind) else { continue };
-        let elem = match variable.kind {
+        let Some(name) = type_name(&variable.kind()) else { continue };
+        let elem = match variable.kind() {
             Kind::Real { of, .. } => SimpleTypeElement::Real(real_attributes(of)),
             Kind::Integer { min, max, .. } => SimpleTypeElement::Integer(integer_attributes(min, max)),
-            Kind::Boolean { .. } => continue,
+            _ => continue,
         };
         match types.iter().find(|known| known.name == name) {
             Some(known) => ensure!(known.elem == elem, "there are two different types with the name {name}"),
@@ -29,7 +29,7 @@ pub(crate) fn type_definitions(variables: &[Variable]) -> Result<Option<TypeDefi
     }
     for name in types.iter().map(|known| &known.name) {
         ensure!(
-            variables.iter().all(|variable| variable.name != name),
+            variables.iter().all(|variable| variable.name() != name),
             "{name} is a variable and a type; rename one of them (section 2.2.3)"
         );
     }
@@ -40,10 +40,11 @@ pub(crate) fn type_definitions(variables: &[Variable]) -> Result<Option<TypeDefi
 pub(crate) fn type_name(kind: &Kind) -> Option<String> {
     match *kind {
         Kind::Real { of, .. } => Some(of.name.to_owned()),
-        Kind::Integer { min: i32::MIN, max: i32::MAX, .. } | Kind::Boolean { .. } => None,
+        Kind::Integer { min: i32::MIN, max: i32::MAX, .. } => None,
         Kind::Integer { min, max: i32::MAX, .. } => Some(format!("Integer_from_{min}")),
         Kind::Integer { min: i32::MIN, max, .. } => Some(format!("Integer_to_{max}")),
         Kind::Integer { min, max, .. } => Some(format!("Integer_from_{min}_to_{max}")),
+        _ => None,
     }
 }
 
@@ -73,7 +74,7 @@ fn integer_attributes(min: i32, max: i32) -> IntegerAttributes {
 pub(crate) fn unit_definitions(variables: &[Variable]) -> Result<Option<UnitDefinitions>> {
     let mut units: Vec<&Unit> = Vec::new();
     for variable in variables {
-        let Kind::Real { of: RealType { unit, .. }, .. } = variable.kind else { continue };
+        let Kind::Real { of: RealType { unit, .. }, .. } = variable.kind() else { continue };
         match units.iter().find(|known| known.name == unit.name) {
             Some(known) => {
                 ensure!(**known == **unit, "there are two different units with the name {}", unit.name)

@@ -16,6 +16,21 @@ pub enum Start {
     Boolean(bool),
 }
 
+#[cfg(feature = "package")]
+impl Start {
+    /// What a variable's table says.
+    pub(crate) fn of(kind: &fmi2_export::Kind) -> Self {
+        use fmi2_export::Kind;
+        match *kind {
+            Kind::Real { start, .. } => Self::Real(start),
+            Kind::Integer { start, .. } => Self::Integer(start),
+            Kind::Boolean { start } => Self::Boolean(start),
+            // fmi2-export has no other kind, and fmi2-package is released with it.
+            ref other => unreachable!("{other:?}"),
+        }
+    }
+}
+
 /// What the library and the description must agree on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variant {

@@ -4,17 +4,14 @@ use fmi_schema::fmi2::DependenciesKind::{self, Constant, Dependent, Fixed, Tunab
 use fmi_schema::fmi2::{Fmi2ModelDescription, ScalarVariableElement};
 use fmi_schema::traits::FmiModelDescription;
 use fmi2_export::{
-    BaseUnit, CoSimulation, DefaultExperiment, Interface, Kind, Model, ModelError, ModelExchange, ModelInfo,
-    RealType, Unit, Variable, variables,
+    CoSimulation, DefaultExperiment, Interface, Kind, Model, ModelError, ModelExchange, ModelInfo, RealType,
+    Variable, units, variables,
 };
 use fmi2_package::structure::ModelStructure;
 use fmi2_package::{Changes, Start, describe};
 
-const ONE: Unit = Unit { name: "1", base: BaseUnit { kg: 0, m: 0, s: 0, rad: 0 }, display: None };
-const NUMBER: RealType =
-    RealType { name: "Number", quantity: "Number", unit: &ONE, min: None, max: None, nominal: None };
-const SHARE: RealType =
-    RealType { name: "Share", quantity: "Share", unit: &ONE, min: Some(0.0), max: Some(1.0), nominal: None };
+const NUMBER: RealType = RealType::new("Number", &units::ONE);
+const SHARE: RealType = RealType { min: Some(0.0), max: Some(1.0), ..RealType::new("Share", &units::ONE) };
 
 variables! {
     /// Input
@@ -39,30 +36,33 @@ variables! {
     b = Variable::parameter(Kind::Boolean { start: true });
 }
 
-/// What a model offers: Co-Simulation, Model Exchange, derivatives.
+/// What a model offers: Co-Simulation, Model Exchange, derivatives, smooth equations.
 trait Offer: Clone {
     const CO_SIMULATION: bool;
     const MODEL_EXCHANGE: bool;
     const DERIVATIVES: bool;
+    const SMOOTH: bool;
 }
 
 macro_rules! offers {
-    ($($name:ident: $co_simulation:literal, $model_exchange:literal, $derivatives:literal;)+) => { $(
+    ($($name:ident: $co_simulation:literal, $model_exchange:literal, $derivatives:literal, $smooth:literal;)+) => { $(
         #[derive(Clone)]
         struct $name;
         impl Offer for $name {
             const CO_SIMULATION: bool = $co_simulation;
             const MODEL_EXCHANGE: bool = $model_exchange;
             const DERIVATIVES: bool = $derivatives;
+            const SMOOTH: bool = $smooth;
         }
     )+ };
 }
 
 offers! {
-    Everything: true, true, true;
-    NoDerivatives: true, true, false;
-    StepsOnly: true, false, false;
-    Nothing: false, false, false;
+    Everything: true, true, true, true;
+    NoDerivatives: true, true, false, true;
+    NotSmooth: true, true, true, false;
+    StepsOnly: true, false, false, true;
+    Nothing: false, false, false, false;
 }
 
 #[derive(Clone)]
@@ -75,21 +75,12 @@ struct Toy<O> {
 
 impl<O: Offer> Model for Toy<O> {
     const INFO: ModelInfo = ModelInfo {
-        name: "Toy",
-        identifier: "toy",
-        guid: "{toy}",
-        description: "",
-        author: "",
-        version: "1",
-        license: "",
-        copyright: "",
         default_experiment: DefaultExperiment {
             start_time: 0.0,
             stop_time: 1.0,
             step_size: 1e-3,
             tolerance: 1e-7,
         },
-        variables: VARIABLES,
         co_simulation: if O::CO_SIMULATION {
             Some(CoSimulation {
                 variable_step_size: true,
@@ -106,6 +97,9 @@ impl<O: Offer> Model for Toy<O> {
         } else {
             None
         },
+        smooth: O::SMOOTH,
+        version: "1",
+        ..ModelInfo::new("Toy", "toy", "{toy}", VARIABLES)
     };
 
     fn new(_interface: Interface) -> Self {
@@ -209,7 +203,7 @@ fn kinds_say_what_a_factor_is_made_of() {
 fn without_derivatives_the_values_tell() {
     let [outputs, derivatives, initial] = lists::<NoDerivatives>(false);
     let expected: Lists = vec![
-        (vr::x, vec![(vr::x, Dependent)]),
+        (vr::x, vec![(vr::x, Constant)]),
         (vr::y, vec![(vr::u, Dependent), (vr::x, Dependent)]),
         (vr::z, vec![(vr::v, Dependent), (vr::x, Dependent)]),
         (vr::five, vec![]),
@@ -217,6 +211,19 @@ fn without_derivatives_the_values_tell() {
     assert_eq!(outputs, expected);
     assert_eq!(derivatives, [(vr::der_x, vec![(vr::u, Dependent), (vr::x, Dependent)])]);
     assert_eq!(initial, initial_unknowns());
+}
+
+/// Trying a few points proves nothing then, whatever the derivatives are there.
+#[test]
+fn without_smooth_equations_nothing_is_ruled_out() {
+    let [outputs, derivatives, initial] = lists::<NotSmooth>(false);
+    let all = |knowns: &[u32]| knowns.iter().map(|known| (*known, Dependent)).collect::<Vec<_>>();
+    let of_all = |unknown| (unknown, all(&[vr::u, vr::v, vr::x]));
+    let itself = (vr::x, vec![(vr::x, Constant)]);
+    assert_eq!(outputs, [itself, of_all(vr::y), of_all(vr::z), of_all(vr::five)]);
+    assert_eq!(derivatives, [of_all(vr::der_x)]);
+    let initial_knowns = all(&[vr::u, vr::v, vr::x, vr::p, vr::n, vr::b]);
+    assert_eq!(initial, [vr::der_x, vr::y, vr::z, vr::five].map(|unknown| (unknown, initial_knowns.clone())));
 }
 
 /// Section 2.2.8: then neither state derivatives nor dependencies on states are listed.
@@ -282,7 +289,7 @@ fn it_reads_back() {
     let text = text::<Everything>(&Changes::default());
     let read = Fmi2ModelDescription::deserialize(&text).unwrap();
     assert_eq!(read.model_variables.variables.len(), VARIABLES.len());
-    assert_eq!(read.model_variables.variables[1].description.as_deref(), Some(VARIABLES[1].description));
+    assert_eq!(read.model_variables.variables[1].description.as_deref(), Some(VARIABLES[1].description()));
     assert_eq!(read.number_of_event_indicators, Some(0));
     let unknowns = &read.model_structure.initial_unknowns.unknowns;
     assert_eq!(unknowns.iter().map(|unknown| unknown.index).collect::<Vec<_>>(), [4, 5, 6, 7]);

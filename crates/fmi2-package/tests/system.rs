@@ -75,6 +75,18 @@ fn what_does_not_fit_is_named() {
         (|s| s.start.push(("plant.y", Start::Real(0.0))), "plant.y is output, not parameter or input"),
         (|s| s.start.push(("plant.on", Start::Real(0.0))), "plant.on is Boolean, its start value is Real"),
         (|s| s.components[0].1 = "none.fmu".into(), "none.fmu is no usable FMU: it cannot be read"),
+        (|s| s.inputs[0].2 = f64::NAN, "the start value of law.r must be a finite number, it is NaN"),
+        (
+            |s| s.start.push(("plant.u", Start::Real(f64::INFINITY))),
+            "the start value of plant.u must be a finite number, it is inf",
+        ),
+        (|s| s.stop_time = f64::INFINITY, "the stop time must be > 0, it is inf"),
+        (|s| s.step_size = 0.0, "the step size must be > 0, it is 0"),
+        (|s| s.components[1].0 = "law", "two components are named law"),
+        (
+            |s| s.components[1].0 = "a.plant",
+            "'a.plant' cannot name a component, because it is empty or has a dot or slash in it",
+        ),
     ] {
         assert_eq!(refusal(change).split(": No such file").next(), Some(message));
     }
@@ -145,4 +157,64 @@ fn the_folder_for_libcosim_has_the_fmus_and_the_start_values() {
     for name in ["law.fmu", "plant.fmu"] {
         assert_eq!(fs::read(out.join(name)).unwrap(), fs::read(folder.path().join(name)).unwrap());
     }
+}
+
+/// Two plants behind one another.
+fn twins<'a>(components: Vec<(&'a str, PathBuf)>) -> System<'a> {
+    System {
+        name: "twins",
+        description: "Two of a kind",
+        components,
+        inputs: vec![("u", "one.u", 0.0)],
+        outputs: vec![("y", "other.y")],
+        connections: vec![("one.y", "other.u")],
+        start: vec![("one.on", Start::Boolean(true)), ("other.on", Start::Boolean(false))],
+        stop_time: 1.0,
+        step_size: 0.1,
+    }
+}
+
+#[test]
+fn two_instances_of_one_fmu_share_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let plant = fmus(folder.path()).remove(1).1;
+    let system = twins(vec![("one", plant.clone()), ("other", plant)]);
+    let checked = system.check().unwrap();
+    let ssp = folder.path().join("twins.ssp");
+    checked.write_ssp(&ssp).unwrap();
+    let mut zip = ZipArchive::new(fs::File::open(&ssp).unwrap()).unwrap();
+    let names: Vec<String> = zip.file_names().map(|name| name.unwrap().into_owned()).collect();
+    let expected =
+        ["experiment.ssv", "one.ssv", "other.ssv", "plant.fmu"].map(|name| format!("resources/{name}"));
+    assert_eq!(names[1..], expected);
+    let mut ssd = String::new();
+    zip.by_name("SystemStructure.ssd").unwrap().read_to_string(&mut ssd).unwrap();
+    assert_eq!(ssd.matches(r#"source="resources/plant.fmu""#).count(), 2, "{ssd}");
+
+    let osp = folder.path().join("osp");
+    checked.write_osp(&osp).unwrap();
+    assert_eq!(fs::read_dir(&osp).unwrap().count(), 2);
+    let text = fs::read_to_string(osp.join("OspSystemStructure.xml")).unwrap();
+    assert_eq!(text.matches(r#"source="plant.fmu""#).count(), 2, "{text}");
+}
+
+#[test]
+fn different_fmus_with_the_same_file_name_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let plant = fmus(folder.path()).remove(1).1;
+    let elsewhere = folder.path().join("elsewhere");
+    fs::create_dir(&elsewhere).unwrap();
+    let signals = [
+        variable("u", "input", "Real"),
+        variable("y", "output", "Real"),
+        variable("on", "parameter", "Boolean"),
+    ];
+    let other = fmu(&elsewhere, "plant.fmu", &signals.concat());
+    let message = format!(
+        "{} and {} are different and have the same file name; rename one of them",
+        plant.display(),
+        other.display()
+    );
+    let error = twins(vec![("one", plant), ("other", other)]).check().err().unwrap();
+    assert_eq!(error.to_string(), message);
 }

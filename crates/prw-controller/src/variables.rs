@@ -53,18 +53,20 @@ variables! {
     /// Measured torque of sensor 2, negative while the motor drives, for backing off; may be left unconnected
     tau2 = Variable::input(&TORQUE, 0.0);
 
+    // Inputs and parameters act from the next sample on: at a communication point nothing depends on them.
+
     /// Angle of motor 1; its start value is where the motor stands when the simulation begins
-    theta1 = Variable::output(&ANGLE).starting_at(0.0);
+    theta1 = Variable::output(&ANGLE).starting_at(0.0).depends_on(&[]);
     /// Angle of motor 2; its start value is where the motor stands when the simulation begins
-    theta2 = Variable::output(&ANGLE).starting_at(0.0);
+    theta2 = Variable::output(&ANGLE).starting_at(0.0).depends_on(&[]);
     /// Angular velocity of motor 1
-    omega1 = Variable::output(&RATE).derivative_of(vr::theta1);
+    omega1 = Variable::output(&RATE).derivative_of(vr::theta1).depends_on(&[]);
     /// Angular velocity of motor 2
-    omega2 = Variable::output(&RATE).derivative_of(vr::theta2);
+    omega2 = Variable::output(&RATE).derivative_of(vr::theta2).depends_on(&[]);
     /// What the control adds to pitch_ref, as of the last sample
-    pitch_correction = Variable::output(&ANGLE);
+    pitch_correction = Variable::output(&ANGLE).depends_on(&[]);
     /// What the control adds to roll_ref, as of the last sample
-    roll_correction = Variable::output(&ANGLE);
+    roll_correction = Variable::output(&ANGLE).depends_on(&[]);
 
     /// Time between samples, whatever the communication step size
     sample_time = parameter(&SAMPLE_TIME, START.sample_time);

@@ -1,18 +1,8 @@
-//! The example is what the README of fmi2-export shows, and what it promises.
+//! The model steps exactly, and becomes an FMU.
 
 use fmi2_export::{Interface, Model};
 use lag_fmu::{Lag, vr};
 use std::process::Command;
-
-#[test]
-fn the_readme_shows_this_model() {
-    let (_, code) = include_str!("../src/lib.rs").split_once("\n\n").unwrap();
-    let readme = include_str!("../../../crates/fmi2-export/README.md");
-    assert!(
-        readme.contains(&format!("```rust,ignore\n{code}```")),
-        "crates/fmi2-export/README.md is out of date"
-    );
-}
 
 #[test]
 fn steps_are_exact() {

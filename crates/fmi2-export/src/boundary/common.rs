@@ -27,8 +27,11 @@ pub unsafe fn fmi2Instantiate<M: Model>(
     logging_on: fmi2Boolean,
 ) -> fmi2Component {
     let instantiate = || {
-        // SAFETY: by contract NULL or the callbacks; copied, for they may go after this call.
-        let functions = unsafe { functions.as_ref() }?;
+        if functions.is_null() {
+            return None;
+        }
+        // SAFETY: by contract the callbacks; copied, from any address, for they may go after this call.
+        let functions = unsafe { functions.read_unaligned() };
         let log = ImporterLog { logger: functions.logger, environment: functions.component_environment };
         // SAFETY: by contract NULL or a string, both.
         let (instance_name, guid) = unsafe { (string(instance_name), string(guid)) };
@@ -242,11 +245,13 @@ pub unsafe fn fmi2SetFMUstate<M: Model>(c: fmi2Component, state: fmi2FMUstate) -
 /// `fmi2FreeFMUstate`. Takes the state back and clears the handle; NULL is ignored.
 pub unsafe fn fmi2FreeFMUstate<M: Model>(c: fmi2Component, state: *mut fmi2FMUstate) -> Status {
     let body = |_: &mut Instance<M>| {
-        // SAFETY: by contract NULL or a pointer to a handle.
-        if let Some(handle) = unsafe { state.as_mut() }
-            && !handle.is_null()
-        {
-            let state = std::mem::replace(handle, std::ptr::null_mut());
+        if state.is_null() {
+            return Ok(());
+        }
+        // SAFETY: by contract a pointer to a handle.
+        let handle = unsafe { slice_mut(state, 1, "FMUstate") }?;
+        if !handle[0].is_null() {
+            let state = std::mem::replace(&mut handle[0], std::ptr::null_mut());
             // SAFETY: by contract a state that this library gave away as a box and that is not freed.
             drop(unsafe { Box::from_raw(state.cast::<SavedState<M>>()) });
         }

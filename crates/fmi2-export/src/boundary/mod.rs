@@ -13,7 +13,8 @@
 //! * a saved state is NULL or comes from `fmi2GetFMUstate` or `fmi2DeSerializeFMUstate` of this
 //!   library, with the same model, and has not been freed;
 //! * a pointer with a length is NULL or points to that many values; a pointer to one value is NULL or
-//!   points to one; strings end with a zero byte; arrays that are written do not overlap others;
+//!   points to one; strings end with a zero byte; arrays that are written do not overlap others, and hold
+//!   whatever the importer's memory holds before (numbers, for which any bits will do);
 //! * the callbacks work until the instance is freed.
 #![allow(non_snake_case)]
 #![allow(clippy::missing_safety_doc, reason = "the contract above is that of every function")]

@@ -2,10 +2,10 @@
 
 use super::{Instance, finite, name, variable};
 use crate::call_table::{Interface, Mode};
-use crate::description::{BaseType, Causality, Variability, Variable};
 use crate::logger::Sink;
 use crate::model::Model;
 use crate::refusal::{Outcome, refuse};
+use crate::variable::{BaseType, Causality, Variability, Variable};
 
 impl<M: Model, S: Sink> Instance<M, S> {
     pub fn directional_derivative(

@@ -10,12 +10,12 @@ mod saved_states;
 mod values;
 
 use crate::call_table::{Function, Interface, Mode};
-use crate::description::{BaseType, Variable};
 use crate::logger::{Category, Logger, Sink};
 use crate::model::Model;
 use crate::refusal::{Outcome, Refusal, refuse, refuse_with};
 use crate::state::InstanceState;
 use crate::types::Status;
+use crate::variable::{BaseType, Variable};
 
 /// An instance of model `M` that logs to `S`.
 pub(crate) struct Instance<M, S> {
@@ -60,7 +60,7 @@ impl<M: Model, S: Sink> Instance<M, S> {
     pub fn log_refusal(&self, function: Function, refusal: &Refusal) {
         let category = match refusal.status {
             Status::Fatal => Category::Fatal,
-            Status::Discard => Category::Warning,
+            Status::Discard => Category::Discard,
             _ => Category::Error,
         };
         self.logger.log(refusal.status, category, &format!("{}: {}", function.rule().name, refusal.message));

@@ -2,10 +2,10 @@
 
 use super::{Instance, finite, name};
 use crate::call_table::Mode;
-use crate::description::Kind;
 use crate::logger::Sink;
 use crate::model::Model;
 use crate::refusal::{Outcome, refuse};
+use crate::variable::Kind;
 
 impl<M: Model, S: Sink> Instance<M, S> {
     pub fn enter_event_mode(&mut self) {

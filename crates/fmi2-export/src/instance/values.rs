@@ -2,11 +2,11 @@
 
 use super::{Instance, finite, variable};
 use crate::call_table::Interface;
-use crate::description::{BaseType, Causality, Kind, Variable};
 use crate::logger::Sink;
 use crate::model::Model;
 use crate::refusal::{Outcome, refuse, refuse_with};
 use crate::types::fmi2String;
+use crate::variable::{BaseType, Causality, Kind, Variable};
 
 impl<M: Model, S: Sink> Instance<M, S> {
     #[inline]

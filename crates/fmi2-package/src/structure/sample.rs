@@ -1,8 +1,9 @@
 //! Points at which a model is asked.
 
+use crate::check::has_start;
 use crate::variant::Start;
 use anyhow::{Result, bail};
-use fmi2_export::{Causality, Initial, Interface, Kind, Model, ModelError, RealType, Variability, Variable};
+use fmi2_export::{Causality, Interface, Kind, Model, ModelError, RealType, Variability};
 use std::marker::PhantomData;
 
 /// Values of everything that an importer can set before the simulation, and how it uses the model.
@@ -45,11 +46,12 @@ impl<M: Model> Sampler<M> {
 
     /// Models that differ in fixed parameters, in tunable ones, and in inputs, states and time.
     pub fn factor_samples(&mut self) -> Result<Vec<FactorSample<M>>> {
-        let is_parameter = |vr: u32| M::INFO.variables[vr as usize].causality == Causality::Parameter;
+        let is_parameter = |vr: u32| M::INFO.variables[vr as usize].causality() == Causality::Parameter;
         let tunable_parameters = self.tunable_parameters;
         let is_tunable = |vr: u32| {
             is_parameter(vr)
-                && (tunable_parameters || M::INFO.variables[vr as usize].variability == Variability::Tunable)
+                && (tunable_parameters
+                    || M::INFO.variables[vr as usize].variability() == Variability::Tunable)
         };
         let mut samples = Vec::new();
         for fixed in 0..4 {
@@ -75,9 +77,9 @@ impl<M: Model> Sampler<M> {
         let mut refused = None;
         for _ in 0..100 {
             for (vr, variable) in (0..).zip(M::INFO.variables) {
-                if is_known(variable) && which(vr) {
+                if has_start(variable) && which(vr) {
                     let value = &mut point.values[vr as usize];
-                    *value = Some(draw_value(&mut self.random, &variable.kind, *value));
+                    *value = Some(draw_value(&mut self.random, &variable.kind(), *value));
                 }
             }
             match model_at(&point) {
@@ -100,11 +102,6 @@ impl<M: Model> Sampler<M> {
             _ => Interface::CoSimulation,
         }
     }
-}
-
-/// Inputs, parameters and what else has an exact start value.
-fn is_known(variable: &Variable) -> bool {
-    variable.causality == Causality::Input || variable.initial == Some(Initial::Exact)
 }
 
 /// A model in Initialization Mode. An importer may set values before it enters that mode and in it.
@@ -143,7 +140,7 @@ fn draw_value(random: &mut fastrand::Rng, kind: &Kind, before: Option<Start>) ->
             let (low, high) = (min.max(start.saturating_sub(3)), max.min(start.saturating_add(3)));
             Start::Integer(random.i32(low..=high))
         }
-        Kind::Boolean { .. } => match before {
+        _ => match before {
             Some(Start::Boolean(before)) => Start::Boolean(!before),
             _ => Start::Boolean(random.bool()),
         },

@@ -1,0 +1,109 @@
+//! What a compiled library runs on, as its headers say.
+
+use crate::platform::Platform;
+use anyhow::{Context, Result, bail, ensure};
+use object::read::macho::{FatArch, MachOFatFile32};
+use object::{Architecture, BinaryFormat, File, FileKind, Object, ObjectKind};
+
+/// The platforms that a library is for: one, or several if it is a universal library of macOS.
+fn platforms(library: &[u8]) -> Result<Vec<Platform>> {
+    const NONE: &str = "it is no shared library";
+    match FileKind::parse(library).context(NONE)? {
+        FileKind::MachOFat32 => {
+            let parts = MachOFatFile32::parse(library).context(NONE)?;
+            parts.arches().iter().map(|part| platform(part.architecture(), BinaryFormat::MachO)).collect()
+        }
+        FileKind::Elf32
+        | FileKind::Elf64
+        | FileKind::MachO32
+        | FileKind::MachO64
+        | FileKind::Pe32
+        | FileKind::Pe64 => {
+            let file = File::parse(library).context(NONE)?;
+            ensure!(file.kind() == ObjectKind::Dynamic, NONE);
+            Ok(vec![platform(file.architecture(), file.format())?])
+        }
+        _ => bail!(NONE),
+    }
+}
+
+fn platform(architecture: Architecture, format: BinaryFormat) -> Result<Platform> {
+    let architecture = match architecture {
+        Architecture::X86_64 => "x86_64",
+        Architecture::I386 => "x86",
+        Architecture::Aarch64 => "aarch64",
+        other => bail!("it is for the processor {other:?}, for which FMI 2.0 has no folder"),
+    };
+    let system = match format {
+        BinaryFormat::Elf => "linux",
+        BinaryFormat::Pe => "windows",
+        BinaryFormat::MachO => "macos",
+        other => bail!("it is a file in the format {other:?}, which no importer loads"),
+    };
+    Platform::of(architecture, system)
+}
+
+/// Fails unless a library runs on the platform; with `any_processor`, on its system is enough.
+pub fn check_platform(library: &[u8], wanted: Platform, any_processor: bool) -> Result<()> {
+    let found = platforms(library)?;
+    let names = || found.iter().map(Platform::to_string).collect::<Vec<_>>().join(" and ");
+    let on_the_system = found.iter().any(|platform| platform.same_system(wanted));
+    ensure!(on_the_system, "it is for {}, not for {wanted}", names());
+    ensure!(
+        any_processor || found.contains(&wanted),
+        "it is for {}, not for {wanted}; if that is meant, for importers that look there on any processor, \
+         add --any-processor",
+        names()
+    );
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check_platform;
+    use crate::platform::Platform;
+
+    /// A universal library of macOS with nothing in its parts.
+    fn universal(processors: &[u32]) -> Vec<u8> {
+        let mut words = vec![0xcafe_babe, processors.len() as u32];
+        for &processor in processors {
+            words.extend([processor, 0, 0x1000, 0, 12]);
+        }
+        words.iter().flat_map(|word: &u32| word.to_be_bytes()).collect()
+    }
+
+    fn check(library: &[u8], folder: &str, any_processor: bool) -> Result<(), String> {
+        let wanted = Platform::of_folder(folder).unwrap();
+        check_platform(library, wanted, any_processor).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_universal_library_is_for_each_of_its_processors() {
+        let (intel, arm) = (0x0100_0007, 0x0100_000c);
+        let both = universal(&[intel, arm]);
+        assert_eq!(check(&both, "darwin64", false), Ok(()));
+        assert_eq!(check(&both, "aarch64-darwin", false), Ok(()));
+        let error = check(&both, "linux64", true).unwrap_err();
+        assert_eq!(error, "it is for darwin64 and aarch64-darwin, not for linux64");
+        let error = check(&universal(&[arm]), "darwin64", false).unwrap_err();
+        assert!(error.contains("aarch64-darwin") && error.contains("--any-processor"), "{error}");
+        assert_eq!(check(&universal(&[arm]), "darwin64", true), Ok(()));
+    }
+
+    #[test]
+    fn a_program_is_for_its_machine_only() {
+        let program = std::fs::read(std::env::current_exe().unwrap()).unwrap();
+        let host = Platform::host().unwrap().to_string();
+        for folder in ["linux64", "win64", "darwin64"].into_iter().filter(|folder| *folder != host) {
+            assert!(check(&program, folder, false).is_err(), "{folder}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_library_is_refused() {
+        for bytes in [&b""[..], b"\x7fELF", b"MZ", b"<html>", &[0xca, 0xfe, 0xba, 0xbe, 0, 0, 0, 9]] {
+            let error = check(bytes, "linux64", false).unwrap_err();
+            assert_eq!(error, "it is no shared library", "{bytes:?}");
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! The guid covers the package and those that it uses by path, and nothing of where they are.
+
+use fmi2_package::Sources;
+use std::fs;
+use std::path::Path;
+
+/// A workspace with a model that uses `near` by path, which uses `far`, outside of the workspace.
+fn project(folder: &Path) {
+    let package = |name: &str, dependencies: &str| {
+        let code = folder.join(name).join("src");
+        fs::create_dir_all(&code).unwrap();
+        fs::write(code.join("lib.rs"), "").unwrap();
+        let manifest = format!("[package]\nname = \"{}\"\n{dependencies}", name.replace('/', "_"));
+        fs::write(folder.join(name).join("Cargo.toml"), manifest).unwrap();
+    };
+    fs::create_dir_all(folder.join("all")).unwrap();
+    let workspace = "[workspace]\nmembers = [\"model\", \"near\", \"tools\"]\n\
+                     [workspace.dependencies]\nall_near = { path = \"near\" }\n";
+    fs::write(folder.join("all/Cargo.toml"), workspace).unwrap();
+    fs::write(folder.join("all/Cargo.lock"), "").unwrap();
+    package(
+        "all/model",
+        "[dependencies]\nall_near.workspace = true\n[dev-dependencies]\nall_tools.path = \"../tools\"\n",
+    );
+    package(
+        "all/near",
+        "[target.'cfg(windows)'.dependencies]\nfar.path = \"../../far\"\n[build-dependencies]\nall_model.path = \"../model\"\n",
+    );
+    package("all/tools", "");
+    package("far", "");
+    for file in ["all/model/build.rs", "all/model/build_fmu.rs", "all/near/build.rs"] {
+        fs::write(folder.join(file), "").unwrap();
+    }
+}
+
+fn fingerprint(folder: &Path) -> String {
+    Sources::of_package(folder.join("all/model")).fingerprint().unwrap()
+}
+
+#[test]
+fn whatever_is_compiled_makes_another_guid() {
+    let folder = tempfile::tempdir().unwrap();
+    project(folder.path());
+    let watched = Sources::of_package(folder.path().join("all/model")).watched().unwrap();
+    for (file, counts) in [
+        ("all/model/src/lib.rs", true),
+        ("all/model/src/table.csv", true),
+        ("all/model/Cargo.toml", true),
+        ("all/Cargo.toml", true),
+        ("all/Cargo.lock", true),
+        ("all/near/src/lib.rs", true),
+        ("all/near/src/deep/table.csv", true),
+        ("all/near/build.rs", true),
+        ("all/near/Cargo.toml", true),
+        ("far/src/lib.rs", true),
+        ("far/Cargo.toml", true),
+        ("all/near/src/.lib.rs.swp", false),
+        ("all/near/README.md", false),
+        ("all/tools/src/lib.rs", false),
+    ] {
+        let path = folder.path().join(file);
+        let before = fingerprint(folder.path());
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, fs::read_to_string(&path).unwrap_or_default() + "\n# more\n").unwrap();
+        assert_eq!(fingerprint(folder.path()) != before, counts, "{file}");
+        assert!(!counts || watched.iter().any(|watched| path.starts_with(watched)), "{file}: {watched:?}");
+    }
+}
+
+#[test]
+fn where_it_is_does_not_count() {
+    let (one, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    project(one.path());
+    project(&other.path().join("deep"));
+    assert_eq!(fingerprint(one.path()), fingerprint(&other.path().join("deep")));
+}
+
+#[test]
+fn a_path_to_nowhere_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    project(folder.path());
+    fs::remove_dir_all(folder.path().join("far")).unwrap();
+    let error = Sources::of_package(folder.path().join("all/model")).fingerprint().unwrap_err();
+    let text = format!("{error:#}");
+    assert!(text.contains("far") && text.lines().count() == 1, "{text}");
+}
