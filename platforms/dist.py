@@ -35,7 +35,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(dir=ROOT / "target") as made:
         folder = Path(made)
         pack(folder, FOLDERS, libraries)
-        pack(folder / "arm", ARM_FOLDERS, libraries)
+        pack(folder / "arm", ARM_FOLDERS, libraries, "--any-processor")
         (folder / "arm" / f"{MODEL}.fmu").rename(folder / f"{MODEL}-linux-arm64.fmu")
         shutil.copyfile(bill_of_materials.BILL, folder / bill_of_materials.BILL.name)
         if compilers:
@@ -74,9 +74,10 @@ def compiled_elsewhere(folder: Path) -> tuple[dict[Target, Path], list[str]]:
     return libraries, []
 
 
-def pack(out: Path, folders: dict[str, tuple[Target, ...]], libraries: dict[Target, Path]) -> None:
+def pack(out: Path, folders: dict[str, tuple[Target, ...]], libraries: dict[Target, Path], *options: str) -> None:
     """Packs an FMU with a library in each of these folders of `binaries/`."""
-    command = ["cargo", "run", "--locked", "--release", "--quiet", "--bin", "build_fmu", "--", "--out", str(out)]
+    command = ["cargo", "run", "--locked", "--release", "--quiet", "--bin", "build_fmu", "--"]
+    command += ["--out", str(out), *options]
     for folder, targets in folders.items():
         parts = [libraries[target] for target in targets]
         path = parts[0] if len(parts) == 1 else universal(out / f"{folder}.dylib", parts)

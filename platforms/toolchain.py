@@ -84,7 +84,8 @@ def _with_sources() -> Toolchain:
         rustc=str(DEBIAN_RUSTC),
         # build-std is unstable; compiler and sources are of one version here.
         environment={"RUSTC": str(DEBIAN_RUSTC), "RUSTC_BOOTSTRAP": "1"},
-        flags=("-Zbuild-std=std,panic_unwind",),
+        # Without the code that prints backtraces: half of the library, and an importer shows none.
+        flags=("-Zbuild-std=std,panic_unwind", "-Zbuild-std-features=panic-unwind"),
     )
 
 
