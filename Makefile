@@ -37,7 +37,7 @@ help:
 	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
 	@echo 'make profile                 count the instructions of a step, with callgrind'
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
-	@echo 'make docs                    write the documentation in the FMU anew'
+	@echo 'make docs                    write the documentation in the FMUs anew, and what README has of it'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make dist                    the FMU for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
 	@echo 'make test-platforms          run what is in dist/ on Linux, Windows (Wine) and ARM (QEMU), check the rest'
@@ -82,10 +82,14 @@ profile: $(VENV)/demo.stamp fmu
 figures: need-rust $(VENV)/demo.stamp fmu
 	@$(VENV)/bin/prw figures --fmu $(FMU) --commit
 
-# The page is part of the FMU, and so of the guid in the model description.
+# The pages' tables come from the model descriptions; the pages are part of the FMUs, and so of the guids in those.
 docs: need-rust $(VENV)/test.stamp
+	@$(describe)
 	@$(VENV)/bin/prw docs
-	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe
+	@$(describe)
+
+describe = $(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe && \
+  $(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --describe
 
 # A controller FMU, the system of both, and the example FMU to copy.
 closed-loop-fmus: fmu

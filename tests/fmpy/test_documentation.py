@@ -13,10 +13,17 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from fmpy import simulate_fmu
 from lxml import etree
+from reference import integrate
+from test_model_exchange import END, OUTPUTS, angle, rate
 
-from prw.documentation import PAGE, render, typeset
-from prw.figures import COMMITTED, ICON
+from prw.documentation.formulas import plain, typeset
+from prw.documentation.pages import CONTROLLER, PAGES, TESTBED, render
+from prw.documentation.readme import renew
+from prw.documentation.sources import read_description, read_table
+from prw.errors import UserError
+from prw.figures import COMMITTED, ICON, ICON_SVG
 from prw.figures.gallery import figures
 from prw.figures.results import numbers, results
 from prw.figures.writing import write_for_page, write_svg
@@ -25,9 +32,18 @@ ROOT = Path(__file__).resolve().parents[2]
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 
 
+def text_of(page) -> str:
+    return (ROOT / page.path).read_text(encoding="utf-8")
+
+
 @pytest.fixture(scope="module")
 def page() -> str:
-    return (ROOT / PAGE).read_text(encoding="utf-8")
+    """The testbed's page."""
+    return text_of(TESTBED)
+
+
+#: For what holds of both pages.
+both = pytest.mark.parametrize("page", [pytest.param(text_of(page), id=page.text) for page in PAGES])
 
 
 @pytest.fixture(scope="module")
@@ -35,25 +51,34 @@ def found(fmu):
     return results(fmu)
 
 
-def test_the_page_is_up_to_date(page):
-    assert page == render(ROOT), f"{PAGE} is out of date; write it anew with `make docs`"
+@pytest.mark.parametrize("which", PAGES, ids=lambda page: page.text)
+def test_the_pages_are_up_to_date(which):
+    assert text_of(which) == render(ROOT, which), f"{which.path} is out of date; write it anew with `make docs`"
+
+
+def test_readme_is_up_to_date():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert readme == renew(ROOT), "README.md is out of date; write it anew with `make docs`"
 
 
 def test_the_page_travels_in_the_fmu(fmu, page):
     with zipfile.ZipFile(fmu) as archive:
         assert archive.read("documentation/index.html").decode() == page
-        assert archive.read("model.png") == (ROOT / ICON).read_bytes()
+        for icon in (ICON, ICON_SVG):
+            assert archive.read(icon.as_posix()) == (ROOT / TESTBED.content / icon).read_bytes()
     assert fmu.stat().st_size < 2e6
 
 
+@both
 def test_nothing_is_loaded_and_nothing_runs(page):
     assert len(page.encode()) < 400e3
     assert "<script" not in page and "@import" not in page and "javascript:" not in page
     links = re.findall(r'(?:href|src)\s*=\s*"([^"]*)"', page)
-    assert all(link.startswith("#") or link == "licenses/license.txt" for link in links)
+    assert links and all(link.startswith("#") for link in links)
     assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", page))
 
 
+@both
 def test_links_inside_the_page(page):
     ids = re.findall(r'\sid="([^"]+)"', page)
     assert len(ids) == len(set(ids))
@@ -61,26 +86,54 @@ def test_links_inside_the_page(page):
     assert set(targets) <= set(ids)
 
 
+@both
 def test_the_page_is_well_formed(page):
     etree.fromstring(re.sub(r"<!DOCTYPE html>|<meta [^>]*>", "", page))
 
 
-def test_every_variable_is_in_the_page(page, description):
+@pytest.mark.parametrize("which", PAGES, ids=lambda page: page.text)
+def test_every_variable_is_in_its_page(which):
+    page, description = text_of(which), read_description(ROOT / which.description)
     for variable in description.modelVariables:
         assert f"<code>{variable.name}</code>" in page and html.escape(variable.description) in page
     assert description.guid not in page and description.guid.strip("{}") not in page
 
 
-def test_no_equation_is_left_untyped(page):
+@pytest.mark.parametrize("which, formulas", [(TESTBED, 30), (CONTROLLER, 7)], ids=lambda value: getattr(value, "text", ""))
+def test_no_equation_is_left_untyped(which, formulas):
+    page = text_of(which)
     text = re.sub(r"<pre.*?</pre>", "", page, flags=re.S)
     assert "\\" not in text and "$" not in text
-    assert page.count("<math") > 30
+    assert page.count("<math") > formulas
 
 
 def test_typeset():
     block = typeset(r"\[ \begin{bmatrix} a & b \end{bmatrix} < 1 \tag{8} \]")
     assert block.startswith('<div class="equation"><math display="block">') and block.endswith("(8)</span></div>")
     assert '<mtable class="matrix">' in block and "<mo>&lt;</mo>" in block
+
+
+def test_formulas_as_plain_text():
+    assert plain(r"\(\dot{\mathbf{q}}_I\) and \(\dot\theta_1 = \sin(10\pi t)\)") == "qI' and theta1' = sin(10 pi t)"
+    with pytest.raises(UserError, match="no plain text is known"):
+        plain(r"\(\frac{1}{2}\)")
+
+
+def test_a_table_that_is_missing_or_has_gaps_is_named(tmp_path):
+    path = tmp_path / "tables.md"
+    path.write_text("# Run\n\ntext\n\n## Deeper\n\n| a | b |\n|---|---|\n| 1 | 2 |\n\n## Gap\n\n| a | b |\n|---|---|\n| 1 |\n")
+    assert read_table(path, "Deeper") == (["a", "b"], [["1", "2"]])
+    for heading, message in [("Run", "no table below a heading “Run”"), ("Gap", "the row of “1” has 1 cells, not 2")]:
+        with pytest.raises(UserError, match=message):
+            read_table(path, heading)
+
+
+def test_readme_without_its_marks_is_refused(tmp_path):
+    (tmp_path / "README.md").write_text("nothing")
+    for name in ("analysis", "modelDescription"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    with pytest.raises(UserError, match="there must be one line <!-- variables, written by make docs -->"):
+        renew(tmp_path)
 
 
 def program(page: str, name: str) -> str:
@@ -104,14 +157,51 @@ def roll_at_2(model, time=2.0) -> float:
 
 @pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange"])
 def test_the_fmpy_program(page, fmu, model, tmp_path, interface):
-    text = program(page, "fmpy").replace("CoSimulation", interface)
+    text = program(page, "run_in_fmpy").replace("CoSimulation", interface)
     assert run(text, fmu, tmp_path) == pytest.approx(roll_at_2(model), rel=1e-3)
 
 
 def test_the_libcosim_program(page, fmu, model, tmp_path):
     pytest.importorskip("libcosimpy")
-    pitch, roll = run(program(page, "libcosim"), fmu, tmp_path)[-2:]
+    pitch, roll = run(program(page, "run_in_libcosim"), fmu, tmp_path)[-2:]
     assert abs(pitch) < 1e-12 and roll == pytest.approx(roll_at_2(model), rel=1e-4)
+
+
+def test_the_script_for_omsimulator_wires_what_there_is(page):
+    (script,) = re.findall(r'<pre data-wires="oms"><code>(.*?)</code></pre>', page, flags=re.S)
+    variables = {
+        f"wrist.root.{which.text}.": {v.name: v for v in read_description(ROOT / which.description).modelVariables}
+        for which in (TESTBED, CONTROLLER)
+    }
+    loops = re.findall(r"ipairs\(\{(.*?)\}\) do\s+oms_addConnection\((\S+) \.\. name, (\S+) \.\. name\)", html.unescape(script))
+    assert len(loops) == 2
+    for names, start, end in loops:
+        for name in re.findall(r'"(\w+)"', names):
+            assert variables[start.strip('"')][name].causality == "output"
+            assert variables[end.strip('"')][name].causality == "input"
+    for kind, component, name in re.findall(r'oms_set(Real|Boolean)\("(wrist\.root\.\w+\.)(\w+)"', html.unescape(script)):
+        assert variables[component][name].type == kind
+
+
+def test_what_is_said_of_model_exchange_in_fmpy(fmu, model):
+    """The percentages in docs/compatibility.md and on the page: FMPy holds inputs over a step."""
+    heads, rows = read_table(ROOT / "docs/compatibility.md", "Run")
+    (said,) = [row[heads.index("what was seen")] for row in rows if row[0].startswith("FMPy with CVode")]
+    percents = [float(number) for number in re.findall(r"([\d.]+) %", said)]
+    seen = []
+    for kind, step in (("ModelExchange", 1e-3), ("ModelExchange", 1e-4), ("CoSimulation", 1e-3)):
+        t = np.linspace(0, END, round(END / step) + 1)
+        names = ("time", "theta1", "theta2", "omega1", "omega2")
+        motors = np.array([(s, *angle(s), *rate(s)) for s in t], dtype=[(name, float) for name in names])
+        options = {"start_values": {"use_omega": True}} if kind == "CoSimulation" else {"relative_tolerance": 1e-8}
+        result = simulate_fmu(
+            str(fmu), fmi_type=kind, stop_time=END, output_interval=step, input=motors, output=list(OUTPUTS), **options
+        )
+        exact = integrate(model, t, angle, rate)
+        error = {name: np.max(np.abs(result[name] - exact[name])) / np.max(np.abs(exact[name])) for name in OUTPUTS}
+        seen += [100 * error["roll"], 100 * max(error["tau1"], error["tau2"])]
+    # One digit is quoted.
+    assert percents == [float(f"{value:.1g}") for value in seen]
 
 
 def test_numbers_are_up_to_date(found):
@@ -148,6 +238,15 @@ def test_figures_are_up_to_date(found, tmp_path):
         assert NUMBER.sub("#", fresh) == NUMBER.sub("#", kept), message
         values = (np.array(NUMBER.findall(text), dtype=float) for text in (fresh, kept))
         np.testing.assert_allclose(*values, atol=0.021, err_msg=message)
+
+
+def test_all_text_in_figures_follows_light_and_dark():
+    figures = sorted((ROOT / COMMITTED).glob("*.svg"))
+    assert figures
+    for path in figures:
+        text = path.read_text(encoding="utf-8")
+        for element in re.findall(r"<text\b[^>]*>", text):
+            assert "fill:currentColor" in element, f"{path.name}: {element}"
 
 
 def test_the_same_figure_is_the_same_file(found, tmp_path):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,6 +13,7 @@ from prw.errors import UserError
 from prw.linearize import linearize
 from prw.modes import pitch_and_roll
 
+ROOT = Path(__file__).resolve().parents[2]
 STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 INPUTS = ("theta1", "theta2", "omega1", "omega2")
 #: q of H(s), and the torques.
@@ -116,3 +120,12 @@ def test_no_fmu(tmp_path):
     for name, complaint in (("absent.fmu", "no such FMU"), ("no.fmu", "cannot be read")):
         with pytest.raises(UserError, match=complaint):
             linearize(tmp_path / name)
+
+
+def test_the_program_in_the_readme(fmu, monkeypatch, capsys):
+    """It runs as it stands, from the project's folder."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (program,) = re.findall(r"```python\n(from prw\.linearize .*?)```", readme, flags=re.S)
+    monkeypatch.chdir(ROOT)
+    exec(program, {})
+    assert "theta3" in capsys.readouterr().out

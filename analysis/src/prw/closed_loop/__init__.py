@@ -117,4 +117,6 @@ def _difference(first: Dict[str, np.ndarray], other: Dict[str, np.ndarray], name
     motion, torque = (
         max(np.abs(first[key] - other[key]).max() for key in first if (key in torques) == wanted) for wanted in (False, True)
     )
-    return f"angles and rates within {motion:.1g} (rad, rad/s) of {name}, torques within {torque:.1g} N.m"
+    # Torques depend on the motors at the same instant, so it matters whether a master reads before it sets.
+    when = ", read after the next inputs are set" if torque > 1e-6 > motion else ""
+    return f"angles and rates within {motion:.1g} (rad, rad/s) of {name}, torques within {torque:.1g} N.m{when}"

@@ -9,7 +9,9 @@ from prw.simulate import DEFAULT_FMU, DEFAULT_OUT
 
 #: The copies that are kept with the sources, for the documentation and the README.
 COMMITTED = Path("analysis/documentation/figures")
-ICON = Path("modelDescription/model.png")
+#: Within the folder of what goes into an FMU: its icon for importers, and to scale it.
+ICON = Path("model.png")
+ICON_SVG = Path("documentation/model.svg")
 
 
 def add_parser(subparsers) -> None:
@@ -28,7 +30,7 @@ def add_parser(subparsers) -> None:
     parser.add_argument(
         "--commit",
         action="store_true",
-        help=f"also renew the copies kept with the sources, in {COMMITTED}, and {ICON}",
+        help=f"also renew the copies kept with the sources, in {COMMITTED}, and the icons of both FMUs",
     )
     parser.set_defaults(run=run)
 
@@ -36,8 +38,9 @@ def add_parser(subparsers) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw figures`. Raises UserError with one line on what is wrong."""
     # FMPy and matplotlib take a while to load.
+    from prw.documentation.pages import CONTROLLER, TESTBED
     from prw.figures.gallery import figures
-    from prw.figures.icon import draw_icon
+    from prw.figures.icon import draw_controller, draw_testbed
     from prw.figures.results import numbers, results
     from prw.figures.writing import write_for_page, write_json, write_png, write_small_png, write_svg
 
@@ -55,6 +58,7 @@ def run(arguments: argparse.Namespace) -> None:
             if figure.for_readme:
                 write_small_png(COMMITTED / f"{name}.png", figure.figure)
         write_json(COMMITTED / "numbers.json", numbers(found))
-        write_png(ICON, draw_icon(), dpi=128)
-        write_svg(COMMITTED / "model.svg", draw_icon())
-        print(f"renewed {COMMITTED} and {ICON}")
+        for page, draw in ((TESTBED, draw_testbed), (CONTROLLER, draw_controller)):
+            write_png(page.content / ICON, draw(), dpi=128)
+            write_svg(page.content / ICON_SVG, draw())
+        print(f"renewed {COMMITTED} and the icons")

@@ -124,6 +124,12 @@ def _steps(found: Results) -> Figure:
     return figure
 
 
+def _power_of_ten(value: float) -> str:
+    """10⁻³ in plain characters, which grow with the text around them."""
+    exponent = round(float(np.log10(value)))
+    return "1" if exponent == 0 else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
 def _convergence(found: Results) -> Figure:
     step, angles, _, broken = found.convergence
     figure = Figure(figsize=(COLUMN, 3.4), layout="constrained")
@@ -140,5 +146,6 @@ def _convergence(found: Results) -> Figure:
     axis.set_xlabel("step (ms)")
     axis.set_ylabel("largest error / largest value")
     axis.set_ylim(1e-14, 1)
+    axis.yaxis.set_major_formatter(lambda value, _: _power_of_ten(value))
     axis.legend(loc="center left", bbox_to_anchor=(0, 0.42))
     return figure

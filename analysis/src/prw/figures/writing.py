@@ -120,8 +120,8 @@ def _shorter(numbers: str) -> str:
 
 def _restyle(element) -> None:
     """The page's colours and fonts in place of matplotlib's."""
-    style = element.attrib.pop("style", None)
-    if style is None:
+    style = element.attrib.pop("style", "")
+    if not style and element.tag != f"{SVG}text":
         return
     rules = dict(re.split(r":\s*", rule.strip(), maxsplit=1) for rule in style.split(";") if rule.strip())
     for key in ("stroke-linecap", "stroke-linejoin", "font-family"):

@@ -1,0 +1,22 @@
+//! The committed description of the controller.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modelDescription/modelDescription.xml");
+
+/// The documentation's tables come from it.
+#[test]
+fn the_committed_description_is_up_to_date() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("controller");
+    let mut build = Command::new(env!("CARGO_BIN_EXE_build_controller"));
+    let output = build.args(["--describe", "--out"]).arg(&folder).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    assert!(
+        fs::read_to_string(COMMITTED).unwrap_or_default()
+            == fs::read_to_string(folder.join("modelDescription.xml")).unwrap(),
+        "modelDescription/modelDescription.xml of the controller is out of date; write it anew with\n    \
+         cargo run --release -p prw_controller --bin build_controller -- --describe"
+    );
+}

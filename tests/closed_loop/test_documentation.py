@@ -1,0 +1,38 @@
+"""The closed loop as the documentation says it: its programs run as printed."""
+
+from __future__ import annotations
+
+import html
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+
+import pytest
+
+from conftest import FMUS, ROOT
+from prw.documentation.pages import CONTROLLER, TESTBED
+from prw.figures import ICON, ICON_SVG
+
+
+@pytest.mark.parametrize("master, package", [("fmpy", "fmpy"), ("libcosim", "libcosimpy")])
+def test_the_programs(closed_loop, tmp_path, master, package):
+    pytest.importorskip(package)
+    page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
+    (program,) = re.findall(rf'<pre data-run="closed_loop_in_{master}"><code>(.*?)</code></pre>', page, flags=re.S)
+    shutil.copy(closed_loop.ssp, tmp_path)
+    shutil.copytree(closed_loop.osp, tmp_path / closed_loop.osp.name)
+    run = subprocess.run(
+        [sys.executable, "-c", html.unescape(program)], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
+    assert run.returncode == 0, run.stderr
+    pitch, roll = map(float, run.stdout.splitlines()[-1].split())
+    assert pitch == pytest.approx(30, abs=0.1) and roll == pytest.approx(60, abs=0.1)
+
+
+def test_the_page_and_the_icons_travel_in_the_controller(controller_fmu):
+    with zipfile.ZipFile(controller_fmu) as archive:
+        assert archive.read("documentation/index.html") == (ROOT / CONTROLLER.path).read_bytes()
+        for icon in (ICON, ICON_SVG):
+            assert archive.read(icon.as_posix()) == (ROOT / CONTROLLER.content / icon).read_bytes()
