@@ -1,8 +1,8 @@
 /* Times whole steps through the C interface, of several libraries in turn, in one run.
  *   whole GUID FMU.so BARE.so EULER.so
  *   whole GUID LIBRARY.so WAY STEPS        one of the ways to step alone, for a profiler
- * Each figure is the smallest of several rounds; the rounds of the libraries alternate, so that a machine
- * whose speed drifts treats them alike. Prints a Markdown table. */
+ * Each figure is the smallest of several rounds over all of them, so that a machine whose speed drifts
+ * treats them alike. Prints a Markdown table. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <malloc.h>
@@ -89,7 +89,7 @@ static void make_motion(void) {
     }
 }
 
-typedef enum { VECTORS, SCALARS, RATES, OMEGA, ALTERNATING, NEW_SIZES, STATES, DERIVATIVES } Way;
+typedef enum { VECTORS, SCALARS, RATES, OMEGA, ALTERNATING, NEW_SIZES, STATES, DERIVATIVES, WAYS_COUNT } Way;
 static const char *WAYS[] = {
     "angles set, step, 4 outputs, as vectors", "the same, one scalar a call",  "with input derivatives",
     "with use_omega and rates set",            "step size alternating among 4", "a new step size every step",
@@ -179,11 +179,20 @@ static void *job(void *p) {
     run(((Job *)p)->l, VECTORS, ((Job *)p)->steps);
     return NULL;
 }
-static double run_threads(const Library *l, int threads, long steps) {
+/* Work for all of a core's adders and no memory: shows whether the machine's processors share a core. */
+static void *spin(void *p) {
+    unsigned long a = 0, b = 0, c = 0, d = 0, e = 0, f = 0;
+    for (long k = 0; k < 40 * ((Job *)p)->steps; k++) {
+        a += 1, b += 2, c += 3, d += 4, e += 5, f += 6;
+        __asm__ volatile("" : "+r"(a), "+r"(b), "+r"(c), "+r"(d), "+r"(e), "+r"(f)); /* as written, please */
+    }
+    return NULL;
+}
+static double run_threads(void *(*work)(void *), const Library *l, int threads, long steps) {
     pthread_t ids[8];
     Job j = {l, steps};
     double begin = now();
-    for (int k = 0; k < threads; k++) pthread_create(ids + k, NULL, job, &j);
+    for (int k = 0; k < threads; k++) pthread_create(ids + k, NULL, work, &j);
     for (int k = 0; k < threads; k++) pthread_join(ids[k], NULL);
     return (now() - begin) / (double)(steps * threads);
 }
@@ -232,34 +241,38 @@ int main(int argc, char **argv) {
         return 0;
     }
     Library fmu = load("FMU", argv[2]), bare = load("bare C", argv[3]), euler = load("Euler", argv[4]);
-    enum { ROUNDS = 15 };
     if (!(difference(&fmu, &bare) < 1e-10)) fail("the bare C version computes something else");
-    printf("| what | FMU / bare C |\n|---|---|\n");
-    double base = 0, base_sizes = 0;
-    for (Way way = VECTORS; way <= DERIVATIVES; way++) {
-        long steps = way == NEW_SIZES ? 4000 : way == DERIVATIVES ? 20000 : 200000;
-        double a = 1e9, b = 1e9;
-        for (int r = 0; r < ROUNDS; r++) a = fmin(a, run(&fmu, way, steps)), b = fmin(b, run(&bare, way, steps));
-        printf("| %s | %.2f |\n", WAYS[way], a / b);
-        fprintf(stderr, "%-42s FMU %8.1f ns, bare C %8.1f ns\n", WAYS[way], 1e9 * a, 1e9 * b);
-        if (way == VECTORS) base = a;
-        if (way == ALTERNATING) base_sizes = a;
-        if (way == NEW_SIZES) printf("\n| what | ratio |\n|---|---|\n| new step size / known one | %.1f |\n"
-                                     "| step size alternating among 4 / constant | %.2f |\n", a / base, base_sizes / base);
-        if (way == NEW_SIZES) printf("\n| what | FMU / bare C |\n|---|---|\n");
-    }
-    double life = 1e9, one = 1e9, many = 1e9, single = 1e9, two = 1e9, slow = 1e9;
+    double ours[WAYS_COUNT], theirs[WAYS_COUNT];
+    double life = 1e9, one = 1e9, many = 1e9, slow = 1e9, single = 1e9, two = 1e9, spin_single = 1e9, spin_two = 1e9;
+    for (int way = 0; way < WAYS_COUNT; way++) ours[way] = theirs[way] = 1e9;
+    enum { ROUNDS = 25 };
     for (int r = 0; r < ROUNDS; r++) {
+        for (int way = 0; way < WAYS_COUNT; way++) {
+            long count = way == NEW_SIZES ? 4000 : way == DERIVATIVES ? 20000 : 100000;
+            ours[way] = fmin(ours[way], run(&fmu, way, count));
+            theirs[way] = fmin(theirs[way], run(&bare, way, count));
+        }
         life = fmin(life, run_life(&fmu, 20000));
-        one = fmin(one, run_many(&fmu, 1, 200000)), many = fmin(many, run_many(&fmu, 1000, 200));
-        single = fmin(single, run_threads(&fmu, 1, 400000)), two = fmin(two, run_threads(&fmu, 2, 400000));
+        one = fmin(one, run_many(&fmu, 1, 100000)), many = fmin(many, run_many(&fmu, 1000, 100));
+        single = fmin(single, run_threads(job, &fmu, 1, 400000)), two = fmin(two, run_threads(job, &fmu, 2, 400000));
+        spin_single = fmin(spin_single, run_threads(spin, NULL, 1, 400000));
+        spin_two = fmin(spin_two, run_threads(spin, NULL, 2, 400000));
         slow = fmin(slow, run(&euler, OMEGA, 20000));
+    }
+    const double base = ours[VECTORS];
+    printf("| what | FMU / bare C |\n|---|---|\n");
+    for (int way = 0; way < WAYS_COUNT; way++) {
+        printf("| %s | %.2f |\n", WAYS[way], ours[way] / theirs[way]);
+        fprintf(stderr, "%-42s FMU %8.1f ns, bare C %8.1f ns\n", WAYS[way], 1e9 * ours[way], 1e9 * theirs[way]);
     }
     double roll, torque;
     errors(&fmu, &euler, &roll, &torque);
     printf("\n| what | ratio |\n|---|---|\n");
+    printf("| new step size / known one | %.1f |\n", ours[NEW_SIZES] / base);
+    printf("| step size alternating among 4 / constant | %.2f |\n", ours[ALTERNATING] / base);
     printf("| 1000 instances in turn / one, per step | %.2f |\n", many / one);
     printf("| two threads / one, throughput | %.2f |\n", single / two);
+    printf("| the same of additions in registers: what the machine gives | %.2f |\n", spin_single / spin_two);
     printf("| instantiate, initialize and free / one step | %.1f |\n", life / base);
     printf("| memory of an instance / 4 KiB | %.2f |\n", memory(&fmu) / 4096);
     printf("| forward Euler in C, inner steps of 0.1 ms / FMU | %.1f |\n", slow / base);

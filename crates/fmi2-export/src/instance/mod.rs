@@ -18,6 +18,10 @@ use crate::types::Status;
 use crate::variable::{BaseType, Variable};
 
 /// An instance of model `M` that logs to `S`.
+///
+/// Processors fetch cache lines of 64 bytes in pairs: instances side by side on the heap share none, so that
+/// threads that step them do not take them from each other.
+#[repr(align(128))]
 pub(crate) struct Instance<M, S> {
     interface: Interface,
     logger: Logger<S>,
