@@ -15,6 +15,7 @@ import sys
 import sysconfig
 from pathlib import Path
 
+import mingw_linker
 import toolchain as tools
 from targets import GLIBC, MODEL, ROOT, Target, target
 
@@ -41,9 +42,9 @@ def link(target: Target) -> tuple[dict[str, str], list[str], bool]:
         # cargo-zigbuild looks for zig and, when it is called as the linker, for itself.
         return {"PATH": os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])}, [], True
     if target.triple.endswith("-windows-gnu"):
-        linker = "x86_64-w64-mingw32-gcc"
-        tools.need(linker)
-        return {f"{target.environment}LINKER": linker}, ["-Clink-arg=-Wl,--no-insert-timestamp"], False
+        tools.need(mingw_linker.LINKER)
+        environment = {f"{target.environment}LINKER": mingw_linker.__file__, "PRW_TARGET_FOLDER": str(target_folder())}
+        return environment, ["-Clink-arg=-Wl,--no-insert-timestamp"], False
     if target.triple.endswith("-windows-msvc"):
         return {}, ["-Ctarget-feature=+crt-static", "-Clink-arg=/Brepro"], False
 

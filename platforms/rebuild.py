@@ -25,7 +25,7 @@ def main() -> None:
         for name in filter(None, names):
             if (ROOT / name).is_file():
                 (copy / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(ROOT / name, copy / name)
+                shutil.copy(ROOT / name, copy / name)
         environment = {**os.environ, "CARGO_TARGET_DIR": str(Path(folder) / "target")}
         subprocess.run([sys.executable, copy / "platforms" / "dist.py"], cwd=copy, env=environment, check=True)
         ours, theirs = ((path / SUMS).read_text().splitlines() for path in (DIST, copy / "dist"))
