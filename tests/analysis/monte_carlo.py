@@ -1,7 +1,7 @@
 """Is `prw identify` unbiased, and are its intervals honest? Repetitions on simulated rigs; `make monte-carlo` runs it.
 
     python tests/analysis/monte_carlo.py target/fmu/prw_testbed.fmu [--repetitions 200] [--sensors all|torque]
-        [--seed 0] [--counts 10000] [--workers N] [--out out/monte_carlo.json]
+        [--motion independent|equal|opposite|fig4] [--seed 0] [--counts 10000] [--workers N] [--out out/monte_carlo.json]
 
 Every repetition has its own rig (parameters up to 30 % off Table 1, where the search starts), its own motion of 10 s
 at 1 kHz, its own noise, encoder positions and sensor offsets; see rig.py. Exit status 1 if an estimate is biased by
@@ -32,12 +32,13 @@ from prw.identify.model import Model  # noqa: E402
 from prw.identify.statistics import certainty  # noqa: E402
 
 SENSORS = {"all": rig.ALL, "torque": ("tau1", "tau2")}
+MOTIONS = ("independent", "equal", "opposite", "fig4")
 
 
-def repetition(fmu: str, seed: int, channels, counts: int) -> tuple:
+def repetition(fmu: str, seed: int, channels, counts: int, motion: str) -> tuple:
     """Logarithms of estimate over truth, their standard errors, and whether the 95 % intervals hold the truth, all
     (5,), and the seconds it took."""
-    truth = rig.experiment(seed)
+    truth = rig.experiment(seed, pattern=motion)
     columns = rig.measure(truth, seed + 1_000_000, channels, counts)
     theta = np.column_stack([columns["theta1"], columns["theta2"]])
     values = np.column_stack([columns[name] for name in channels])
@@ -58,6 +59,7 @@ def main() -> int:
     parser.add_argument("fmu")
     parser.add_argument("--repetitions", type=int, default=200)
     parser.add_argument("--sensors", choices=SENSORS, default="all")
+    parser.add_argument("--motion", choices=MOTIONS, default="independent")
     parser.add_argument("--seed", type=int, default=0, help="of the first repetition; the others follow")
     parser.add_argument("--counts", type=int, default=rig.COUNTS)
     parser.add_argument("--workers", type=int, default=multiprocessing.cpu_count())
@@ -68,6 +70,7 @@ def main() -> int:
         range(options.seed, options.seed + options.repetitions),
         [SENSORS[options.sensors]] * options.repetitions,
         [options.counts] * options.repetitions,
+        [options.motion] * options.repetitions,
     ]
     with ProcessPoolExecutor(options.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         found = list(pool.map(repetition, *arguments))

@@ -33,13 +33,15 @@ class Truth(NamedTuple):
 def experiment(
     seed: int, duration: float = 10.0, rate: float = 1000.0, pattern: str = "independent", spread: float = 0.3
 ) -> Truth:
-    """A random rig in a random motion: NAMES up to `spread` off Table 1, 40 sines from 0.1 to 20 Hz a motor, 30
-    deg."""
+    """A random rig in a random motion: NAMES up to `spread` off Table 1, 40 sines from 0.1 to 20 Hz a motor, 30 deg.
+    Both motors in the same motion or in opposite ones, or each in its own; "fig4": the paper's, over and over."""
     random = np.random.default_rng(seed)
     parameters = dict(table_1())
     for name in NAMES:
         parameters[name] *= float(np.exp(random.uniform(-1, 1) * np.log(1 + spread)))
     time = np.arange(int(round(duration * rate)) + 1) / rate
+    if pattern == "fig4":
+        return respond(parameters, time, np.array([5.0]), np.array([[-1.0], [1.0]]), 1 / (10 * np.pi))
     frequency = np.sort(random.uniform(0.1, 20, 40))
     size = np.minimum(1, (2 / frequency) ** 1.5)
     phases = random.uniform(0, 2 * np.pi, (2, 40))

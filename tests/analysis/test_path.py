@@ -57,6 +57,18 @@ def test_logged_rates_help_and_their_noise_is_found():
     assert errors[1] < errors[0] / 3
 
 
+def test_errors_drawn_at_two_angles_differ():
+    """At each of two angles the motor rests at, an encoder errs by anything up to half a quantum."""
+    t = np.arange(4001) * 1e-3
+    quantum = 2 * np.pi / 10_000
+    angle = 0.4 / (1 + np.exp(-(t - 2) / 0.02))
+    path = smooth(t, np.round(angle / quantum) * quantum)
+    random = np.random.default_rng(0)
+    differences = [np.ptp(path.wander(random)([1.0, 3.0])) for _ in range(200)]
+    # of two uniform errors: sqrt(2 / 12)
+    assert np.sqrt(np.mean(np.square(differences))) == pytest.approx(quantum / np.sqrt(6), rel=0.2)
+
+
 def test_uneven_samples_and_a_gap():
     random = np.random.default_rng(3)
     t = np.sort(random.uniform(0, 8, 5000))

@@ -28,6 +28,10 @@ GUESSES = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
 #: The most probable penalty is divided by this. Angles smoothed too little add a little noise; smoothed too much they
 #: bias the parameters. It raises the frequency up to which the path follows by its sixth root, 1.6.
 UNDERSMOOTHING = 16.0
+#: Encoders' errors are drawn along a path whose penalty is this many times the most probable one, and that is longer or
+#: shorter by up to a fraction. One that follows the encoder's steps would be rounded to the same steps again wherever
+#: the motor is slow, and the errors drawn would be up to three times too large.
+OVERSMOOTHING, RESCALED = 64.0, 0.05
 #: A column is a multiple of a quantum if all its values are, to this fraction of the quantum.
 ON_GRID = 0.05
 #: So many quanta at most lie between neighbouring values of a typical column.
@@ -58,15 +62,15 @@ def smooth(time: np.ndarray, theta: np.ndarray, omega: Optional[np.ndarray] = No
     spline = _Spline(time)
     angles = spline.rows(time, 0)
     blocks = [(angles, theta)] + ([(spline.rows(time, 1), omega)] if omega is not None else [])
-    coefficients, noise, penalty, weights, solve = _fit(spline, blocks, quantum)
+    coefficients, quiet, noise, penalty, weights, solve = _fit(spline, blocks, quantum)
     strengths = noise / np.sqrt(weights)
 
-    path = spline.curve(coefficients)
+    path, quiet = spline.curve(coefficients), spline.curve(quiet)(time)
 
     def error(random: np.random.Generator) -> np.ndarray:
         if noise >= quantum:
             return random.normal(0, noise, len(time))
-        return rounding(path(time), quantum, random)
+        return rounding(quiet, quantum, random)
 
     def wander(random: np.random.Generator) -> BSpline:
         errors = [error(random)] + [random.normal(0, strength, len(time)) for strength in strengths[1:]]
@@ -95,9 +99,11 @@ def quantum_of(values: np.ndarray) -> float:
 
 
 def rounding(values: np.ndarray, quantum: float, random: np.random.Generator) -> np.ndarray:
-    """The errors of an encoder with a random zero at the values (n,). It errs the same way at the same angle, and so
-    alike in every period of a motion."""
-    level = values / quantum + random.uniform()
+    """Errors like those an encoder makes at the values (n,). It errs the same way at the same angle, and so alike in
+    every period of a motion."""
+    # What is left of the samples' own errors in `values` must not meet the grid it came from: another zero, another
+    # scale.
+    level = values * (1 + random.uniform(-RESCALED, RESCALED)) / quantum + random.uniform()
     return (np.rint(level) - level) * quantum
 
 
@@ -136,8 +142,9 @@ class _Spline:
 
 
 def _fit(spline: _Spline, blocks, quantum: float) -> tuple:
-    """The most probable coefficients, and what goes with them: noise of the first block (rad), penalty, weight of the
-    second block relative to the first (the ratio of their variances). blocks: (rows, values) of what was measured."""
+    """The coefficients, those of a quieter path, and what goes with them: noise of the first block (rad), penalty,
+    weight of the second block relative to the first (the ratio of their variances), and what solves for coefficients
+    again. blocks: (rows, values) of what was measured."""
     count = sum(len(values) for _, values in blocks) - ORDER
     normals, rights = [], []
     for rows, values in blocks:
@@ -184,9 +191,10 @@ def _fit(spline: _Spline, blocks, quantum: float) -> tuple:
     if variance < least:
         variance = least
         penalty, weights = most_probable(variance)
+    quiet = solve(min(penalty * OVERSMOOTHING, 10.0 ** STIFFNESS[1]), weights)[0]
     penalty = max(penalty / UNDERSMOOTHING, 10.0 ** STIFFNESS[0])
     again = partial(cho_solve_banded, (factorize(penalty, weights), False), check_finite=False)
-    return solve(penalty, weights)[0], float(np.sqrt(variance)), penalty, weights, again
+    return solve(penalty, weights)[0], quiet, float(np.sqrt(variance)), penalty, weights, again
 
 
 def _weights(x) -> list:

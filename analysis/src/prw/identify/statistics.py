@@ -2,9 +2,10 @@
 
 Two information matrices. F = sum J'J, of the weighted sensitivities J, is the Fisher information if the noise is
 white; its inverse is the smallest covariance that any unbiased estimate can have. Real noise is not white: a smoothed
-encoder, a filtered sensor, a quantised angle. The covariance given is F^-1 S F^-1 with S = sum J' R J over
+encoder, a filtered sensor, a quantised angle. The residuals' covariance is F^-1 S F^-1 with S = sum J' R J over
 frequencies and the residuals' auto- and cross-spectra R, estimated from the residuals (Ljung, System Identification,
-2nd ed., Sec. 9.4-9.5). Encoders that repeat their errors add to it what residuals cannot show.
+2nd ed., Sec. 9.4-9.5). Encoders repeat their errors with the motion, and residuals do not show all of that: what they
+do to the estimates is drawn instead (parametric bootstrap; Efron and Tibshirani 1993, Sec. 6.5).
 """
 
 from __future__ import annotations
@@ -36,10 +37,8 @@ LEAST_FREEDOM = 0.1
 UNDETERMINED = 0.3
 #: Information counts as far as it exceeds this many times what the noise of the motors' samples feigns.
 MARGIN = 3.0
-#: Draws of encoders' errors, and by how many times their effect must exceed what residuals show of it to be added. In
-#: motions that do not repeat themselves it is 1 to 2.5 with all sensors and about 7 with torques alone, where residuals
-#: understate the variance by a fifth and the draws exaggerate it by two fifths; in the motion of Fig. 4 it is up to 800.
-DRAWS, EXCESS = 16, 6.0
+#: Draws of encoders' errors.
+DRAWS = 16
 #: Parameters that take less than this share in a combination are not named.
 SHARE = 0.15
 
@@ -90,7 +89,7 @@ def certainty(solution: Solution, level: float = 0.95) -> Certainty:
     white = covariance_of(bread)
     for jacobian, residual in zip(solution.jacobians, solution.evaluation.residuals):
         meat += correlated(jacobian, residual, white)
-    covariance = white @ meat @ white + np.diag(repeated(solution, white))
+    covariance = with_encoders(white @ meat @ white, solution, white)
     honest = genuine(bread, solution.spurious)
     open_ones = undetermined(names, honest)
     # Spectra from few frequencies scatter; no error is claimed to be smaller than white noise would make it.
@@ -122,16 +121,23 @@ def genuine(information: np.ndarray, spurious: np.ndarray) -> np.ndarray:
     return (vectors * np.maximum(values, 0.0)) @ vectors.T
 
 
-def repeated(solution: Solution, white: np.ndarray) -> np.ndarray:
-    """Variances (p,) that residuals do not show, because encoders repeat their errors with the motion: at the same
-    angles, in every period. Then the errors look like motion, and the fit takes them in."""
-    true, seen = np.zeros(len(white)), np.zeros(len(white))
+def with_encoders(residual: np.ndarray, solution: Solution, white: np.ndarray) -> np.ndarray:
+    """Covariance (p, p) of what encoders do to the estimates and of what `residual`, the covariance that the residuals
+    show, has beyond that. white: (p, p), the covariance for white noise.
+
+    An encoder errs the same way at the same angle, in every period of a motion. Then its errors look like motion, the
+    fit takes them in, and the residuals have few frequencies to tell of it.
+    """
+    true, seen = np.zeros_like(white), np.zeros_like(white)
     for spectra in solution.fitter.feigned(solution.logarithms, DRAWS):
         moved = white @ sum(np.einsum("fcp,fc->p", j, r) for j, r in zip(solution.jacobians, spectra))
         left = [(j, r - j @ moved) for j, r in zip(solution.jacobians, spectra)]
-        true += moved**2 / DRAWS
-        seen += np.diag(white @ sum(correlated(j, r, white) for j, r in left) @ white) / DRAWS
-    return np.where(true > EXCESS * seen, true - seen, 0.0)
+        true += np.outer(moved, moved) / DRAWS
+        seen += white @ sum(correlated(j, r, white) for j, r in left) @ white / DRAWS
+    scale = np.sqrt(np.diag(white))
+    values, vectors = np.linalg.eigh((residual - seen) / np.outer(scale, scale))
+    beyond = (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale)
+    return true + beyond
 
 
 def correlated(jacobian: np.ndarray, residual: np.ndarray, white: np.ndarray) -> np.ndarray:
