@@ -119,7 +119,7 @@ study: $(VENV)/study.stamp fmu
 
 # Takes minutes; `make test` has the short version.
 monte-carlo: $(VENV)/study.stamp fmu
-	$(PY) tests/analysis/monte_carlo.py $(FMU) --out out/monte_carlo.json
+	$(PY) tests/analysis/monte_carlo.py $(FMU) --out out/monte_carlo.json $(ARGS)
 
 # libFuzzer keeps what is new in target/fuzz/corpus; fuzz/corpus has the committed beginnings.
 fuzz: need-rust need-nightly

@@ -32,6 +32,8 @@ UNSEEN = 1e-9
 ROUNDS, SETTLED = 12, 0.003
 #: A channel cannot be more exact than this fraction of its range: doubles and CSV digits end somewhere.
 FINEST = 1e-9
+#: A search starts at least this far inside its bounds.
+MARGIN = 1e-6
 #: Two minima are the same if no parameter differs by more than this fraction.
 SAME = 0.01
 #: Another minimum is reported if it is no more than this worse, in terms of -2 log likelihood.
@@ -207,10 +209,9 @@ class Fitter:
     def search(self, start: np.ndarray, coarse: bool = False):
         """scipy's trust-region least squares from `start` at the present noise."""
         low, high = self.task.span()
-        margin = 1e-6
         return least_squares(
             self.residuals,
-            np.clip(start, low + margin, high - margin),
+            np.clip(start, low + MARGIN, high - MARGIN),
             self.slopes,
             bounds=(low, high),
             method="trf",
