@@ -33,7 +33,7 @@ ROUNDS, SETTLED = 12, 0.003
 #: A channel cannot be more exact than this fraction of its range: doubles and CSV digits end somewhere.
 FINEST = 1e-9
 #: A search starts at least this far inside its bounds.
-MARGIN = 1e-6
+INSIDE = 1e-6
 #: Two minima are the same if no parameter differs by more than this fraction.
 SAME = 0.01
 #: Another minimum is reported if it is no more than this worse, in terms of -2 log likelihood.
@@ -211,7 +211,7 @@ class Fitter:
         low, high = self.task.span()
         return least_squares(
             self.residuals,
-            np.clip(start, low + MARGIN, high - MARGIN),
+            np.clip(start, low + INSIDE, high - INSIDE),
             self.slopes,
             bounds=(low, high),
             method="trf",

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import least_squares
 
-from prw.identify.fit import MARGIN, Solution
+from prw.identify.fit import INSIDE, Solution
 
 #: Below this standard error (of the logarithm) the model is as good as linear; above the other, there is no interval.
 LINEAR, HOPELESS = 0.01, 1.0
@@ -60,7 +60,7 @@ def _follow(solution: Solution, i: int, point: np.ndarray) -> tuple:
 
     found = least_squares(
         lambda moved: solution.fitter.residuals(at(moved)),
-        np.clip(point[others], low + MARGIN, high - MARGIN),
+        np.clip(point[others], low + INSIDE, high - INSIDE),
         lambda moved: solution.fitter.slopes(at(moved))[:, others],
         bounds=(low, high),
         ftol=FOLLOWED,
