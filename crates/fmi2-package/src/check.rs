@@ -213,7 +213,7 @@ pub(crate) fn check_changes<M: Model>(changes: &Changes) -> Result<()> {
     for interface in offered::<M>() {
         let mut model = M::new(interface);
         for (vr, variable) in (0..).zip(M::INFO.variables) {
-            match changes.start.iter().find(|(name, _)| name == variable.name()).map(|(_, start)| *start) {
+            match changes.start_of(variable) {
                 Some(Start::Real(value)) => model.set_real(vr, value),
                 Some(Start::Integer(value)) => model.set_integer(vr, value),
                 Some(Start::Boolean(value)) => model.set_boolean(vr, value),

@@ -24,6 +24,13 @@ pub struct Changes {
     pub tunable_parameters: bool,
 }
 
+impl Changes {
+    /// The other start value of a variable, if it has one.
+    pub(crate) fn start_of(&self, variable: &Variable) -> Option<Start> {
+        self.start.iter().find(|(name, _)| name == variable.name()).map(|(_, start)| *start)
+    }
+}
+
 impl From<&Variant> for Changes {
     fn from(variant: &Variant) -> Self {
         Self { guid: Some(variant.guid()), start: variant.start.clone(), tunable_parameters: variant.tunable }
@@ -115,9 +122,8 @@ fn log_categories() -> LogCategories {
 }
 
 fn scalar_variable(variable: &Variable, vr: u32, changes: &Changes) -> ScalarVariable {
-    let changed = changes.start.iter().find(|(name, _)| name == variable.name()).map(|(_, start)| *start);
     let own = Start::of(&variable.kind());
-    let start = has_start(variable).then_some(changed.unwrap_or(own));
+    let start = has_start(variable).then_some(changes.start_of(variable).unwrap_or(own));
     let declared_type = type_name(&variable.kind());
     ScalarVariable {
         name: variable.name().into(),

@@ -2,7 +2,7 @@
 
 use crate::content::{ContentFile, content_files};
 use crate::fingerprint::Fingerprint;
-use crate::packages::Neighbourhood;
+use crate::packages::{LocalPackage, Neighbourhood};
 use anyhow::{Context, Result};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -73,24 +73,9 @@ impl Sources {
             fingerprint.add(name, &bytes);
             anyhow::Ok(())
         };
-        if let Some(lock) = self.lock() {
-            add("Cargo.lock", &lock)?;
-        }
-        for source in &self.code {
-            for (inside, path) in files(&self.folder.join(source))? {
-                add(&format!("{source}{inside}"), &path)?;
-            }
-        }
-        let Neighbourhood { workspace, used } = Neighbourhood::of(&self.folder)?;
-        if workspace != self.folder {
-            add("workspace/Cargo.toml", &workspace.join("Cargo.toml"))?;
-        }
-        for package in used {
-            add(&format!("{}/Cargo.toml", package.name), &package.folder.join("Cargo.toml"))?;
-            for (place, path) in package.code.iter().enumerate() {
-                for (inside, path) in files(path)? {
-                    add(&format!("{}/{place}{inside}", package.name), &path)?;
-                }
+        for (name, place) in self.compiled()? {
+            for (inside, path) in files(&place)? {
+                add(&format!("{name}{inside}"), &path)?;
             }
         }
         for file in self.content_files()? {
@@ -104,14 +89,8 @@ impl Sources {
     /// # Errors
     /// When the folder of the content cannot be read, or cargo does not say what the package is made of.
     pub fn watched(&self) -> Result<Vec<PathBuf>> {
-        let listed = self.code.iter().chain(&self.licenses).map(|name| self.folder.join(name));
-        let mut paths: Vec<PathBuf> = self.lock().into_iter().chain(listed).collect();
-        let Neighbourhood { workspace, used } = Neighbourhood::of(&self.folder)?;
-        paths.push(workspace.join("Cargo.toml"));
-        for package in used {
-            paths.push(package.folder.join("Cargo.toml"));
-            paths.extend(package.code);
-        }
+        let mut paths: Vec<PathBuf> = self.compiled()?.into_iter().map(|(_, place)| place).collect();
+        paths.extend(self.licenses.iter().map(|name| self.folder.join(name)));
         if let Some(content) = self.content {
             let folder = self.folder.join(content);
             for entry in fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))? {
@@ -122,8 +101,25 @@ impl Sources {
             }
         }
         paths.sort();
-        paths.dedup();
         Ok(paths)
+    }
+
+    /// What the library is compiled from: files, and folders of which all files count but hidden ones. Each with
+    /// a name that says nothing of where it is.
+    fn compiled(&self) -> Result<Vec<(String, PathBuf)>> {
+        let mut places: Vec<(String, PathBuf)> = Vec::new();
+        places.extend(self.lock().map(|lock| ("Cargo.lock".to_owned(), lock)));
+        places.extend(self.code.iter().map(|&name| (name.to_owned(), self.folder.join(name))));
+        let Neighbourhood { workspace, used } = Neighbourhood::of(&self.folder)?;
+        if workspace != self.folder {
+            places.push(("workspace/Cargo.toml".to_owned(), workspace.join("Cargo.toml")));
+        }
+        for LocalPackage { name, folder, code, .. } in used {
+            places.push((format!("{name}/Cargo.toml"), folder.join("Cargo.toml")));
+            let code = code.into_iter().enumerate();
+            places.extend(code.map(|(place, path)| (format!("{name}/{place}"), path)));
+        }
+        Ok(places)
     }
 
     /// The `Cargo.lock` of the package or of the workspace around it.
