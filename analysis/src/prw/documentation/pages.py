@@ -60,7 +60,7 @@ def render(project: Path, page: Page) -> str:
         "parameter_table": lambda: tables.parameter_table(description, {}),
         "parameter_table_as_printed": lambda: tables.parameter_table(description, printed),
         "order_table": lambda: tables.order_table(numbers),
-        "minus": lambda number: str(number).replace("-", "\N{MINUS SIGN}"),
+        "minus": _minus,
         "poles": {mode: _roots(numbers["poles"][mode]) for mode in ("pitch", "roll")},
         "zeros": _roots(list(reversed(numbers["zeros"]))),
         "identifier": html.escape(description.coSimulation.modelIdentifier),
@@ -117,4 +117,9 @@ def _roots(roots) -> str:
     words = []
     for real, imaginary in roots:
         words.append(f"{real:.2f}" + (f" ± {imaginary:.2f} i" if imaginary else ""))
-    return " and ".join(words).replace("-", "−")
+    return _minus(" and ".join(words))
+
+
+def _minus(number) -> str:
+    """A number, or words with numbers in them, with the sign that mathematics has."""
+    return str(number).replace("-", "\N{MINUS SIGN}")

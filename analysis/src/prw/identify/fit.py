@@ -34,6 +34,8 @@ ROUNDS, SETTLED = 12, 0.003
 FINEST = 1e-9
 #: A search starts at least this far inside its bounds.
 INSIDE = 1e-6
+#: When a search ends.
+FINE, COARSE = {"ftol": 1e-12, "xtol": 1e-9, "max_nfev": 100}, {"ftol": 1e-5, "xtol": 1e-4, "max_nfev": 25}
 #: Two minima are the same if no parameter differs by more than this fraction.
 SAME = 0.01
 #: Another minimum is reported if it is no more than this worse, in terms of -2 log likelihood.
@@ -206,20 +208,28 @@ class Fitter:
         rows = [-jacobian.reshape(-1, len(logarithms)) for jacobian in self.jacobians(logarithms)]
         return np.vstack([*rows, -np.diag(self._priors()[1])])
 
-    def search(self, start: np.ndarray, coarse: bool = False):
-        """scipy's trust-region least squares from `start` at the present noise."""
-        low, high = self.task.span()
-        return least_squares(
-            self.residuals,
-            np.clip(start, low + INSIDE, high - INSIDE),
-            self.slopes,
+    def search(self, start: np.ndarray, tolerances=FINE, held: Optional[int] = None):
+        """scipy's trust-region least squares from `start` (p,) at the present noise. held: a parameter that stays
+        where `start` has it. tolerances: scipy's, for when to end."""
+        free = np.arange(len(start)) != (-1 if held is None else held)
+        low, high = (bound[free] for bound in self.task.span())
+
+        def at(moved: np.ndarray) -> np.ndarray:
+            point = start.copy()
+            point[free] = moved
+            return point
+
+        found = least_squares(
+            lambda moved: self.residuals(at(moved)),
+            np.clip(start[free], low + INSIDE, high - INSIDE),
+            lambda moved: self.slopes(at(moved))[:, free],
             bounds=(low, high),
             method="trf",
-            ftol=1e-5 if coarse else 1e-12,
-            xtol=1e-4 if coarse else 1e-9,
             gtol=1e-12,
-            max_nfev=25 if coarse else 100,
+            **tolerances,
         )
+        found.x = at(found.x)
+        return found
 
     def _priors(self) -> tuple:
         """Logarithms (p,) of the priors' values, and 1/sigma (p,), 0 where there is none."""
@@ -339,7 +349,7 @@ def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int
             raise UserError(f"{name} starts at {task.start[name]:.6g}, outside of its bounds {low:.6g} to {high:.6g}")
     first = np.log([task.start[name] for name in task.names])
     fitter.noise = fitter.first_noise()
-    point = fitter.search(first, coarse=True).x
+    point = fitter.search(first, COARSE).x
     fitter.noise = fitter.judge_noise(fitter.evaluate(point))
     point = _settle(fitter, point)
 
@@ -349,7 +359,7 @@ def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int
     with Progress("looking for other minima", len(others)) as progress:
         for done, start in enumerate(others):
             progress(done)
-            found = fitter.search(start, coarse=True)
+            found = fitter.search(start, COARSE)
             better = 2 * found.cost < min(misfit for _, misfit in minima) + max(RIVAL, 0.05 * len(found.fun))
             if not better or any(np.abs(found.x - x).max() < SAME for x, _ in minima):
                 continue

@@ -8,17 +8,16 @@ likelihood; Meeker and Escobar, The American Statistician 49 (1995) 48); by more
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from prw.identify.fit import INSIDE, Solution
+from prw.identify.fit import Solution
 
 #: Below this standard error (of the logarithm) the model is as good as linear; above the other, there is no interval.
 LINEAR, HOPELESS = 0.01, 1.0
 #: Trials for an end, how close the rise of the misfit's root must come to what is wanted, and how far a trial may reach
 #: beyond the one before.
 TRIALS, CLOSE, FURTHER = 8, 0.02, 2.0
-#: The other parameters have followed when the misfit changes by no more than this fraction.
-FOLLOWED = 1e-5
+#: When the other parameters have followed.
+FOLLOWED = {"ftol": 1e-5, "xtol": 1e-5}
 
 
 def ends(solution: Solution, white: np.ndarray, errors: np.ndarray, quantile: float) -> tuple:
@@ -39,31 +38,11 @@ def _end(solution: Solution, i: int, step: np.ndarray, wanted: float) -> float:
     centre, (low, high) = solution.logarithms, solution.task.span()
     for _ in range(TRIALS):
         point = np.clip(centre + step, low, high)
-        point, misfit = _follow(solution, i, point)
-        rise = misfit - solution.misfit
+        found = solution.fitter.search(point, FOLLOWED, held=i)
+        point, rise = found.x, 2 * found.cost - solution.misfit
         further = np.sqrt(wanted / rise) if rise > wanted / FURTHER**2 else FURTHER
         if abs(further - 1) < CLOSE or (point[i] in (low[i], high[i]) and further > 1):
             break
         step = (point - centre) * max(further, 1 / FURTHER)
     return float(point[i])
 
-
-def _follow(solution: Solution, i: int, point: np.ndarray) -> tuple:
-    """The least misfit with parameter i where `point` (p,) has it, and the point where that is."""
-    others = np.arange(len(point)) != i
-    low, high = (bound[others] for bound in solution.task.span())
-
-    def at(moved: np.ndarray) -> np.ndarray:
-        whole = point.copy()
-        whole[others] = moved
-        return whole
-
-    found = least_squares(
-        lambda moved: solution.fitter.residuals(at(moved)),
-        np.clip(point[others], low + INSIDE, high - INSIDE),
-        lambda moved: solution.fitter.slopes(at(moved))[:, others],
-        bounds=(low, high),
-        ftol=FOLLOWED,
-        xtol=FOLLOWED,
-    )
-    return at(found.x), 2 * found.cost

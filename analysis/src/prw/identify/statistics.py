@@ -117,7 +117,12 @@ def certainty(solution: Solution, level: float = 0.95) -> Certainty:
 
 def genuine(information: np.ndarray, spurious: np.ndarray) -> np.ndarray:
     """Information (p, p) without what the noise of the motors' samples feigns, and something to be safe."""
-    values, vectors = np.linalg.eigh(information - MARGIN * spurious)
+    return _positive(information - MARGIN * spurious)
+
+
+def _positive(matrix: np.ndarray) -> np.ndarray:
+    """A symmetric matrix (p, p) without the directions in which it is negative."""
+    values, vectors = np.linalg.eigh(matrix)
     return (vectors * np.maximum(values, 0.0)) @ vectors.T
 
 
@@ -135,9 +140,8 @@ def with_encoders(residual: np.ndarray, solution: Solution, white: np.ndarray) -
         true += np.outer(moved, moved) / DRAWS
         seen += white @ sum(correlated(j, r, white) for j, r in left) @ white / DRAWS
     scale = np.sqrt(np.diag(white))
-    values, vectors = np.linalg.eigh((residual - seen) / np.outer(scale, scale))
-    beyond = (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(scale, scale)
-    return true + beyond
+    unit = np.outer(scale, scale)
+    return true + _positive((residual - seen) / unit) * unit
 
 
 def correlated(jacobian: np.ndarray, residual: np.ndarray, white: np.ndarray) -> np.ndarray:
