@@ -1,7 +1,7 @@
 //! Builds target/fmu/lag.fmu. See `--help`.
 
 use clap::Parser;
-use fmi2_package::{BuildOptions, Builder, terminal};
+use fmu_package::{BuildOptions, Builder, terminal};
 use std::process::ExitCode;
 
 /// Builds the FMU of a first-order lag.

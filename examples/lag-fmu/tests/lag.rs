@@ -1,17 +1,19 @@
 //! The model steps exactly, and becomes an FMU.
 
-use fmi2_export::{Interface, Model};
-use lag_fmu::{Lag, vr};
+use fmu_export::*;
+use lag_fmu::{Lag, Name};
 use std::process::Command;
 
 #[test]
 fn steps_are_exact() {
-    let mut lag = Lag::new(Interface::CoSimulation);
-    lag.set_real(vr::u, 2.0);
+    let mut lag = Lag::new(&Setup::new(Interface::CoSimulation)).unwrap();
+    Lag::TABLE[Name::u as usize].set(&mut lag, &Value::Real(2.0));
     for k in 0..10 {
-        lag.do_step(f64::from(k) * 0.3, 0.3).unwrap();
+        let step = Step { time: f64::from(k) * 0.3, size: 0.3 };
+        assert_eq!(lag.step(step).unwrap(), Stepped::Done);
     }
-    assert!((lag.real(vr::x) - 2.0 * (1.0 - (-3.0_f64).exp())).abs() < 1e-15);
+    let Some(Value::Real(x)) = Lag::TABLE[Name::x as usize].value(&lag) else { panic!("x is a Real") };
+    assert!((x - 2.0 * (1.0 - (-3.0_f64).exp())).abs() < 1e-15);
 }
 
 #[test]
@@ -23,4 +25,16 @@ fn build_fmu_makes_an_fmu() {
     assert!(folder.path().join("lag.fmu").is_file());
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(text.contains("lag.fmu") && text.contains("guid {"), "{text}");
+}
+
+/// As it would be kept with the sources: without what changes with each of them.
+#[test]
+fn build_fmu_describes_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut build_fmu = Command::new(env!("CARGO_BIN_EXE_build_fmu_lag"));
+    let output = build_fmu.arg("--describe").arg("--out").arg(folder.path()).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let text = std::fs::read_to_string(folder.path().join("modelDescription.xml")).unwrap();
+    assert!(text.contains("guid=\"{00000000-0000-0000-0000-000000000000}\""), "{text}");
+    assert!(text.contains("<Unknown index=\"3\" dependencies=\"1 2\""), "{text}");
 }

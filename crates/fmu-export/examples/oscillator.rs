@@ -1,0 +1,6 @@
+//! The oscillator of the tests as a shared library, for C programs.
+
+#[path = "../tests/toys/oscillator.rs"]
+mod oscillator;
+
+fmu_export::fmi2_symbols!(oscillator::Oscillator);

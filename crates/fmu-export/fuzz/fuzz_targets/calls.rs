@@ -1,0 +1,30 @@
+//! libFuzzer looks for bytes that, read as calls of the FMU's functions, break a promise of `fmu_run::careless` or, under
+//! the AddressSanitizer, the memory.
+#![no_main]
+
+#[path = "../../tests/toys/mod.rs"]
+mod toys;
+
+use fmu_run::careless::{Tally, run};
+use libfuzzer_sys::fuzz_target;
+use std::sync::atomic::{AtomicU64, Ordering};
+use toys::*;
+
+/// Any exported model can stand here: `run::<prw_testbed::TestbedFmu>` with that crate among the dependencies.
+const MODELS: [fn(&[u8], &mut Tally); 6] =
+    [run::<Oscillator>, run::<Ball>, run::<Counter>, run::<Talker>, run::<Sum>, run::<Fuse>];
+
+static CALLS: AtomicU64 = AtomicU64::new(0);
+const REPORT_EVERY: u64 = 1_000_000;
+
+fuzz_target!(|bytes: &[u8]| {
+    // The last byte says which model; the calls are read from the front.
+    let Some((which, calls)) = bytes.split_last() else { return };
+    let mut tally = Tally::new();
+    MODELS[usize::from(*which) % MODELS.len()](calls, &mut tally);
+    let calls: u64 = tally.values().flatten().sum();
+    let before = CALLS.fetch_add(calls, Ordering::Relaxed);
+    if before / REPORT_EVERY != (before + calls) / REPORT_EVERY {
+        eprintln!("{} million calls", (before + calls) / REPORT_EVERY);
+    }
+});

@@ -1,0 +1,115 @@
+//! What a model can do: a trait for each capability. The description says what is implemented.
+
+use crate::model::{Error, Model};
+
+/// The model steps itself (section 4 of FMI 2.0).
+pub trait CoSimulation: Model {
+    /// Whether steps may have any size, also one unlike the last.
+    const VARIABLE_STEP_SIZE: bool = true;
+
+    /// Goes on from a communication point.
+    ///
+    /// # Errors
+    /// When the step cannot be carried out; the model must then be as it was before.
+    fn step(&mut self, step: Step) -> Result<Stepped, Error>;
+}
+
+/// A step from a communication point to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// The communication point, s.
+    pub time: f64,
+    /// The step size, s; finite and above 0.
+    pub size: f64,
+}
+
+/// How a step ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stepped {
+    /// At the next communication point.
+    Done,
+    /// At an earlier time, s, which the model has reached: the importer is told (`fmi2Discard`) and goes back to a
+    /// saved state or ends the simulation.
+    Early(f64),
+    /// At an earlier time, s, or the next point: the model wants to end the simulation.
+    Terminate(f64),
+}
+
+/// The importer integrates the model (section 3 of FMI 2.0).
+pub trait ModelExchange: Model {
+    /// The number of event indicators.
+    const INDICATORS: usize = 0;
+
+    /// Whether the model wants to know when a step of the integrator is complete.
+    const STEP_COMPLETED: bool = false;
+
+    /// Fills in the event indicators: an event happens where one of them changes its sign.
+    fn indicators(&self, _indicators: &mut [f64]) {}
+
+    /// An event at a time, s: at the begin of the simulation, where an indicator has changed its sign, at the time
+    /// that the last event has asked for, or when the importer likes. Called again while events ask for it.
+    ///
+    /// # Errors
+    /// When the model cannot go on. It is then as it was before.
+    fn event(&mut self, _time: f64) -> Result<Event, Error> {
+        Ok(Event::default())
+    }
+
+    /// The integrator has completed a step. Called if [`STEP_COMPLETED`](Self::STEP_COMPLETED).
+    fn step_completed(&mut self, _time: f64) -> StepCompleted {
+        StepCompleted::default()
+    }
+
+    /// Changes the orders of magnitude of the states, in the order of the table, which come as the types say.
+    fn nominals(&self, _nominals: &mut [f64]) {}
+}
+
+/// What an event did (section 3.2.2).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Event {
+    /// There is another event at the same time.
+    pub again: bool,
+    /// The model wants to end the simulation.
+    pub terminate: bool,
+    /// The orders of magnitude of the states have changed.
+    pub nominals_changed: bool,
+    /// The event has changed states.
+    pub states_changed: bool,
+    /// When the next event is due, s.
+    pub next: Option<f64>,
+}
+
+/// What the model wants after a step of the integrator.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StepCompleted {
+    /// An event.
+    pub event: bool,
+    /// The end of the simulation.
+    pub terminate: bool,
+}
+
+/// The model knows its partial derivatives (section 2.1.9): directional and adjoint ones follow.
+pub trait Partials: Model {
+    /// The partial derivative of one Real variable with respect to another, now. The unknown is an output or a
+    /// state's derivative, the known an input, a state or, while initializing, a parameter.
+    ///
+    /// `None` if the model does not know it: the importer is then refused.
+    fn partial(&self, unknown: Self::Name, known: Self::Name) -> Option<f64>;
+}
+
+/// The model uses time derivatives of inputs in Co-Simulation (section 4.2.1).
+pub trait InputDerivatives: CoSimulation {
+    /// Takes the time derivative of an input, of order 1 or higher, at the current communication point. Orders that
+    /// the model has no use for are ignored.
+    fn set_input_derivative(&mut self, of: Self::Name, order: u32, value: f64);
+}
+
+/// The model knows time derivatives of its variables in Co-Simulation (section 4.2.1).
+pub trait OutputDerivatives: CoSimulation {
+    /// The highest order it knows.
+    const HIGHEST: u32 = 1;
+
+    /// The time derivative of order 1 or higher of any Real variable that is no parameter, now; 0 for orders above
+    /// the model's.
+    fn output_derivative(&self, of: Self::Name, order: u32) -> f64;
+}

@@ -1,0 +1,185 @@
+//! From a model with capabilities to an FMU: [`export_fmu!`](crate::export_fmu).
+
+use crate::capabilities::{Event, Step, StepCompleted, Stepped};
+use crate::model::{Error, Model};
+
+/// A model with what it offers. Implemented by [`offer!`](crate::offer), which takes everything from the
+/// capabilities that it is given; what the model lacks is never called.
+pub trait Exported: Model {
+    /// What it offers as Co-Simulation slave; `None` if it is none.
+    const CO_SIMULATION: Option<CoSimulationOffer> = None;
+    /// What it offers as Model Exchange model; `None` if it is none.
+    const MODEL_EXCHANGE: Option<ModelExchangeOffer> = None;
+    /// Whether it knows partial derivatives.
+    const PARTIALS: bool = false;
+    /// Whether it uses input derivatives.
+    const INPUT_DERIVATIVES: bool = false;
+    /// The highest order of output derivatives.
+    const OUTPUT_DERIVATIVES: u32 = 0;
+
+    #[doc(hidden)]
+    fn exported_step(&mut self, _step: Step) -> Result<Stepped, Error> {
+        Err(Error::new("this FMU has no Co-Simulation"))
+    }
+    #[doc(hidden)]
+    fn exported_indicators(&self, _indicators: &mut [f64]) {}
+    #[doc(hidden)]
+    fn exported_event(&mut self, _time: f64) -> Result<Event, Error> {
+        Ok(Event::default())
+    }
+    #[doc(hidden)]
+    fn exported_step_completed(&mut self, _time: f64) -> StepCompleted {
+        StepCompleted::default()
+    }
+    #[doc(hidden)]
+    fn exported_nominals(&self, _nominals: &mut [f64]) {}
+    #[doc(hidden)]
+    fn exported_partial(&self, _unknown: Self::Name, _known: Self::Name) -> Option<f64> {
+        None
+    }
+    #[doc(hidden)]
+    fn exported_input_derivative(&mut self, _of: Self::Name, _order: u32, _value: f64) {}
+    #[doc(hidden)]
+    fn exported_output_derivative(&self, _of: Self::Name, _order: u32) -> f64 {
+        0.0
+    }
+}
+
+/// What the model description says of a Co-Simulation slave.
+#[derive(Clone, Copy, Debug)]
+pub struct CoSimulationOffer {
+    /// Steps may have any size.
+    pub variable_step_size: bool,
+}
+
+/// What the model description says of a Model Exchange model.
+#[derive(Clone, Copy, Debug)]
+pub struct ModelExchangeOffer {
+    /// The number of event indicators.
+    pub indicators: usize,
+    /// Whether the importer tells when a step of the integrator is complete.
+    pub step_completed: bool,
+}
+
+/// Exports a [`Model`] with its capabilities as an FMU: the functions of FMI 2.0 as symbols of the library.
+///
+/// Goes once into the library crate of an FMU, which must be a `cdylib`. The symbols live in the crate that calls
+/// the macro, so several FMU crates can share a workspace.
+///
+/// ```text
+/// export_fmu!(Lag: CoSimulation + ModelExchange);
+/// ```
+#[macro_export]
+macro_rules! export_fmu {
+    ($model:ty : $first:ident $(+ $next:ident)*) => {
+        $crate::offer!($model: $first $(+ $next)*);
+        $crate::fmi2_symbols!($model);
+    };
+}
+
+/// What [`export_fmu!`](crate::export_fmu) does besides the symbols: it says what the model offers. For tests, and
+/// for libraries with several models.
+///
+/// A capability that is named must be implemented, and one that is implemented must be named: the compiler sees to
+/// both.
+#[macro_export]
+macro_rules! offer {
+    // An associated constant of the type itself, if the bound holds, comes before that of the trait.
+    (@must_agree $model:ty, $capability:ident, $($offered:tt)+) => {
+        const _: () = {
+            struct Is<T>(::core::marker::PhantomData<T>);
+            trait Not {
+                const IMPLEMENTED: bool = false;
+            }
+            impl<T> Not for Is<T> {}
+            #[allow(dead_code)]
+            impl<T: $crate::$capability> Is<T> {
+                const IMPLEMENTED: bool = true;
+            }
+            if <Is<$model>>::IMPLEMENTED != (<$model as $crate::Exported>::$($offered)+) {
+                ::core::panic!(::core::concat!(
+                    ::core::stringify!($model), " implements ", ::core::stringify!($capability),
+                    ": name it in export_fmu! as well"
+                ));
+            }
+        };
+    };
+
+    (@capability CoSimulation) => {
+        const CO_SIMULATION: ::core::option::Option<$crate::CoSimulationOffer> =
+            ::core::option::Option::Some($crate::CoSimulationOffer {
+                variable_step_size: <Self as $crate::CoSimulation>::VARIABLE_STEP_SIZE,
+            });
+
+        #[inline]
+        fn exported_step(&mut self, step: $crate::Step) -> ::core::result::Result<$crate::Stepped, $crate::Error> {
+            $crate::CoSimulation::step(self, step)
+        }
+    };
+    (@capability ModelExchange) => {
+        const MODEL_EXCHANGE: ::core::option::Option<$crate::ModelExchangeOffer> =
+            ::core::option::Option::Some($crate::ModelExchangeOffer {
+                indicators: <Self as $crate::ModelExchange>::INDICATORS,
+                step_completed: <Self as $crate::ModelExchange>::STEP_COMPLETED,
+            });
+
+        fn exported_indicators(&self, indicators: &mut [f64]) {
+            $crate::ModelExchange::indicators(self, indicators);
+        }
+        fn exported_event(&mut self, time: f64) -> ::core::result::Result<$crate::Event, $crate::Error> {
+            $crate::ModelExchange::event(self, time)
+        }
+        fn exported_step_completed(&mut self, time: f64) -> $crate::StepCompleted {
+            $crate::ModelExchange::step_completed(self, time)
+        }
+        fn exported_nominals(&self, nominals: &mut [f64]) {
+            $crate::ModelExchange::nominals(self, nominals);
+        }
+    };
+    (@capability Partials) => {
+        const PARTIALS: bool = true;
+
+        fn exported_partial(
+            &self,
+            unknown: <Self as $crate::Variables>::Name,
+            known: <Self as $crate::Variables>::Name,
+        ) -> ::core::option::Option<f64> {
+            $crate::Partials::partial(self, unknown, known)
+        }
+    };
+    (@capability InputDerivatives) => {
+        const INPUT_DERIVATIVES: bool = true;
+
+        fn exported_input_derivative(&mut self, of: <Self as $crate::Variables>::Name, order: u32, value: f64) {
+            $crate::InputDerivatives::set_input_derivative(self, of, order, value);
+        }
+    };
+    (@capability OutputDerivatives) => {
+        const OUTPUT_DERIVATIVES: u32 = <Self as $crate::OutputDerivatives>::HIGHEST;
+
+        fn exported_output_derivative(&self, of: <Self as $crate::Variables>::Name, order: u32) -> f64 {
+            $crate::OutputDerivatives::output_derivative(self, of, order)
+        }
+    };
+    (@capability $other:ident) => {
+        ::core::compile_error!(::core::concat!(
+            ::core::stringify!($other), " is no capability: there are CoSimulation, ModelExchange, Partials, \
+             InputDerivatives and OutputDerivatives"
+        ));
+    };
+
+    ($model:ty : $first:ident $(+ $next:ident)*) => {
+        impl $crate::Exported for $model {
+            $crate::offer! { @capability $first }
+            $( $crate::offer! { @capability $next } )*
+        }
+
+        const _: () = {
+            $crate::offer! { @must_agree $model, CoSimulation, CO_SIMULATION.is_some() }
+            $crate::offer! { @must_agree $model, ModelExchange, MODEL_EXCHANGE.is_some() }
+            $crate::offer! { @must_agree $model, Partials, PARTIALS }
+            $crate::offer! { @must_agree $model, InputDerivatives, INPUT_DERIVATIVES }
+            $crate::offer! { @must_agree $model, OutputDerivatives, OUTPUT_DERIVATIVES > 0 }
+        };
+    };
+}

@@ -1,0 +1,72 @@
+//! The importer's arrays and places.
+
+use crate::instance::{Outcome, refuse};
+use std::mem::MaybeUninit;
+
+/// The importer's array of `length` values, to be read.
+///
+/// # Safety
+/// `pointer` is NULL or points to `length` values that stay as they are for `'a`.
+#[inline]
+pub(super) unsafe fn array<'a, T>(pointer: *const T, length: usize, argument: &str) -> Outcome<&'a [T]> {
+    if length == 0 {
+        return Ok(&[]);
+    }
+    check(pointer, length, argument)?;
+    // SAFETY: not NULL, aligned, of a possible size; the length is the caller's promise.
+    Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
+}
+
+/// The importer's array of `length` values, to be written. What is in it before may be anything.
+///
+/// # Safety
+/// `pointer` is NULL or points to `length` values that nobody else uses for `'a`.
+#[inline]
+pub(super) unsafe fn output<'a, T>(
+    pointer: *mut T,
+    length: usize,
+    argument: &str,
+) -> Outcome<&'a mut [MaybeUninit<T>]> {
+    if length == 0 {
+        return Ok(&mut []);
+    }
+    check(pointer, length, argument)?;
+    // SAFETY: not NULL, aligned, of a possible size; the length is the caller's promise, and `MaybeUninit` asks for
+    // no initialized values.
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), length) })
+}
+
+/// The importer's place for one value.
+///
+/// # Safety
+/// `pointer` is NULL or points to a value that nobody else uses for `'a`.
+pub(super) unsafe fn place<'a, T>(pointer: *mut T, argument: &str) -> Outcome<&'a mut MaybeUninit<T>> {
+    if pointer.is_null() || !pointer.is_aligned() {
+        return refuse(format!("the pointer {argument} is NULL or not aligned"));
+    }
+    // SAFETY: not NULL and aligned; that it points to a value is the caller's promise.
+    Ok(unsafe { &mut *pointer.cast() })
+}
+
+#[inline]
+fn check<T>(pointer: *const T, length: usize, argument: &str) -> Outcome {
+    // In one test: not aligned, or so long that its bytes cannot be counted.
+    let odd = pointer.addr() & (align_of::<T>() - 1) | length >> (isize::BITS - 1 - size_of::<T>().ilog2());
+    if pointer.is_null() || odd != 0 {
+        return refuse_array(pointer, length, argument);
+    }
+    Ok(())
+}
+
+#[cold]
+#[inline(never)]
+fn refuse_array<T>(pointer: *const T, length: usize, argument: &str) -> Outcome {
+    let fault = if pointer.is_null() {
+        "is NULL"
+    } else if !pointer.is_aligned() {
+        "is not aligned"
+    } else {
+        "is larger than memory"
+    };
+    refuse(format!("the array {argument} {fault}, its length is {length}"))
+}

@@ -1,0 +1,170 @@
+//! What every call on an instance has in common.
+
+use super::functions::Function;
+use super::types::*;
+use crate::export::Exported;
+use crate::instance::{Instance, Outcome, Refusal};
+use crate::log::Message;
+use crate::mode::Mode;
+use std::any::Any;
+use std::cell::{Cell, UnsafeCell};
+use std::ffi::{CStr, CString};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+#[cfg(panic = "abort")]
+compile_error!("an FMU must not end the importer's process: build with panic = \"unwind\"");
+
+/// What a component points to.
+///
+/// Processors fetch cache lines of 64 bytes in pairs: instances side by side on the heap share none, so that
+/// threads that step them do not take them from each other.
+#[repr(align(128))]
+pub(super) struct Component<M> {
+    /// Whether the importer's log callback is running: it must not call back.
+    pub delivering: Cell<bool>,
+    pub instance: UnsafeCell<Instance<M>>,
+    pub importer: ImporterLog,
+}
+
+/// The importer's log callback and what it wants back with every call. Copied, because the callbacks structure may go
+/// after `fmi2Instantiate`.
+pub(super) struct ImporterLog {
+    pub logger: Option<fmi2CallbackLogger>,
+    pub environment: fmi2ComponentEnvironment,
+    pub instance_name: CString,
+}
+
+impl ImporterLog {
+    pub fn deliver(&self, message: &Message) {
+        if let Some(logger) = self.logger {
+            let text = message.printable();
+            // SAFETY: the importer's promise that the logger works until the instance is freed; all strings end with
+            // a zero byte, and the message holds no format directive that would ask for further arguments.
+            unsafe {
+                logger(
+                    self.environment,
+                    self.instance_name.as_ptr(),
+                    message.status,
+                    message.category().as_ptr(),
+                    text.as_ptr(),
+                );
+            }
+        }
+    }
+}
+
+/// Runs a function's body on the instance behind `c` if the table of allowed calls has it.
+///
+/// # Safety
+/// `c` as in the module's contract.
+#[inline(always)]
+pub(super) unsafe fn call<M: Exported>(
+    c: fmi2Component,
+    function: Function,
+    body: impl FnOnce(&mut Instance<M>) -> Outcome,
+) -> Status {
+    // SAFETY: by contract NULL or a living component of this model. Shared, because the log callback of a call that
+    // is not over may come here, too.
+    let Some(component) = (unsafe { c.cast::<Component<M>>().as_ref() }) else {
+        return Status::Error;
+    };
+    if component.delivering.get() {
+        return Status::Error;
+    }
+    // SAFETY: by contract no other thread is here, and no call on this thread: none is running a body, because bodies
+    // call nothing of the importer's, and none is delivering. The reference ends with this function's use of it, before
+    // anything is delivered.
+    let instance = unsafe { &mut *component.instance.get() };
+    let outcome = catch_unwind(AssertUnwindSafe(|| {
+        if !instance.situation().is_in(function.rule().accepted()) {
+            return refuse_call(instance, function);
+        }
+        let outcome = body(instance);
+        instance.listen();
+        outcome
+    }));
+    match outcome {
+        Ok(Ok(())) if instance.logger.is_empty() => Status::Ok,
+        other => finish(component, function, other),
+    }
+}
+
+#[cold]
+fn refuse_call<M: Exported>(instance: &Instance<M>, function: Function) -> Outcome {
+    let (interface, mode) = (instance.interface(), instance.mode());
+    let allowed = function.rule().accepted().names(interface);
+    let message = format!("not allowed in state '{mode}' of {interface}; allowed in: {allowed}");
+    let status = if mode == Mode::Fatal { Status::Fatal } else { Status::Error };
+    Err(Box::new(Refusal { status, message }))
+}
+
+/// What became of a body: the refusal or the panic that it ended with.
+type Ended = Result<Outcome, Box<dyn Any + Send>>;
+
+/// The end of a call that is not simply OK: says what there is to say.
+#[cold]
+#[inline(never)]
+fn finish<M: Exported>(component: &Component<M>, function: Function, ended: Ended) -> Status {
+    let name = function.rule().name;
+    let status = match &ended {
+        Ok(Ok(())) => Status::Ok,
+        Ok(Err(refusal)) => refusal.status,
+        Err(_) => Status::Fatal,
+    };
+    let deliver = || {
+        let messages = {
+            // SAFETY: as in `call`: nobody else has a reference to the instance, and this one ends before the first
+            // message is delivered.
+            let instance = unsafe { &mut *component.instance.get() };
+            match &ended {
+                Ok(Ok(())) => {}
+                Ok(Err(refusal)) => instance.logger.log(status, format!("{name}: {}", refusal.message)),
+                Err(panic) => {
+                    instance.break_down();
+                    instance.logger.log(
+                        status,
+                        format!(
+                            "{name}: internal failure ({}); free this instance, others are not affected",
+                            panic_message(&**panic)
+                        ),
+                    );
+                }
+            }
+            instance.logger.take()
+        };
+        component.delivering.set(true);
+        messages.iter().for_each(|message| component.importer.deliver(message));
+        component.delivering.set(false);
+    };
+    forget_panic(catch_unwind(AssertUnwindSafe(deliver)));
+    if let Err(panic) = ended {
+        forget_panic(Err(panic));
+    }
+    status
+}
+
+/// Drops what a panic carries. If that panics as well, what the second one carries is left to itself.
+pub(super) fn forget_panic(ended: Result<(), Box<dyn Any + Send>>) {
+    if let Err(panic) = ended
+        && let Err(second) = catch_unwind(AssertUnwindSafe(|| drop(panic)))
+    {
+        std::mem::forget(second);
+    }
+}
+
+pub(super) fn panic_message(panic: &(dyn Any + Send)) -> &str {
+    panic
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("no message")
+}
+
+/// The importer's string.
+///
+/// # Safety
+/// `pointer` is NULL or a string with a zero byte at its end that stays as it is for `'a`.
+pub(super) unsafe fn string<'a>(pointer: fmi2String) -> Option<&'a CStr> {
+    // SAFETY: the caller's promise.
+    (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) })
+}

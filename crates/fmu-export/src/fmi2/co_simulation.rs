@@ -1,0 +1,122 @@
+//! Co-Simulation (section 4.2).
+//!
+//! # Safety
+//! As in the [module above](super): each argument is what the standard says it is.
+
+use super::arrays::{array, output, place};
+use super::types::*;
+use crate::export::Exported;
+use crate::instance::{Instance, Outcome, no_status, refuse};
+
+pub unsafe fn fmi2SetRealInputDerivatives<M: Exported>(
+    instance: &mut Instance<M>,
+    vr: *const fmi2ValueReference,
+    count: usize,
+    order: *const fmi2Integer,
+    value: *const fmi2Real,
+) -> Outcome {
+    // SAFETY: by contract arrays of this length.
+    let (vr, order, value) =
+        unsafe { (array(vr, count, "vr")?, array(order, count, "order")?, array(value, count, "value")?) };
+    instance.set_input_derivatives(vr, order, value)
+}
+
+pub unsafe fn fmi2GetRealOutputDerivatives<M: Exported>(
+    instance: &mut Instance<M>,
+    vr: *const fmi2ValueReference,
+    count: usize,
+    order: *const fmi2Integer,
+    value: *mut fmi2Real,
+) -> Outcome {
+    // SAFETY: by contract arrays of this length; the written one does not overlap the others.
+    let (vr, order, value) =
+        unsafe { (array(vr, count, "vr")?, array(order, count, "order")?, output(value, count, "value")?) };
+    instance.get_output_derivatives(vr, order, value)
+}
+
+#[inline]
+pub unsafe fn fmi2DoStep<M: Exported>(
+    instance: &mut Instance<M>,
+    current_communication_point: fmi2Real,
+    communication_step_size: fmi2Real,
+    _no_set_fmu_state_prior_to_current_point: fmi2Boolean,
+) -> Outcome {
+    instance.do_step(current_communication_point, communication_step_size)
+}
+
+/// Steps are synchronous, so there is never one to cancel: the table of allowed calls has no place for it.
+pub unsafe fn fmi2CancelStep<M: Exported>(_: &mut Instance<M>) -> Outcome {
+    Ok(())
+}
+
+/// What can be asked for, or why it cannot.
+fn status_kind(kind: fmi2StatusKind) -> Outcome<StatusKind> {
+    StatusKind::from_c(kind).map_or_else(|| refuse(format!("there is no fmi2StatusKind {kind}")), Ok)
+}
+
+fn nothing_to_say(kind: StatusKind) -> Outcome {
+    no_status(match kind {
+        StatusKind::DoStepStatus | StatusKind::PendingStatus => {
+            "no step is pending: fmi2DoStep works synchronously"
+        }
+        StatusKind::LastSuccessfulTime => "fmi2LastSuccessfulTime is a Real: ask fmi2GetRealStatus",
+        StatusKind::Terminated => "fmi2Terminated is a Boolean: ask fmi2GetBooleanStatus",
+    })
+}
+
+pub unsafe fn fmi2GetRealStatus<M: Exported>(
+    instance: &mut Instance<M>,
+    kind: fmi2StatusKind,
+    value: *mut fmi2Real,
+) -> Outcome {
+    match status_kind(kind)? {
+        StatusKind::LastSuccessfulTime => {
+            // SAFETY: by contract NULL or a pointer to a value.
+            unsafe { place(value, "value") }?.write(instance.last_successful_time());
+            Ok(())
+        }
+        other => nothing_to_say(other),
+    }
+}
+
+pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
+    instance: &mut Instance<M>,
+    kind: fmi2StatusKind,
+    value: *mut fmi2Boolean,
+) -> Outcome {
+    match status_kind(kind)? {
+        StatusKind::Terminated => {
+            // SAFETY: by contract NULL or a pointer to a value.
+            unsafe { place(value, "value") }?.write(instance.has_ended().into());
+            Ok(())
+        }
+        other => nothing_to_say(other),
+    }
+}
+
+/// Answers `fmi2Discard`: it belongs to asynchronous steps.
+pub unsafe fn fmi2GetStatus<M: Exported>(
+    _: &mut Instance<M>,
+    kind: fmi2StatusKind,
+    _value: *mut Status,
+) -> Outcome {
+    nothing_to_say(status_kind(kind)?)
+}
+
+/// See [`fmi2GetStatus`].
+pub unsafe fn fmi2GetIntegerStatus<M: Exported>(
+    _: &mut Instance<M>,
+    kind: fmi2StatusKind,
+    _value: *mut fmi2Integer,
+) -> Outcome {
+    nothing_to_say(status_kind(kind)?)
+}
+
+/// See [`fmi2GetStatus`].
+pub unsafe fn fmi2GetStringStatus<M: Exported>(
+    _: &mut Instance<M>,
+    kind: fmi2StatusKind,
+    _value: *mut fmi2String,
+) -> Outcome {
+    nothing_to_say(status_kind(kind)?)
+}

@@ -1,0 +1,133 @@
+//! The functions of FMI 2.0 that work on an instance, listed once: arguments, and where each may be called.
+//!
+//! From this list come the table of allowed calls, the symbols of the library, and the table of function pointers
+//! that importers in Rust use.
+
+use crate::mode::Situations;
+
+/// Passes the list of functions on to another macro: `name (arguments) CS ME tolerated;` for each, after whatever
+/// tokens are given behind the macro's name.
+///
+/// The letters are the columns of the standard's tables (sections 4.2.4 and 3.2.3): I instantiated,
+/// N initialization, C step complete, F step failed, M event, K continuous time, T terminated, E error. In fatal
+/// nothing is allowed. For `fmi2Set...` the table has the columns; which variable can be set in which of them is said
+/// by [`settable`](crate::settable). `fmi2CancelStep` belongs to asynchronous steps, which do not exist here.
+///
+/// Tolerated, for interface types that have the function:
+///   fmi2Terminate after an error (FMI Library calls it in a destructor);
+///   fmi2EnterInitializationMode without fmi2SetupExperiment before it: the start time is 0;
+///   fmi2SetTime while initializing and in event mode, fmi2SetContinuousStates in event mode (OpenModelica, on
+///   every run).
+#[doc(hidden)]
+#[macro_export]
+#[rustfmt::skip]
+macro_rules! fmi2_functions {
+    ($with:path $(, $($before:tt)*)?) => { $with! { $($($before)*)?
+        // function                         CS        ME        tolerated
+        fmi2SetDebugLogging                 "INCFTE"  "INMKTE"  ""
+            (logging_on: fmi2Boolean, n: usize, categories: *const fmi2String);
+        fmi2SetupExperiment                 "I"       "I"       ""
+            (tolerance_defined: fmi2Boolean, tolerance: fmi2Real, start_time: fmi2Real,
+             stop_time_defined: fmi2Boolean, stop_time: fmi2Real);
+        fmi2EnterInitializationMode         "I"       "I"       "" ();
+        fmi2ExitInitializationMode          "N"       "N"       "" ();
+        fmi2Terminate                       "CF"      "MK"      "E" ();
+        fmi2Reset                           "INCFTE"  "INMKTE"  "" ();
+        fmi2GetReal                         "NCFTE"   "NMKTE"   ""
+            (vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Real);
+        fmi2GetInteger                      "NCFTE"   "NMKTE"   ""
+            (vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Integer);
+        fmi2GetBoolean                      "NCFTE"   "NMKTE"   ""
+            (vr: *const fmi2ValueReference, n: usize, value: *mut fmi2Boolean);
+        fmi2GetString                       "NCFTE"   "NMKTE"   ""
+            (vr: *const fmi2ValueReference, n: usize, value: *mut fmi2String);
+        fmi2SetReal                         "INC"     "INMK"    ""
+            (vr: *const fmi2ValueReference, n: usize, value: *const fmi2Real);
+        fmi2SetInteger                      "INC"     "INM"     ""
+            (vr: *const fmi2ValueReference, n: usize, value: *const fmi2Integer);
+        fmi2SetBoolean                      "INC"     "INM"     ""
+            (vr: *const fmi2ValueReference, n: usize, value: *const fmi2Boolean);
+        fmi2SetString                       "INC"     "INM"     ""
+            (vr: *const fmi2ValueReference, n: usize, value: *const fmi2String);
+        fmi2GetFMUstate                     "INCFTE"  "INMKTE"  "" (state: *mut fmi2FMUstate);
+        fmi2SetFMUstate                     "INCFTE"  "INMKTE"  "" (state: fmi2FMUstate);
+        fmi2FreeFMUstate                    "INCFTE"  "INMKTE"  "" (state: *mut fmi2FMUstate);
+        fmi2SerializedFMUstateSize          "INCFTE"  "INMKTE"  "" (state: fmi2FMUstate, size: *mut usize);
+        fmi2SerializeFMUstate               "INCFTE"  "INMKTE"  ""
+            (state: fmi2FMUstate, bytes: *mut fmi2Byte, size: usize);
+        fmi2DeSerializeFMUstate             "INCFTE"  "INMKTE"  ""
+            (bytes: *const fmi2Byte, size: usize, state: *mut fmi2FMUstate);
+        fmi2GetDirectionalDerivative        "NCFTE"   "NMKTE"   ""
+            (unknown: *const fmi2ValueReference, n_unknown: usize, known: *const fmi2ValueReference, n_known: usize,
+             dv_known: *const fmi2Real, dv_unknown: *mut fmi2Real);
+        fmi2SetRealInputDerivatives         "INC"     ""        ""
+            (vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer, value: *const fmi2Real);
+        fmi2GetRealOutputDerivatives        "CFTE"    ""        ""
+            (vr: *const fmi2ValueReference, n: usize, order: *const fmi2Integer, value: *mut fmi2Real);
+        fmi2DoStep                          "C"       ""        ""
+            (point: fmi2Real, step_size: fmi2Real, no_set_state_prior: fmi2Boolean);
+        fmi2CancelStep                      ""        ""        "" ();
+        fmi2GetStatus                       "CFT"     ""        "" (kind: fmi2StatusKind, value: *mut Status);
+        fmi2GetRealStatus                   "CFT"     ""        "" (kind: fmi2StatusKind, value: *mut fmi2Real);
+        fmi2GetIntegerStatus                "CFT"     ""        "" (kind: fmi2StatusKind, value: *mut fmi2Integer);
+        fmi2GetBooleanStatus                "CFT"     ""        "" (kind: fmi2StatusKind, value: *mut fmi2Boolean);
+        fmi2GetStringStatus                 "CFT"     ""        "" (kind: fmi2StatusKind, value: *mut fmi2String);
+        fmi2EnterEventMode                  ""        "MK"      "" ();
+        fmi2NewDiscreteStates               ""        "M"       "" (info: *mut fmi2EventInfo);
+        fmi2EnterContinuousTimeMode         ""        "M"       "" ();
+        fmi2CompletedIntegratorStep         ""        "K"       ""
+            (no_set_state_prior: fmi2Boolean, enter_event_mode: *mut fmi2Boolean, terminate: *mut fmi2Boolean);
+        fmi2SetTime                         ""        "K"       "NM" (time: fmi2Real);
+        fmi2SetContinuousStates             ""        "K"       "M" (x: *const fmi2Real, nx: usize);
+        fmi2GetDerivatives                  ""        "NMKTE"   "" (derivatives: *mut fmi2Real, nx: usize);
+        fmi2GetEventIndicators              ""        "NMKTE"   "" (indicators: *mut fmi2Real, ni: usize);
+        fmi2GetContinuousStates             ""        "NMKTE"   "" (x: *mut fmi2Real, nx: usize);
+        fmi2GetNominalsOfContinuousStates   ""        "INMKTE"  "" (nominals: *mut fmi2Real, nx: usize);
+    } };
+}
+
+/// One row of the table of allowed calls.
+#[derive(Clone, Copy, Debug)]
+pub struct Rule {
+    /// The function's name.
+    pub name: &'static str,
+    /// Where the standard allows the call.
+    pub standard: Situations,
+    /// Where the call is tolerated beyond the standard.
+    pub tolerated: Situations,
+}
+
+impl Rule {
+    const fn new(name: &'static str, co_simulation: &str, model_exchange: &str, tolerated: &str) -> Self {
+        let standard = Situations::new(co_simulation, model_exchange);
+        let tolerated = Situations::new(tolerated, tolerated).where_any(standard);
+        Self { name, standard, tolerated }
+    }
+
+    /// Where the call is accepted.
+    pub const fn accepted(&self) -> Situations {
+        self.standard.and(self.tolerated)
+    }
+}
+
+macro_rules! rules {
+    ($($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+) => {
+        /// The functions that work on an instance.
+        #[allow(non_camel_case_types, missing_docs)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Function { $($function),+ }
+
+        /// The table of allowed calls, in the order of [`Function`].
+        pub const ALLOWED: &[Rule] = &[$(Rule::new(stringify!($function), $cs, $me, $tolerated)),+];
+    };
+}
+
+fmi2_functions!(rules);
+
+impl Function {
+    /// The function's row of the table.
+    #[inline]
+    pub const fn rule(self) -> &'static Rule {
+        &ALLOWED[self as usize]
+    }
+}

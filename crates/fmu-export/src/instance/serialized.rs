@@ -1,0 +1,288 @@
+//! Saved states as bytes, with version and checksum.
+
+use super::State;
+use super::values::check_value;
+use crate::export::Exported;
+use crate::mode::{Interface, Mode, POSSIBLE};
+use crate::saved::{Saved, StateVisitor};
+
+impl<M: Exported> State<M> {
+    /// Shows everything to the visitor but what follows from the rest.
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        let mut mode = i64::from(self.mode as u32);
+        visitor.integer(&mut mode);
+        match Mode::from_number(mode) {
+            Some(mode) => self.mode = mode,
+            None => visitor.invalid(),
+        }
+        self.ended.visit(visitor);
+        self.time.visit(visitor);
+        self.experiment.start_time.visit(visitor);
+        self.experiment.stop_time.visit(visitor);
+        self.experiment.tolerance.visit(visitor);
+        for variable in M::TABLE {
+            variable.visit(&mut self.model, visitor);
+        }
+        self.model.visit_memory(visitor);
+    }
+}
+
+/// Begins every serialized state; the last digit is the version of the layout.
+const MAGIC: &[u8; 8] = b"fmustat2";
+/// The magic, a hash of the guid, the interface type.
+const HEADER_LENGTH: usize = 8 + 8 + 1;
+const CHECKSUM_LENGTH: usize = 8;
+
+/// The number of bytes of a serialized state.
+pub(super) fn size<M: Exported>(state: &State<M>) -> usize {
+    let mut counter = Counter(0);
+    state.clone().visit(&mut counter);
+    HEADER_LENGTH + counter.0 + CHECKSUM_LENGTH
+}
+
+/// Fills `bytes`, which must have the length that [`size`] tells.
+pub(super) fn write<M: Exported>(state: &State<M>, interface: Interface, bytes: &mut [u8]) {
+    let (content, checksum) = bytes.split_at_mut(bytes.len() - CHECKSUM_LENGTH);
+    let mut writer = Writer { rest: &mut *content };
+    writer.put(MAGIC);
+    writer.put(&guid_hash::<M>());
+    writer.put(&[interface as u8]);
+    state.clone().visit(&mut writer);
+    checksum.copy_from_slice(&fnv1a(content).to_le_bytes());
+}
+
+/// Rebuilds a state from bytes that may come from anywhere. `template` is any state of the model.
+pub(super) fn read<M: Exported>(
+    bytes: &[u8],
+    interface: Interface,
+    template: &State<M>,
+) -> Result<State<M>, String> {
+    let version = MAGIC.len() - 1;
+    if bytes.len() < MAGIC.len() || bytes[..version] != MAGIC[..version] {
+        return Err("the bytes are no saved state of an FMU of this kind".into());
+    }
+    if bytes[version] != MAGIC[version] {
+        return Err("the saved state has another version of the layout; save it again with this FMU".into());
+    }
+    if bytes.len() < HEADER_LENGTH + CHECKSUM_LENGTH {
+        return Err("the saved state is cut short".into());
+    }
+    if bytes[8..16] != guid_hash::<M>() {
+        return Err("the saved state comes from another FMU (its guid differs)".into());
+    }
+    let (content, checksum) = bytes.split_at(bytes.len() - CHECKSUM_LENGTH);
+    if fnv1a(content).to_le_bytes() != *checksum {
+        return Err("the saved state is damaged or has the wrong length (its checksum is wrong)".into());
+    }
+    if content[16] != interface as u8 {
+        return Err(
+            "the saved state comes from the other interface type (Co-Simulation or Model Exchange)".into()
+        );
+    }
+    let mut reader = Reader { rest: &content[HEADER_LENGTH..], valid: true };
+    let mut state = template.clone();
+    state.visit(&mut reader);
+    if !reader.rest.is_empty() {
+        return Err("the saved state has the wrong length".into());
+    }
+    if !reader.valid || !POSSIBLE.contain(interface, state.mode) {
+        return Err("the saved state holds impossible values".into());
+    }
+    for variable in M::TABLE.iter().filter(|variable| variable.has_start()) {
+        if let Some(value) = variable.value(&state.model) {
+            check_value(variable, &value).map_err(|refusal| refusal.message)?;
+        }
+    }
+    state.model.update().map_err(|error| error.to_string())?;
+    state.stale = true;
+    Ok(state)
+}
+
+fn guid_hash<M: Exported>() -> [u8; 8] {
+    fnv1a(M::INFO.guid.as_bytes()).to_le_bytes()
+}
+
+/// FNV-1a: every step is a bijection of the running value, so no single changed byte goes unseen.
+fn fnv1a(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+struct Counter(usize);
+
+impl StateVisitor for Counter {
+    fn real(&mut self, _: &mut f64) {
+        self.0 += 8;
+    }
+    fn integer(&mut self, _: &mut i64) {
+        self.0 += 8;
+    }
+    fn boolean(&mut self, _: &mut bool) {
+        self.0 += 1;
+    }
+    fn text(&mut self, text: &mut String) {
+        self.0 += 8 + text.len();
+    }
+    fn length(&mut self, _: &mut usize) {
+        self.0 += 8;
+    }
+    fn invalid(&mut self) {}
+}
+
+struct Writer<'a> {
+    rest: &'a mut [u8],
+}
+
+impl Writer<'_> {
+    fn put(&mut self, bytes: &[u8]) {
+        let (head, rest) = std::mem::take(&mut self.rest).split_at_mut(bytes.len());
+        head.copy_from_slice(bytes);
+        self.rest = rest;
+    }
+}
+
+impl StateVisitor for Writer<'_> {
+    fn real(&mut self, value: &mut f64) {
+        self.put(&value.to_bits().to_le_bytes());
+    }
+    fn integer(&mut self, value: &mut i64) {
+        self.put(&value.to_le_bytes());
+    }
+    fn boolean(&mut self, value: &mut bool) {
+        self.put(&[u8::from(*value)]);
+    }
+    fn text(&mut self, text: &mut String) {
+        self.put(&(text.len() as u64).to_le_bytes());
+        self.put(text.as_bytes());
+    }
+    fn length(&mut self, length: &mut usize) {
+        self.put(&(*length as u64).to_le_bytes());
+    }
+    fn invalid(&mut self) {}
+}
+
+struct Reader<'a> {
+    rest: &'a [u8],
+    valid: bool,
+}
+
+impl Reader<'_> {
+    fn take<const N: usize>(&mut self) -> [u8; N] {
+        let Some((head, rest)) = self.rest.split_first_chunk::<N>() else {
+            self.invalid();
+            return [0; N];
+        };
+        self.rest = rest;
+        *head
+    }
+}
+
+impl StateVisitor for Reader<'_> {
+    fn real(&mut self, value: &mut f64) {
+        *value = f64::from_bits(u64::from_le_bytes(self.take()));
+        self.valid &= value.is_finite();
+    }
+    fn integer(&mut self, value: &mut i64) {
+        *value = i64::from_le_bytes(self.take());
+    }
+    fn boolean(&mut self, value: &mut bool) {
+        let [byte] = self.take();
+        self.valid &= byte <= 1;
+        *value = byte == 1;
+    }
+    fn text(&mut self, text: &mut String) {
+        let length = u64::from_le_bytes(self.take());
+        let bytes = usize::try_from(length).ok().and_then(|length| self.rest.split_at_checked(length));
+        match bytes.and_then(|(bytes, rest)| Some((std::str::from_utf8(bytes).ok()?, rest))) {
+            Some((read, rest)) => {
+                read.clone_into(text);
+                self.rest = rest;
+            }
+            None => self.invalid(),
+        }
+    }
+    /// Hostile bytes may claim any length; nothing is reserved for elements that cannot be there.
+    fn length(&mut self, length: &mut usize) {
+        let claimed = u64::from_le_bytes(self.take());
+        *length = match usize::try_from(claimed) {
+            Ok(length) if length <= self.rest.len() => length,
+            _ => {
+                self.invalid();
+                0
+            }
+        };
+    }
+    fn invalid(&mut self) {
+        self.valid = false;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Counter, Reader, Writer};
+    use crate::saved::Saved;
+
+    fn written<T: Saved>(mut value: T) -> Vec<u8> {
+        let mut counter = Counter(0);
+        value.visit(&mut counter);
+        let mut bytes = vec![0; counter.0];
+        let mut writer = Writer { rest: &mut bytes };
+        value.visit(&mut writer);
+        assert!(writer.rest.is_empty(), "the counter is right");
+        bytes
+    }
+
+    /// What the bytes are read as, if they are valid to the last one.
+    fn read<T: Saved + Default>(bytes: &[u8]) -> Option<T> {
+        let mut value = T::default();
+        let mut reader = Reader { rest: bytes, valid: true };
+        value.visit(&mut reader);
+        (reader.valid && reader.rest.is_empty()).then_some(value)
+    }
+
+    #[track_caller]
+    fn comes_back<T: Saved + Default + Clone + PartialEq + std::fmt::Debug>(value: T) {
+        let bytes = written(value.clone());
+        assert_eq!(read(&bytes), Some(value));
+        assert!((0..bytes.len()).all(|length| read::<T>(&bytes[..length]).is_none()), "a cut is seen");
+    }
+
+    #[test]
+    fn every_type_comes_back() {
+        comes_back(-0.25);
+        comes_back(f64::MIN_POSITIVE);
+        comes_back(true);
+        comes_back("Gödel".to_owned());
+        comes_back([i8::MIN, -1, i8::MAX]);
+        comes_back([u32::MAX, 0]);
+        comes_back(i64::MIN);
+        comes_back((7_u8, Some(-3_i16)));
+        comes_back([None, Some(2.5)]);
+        comes_back(vec![vec![String::new(), "a".to_owned()], vec![], vec!["bc".to_owned()]]);
+    }
+
+    #[test]
+    fn what_cannot_be_is_invalid() {
+        assert_eq!(read::<f64>(&written(f64::NAN)), None);
+        assert_eq!(read::<bool>(&[2]), None);
+        assert_eq!(read::<u8>(&written(256_i32)), None);
+        assert_eq!(read::<u32>(&written(-1_i64)), None);
+        assert_eq!(read::<i32>(&written(i64::MAX)), None);
+        assert_eq!(read::<String>(&[written(1_i64), vec![0xff]].concat()), None);
+        for length in [1, 2, 1 << 40, i64::MAX, -1] {
+            assert_eq!(read::<Vec<f64>>(&written(length)), None);
+            assert_eq!(
+                read::<Vec<Vec<f64>>>(&[written(2_i64), written(length), written(length)].concat()),
+                None
+            );
+        }
+    }
+
+    /// However many: what was saved can be read.
+    #[test]
+    fn long_vectors() {
+        let value = vec![true; (1 << 20) + 1];
+        assert_eq!(read(&written(value.clone())), Some(value));
+    }
+}

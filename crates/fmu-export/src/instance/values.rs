@@ -1,0 +1,159 @@
+//! Values (section 2.1.7).
+
+use super::{Instance, Outcome, finite, refuse, refuse_with, variable};
+use crate::export::Exported;
+use crate::types::{Attributes, BaseType};
+use crate::value::Value;
+use crate::variable::{Causality, Variable};
+use std::mem::MaybeUninit;
+
+impl<M: Exported> Instance<M> {
+    #[inline]
+    pub fn get_reals(&mut self, vr: &[u32], values: &mut [MaybeUninit<f64>]) -> Outcome {
+        for vr in vr {
+            variable::<M>(*vr, BaseType::Real)?;
+        }
+        let time = self.state.time;
+        let model = self.calculated();
+        // 0 as long as all values are finite: one question at the end costs less than one for each.
+        let mut none = 0.0;
+        for (vr, value) in vr.iter().zip(&mut *values) {
+            let read = M::TABLE[*vr as usize].real(model).unwrap_or(time);
+            none += read * 0.0;
+            value.write(read);
+        }
+        if none == 0.0 { Ok(()) } else { self.refuse_reals(vr) }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn refuse_reals(&mut self, vr: &[u32]) -> Outcome {
+        let model = self.calculated();
+        for vr in vr {
+            let variable = &M::TABLE[*vr as usize];
+            finite(variable, variable.real(model).unwrap_or_default())?;
+        }
+        Ok(())
+    }
+
+    #[inline]
+    pub fn set_reals(&mut self, vr: &[u32], values: &[f64]) -> Outcome {
+        let situation = self.situation();
+        let simple = |(vr, value): (&u32, &f64)| {
+            let variable = M::TABLE.get(*vr as usize);
+            variable.is_some_and(|variable| situation.is_in(variable.takes_reals)) && value.is_finite()
+        };
+        if !vr.iter().zip(values).all(simple) {
+            return self.set_reals_and_parameters(vr, values);
+        }
+        self.state.stale = true;
+        for (vr, value) in vr.iter().zip(values) {
+            M::TABLE[*vr as usize].set_real(&mut self.state.model, *value);
+        }
+        Ok(())
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn set_reals_and_parameters(&mut self, vr: &[u32], values: &[f64]) -> Outcome {
+        self.set(vr, &[BaseType::Real], values.iter().map(|value| Value::Real(*value)))
+    }
+
+    /// Values of any other type: all are checked, then each is handed over with its place.
+    pub fn get(&mut self, vr: &[u32], bases: &[BaseType], mut each: impl FnMut(usize, Value)) -> Outcome {
+        for vr in vr {
+            self.variable_of(*vr, bases)?;
+        }
+        let time = self.state.time;
+        let model = self.calculated();
+        for (place, vr) in vr.iter().enumerate() {
+            each(place, M::TABLE[*vr as usize].value(model).unwrap_or(Value::Real(time)));
+        }
+        Ok(())
+    }
+
+    fn variable_of(&self, vr: u32, bases: &[BaseType]) -> Outcome<&'static Variable<M>> {
+        match M::TABLE.get(vr as usize) {
+            Some(variable) if bases.contains(&variable.base()) => Ok(variable),
+            other => super::refuse_variable(vr, other, bases[0]),
+        }
+    }
+
+    /// Sets values of any type: all are checked, then all are set.
+    pub fn set(
+        &mut self,
+        vr: &[u32],
+        bases: &[BaseType],
+        values: impl Iterator<Item = Value> + Clone,
+    ) -> Outcome {
+        let mut parameters = false;
+        for (vr, value) in vr.iter().zip(values.clone()) {
+            let variable = self.variable_of(*vr, bases)?;
+            self.check_settable(variable)?;
+            check_value(variable, &value)?;
+            parameters |= variable.causality() == Causality::Parameter;
+        }
+        let set = |model: &mut M| {
+            for (vr, value) in vr.iter().zip(values) {
+                M::TABLE[*vr as usize].set(model, &value);
+            }
+        };
+        if !parameters {
+            self.state.stale = true;
+            set(&mut self.state.model);
+            return Ok(());
+        }
+        self.try_on_copy(|model| {
+            set(model);
+            model.update()
+        })
+    }
+
+    /// The name of a variable that has the type.
+    pub fn name(&self, vr: u32, base: BaseType) -> Outcome<&'static str> {
+        Ok(variable::<M>(vr, base)?.name())
+    }
+
+    fn check_settable(&self, variable: &Variable<M>) -> Outcome {
+        if self.situation().is_in(variable.settable) {
+            return Ok(());
+        }
+        let (interface, mode) = (self.interface(), self.mode());
+        refuse_with(|| {
+            format!(
+                "{} cannot be set in state '{mode}' of {interface}; it can be set in: {}",
+                variable.name(),
+                variable.settable.names(interface)
+            )
+        })
+    }
+}
+
+/// Numbers must be finite, parameters in the range of their type, items those of their enumeration.
+pub(super) fn check_value<M>(variable: &Variable<M>, value: &Value) -> Outcome {
+    let name = variable.name();
+    let enforced = variable.causality() == Causality::Parameter;
+    match (&variable.of().of, value) {
+        (_, Value::Real(value)) if !value.is_finite() => {
+            refuse(format!("{name} must be a finite number, it is {value}"))
+        }
+        (Attributes::Real { min: Some(min), .. }, Value::Real(value)) if enforced && value < min => {
+            refuse(format!("{name} must not be below {min}, it is {value}"))
+        }
+        (Attributes::Real { max: Some(max), .. }, Value::Real(value)) if enforced && value > max => {
+            refuse(format!("{name} must not be above {max}, it is {value}"))
+        }
+        (Attributes::Integer { min, max }, Value::Integer(value))
+            if enforced && !(min..=max).contains(&value) =>
+        {
+            refuse(format!("{name} must be between {min} and {max}, it is {value}"))
+        }
+        (Attributes::Enumeration(items), Value::Integer(value))
+            if items.iter().all(|item| item.value != *value) =>
+        {
+            let known: Vec<_> = items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
+            refuse(format!("{name} must be one of {}, it is {value}", known.join(", ")))
+        }
+        _ => Ok(()),
+    }
+}

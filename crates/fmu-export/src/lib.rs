@@ -1,0 +1,48 @@
+#![doc = include_str!("../README.md")]
+//!
+//! ## Inside
+//!
+//! What an author writes: [`Model`] with a table of [`variables!`], the capabilities, [`export_fmu!`]. Below it, from
+//! the inside out: `instance` has what each call checks and does, free of pointers and of versions of FMI; [`fmi2`]
+//! has the C functions of the standard, its table of allowed calls, and all `unsafe`.
+
+mod capabilities;
+mod export;
+pub mod fmi2;
+mod info;
+mod instance;
+mod log;
+mod mode;
+mod model;
+mod saved;
+mod settable;
+mod status;
+mod table;
+mod types;
+pub mod units;
+mod value;
+mod variable;
+
+pub use capabilities::{
+    CoSimulation, Event, InputDerivatives, ModelExchange, OutputDerivatives, Partials, Step, StepCompleted,
+    Stepped,
+};
+pub use export::{CoSimulationOffer, Exported, ModelExchangeOffer};
+pub use info::{DefaultExperiment, Info};
+pub use log::{Category, Log};
+pub use mode::{Interface, Mode, Situations};
+pub use model::{Error, Experiment, Model, Setup};
+pub use saved::{Saved, StateVisitor};
+pub use status::Status;
+pub use table::Variables;
+pub use types::{Attributes, BOOLEAN, BaseType, INTEGER, Item, NUMBER, STRING, TIME, Type};
+pub use units::{BaseUnit, DisplayUnit, Unit};
+pub use value::{Enumeration, Scalar, Value};
+pub use variable::{Causality, Initial, Variability, Variable};
+
+#[doc(hidden)]
+pub use {
+    table::{StateOfTable, check_names, count_states, find_states},
+    value::visit_enumeration,
+    variable::{Index, Read, Store, base_of_calculation, base_of_place, read},
+};

@@ -1,0 +1,203 @@
+//! Log messages, delivered so that every importer shows them as they are.
+//!
+//! The callback is variadic and its message a `printf` format, but some importers never expand it and others look
+//! for `#r1#` in it. So the text is complete before it is handed over, free of `%` and of `#`, and there are no
+//! further arguments.
+
+use crate::status::Status;
+use std::ffi::{CStr, CString};
+
+/// What a message is about; becomes `LogCategories` (section 2.2.4).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Category {
+    /// The course of the simulation.
+    Events,
+    /// Something is odd.
+    Warning,
+    /// A question that has no answer, or a step that ended early.
+    Discard,
+    /// A call was refused.
+    Error,
+    /// The instance is broken.
+    Fatal,
+    /// Every category.
+    All,
+}
+
+impl Category {
+    /// All categories, for the model description.
+    pub const ALL: [Self; 6] =
+        [Self::Events, Self::Warning, Self::Discard, Self::Error, Self::Fatal, Self::All];
+
+    /// The name, as section 2.2.4 proposes it.
+    pub const fn name(self) -> &'static CStr {
+        match self {
+            Self::Events => c"logEvents",
+            Self::Warning => c"logStatusWarning",
+            Self::Discard => c"logStatusDiscard",
+            Self::Error => c"logStatusError",
+            Self::Fatal => c"logStatusFatal",
+            Self::All => c"logAll",
+        }
+    }
+
+    /// One sentence for the model description.
+    pub const fn description(self) -> &'static str {
+        match self {
+            Self::Events => "The course of the simulation: instantiation, initialization, reset, termination",
+            Self::Warning => "Something is odd; the simulation goes on",
+            Self::Discard => "A question about the step has no answer; the simulation goes on",
+            Self::Error => "A call was refused; the message says why and what to do",
+            Self::Fatal => "The instance is broken and can only be freed",
+            Self::All => "All of the above",
+        }
+    }
+
+    const fn of(status: Status) -> Self {
+        match status {
+            Status::Ok => Self::Events,
+            Status::Warning => Self::Warning,
+            Status::Discard => Self::Discard,
+            Status::Error => Self::Error,
+            Status::Fatal => Self::Fatal,
+        }
+    }
+
+    const fn bit(self) -> u8 {
+        match self {
+            Self::All => 0b1_1111,
+            other => 1 << other as u8,
+        }
+    }
+}
+
+/// A message on its way to the importer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Message {
+    pub status: Status,
+    pub text: String,
+}
+
+impl Message {
+    pub fn category(&self) -> &'static CStr {
+        Category::of(self.status).name()
+    }
+
+    /// The text on one line, without what `printf`, FMI (section 2.1.5) or C strings give a meaning to.
+    pub fn printable(&self) -> CString {
+        let special = |c: char| matches!(c, '%' | '#') || c.is_control();
+        let safe: String = self.text.chars().map(|c| if special(c) { '_' } else { c }).collect();
+        CString::new(safe).unwrap_or_default()
+    }
+}
+
+/// A model's messages to the user. A field of the model; [`Model::log`](crate::Model::log) hands it out, and what is
+/// in it is delivered at the end of the call.
+///
+/// ```
+/// # let mut log = fmu_export::Log::default();
+/// log.warning("the valve is nearly closed: pressures are less exact");
+/// ```
+#[derive(Debug, Default)]
+pub struct Log(Vec<Message>);
+
+impl Log {
+    /// Says what happens, to who follows the course of the simulation (`logEvents`).
+    pub fn event(&mut self, text: impl Into<String>) {
+        self.0.push(Message { status: Status::Ok, text: text.into() });
+    }
+
+    /// Says that something is odd, while the simulation goes on (`logStatusWarning`).
+    pub fn warning(&mut self, text: impl Into<String>) {
+        self.0.push(Message { status: Status::Warning, text: text.into() });
+    }
+
+    /// Whether nothing is waiting.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub(crate) fn take(&mut self) -> Vec<Message> {
+        std::mem::take(&mut self.0)
+    }
+}
+
+/// A copy of a model has nothing to say yet.
+impl Clone for Log {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+
+    fn clone_from(&mut self, _: &Self) {}
+}
+
+/// Decides which messages are shown, and keeps them until the call has ended.
+#[derive(Debug)]
+pub(crate) struct Logger {
+    enabled: u8,
+    waiting: Vec<Message>,
+}
+
+impl Logger {
+    /// Section 2.1.3: errors are always shown, the rest (`fmi2Discard` too) on demand.
+    pub fn new(logging_on: bool) -> Self {
+        let mut logger = Self { enabled: 0, waiting: Vec::new() };
+        logger.set_all(logging_on);
+        logger
+    }
+
+    /// `fmi2SetDebugLogging` without a list: everything, or errors and warnings only.
+    pub fn set_all(&mut self, on: bool) {
+        let always = Category::Error.bit() | Category::Fatal.bit() | Category::Warning.bit();
+        self.enabled = if on { Category::All.bit() } else { always };
+    }
+
+    /// `fmi2SetDebugLogging` with a list: switches just these.
+    pub fn set(&mut self, categories: u8, on: bool) {
+        if on {
+            self.enabled |= categories;
+        } else {
+            self.enabled &= !categories;
+        }
+    }
+
+    /// The bit of the category of this name.
+    pub fn find(name: &[u8]) -> Option<u8> {
+        let mut known = Category::ALL.iter();
+        known.find(|category| category.name().to_bytes() == name).map(|category| category.bit())
+    }
+
+    #[cold]
+    pub fn log(&mut self, status: Status, text: impl Into<String>) {
+        self.add(Message { status, text: text.into() });
+    }
+
+    #[cold]
+    pub fn add(&mut self, message: Message) {
+        if self.enabled & Category::of(message.status).bit() != 0 {
+            self.waiting.push(message);
+        }
+    }
+
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.waiting.is_empty()
+    }
+
+    pub fn take(&mut self) -> Vec<Message> {
+        std::mem::take(&mut self.waiting)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Message;
+    use crate::status::Status;
+
+    #[test]
+    fn nothing_is_left_that_an_importer_would_expand() {
+        let message = Message { status: Status::Ok, text: "a%s#r1#\0b\nc".to_owned() };
+        assert_eq!(message.printable().to_str(), Ok("a_s_r1__b_c"));
+    }
+}

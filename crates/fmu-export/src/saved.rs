@@ -1,0 +1,145 @@
+//! What a serialized state holds: [`Saved`] for every Rust type that a model may remember something in.
+
+/// Sees every value of a model's state in turn; counts it, writes it or replaces it.
+pub trait StateVisitor {
+    /// A finite floating-point value. Reading one that is not finite makes the state invalid.
+    fn real(&mut self, value: &mut f64);
+    /// A whole number.
+    fn integer(&mut self, value: &mut i64);
+    /// A truth value.
+    fn boolean(&mut self, value: &mut bool);
+    /// A text.
+    fn text(&mut self, value: &mut String);
+    /// How many elements follow, each of one byte at least. Reading more than there can be makes the state invalid, and
+    /// there are none.
+    fn length(&mut self, value: &mut usize);
+    /// What was read cannot be: the state is refused.
+    fn invalid(&mut self);
+}
+
+/// A value that can be written into a serialized state and read back.
+///
+/// Implemented for numbers, truth values, texts, options, pairs, arrays and vectors of such; [`saved!`](crate::saved)
+/// implements it for a struct.
+pub trait Saved {
+    /// Shows every value to the visitor, always in the same order: the same list serves to write and to read.
+    fn visit(&mut self, visitor: &mut dyn StateVisitor);
+}
+
+impl Saved for f64 {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        visitor.real(self);
+    }
+}
+
+impl Saved for bool {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        visitor.boolean(self);
+    }
+}
+
+impl Saved for String {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        visitor.text(self);
+    }
+}
+
+macro_rules! whole_numbers {
+    ($($type:ty)+) => {
+        $(impl Saved for $type {
+            fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+                let mut number = *self as i64;
+                visitor.integer(&mut number);
+                match Self::try_from(number) {
+                    Ok(number) => *self = number,
+                    Err(_) => visitor.invalid(),
+                }
+            }
+        })+
+    };
+}
+
+whole_numbers!(i8 i16 i32 i64 u8 u16 u32);
+
+impl<T: Saved, const N: usize> Saved for [T; N] {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        self.iter_mut().for_each(|value| value.visit(visitor));
+    }
+}
+
+impl<A: Saved, B: Saved> Saved for (A, B) {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        self.0.visit(visitor);
+        self.1.visit(visitor);
+    }
+}
+
+impl<T: Saved + Default> Saved for Option<T> {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        let mut present = self.is_some();
+        visitor.boolean(&mut present);
+        // A value that is missing takes its place all the same: the length of a state does not vary.
+        let mut value = self.take().unwrap_or_default();
+        value.visit(visitor);
+        *self = present.then_some(value);
+    }
+}
+
+impl<T: Saved + Default> Saved for Vec<T> {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        let mut length = self.len();
+        visitor.length(&mut length);
+        self.resize_with(length, T::default);
+        self.iter_mut().for_each(|value| value.visit(visitor));
+    }
+}
+
+/// Defines a struct all of whose fields belong to a serialized state; or says that of one that is defined elsewhere,
+/// where the compiler sees to it that no field is missing.
+///
+/// ```
+/// fmu_export::saved! {
+///     /// A sample and when it was taken.
+///     #[derive(Clone, Copy, Default)]
+///     pub struct Sample {
+///         /// Its value.
+///         pub value: f64,
+///         /// Its time, s.
+///         pub time: f64,
+///     }
+/// }
+///
+/// struct Pair {
+///     samples: [Sample; 2],
+///     count: i32,
+/// }
+/// fmu_export::saved!(for Pair { samples, count });
+/// ```
+#[macro_export]
+macro_rules! saved {
+    (for $name:ty { $($field:ident),+ $(,)? }) => {
+        impl $crate::Saved for $name {
+            fn visit(&mut self, visitor: &mut dyn $crate::StateVisitor) {
+                let Self { $($field),+ } = self;
+                $( $crate::Saved::visit($field, visitor); )+
+            }
+        }
+    };
+    (
+        $(#[$attribute:meta])*
+        $visibility:vis struct $name:ident {
+            $( $(#[$field_attribute:meta])* $field_visibility:vis $field:ident : $type:ty ),* $(,)?
+        }
+    ) => {
+        $(#[$attribute])*
+        $visibility struct $name {
+            $( $(#[$field_attribute])* $field_visibility $field: $type ),*
+        }
+
+        impl $crate::Saved for $name {
+            fn visit(&mut self, visitor: &mut dyn $crate::StateVisitor) {
+                $( $crate::Saved::visit(&mut self.$field, visitor); )*
+            }
+        }
+    };
+}

@@ -1,0 +1,189 @@
+//! Units (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0); those of mechanics ready to use in a [`Type`](crate::Type).
+//! People see angles in degrees.
+
+use std::f64::consts::PI;
+
+/// A unit: exponents of the SI base units and of rad, with factor and offset.
+///
+/// ```
+/// use fmu_export::Unit;
+///
+/// const VOLT: Unit = Unit::new("V").kg(1).m(2).s(-3).A(-1);
+/// const CELSIUS: Unit = Unit::new("degC").K(1).offset(273.15).display("degF", 1.8, 32.0);
+/// assert_eq!(CELSIUS.base.offset, 273.15);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unit {
+    /// Name, for example `N.m/rad`.
+    pub name: &'static str,
+    /// What it is in base units.
+    pub base: BaseUnit,
+    /// The unit that people prefer.
+    pub display: Option<DisplayUnit>,
+}
+
+/// Exponents of the base units; a value in them is `factor * value + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(non_snake_case, reason = "the symbols of the units")]
+pub struct BaseUnit {
+    /// Exponent of the kilogram.
+    pub kg: i32,
+    /// Exponent of the metre.
+    pub m: i32,
+    /// Exponent of the second.
+    pub s: i32,
+    /// Exponent of the ampere.
+    pub A: i32,
+    /// Exponent of the kelvin.
+    pub K: i32,
+    /// Exponent of the mole.
+    pub mol: i32,
+    /// Exponent of the candela.
+    pub cd: i32,
+    /// Exponent of the radian.
+    pub rad: i32,
+    /// Multiplies a value in the unit.
+    pub factor: f64,
+    /// Is added then.
+    pub offset: f64,
+}
+
+/// A unit to show values in: the value shown is `factor * value + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DisplayUnit {
+    /// Name, for example `deg`.
+    pub name: &'static str,
+    /// Multiplies the value.
+    pub factor: f64,
+    /// Is added then.
+    pub offset: f64,
+}
+
+/// Defines a method for the exponent of each base unit.
+macro_rules! exponents {
+    ($($unit:ident)+) => {
+        $(
+            #[doc = concat!("With this exponent of ", stringify!($unit), ".")]
+            #[allow(non_snake_case, reason = "the symbols of the units")]
+            #[must_use]
+            pub const fn $unit(mut self, exponent: i32) -> Self {
+                self.base.$unit = exponent;
+                self
+            }
+        )+
+    };
+}
+
+impl Unit {
+    /// A unit of this name, so far the number 1.
+    pub const fn new(name: &'static str) -> Self {
+        let base =
+            BaseUnit { kg: 0, m: 0, s: 0, A: 0, K: 0, mol: 0, cd: 0, rad: 0, factor: 1.0, offset: 0.0 };
+        Self { name, base, display: None }
+    }
+
+    exponents!(kg m s A K mol cd rad);
+
+    /// With a factor to the base units.
+    #[must_use]
+    pub const fn factor(mut self, factor: f64) -> Self {
+        self.base.factor = factor;
+        self
+    }
+
+    /// With an offset, in base units.
+    #[must_use]
+    pub const fn offset(mut self, offset: f64) -> Self {
+        self.base.offset = offset;
+        self
+    }
+
+    /// With a unit that people prefer: what they see is `factor * value + offset`.
+    #[must_use]
+    pub const fn display(mut self, name: &'static str, factor: f64, offset: f64) -> Self {
+        self.display = Some(DisplayUnit { name, factor, offset });
+        self
+    }
+}
+
+const DEG_PER_RAD: f64 = 180.0 / PI;
+const RAD_PER_DEG: f64 = PI / 180.0;
+
+/// A number.
+pub const ONE: Unit = Unit::new("1");
+/// Second.
+pub const S: Unit = Unit::new("s").s(1);
+/// Per second.
+pub const PER_S: Unit = Unit::new("1/s").s(-1);
+/// Angle.
+pub const RAD: Unit = Unit::new("rad").rad(1).display("deg", DEG_PER_RAD, 0.0);
+/// Angular velocity.
+pub const RAD_PER_S: Unit = Unit::new("rad/s").s(-1).rad(1).display("deg/s", DEG_PER_RAD, 0.0);
+/// Angular acceleration.
+pub const RAD_PER_S2: Unit = Unit::new("rad/s2").s(-2).rad(1).display("deg/s2", DEG_PER_RAD, 0.0);
+/// Torque.
+pub const N_M: Unit = Unit::new("N.m").kg(1).m(2).s(-2);
+/// Moment of inertia.
+pub const KG_M2: Unit = Unit::new("kg.m2").kg(1).m(2);
+/// Torsional stiffness.
+pub const N_M_PER_RAD: Unit =
+    Unit::new("N.m/rad").kg(1).m(2).s(-2).rad(-1).display("N.m/deg", RAD_PER_DEG, 0.0);
+/// Torsional damping.
+pub const N_M_S_PER_RAD: Unit =
+    Unit::new("N.m.s/rad").kg(1).m(2).s(-1).rad(-1).display("N.m.s/deg", RAD_PER_DEG, 0.0);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a unit is in base units follows from what its name says.
+    #[test]
+    fn names_and_exponents_agree() {
+        let exponents = |unit: &Unit| [unit.base.kg, unit.base.m, unit.base.s, unit.base.rad];
+        // N.m is counted as kg m2 s-2.
+        let named = |unit: &Unit| {
+            let (above, below) = unit.name.split_once('/').unwrap_or((unit.name, ""));
+            let mut sum = [0; 4];
+            for (factors, sign) in [(above, 1), (below, -1)] {
+                for factor in factors.split('.').filter(|factor| !["", "1"].contains(factor)) {
+                    let (symbol, power) = match factor.strip_suffix('2') {
+                        Some(symbol) => (symbol, 2),
+                        None => (factor, 1),
+                    };
+                    let base = match symbol {
+                        "N" => [1, 1, -2, 0],
+                        "kg" => [1, 0, 0, 0],
+                        "m" => [0, 1, 0, 0],
+                        "s" => [0, 0, 1, 0],
+                        "rad" => [0, 0, 0, 1],
+                        other => panic!("{other} is new here"),
+                    };
+                    sum = std::array::from_fn(|i| sum[i] + sign * power * base[i]);
+                }
+            }
+            sum
+        };
+        for unit in [ONE, S, PER_S, RAD, RAD_PER_S, RAD_PER_S2, N_M, KG_M2, N_M_PER_RAD, N_M_S_PER_RAD] {
+            assert_eq!(exponents(&unit), named(&unit), "{}", unit.name);
+            assert_eq!((unit.base.factor, unit.base.offset), (1.0, 0.0), "{}", unit.name);
+        }
+    }
+
+    /// A right angle, and a stiffness of 1 N m per degree.
+    #[test]
+    fn people_see_degrees() {
+        let shown =
+            |unit: Unit, value: f64| unit.display.map(|display| display.factor * value + display.offset);
+        assert_eq!(shown(RAD, PI / 2.0), Some(90.0));
+        assert!((shown(N_M_PER_RAD, 180.0 / PI).unwrap() - 1.0).abs() < 1e-15);
+        assert_eq!(shown(ONE, 1.0), None);
+    }
+
+    #[test]
+    fn builders_set_what_they_say() {
+        let unit = Unit::new("x").kg(1).m(2).s(3).A(4).K(5).mol(6).cd(7).rad(8).factor(9.0).offset(10.0);
+        let base =
+            BaseUnit { kg: 1, m: 2, s: 3, A: 4, K: 5, mol: 6, cd: 7, rad: 8, factor: 9.0, offset: 10.0 };
+        assert_eq!(unit, Unit { name: "x", base, display: None });
+    }
+}

@@ -1,0 +1,261 @@
+//! Values of variables, and the Rust types that they live in.
+
+use crate::saved::{Saved, StateVisitor};
+use crate::types::{BaseType, Item};
+use std::fmt;
+
+/// A value of a variable.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Value {
+    /// Of a Real.
+    Real(f64),
+    /// Of an Integer or an Enumeration.
+    Integer(i32),
+    /// Of a Boolean.
+    Boolean(bool),
+    /// Of a String.
+    String(String),
+}
+
+impl From<f64> for Value {
+    fn from(value: f64) -> Self {
+        Self::Real(value)
+    }
+}
+
+/// As it is written in XML.
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Real(value) => write!(f, "{value}"),
+            Self::Integer(value) => write!(f, "{value}"),
+            Self::Boolean(value) => write!(f, "{value}"),
+            Self::String(value) => write!(f, "{value}"),
+        }
+    }
+}
+
+/// A Rust type that a variable's value may live in: `f64`, `i32`, `bool`, `String`, or an enum made by
+/// [`enumeration!`](crate::enumeration).
+pub trait Scalar: Saved {
+    /// The kind of value it is for an importer.
+    const BASE: BaseType;
+
+    /// The value.
+    fn value(&self) -> Value;
+
+    /// Takes a value of the right kind. What cannot be is left out: the importer has been refused before.
+    fn assign(&mut self, value: &Value);
+
+    /// The value of a Real, without a detour.
+    #[inline]
+    fn real(&self) -> f64 {
+        f64::NAN
+    }
+
+    /// Takes the value of a Real, without a detour.
+    #[inline]
+    fn set_real(&mut self, _value: f64) {}
+}
+
+impl Scalar for f64 {
+    const BASE: BaseType = BaseType::Real;
+
+    fn value(&self) -> Value {
+        Value::Real(*self)
+    }
+
+    fn assign(&mut self, value: &Value) {
+        if let Value::Real(value) = value {
+            *self = *value;
+        }
+    }
+
+    #[inline]
+    fn real(&self) -> f64 {
+        *self
+    }
+
+    #[inline]
+    fn set_real(&mut self, value: f64) {
+        *self = value;
+    }
+}
+
+macro_rules! scalar {
+    ($($type:ty: $kind:ident;)+) => {
+        $(impl Scalar for $type {
+            const BASE: BaseType = BaseType::$kind;
+
+            fn value(&self) -> Value {
+                Value::$kind(self.clone())
+            }
+
+            fn assign(&mut self, value: &Value) {
+                if let Value::$kind(value) = value {
+                    self.clone_from(value);
+                }
+            }
+        })+
+    };
+}
+
+scalar! {
+    i32: Integer;
+    bool: Boolean;
+    String: String;
+}
+
+/// An enum that is an enumeration for importers. Made by [`enumeration!`](crate::enumeration).
+pub trait Enumeration: Copy + 'static {
+    /// The values, in the order of declaration.
+    const ITEMS: &'static [Item];
+
+    /// The value that this number stands for.
+    fn from_number(number: i32) -> Option<Self>;
+
+    /// The number that stands for the value.
+    fn number(self) -> i32;
+}
+
+/// What [`enumeration!`](crate::enumeration) needs of [`Saved`].
+#[doc(hidden)]
+pub fn visit_enumeration<T: Enumeration>(value: &mut T, visitor: &mut dyn StateVisitor) {
+    let mut number = i64::from(value.number());
+    visitor.integer(&mut number);
+    match i32::try_from(number).ok().and_then(T::from_number) {
+        Some(read) => *value = read,
+        None => visitor.invalid(),
+    }
+}
+
+/// Defines an enum that importers see as an enumeration: names, numbers and descriptions, written once.
+///
+/// ```
+/// fmu_export::enumeration! {
+///     /// What a valve does.
+///     pub enum Valve {
+///         /// Nothing passes
+///         Closed = 1,
+///         /// All passes
+///         Open = 2,
+///     }
+/// }
+/// const VALVE: fmu_export::Type = fmu_export::Type::enumeration("Valve", <Valve as fmu_export::Enumeration>::ITEMS);
+/// ```
+#[macro_export]
+macro_rules! enumeration {
+    (
+        $(#[$attribute:meta])*
+        $visibility:vis enum $name:ident {
+            $( $(#[doc = $text:literal])+ $item:ident = $number:literal ),+ $(,)?
+        }
+    ) => {
+        $(#[$attribute])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        $visibility enum $name {
+            $( $(#[doc = $text])+ $item = $number ),+
+        }
+
+        impl $crate::Enumeration for $name {
+            const ITEMS: &'static [$crate::Item] = &[
+                $( $crate::Item {
+                    name: ::core::stringify!($item),
+                    value: $number,
+                    description: ::core::concat!($($text),+).trim_ascii(),
+                } ),+
+            ];
+
+            fn from_number(number: i32) -> ::core::option::Option<Self> {
+                match number {
+                    $( $number => ::core::option::Option::Some(Self::$item), )+
+                    _ => ::core::option::Option::None,
+                }
+            }
+
+            fn number(self) -> i32 {
+                self as i32
+            }
+        }
+
+        impl $crate::Saved for $name {
+            fn visit(&mut self, visitor: &mut dyn $crate::StateVisitor) {
+                $crate::visit_enumeration(self, visitor);
+            }
+        }
+
+        impl $crate::Scalar for $name {
+            const BASE: $crate::BaseType = $crate::BaseType::Enumeration;
+
+            fn value(&self) -> $crate::Value {
+                $crate::Value::Integer($crate::Enumeration::number(*self))
+            }
+
+            fn assign(&mut self, value: &$crate::Value) {
+                if let $crate::Value::Integer(number) = value
+                    && let ::core::option::Option::Some(item) = <Self as $crate::Enumeration>::from_number(*number)
+                {
+                    *self = item;
+                }
+            }
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_go_in_and_out() {
+        fn check<T: Scalar + Clone + PartialEq + fmt::Debug>(
+            start: T,
+            other: T,
+            value: Value,
+            base: BaseType,
+        ) {
+            assert_eq!((T::BASE, other.value()), (base, value.clone()));
+            let mut place = start.clone();
+            place.assign(&value);
+            assert_eq!(place, other);
+            // A value of another kind is left out.
+            let wrong = if base == BaseType::Boolean { Value::Real(1.0) } else { Value::Boolean(true) };
+            place.assign(&wrong);
+            assert_eq!(place, other);
+        }
+        check(0.0, 1.5, Value::Real(1.5), BaseType::Real);
+        check(0, -7, Value::Integer(-7), BaseType::Integer);
+        check(false, true, Value::Boolean(true), BaseType::Boolean);
+        check(String::new(), "a".to_owned(), Value::String("a".to_owned()), BaseType::String);
+    }
+
+    /// The short way of Reals is the long one.
+    #[test]
+    fn reals_without_a_detour() {
+        let mut place = 1.0;
+        place.set_real(2.5);
+        assert_eq!((place.real(), place.value()), (2.5, Value::Real(2.5)));
+        assert!(7_i32.real().is_nan() && true.real().is_nan());
+        let mut whole = 7;
+        whole.set_real(8.0);
+        assert_eq!(whole, 7);
+    }
+
+    /// As XML has them, and Reals to the last digit.
+    #[test]
+    fn texts_of_values() {
+        for (value, text) in [
+            (Value::Real(0.1), "0.1"),
+            (Value::Real(-1e-300), "-0.000"),
+            (Value::Integer(-3), "-3"),
+            (Value::Boolean(true), "true"),
+            (Value::String("<a>".to_owned()), "<a>"),
+        ] {
+            assert!(value.to_string().starts_with(text), "{value}");
+        }
+        for value in [0.1, 1e300, f64::MIN_POSITIVE, 5e-324, -1.0 / 3.0] {
+            assert_eq!(Value::Real(value).to_string().parse(), Ok(value));
+        }
+    }
+}

@@ -1,0 +1,524 @@
+//! Variables: what each is, and how the model's value is reached.
+
+use crate::mode::Situations;
+use crate::saved::StateVisitor;
+use crate::settable::settable;
+use crate::types::{BaseType, Type};
+use crate::value::{Scalar, Value};
+
+/// Who sets a variable and who reads it (section 2.2.7).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Causality {
+    /// Set by the user before the simulation.
+    Parameter,
+    /// Follows from parameters.
+    CalculatedParameter,
+    /// Set by the importer at every communication point.
+    Input,
+    /// Read by the importer.
+    Output,
+    /// Of interest inside the model only.
+    Local,
+    /// The time.
+    Independent,
+}
+
+/// When a variable changes (section 2.2.7).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Variability {
+    /// Never.
+    Constant,
+    /// Not after initialization.
+    Fixed,
+    /// When the user changes a parameter.
+    Tunable,
+    /// At events or communication points.
+    Discrete,
+    /// At any time.
+    Continuous,
+}
+
+/// How a variable gets its first value (section 2.2.7).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Initial {
+    /// From its start value.
+    Exact,
+    /// By calculation that begins with its start value.
+    Approx,
+    /// By calculation.
+    Calculated,
+}
+
+/// A variable's place in the table. Authors write its name; see [`variables!`](crate::variables).
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Index(pub u32);
+
+/// A variable of model `M`: an entry of the table that [`variables!`](crate::variables) makes.
+pub struct Variable<M> {
+    name: &'static str,
+    description: &'static str,
+    causality: Causality,
+    variability: Variability,
+    initial: Option<Initial>,
+    of: &'static Type,
+    /// Follows from the type; here for speed.
+    base: BaseType,
+    derivative_of: Option<Index>,
+    depends_on: Option<&'static [Index]>,
+    state: bool,
+    reinit: bool,
+    /// Where the importer may set this variable; follows from the rest.
+    pub(crate) settable: Situations,
+    /// The same for a Real that takes its value without further ado, else nowhere.
+    pub(crate) takes_reals: Situations,
+    read: Option<Read<M>>,
+    store: Option<Store<M>>,
+}
+
+impl<M> Clone for Variable<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for Variable<M> {}
+
+/// How a value is read.
+#[doc(hidden)]
+pub struct Read<M> {
+    pub base: BaseType,
+    pub real: fn(&M) -> f64,
+    pub value: fn(&M) -> Value,
+}
+
+impl<M> Clone for Read<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for Read<M> {}
+
+/// How a value that lives in the model is set, and visited to be saved.
+#[doc(hidden)]
+pub struct Store<M> {
+    pub real: fn(&mut M, f64),
+    pub value: fn(&mut M, &Value),
+    pub visit: fn(&mut M, &mut dyn StateVisitor),
+}
+
+impl<M> Clone for Store<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for Store<M> {}
+
+impl<M> Variable<M> {
+    const fn new(causality: Causality, variability: Variability, of: &'static Type) -> Self {
+        Self {
+            name: "",
+            description: "",
+            causality,
+            variability,
+            initial: None,
+            of,
+            base: of.base(),
+            derivative_of: None,
+            depends_on: None,
+            state: false,
+            reinit: false,
+            settable: Situations::NONE,
+            takes_reals: Situations::NONE,
+            read: None,
+            store: None,
+        }
+    }
+
+    /// Continuous for a Real, discrete for the rest.
+    const fn moving(causality: Causality, of: &'static Type) -> Self {
+        let variability = match of.base() {
+            BaseType::Real => Variability::Continuous,
+            _ => Variability::Discrete,
+        };
+        Self::new(causality, variability, of)
+    }
+
+    /// An input: continuous if it is a Real, else discrete.
+    pub const fn input(of: &'static Type) -> Self {
+        Self::moving(Causality::Input, of)
+    }
+
+    /// An output that the model calculates: continuous if it is a Real, else discrete.
+    pub const fn output(of: &'static Type) -> Self {
+        let mut variable = Self::moving(Causality::Output, of);
+        variable.initial = Some(Initial::Calculated);
+        variable
+    }
+
+    /// A variable of the model's inside, calculated: continuous if it is a Real, else discrete.
+    pub const fn local(of: &'static Type) -> Self {
+        let mut variable = Self::moving(Causality::Local, of);
+        variable.initial = Some(Initial::Calculated);
+        variable
+    }
+
+    /// A fixed parameter.
+    pub const fn parameter(of: &'static Type) -> Self {
+        let mut variable = Self::new(Causality::Parameter, Variability::Fixed, of);
+        variable.initial = Some(Initial::Exact);
+        variable
+    }
+
+    /// A value that follows from fixed parameters.
+    pub const fn calculated_parameter(of: &'static Type) -> Self {
+        let mut variable = Self::new(Causality::CalculatedParameter, Variability::Fixed, of);
+        variable.initial = Some(Initial::Calculated);
+        variable
+    }
+
+    /// The time. It has neither `in` nor `by`: its value is the instance's time.
+    pub const fn independent(of: &'static Type) -> Self {
+        Self::new(Causality::Independent, Variability::Continuous, of)
+    }
+
+    /// The variable, an output or local, as one that never changes.
+    #[must_use]
+    pub const fn constant(mut self) -> Self {
+        self.variability = Variability::Constant;
+        self.initial = Some(Initial::Exact);
+        self
+    }
+
+    /// The variable, a local, as one that does not change after the initialization.
+    #[must_use]
+    pub const fn fixed(mut self) -> Self {
+        self.variability = Variability::Fixed;
+        self
+    }
+
+    /// The variable, a parameter or what follows from parameters, as one that changes with them while it runs.
+    #[must_use]
+    pub const fn tunable(mut self) -> Self {
+        self.variability = Variability::Tunable;
+        self
+    }
+
+    /// The variable, a Real, as one that changes at events or communication points only.
+    #[must_use]
+    pub const fn discrete(mut self) -> Self {
+        self.variability = Variability::Discrete;
+        self
+    }
+
+    /// The variable, an output or local, as continuous-time state with an exact start value.
+    ///
+    /// It lives in the model (`in`): its value is what was set, or what the last step made of it.
+    #[must_use]
+    pub const fn state(mut self) -> Self {
+        self.state = true;
+        self.exact()
+    }
+
+    /// The variable, a state, as one that events may change
+    /// ([`Event::states_changed`](crate::Event::states_changed)).
+    #[must_use]
+    pub const fn reinit(mut self) -> Self {
+        self.reinit = true;
+        self
+    }
+
+    /// The variable, an output or local, with an exact start value that the importer may set.
+    #[must_use]
+    pub const fn exact(mut self) -> Self {
+        self.initial = Some(Initial::Exact);
+        self
+    }
+
+    /// The variable, an output or local, with a start value that its calculation begins with.
+    #[must_use]
+    pub const fn approx(mut self) -> Self {
+        self.initial = Some(Initial::Approx);
+        self
+    }
+
+    /// The variable as time derivative of another, given by its name.
+    #[must_use]
+    pub const fn derivative_of(mut self, of: Index) -> Self {
+        self.derivative_of = Some(of);
+        self
+    }
+
+    /// The variable, an output or local, as one that depends on no inputs, states, parameters and other start
+    /// values but these, given by their names.
+    ///
+    /// It is about direct dependence (section 2.2.8): at a communication point or instant, and while
+    /// initializing. An output that an input reaches through a step or a state only does not depend on that
+    /// input. Where nothing is said, it depends on all of them, see [`Info::smooth`](crate::Info::smooth).
+    #[must_use]
+    pub const fn depends_on(mut self, knowns: &'static [Index]) -> Self {
+        self.depends_on = Some(knowns);
+        self
+    }
+
+    /// Called by the macro: the value lives in the model.
+    #[doc(hidden)]
+    pub const fn stored(mut self, read: Read<M>, store: Store<M>) -> Self {
+        self.read = Some(read);
+        self.store = Some(store);
+        self
+    }
+
+    /// Called by the macro: the value is calculated from the model.
+    #[doc(hidden)]
+    pub const fn calculated(mut self, read: Read<M>) -> Self {
+        self.read = Some(read);
+        self
+    }
+
+    /// Called by the macro at last: name and description, and what cannot be is refused when compiling.
+    #[doc(hidden)]
+    pub const fn finished(mut self, name: &'static str, description: &'static str) -> Self {
+        self.name = name;
+        self.description = description.trim_ascii();
+        if let Some(fault) = self.fault() {
+            refuse(name, fault);
+        }
+        self.settable = settable(self.causality, self.variability, self.initial, self.state);
+        if !matches!(self.causality, Causality::Parameter) && matches!(self.of.base(), BaseType::Real) {
+            self.takes_reals = self.settable;
+        }
+        self
+    }
+
+    /// What is wrong with the variable on its own.
+    const fn fault(&self) -> Option<&'static str> {
+        use Causality::*;
+        use Variability::*;
+        let legal = matches!(
+            (self.causality, self.variability),
+            (Parameter | CalculatedParameter, Fixed | Tunable)
+                | (Input, Discrete | Continuous)
+                | (Output, Constant | Discrete | Continuous)
+                | (Local, _)
+                | (Independent, Continuous)
+        );
+        if self.description.is_empty() {
+            return Some("say in a comment above it (///) what it is");
+        }
+        if !legal {
+            return Some(
+                "what it is cannot be constant, fixed, tunable or discrete as it is said to be here (section 2.2.7)",
+            );
+        }
+        let legal = matches!(
+            (self.causality, self.variability, self.initial),
+            (Input | Independent, _, None)
+                | (Parameter, _, Some(Initial::Exact))
+                | (_, Constant, Some(Initial::Exact))
+                | (Output | Local, Discrete | Continuous, Some(_))
+                | (CalculatedParameter | Local, Fixed | Tunable, Some(Initial::Calculated | Initial::Approx))
+        );
+        if !legal {
+            return Some("what it is cannot be exact or approx as it is said to be here (section 2.2.7)");
+        }
+        if matches!(self.variability, Continuous) && !matches!(self.of.base(), BaseType::Real) {
+            return Some("only a Real can be continuous (section 2.2.7)");
+        }
+        if self.state && !matches!(self.variability, Continuous) {
+            return Some("only a continuous Real can be a state");
+        }
+        if self.reinit && !self.state {
+            return Some("only a state can be changed by events (reinit)");
+        }
+        if self.derivative_of.is_some()
+            && !(matches!(self.variability, Continuous) && matches!(self.of.base(), BaseType::Real))
+        {
+            return Some("only a continuous Real can be a derivative");
+        }
+        if self.depends_on.is_some() && !matches!(self.causality, Output | Local | CalculatedParameter) {
+            return Some("only what is calculated depends on others");
+        }
+        match self.read {
+            None if !matches!(self.causality, Independent) => {
+                return Some("say where its value lives (in ...) or how it is calculated (by ...)");
+            }
+            Some(_) if matches!(self.causality, Independent) => {
+                return Some("its value is the time: it has neither in nor by");
+            }
+            Some(Read { base, .. }) if base as u8 != self.of.base() as u8 => {
+                return Some(
+                    "the Rust type of its value is not that of its type: f64 for a Real, i32 for an \
+                             Integer, bool for a Boolean, String for a String, an enumeration! for an Enumeration",
+                );
+            }
+            _ => {}
+        }
+        let is_set = matches!(self.causality, Parameter | Input)
+            || matches!(self.initial, Some(Initial::Exact | Initial::Approx))
+                && !matches!(self.variability, Constant);
+        if is_set && self.store.is_none() {
+            return Some("what importers set must live in the model (in ...)");
+        }
+        None
+    }
+
+    /// The name.
+    pub const fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// One sentence for the user.
+    pub const fn description(&self) -> &'static str {
+        self.description
+    }
+
+    /// Who sets it and who reads it.
+    pub const fn causality(&self) -> Causality {
+        self.causality
+    }
+
+    /// When it changes.
+    pub const fn variability(&self) -> Variability {
+        self.variability
+    }
+
+    /// How it gets its first value; `None` for inputs and the time.
+    pub const fn initial(&self) -> Option<Initial> {
+        self.initial
+    }
+
+    /// Unit, range and so on.
+    pub const fn of(&self) -> &'static Type {
+        self.of
+    }
+
+    /// The kind of value.
+    #[inline]
+    pub const fn base(&self) -> BaseType {
+        self.base
+    }
+
+    /// The place in the table of the variable that this one is the time derivative of.
+    pub const fn differentiates(&self) -> Option<u32> {
+        match self.derivative_of {
+            Some(Index(of)) => Some(of),
+            None => None,
+        }
+    }
+
+    /// What [`depends_on`](Self::depends_on) has said, as places in the table.
+    pub fn dependencies(&self) -> Option<impl Iterator<Item = u32> + use<M>> {
+        self.depends_on.map(|knowns| knowns.iter().map(|known| known.0))
+    }
+
+    /// Whether this is a continuous-time state.
+    pub const fn is_state(&self) -> bool {
+        self.state
+    }
+
+    /// Whether this is a state that events may change.
+    pub const fn is_reinit(&self) -> bool {
+        self.reinit
+    }
+
+    /// Whether this is the derivative of a state (and not, say, an input that is another's rate).
+    pub const fn is_state_derivative(&self) -> bool {
+        self.derivative_of.is_some() && matches!(self.causality, Causality::Output | Causality::Local)
+    }
+
+    /// Whether it begins with a value that is given: inputs, and what is exact or approx (section 2.2.7).
+    pub const fn has_start(&self) -> bool {
+        matches!(
+            (self.causality, self.initial),
+            (Causality::Input, _) | (_, Some(Initial::Exact | Initial::Approx))
+        )
+    }
+
+    /// Its value, where it does not depend on the instance: `None` for the time.
+    pub fn value(&self, model: &M) -> Option<Value> {
+        self.read.map(|read| (read.value)(model))
+    }
+
+    /// Sets its value in the model, without any check. What is calculated stays as it is.
+    pub fn set(&self, model: &mut M, value: &Value) {
+        if let Some(store) = self.store {
+            (store.value)(model, value);
+        }
+    }
+
+    /// The value of a Real; `None` for the time.
+    #[inline]
+    pub(crate) fn real(&self, model: &M) -> Option<f64> {
+        self.read.as_ref().map(|read| (read.real)(model))
+    }
+
+    #[inline]
+    pub(crate) fn set_real(&self, model: &mut M, value: f64) {
+        if let Some(store) = &self.store {
+            (store.real)(model, value);
+        }
+    }
+
+    /// Shows the value to a visitor, if it lives in the model.
+    pub(crate) fn visit(&self, model: &mut M, visitor: &mut dyn StateVisitor) {
+        if let Some(store) = self.store {
+            (store.visit)(model, visitor);
+        }
+    }
+}
+
+/// The kind of value in a place of the model.
+#[doc(hidden)]
+pub const fn base_of_place<M, T: Scalar>(_: fn(&M) -> &T) -> BaseType {
+    T::BASE
+}
+
+/// The kind of value that a calculation gives.
+#[doc(hidden)]
+pub const fn base_of_calculation<M, T: Scalar>(_: fn(&M) -> T) -> BaseType {
+    T::BASE
+}
+
+/// Calls a closure whose argument's type it need not say.
+#[doc(hidden)]
+#[inline(always)]
+pub fn read<M, T>(model: &M, calculate: impl Fn(&M) -> T) -> T {
+    calculate(model)
+}
+
+/// Ends the compilation with a message: a variable's name and what is wrong with it.
+pub(crate) const fn refuse(name: &str, fault: &str) -> ! {
+    panic!("{}", Message::new(name, fault).text())
+}
+
+/// The text of such a message.
+struct Message {
+    bytes: [u8; 400],
+    length: usize,
+}
+
+impl Message {
+    const fn new(name: &str, fault: &str) -> Self {
+        Self { bytes: [0; 400], length: 0 }.with("the variable ").with(name).with(": ").with(fault)
+    }
+
+    const fn with(mut self, text: &str) -> Self {
+        let mut place = 0;
+        while place < text.len() && self.length < self.bytes.len() {
+            self.bytes[self.length] = text.as_bytes()[place];
+            self.length += 1;
+            place += 1;
+        }
+        self
+    }
+
+    const fn text(&self) -> &str {
+        match std::str::from_utf8(self.bytes.split_at(self.length).0) {
+            Ok(text) => text,
+            Err(_) => "a variable whose name is very long cannot be what it is said to be",
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Steps that end early, and models that end the simulation (sections 4.2.1 and 4.2.3).
+
+use crate::toys::{Fuse, fuse::Name};
+use fmu_export::Interface::CoSimulation;
+use fmu_export::fmi2::types::*;
+use fmu_run::Importer;
+
+const TEMPERATURE: u32 = Name::temperature as u32;
+/// `fmi2LastSuccessfulTime` and `fmi2Terminated`.
+const TIME: i32 = 2;
+const TERMINATED: i32 = 3;
+
+/// How far it got, and whether it wants the simulation to end.
+fn progress(fmu: &Importer) -> (f64, bool) {
+    let (mut time, mut terminated) = (f64::NAN, -1);
+    fmu.ok(fmu.fmi2GetRealStatus(TIME, &mut time));
+    fmu.ok(fmu.fmi2GetBooleanStatus(TERMINATED, &mut terminated));
+    (time, terminated == fmi2True)
+}
+
+fn discarded(fmu: &Importer, point: f64, step_size: f64) -> String {
+    assert_eq!(fmu.try_step(point, step_size), Status::Discard);
+    let log = fmu.take_log();
+    assert_eq!((log.len(), log[0].category.as_str()), (1, "logStatusDiscard"));
+    log[0].text.clone()
+}
+
+/// Warms up by 10 degrees in a second, from 20: hot after 8 s, melted after 18 s.
+fn running() -> Importer {
+    let fmu = Importer::of::<Fuse>(CoSimulation);
+    fmu.ok(fmu.set_debug_logging(true, &[c"logStatusDiscard"]));
+    fmu.initialize(0.0);
+    fmu.step(0.0, 5.0);
+    fmu
+}
+
+/// A master finds out when, goes back, and makes a step to just there.
+#[test]
+fn an_early_end_and_a_shorter_step() {
+    let fmu = running();
+    let state = fmu.save();
+    let message = discarded(&fmu, 5.0, 5.0);
+    assert!(message.contains("10") && message.contains("early, at 8"), "{message}");
+    assert_eq!(progress(&fmu), (8.0, false));
+    assert_eq!(fmu.get([TEMPERATURE]), [100.0], "readable where it ended");
+    fmu.refused("a step after it", |fmu| fmu.try_step(8.0, 1.0));
+    fmu.refused("an input after it", |fmu| fmu.try_set(&[Name::load as u32], &[0.0]));
+    fmu.ok(fmu.fmi2SetFMUstate(state));
+    fmu.forget(state);
+    assert_eq!(progress(&fmu), (5.0, false));
+    fmu.step(5.0, 3.0);
+    fmu.step(8.0, 1.0);
+    assert_eq!(fmu.get([TEMPERATURE]), [110.0]);
+}
+
+/// Or it ends the simulation there; or begins again.
+#[test]
+fn what_else_a_master_can_do() {
+    let fmu = running();
+    discarded(&fmu, 5.0, 5.0);
+    fmu.ok(fmu.fmi2Terminate());
+    assert_eq!(progress(&fmu), (8.0, false));
+    let fmu = running();
+    discarded(&fmu, 5.0, 5.0);
+    fmu.ok(fmu.fmi2Reset());
+    fmu.initialize(0.0);
+    assert_eq!(fmu.get([TEMPERATURE]), [20.0]);
+}
+
+#[test]
+fn the_model_ends_the_simulation() {
+    let fmu = running();
+    fmu.step(5.0, 3.0);
+    let message = discarded(&fmu, 8.0, 20.0);
+    assert!(message.contains("ends the simulation at 18"), "{message}");
+    assert_eq!(progress(&fmu), (18.0, true));
+    let bytes = fmu.bytes();
+    fmu.ok(fmu.fmi2Terminate());
+    assert_eq!(progress(&fmu), (18.0, true));
+    // That it has ended belongs to the state.
+    let other = Importer::of::<Fuse>(CoSimulation);
+    other.restore(&bytes);
+    assert_eq!(progress(&other), (18.0, true));
+}
+
+/// Without debug logging nothing is said of it: section 2.1.3 has fmi2Discard shown on demand.
+#[test]
+fn silence() {
+    let fmu = Importer::of::<Fuse>(CoSimulation);
+    fmu.initialize(0.0);
+    assert_eq!(fmu.try_step(0.0, 10.0), Status::Discard);
+    assert_eq!(fmu.take_log(), []);
+}

@@ -1,0 +1,263 @@
+//! Model Exchange with events, called as a master with an integrator does it (section 3.2.2, and the pseudocode of
+//! section 3.2.4).
+
+use crate::modes::{enter_continuous_time, in_mode};
+use crate::toys::{Ball, Counter, Oscillator, ball, counter};
+use fmu_export::Exported;
+use fmu_export::Interface::ModelExchange;
+use fmu_export::Mode::*;
+use fmu_export::fmi2::types::*;
+use fmu_run::Importer;
+
+/// A master of this size: Euler steps, halved as often as it takes to find a state event.
+struct Master {
+    fmu: Importer,
+    states: usize,
+    indicators: usize,
+    time: f64,
+    /// What the last events have said, together.
+    said: fmi2EventInfo,
+    /// When there were events, and which.
+    events: Vec<(f64, &'static str)>,
+}
+
+impl Master {
+    fn new<M: Exported>(prepare: impl FnOnce(&Importer)) -> Self {
+        let fmu = Importer::of::<M>(ModelExchange);
+        prepare(&fmu);
+        fmu.initialize(0.0);
+        let said = enter_continuous_time(&fmu);
+        let indicators = M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators);
+        Self { fmu, states: M::STATES.len(), indicators, time: 0.0, said, events: Vec::new() }
+    }
+
+    fn vector(&self, count: usize, get: impl FnOnce(*mut f64, usize) -> Status) -> Vec<f64> {
+        let mut values = vec![f64::NAN; count];
+        self.fmu.ok(get(values.as_mut_ptr(), count));
+        values
+    }
+
+    fn states(&self) -> Vec<f64> {
+        self.vector(self.states, |x, count| self.fmu.fmi2GetContinuousStates(x, count))
+    }
+
+    fn indicators(&self) -> Vec<f64> {
+        self.vector(self.indicators, |z, count| self.fmu.fmi2GetEventIndicators(z, count))
+    }
+
+    fn go_to(&self, time: f64, x: &[f64]) {
+        self.fmu.ok(self.fmu.fmi2SetTime(time));
+        self.fmu.ok(self.fmu.fmi2SetContinuousStates(x.as_ptr(), x.len()));
+    }
+
+    /// To this time or, if that comes first, to the next event; returns false when the model ends the simulation.
+    fn step(&mut self, h: f64) -> bool {
+        let (start, x) = (self.time, self.states());
+        let rates = self.vector(self.states, |rates, count| self.fmu.fmi2GetDerivatives(rates, count));
+        let before = self.indicators();
+        let time_event = (self.said.next_event_time_defined == fmi2True
+            && self.said.next_event_time <= start + h)
+            .then_some(self.said.next_event_time);
+        let end = time_event.unwrap_or(start + h);
+        // Exact for the ball's velocity; its height gets the middle of both velocities.
+        let at = |time: f64| -> Vec<f64> {
+            let h = time - start;
+            let bend = if self.states == 2 { 0.5 * h * h * rates[1] } else { 0.0 };
+            x.iter()
+                .zip(&rates)
+                .enumerate()
+                .map(|(i, (x, rate))| x + h * rate + if i == 0 { bend } else { 0.0 })
+                .collect()
+        };
+        let crossed = |time: f64| {
+            self.go_to(time, &at(time));
+            let after = self.indicators();
+            before.iter().zip(&after).any(|(before, after)| (*before > 0.0) != (*after > 0.0))
+        };
+        let mut reached = end;
+        let state_event = crossed(end);
+        if state_event {
+            let (mut low, mut high) = (start, end);
+            while high - low > 1e-12 {
+                let middle = 0.5 * (low + high);
+                if crossed(middle) { high = middle } else { low = middle }
+            }
+            reached = high;
+            self.go_to(reached, &at(reached));
+        }
+        self.time = reached;
+        let (mut asked, mut terminate) = (-1, -1);
+        self.fmu.ok(self.fmu.fmi2CompletedIntegratorStep(fmi2True, &mut asked, &mut terminate));
+        if terminate == fmi2True {
+            return false;
+        }
+        let time_event = time_event == Some(reached);
+        if !state_event && !time_event && asked == fmi2False {
+            return true;
+        }
+        self.fmu.ok(self.fmu.fmi2EnterEventMode());
+        self.said = enter_continuous_time(&self.fmu);
+        // A ball that rises through the floor is no bounce: the sign changes, and nothing happens.
+        let happened = time_event || self.said.values_of_continuous_states_changed == fmi2True;
+        if happened {
+            self.events.push((reached, if time_event { "time" } else { "state" }));
+        }
+        self.said.terminate_simulation == fmi2False
+    }
+}
+
+/// The ball bounces when it should: at the times of free fall, each flight shorter by the restitution, until it has
+/// bounced enough and ends the simulation.
+#[test]
+fn state_events() {
+    let mut master = Master::new::<Ball>(|_| ());
+    let mut nominals = [0.0; 2];
+    while master.step(0.05) {
+        if master.said.nominals_of_continuous_states_changed == fmi2True {
+            assert_eq!(master.said.values_of_continuous_states_changed, fmi2True);
+            let before = nominals[0];
+            master.fmu.ok(master.fmu.fmi2GetNominalsOfContinuousStates(nominals.as_mut_ptr(), 2));
+            assert!(nominals[0] > 0.0 && (before == 0.0 || nominals[0] <= before), "{nominals:?}");
+            master.said.nominals_of_continuous_states_changed = fmi2False;
+        }
+    }
+    assert_eq!(master.events.len(), 5);
+    let fall = (2.0_f64 / 9.81).sqrt();
+    let mut expected = fall;
+    let mut flight = 2.0 * fall;
+    for (time, kind) in &master.events {
+        assert_eq!(*kind, "state");
+        assert!((time - expected).abs() < 1e-9, "{time} instead of {expected}");
+        flight *= 0.7;
+        expected += flight;
+    }
+    let mut bounces = 0;
+    master.fmu.ok(master.fmu.fmi2GetInteger(&(ball::Name::bounces as u32), 1, &mut bounces));
+    assert_eq!(bounces, 5);
+    // The apex of a flight is what is left of the height: restitution^2 per bounce.
+    assert!((nominals[0] - 0.49_f64.powi(4)).abs() < 1e-6, "{nominals:?}");
+}
+
+/// After each step of the integrator the model is asked; it notices an event that was missed, and a ball that is lost.
+#[test]
+fn completed_steps() {
+    let fmu = in_mode::<Ball>(ModelExchange, ContinuousTime);
+    for (x, expected) in
+        [([1.0, -1.0], [0, 0]), ([-0.5, -1.0], [1, 0]), ([-0.5, 1.0], [0, 0]), ([-200.0, -1.0], [1, 1])]
+    {
+        for no_set_state_prior in [0, 1] {
+            let mut found = [-1; 2];
+            let [event, terminate] = &mut found;
+            fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), 2));
+            fmu.ok(fmu.fmi2CompletedIntegratorStep(no_set_state_prior, event, terminate));
+            assert_eq!(found, expected, "{x:?}");
+        }
+    }
+    // A model that does not want to know is not asked.
+    let fmu = in_mode::<Oscillator>(ModelExchange, ContinuousTime);
+    let mut found = [-1; 2];
+    let [event, terminate] = &mut found;
+    fmu.ok(fmu.fmi2CompletedIntegratorStep(1, event, terminate));
+    assert_eq!(found, [0, 0]);
+}
+
+fn integers<const N: usize>(fmu: &Importer, names: [counter::Name; N]) -> [i32; N] {
+    let mut values = [i32::MIN; N];
+    fmu.ok(fmu.fmi2GetInteger(names.map(|name| name as u32).as_ptr(), N, values.as_mut_ptr()));
+    values
+}
+
+fn prepare_counter(fmu: &Importer) {
+    let integers = [counter::Name::increment as u32, counter::Name::full as u32];
+    fmu.ok(fmu.fmi2SetInteger(integers.as_ptr(), 2, [7, 10].as_ptr()));
+    fmu.ok(fmu.fmi2SetBoolean(&(counter::Name::on as u32), 1, &fmi2True));
+    fmu.set(&[counter::Name::period as u32, counter::Name::weight as u32], &[0.25, 0.5]);
+}
+
+/// Time events come when the model has asked for them, whatever the steps of the integrator are.
+#[test]
+fn time_events() {
+    use counter::Name::*;
+    for h in [0.01, 0.1, 1.0] {
+        let mut master = Master::new::<Counter>(prepare_counter);
+        assert_eq!((master.said.next_event_time_defined, master.said.next_event_time), (1, 0.25));
+        while master.events.len() < 4 {
+            assert!(master.step(h));
+        }
+        assert_eq!(master.events, [0.25, 0.5, 0.75, 1.0].map(|time| (time, "time")), "steps of {h}");
+        // 4 times 7: carried twice.
+        assert_eq!(integers(&master.fmu, [count, carries]), [8, 2]);
+        assert_eq!(master.fmu.get([sum as u32]), [14.0]);
+        let mut is_odd = -1;
+        master.fmu.ok(master.fmu.fmi2GetBoolean(&(odd as u32), 1, &mut is_odd));
+        assert_eq!(is_odd, fmi2False);
+    }
+}
+
+/// An event that causes another at the same time takes a round more, and the count is seen full in between.
+#[test]
+fn event_iteration() {
+    let fmu = Importer::of::<Counter>(ModelExchange);
+    prepare_counter(&fmu);
+    fmu.initialize(0.0);
+    let round = || {
+        let mut info = fmi2EventInfo::default();
+        fmu.ok(fmu.fmi2NewDiscreteStates(&mut info));
+        (info.new_discrete_states_needed, info.next_event_time, integers(&fmu, [counter::Name::count])[0])
+    };
+    assert_eq!(round(), (0, 0.25, 0), "nothing is due at the begin");
+    // Two periods later, both counts are due, the second one fills the count.
+    fmu.ok(fmu.fmi2EnterContinuousTimeMode());
+    fmu.ok(fmu.fmi2SetTime(0.5));
+    fmu.ok(fmu.fmi2EnterEventMode());
+    assert_eq!(round(), (1, 0.5, 7));
+    assert_eq!(round(), (1, 0.75, 14));
+    assert_eq!(round(), (0, 0.75, 4));
+    assert_eq!(round(), (0, 0.75, 4), "an importer may ask once more");
+}
+
+/// An importer's own events, one after the other, and settling more than once.
+#[test]
+fn events_of_the_importer() {
+    let fmu = in_mode::<Oscillator>(ModelExchange, ContinuousTime);
+    for _ in 0..3 {
+        fmu.ok(fmu.fmi2EnterEventMode());
+        fmu.ok(fmu.fmi2EnterEventMode());
+        fmu.ok(fmu.fmi2NewDiscreteStates(&mut Default::default()));
+        assert_eq!(enter_continuous_time(&fmu), fmi2EventInfo::default(), "nothing happens at events");
+    }
+}
+
+/// A step that fails has counted nothing: the model tries on a copy, and an event that fails is undone by the crate.
+#[test]
+fn failing_events_and_steps_change_nothing() {
+    use fmu_export::Interface::CoSimulation;
+    for interface in [CoSimulation, ModelExchange] {
+        let fmu = Importer::of::<Counter>(interface);
+        prepare_counter(&fmu);
+        fmu.set(&[counter::Name::weight as u32], &[f64::MAX]);
+        fmu.initialize(0.0);
+        let message = if interface == CoSimulation {
+            fmu.refused("step", |fmu| fmu.try_step(0.0, 1.0))
+        } else {
+            fmu.ok(fmu.fmi2SetTime(1.0));
+            fmu.refused("event", |fmu| fmu.fmi2NewDiscreteStates(&mut Default::default()))
+        };
+        assert!(message.contains("range of numbers"), "{message}");
+    }
+}
+
+/// The same counts at the communication points of Co-Simulation, however long the steps are.
+#[test]
+fn the_same_in_co_simulation() {
+    use counter::Name::*;
+    for steps in [1, 4, 16] {
+        let fmu = Importer::of::<Counter>(fmu_export::Interface::CoSimulation);
+        prepare_counter(&fmu);
+        fmu.initialize(0.0);
+        let h = 1.0 / f64::from(steps);
+        (0..steps).for_each(|step| fmu.step(f64::from(step) * h, h));
+        assert_eq!(integers(&fmu, [count, carries]), [8, 2], "{steps} steps");
+        assert_eq!(fmu.get([sum as u32]), [14.0]);
+    }
+}

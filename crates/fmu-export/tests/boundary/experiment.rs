@@ -1,0 +1,129 @@
+//! What the importer says of itself and of its experiment, and what the model makes of it (sections 2.1.5 and 2.1.6).
+
+use crate::toys::{Talker, talker::Name};
+use crate::variables::texts;
+use fmu_export::Interface::CoSimulation;
+use fmu_run::{Arguments, Functions, Importer};
+use std::ffi::{CStr, CString};
+use std::path::PathBuf;
+
+fn talker(instance_name: &'static CStr, resource_location: Option<&CStr>) -> Importer {
+    let arguments = Arguments {
+        instance_name: Some(instance_name),
+        resource_location,
+        ..Arguments::of::<Talker>(CoSimulation)
+    };
+    Importer::instantiate(Functions::of::<Talker>(), &arguments).unwrap()
+}
+
+#[test]
+fn the_instance_name() {
+    let [one, other] = [c"G\xc3\xb6del", c"Turing"].map(|name| talker(name, None));
+    one.enter_initialization(0.0, None);
+    other.enter_initialization(0.0, None);
+    assert_eq!(texts(&one, [Name::who]), ["Gödel"]);
+    assert_eq!(texts(&other, [Name::who]), ["Turing"]);
+    one.ok(one.fmi2Reset());
+    one.enter_initialization(0.0, None);
+    assert_eq!(texts(&one, [Name::who]), ["Gödel"], "after a reset too");
+}
+
+/// Start time, stop time and tolerance; -1 stands for what is not said.
+#[test]
+fn times_and_tolerance() {
+    for (tolerance, start, stop) in [(None, 0.0, None), (Some(1e-4), 2.0, Some(3.0)), (Some(0.0), -1.5, None)]
+    {
+        let fmu = talker(c"talker", None);
+        fmu.ok(fmu.fmi2SetupExperiment(
+            tolerance.is_some().into(),
+            tolerance.unwrap_or(f64::NAN),
+            start,
+            stop.is_some().into(),
+            stop.unwrap_or(f64::NAN),
+        ));
+        fmu.ok(fmu.fmi2EnterInitializationMode());
+        let found = fmu.get([Name::begin, Name::end, Name::tolerance, Name::time].map(|name| name as u32));
+        assert_eq!(found, [start, stop.unwrap_or(-1.0), tolerance.unwrap_or(-1.0), start]);
+        // They belong to the state.
+        let other = talker(c"other", None);
+        other.restore(&fmu.bytes());
+        assert_eq!(other.get([Name::begin, Name::end].map(|name| name as u32)), found[..2]);
+    }
+}
+
+/// Without fmi2SetupExperiment the start time is 0.
+#[test]
+fn no_experiment() {
+    let fmu = talker(c"talker", None);
+    fmu.ok(fmu.fmi2EnterInitializationMode());
+    assert_eq!(fmu.get([Name::begin, Name::time].map(|name| name as u32)), [0.0, 0.0]);
+}
+
+/// A folder for resources, with a space in its name.
+fn resources(name: &str, words: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("resources of").join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("words.txt"), words).unwrap();
+    folder
+}
+
+/// A file of the resources is read, however importers write where that is.
+#[test]
+fn files_in_the_resources() {
+    let folder = resources("talker", "To be or not to be\n");
+    let path = folder.to_str().unwrap();
+    for location in [
+        format!("file://{path}").replace(' ', "%20"),
+        format!("file://{path}"),
+        format!("file:{path}"),
+        format!("file:///{path}/"),
+        format!("file://localhost{path}"),
+        path.to_owned(),
+    ] {
+        let fmu = talker(c"talker", Some(&CString::new(location.clone()).unwrap()));
+        fmu.enter_initialization(0.0, None);
+        assert_eq!(texts(&fmu, [Name::words]), ["To be or not to be"], "{location}");
+    }
+}
+
+/// Whatever it is: a model that does without gets its instance.
+#[test]
+fn resource_locations() {
+    for resource_location in [
+        None,
+        Some(c""),
+        Some(c"file:///tmp/does%20not%20exist/resources"),
+        Some(c"file:/tmp/resources"),
+        Some(c"file:////tmp/resources"),
+        Some(c"file://localhost/tmp/resources"),
+        Some(c"file:///C:/temp/MyFMU/resources"),
+        Some(c"/tmp/no scheme at all"),
+        Some(c"fmi2://elsewhere/100%"),
+    ] {
+        let fmu = talker(c"talker", resource_location);
+        fmu.initialize(0.0);
+        assert_eq!(texts(&fmu, [Name::words]), ["none"]);
+        assert_eq!(fmu.take_log(), []);
+    }
+}
+
+/// A model that cannot be made says why.
+#[test]
+fn bad_resources() {
+    let location = CString::new(resources("mute", "\n").to_str().unwrap()).unwrap();
+    let arguments = Arguments { resource_location: Some(&location), ..Arguments::of::<Talker>(CoSimulation) };
+    let log =
+        Importer::instantiate(Functions::of::<Talker>(), &arguments).expect_err("there is nothing to say");
+    assert_eq!(log.len(), 1);
+    assert_eq!(log[0].text, "fmi2Instantiate: resources/words.txt is empty");
+}
+
+/// An instance name that is no UTF-8 is still a name, and one that a `printf` would expand.
+#[test]
+fn odd_instance_names() {
+    for name in [c"wr\xffst", c"%d #r1#"] {
+        let arguments =
+            Arguments { instance_name: Some(name), logger: false, ..Arguments::of::<Talker>(CoSimulation) };
+        assert!(Importer::instantiate(Functions::of::<Talker>(), &arguments).is_ok());
+    }
+}

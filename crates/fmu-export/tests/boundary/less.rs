@@ -1,0 +1,72 @@
+//! Models that offer less than everything: the FMU refuses what it does not have, in words, and the rest works.
+
+use crate::toys::{Ball, Sum, sum::Name};
+use fmu_export::Exported;
+use fmu_export::Interface::{self, CoSimulation, ModelExchange};
+use fmu_run::{Arguments, Functions, Importer};
+
+const U: u32 = Name::u as u32;
+const Y: u32 = Name::y as u32;
+const GAIN: u32 = Name::gain as u32;
+
+#[test]
+fn what_it_has_works() {
+    let fmu = Importer::of::<Sum>(CoSimulation);
+    fmu.set(&[GAIN], &[2.0]);
+    fmu.initialize(0.0);
+    fmu.set(&[U], &[1.5]);
+    fmu.step(0.0, 1.0);
+    assert_eq!(fmu.get([U, Y, GAIN]), [1.5, 3.0, 2.0]);
+    let state = fmu.save();
+    fmu.step(1.0, 0.5);
+    assert_eq!(fmu.get([Y]), [6.0]);
+    fmu.ok(fmu.fmi2SetFMUstate(state));
+    assert_eq!(fmu.get([Y]), [3.0]);
+    fmu.step(1.0, 0.5);
+    fmu.forget(state);
+    fmu.ok(fmu.fmi2Terminate());
+    fmu.ok(fmu.fmi2Reset());
+    fmu.initialize(0.0);
+    assert_eq!(fmu.get([U, Y, GAIN]), [0.0, 0.0, 1.0]);
+}
+
+fn refused_interface<M: Exported>(interface: Interface) -> String {
+    let log = Importer::instantiate(Functions::of::<M>(), &Arguments::of::<M>(interface));
+    let [message] = &log.expect_err("it has no such interface")[..] else { panic!("one message expected") };
+    message.text.clone()
+}
+
+#[test]
+fn the_other_interface_type() {
+    assert_eq!(refused_interface::<Sum>(ModelExchange), "fmi2Instantiate: this FMU has no Model Exchange");
+    assert_eq!(refused_interface::<Ball>(CoSimulation), "fmi2Instantiate: this FMU has no Co-Simulation");
+}
+
+/// What the model itself refuses comes back as its words, and the step can be repeated.
+#[test]
+fn errors_of_the_model() {
+    let fmu = Importer::of::<Sum>(CoSimulation);
+    fmu.ok(fmu.fmi2SetupExperiment(0, 0.0, -1.0, 0, 0.0));
+    let message = fmu.refused("start time", |fmu| fmu.fmi2EnterInitializationMode());
+    assert_eq!(message, "fmi2EnterInitializationMode: this model knows no time before 0");
+    fmu.initialize(0.0);
+    fmu.set(&[U], &[9.0]);
+    fmu.step(0.0, 1.0);
+    let message = fmu.refused("sum", |fmu| fmu.try_step(1.0, 1.0));
+    assert_eq!(message, "fmi2DoStep: the sum would be more than 10");
+    fmu.set(&[U], &[1.0]);
+    fmu.step(1.0, 1.0);
+    assert_eq!(fmu.get([Y]), [10.0]);
+}
+
+/// The range of a parameter's type is enforced, that of an input or output is a hint.
+#[test]
+fn ranges() {
+    let fmu = Importer::of::<Sum>(CoSimulation);
+    for (value, word) in [(10.5, "above 10"), (-0.5, "below 0")] {
+        let message = fmu.refused("gain", |fmu| fmu.try_set(&[GAIN], &[value]));
+        assert!(message.contains("gain") && message.contains(word), "{message}");
+        fmu.set(&[U, Y], &[value, value]);
+    }
+    fmu.set(&[GAIN], &[10.0]);
+}

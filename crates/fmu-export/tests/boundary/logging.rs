@@ -1,0 +1,154 @@
+//! What the importer's log shows, and when (sections 2.1.5 and 2.2.4).
+
+use crate::toys::{Oscillator, Talker, talker::Name};
+use crate::variables::say;
+use fmu_export::Exported;
+use fmu_export::Interface::{CoSimulation, ModelExchange};
+use fmu_export::fmi2::types::Status;
+use fmu_run::testing::assert_clean;
+use fmu_run::{Arguments, Functions, Importer, Message};
+use std::ffi::CStr;
+use std::ptr::null;
+
+fn logging<M: Exported>(logging_on: bool) -> Importer {
+    let arguments = Arguments { logging_on, ..Arguments::of::<M>(CoSimulation) };
+    Importer::instantiate(Functions::of::<M>(), &arguments).unwrap()
+}
+
+/// What is logged of an event, a warning, a discarded question and an error: O, W, D, E for their statuses.
+fn shown(fmu: &Importer) -> String {
+    fmu.take_log();
+    fmu.ok(fmu.fmi2Reset());
+    fmu.initialize(0.0);
+    say(fmu, Name::heard, "%s#r1#\n");
+    fmu.step(0.0, 0.1);
+    fmu.set(&[Name::volume as u32], &[10.5]);
+    assert_eq!(fmu.fmi2GetStatus(0, &mut Status::Ok), Status::Discard);
+    assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);
+    let log = fmu.take_log();
+    log.iter().for_each(|message| {
+        assert_clean(message);
+        assert_eq!(message.instance_name, "instance");
+        let category = match message.status {
+            Status::Ok => "logEvents",
+            Status::Warning => "logStatusWarning",
+            Status::Discard => "logStatusDiscard",
+            _ => "logStatusError",
+        };
+        assert_eq!(message.category, category, "{message:?}");
+    });
+    let mut letters: Vec<_> = log.iter().map(|message| format!("{:?}", message.status).remove(0)).collect();
+    letters.dedup();
+    letters.into_iter().collect()
+}
+
+/// Errors and warnings are always told, the rest on demand: section 2.1.3 has fmi2Discard shown in debug mode only.
+#[test]
+fn logging_on_and_off() {
+    assert_eq!(shown(&logging::<Talker>(false)), "WE");
+    assert_eq!(shown(&logging::<Talker>(true)), "OWDE");
+    let fmu = logging::<Talker>(true);
+    fmu.ok(fmu.fmi2SetDebugLogging(0, 0, null()));
+    assert_eq!(shown(&fmu), "WE");
+    fmu.ok(fmu.fmi2SetDebugLogging(1, 0, null()));
+    assert_eq!(shown(&fmu), "OWDE");
+}
+
+/// A list switches what it names.
+#[test]
+fn categories() {
+    let cases: &[(bool, bool, &[&CStr], &str)] = &[
+        // loggingOn of fmi2Instantiate, of fmi2SetDebugLogging, the list, what is shown
+        (false, true, &[c"logEvents"], "OWE"),
+        (false, true, &[c"logAll"], "OWDE"),
+        (false, true, &[c"logStatusDiscard"], "WDE"),
+        (true, false, &[c"logEvents"], "WDE"),
+        (true, false, &[c"logEvents", c"logStatusDiscard"], "WE"),
+        (true, false, &[c"logStatusWarning"], "ODE"),
+        (true, false, &[c"logStatusError"], "OWD"),
+        (true, false, &[c"logAll"], ""),
+    ];
+    for (first, on, list, expected) in cases {
+        let fmu = logging::<Talker>(*first);
+        fmu.ok(fmu.set_debug_logging(*on, list));
+        assert_eq!(shown(&fmu), *expected, "{first} {on} {list:?}");
+    }
+}
+
+#[test]
+fn categories_that_do_not_exist() {
+    let fmu = logging::<Talker>(false);
+    let message = fmu.refused("unknown", |fmu| fmu.set_debug_logging(true, &[c"logEvents", c"logWishes%s"]));
+    for category in fmu_export::Category::ALL {
+        assert!(message.contains(category.name().to_str().unwrap()), "{message}");
+    }
+    assert!(message.contains("logWishes"), "{message}");
+    fmu.refused("NULL entry", |fmu| fmu.fmi2SetDebugLogging(1, 2, [c"logEvents".as_ptr(), null()].as_ptr()));
+    fmu.refused("NULL list", |fmu| fmu.fmi2SetDebugLogging(1, 3, null()));
+    fmu.refused("no UTF-8", |fmu| fmu.set_debug_logging(true, &[c"\xff"]));
+    assert_eq!(shown(&fmu), "WE", "nothing was switched");
+}
+
+/// The course of a run as a user reads it.
+#[test]
+fn events() {
+    let fmu = logging::<Oscillator>(true);
+    fmu.initialize(0.0);
+    fmu.set(&[0], &[0.1]);
+    fmu.step(0.0, 0.1);
+    fmu.ok(fmu.fmi2Terminate());
+    fmu.ok(fmu.fmi2Reset());
+    let log = fmu.take_log();
+    let texts: Vec<_> = log.iter().map(|message| message.text.as_str()).collect();
+    assert_eq!(texts, ["instantiated", "initialized", "terminated", "reset to the start values"]);
+    assert!(log.iter().all(|Message { status, category, .. }| (*status, category.as_str()) == (Status::Ok, "logEvents")));
+}
+
+/// What the model says comes at the end of the call in which it says it, once, with a status that is still OK.
+#[test]
+fn messages_of_the_model() {
+    let fmu = logging::<Talker>(true);
+    fmu.initialize(0.0);
+    say(&fmu, Name::heard, "Ping");
+    fmu.take_log();
+    fmu.step(0.0, 1.0);
+    assert_eq!(fmu.take_log().iter().map(|message| message.text.as_str()).collect::<Vec<_>>(), ["says Ping"]);
+    let volume = [Name::volume as u32];
+    fmu.set(&volume, &[10.5]);
+    let log = fmu.take_log();
+    assert_eq!(
+        (log.len(), log[0].status, log[0].text.as_str()),
+        (1, Status::Warning, "a volume of 10.5 hurts")
+    );
+    fmu.set(&volume, &[1.0]);
+    assert_eq!(fmu.take_log(), []);
+    // Saved states have nothing to say.
+    let bytes = fmu.bytes();
+    fmu.restore(&bytes);
+    assert_eq!(fmu.take_log(), []);
+}
+
+/// Every instance logs under its own name to its own environment.
+#[test]
+fn instances_do_not_mix() {
+    let fmus = [c"left", c"right"].map(|name| {
+        let arguments = Arguments { instance_name: Some(name), ..Arguments::of::<Talker>(CoSimulation) };
+        Importer::instantiate(Functions::of::<Talker>(), &arguments).unwrap()
+    });
+    for (fmu, name) in fmus.iter().zip(["left", "right"]) {
+        assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);
+        let log = fmu.take_log();
+        assert_eq!(log.len(), 1);
+        assert_eq!(log[0].instance_name, name);
+    }
+}
+
+/// NULL as logger silences the FMU, nothing more. (NULL as memory callbacks is what all tests pass.)
+#[test]
+fn no_logger() {
+    let arguments = Arguments { logger: false, logging_on: true, ..Arguments::of::<Talker>(ModelExchange) };
+    let fmu = Importer::instantiate(Functions::of::<Talker>(), &arguments).unwrap();
+    fmu.initialize(0.0);
+    assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);
+    assert_eq!(fmu.take_log(), []);
+}

@@ -1,0 +1,509 @@
+//! Calls that make no sense are refused: `fmi2Error`, one message that says what is wrong, and nothing changed.
+//! [`Importer::refused`] checks all that; the tables here say what is tried and what the message must tell.
+
+use crate::modes::{INTERFACES, in_mode};
+use crate::toys::{Ball, Oscillator, Talker, oscillator::Name, talker};
+use fmu_export::Interface::{CoSimulation, ModelExchange};
+use fmu_export::Mode::*;
+use fmu_export::fmi2::types::Status;
+use fmu_export::{Model, Variables};
+use fmu_run::testing::assert_clean;
+use fmu_run::{Arguments, Functions, Importer};
+use std::ffi::CString;
+use std::ptr::{null, null_mut};
+
+const FORCE: u32 = Name::force as u32;
+const POSITION: u32 = Name::position as u32;
+const VELOCITY: u32 = Name::velocity as u32;
+const ACCELERATION: u32 = Name::der_velocity as u32;
+const SPRING_FORCE: u32 = Name::spring_force as u32;
+const ENERGY: u32 = Name::energy as u32;
+const MASS: u32 = Name::mass as u32;
+const STIFFNESS: u32 = Name::stiffness as u32;
+const SPRINGS: u32 = Name::springs as u32;
+const DAMPING: u32 = Name::damping as u32;
+const DAMPED: u32 = Name::damped as u32;
+const UNKNOWN: u32 = Oscillator::TABLE.len() as u32;
+const NAN: f64 = f64::NAN;
+const INF: f64 = f64::INFINITY;
+
+/// What is tried, the call, words of the message.
+type Case = (&'static str, fn(&Importer) -> Status, &'static [&'static str]);
+
+#[track_caller]
+fn all_refused(fmu: &Importer, cases: &[Case]) {
+    for (label, call, words) in cases {
+        let message = fmu.refused(label, call);
+        for word in *words {
+            assert!(message.contains(word), "{label}: '{word}' is not in: {message}");
+        }
+    }
+}
+
+/// An array whose pointer no processor likes; it is never followed.
+fn misaligned<T>(value: &T) -> *const T {
+    (&raw const *value).wrapping_byte_add(1)
+}
+
+fn misaligned_mut<T>(value: &mut T) -> *mut T {
+    (&raw mut *value).wrapping_byte_add(1)
+}
+
+/// Value references and arrays, the same for both interface types and all modes with getters and setters.
+const ARRAYS: &[Case] = &[
+    ("get, unknown", |fmu| fmu.fmi2GetReal(&UNKNOWN, 1, &mut 0.0), &["value reference 12"]),
+    ("get, unknown, last", |fmu| fmu.fmi2GetReal(&u32::MAX, 1, &mut 0.0), &["4294967295"]),
+    ("get, one of three", |fmu| fmu.fmi2GetReal([0, 99, 1].as_ptr(), 3, [0.0; 3].as_mut_ptr()), &["99"]),
+    (
+        "get Real of an Integer",
+        |fmu| fmu.fmi2GetReal(&SPRINGS, 1, &mut 0.0),
+        &["springs is of type Integer", "Real"],
+    ),
+    ("get Real of a Boolean", |fmu| fmu.fmi2GetReal(&DAMPED, 1, &mut 0.0), &["damped", "Boolean"]),
+    ("get Integer of a Real", |fmu| fmu.fmi2GetInteger(&ENERGY, 1, &mut 0), &["energy", "Real", "Integer"]),
+    ("get Integer, unknown", |fmu| fmu.fmi2GetInteger(&UNKNOWN, 1, &mut 0), &["12"]),
+    (
+        "get Boolean of an Integer",
+        |fmu| fmu.fmi2GetBoolean(&SPRINGS, 1, &mut 0),
+        &["springs", "Integer", "Boolean"],
+    ),
+    ("get Boolean, unknown", |fmu| fmu.fmi2GetBoolean(&UNKNOWN, 1, &mut 0), &["12"]),
+    ("get String of a Real", |fmu| fmu.fmi2GetString(&ENERGY, 1, &mut null()), &["energy", "Real", "String"]),
+    ("get String, unknown", |fmu| fmu.fmi2GetString(&UNKNOWN, 1, &mut null()), &["12"]),
+    ("set, unknown", |fmu| fmu.try_set(&[UNKNOWN], &[0.0]), &["12"]),
+    ("set, last of two", |fmu| fmu.try_set(&[FORCE, 99], &[0.1, 0.2]), &["99"]),
+    ("set Real of an Integer", |fmu| fmu.try_set(&[SPRINGS], &[7.0]), &["springs is of type Integer"]),
+    ("set Integer of a Real", |fmu| fmu.fmi2SetInteger(&MASS, 1, &1), &["mass is of type Real"]),
+    ("set Boolean of an Integer", |fmu| fmu.fmi2SetBoolean(&SPRINGS, 1, &1), &["springs is of type Integer"]),
+    ("set String of a Boolean", |fmu| fmu.fmi2SetString(&DAMPED, 1, &c"1".as_ptr()), &["damped"]),
+    ("set calculated", |fmu| fmu.try_set(&[ENERGY], &[0.0]), &["energy cannot be set"]),
+    ("set NaN", |fmu| fmu.try_set(&[MASS, FORCE], &[1.1, NAN]), &["force", "finite"]),
+    ("set infinity", |fmu| fmu.try_set(&[FORCE], &[INF]), &["force", "finite", "inf"]),
+    ("set -infinity", |fmu| fmu.try_set(&[FORCE], &[-INF]), &["force", "-inf"]),
+    ("get, NULL vr", |fmu| fmu.fmi2GetReal(null(), 1, &mut 0.0), &["vr", "NULL"]),
+    ("get, NULL values", |fmu| fmu.fmi2GetReal(&ENERGY, 1, null_mut()), &["value", "NULL"]),
+    ("get, beyond memory", |fmu| fmu.fmi2GetReal(&0, usize::MAX, &mut 0.0), &["larger than memory"]),
+    ("get Integer, NULL", |fmu| fmu.fmi2GetInteger(&SPRINGS, 1, null_mut()), &["NULL"]),
+    ("get Boolean, NULL", |fmu| fmu.fmi2GetBoolean(null(), 2, &mut 0), &["NULL", "2"]),
+    ("get String, NULL", |fmu| fmu.fmi2GetString(null(), 1, &mut null()), &["NULL"]),
+    ("set, NULL vr", |fmu| fmu.fmi2SetReal(null(), 1, &0.0), &["vr", "NULL"]),
+    ("set, NULL values", |fmu| fmu.fmi2SetReal(&FORCE, 1, null()), &["value", "NULL"]),
+    ("set, beyond memory", |fmu| fmu.fmi2SetReal(&FORCE, usize::MAX / 4, &0.0), &["larger than memory"]),
+    ("set Integer, NULL", |fmu| fmu.fmi2SetInteger(&SPRINGS, 1, null()), &["NULL"]),
+    ("set Boolean, NULL", |fmu| fmu.fmi2SetBoolean(null(), 1, &1), &["NULL"]),
+    ("set String, NULL", |fmu| fmu.fmi2SetString(null(), 1, null()), &["NULL"]),
+    ("get, misaligned vr", |fmu| fmu.fmi2GetReal(misaligned(&FORCE), 1, &mut 0.0), &["vr", "not aligned"]),
+    (
+        "get, misaligned",
+        |fmu| fmu.fmi2GetReal(&FORCE, 1, misaligned_mut(&mut 0.0)),
+        &["value", "not aligned"],
+    ),
+    ("set, misaligned", |fmu| fmu.fmi2SetReal(&FORCE, 1, misaligned(&0.0)), &["value", "not aligned"]),
+    (
+        "state, misaligned",
+        |fmu| fmu.fmi2GetFMUstate(misaligned_mut(&mut null_mut())),
+        &["FMUstate", "not aligned"],
+    ),
+];
+
+#[test]
+fn value_references_and_arrays() {
+    for interface in INTERFACES {
+        all_refused(&in_mode::<Oscillator>(interface, Initialization), ARRAYS);
+    }
+    all_refused(&in_mode::<Oscillator>(CoSimulation, StepComplete), ARRAYS);
+    all_refused(&in_mode::<Oscillator>(ModelExchange, Event), ARRAYS);
+}
+
+#[test]
+fn empty_arrays_are_fine() {
+    let fmu = in_mode::<Oscillator>(CoSimulation, Initialization);
+    fmu.ok(fmu.fmi2GetReal(null(), 0, null_mut()));
+    fmu.ok(fmu.fmi2SetInteger(null(), 0, null()));
+    fmu.ok(fmu.fmi2GetString(null(), 0, null_mut()));
+    fmu.ok(fmu.fmi2SetString(null(), 0, null()));
+    fmu.ok(fmu.fmi2GetDirectionalDerivative(null(), 0, null(), 0, null(), null_mut()));
+    fmu.ok(fmu.fmi2SetRealInputDerivatives(null(), 0, null(), null()));
+}
+
+/// Parameters out of their range, with what the message must tell.
+const PARAMETERS: &[Case] = &[
+    ("mass = 0", |fmu| fmu.try_set(&[MASS], &[0.0]), &["mass", "below 0.001", "0"]),
+    ("mass < 0", |fmu| fmu.try_set(&[MASS], &[-0.1]), &["mass", "-0.1"]),
+    ("mass too large", |fmu| fmu.try_set(&[MASS], &[1e7]), &["mass", "above 1000000"]),
+    ("damping < 0", |fmu| fmu.try_set(&[DAMPING], &[-1e-300]), &["damping"]),
+    ("stiffness NaN", |fmu| fmu.try_set(&[STIFFNESS], &[NAN]), &["stiffness", "finite"]),
+    ("mass good, stiffness bad", |fmu| fmu.try_set(&[MASS, STIFFNESS], &[1.1, -1.0]), &["stiffness"]),
+    ("force good, mass bad", |fmu| fmu.try_set(&[FORCE, MASS], &[0.1, 0.0]), &["mass"]),
+    ("do not fit together", |fmu| fmu.try_set(&[FORCE, DAMPING], &[0.1, 20.0]), &["nothing oscillates"]),
+    ("springs = 0", |fmu| fmu.fmi2SetInteger(&SPRINGS, 1, &0), &["springs", "1", "9", "0"]),
+    ("springs < 0", |fmu| fmu.fmi2SetInteger(&SPRINGS, 1, &-7), &["springs", "-7"]),
+    ("springs, second bad", |fmu| fmu.fmi2SetInteger([SPRINGS; 2].as_ptr(), 2, [9, 10].as_ptr()), &["10"]),
+    ("damped = 2", |fmu| fmu.fmi2SetBoolean(&DAMPED, 1, &2), &["damped", "2"]),
+    ("damped = -1", |fmu| fmu.fmi2SetBoolean(&DAMPED, 1, &-1), &["damped", "-1"]),
+];
+
+#[test]
+fn parameters_out_of_range() {
+    for interface in INTERFACES {
+        all_refused(&in_mode::<Oscillator>(interface, Instantiated), PARAMETERS);
+        all_refused(&in_mode::<Oscillator>(interface, Initialization), PARAMETERS);
+    }
+    all_refused(&in_mode::<Oscillator>(CoSimulation, StepComplete), PARAMETERS);
+}
+
+/// What fits together is tried with all that one call sets: one by one it would not pass.
+#[test]
+fn combinations_are_set_together() {
+    let fmu = in_mode::<Oscillator>(CoSimulation, Instantiated);
+    fmu.refused("the damping alone", |fmu| fmu.try_set(&[DAMPING], &[30.0]));
+    fmu.set(&[DAMPING, STIFFNESS], &[30.0, 5000.0]);
+    fmu.refused("the stiffness alone", |fmu| fmu.try_set(&[STIFFNESS], &[50.0]));
+    fmu.ok(fmu.fmi2SetBoolean(&DAMPED, 1, &0));
+    fmu.set(&[STIFFNESS], &[50.0]);
+    fmu.refused("the damper again", |fmu| fmu.fmi2SetBoolean(&DAMPED, 1, &1));
+}
+
+const HEARD: u32 = talker::Name::heard as u32;
+const GREETING: u32 = talker::Name::greeting as u32;
+
+const TEXTS: &[Case] = &[
+    ("no UTF-8", |fmu| fmu.fmi2SetString(&HEARD, 1, &c"\xff\xfe".as_ptr()), &["heard is not UTF-8"]),
+    ("half a letter", |fmu| fmu.fmi2SetString(&HEARD, 1, &c"G\xc3".as_ptr()), &["heard is not UTF-8"]),
+    ("NULL text", |fmu| fmu.fmi2SetString(&GREETING, 1, &null()), &["greeting is NULL"]),
+    (
+        "second NULL",
+        |fmu| fmu.fmi2SetString([GREETING, HEARD].as_ptr(), 2, [c"a".as_ptr(), null()].as_ptr()),
+        &["heard is NULL"],
+    ),
+    (
+        "of an output",
+        |fmu| fmu.fmi2SetString(&(talker::Name::reply as u32), 1, &c"a".as_ptr()),
+        &["reply cannot be set"],
+    ),
+    (
+        "of an Integer",
+        |fmu| fmu.fmi2SetString(&(talker::Name::answer as u32), 1, &null()),
+        &["answer is of type Integer"],
+    ),
+    ("of nothing", |fmu| fmu.fmi2SetString(&99, 1, &c"\xff".as_ptr()), &["value reference 99"]),
+    (
+        "a constant",
+        |fmu| fmu.fmi2SetInteger(&(talker::Name::answer as u32), 1, &42),
+        &["answer cannot be set"],
+    ),
+    (
+        "Integer of a text",
+        |fmu| fmu.fmi2GetInteger(&HEARD, 1, &mut 0),
+        &["heard is of type String, not Integer"],
+    ),
+];
+
+#[test]
+fn texts() {
+    for (interface, mode) in
+        [(CoSimulation, StepComplete), (ModelExchange, Event), (CoSimulation, Instantiated)]
+    {
+        let fmu = in_mode::<Talker>(interface, mode);
+        let readable = mode != Instantiated;
+        let get = TEXTS.len() - 1;
+        all_refused(&fmu, if readable { TEXTS } else { &TEXTS[..get] });
+    }
+}
+
+#[test]
+fn experiments() {
+    let setup = |defined, tolerance, start, stop_defined, stop| {
+        move |fmu: &Importer| fmu.fmi2SetupExperiment(defined, tolerance, start, stop_defined, stop)
+    };
+    for interface in INTERFACES {
+        let fmu = in_mode::<Oscillator>(interface, Instantiated);
+        for (label, call, word) in [
+            ("tolerance NaN", setup(1, NAN, 0.0, 0, 0.0), "tolerance"),
+            ("tolerance infinite", setup(1, INF, 0.0, 0, 0.0), "tolerance"),
+            ("tolerance < 0", setup(1, -1e-6, 0.0, 0, 0.0), "tolerance"),
+            ("start NaN", setup(0, 0.0, NAN, 0, 0.0), "startTime"),
+            ("start infinite", setup(0, 0.0, -INF, 0, 0.0), "startTime"),
+            ("stop before start", setup(0, 0.0, 1.0, 1, 0.5), "stopTime"),
+            ("stop NaN", setup(0, 0.0, 0.0, 1, NAN), "stopTime"),
+        ] {
+            let message = fmu.refused(label, call);
+            assert!(message.contains(word), "{message}");
+        }
+        // What is not defined is not looked at, and a tolerance of 0 is none.
+        fmu.ok(setup(0, NAN, 0.0, 0, NAN)(&fmu));
+        fmu.ok(setup(1, 0.0, 0.0, 1, 0.0)(&fmu));
+    }
+}
+
+#[test]
+fn steps() {
+    let fmu = Importer::of::<Oscillator>(CoSimulation);
+    fmu.enter_initialization(1.0, Some(2.0));
+    fmu.ok(fmu.fmi2ExitInitializationMode());
+    fmu.step(1.0, 0.25);
+    for (label, point, step_size, word) in [
+        ("no step", 1.25, 0.0, "step size"),
+        ("negative zero", 1.25, -0.0, "step size"),
+        ("backwards", 1.25, -0.25, "step size"),
+        ("NaN step", 1.25, NAN, "step size"),
+        ("infinite step", 1.25, INF, "step size"),
+        ("vanishing step", 1.25, 1e-17, "vanishes"),
+        ("NaN point", NAN, 0.25, "point"),
+        ("infinite point", INF, 0.25, "point"),
+        ("point before", 1.0, 0.25, "1.25"),
+        ("point after", 1.5, 0.25, "1.25"),
+        ("point slightly off", 1.25 + 1e-6, 0.25, "1.25"),
+        ("past the stop time", 1.25, 0.76, "stop time 2"),
+        ("far past the stop time", 1.25, 1e300, "stop time 2"),
+    ] {
+        let message = fmu.refused(label, |fmu| fmu.try_step(point, step_size));
+        assert!(message.contains(word), "{label}: {message}");
+    }
+    fmu.step(1.25, 0.75);
+}
+
+/// A step to infinity is refused, and everything stays usable; so is reading what is infinite.
+#[test]
+fn out_of_the_range_of_numbers() {
+    let fmu = in_mode::<Oscillator>(CoSimulation, StepComplete);
+    fmu.set(&[FORCE], &[f64::MAX]);
+    fmu.set_rates([FORCE], [f64::MAX]);
+    fmu.set(&[MASS], &[0.1]);
+    let message = fmu.refused("a step to infinity", |fmu| fmu.try_step(0.0, 1e3));
+    assert!(message.contains("range of numbers"), "{message}");
+    fmu.refused("an infinite rate", |fmu| fmu.fmi2GetRealOutputDerivatives(&ACCELERATION, 1, &1, &mut 0.0));
+    fmu.set(&[FORCE], &[0.1]);
+    fmu.set_rates([FORCE], [0.0]);
+    fmu.step(0.0, 10.0);
+    let fmu = in_mode::<Oscillator>(ModelExchange, ContinuousTime);
+    fmu.set(&[POSITION, FORCE], &[1e200, 0.1]);
+    let message = fmu.refused("an infinite energy", |fmu| fmu.fmi2GetReal(&ENERGY, 1, &mut 0.0));
+    assert!(message.contains("energy is out of the range of numbers"), "{message}");
+    fmu.set(&[POSITION], &[f64::MAX]);
+    let message = fmu.refused("infinite rates", |fmu| fmu.fmi2GetDerivatives([0.0; 2].as_mut_ptr(), 2));
+    assert!(message.contains("der(velocity)"), "{message}");
+    fmu.refused("their partials", |fmu| {
+        fmu.fmi2GetDirectionalDerivative(&ENERGY, 1, &POSITION, 1, &1e10, &mut 0.0)
+    });
+}
+
+/// Masters that wait for long take long steps. However long, an answer comes at once.
+#[test]
+fn steps_of_any_size() {
+    for step_size in [1e-300, 1e-9, 1.0, 1e9, 1e100, 1e300, 0.5 * f64::MAX] {
+        let (answer, answers) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let fmu = in_mode::<Oscillator>(CoSimulation, StepComplete);
+            fmu.set(&[FORCE], &[0.5]);
+            let _ = answer.send((fmu.try_step(0.0, step_size), fmu.get([POSITION])));
+        });
+        let (status, [position]) = answers
+            .recv_timeout(std::time::Duration::from_secs(10))
+            .unwrap_or_else(|_| panic!("a step of {step_size:e} s takes for ever"));
+        assert!(matches!(status, Status::Ok | Status::Error), "{step_size:e}: {status:?}");
+        assert!(
+            status != Status::Ok || step_size < 1e3 || (position - 0.01).abs() < 1e-12,
+            "{step_size:e}: {position}"
+        );
+    }
+}
+
+const DERIVATIVES: &[Case] = &[
+    ("order 0", |fmu| fmu.fmi2SetRealInputDerivatives(&FORCE, 1, &0, &0.0), &["force", "order", "0"]),
+    ("order -1", |fmu| fmu.fmi2SetRealInputDerivatives(&FORCE, 1, &-1, &0.0), &["force", "-1"]),
+    ("NaN", |fmu| fmu.fmi2SetRealInputDerivatives(&FORCE, 1, &1, &NAN), &["force", "finite"]),
+    ("infinity of order 3", |fmu| fmu.fmi2SetRealInputDerivatives(&FORCE, 1, &3, &INF), &["force"]),
+    ("of an output", |fmu| fmu.fmi2SetRealInputDerivatives(&ENERGY, 1, &1, &0.0), &["energy", "input"]),
+    ("of a parameter", |fmu| fmu.fmi2SetRealInputDerivatives(&MASS, 1, &1, &0.0), &["mass", "input"]),
+    ("of an Integer", |fmu| fmu.fmi2SetRealInputDerivatives(&SPRINGS, 1, &1, &0.0), &["springs", "Integer"]),
+    ("of nothing", |fmu| fmu.fmi2SetRealInputDerivatives(&UNKNOWN, 1, &1, &0.0), &["12"]),
+    (
+        "good and bad",
+        |fmu| fmu.fmi2SetRealInputDerivatives([FORCE; 2].as_ptr(), 2, [1, 0].as_ptr(), [0.5; 2].as_ptr()),
+        &["force"],
+    ),
+    ("NULL vr", |fmu| fmu.fmi2SetRealInputDerivatives(null(), 1, &1, &0.0), &["vr", "NULL"]),
+    ("NULL order", |fmu| fmu.fmi2SetRealInputDerivatives(&0, 1, null(), &0.0), &["order", "NULL"]),
+    ("NULL value", |fmu| fmu.fmi2SetRealInputDerivatives(&0, 1, &1, null()), &["value", "NULL"]),
+    (
+        "output, order 0",
+        |fmu| fmu.fmi2GetRealOutputDerivatives(&ENERGY, 1, &0, &mut 0.0),
+        &["energy", "order"],
+    ),
+    (
+        "output, order -2",
+        |fmu| fmu.fmi2GetRealOutputDerivatives(&ENERGY, 1, &-2, &mut 0.0),
+        &["energy", "-2"],
+    ),
+    (
+        "output, Integer",
+        |fmu| fmu.fmi2GetRealOutputDerivatives(&SPRINGS, 1, &1, &mut 0.0),
+        &["springs", "Integer"],
+    ),
+    ("output, nothing", |fmu| fmu.fmi2GetRealOutputDerivatives(&UNKNOWN, 1, &1, &mut 0.0), &["12"]),
+    ("output, NULL", |fmu| fmu.fmi2GetRealOutputDerivatives(&ENERGY, 1, &1, null_mut()), &["value", "NULL"]),
+    (
+        "output, NULL order",
+        |fmu| fmu.fmi2GetRealOutputDerivatives(&0, 1, null(), &mut 0.0),
+        &["order", "NULL"],
+    ),
+];
+
+#[test]
+fn derivatives_with_respect_to_time() {
+    all_refused(&in_mode::<Oscillator>(CoSimulation, StepComplete), DERIVATIVES);
+}
+
+fn directional(fmu: &Importer, unknown: u32, known: u32, seed: f64) -> Status {
+    fmu.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &seed, &mut 0.0)
+}
+
+const DIRECTIONAL: &[Case] = &[
+    ("of an input", |fmu| directional(fmu, FORCE, FORCE, 1.0), &["force", "unknown"]),
+    ("of a parameter", |fmu| directional(fmu, MASS, FORCE, 1.0), &["mass", "unknown"]),
+    ("of a local state", |fmu| directional(fmu, VELOCITY, FORCE, 1.0), &["velocity", "unknown"]),
+    ("with respect to an output", |fmu| directional(fmu, SPRING_FORCE, ENERGY, 1.0), &["energy", "known"]),
+    ("with respect to a derivative", |fmu| directional(fmu, ENERGY, ACCELERATION, 1.0), &["der(velocity)"]),
+    ("with respect to an Integer", |fmu| directional(fmu, ENERGY, SPRINGS, 1.0), &["springs", "Integer"]),
+    ("with respect to a parameter", |fmu| directional(fmu, ENERGY, MASS, 1.0), &["mass is no known"]),
+    ("of nothing", |fmu| directional(fmu, UNKNOWN, FORCE, 1.0), &["12"]),
+    ("with respect to nothing", |fmu| directional(fmu, ENERGY, UNKNOWN, 1.0), &["12"]),
+    ("along NaN", |fmu| directional(fmu, ENERGY, FORCE, NAN), &["force", "seed"]),
+    (
+        "NULL seed",
+        |fmu| fmu.fmi2GetDirectionalDerivative(&ENERGY, 1, &FORCE, 1, null(), &mut 0.0),
+        &["dvKnown", "NULL"],
+    ),
+    (
+        "NULL result",
+        |fmu| fmu.fmi2GetDirectionalDerivative(&ENERGY, 1, &FORCE, 1, &1.0, null_mut()),
+        &["dvUnknown", "NULL"],
+    ),
+    (
+        "NULL knowns",
+        |fmu| fmu.fmi2GetDirectionalDerivative(&ENERGY, 1, null(), 1, &1.0, &mut 0.0),
+        &["vKnown_ref", "NULL"],
+    ),
+    (
+        "NULL unknowns",
+        |fmu| fmu.fmi2GetDirectionalDerivative(null(), 2, &FORCE, 1, &1.0, &mut 0.0),
+        &["vUnknown_ref", "NULL"],
+    ),
+];
+
+#[test]
+fn directional_derivatives() {
+    for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, ContinuousTime)] {
+        all_refused(&in_mode::<Oscillator>(interface, mode), DIRECTIONAL);
+    }
+}
+
+const STATES: &[Case] = &[
+    ("one state", |fmu| fmu.fmi2SetContinuousStates([0.1; 1].as_ptr(), 1), &["2", "1"]),
+    ("three states", |fmu| fmu.fmi2SetContinuousStates([0.1; 3].as_ptr(), 3), &["2", "3"]),
+    ("no states", |fmu| fmu.fmi2SetContinuousStates(null(), 0), &["2", "0"]),
+    ("NULL states", |fmu| fmu.fmi2SetContinuousStates(null(), 2), &["NULL"]),
+    ("last state NaN", |fmu| fmu.fmi2SetContinuousStates([0.1, NAN].as_ptr(), 2), &["velocity", "finite"]),
+    ("infinite state", |fmu| fmu.try_set(&[VELOCITY], &[INF]), &["velocity"]),
+    ("get one", |fmu| fmu.fmi2GetContinuousStates([0.0; 1].as_mut_ptr(), 1), &["2", "1"]),
+    ("get into NULL", |fmu| fmu.fmi2GetContinuousStates(null_mut(), 2), &["NULL"]),
+    ("three derivatives", |fmu| fmu.fmi2GetDerivatives([0.0; 3].as_mut_ptr(), 3), &["2", "3"]),
+    ("derivatives into NULL", |fmu| fmu.fmi2GetDerivatives(null_mut(), 2), &["NULL"]),
+    ("one nominal", |fmu| fmu.fmi2GetNominalsOfContinuousStates([0.0; 1].as_mut_ptr(), 1), &["2", "1"]),
+    ("nominals into NULL", |fmu| fmu.fmi2GetNominalsOfContinuousStates(null_mut(), 2), &["NULL"]),
+    ("one event indicator", |fmu| fmu.fmi2GetEventIndicators(&mut 0.0, 1), &["no event indicators"]),
+    ("time NaN", |fmu| fmu.fmi2SetTime(NAN), &["time", "finite"]),
+    ("time infinite", |fmu| fmu.fmi2SetTime(INF), &["time", "finite"]),
+    ("step ends in NULL", |fmu| fmu.fmi2CompletedIntegratorStep(1, null_mut(), &mut 0), &["enterEventMode"]),
+    (
+        "step ends in NULL, 2",
+        |fmu| fmu.fmi2CompletedIntegratorStep(1, &mut 0, null_mut()),
+        &["terminateSimulation"],
+    ),
+];
+
+#[test]
+fn continuous_states() {
+    all_refused(&in_mode::<Oscillator>(ModelExchange, ContinuousTime), STATES);
+    let fmu = in_mode::<Oscillator>(ModelExchange, Event);
+    let message = fmu.refused("no event info", |fmu| fmu.fmi2NewDiscreteStates(null_mut()));
+    assert!(message.contains("NULL"), "{message}");
+    let fmu = in_mode::<Ball>(ModelExchange, ContinuousTime);
+    let message = fmu.refused("none", |fmu| fmu.fmi2GetEventIndicators(null_mut(), 0));
+    assert!(message.contains("1 event indicators, not 0"), "{message}");
+}
+
+#[test]
+fn status_kinds() {
+    let fmu = in_mode::<Oscillator>(CoSimulation, StepComplete);
+    for kind in [-1, 4, i32::MAX] {
+        fmu.refused("GetStatus", |fmu| fmu.fmi2GetStatus(kind, &mut Status::Ok));
+        fmu.refused("GetRealStatus", |fmu| fmu.fmi2GetRealStatus(kind, &mut 0.0));
+        fmu.refused("GetIntegerStatus", |fmu| fmu.fmi2GetIntegerStatus(kind, &mut 0));
+        fmu.refused("GetBooleanStatus", |fmu| fmu.fmi2GetBooleanStatus(kind, &mut 0));
+        fmu.refused("GetStringStatus", |fmu| fmu.fmi2GetStringStatus(kind, &mut null()));
+    }
+    fmu.refused("NULL", |fmu| fmu.fmi2GetRealStatus(2, null_mut()));
+    fmu.refused("NULL", |fmu| fmu.fmi2GetBooleanStatus(3, null_mut()));
+    // Each question has one function; the others say which.
+    fmu.ok(fmu.set_debug_logging(true, &[c"logStatusDiscard"]));
+    type Question = fn(&Importer) -> Status;
+    let questions: &[(Question, &str)] = &[
+        (|fmu| fmu.fmi2GetRealStatus(0, &mut 0.0), "synchronously"),
+        (|fmu| fmu.fmi2GetRealStatus(3, &mut 0.0), "fmi2GetBooleanStatus"),
+        (|fmu| fmu.fmi2GetBooleanStatus(2, &mut 0), "fmi2GetRealStatus"),
+        (|fmu| fmu.fmi2GetStringStatus(1, &mut null()), "synchronously"),
+        (|fmu| fmu.fmi2GetIntegerStatus(2, &mut 0), "fmi2GetRealStatus"),
+    ];
+    for (question, word) in questions {
+        assert_eq!(question(&fmu), Status::Discard);
+        let log = fmu.take_log();
+        assert!(log.len() == 1 && log[0].text.contains(word), "{log:?}");
+    }
+
+    fmu.step(0.0, 0.25);
+    let (mut time, mut terminated) = (0.0, -1);
+    fmu.ok(fmu.fmi2GetRealStatus(2, &mut time));
+    fmu.ok(fmu.fmi2GetBooleanStatus(3, &mut terminated));
+    assert_eq!((time, terminated), (0.25, 0));
+}
+
+/// What is wrong with the arguments, and words of the message.
+#[test]
+fn instantiation() {
+    type Change = fn(&mut Arguments<'static>);
+    let cases: &[(&str, Change, &[&str])] = &[
+        ("no name", |a| a.instance_name = None, &["name"]),
+        ("empty name", |a| a.instance_name = Some(c""), &["name"]),
+        ("blank name", |a| a.instance_name = Some(c" \t "), &["name"]),
+        ("no guid", |a| a.guid = None, &["guid", "NULL"]),
+        ("empty guid", |a| a.guid = Some(CString::default()), &["guid"]),
+        (
+            "wrong guid",
+            |a| a.guid = Some(c"{1%s-#r1#}".into()),
+            &["guid", "{1_s-_r1_}", Oscillator::INFO.guid],
+        ),
+        ("guid of another", |a| a.guid = CString::new(Talker::INFO.guid).ok(), &["{talker}", "{oscillator}"]),
+        ("fmuType 2", |a| a.fmu_type = 2, &["fmuType", "2"]),
+        ("fmuType -1", |a| a.fmu_type = -1, &["fmuType", "-1"]),
+    ];
+    let instantiate = |arguments: &Arguments| Importer::instantiate(Functions::of::<Oscillator>(), arguments);
+    let usual = || Arguments::of::<Oscillator>(CoSimulation);
+    for (label, change, words) in cases {
+        let mut arguments = usual();
+        change(&mut arguments);
+        let Err(log) = instantiate(&arguments) else { panic!("{label} is accepted") };
+        let [message] = log.as_slice() else { panic!("{label}: one message expected, not {log:?}") };
+        assert_clean(message);
+        assert_eq!((message.status, message.category.as_str()), (Status::Error, "logStatusError"), "{label}");
+        assert!(message.text.starts_with("fmi2Instantiate: "), "{label}: {}", message.text);
+        for word in *words {
+            assert!(message.text.contains(word), "{label}: '{word}' is not in: {}", message.text);
+        }
+        // Without anyone to tell it is refused all the same.
+        arguments.logger = false;
+        assert!(instantiate(&arguments).is_err_and(|log| log.is_empty()), "{label}, silently");
+    }
+    assert!(instantiate(&Arguments { callbacks: false, ..usual() }).is_err());
+}

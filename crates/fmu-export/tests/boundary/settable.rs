@@ -1,0 +1,155 @@
+//! Which variable can be set when (footnotes 1, 3, 4, 5 and 6 of sections 3.2.3 and 4.2.4), for every variable in every
+//! state.
+
+use crate::modes::{in_mode, modes_of_model, offers};
+use crate::toys::*;
+use fmu_export::Interface::{self, CoSimulation, ModelExchange};
+use fmu_export::Mode::{self, *};
+use fmu_export::fmi2::types::Status;
+use fmu_export::{BaseType, Causality, Exported, Initial, Variability, Variable};
+use fmu_run::Importer;
+use std::ffi::CStr;
+use std::ptr::null;
+
+/// The standard's rule, state by state.
+fn standard<M>(variable: &Variable<M>, interface: Interface, mode: Mode) -> bool {
+    let exact = variable.initial() == Some(Initial::Exact) && variable.variability() != Variability::Constant;
+    let input = variable.causality() == Causality::Input;
+    let tunable =
+        (variable.causality(), variable.variability()) == (Causality::Parameter, Variability::Tunable);
+    match (mode, interface) {
+        (Instantiated, _) => exact || variable.initial() == Some(Initial::Approx), // footnote 1
+        (Initialization, _) => exact || input,                                     // footnote 3
+        (StepComplete, CoSimulation) | (Event, ModelExchange) => input || tunable, // footnotes 6 and 4
+        (ContinuousTime, ModelExchange) => {
+            variable.is_state() || input && variable.variability() == Variability::Continuous // footnote 5
+        }
+        _ => false,
+    }
+}
+
+/// What real masters do beyond it: inputs before the initialization, parameters after it.
+fn tolerated<M>(variable: &Variable<M>, mode: Mode) -> bool {
+    matches!(
+        (variable.causality(), mode),
+        (Causality::Input, Instantiated) | (Causality::Parameter, StepComplete | Event)
+    )
+}
+
+pub fn accepted<M>(variable: &Variable<M>, interface: Interface, mode: Mode) -> bool {
+    standard(variable, interface, mode) || tolerated(variable, mode)
+}
+
+/// The same by name, in the letters of the tables, for one variable of each kind: Co-Simulation, Model Exchange.
+fn check_by_hand<M: Exported>(rows: &[(&str, &str, &str)]) {
+    for (name, co_simulation, model_exchange) in rows {
+        let mut variables = M::TABLE.iter();
+        let variable = variables.find(|variable| variable.name() == *name).expect(name);
+        for (interface, letters) in [(CoSimulation, co_simulation), (ModelExchange, model_exchange)] {
+            let found: String = crate::modes::modes_of(interface)
+                .into_iter()
+                .zip(if interface == CoSimulation { "INCFTE".chars() } else { "INMKTE".chars() })
+                .filter_map(|(mode, letter)| accepted(variable, interface, mode).then_some(letter))
+                .collect();
+            assert_eq!(found, *letters, "{name}, {interface}");
+        }
+    }
+}
+
+#[test]
+fn one_of_each_kind() {
+    check_by_hand::<Oscillator>(&[
+        ("force", "INC", "INMK"),
+        ("position", "IN", "INK"),
+        ("velocity", "IN", "INK"),
+        ("der(velocity)", "", ""),
+        ("energy", "", ""),
+        ("mass", "INC", "INM"),
+        ("springs", "INC", "INM"),
+    ]);
+    check_by_hand::<Counter>(&[("weight", "INC", "INM"), ("count", "IN", "IN"), ("odd", "", "")]);
+    check_by_hand::<Talker>(&[
+        ("heard", "INC", "INM"),
+        ("volume", "INC", "INM"),
+        ("decibels", "", ""),
+        ("root", "I", "I"),
+        ("answer", "", ""),
+        ("time", "", ""),
+        ("who", "", ""),
+    ]);
+}
+
+fn set(fmu: &Importer, vr: u32, base: BaseType) -> Status {
+    match base {
+        BaseType::Real => fmu.try_set(&[vr], &[0.625]),
+        BaseType::Integer => fmu.fmi2SetInteger(&vr, 1, &3),
+        BaseType::Enumeration => fmu.fmi2SetInteger(&vr, 1, &2),
+        BaseType::Boolean => fmu.fmi2SetBoolean(&vr, 1, &1),
+        _ => fmu.fmi2SetString(&vr, 1, &c"a text".as_ptr()),
+    }
+}
+
+/// Whether the value is the one that is set above.
+fn is_set(fmu: &Importer, vr: u32, base: BaseType) -> bool {
+    let (mut integer, mut text) = (-1, null());
+    match base {
+        BaseType::Real => return fmu.get([vr]) == [0.625],
+        BaseType::Integer | BaseType::Enumeration => fmu.ok(fmu.fmi2GetInteger(&vr, 1, &mut integer)),
+        BaseType::Boolean => fmu.ok(fmu.fmi2GetBoolean(&vr, 1, &mut integer)),
+        _ => {
+            fmu.ok(fmu.fmi2GetString(&vr, 1, &mut text));
+            // SAFETY: a string of the instance, until the next call.
+            return unsafe { CStr::from_ptr(text) } == c"a text";
+        }
+    }
+    integer
+        == [(BaseType::Integer, 3), (BaseType::Enumeration, 2), (BaseType::Boolean, 1)]
+            .into_iter()
+            .find_map(|(of, value)| (of == base).then_some(value))
+            .expect("one of the three")
+}
+
+#[test]
+fn every_variable_in_every_state() {
+    for_every_toy!(check_every_variable());
+}
+
+fn check_every_variable<M: Exported>() {
+    for (interface, mode) in modes_of_model::<M>() {
+        let fmu = in_mode::<M>(interface, mode);
+        for (vr, variable) in (0..).zip(M::TABLE) {
+            let base = variable.base();
+            let label = format!("{} in state '{mode}' of {interface}", variable.name());
+            if accepted(variable, interface, mode) {
+                assert_eq!(set(&fmu, vr, base), Status::Ok, "{label}: {:?}", fmu.take_log());
+                continue;
+            }
+            let message = fmu.refused(&label, |fmu| set(fmu, vr, base));
+            let in_this_state = matches!(mode, Instantiated | Initialization | StepComplete | Event)
+                || (mode == ContinuousTime && base == BaseType::Real);
+            // Where the whole function is refused, its variables are not looked at.
+            assert!(!in_this_state || message.contains(variable.name()), "{label}: {message}");
+        }
+    }
+}
+
+/// What is set is what is read, inputs too, without a step in between.
+#[test]
+fn values_are_read_back() {
+    for_every_toy!(check_values());
+}
+
+fn check_values<M: Exported>() {
+    for interface in crate::modes::INTERFACES.into_iter().filter(|interface| offers::<M>(*interface)) {
+        let fmu = in_mode::<M>(interface, Initialization);
+        let settable =
+            || (0..).zip(M::TABLE).filter(|(_, variable)| accepted(variable, interface, Initialization));
+        for (vr, variable) in settable() {
+            fmu.ok(set(&fmu, vr, variable.base()));
+        }
+        for (vr, variable) in settable() {
+            assert!(is_set(&fmu, vr, variable.base()), "{}", variable.name());
+        }
+        assert!(settable().count() > 1);
+    }
+}

@@ -1,0 +1,85 @@
+/* Loads FMUs, uses them all at once, frees everything in ever new order and unloads: reload ROUNDS LIBRARY...
+   Prints the resident memory in KiB after a tenth of the rounds and at the end. */
+#include "fmu.h"
+#include <unistd.h>
+
+enum { LIBRARIES = 4, INSTANCES = 3, STEPS = 8, GUID_LENGTH = 64 };
+
+/* The functions of one library. */
+struct fmu {
+#define MEMBER(name) fmi2##name##TYPE *fmi2##name;
+    FMI2_FUNCTIONS(MEMBER)
+#undef MEMBER
+    void *library;
+    fmi2Component instances[INSTANCES];
+    fmi2FMUstate states[INSTANCES];
+};
+
+static struct fmu open_fmu(const char *path) {
+    struct fmu fmu = {.library = load(path)};
+#define COPY(name) fmu.fmi2##name = fmi2##name;
+    FMI2_FUNCTIONS(COPY)
+#undef COPY
+    return fmu;
+}
+
+/* Every FMU of this project refuses a wrong guid and says its own. */
+static void learn_guid(fmi2ComponentEnvironment guid, fmi2String instance, fmi2Status status, fmi2String category,
+                       fmi2String message, ...) {
+    const char *own = strstr(message, "library's {");
+    (void)instance, (void)status, (void)category;
+    if (own && guid) sscanf(own, "library's %63[^:]", (char *)guid);
+}
+
+static void use(struct fmu *fmu) {
+    char guid[GUID_LENGTH] = "";
+    fmi2CallbackFunctions callbacks = {learn_guid, NULL, NULL, NULL, guid};
+    int i, k;
+    CHECK(!fmu->fmi2Instantiate("none", fmi2CoSimulation, "{}", "", &callbacks, 0, 0) && guid[0] == '{');
+    callbacks.componentEnvironment = NULL;
+    for (i = 0; i < INSTANCES; ++i) {
+        fmi2Component c = fmu->fmi2Instantiate("some", fmi2CoSimulation, guid, "", &callbacks, 0, 0);
+        CHECK(c);
+        CHECK(fmu->fmi2SetupExperiment(c, 0, 0, 0, 0, 0) == fmi2OK);
+        CHECK(fmu->fmi2EnterInitializationMode(c) == fmi2OK && fmu->fmi2ExitInitializationMode(c) == fmi2OK);
+        for (k = 0; k < STEPS; ++k) CHECK(fmu->fmi2DoStep(c, k / 512.0, 1 / 512.0, 1) == fmi2OK);
+        CHECK(fmu->fmi2DoStep(c, -1, 1, 1) == fmi2Error);
+        CHECK(fmu->fmi2GetFMUstate(c, &fmu->states[i]) == fmi2OK);
+        fmu->instances[i] = c;
+    }
+}
+
+/* Instances from any one on; each frees the state of its neighbour before or after it is gone itself. */
+static void free_all(struct fmu *fmu, int first) {
+    int i;
+    for (i = 0; i < INSTANCES; ++i) {
+        int own = (first + i) % INSTANCES, other = (own + first) % INSTANCES;
+        CHECK(fmu->fmi2FreeFMUstate(fmu->instances[own], &fmu->states[other]) == fmi2OK && !fmu->states[other]);
+        fmu->fmi2FreeInstance(fmu->instances[own]);
+    }
+    fmu->fmi2FreeInstance(NULL);
+}
+
+static long resident(void) {
+    long size = 0, pages = 0;
+    FILE *file = fopen("/proc/self/statm", "r");
+    CHECK(file && fscanf(file, "%ld %ld", &size, &pages) == 2);
+    fclose(file);
+    return pages * (sysconf(_SC_PAGESIZE) / 1024);
+}
+
+int main(int argc, char **argv) {
+    int libraries = argc - 2, rounds = argc > 2 ? atoi(argv[1]) : 0, round, i;
+    struct fmu fmus[LIBRARIES];
+    CHECK(libraries > 0 && libraries <= LIBRARIES && rounds > 0);
+    for (round = 0; round < rounds; ++round) {
+        for (i = 0; i < libraries; ++i) fmus[i] = open_fmu(argv[2 + (i + round) % libraries]);
+        for (i = 0; i < libraries; ++i) use(&fmus[i]);
+        for (i = 0; i < libraries; ++i) free_all(&fmus[(i + round) % libraries], round % INSTANCES);
+        for (i = 0; i < libraries; ++i) CHECK(dlclose(fmus[i].library) == 0);
+        for (i = 0; i < libraries; ++i) CHECK(!dlopen(argv[2 + i], RTLD_NOW | RTLD_NOLOAD));
+        if (round == rounds / 10) printf("%ld\n", resident());
+    }
+    printf("%ld\n", resident());
+    return 0;
+}

@@ -1,0 +1,16 @@
+//! No variable is a u64.
+use fmu_export::*;
+
+#[derive(Clone)]
+pub struct Toy {
+    u: f64,
+    x: f64,
+    n: i32,
+}
+
+variables! { for Toy;
+    /// An output
+    y = output(&INTEGER) by |_| 7_u64;
+}
+
+fn main() {}

@@ -1,0 +1,16 @@
+//! An Integer lives in an i32.
+use fmu_export::*;
+
+#[derive(Clone)]
+pub struct Toy {
+    u: f64,
+    x: f64,
+    n: i32,
+}
+
+variables! { for Toy;
+    /// An output
+    y = output(&INTEGER) in x;
+}
+
+fn main() {}

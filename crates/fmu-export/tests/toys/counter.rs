@@ -1,0 +1,112 @@
+//! A counter that is asked in regular intervals: time events, event iteration, Integers and Booleans.
+
+use fmu_export::*;
+
+/// Adds its input to a count in every period, and carries where the count is full.
+#[derive(Clone)]
+pub struct Counter {
+    on: bool,
+    increment: i32,
+    weight: f64,
+    count: i32,
+    carries: i32,
+    sum: f64,
+    period: f64,
+    full: i32,
+    /// When it counts next.
+    next: f64,
+}
+
+const PERIOD: Type = Type::real("Period", &units::S).min(1e-3).max(1e3);
+const DIGITS: Type = Type::integer("Digits").from(2);
+
+variables! { for Counter, memory in next;
+    /// Whether it counts
+    on = input(&BOOLEAN) in on;
+    /// What it adds
+    increment = input(&INTEGER) in increment;
+    /// What the increments weigh; changes at events only
+    weight = input(&NUMBER).discrete() in weight;
+    /// What it has counted
+    count = output(&INTEGER).exact() in count;
+    /// How often it was full
+    carries = output(&INTEGER).exact() in carries;
+    /// What all increments have weighed
+    sum = output(&NUMBER).discrete().exact() in sum;
+    /// Whether the count is odd
+    odd = output(&BOOLEAN) by |counter| counter.count % 2 != 0;
+    /// Between two counts
+    period = parameter(&PERIOD) in period;
+    /// The first count that is too much
+    full = parameter(&DIGITS) in full;
+}
+
+impl Counter {
+    fn tick(&mut self) -> Result<(), Error> {
+        if self.on {
+            self.count = self.count.saturating_add(self.increment);
+            self.sum += self.weight * f64::from(self.increment);
+        }
+        if !self.sum.is_finite() {
+            return Err(Error::new("the sum leaves the range of numbers"));
+        }
+        self.next += self.period;
+        Ok(())
+    }
+
+    fn carry(&mut self) {
+        self.carries = self.carries.wrapping_add(self.count / self.full);
+        self.count %= self.full;
+    }
+}
+
+impl Model for Counter {
+    const INFO: Info =
+        Info { description: "Counts in regular intervals", guid: "{counter}", ..info!("Counter", "counter") };
+
+    fn new(_: &Setup) -> Result<Self, Error> {
+        let (on, increment, weight, count, carries, sum) = (false, 1, 1.0, 0, 0, 0.0);
+        Ok(Self { on, increment, weight, count, carries, sum, period: 0.1, full: 10, next: 0.1 })
+    }
+
+    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Error> {
+        self.next = experiment.start_time + self.period;
+        Ok(())
+    }
+}
+
+impl ModelExchange for Counter {
+    /// At most one thing at a time: where more is to do at the same time, the importer calls again (section 3.2.2).
+    fn event(&mut self, time: f64) -> Result<Event, Error> {
+        if self.count >= self.full {
+            self.carry();
+        } else if time >= self.next {
+            self.tick()?;
+        }
+        let again = self.count >= self.full || time >= self.next;
+        Ok(Event { again, next: Some(self.next), ..Event::default() })
+    }
+}
+
+impl CoSimulation for Counter {
+    fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+        const MOST: f64 = 1000.0;
+        // The last count of a step happens even if rounding has the step end just before it.
+        let end = step.time + step.size + 1e-9 * self.period;
+        if end - self.next > MOST * self.period || end + self.period == end {
+            return Err(Error::new(format!("a step may have {MOST} periods, and they must not vanish")));
+        }
+        // A step that fails must leave the model as it was.
+        let mut counter = self.clone();
+        while counter.next <= end {
+            counter.tick()?;
+            if counter.count >= counter.full {
+                counter.carry();
+            }
+        }
+        *self = counter;
+        Ok(Stepped::Done)
+    }
+}
+
+offer!(Counter: CoSimulation + ModelExchange);

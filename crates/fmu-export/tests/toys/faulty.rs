@@ -1,0 +1,224 @@
+//! A model whose every method can panic. No example to follow.
+
+use fmu_export::*;
+use std::cell::Cell;
+
+/// Where it breaks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(i32)]
+pub enum Fault {
+    None,
+    Read,
+    Then,
+    ReadText,
+    Update,
+    Initialize,
+    Calculate,
+    Log,
+    Step,
+    Indicators,
+    Event,
+    StepCompleted,
+    Nominals,
+    Partial,
+    InputDerivative,
+    OutputDerivative,
+    Memory,
+    Drop,
+    /// With something that is no text.
+    NoMessage,
+    /// With something that panics when it is dropped, and so does what that panic carries.
+    Bomb,
+    /// In the next instance or copy, whatever this one is told.
+    New,
+    Clone,
+}
+
+thread_local! {
+    /// Breaks every new instance or every copy.
+    static EVERYWHERE: Cell<Fault> = const { Cell::new(Fault::None) };
+}
+
+/// Runs the work while every new instance or copy breaks.
+pub fn while_all_break<T>(fault: Fault, work: impl FnOnce() -> T) -> T {
+    EVERYWHERE.set(fault);
+    let result = work();
+    EVERYWHERE.set(Fault::None);
+    result
+}
+
+/// Breaks in the method that its parameter names.
+pub struct Faulty {
+    fault: i32,
+    number: f64,
+    state: f64,
+    truth: bool,
+    text: String,
+    memory: Memory,
+}
+
+/// What it remembers besides its variables: its fault once more.
+#[derive(Clone)]
+struct Memory(i32);
+
+struct Bomb;
+
+impl Drop for Bomb {
+    fn drop(&mut self) {
+        std::panic::panic_any(SecondBomb);
+    }
+}
+
+struct SecondBomb;
+
+impl Drop for SecondBomb {
+    fn drop(&mut self) {
+        panic!("a second bomb");
+    }
+}
+
+impl Faulty {
+    fn panic_if(&self, fault: Fault) {
+        check(self.fault, fault);
+    }
+
+    fn read<T>(&self, value: T) -> T {
+        self.panic_if(Fault::Read);
+        if self.fault == Fault::NoMessage as i32 {
+            std::panic::panic_any(7);
+        }
+        if self.fault == Fault::Bomb as i32 {
+            std::panic::panic_any(Bomb);
+        }
+        value
+    }
+}
+
+fn check(fault: i32, here: Fault) {
+    assert!(fault != here as i32, "fault #{here:?} at 100%s");
+}
+
+impl Saved for Memory {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        check(self.0, Fault::Memory);
+        self.0.visit(visitor);
+    }
+}
+
+variables! { for Faulty, memory in memory;
+    /// What comes in
+    u = input(&NUMBER) in number then |faulty| { faulty.panic_if(Fault::Then); };
+    /// What goes out
+    y = output(&NUMBER) by |faulty| faulty.read(0.5);
+    /// Where it breaks
+    fault = parameter(&INTEGER) in fault then |faulty| { faulty.memory = Memory(faulty.fault); };
+    /// A whole number
+    n = output(&INTEGER) by |faulty| faulty.read(3);
+    /// A truth
+    truth = input(&BOOLEAN) in truth then |faulty| { faulty.panic_if(Fault::Then); } by |faulty| faulty.read(faulty.truth);
+    /// A text
+    text = input(&STRING) in text then |faulty| { faulty.panic_if(Fault::Then); } by |faulty| {
+        faulty.panic_if(Fault::ReadText);
+        faulty.text.clone()
+    };
+    /// A state
+    x = local(&NUMBER).state() in state then |faulty| { faulty.panic_if(Fault::Then); };
+    /// Its rate
+    der_x as "der(x)" = local(&NUMBER).derivative_of(x) by |faulty| faulty.read(0.0);
+}
+
+impl Clone for Faulty {
+    fn clone(&self) -> Self {
+        check(EVERYWHERE.get() as i32, Fault::Clone);
+        Self { text: self.text.clone(), memory: self.memory.clone(), ..*self }
+    }
+}
+
+impl Drop for Faulty {
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            self.panic_if(Fault::Drop);
+        }
+    }
+}
+
+impl Model for Faulty {
+    const INFO: Info = Info { guid: "{faulty}", ..info!("Faulty", "faulty") };
+
+    fn new(_: &Setup) -> Result<Self, Error> {
+        check(EVERYWHERE.get() as i32, Fault::New);
+        let memory = Memory(0);
+        Ok(Self { fault: 0, number: 0.0, state: 0.0, truth: false, text: String::new(), memory })
+    }
+
+    fn update(&mut self) -> Result<(), Error> {
+        self.panic_if(Fault::Update);
+        Ok(())
+    }
+
+    fn initialize(&mut self, _: &Experiment) -> Result<(), Error> {
+        self.panic_if(Fault::Initialize);
+        Ok(())
+    }
+
+    fn calculate(&mut self, _: f64) {
+        self.panic_if(Fault::Calculate);
+    }
+
+    fn log(&mut self) -> Option<&mut Log> {
+        self.panic_if(Fault::Log);
+        None
+    }
+}
+
+impl CoSimulation for Faulty {
+    fn step(&mut self, _: Step) -> Result<Stepped, Error> {
+        self.panic_if(Fault::Step);
+        Ok(Stepped::Done)
+    }
+}
+
+impl ModelExchange for Faulty {
+    const INDICATORS: usize = 1;
+    const STEP_COMPLETED: bool = true;
+
+    fn indicators(&self, _: &mut [f64]) {
+        self.panic_if(Fault::Indicators);
+    }
+
+    fn event(&mut self, _: f64) -> Result<Event, Error> {
+        self.panic_if(Fault::Event);
+        Ok(Event::default())
+    }
+
+    fn step_completed(&mut self, _: f64) -> StepCompleted {
+        self.panic_if(Fault::StepCompleted);
+        StepCompleted::default()
+    }
+
+    fn nominals(&self, _: &mut [f64]) {
+        self.panic_if(Fault::Nominals);
+    }
+}
+
+impl Partials for Faulty {
+    fn partial(&self, _: Name, _: Name) -> Option<f64> {
+        self.panic_if(Fault::Partial);
+        Some(1.0)
+    }
+}
+
+impl InputDerivatives for Faulty {
+    fn set_input_derivative(&mut self, _: Name, _: u32, _: f64) {
+        self.panic_if(Fault::InputDerivative);
+    }
+}
+
+impl OutputDerivatives for Faulty {
+    fn output_derivative(&self, _: Name, _: u32) -> f64 {
+        self.panic_if(Fault::OutputDerivative);
+        0.0
+    }
+}
+
+offer!(Faulty: CoSimulation + ModelExchange + Partials + InputDerivatives + OutputDerivatives);

@@ -1,0 +1,18 @@
+//! Toy models that together show all that FMI 2.0 allows. Each is short, and complete.
+#![allow(dead_code, missing_docs, unused_imports, reason = "not every test uses every toy")]
+
+pub mod ball;
+pub mod counter;
+pub mod faulty;
+pub mod fuse;
+pub mod oscillator;
+pub mod sum;
+pub mod talker;
+
+pub use ball::Ball;
+pub use counter::Counter;
+pub use faulty::Faulty;
+pub use fuse::Fuse;
+pub use oscillator::Oscillator;
+pub use sum::Sum;
+pub use talker::Talker;

@@ -1,0 +1,157 @@
+//! Texts, names and all the odd kinds of variables; messages, resources, and what the importer says of its experiment.
+
+use fmu_export::*;
+
+enumeration! {
+    /// How it talks.
+    pub enum Mood {
+        /// Says what it is told
+        Calm = 1,
+        /// Says it with emphasis
+        Excited = 2,
+        /// Says nothing
+        Sulking = 7,
+    }
+}
+
+/// Says what it hears, in its own way.
+#[derive(Clone)]
+pub struct Talker {
+    heard: String,
+    greeting: String,
+    mood: Mood,
+    volume: f64,
+    radicand: f64,
+    guess: f64,
+    root: f64,
+    /// All that it has said.
+    said: Vec<String>,
+    who: String,
+    words: String,
+    experiment: Experiment,
+    log: Log,
+}
+
+const MOOD: Type = Type::enumeration("Mood", <Mood as Enumeration>::ITEMS);
+const LEVEL: Type = Type::real("Level", &units::ONE).min(0.0).max(11.0);
+const SQUARE: Type = Type::real("Square", &units::ONE).min(1e-6).max(1e6);
+
+variables! { for Talker, memory in said, experiment.start_time, experiment.stop_time, experiment.tolerance;
+    /// What it hears
+    heard = input(&STRING) in heard;
+    /// What it says
+    reply = output(&STRING) by |talker| talker.reply();
+    /// What it said last
+    said = output(&STRING) by |talker| talker.said.last().cloned().unwrap_or_default();
+    /// What it says first
+    greeting = parameter(&STRING) in greeting;
+    /// How it talks
+    mood = input(&MOOD) in mood;
+    /// The same mood, as it hears itself
+    own_mood = output(&MOOD) by |talker| talker.mood;
+    /// How loud it is, to be turned while it runs
+    volume = parameter(&LEVEL).tunable() in volume;
+    /// The same in decibels
+    decibels = calculated_parameter(&NUMBER).tunable() by |talker| 20.0 * (1e-3 + talker.volume).log10();
+    /// What the greeting is long
+    length = calculated_parameter(&INTEGER) by |talker| talker.greeting.len() as i32;
+    /// What it finds the square root of
+    square = parameter(&SQUARE) in radicand;
+    /// The root, from a start value on
+    root = local(&NUMBER).approx() in guess by |talker| talker.root;
+    /// The answer
+    answer = output(&INTEGER).constant() by |_| 42;
+    /// The time
+    time = independent(&TIME);
+    /// Who it is
+    who = local(&STRING).fixed() by |talker| talker.who.clone();
+    /// What it has read in its resources
+    words = local(&STRING).fixed() by |talker| talker.words.clone();
+    /// When it begins
+    begin = local(&TIME).fixed() by |talker| talker.experiment.start_time;
+    /// When it ends, or -1
+    end = local(&TIME).fixed() by |talker| talker.experiment.stop_time.unwrap_or(-1.0);
+    /// How exact it should be, or -1
+    tolerance = local(&NUMBER).fixed() by |talker| talker.experiment.tolerance.unwrap_or(-1.0);
+}
+
+impl Talker {
+    fn reply(&self) -> String {
+        match self.mood {
+            Mood::Calm => self.heard.clone(),
+            Mood::Excited => format!("{}!", self.heard),
+            Mood::Sulking => String::new(),
+        }
+    }
+}
+
+impl Model for Talker {
+    const INFO: Info =
+        Info { description: "Says what it hears", guid: "{talker}", ..info!("Talker", "talker") };
+
+    fn new(setup: &Setup) -> Result<Self, Error> {
+        let path = setup.resources().map(|folder| folder.join("words.txt"));
+        let words = match path.map(std::fs::read_to_string) {
+            Some(Ok(words)) if words.trim().is_empty() => {
+                return Err(Error::new("resources/words.txt is empty"));
+            }
+            Some(Ok(words)) => words.trim().to_owned(),
+            _ => "none".to_owned(),
+        };
+        Ok(Self {
+            heard: String::new(),
+            greeting: "Hello".to_owned(),
+            mood: Mood::Calm,
+            volume: 5.0,
+            radicand: 2.0,
+            guess: 1.0,
+            root: 1.0,
+            said: Vec::new(),
+            who: setup.instance_name.clone(),
+            words,
+            experiment: Experiment::default(),
+            log: Log::default(),
+        })
+    }
+
+    fn update(&mut self) -> Result<(), Error> {
+        if self.volume > 10.0 {
+            self.log.warning(format!("a volume of {} hurts", self.volume));
+        }
+        Ok(())
+    }
+
+    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Error> {
+        self.experiment = *experiment;
+        self.said = vec![self.greeting.clone()];
+        Ok(())
+    }
+
+    /// Newton's method begins with the start value; a few rounds more or less do not matter.
+    fn calculate(&mut self, _: f64) {
+        let rounds = (0..60).try_fold(self.guess, |root, _| {
+            let next = 0.5 * (root + self.radicand / root);
+            next.is_finite().then_some(next)
+        });
+        self.root = rounds.unwrap_or(self.guess);
+    }
+
+    fn log(&mut self) -> Option<&mut Log> {
+        Some(&mut self.log)
+    }
+}
+
+impl CoSimulation for Talker {
+    fn step(&mut self, _: Step) -> Result<Stepped, Error> {
+        let reply = self.reply();
+        if !reply.is_empty() && self.said.len() < 100 {
+            self.log.event(format!("says {reply}"));
+            self.said.push(reply);
+        }
+        Ok(Stepped::Done)
+    }
+}
+
+impl ModelExchange for Talker {}
+
+offer!(Talker: CoSimulation + ModelExchange);

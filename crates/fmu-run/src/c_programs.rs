@@ -1,0 +1,96 @@
+//! C programs that load FMUs, compiled and run for tests, with the standard's own headers.
+//!
+//! All functions panic where something is missing, with a message that says what to do.
+
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The folder with the standard's `fmi2Functions.h`: `FMI2_HEADERS`, or that of the pip package fmpy in the `.venv` of
+/// this folder or one above it.
+///
+/// # Panics
+/// When there is none.
+pub fn headers(folder: &Path) -> PathBuf {
+    let named = std::env::var_os("FMI2_HEADERS").map(PathBuf::from);
+    let in_venvs = folder.ancestors().flat_map(|folder| {
+        let versions = std::fs::read_dir(folder.join(".venv/lib")).into_iter().flatten().flatten();
+        versions.map(|version| version.path().join("site-packages/fmpy/c-code"))
+    });
+    named
+        .into_iter()
+        .chain(in_venvs)
+        .find(|folder| folder.join("fmi2Functions.h").exists())
+        .expect("the headers of FMI 2.0 are missing; run: make headers (or set FMI2_HEADERS to their folder)")
+}
+
+/// The shared library of this name: Cargo puts it beside the test, one folder up, or among the examples there.
+///
+/// # Panics
+/// When it has not been built.
+pub fn library(name: &str) -> PathBuf {
+    let test = std::env::current_exe().expect("a test");
+    let file = format!("{DLL_PREFIX}{name}{DLL_SUFFIX}");
+    let folders = test.ancestors().skip(1).take(2);
+    let mut paths = folders.flat_map(|folder| [folder.join(&file), folder.join("examples").join(&file)]);
+    paths.find(|path| path.exists()).unwrap_or_else(|| {
+        panic!(
+            "there is no {file} near {}; cargo build --examples makes it, and cargo test without --test",
+            test.display()
+        )
+    })
+}
+
+/// What a program prints.
+///
+/// # Panics
+/// When it cannot be run, with the sentence that says what is missing, or fails.
+pub fn output(command: &mut Command, missing: &str) -> String {
+    let output = command.output().unwrap_or_else(|error| panic!("{missing}: {command:?}: {error}"));
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{command:?}: {}\n{stderr}", output.status);
+    String::from_utf8(output.stdout).expect("UTF-8")
+}
+
+/// Compiles a C program into a folder, with the headers found from the folder of its source.
+///
+/// # Panics
+/// When it does not compile without warnings.
+pub fn compile(source: &Path, folder: &Path) -> PathBuf {
+    let program = folder.join(source.file_stem().expect("a file"));
+    output(c_compiler(&headers(source)).arg("-o").args([&program, source]).arg("-ldl"), NO_COMPILER);
+    program
+}
+
+/// Checks that a C file compiles without warnings.
+///
+/// # Errors
+/// What the compiler says.
+///
+/// # Panics
+/// When there is no compiler.
+pub fn check_syntax(source: &Path, headers: &Path) -> Result<(), String> {
+    let output = c_compiler(headers).arg("-fsyntax-only").arg(source).output().expect(NO_COMPILER);
+    if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
+}
+
+const NO_COMPILER: &str = "these tests need a C compiler (cc, or set CC)";
+
+fn c_compiler(headers: &Path) -> Command {
+    let mut compiler = Command::new(std::env::var("CC").unwrap_or_else(|_| "cc".into()));
+    compiler.args(["-std=c11", "-D_GNU_SOURCE", "-Wall", "-Wextra", "-Werror", "-g", "-I"]).arg(headers);
+    compiler
+}
+
+/// Runs a program, under what `C_RUNNER` says (`make sanitize`: valgrind).
+///
+/// # Panics
+/// Never.
+pub fn command(program: &Path) -> Command {
+    let runner = std::env::var("C_RUNNER").unwrap_or_default();
+    let mut words = runner.split_whitespace().map(OsStr::new).chain([program.as_os_str()]);
+    let mut command = Command::new(words.next().expect("the program at least"));
+    command.args(words);
+    command
+}

@@ -1,0 +1,252 @@
+//! The arguments of a call, from bytes: mostly sensible ones, so that simulations get somewhere, and everything else that
+//! a C caller can pass.
+
+use arbitrary::{Result, Unstructured};
+use fmu_export::fmi2::types::*;
+use fmu_export::{BaseType, Causality, Exported};
+use std::ffi::CStr;
+use std::ptr::{null, null_mut};
+
+/// The value references that functions have a use for.
+pub struct Variables {
+    all: u32,
+    reals: Vec<u32>,
+    real_inputs: Vec<u32>,
+    real_starts: Vec<u32>,
+    unknowns: Vec<u32>,
+    whole: Vec<u32>,
+    booleans: Vec<u32>,
+    texts: Vec<u32>,
+    states: usize,
+    indicators: usize,
+}
+
+impl Variables {
+    pub fn of<M: Exported>() -> Self {
+        let those = |wanted: &dyn Fn(&fmu_export::Variable<M>) -> bool| {
+            let places = (0..).zip(M::TABLE).filter(|(_, variable)| wanted(variable));
+            places.map(|(vr, _)| vr).collect::<Vec<u32>>()
+        };
+        let real = |variable: &fmu_export::Variable<M>| variable.base() == BaseType::Real;
+        Self {
+            all: M::TABLE.len() as u32,
+            reals: those(&real),
+            real_inputs: those(&|variable| real(variable) && variable.causality() == Causality::Input),
+            real_starts: those(&|variable| real(variable) && variable.has_start()),
+            unknowns: those(&|variable| {
+                real(variable)
+                    && (variable.causality() == Causality::Output || variable.is_state_derivative())
+            }),
+            whole: those(&|variable| [BaseType::Integer, BaseType::Enumeration].contains(&variable.base())),
+            booleans: those(&|variable| variable.base() == BaseType::Boolean),
+            texts: those(&|variable| variable.base() == BaseType::String),
+            states: M::STATES.len(),
+            indicators: M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators),
+        }
+    }
+
+    /// Value references, mostly of variables that the function can use.
+    fn references(&self, u: &mut Unstructured, count: usize, function: &str) -> Result<Vec<u32>> {
+        let fitting = match function {
+            "fmi2SetReal" if u.ratio(1, 2)? => &self.real_inputs,
+            "fmi2SetReal" => &self.real_starts,
+            "fmi2SetRealInputDerivatives" => &self.real_inputs,
+            "fmi2GetDirectionalDerivative" => &self.unknowns,
+            name if name.ends_with("Real") || name.ends_with("Derivatives") => &self.reals,
+            name if name.ends_with("Integer") => &self.whole,
+            name if name.ends_with("Boolean") => &self.booleans,
+            name if name.ends_with("String") => &self.texts,
+            _ => &self.reals,
+        };
+        let fits = u.ratio(15, 16)? && !fitting.is_empty();
+        array(count, || {
+            let odd = [self.all, self.all + 1, u32::MAX, 1 << 31, self.all / 2, 0];
+            Ok(*u.choose(if fits { fitting } else { &odd })?)
+        })
+    }
+}
+
+/// What is wrong with a pointer. Wrong pointers that the FMU cannot recognize are not passed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Fault {
+    None,
+    Null,
+    Misaligned,
+}
+
+/// The arguments of any function; each takes what it has a use for.
+#[derive(Clone, Debug)]
+pub struct CallArguments {
+    pub vr: Vec<u32>,
+    pub known: Vec<u32>,
+    pub orders: Vec<i32>,
+    pub reals: Vec<f64>,
+    pub integers: Vec<i32>,
+    pub texts: Vec<fmi2String>,
+    pub categories: Vec<fmi2String>,
+    pub flags: [i32; 2],
+    pub kind: i32,
+    pub numbers: [f64; 3],
+    faults: [Fault; 4],
+    /// A length that no array can have.
+    endless: bool,
+}
+
+/// Real numbers to try at least.
+const SPECIAL: [f64; 20] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    1e-9,
+    1e9,
+    1e150,
+    -1e150,
+    1e308,
+    -1e308,
+    f64::MAX,
+    f64::MIN,
+    f64::EPSILON,
+    f64::MIN_POSITIVE,
+    5e-324,
+    -5e-324,
+    f64::NAN,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+    1e-300,
+];
+
+const TEXTS: [Option<&CStr>; 8] = [
+    Some(c"hello"),
+    Some(c""),
+    Some(c"G\xc3\xb6del"),
+    Some(c"%s%n#r1#\n"),
+    Some(c"rather a long text, longer than what fits beside a pointer in a structure of a few words"),
+    Some(c"no UTF-8: \xff\xfe"),
+    Some(c"\xf0\x9f\x99\x82"),
+    None,
+];
+
+const CATEGORIES: [Option<&CStr>; 8] = [
+    Some(c"logEvents"),
+    Some(c"logStatusDiscard"),
+    Some(c"logStatusError"),
+    Some(c"logStatusFatal"),
+    Some(c"logAll"),
+    Some(c"%s%n"),
+    Some(c""),
+    None,
+];
+
+const STEP_SIZES: [f64; 8] = [1e-3, 1e-3, 1e-2, 1.0 / 60.0, 0.1, 2.0, 1e-9, 1e4];
+
+/// Any number.
+fn wild(u: &mut Unstructured) -> Result<f64> {
+    Ok(if u.ratio(2, 3)? { *u.choose(&SPECIAL)? } else { f64::from_bits(u.arbitrary()?) })
+}
+
+/// An ordinary number.
+fn tame(u: &mut Unstructured) -> Result<f64> {
+    Ok(f64::from(u.arbitrary::<i16>()?) / 8192.0)
+}
+
+/// An array; a long one repeats itself.
+fn array<T: Clone>(count: usize, element: impl FnMut() -> Result<T>) -> Result<Vec<T>> {
+    let first: Vec<T> = std::iter::repeat_with(element).take(count.min(16)).collect::<Result<_>>()?;
+    Ok(first.into_iter().cycle().take(count).collect())
+}
+
+fn reals(u: &mut Unstructured, count: usize) -> Result<Vec<f64>> {
+    let is_tame = u.ratio(4, 5)?;
+    array(count, || if is_tame { tame(u) } else { wild(u) })
+}
+
+fn texts(u: &mut Unstructured, count: usize, known: &[Option<&CStr>]) -> Result<Vec<fmi2String>> {
+    array(count, || Ok(u.choose(known)?.map_or(null(), CStr::as_ptr)))
+}
+
+impl CallArguments {
+    /// Decodes the arguments of a call at this time of the instance.
+    pub fn decode(u: &mut Unstructured, function: &str, time: f64, variables: &Variables) -> Result<Self> {
+        let count = match u.int_in_range(0..=63_u8)? {
+            0 => 5000,
+            n @ 1..=50 => usize::from(n % 5),
+            n => usize::from(n - 50),
+        };
+        let right = match function {
+            "fmi2GetEventIndicators" => Some(variables.indicators),
+            name if name.contains("Continuous") || name == "fmi2GetDerivatives" => Some(variables.states),
+            _ => None,
+        };
+        let count = match right {
+            Some(right) if u.ratio(7, 8)? => right,
+            _ => count,
+        };
+        let mut fault = || -> Result<Fault> {
+            Ok(match u.int_in_range(0..=63_u8)? {
+                0 => Fault::Null,
+                1 => Fault::Misaligned,
+                _ => Fault::None,
+            })
+        };
+        let faults = [fault()?, fault()?, fault()?, fault()?];
+        let numbers = if function == "fmi2DoStep" {
+            let off = if u.ratio(1, 16)? { wild(u)? } else { *u.choose(&[0.0, 0.0, 1e-12, -1e-12])? };
+            let size = if u.ratio(1, 16)? { wild(u)? } else { *u.choose(&STEP_SIZES)? };
+            [time + off, size, 0.0]
+        } else if u.ratio(3, 4)? {
+            [tame(u)?.abs(), tame(u)?, 10.0 + tame(u)?]
+        } else {
+            [wild(u)?, wild(u)?, wild(u)?]
+        };
+        // Not all of 5000 with respect to 5000, which would take seconds.
+        let known_count = if count > 100 { 100 } else { u.int_in_range(0..=6)? };
+        let small = |u: &mut Unstructured| -> Result<i32> {
+            Ok(if u.ratio(15, 16)? { u.int_in_range(0..=3)? } else { u.arbitrary()? })
+        };
+        let mut known = variables.references(u, known_count, "fmi2SetReal")?;
+        if known_count == 0 && u.ratio(1, 8)? {
+            known.push(u.arbitrary()?);
+        }
+        // Not every second text a wrong one.
+        let good = if u.ratio(3, 4)? { &TEXTS[..5] } else { &TEXTS };
+        Ok(Self {
+            vr: variables.references(u, count, function)?,
+            orders: array(count, || if u.ratio(15, 16)? { Ok(1) } else { small(u) })?,
+            reals: reals(u, count.max(known.len()))?,
+            integers: array(count, || small(u))?,
+            texts: texts(u, count, good)?,
+            categories: texts(u, count, &CATEGORIES)?,
+            flags: [small(u)?, small(u)?],
+            kind: small(u)?,
+            numbers,
+            known,
+            faults,
+            endless: u.ratio(1, 64)?,
+        })
+    }
+
+    /// The length to pass for arrays of `count` values.
+    pub fn count(&self, count: usize) -> usize {
+        if self.endless { usize::MAX } else { count }
+    }
+
+    /// The pointer to pass for the array at this place of the function's arguments.
+    pub fn pointer<T>(&self, place: usize, values: &[T]) -> *const T {
+        match self.faults[place] {
+            Fault::Null => null(),
+            // Never followed: the FMU refuses it. Bytes are never misaligned, and then there is no fault.
+            Fault::Misaligned if align_of::<T>() > 1 => values.as_ptr().wrapping_byte_add(1),
+            _ => values.as_ptr(),
+        }
+    }
+
+    /// The pointer to pass for an array that the function writes.
+    pub fn output<T>(&self, place: usize, values: &mut [T]) -> *mut T {
+        match self.faults[place] {
+            Fault::Null => null_mut(),
+            Fault::Misaligned if align_of::<T>() > 1 => values.as_mut_ptr().wrapping_byte_add(1),
+            _ => values.as_mut_ptr(),
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! Loads FMUs and calls them: the functions of FMI 2.0 as methods, on an instance that frees itself.
+//!
+//! [`load`] takes the shared library of any FMU; [`Functions::of`](fmu_export::fmi2::Functions::of) those of a model in
+//! the same program. [`testing`] has what tests of FMUs need, [`serialized`] the bytes of saved states, [`c_programs`]
+//! what tests with C programs need. With the feature `careless` there is an importer that makes any calls in any order,
+//! with `realtime` a check that code may run in a control loop.
+
+pub mod c_programs;
+#[cfg(feature = "careless")]
+pub mod careless;
+mod importer;
+mod library;
+#[cfg(feature = "realtime")]
+pub mod realtime;
+pub mod serialized;
+pub mod testing;
+
+pub use fmu_export::fmi2::Functions;
+pub use importer::{Arguments, FUNCTIONS, Importer, Message};
+pub use library::{Library, load};
