@@ -2,11 +2,11 @@
 
 use crate::content::{ContentFile, content_files};
 use crate::fingerprint::Fingerprint;
+use crate::folder::files;
 use crate::packages::{LocalPackage, Neighbourhood};
 use anyhow::{Context, Result};
 use std::fs;
 use std::path::{Path, PathBuf};
-use walkdir::{DirEntry, WalkDir};
 
 /// The files that an FMU follows from.
 ///
@@ -126,23 +126,4 @@ impl Sources {
     fn lock(&self) -> Option<PathBuf> {
         self.folder.ancestors().map(|folder| folder.join("Cargo.lock")).find(|lock| lock.is_file())
     }
-}
-
-/// The file itself, or all files of a folder but hidden ones: the name after the folder's, the same on every
-/// system, and the path.
-fn files(path: &Path) -> Result<Vec<(String, PathBuf)>> {
-    if !path.is_dir() {
-        return Ok(vec![(String::new(), path.to_owned())]);
-    }
-    let is_hidden = |entry: &DirEntry| entry.depth() > 0 && entry.file_name().as_encoded_bytes()[0] == b'.';
-    let mut files = Vec::new();
-    for entry in WalkDir::new(path).sort_by_file_name().into_iter().filter_entry(|entry| !is_hidden(entry)) {
-        let entry = entry.with_context(|| format!("cannot read {}", path.display()))?;
-        if entry.file_type().is_file() {
-            let inside = entry.path().strip_prefix(path)?.iter();
-            let inside: String = inside.map(|part| format!("/{}", part.to_string_lossy())).collect();
-            files.push((inside, entry.into_path()));
-        }
-    }
-    Ok(files)
 }

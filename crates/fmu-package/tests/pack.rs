@@ -1,7 +1,8 @@
 //! The FMU as a file.
 
 use anyhow::bail;
-use fmi2_package::{ContentFile, Library, Platform, pack, write_atomically};
+use fmu_package::files::write_atomically;
+use fmu_package::{ContentFile, Library, Platform, pack};
 use std::fs;
 use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};

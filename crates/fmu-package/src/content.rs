@@ -1,8 +1,8 @@
 //! The files of an FMU that are neither its description nor its library.
 
-use anyhow::{Context, Result, bail};
+use crate::folder::{files, names};
+use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
-use walkdir::WalkDir;
 
 /// Where a folder's entries go in the FMU (section 2.3).
 const PLACES: [(&str, &str); 6] = [
@@ -31,40 +31,25 @@ pub struct ContentFile {
 /// # Errors
 /// When a top-level entry is none of these, a file cannot be found, or a name is not UTF-8.
 pub fn content_files(folder: &Path, except: &[&str]) -> Result<Vec<ContentFile>> {
-    let mut files = Vec::new();
-    let mut walk = WalkDir::new(folder).min_depth(1).follow_links(true).into_iter();
-    while let Some(entry) = walk.next() {
-        let entry = entry.with_context(|| format!("cannot read {}", folder.display()))?;
-        let inside = entry.path().strip_prefix(folder)?;
-        let Some(inside) = inside.to_str() else {
-            bail!("the name of {} is not UTF-8; rename it", entry.path().display());
-        };
-        if entry.file_name().to_string_lossy().starts_with('.') || except.contains(&inside) {
-            if entry.file_type().is_dir() {
-                walk.skip_current_dir();
-            }
-            continue;
-        }
-        let inside = inside.replace(std::path::MAIN_SEPARATOR, "/");
-        let (top, rest) = inside.split_once('/').unwrap_or((&inside, ""));
+    let mut content = Vec::new();
+    for top in names(folder)?.into_iter().filter(|top| !except.contains(&top.as_str())) {
+        let path = folder.join(&top);
         let Some((_, place)) = PLACES.iter().find(|(name, _)| *name == top) else {
             let known = PLACES.map(|(name, _)| name).join(", ");
-            bail!("{} has no place in an FMU; move it away, or into one of {known}", entry.path().display());
+            bail!("{} has no place in an FMU; move it away, or into one of {known}", path.display());
         };
-        if entry.file_type().is_file() {
-            let name = if rest.is_empty() { (*place).to_owned() } else { format!("{place}/{rest}") };
-            files.push(ContentFile { name, path: entry.into_path() });
-        }
+        let files = files(&path)?.into_iter();
+        content.extend(files.map(|(rest, path)| ContentFile { name: format!("{place}{rest}"), path }));
     }
-    files.sort_by(|a, b| a.name.cmp(&b.name));
-    if let Some(pair) = files.windows(2).find(|pair| pair[0].name == pair[1].name) {
+    content.sort_by(|a, b| a.name.cmp(&b.name));
+    if let Some(pair) = content.windows(2).find(|pair| pair[0].name == pair[1].name) {
         bail!(
             "{} and {} would have the same name in the FMU",
             pair[0].path.display(),
             pair[1].path.display()
         );
     }
-    Ok(files)
+    Ok(content)
 }
 
 #[cfg(all(test, feature = "package"))]

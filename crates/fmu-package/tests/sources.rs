@@ -1,6 +1,6 @@
 //! The guid covers the package and those that it uses by path, and nothing of where they are.
 
-use fmi2_package::Sources;
+use fmu_package::Sources;
 use std::fs;
 use std::path::Path;
 

@@ -1,13 +1,15 @@
 //! Systems of FMUs: what is wired wrongly is named; what is right comes out as the standards want it.
 
-use fmi2_package::{Start, System};
+use fmu_system::System;
 use std::fs;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
 const UNITS: &str = r#"<UnitDefinitions><Unit name="rad"><BaseUnit rad="1"/></Unit><Unit name="s"><BaseUnit s="1"/></Unit></UnitDefinitions>
-<TypeDefinitions><SimpleType name="Angle"><Real unit="rad"/></SimpleType></TypeDefinitions>"#;
+<TypeDefinitions><SimpleType name="Angle"><Real unit="rad"/></SimpleType>
+<SimpleType name="Gear"><Enumeration><Item name="Neutral" value="0"/><Item name="Drive" value="3"/></Enumeration></SimpleType>
+<SimpleType name="Other"><Enumeration><Item name="Neutral" value="1"/></Enumeration></SimpleType></TypeDefinitions>"#;
 
 fn fmu(folder: &Path, name: &str, variables: &str) -> PathBuf {
     let path = folder.join(name);
@@ -33,11 +35,16 @@ fn fmus(folder: &Path) -> Vec<(&'static str, PathBuf)> {
         variable("delay", "output", r#"Real unit="s""#),
         variable("bare", "output", "Real"),
         variable("on", "parameter", "Boolean"),
+        variable("gear", "parameter", r#"Enumeration declaredType="Gear""#),
+        variable("gear_now", "output", r#"Enumeration declaredType="Gear""#),
+        variable("note", "parameter", "String"),
     ];
     let law = [
         variable("r", "input", r#"Real unit="rad""#),
         variable("y", "input", r#"Real declaredType="Angle""#),
         variable("n", "input", "Integer"),
+        variable("gear", "input", r#"Enumeration declaredType="Gear""#),
+        variable("other_gear", "input", r#"Enumeration declaredType="Other""#),
         variable("u", "output", r#"Real unit="rad""#),
     ];
     vec![("law", fmu(folder, "law.fmu", &law.concat())), ("plant", fmu(folder, "plant.fmu", &plant.concat()))]
@@ -48,10 +55,10 @@ fn system<'a>(folder: &Path) -> System<'a> {
         name: "loop",
         description: "A loop",
         components: fmus(folder),
-        inputs: vec![("reference", "law.r", 0.5)],
+        inputs: vec![("reference", "law.r", "0.5".into())],
         outputs: vec![("angle", "plant.y")],
         connections: vec![("law.u", "plant.u"), ("plant.y", "law.y")],
-        start: vec![("plant.on", Start::Boolean(true))],
+        start: vec![("plant.on", "true".into())],
         stop_time: 2.0,
         step_size: 0.001,
     }
@@ -72,12 +79,21 @@ fn what_does_not_fit_is_named() {
         (|s| s.connections.push(("plant.y", "law.n")), "plant.y is Real, law.n is Integer"),
         (|s| s.connections.push(("plant.y", "law.r")), "law.r is fed twice"),
         (|s| s.outputs.push(("x", "plant.on")), "plant.on is parameter, not output"),
-        (|s| s.start.push(("plant.y", Start::Real(0.0))), "plant.y is output, not parameter or input"),
-        (|s| s.start.push(("plant.on", Start::Real(0.0))), "plant.on is Boolean, its start value is Real"),
-        (|s| s.components[0].1 = "none.fmu".into(), "none.fmu is no usable FMU: it cannot be read"),
-        (|s| s.inputs[0].2 = f64::NAN, "the start value of law.r must be a finite number, it is NaN"),
+        (|s| s.start.push(("plant.y", "0".into())), "plant.y is output, not parameter or input"),
+        (|s| s.start.push(("plant.on", "0".into())), "plant.on is Boolean, its start value cannot be '0'"),
+        (|s| s.inputs[0].2 = "far".into(), "law.r is Real, its start value cannot be 'far'"),
         (
-            |s| s.start.push(("plant.u", Start::Real(f64::INFINITY))),
+            |s| s.start.push(("plant.gear", "Fast".into())),
+            "plant.gear is Enumeration, its start value cannot be 'Fast'",
+        ),
+        (
+            |s| s.connections.push(("plant.gear_now", "law.other_gear")),
+            "plant.gear_now and law.other_gear have different items",
+        ),
+        (|s| s.components[0].1 = "none.fmu".into(), "none.fmu is no usable FMU: it cannot be read"),
+        (|s| s.inputs[0].2 = "NaN".into(), "the start value of law.r must be a finite number, it is NaN"),
+        (
+            |s| s.start.push(("plant.u", "inf".into())),
             "the start value of plant.u must be a finite number, it is inf",
         ),
         (|s| s.stop_time = f64::INFINITY, "the stop time must be > 0, it is inf"),
@@ -165,10 +181,10 @@ fn twins<'a>(components: Vec<(&'a str, PathBuf)>) -> System<'a> {
         name: "twins",
         description: "Two of a kind",
         components,
-        inputs: vec![("u", "one.u", 0.0)],
+        inputs: vec![("u", "one.u", "0".into())],
         outputs: vec![("y", "other.y")],
         connections: vec![("one.y", "other.u")],
-        start: vec![("one.on", Start::Boolean(true)), ("other.on", Start::Boolean(false))],
+        start: vec![("one.on", "true".into()), ("other.on", "false".into())],
         stop_time: 1.0,
         step_size: 0.1,
     }
@@ -217,4 +233,34 @@ fn different_fmus_with_the_same_file_name_are_named() {
     );
     let error = twins(vec![("one", plant), ("other", other)]).check().err().unwrap();
     assert_eq!(error.to_string(), message);
+}
+
+#[test]
+fn enumerations_and_strings_are_passed_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut system = system(folder.path());
+    system.connections.push(("plant.gear_now", "law.gear"));
+    system.start = vec![("plant.gear", "Drive".into()), ("plant.note", "a < b".into())];
+    let checked = system.check().unwrap();
+    let (ssp, osp) = (folder.path().join("loop.ssp"), folder.path().join("osp"));
+    checked.write_ssp(&ssp).unwrap();
+    let mut zip = ZipArchive::new(fs::File::open(&ssp).unwrap()).unwrap();
+    let mut read = |name: &str| {
+        let mut text = String::new();
+        zip.by_name(name).unwrap().read_to_string(&mut text).unwrap();
+        text
+    };
+    let (ssd, ssv) = (read("SystemStructure.ssd"), read("resources/plant.ssv"));
+    assert_eq!(ssd.matches(r#"<ssc:Enumeration name="Gear"/>"#).count(), 2, "{ssd}");
+    assert_eq!(ssd.matches(r#"<ssc:Enumeration name="Gear">"#).count(), 1, "{ssd}");
+    assert!(ssd.contains(r#"<ssc:Item name="Drive" value="3"/>"#) && !ssd.contains("Other"), "{ssd}");
+    assert!(ssv.contains(r#"<ssv:Enumeration value="Drive"/>"#), "{ssv}");
+    assert!(ssv.contains(r#"<ssv:String value="a &lt; b"/>"#), "{ssv}");
+
+    checked.write_osp(&osp).unwrap();
+    let text = fs::read_to_string(osp.join("OspSystemStructure.xml")).unwrap();
+    assert!(
+        text.contains(r#"<Integer value="3"/>"#) && text.contains(r#"<String value="a &lt; b"/>"#),
+        "{text}"
+    );
 }

@@ -1,16 +1,18 @@
 //! The command `build_fmu`, the same for every model.
 
 use crate::cargo::LibraryBuild;
-use crate::describe::{Changes, describe};
+use crate::changes::Changes;
+use crate::describe::describe;
+use crate::files::write_atomically;
 use crate::library::check_platform;
-use crate::pack::{Library, pack, write_atomically};
+use crate::pack::{Library, pack};
 use crate::packages::Neighbourhood;
 use crate::platform::Platform;
 use crate::sources::Sources;
 use crate::terminal::short;
-use crate::variant::{Start, Variant};
+use crate::variant::{NO_GUID, Variant};
 use anyhow::{Context, Result, bail, ensure};
-use fmi2_export::Model;
+use fmu_export::Exported;
 use std::ffi::OsString;
 use std::fs;
 use std::io::Write;
@@ -59,8 +61,8 @@ pub struct Builder {
     pub compiled_from: &'static str,
     /// The cargo profile of the library.
     pub profile: &'static str,
-    /// Start values that differ from the ones this program was compiled with.
-    pub start: Vec<(String, Start)>,
+    /// Start values that differ from the ones this program was compiled with, see [`Variant::start`].
+    pub start: Vec<(String, String)>,
     /// The file that those start values are from, for messages.
     pub start_from: Option<PathBuf>,
     /// Whether they are the ones of the description that is kept with the sources.
@@ -95,13 +97,17 @@ impl Builder {
     /// # Errors
     /// When the sources have changed since this program was compiled, the model contradicts itself, the
     /// library cannot be compiled or does not belong to it, or a file cannot be written.
-    pub fn run<M: Model>(&self, options: &BuildOptions) -> Result<()> {
+    pub fn run<M: Exported>(&self, options: &BuildOptions) -> Result<()> {
         let variant = self.variant(options.tunable)?;
         let described = match &self.start_from {
             Some(file) if !self.is_default => short(file),
-            _ => M::INFO.identifier.into(),
+            _ => M::INFO.identifier.to_owned(),
         };
-        let description = describe::<M>(&Changes::from(&variant)).context(described)?;
+        let guid = variant.guid();
+        let describe = |guid: &str| {
+            let changes = Changes { guid: Some(guid.to_owned()), ..Changes::from(&variant) };
+            describe::<M>(&changes).with_context(|| described.clone())
+        };
         let committed = self.sources.folder.join(DESCRIPTION);
         let is_default = self.is_default && !options.tunable;
         if options.describe {
@@ -110,11 +116,12 @@ impl Builder {
                 None if is_default => committed,
                 None => bail!("{DESCRIPTION} is for the defaults; name another folder with --out"),
             };
-            return write_description(&path, &description);
+            // Kept with the sources, it must not change whenever they do.
+            return write_description(&path, &describe(NO_GUID)?);
         }
 
+        let description = describe(&guid)?;
         let libraries = self.libraries(options)?;
-        let guid = variant.guid();
         for library in &libraries {
             check_library(library, &guid, options.any_processor)?;
         }
@@ -136,7 +143,10 @@ impl Builder {
         };
         let tunable = if options.tunable { ", tunable" } else { "" };
         println!("guid {guid}{start}{tunable}");
-        if is_default && fs::read(&committed).is_ok_and(|text| text != description.as_bytes()) {
+        if is_default
+            && let Ok(text) = fs::read(&committed)
+            && text != describe(NO_GUID)?.as_bytes()
+        {
             eprintln!(
                 "note: {DESCRIPTION} in the sources is out of date; write it anew with\n      {} -- --describe",
                 self.command

@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 /// builds of the same content must agree on it.
 ///
 /// ```
-/// use fmi2_package::Fingerprint;
+/// use fmu_package::Fingerprint;
 ///
 /// let mut fingerprint = Fingerprint::new();
 /// fingerprint.add("src/lib.rs", b"fn main() {}");

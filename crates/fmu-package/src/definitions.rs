@@ -1,0 +1,109 @@
+//! Definitions of units and types (sections 2.2.2 and 2.2.3).
+
+use crate::xml::Element;
+use anyhow::{Result, ensure};
+use fmu_export::{Attributes, Type, Unit};
+
+/// The units of these types, in the order of their first use.
+///
+/// Fails when two different units share a name.
+pub(crate) fn unit_definitions(types: &[&Type]) -> Result<Option<Element>> {
+    let mut units: Vec<&Unit> = Vec::new();
+    for of in types {
+        let Attributes::Real { unit, .. } = of.of else { continue };
+        match units.iter().find(|known| known.name == unit.name) {
+            Some(known) => {
+                ensure!(*known == unit, "there are two different units with the name {}", unit.name)
+            }
+            None => units.push(unit),
+        }
+    }
+    Ok(list("UnitDefinitions", units.into_iter().map(unit_definition)))
+}
+
+fn unit_definition(unit: &Unit) -> Element {
+    let fmu_export::BaseUnit { kg, m, s, A: ampere, K: kelvin, mol, cd, rad, factor, offset } = unit.base;
+    let exponents = [
+        ("kg", kg),
+        ("m", m),
+        ("s", s),
+        ("A", ampere),
+        ("K", kelvin),
+        ("mol", mol),
+        ("cd", cd),
+        ("rad", rad),
+    ];
+    let exponents = exponents.into_iter().filter(|(_, exponent)| *exponent != 0);
+    let base = exponents.fold(Element::new("BaseUnit"), |base, (name, exponent)| base.with(name, exponent));
+    let base =
+        base.with_some("factor", (factor != 1.0).then_some(factor)).with_some("offset", not_zero(offset));
+    let display = unit.display.map(|display| {
+        Element::new("DisplayUnit")
+            .with("name", display.name)
+            .with("factor", display.factor)
+            .with_some("offset", not_zero(display.offset))
+    });
+    Element::new("Unit").with("name", unit.name).containing([base]).containing(display)
+}
+
+fn not_zero(offset: f64) -> Option<f64> {
+    (offset != 0.0).then_some(offset)
+}
+
+/// Those of these types that have a name, in the order of their first use.
+///
+/// Fails when two different types share a name, or a type and a variable do.
+pub(crate) fn type_definitions(types: &[&Type], variables: &[&str]) -> Result<Option<Element>> {
+    let mut named: Vec<&Type> = Vec::new();
+    for of in types.iter().filter(|of| !of.name.is_empty()) {
+        let name = of.name;
+        ensure!(
+            !variables.contains(&name),
+            "{name} is a variable and a type; rename one of them (section 2.2.3)"
+        );
+        match named.iter().find(|known| known.name == name) {
+            Some(known) => ensure!(known == of, "there are two different types with the name {name}"),
+            None => named.push(of),
+        }
+    }
+    let definition = |of: &Type| {
+        let element = with_attributes(Element::new(of.base().to_string()), of);
+        let items = if let Attributes::Enumeration(items) = of.of { items } else { &[] };
+        let item = |item: &fmu_export::Item| {
+            Element::new("Item")
+                .with("name", item.name)
+                .with("value", item.value)
+                .with_some("description", filled(item.description))
+        };
+        let element = element.containing(items.iter().map(item));
+        Element::new("SimpleType").with("name", of.name).containing([element])
+    };
+    Ok(list("TypeDefinitions", named.into_iter().map(definition)))
+}
+
+/// The element with what its type says: quantity, unit, range, nominal value.
+pub(crate) fn with_attributes(element: Element, of: &Type) -> Element {
+    match of.of {
+        Attributes::Real { quantity, unit, min, max, nominal } => element
+            .with_some("quantity", filled(quantity))
+            .with("unit", unit.name)
+            .with_some("displayUnit", unit.display.map(|display| display.name))
+            .with_some("min", min)
+            .with_some("max", max)
+            .with_some("nominal", nominal),
+        Attributes::Integer { min, max } => element
+            .with_some("min", (min != i32::MIN).then_some(min))
+            .with_some("max", (max != i32::MAX).then_some(max)),
+        _ => element,
+    }
+}
+
+/// The text, unless it is empty.
+pub(crate) fn filled(text: &str) -> Option<&str> {
+    Some(text).filter(|text| !text.is_empty())
+}
+
+/// An element with these in it; `None` if there are none: the schema has no empty lists.
+pub(crate) fn list(name: &str, elements: impl IntoIterator<Item = Element>) -> Option<Element> {
+    Some(Element::new(name).containing(elements)).filter(|list| !list.children.is_empty())
+}

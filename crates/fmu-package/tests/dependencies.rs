@@ -1,0 +1,137 @@
+//! The dependencies of models with branches and memory, where no trying near the start values can find them.
+
+use fmu_export::*;
+use fmu_package::structure::DependencyKind::Dependent;
+use fmu_package::structure::{ModelStructure, Unknown};
+use fmu_package::{Changes, describe};
+
+#[derive(Clone, Default)]
+struct Branches {
+    u: f64,
+    v: f64,
+    sum: f64,
+    gain: f64,
+    stepped: bool,
+}
+
+impl Branches {
+    fn above(&self) -> f64 {
+        if self.u > 10.0 { self.u } else { 0.0 }
+    }
+}
+
+variables! { for Branches, memory in sum, stepped;
+    /// Input
+    u = input(&NUMBER) in u;
+    /// Input
+    v = input(&NUMBER) in v;
+    /// u where it is above 10, else 0
+    above = output(&NUMBER) by |model| model.above();
+    /// u within 100, v after the first step
+    limited = output(&NUMBER) by |model| model.u.clamp(-100.0, 100.0) + if model.stepped { model.v } else { 0.0 };
+    /// The same as above
+    declared = output(&NUMBER).depends_on(&[u]) by |model| model.above();
+    /// The sum of u at the steps before, times the gain
+    sum = output(&NUMBER).depends_on(&[gain]) by |model| model.gain * (1.0 + model.sum);
+    /// Factor
+    gain = parameter(&NUMBER) in gain;
+}
+
+impl Model for Branches {
+    const INFO: Info = Info::new("Branches", "branches", "{branches}");
+
+    fn new(_: &Setup) -> Result<Self, Error> {
+        Ok(Self { gain: 1.0, ..Self::default() })
+    }
+}
+
+impl CoSimulation for Branches {
+    fn step(&mut self, _: Step) -> Result<Stepped, Error> {
+        self.sum += self.u;
+        self.stepped = true;
+        Ok(Stepped::Done)
+    }
+}
+
+impl Partials for Branches {
+    /// Exact where the model is, and 0 all around the start values.
+    fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
+        Some(match (unknown, known) {
+            (Name::above | Name::declared, Name::u) => f64::from(self.u > 10.0),
+            (Name::limited, Name::u) => f64::from(self.u.abs() < 100.0),
+            (Name::limited, Name::v) => f64::from(self.stepped),
+            _ => 0.0,
+        })
+    }
+}
+
+offer!(Branches: CoSimulation + Partials);
+
+#[test]
+fn what_cannot_be_ruled_out_is_listed_and_what_is_declared_narrows_it() {
+    let structure = ModelStructure::of::<Branches>(false).unwrap();
+    let known = |list: Vec<Unknown>| {
+        list.into_iter()
+            .map(|Unknown { vr, dependencies }| {
+                assert!(dependencies.iter().all(|(_, kind)| *kind == Dependent), "{dependencies:?}");
+                (vr, dependencies.into_iter().map(|(known, _)| known).collect())
+            })
+            .collect::<Vec<(u32, Vec<u32>)>>()
+    };
+    let [u, v, above, limited, declared, sum, gain] = [0, 1, 2, 3, 4, 5, 6];
+    assert_eq!(
+        known(structure.outputs),
+        [(above, vec![u, v]), (limited, vec![u, v]), (declared, vec![u]), (sum, vec![])]
+    );
+    assert_eq!(
+        known(structure.initial_unknowns),
+        [(above, vec![u, v, gain]), (limited, vec![u, v, gain]), (declared, vec![u]), (sum, vec![gain])]
+    );
+}
+
+/// Models that say that their output depends on nothing.
+macro_rules! liars {
+    ($($name:ident: $smooth:literal;)+) => { $(
+        mod $name {
+            use super::*;
+
+            #[derive(Clone, Default)]
+            pub struct Liar {
+                u: f64,
+            }
+
+            variables! { for Liar;
+                /// Input
+                u = input(&NUMBER) in u;
+                /// The input
+                y = output(&NUMBER).depends_on(&[]) by |liar| liar.u;
+            }
+
+            impl Model for Liar {
+                const INFO: Info = Info { smooth: $smooth, ..Info::new("Liar", "liar", "{liar}") };
+
+                fn new(_: &Setup) -> Result<Self, Error> {
+                    Ok(Self::default())
+                }
+            }
+
+            impl ModelExchange for Liar {}
+            offer!(Liar: ModelExchange);
+        }
+    )+ };
+}
+
+liars! {
+    plain: false;
+    smooth: true;
+}
+
+#[test]
+fn a_declaration_that_the_model_contradicts_is_refused() {
+    for error in [
+        describe::<plain::Liar>(&Changes::default()).unwrap_err(),
+        describe::<smooth::Liar>(&Changes::default()).unwrap_err(),
+    ] {
+        assert_eq!(error.to_string(), "y reacts to u, which its depends_on does not name");
+    }
+}

@@ -1,0 +1,179 @@
+//! As SSP: System Structure and Parameterization 1.0.
+
+use crate::fmu::{Items, Variable};
+use crate::system::{CheckedSystem, System, file_name, split};
+use anyhow::{Result, ensure};
+use fmu_package::files::{write_atomically, zip};
+use fmu_package::xml::Element;
+use std::collections::{BTreeMap, HashSet};
+use std::io::Write;
+use std::path::Path;
+
+const COMMON: &str = "http://ssp-standard.org/SSP1/SystemStructureCommon";
+
+impl CheckedSystem<'_> {
+    /// Writes the SSP and tells its size in bytes.
+    ///
+    /// The FMUs are in `resources`, with a file of start values beside each that needs one; the start values
+    /// of the system's inputs are in `resources/experiment.ssv`. All sets of start values are named `default`.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write_ssp(&self, destination: &Path) -> Result<u64> {
+        let mut entries = vec![("SystemStructure.ssd".to_owned(), self.ssd()?.document()?.into_bytes())];
+        for (name, bytes) in self.files()? {
+            entries.push((format!("resources/{name}"), bytes.to_vec()));
+        }
+        for (component, _) in &self.system.components {
+            let own = self.own_start(component).into_iter().map(|(name, start)| (split(name).1, name, start));
+            entries.extend(self.ssv(component, own)?);
+        }
+        let inputs = self.system.inputs.iter().map(|(name, to, start)| (*name, *to, start.as_str()));
+        entries.extend(self.ssv("experiment", inputs)?);
+        entries[1..].sort();
+        let bytes = zip(&entries)?;
+        write_atomically(destination, |file| Ok(file.write_all(&bytes)?))
+    }
+
+    fn ssd(&self) -> Result<Element> {
+        let System { name, description, components, inputs, outputs, connections, .. } = self.system;
+        let mut elements = Vec::new();
+        for (component, path) in components {
+            let own = |end: &str| split(end).0 == *component;
+            // Only what is connected: masters trip over the rest.
+            let mut connectors = Vec::new();
+            let to = inputs.iter().map(|(_, to, _)| *to).chain(connections.iter().map(|(_, to)| *to));
+            for to in to.filter(|to| own(to)) {
+                connectors.push(self.connector(split(to).1, to, "input")?);
+            }
+            let from = outputs.iter().map(|(_, from)| *from).chain(connections.iter().map(|(from, _)| *from));
+            let mut listed = HashSet::new();
+            for from in from.filter(|from| own(from) && listed.insert(*from)) {
+                connectors.push(self.connector(split(from).1, from, "output")?);
+            }
+            let start = !self.own_start(component).is_empty();
+            let element = Element::new("ssd:Component")
+                .with("name", component)
+                .with("type", "application/x-fmu-sharedlibrary")
+                .with("source", format!("resources/{}", file_name(path)?))
+                .containing([Element::new("ssd:Connectors").containing(connectors)])
+                .containing(start.then(|| binding(component)));
+            elements.push(element);
+        }
+        let from_inputs = inputs.iter().map(|(name, to, _)| connection(("", *name), split(to)));
+        let inside = connections.iter().map(|(from, to)| connection(split(from), split(to)));
+        let to_outputs = outputs.iter().map(|(name, from)| connection(split(from), ("", *name)));
+
+        let own_inputs = inputs.iter().map(|(name, to, _)| self.connector(name, to, "input"));
+        let own_outputs = outputs.iter().map(|(name, from)| self.connector(name, from, "output"));
+        let connectors: Vec<Element> = own_inputs.chain(own_outputs).collect::<Result<_>>()?;
+        let system = Element::new("ssd:System")
+            .with("name", name)
+            .with("description", description)
+            .containing([Element::new("ssd:Connectors").containing(connectors)])
+            .containing((!inputs.is_empty()).then(|| binding("experiment")))
+            .containing([
+                Element::new("ssd:Elements").containing(elements),
+                Element::new("ssd:Connections").containing(from_inputs.chain(inside).chain(to_outputs)),
+            ]);
+        let root = Element::new("ssd:SystemStructureDescription")
+            .with("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription")
+            .with("xmlns:ssc", COMMON)
+            .with("version", "1.0")
+            .with("name", name)
+            .with("generationTool", concat!("fmu-system ", env!("CARGO_PKG_VERSION")));
+        let experiment = Element::new("ssd:DefaultExperiment")
+            .with("startTime", 0)
+            .with("stopTime", self.system.stop_time);
+        let used = self.connected()?;
+        Ok(root
+            .containing([system])
+            .containing(enumerations(&used)?)
+            .containing([self.units_of(&used), experiment]))
+    }
+
+    /// The variables that have connectors.
+    fn connected(&self) -> Result<Vec<&Variable>> {
+        let System { inputs, outputs, connections, .. } = self.system;
+        let ends = connections.iter().map(|(_, to)| *to).chain(inputs.iter().map(|(_, to, _)| *to));
+        let ends = ends.chain(outputs.iter().map(|(_, from)| *from));
+        ends.map(|end| self.variable(end)).collect()
+    }
+
+    /// The units of variables, and no others.
+    fn units_of(&self, variables: &[&Variable]) -> Element {
+        let used: HashSet<_> = variables.iter().map(|variable| variable.unit.as_deref()).collect();
+        let in_use = |(name, _): &(&String, &Element)| used.contains(&Some(name.as_str()));
+        let units = self.units.iter().filter(in_use).map(|(_, unit)| unit.clone());
+        Element::new("ssd:Units").containing(units)
+    }
+
+    /// A connector with the type and unit of a variable.
+    fn connector(&self, name: &str, of: &str, kind: &str) -> Result<Element> {
+        let Variable { kind: base_type, unit, items, .. } = self.variable(of)?;
+        let base_type = Element::new(format!("ssc:{base_type}"))
+            .with_some("unit", unit.as_ref())
+            .with_some("name", items.as_ref().map(|items| &items.name));
+        Ok(Element::new("ssd:Connector").with("name", name).with("kind", kind).containing([base_type]))
+    }
+
+    /// The file with the start values of a component: each with its name, the variable it is for, and its value.
+    fn ssv<'b>(
+        &self,
+        component: &str,
+        start: impl IntoIterator<Item = (&'b str, &'b str, &'b str)>,
+    ) -> Result<Option<(String, Vec<u8>)>> {
+        let mut units = BTreeMap::new();
+        let mut parameters = Vec::new();
+        for (name, variable, start) in start {
+            let Variable { kind, unit, .. } = self.variable(variable)?;
+            let value =
+                Element::new(format!("ssv:{kind}")).with("value", start).with_some("unit", unit.as_ref());
+            units.extend(unit.as_ref().and_then(|unit| Some((unit, self.units.get(unit)?.clone()))));
+            parameters.push(Element::new("ssv:Parameter").with("name", name).containing([value]));
+        }
+        if parameters.is_empty() {
+            return Ok(None);
+        }
+        let root = Element::new("ssv:ParameterSet")
+            .with("xmlns:ssv", "http://ssp-standard.org/SSP1/SystemStructureParameterValues")
+            .with("xmlns:ssc", COMMON)
+            .with("version", "1.0")
+            .with("name", "default")
+            .containing([Element::new("ssv:Parameters").containing(parameters)])
+            .containing(
+                (!units.is_empty()).then(|| Element::new("ssv:Units").containing(units.into_values())),
+            );
+        Ok(Some((format!("resources/{component}.ssv"), root.document()?.into_bytes())))
+    }
+}
+
+/// The enumerations of variables, if there are any.
+fn enumerations(variables: &[&Variable]) -> Result<Option<Element>> {
+    let mut known: BTreeMap<&str, &Items> = BTreeMap::new();
+    for items in variables.iter().filter_map(|variable| variable.items.as_ref()) {
+        let before = known.entry(&items.name).or_insert(items);
+        ensure!(*before == items, "two FMUs have different enumerations with the name {}", items.name);
+    }
+    let element = |items: &Items| {
+        let item = |(name, value): &(String, String)| {
+            Element::new("ssc:Item").with("name", name).with("value", value)
+        };
+        Element::new("ssc:Enumeration").with("name", &items.name).containing(items.items.iter().map(item))
+    };
+    let all = known.into_values().map(element);
+    Ok(Some(Element::new("ssd:Enumerations").containing(all)).filter(|list| !list.children.is_empty()))
+}
+
+fn connection(from: (&str, &str), to: (&str, &str)) -> Element {
+    let ends = [("start", from), ("end", to)];
+    ends.into_iter().fold(Element::new("ssd:Connection"), |connection, (side, (component, name))| {
+        let component = Some(component).filter(|component| !component.is_empty());
+        connection.with_some(&format!("{side}Element"), component).with(format!("{side}Connector"), name)
+    })
+}
+
+fn binding(component: &str) -> Element {
+    let binding = Element::new("ssd:ParameterBinding").with("source", format!("resources/{component}.ssv"));
+    Element::new("ssd:ParameterBindings").containing([binding])
+}
