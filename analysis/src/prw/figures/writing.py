@@ -23,6 +23,8 @@ COLOURS = {
     "#e6e6e6": "var(--grid, #e5e5e5)",
     "#e5e5e5": "var(--grid, #e5e5e5)",
 }
+#: What matplotlib's ids begin with, and what they are called here.
+ID_WORDS = {"p": "clip", "m": "mark", "h": "hatch"}
 SVG = "{http://www.w3.org/2000/svg}"
 XLINK = "{http://www.w3.org/1999/xlink}"
 
@@ -65,7 +67,17 @@ def _svg(figure: Figure, transparent: bool = False) -> bytes:
     file = io.BytesIO()
     with matplotlib.rc_context(PAGE_STYLE):
         figure.savefig(file, format="svg", metadata={"Date": None}, transparent=transparent)
-    return file.getvalue()
+    return _with_counted_ids(file.getvalue().decode()).encode()
+
+
+def _with_counted_ids(svg: str) -> str:
+    """clip1, clip2, mark1 in order of appearance: matplotlib's ids are hashes of coordinates to the last digit, which
+    is not the same on every processor."""
+    for kind, word in ID_WORDS.items():
+        ids = dict.fromkeys(re.findall(rf'["#]({kind}[0-9a-f]{{10}})[")]', svg))
+        for number, identifier in enumerate(ids, 1):
+            svg = svg.replace(identifier, f"{word}{number}")
+    return svg
 
 
 def for_page(svg: bytes, name: str) -> bytes:
