@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result, ensure};
 use clap::Parser;
-use fmi2_package::terminal::{exit, short};
-use fmi2_package::{Start, System};
+use fmu_package::terminal::{exit, short};
+use fmu_system::System;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -60,7 +60,10 @@ fn run(options: &Options) -> Result<()> {
             ("controller", fmu(&options.controller, "prw_controller.fmu")),
             ("testbed", fmu(&options.testbed, "prw_testbed.fmu")),
         ],
-        inputs: vec![("pitch_ref", "controller.pitch_ref", pitch), ("roll_ref", "controller.roll_ref", roll)],
+        inputs: vec![
+            ("pitch_ref", "controller.pitch_ref", pitch.to_string()),
+            ("roll_ref", "controller.roll_ref", roll.to_string()),
+        ],
         outputs: vec![("pitch", "testbed.pitch"), ("roll", "testbed.roll")],
         connections: vec![
             ("controller.theta1", "testbed.theta1"),
@@ -75,7 +78,7 @@ fn run(options: &Options) -> Result<()> {
             ("testbed.tau2", "controller.tau2"),
         ],
         // The controller tells the motors' rates: the testbed need not differentiate.
-        start: vec![("testbed.use_omega", Start::Boolean(true))],
+        start: vec![("testbed.use_omega", "true".to_owned())],
         stop_time: options.stop_time,
         step_size: options.step_size,
     };

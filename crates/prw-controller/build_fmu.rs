@@ -1,9 +1,9 @@
 //! Builds the FMU of the controller. See `--help`.
 
 use clap::Parser;
-use fmi2_package::terminal::exit;
-use fmi2_package::{BuildOptions, Builder};
-use prw_controller::{ControllerFmu, sources::sources};
+use fmu_package::terminal::exit;
+use fmu_package::{BuildOptions, Builder};
+use prw_controller::{Controller, sources::sources};
 use std::process::ExitCode;
 
 /// Builds the FMU of the wrist's controller, target/fmu/prw_controller.fmu.
@@ -21,5 +21,5 @@ fn main() -> ExitCode {
         profile: "library",
         ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"), env!("FMU_SOURCES"))
     };
-    exit(builder.run::<ControllerFmu>(&Options::parse().build))
+    exit(builder.run::<Controller>(&Options::parse().build))
 }

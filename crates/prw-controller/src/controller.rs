@@ -98,8 +98,8 @@ pub struct Controller {
     pub now: f64,
 }
 
-/// Steps with more samples are refused: an hour at 1 MHz.
-const MOST_SAMPLES: f64 = 3.6e9;
+/// Steps with more samples are refused: an hour at 1 kHz, which takes less than a second.
+const MOST_SAMPLES: f64 = 3.6e6;
 /// Beyond it a double cannot count.
 const LAST_SAMPLE: f64 = (1_u64 << 53) as f64;
 
@@ -159,7 +159,7 @@ impl Controller {
     ///
     /// A sample within rounding of the end belongs to the next step, which knows its inputs.
     ///
-    /// Returns false, with nothing changed, if the step holds more samples than anyone can mean.
+    /// Returns false, with nothing changed, if the step holds so many samples that a master would wait long for it.
     #[must_use]
     pub fn step(&mut self, time: f64, h: f64) -> bool {
         let end = time + h;

@@ -2,7 +2,8 @@
 //!
 //! [`Controller`] moves the testbed's two motors so that the wrist takes the pitch and the roll it is told:
 //! the inverse of eq. (1) as feed-forward, PI correction from measured pitch and roll, limits on the motors'
-//! rate, acceleration and torque. It knows no FMI; `fmu.rs` and the table of [`variables`] do.
+//! rate, acceleration and torque. The table of [`variables`] and `fmu.rs` make the FMU
+//! of it; the rest knows no FMI.
 
 pub mod controller;
 mod fmu;
@@ -14,7 +15,6 @@ pub mod variables;
 pub mod wrist;
 
 pub use controller::Controller;
-pub use fmu::ControllerFmu;
 pub use parameters::Parameters;
 
-fmi2_export::export_fmi2!(ControllerFmu);
+fmu_export::export_fmu!(Controller: CoSimulation + InputDerivatives + OutputDerivatives + Partials);

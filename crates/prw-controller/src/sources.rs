@@ -1,6 +1,6 @@
 //! What the FMU of the controller is made from; its guid is a hash of that.
 
-use fmi2_package::Sources;
+use fmu_package::Sources;
 
 /// The files that the library and its description are made from.
 pub fn sources() -> Sources {
