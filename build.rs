@@ -5,12 +5,13 @@
 
 #[path = "src/fingerprint.rs"]
 mod fingerprint;
-#[allow(dead_code, reason = "build_fmu needs the rest")]
 #[path = "src/parameter_file.rs"]
 mod parameter_file;
+#[allow(dead_code, reason = "the model needs the rest")]
+#[path = "src/parameters.rs"]
+mod parameters;
 
 use anyhow::Context;
-use parameter_file::ParameterSet;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
@@ -28,8 +29,9 @@ fn run() -> anyhow::Result<()> {
         _ => project.join(fingerprint::PARAMETERS),
     };
     println!("cargo::rerun-if-changed={}", file.display());
-    let parameters = ParameterSet::read(&file)?;
+    let parameters = parameter_file::read(&file)?;
     let table = Path::new(&env::var_os("OUT_DIR").context("cargo sets OUT_DIR")?).join("table_1.rs");
-    fs::write(&table, parameters.to_string()).with_context(|| format!("cannot write {}", table.display()))?;
-    fmi2_package::build_script(&fingerprint::sources(project), fingerprint::start(&parameters))
+    fs::write(&table, format!("{parameters:?}"))
+        .with_context(|| format!("cannot write {}", table.display()))?;
+    fmu_package::build_script(&fingerprint::sources(project), fingerprint::start(&parameters))
 }

@@ -2,10 +2,10 @@
 
 use anyhow::{Context, Result};
 use clap::Parser;
-use fmi2_package::{BuildOptions, Builder};
+use fmu_package::{BuildOptions, Builder};
 use prw_testbed::TestbedFmu;
 use prw_testbed::fingerprint::{self, PARAMETERS};
-use prw_testbed::parameter_file::ParameterSet;
+use prw_testbed::parameter_file;
 use std::path::{Path, PathBuf, absolute};
 use std::process::ExitCode;
 
@@ -33,7 +33,7 @@ struct Options {
 }
 
 fn main() -> ExitCode {
-    fmi2_package::terminal::exit(run(&Options::parse()))
+    fmu_package::terminal::exit(run(&Options::parse()))
 }
 
 fn run(options: &Options) -> Result<()> {
@@ -45,7 +45,7 @@ fn run(options: &Options) -> Result<()> {
     let builder = Builder {
         sources: fingerprint::sources(PROJECT),
         profile: "library",
-        start: fingerprint::start(&ParameterSet::read(&file)?),
+        start: fingerprint::start(&parameter_file::read(&file)?),
         is_default: other.is_none(),
         start_from: Some(file),
         environment: vec![("PRW_PARAMETERS", other.map(Into::into))],

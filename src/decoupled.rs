@@ -17,8 +17,10 @@
 
 use crate::motor::Motion;
 use crate::number::Number;
+use crate::pair::Pair;
 use crate::parameters::{InvalidParameter, Parameters};
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector3};
+use std::ops::{Add, Mul, Sub};
 
 /// The coupling pair of one side: motor - k1, c1 - massless shaft - k2, c2 - SECT.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,32 +47,39 @@ impl<T: Number> Side<T> {
         let [k1, k2, c1, c2] = [p.k1, p.k2, p.c1, p.c2].map(T::from);
         let c = c1 + c2;
         Self {
-            motor_share: c1 / c,
-            sect_share: c2 / c,
-            rate_motor: k1 / c,
-            rate_sect: k2 / c,
-            stiffness_motor: c2 / c * k1,
-            stiffness_sect: c1 / c * k2,
-            damping: c1 / c * c2,
+            motor_share: c1.over(c),
+            sect_share: c2.over(c),
+            rate_motor: k1.over(c),
+            rate_sect: k2.over(c),
+            stiffness_motor: c2.over(c) * k1,
+            stiffness_sect: c1.over(c) * k2,
+            damping: c1.over(c) * c2,
         }
     }
 }
 
 impl Side {
-    /// Rate of the massless shaft, the first row of eq. (8) solved for `q_I'`.
+    /// Rate of the massless shaft of one side, or of both in pairs, the first row of eq. (8) solved for `q_I'`.
     #[inline]
-    pub fn shaft_rate(&self, q_i: f64, q_ii: f64, v: f64, motor: Motion) -> f64 {
+    pub fn shaft_rate<T>(&self, q_i: T, q_ii: T, v: T, motor: Motion<T>) -> T
+    where
+        T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
+    {
         let Motion { angle: u, rate: w, .. } = motor;
-        self.motor_share * w + self.sect_share * v
-            - self.rate_motor * (q_i - u)
-            - self.rate_sect * (q_i - q_ii)
+        w * self.motor_share + v * self.sect_share
+            - (q_i - u) * self.rate_motor
+            - (q_i - q_ii) * self.rate_sect
     }
 
-    /// Sensor torque, eq. (9), with [`shaft_rate`](Self::shaft_rate) inserted.
+    /// Sensor torque of one side, or of both in pairs, eq. (9), with [`shaft_rate`](Self::shaft_rate)
+    /// inserted.
     #[inline]
-    pub fn torque(&self, q_i: f64, q_ii: f64, v: f64, motor: Motion) -> f64 {
+    pub fn torque<T>(&self, q_i: T, q_ii: T, v: T, motor: Motion<T>) -> T
+    where
+        T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
+    {
         let Motion { angle: u, rate: w, .. } = motor;
-        self.stiffness_motor * (q_i - u) - self.stiffness_sect * (q_i - q_ii) + self.damping * (v - w)
+        (q_i - u) * self.stiffness_motor - (q_i - q_ii) * self.stiffness_sect + (v - w) * self.damping
     }
 }
 
@@ -95,7 +104,7 @@ impl<T: Number> Subsystem<T> {
         let side = Side::new(p);
         let [j2, j3, h3, c3, half] = [p.J2, p.J3, p.H3, p.c3, 0.5].map(T::from);
         let [lobes, rollers] = [p.M, p.N].map(|count| T::from(count.into()));
-        let ratio = rollers / lobes;
+        let ratio = rollers.over(lobes);
         let roll_share = half * ratio * ratio;
         [Self::new(&side, j2 + half * h3, half * c3), Self::new(&side, j2 + roll_share * j3, roll_share * c3)]
     }
@@ -113,31 +122,35 @@ impl<T: Number> Subsystem<T> {
                 T::zero(),
                 T::zero(),
                 T::one(),
-                (stiffness_sect - stiffness_motor) / inertia,
-                -stiffness_sect / inertia,
-                -(damping + load_damping) / inertia,
+                (stiffness_sect - stiffness_motor).over(inertia),
+                -stiffness_sect.over(inertia),
+                -(damping + load_damping).over(inertia),
             ),
-            b_angle: Vector3::new(rate_motor, T::zero(), stiffness_motor / inertia),
-            b_rate: Vector3::new(motor_share, T::zero(), damping / inertia),
+            b_angle: Vector3::new(rate_motor, T::zero(), stiffness_motor.over(inertia)),
+            b_rate: Vector3::new(motor_share, T::zero(), damping.over(inertia)),
         }
     }
 }
 
-/// A quantity of the pitch subsystem beside the same of the roll subsystem: both take every step of
-/// the calculation together.
-pub type PitchRoll = Vector2<f64>;
+/// A quantity of both sides.
+pub type Sides = Pair;
+
+/// A quantity of the pitch and of the roll subsystem.
+pub type PitchRoll = Pair;
 
 /// Sum and difference of the two sides, twice the quantities of pitch and roll. The factor 1/2 is left
 /// to the matrices that they meet.
 #[inline]
-pub fn sum_difference(side1: f64, side2: f64) -> PitchRoll {
-    Vector2::new(side1 + side2, side1 - side2)
+pub fn sum_difference(sides: Sides) -> PitchRoll {
+    let [side1, side2] = sides.array();
+    PitchRoll::new(side1 + side2, side1 - side2)
 }
 
 /// The two sides from the quantities of pitch and roll, their mean and half difference.
 #[inline]
-pub fn sides(z: PitchRoll) -> [f64; 2] {
-    [z.x + z.y, z.x - z.y]
+pub fn sides(z: PitchRoll) -> Sides {
+    let [pitch, roll] = z.array();
+    Sides::new(pitch + roll, pitch - roll)
 }
 
 /// The decoupled testbed.
@@ -151,8 +164,6 @@ pub struct Decoupled {
     pub pitch: Subsystem,
     /// Half difference of the sides.
     pub roll: Subsystem,
-    /// Half the jump of q_I and of v per jump of the motor angle (the rate columns; q_II does not jump).
-    pub half_jump: [PitchRoll; 2],
     /// N / 2M of eq. (1).
     pub roll_ratio: f64,
 }
@@ -174,7 +185,16 @@ impl Decoupled {
                 ));
             }
         }
-        let half_jump = [0, 2].map(|i| PitchRoll::new(pitch.b_rate[i], roll.b_rate[i]) * 0.5);
-        Ok(Self { parameters: *p, side: Side::new(p), pitch, roll, half_jump, roll_ratio: p.roll_ratio() })
+        Ok(Self { parameters: *p, side: Side::new(p), pitch, roll, roll_ratio: p.roll_ratio() })
+    }
+
+    /// The inertias of pitch and of roll.
+    pub fn inertia(&self) -> PitchRoll {
+        PitchRoll::new(self.pitch.inertia, self.roll.inertia)
+    }
+
+    /// The damping of the load in pitch and in roll.
+    pub fn load_damping(&self) -> PitchRoll {
+        PitchRoll::new(self.pitch.load_damping, self.roll.load_damping)
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! The build script compiles the guid into the library, `build_fmu` writes it into the model description.
 
-use crate::parameter_file::{ParameterSet, Value};
-use fmi2_package::{Sources, Start};
+use crate::parameters::{Parameters, table};
+use fmu_package::Sources;
 use std::path::PathBuf;
 
 /// Table 1.
@@ -21,11 +21,12 @@ pub fn sources(project: impl Into<PathBuf>) -> Sources {
     }
 }
 
-/// The start values that a set of parameters stands for.
-pub fn start(parameters: &ParameterSet) -> Vec<(String, Start)> {
-    let start = |value| match value {
-        Value::Real(value) => Start::Real(value),
-        Value::Integer(value) => Start::Integer(value),
+macro_rules! start {
+    ($($(#[$_meaning:meta])* $name:ident: $kind:ident $_compare:tt $_limit:literal, $_unit:literal;)+) => {
+        /// The start values that a set of parameters stands for, to the last digit.
+        pub fn start(parameters: &Parameters) -> Vec<(String, String)> {
+            vec![$((stringify!($name).to_owned(), parameters.$name.to_string())),+]
+        }
     };
-    parameters.iter().map(|(name, value)| (name.to_owned(), start(value))).collect()
 }
+table!(start);

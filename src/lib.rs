@@ -19,8 +19,8 @@
 //!    roll, which do not influence each other.
 //! 6. [`propagator`]: their solution over a step on which the motors move on straight lines.
 //! 7. [`testbed`]: motors and state, advanced from point to point.
-//! 8. [`sensitivities`]: how torques and accelerations react to the parameters.
-//! 9. [`variables`] and [`TestbedFmu`]: the names, units and start values that an importer sees.
+//! 8. [`instant`]: torques, rates and accelerations at one instant, and how they react to the parameters.
+//! 9. [`TestbedFmu`] and [`variables`]: the names and units that an importer sees, and what the FMU offers.
 //!
 //! Where the printed equations are wrong, the item that mends them says so.
 //!
@@ -30,9 +30,9 @@
 //! // Both motors at 1 rad/s: the wrist pitches and does not roll.
 //! let mut testbed = Testbed::new(Parameters::BUILT_IN)?;
 //! for i in 0..2000 {
-//!     for motor in &mut testbed.motors {
-//!         motor.set_theta(1e-3 * f64::from(i));
-//!         motor.set_rate(1.0);
+//!     for motor in 0..2 {
+//!         testbed.motors.set_theta(motor, 1e-3 * f64::from(i));
+//!         testbed.motors.set_rate(motor, 1.0);
 //!     }
 //!     assert!(testbed.step(1e-3));
 //! }
@@ -42,18 +42,20 @@
 //! # Ok::<(), prw_testbed::parameters::InvalidParameter>(())
 //! ```
 
+mod capabilities;
 pub mod decoupled;
 pub mod energies;
 #[cfg(feature = "packaging")]
 pub mod fingerprint;
 mod fmu;
+pub mod instant;
 pub mod motor;
 pub mod number;
+pub mod pair;
 #[cfg(feature = "packaging")]
 pub mod parameter_file;
 pub mod parameters;
 pub mod propagator;
-pub mod sensitivities;
 pub mod state_space;
 pub mod testbed;
 pub mod variables;
@@ -62,4 +64,12 @@ pub use fmu::TestbedFmu;
 pub use parameters::Parameters;
 pub use testbed::Testbed;
 
-fmi2_export::export_fmi2!(TestbedFmu);
+impl Parameters {
+    /// Table 1, or what the library was built with instead; read from `modelDescription/parameters.json`
+    /// when it is compiled.
+    pub const BUILT_IN: Self = include!(concat!(env!("OUT_DIR"), "/table_1.rs"));
+}
+
+fmu_export::export_fmu!(
+    TestbedFmu: CoSimulation + ModelExchange + InputDerivatives + OutputDerivatives + Partials
+);

@@ -1,15 +1,8 @@
-//! How a motor moves between communication points, known only by samples of its angle.
+//! How the motors move between communication points, known only by samples of their angles.
 
-/// Where a motor's rate comes from in Co-Simulation when the importer sets no derivative.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RateSource {
-    /// The input omega.
-    Omega,
-    /// A backward difference of the sampled angles.
-    Samples,
-}
+use crate::decoupled::Sides;
 
-/// When the last two samples before the current one were taken, the same for both motors.
+/// When the last two samples before the current one were taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SampleTimes {
     /// Number of earlier samples: 0, 1, or 2 for two and more.
@@ -18,145 +11,260 @@ pub struct SampleTimes {
     pub last_step: f64,
     /// Step before that, s.
     pub step_before: f64,
-    /// 1 / last_step, 1 / step_before and 1 / (last_step + step_before): a step needs no division.
-    inverses: [f64; 3],
+    /// The step size that leaves all of this as it is, if there is one, else 0.
+    steady_step: f64,
+    /// 1 / last_step, 1 / step_before and 1 / mean of both, and half of last_step, each for both motors:
+    /// a step needs no division.
+    inverses: [Sides; 3],
+    half_last_step: Sides,
 }
 
 impl SampleTimes {
     /// The current sample becomes the previous one after a step of size `h`.
     #[inline]
     pub fn shift(&mut self, h: f64) {
-        let steady = self.count == 2 && h == self.last_step && h == self.step_before;
-        if !steady {
-            self.count = (self.count + 1).min(2);
-            self.step_before = self.last_step;
-            self.last_step = h;
-            self.update_inverses();
+        if h != self.steady_step {
+            self.shift_by(h);
         }
     }
 
-    /// Whether there was time between the samples.
+    #[cold]
+    fn shift_by(&mut self, h: f64) {
+        self.count = (self.count + 1).min(2);
+        self.step_before = self.last_step;
+        self.last_step = h;
+        self.update();
+    }
+
+    /// Whether the number of samples is one that counts, and there was time between them.
     pub fn are_possible(&self) -> bool {
-        (self.count < 1 || self.last_step > 0.0) && (self.count < 2 || self.step_before > 0.0)
+        (0..=2).contains(&self.count)
+            && (self.count < 1 || self.last_step > 0.0)
+            && (self.count < 2 || self.step_before > 0.0)
     }
 
     /// Brings what follows from the steps up to date.
-    pub fn update_inverses(&mut self) {
-        self.inverses = [self.last_step, self.step_before, self.last_step + self.step_before].map(f64::recip);
+    pub fn update(&mut self) {
+        let Self { count, last_step, step_before, .. } = *self;
+        let is_steady = count == 2 && last_step == step_before;
+        self.steady_step = if is_steady { last_step } else { 0.0 };
+        self.inverses =
+            [last_step, step_before, 0.5 * (last_step + step_before)].map(|step| Sides::both(1.0 / step));
+        self.half_last_step = Sides::both(0.5 * last_step);
     }
 }
 
 /// A motor's angle, rate and angular acceleration at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Motion {
+pub struct Motion<T = f64> {
     /// Angle, rad.
-    pub angle: f64,
+    pub angle: T,
     /// Rate, rad/s.
-    pub rate: f64,
+    pub rate: T,
     /// Acceleration, rad/s2.
-    pub acceleration: f64,
+    pub acceleration: T,
 }
 
-/// One motor as the FMU sees it: its inputs and what is remembered of earlier steps.
+/// The motions of both motors.
+pub type Motions = Motion<Sides>;
+
+impl Motions {
+    /// The motions of both.
+    #[inline]
+    pub const fn new(motor1: Motion, motor2: Motion) -> Self {
+        Self {
+            angle: Sides::new(motor1.angle, motor2.angle),
+            rate: Sides::new(motor1.rate, motor2.rate),
+            acceleration: Sides::new(motor1.acceleration, motor2.acceleration),
+        }
+    }
+
+    /// The motion of motor 0 or 1.
+    #[inline]
+    pub fn of(&self, motor: usize) -> Motion {
+        Motion { angle: self.angle[motor], rate: self.rate[motor], acceleration: self.acceleration[motor] }
+    }
+
+    /// After time `h`: the angle on a straight line, the rate as the parabola predicts it, so that
+    /// torques read before the next sample are second-order accurate too.
+    #[inline]
+    pub fn after(&self, h: f64) -> Self {
+        Self {
+            angle: self.angle + self.rate * h,
+            rate: self.rate + self.acceleration * h,
+            acceleration: self.acceleration,
+        }
+    }
+}
+
+/// The inputs of one motor.
+///
+/// By motor and not in pairs: an importer sets one number at a time, and a pair that is read at once right
+/// after its halves were written makes the processor wait.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Motor {
-    /// Input theta, rad.
+pub struct Inputs {
+    /// Angle, rad; see [`Motors::theta_set`].
     pub theta: f64,
-    /// Input omega, rad/s.
+    /// Rate, rad/s; see [`Motors::omega_set`].
     pub omega: f64,
-    /// Derivative of theta that the importer has set since the last step, rad/s.
-    pub set_rate: Option<f64>,
-    /// Whether theta has been set since the last step; if not, the path's end stands in for it.
-    pub is_sampled: bool,
-    /// theta of the previous sample and of the one before, rad.
-    pub earlier: [f64; 2],
-    /// Where the last step's straight line ended.
-    pub path_end: Motion,
 }
 
-impl Motor {
-    /// Takes a new angle.
+/// The motors as the FMU sees them: their inputs and what is remembered of earlier steps.
+///
+/// Inputs may be set as fields; then the method named after the field must follow.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motors {
+    /// What the importer sets.
+    pub inputs: [Inputs; 2],
+    /// Whether the rates come from omega where no derivative is set, else from a backward difference of
+    /// the sampled angles; see [`use_omega_set`](Self::use_omega_set).
+    pub use_omega: bool,
+    /// Whether theta has been set since the last step; if not, the path's end stands in for it.
+    pub is_sampled: [bool; 2],
+    /// Derivatives of theta that the importer has set since the last step, rad/s.
+    pub set_rate: [Option<f64>; 2],
+    /// theta of the previous samples and of those before, rad.
+    pub earlier: [Sides; 2],
+    /// Where the last step's straight lines ended.
+    pub path_end: Motions,
+    /// When the angles were sampled.
+    pub times: SampleTimes,
+}
+
+impl Motors {
+    /// The angles that are set, rad.
     #[inline]
-    pub fn set_theta(&mut self, theta: f64) {
-        self.theta = theta;
-        self.is_sampled = true;
+    pub fn theta(&self) -> Sides {
+        Sides::new(self.inputs[0].theta, self.inputs[1].theta)
     }
 
-    /// Takes a new rate from the input omega. If rates come from there, it holds at once.
+    /// Both rates, rad/s.
     #[inline]
-    pub fn set_omega(&mut self, omega: f64, source: RateSource) {
-        self.omega = omega;
-        self.source_changed(source);
+    pub fn omega(&self) -> Sides {
+        Sides::new(self.inputs[0].omega, self.inputs[1].omega)
     }
 
-    /// If rates come from omega now, its value holds at once, but for a derivative that is set.
+    /// Takes a new angle of motor 0 or 1.
     #[inline]
-    pub fn source_changed(&mut self, source: RateSource) {
-        if source == RateSource::Omega && self.set_rate.is_none() {
-            self.path_end.rate = self.omega;
+    pub fn set_theta(&mut self, motor: usize, theta: f64) {
+        self.inputs[motor].theta = theta;
+        self.theta_set(motor);
+    }
+
+    /// Takes a new rate of motor 0 or 1 from the input omega.
+    #[inline]
+    pub fn set_omega(&mut self, motor: usize, omega: f64) {
+        self.inputs[motor].omega = omega;
+        self.omega_set(motor);
+    }
+
+    /// After theta of motor 0 or 1 has been set: there is a new sample.
+    #[inline]
+    pub fn theta_set(&mut self, motor: usize) {
+        self.is_sampled[motor] = true;
+    }
+
+    /// After omega of motor 0 or 1 has been set. If rates come from there, it holds at once, but for a
+    /// derivative that is set.
+    #[inline]
+    pub fn omega_set(&mut self, motor: usize) {
+        if self.use_omega && self.set_rate[motor].is_none() {
+            self.path_end.rate[motor] = self.inputs[motor].omega;
         }
     }
 
-    /// Takes the derivative of theta at the current communication point. It precedes omega, in whatever
-    /// order they are set.
-    #[inline]
-    pub fn set_rate(&mut self, rate: f64) {
-        self.set_rate = Some(rate);
-        self.path_end.rate = rate;
+    /// After `use_omega` has been set.
+    pub fn use_omega_set(&mut self) {
+        self.omega_set(0);
+        self.omega_set(1);
     }
 
-    /// The motion at the current communication point, from the current sample and the rate's source:
-    /// what the importer has set, or omega, or the parabola through the last three samples (a straight
-    /// line through two; a motor with one sample rests).
+    /// Takes the derivative of theta of motor 0 or 1 at the current communication point. It precedes
+    /// omega, in whatever order they are set.
     #[inline]
-    pub fn sampled(&self, times: &SampleTimes, source: RateSource) -> Motion {
-        let steady = |rate| Motion { angle: self.theta, rate, acceleration: 0.0 };
-        match (self.set_rate, source) {
-            (Some(rate), _) => steady(rate),
-            (None, RateSource::Omega) => steady(self.omega),
-            (None, RateSource::Samples) => match times.count {
-                0 => steady(0.0),
-                1 => steady((self.theta - self.earlier[0]) * times.inverses[0]),
-                _ => self.parabola(times),
-            },
-        }
+    pub fn set_rate(&mut self, motor: usize, rate: f64) {
+        self.set_rate[motor] = Some(rate);
+        self.path_end.rate[motor] = rate;
     }
 
-    #[inline]
-    fn parabola(&self, times: &SampleTimes) -> Motion {
-        let last = (self.theta - self.earlier[0]) * times.inverses[0];
-        let before = (self.earlier[0] - self.earlier[1]) * times.inverses[1];
-        let bend = (last - before) * times.inverses[2];
-        Motion { angle: self.theta, rate: last + bend * times.last_step, acceleration: 2.0 * bend }
+    /// Forgets the samples: the next one is the first.
+    pub fn forget_samples(&mut self) {
+        let Self { inputs, use_omega, set_rate, .. } = *self;
+        *self = Self { inputs, use_omega, set_rate, ..Self::default() };
     }
 
-    /// The motion now: the sample's if the importer has set one since the last step, else where that
-    /// step left off.
+    /// Whether all rates come from parabolas, and the step size `h` is that of the last two steps.
     #[inline]
-    pub fn now(&self, times: &SampleTimes, source: RateSource) -> Motion {
-        if self.is_sampled || times.count == 0 { self.sampled(times, source) } else { self.path_end }
+    pub fn are_steady(&self, h: f64) -> bool {
+        // Together, because one branch costs more than they do.
+        let is_rate_given = self.use_omega | self.set_rate[0].is_some() | self.set_rate[1].is_some();
+        h == self.times.steady_step && !is_rate_given
     }
 
-    /// The jump from the end of the last path to the current sample, rad. The first sample jumps from
-    /// nowhere.
+    /// The motions at the current communication point that the last three samples let expect.
     #[inline]
-    pub fn jump(&self, times: &SampleTimes) -> f64 {
-        if times.count == 0 { 0.0 } else { self.theta - self.path_end.angle }
+    pub fn parabolas(&self) -> Motions {
+        let [inverse_last, inverse_before, inverse_mean] = self.times.inverses;
+        let last = (self.theta() - self.earlier[0]) * inverse_last;
+        let before = (self.earlier[0] - self.earlier[1]) * inverse_before;
+        let acceleration = (last - before) * inverse_mean;
+        Motion { angle: self.theta(), rate: last + acceleration * self.times.half_last_step, acceleration }
     }
 
-    /// After a step of size `h` on the straight line of `motion`: the sample becomes an earlier one.
-    ///
-    /// The end of the path has the rate that the parabola predicts there, so that torques read before
-    /// the next sample are second-order accurate too.
-    #[inline]
-    pub fn step(&mut self, motion: &Motion, h: f64) {
-        self.earlier = [self.theta, self.earlier[0]];
-        self.path_end = Motion {
-            angle: motion.angle + motion.rate * h,
-            rate: motion.rate + motion.acceleration * h,
-            acceleration: motion.acceleration,
+    /// The motions at the current communication point, from the current samples and the rates' sources:
+    /// what the importer has set, or omega, or the parabolas through the last three samples (straight
+    /// lines through two; with one sample the motors rest).
+    pub fn sampled(&self) -> Motions {
+        let steady = |rate| Motion { angle: self.theta(), rate, acceleration: Sides::default() };
+        let mut motions = match self.times.count {
+            0 => steady(Sides::default()),
+            1 => steady((self.theta() - self.earlier[0]) * self.times.inverses[0]),
+            _ => self.parabolas(),
         };
-        self.set_rate = None;
-        self.is_sampled = false;
+        for motor in 0..2 {
+            let given = self.set_rate[motor].or(self.use_omega.then_some(self.inputs[motor].omega));
+            if let Some(rate) = given {
+                motions.rate[motor] = rate;
+                motions.acceleration[motor] = 0.0;
+            }
+        }
+        motions
+    }
+
+    /// Whether motor 0 or 1 is where the last step left off: the importer has set no sample since.
+    #[inline]
+    pub fn is_at_path_end(&self, motor: usize) -> bool {
+        !self.is_sampled[motor] && self.times.count > 0
+    }
+
+    /// Whether both motors are.
+    #[inline]
+    pub fn are_at_path_end(&self) -> bool {
+        self.is_at_path_end(0) & self.is_at_path_end(1)
+    }
+
+    /// The motions of both motors now: the sample's, or that at the end of the path.
+    pub fn now(&self) -> Motions {
+        let motions = self.sampled();
+        let now =
+            |motor| if self.is_at_path_end(motor) { self.path_end.of(motor) } else { motions.of(motor) };
+        Motions::new(now(0), now(1))
+    }
+
+    /// The jumps from the ends of the last paths to the current samples, rad. The first samples jump
+    /// from nowhere.
+    #[inline]
+    pub fn jumps(&self) -> Sides {
+        if self.times.count == 0 { Sides::default() } else { self.theta() - self.path_end.angle }
+    }
+
+    /// After a step that led to `end`: the samples become earlier ones. The times are another matter.
+    #[inline]
+    pub fn go_on(&mut self, end: &Motions) {
+        self.earlier[1] = self.earlier[0];
+        self.earlier[0] = self.theta();
+        self.path_end = *end;
+        self.set_rate = [None; 2];
+        self.is_sampled = [false; 2];
     }
 }

@@ -2,37 +2,92 @@
 
 use std::fmt;
 
-/// Inertias, stiffnesses, damping coefficients and the numbers of cam lobes and rollers.
-#[allow(non_snake_case, reason = "the paper's symbols")]
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameters {
-    /// Inertia of a roller-carrier with rollers and shafts, kg.m2.
-    pub J2: f64,
-    /// Inertia of the load about the roll axis, kg.m2.
-    pub J3: f64,
-    /// Inertia of the load about the pitch axis, kg.m2.
-    pub H3: f64,
-    /// Stiffness of couplings 1 and 3 (motor side), N.m/rad.
-    pub k1: f64,
-    /// Stiffness of couplings 2 and 4 (SECT side), N.m/rad.
-    pub k2: f64,
-    /// Damping of couplings 1 and 3, N.m.s/rad.
-    pub c1: f64,
-    /// Damping of couplings 2 and 4, N.m.s/rad.
-    pub c2: f64,
-    /// Damping of the load in pitch and in roll, N.m.s/rad.
-    pub c3: f64,
-    /// Number of lobes of the spherical cams.
-    pub M: i32,
-    /// Number of rollers on each side of the roller-carriers.
-    pub N: i32,
+/// What a parameter that is measured is, as FMI calls it.
+pub type Real = f64;
+/// What a parameter that is counted is.
+pub type Integer = i32;
+
+/// Hands the table of parameters to the macro `$make`: meaning, name, type, range and unit of each.
+macro_rules! table {
+    ($make:ident) => {
+        $make! {
+            /// Inertia of a roller-carrier with rollers and shafts.
+            J2: Real > 0, "kg.m2";
+            /// Inertia of the load about the roll axis.
+            J3: Real > 0, "kg.m2";
+            /// Inertia of the load about the pitch axis.
+            H3: Real > 0, "kg.m2";
+            /// Stiffness of couplings 1 and 3 (motor side).
+            k1: Real > 0, "N.m/rad";
+            /// Stiffness of couplings 2 and 4 (SECT side).
+            k2: Real > 0, "N.m/rad";
+            /// Damping of couplings 1 and 3.
+            c1: Real >= 0, "N.m.s/rad";
+            /// Damping of couplings 2 and 4.
+            c2: Real >= 0, "N.m.s/rad";
+            /// Damping of the load in pitch and in roll.
+            c3: Real >= 0, "N.m.s/rad";
+            /// Number of lobes of the spherical cams.
+            M: Integer >= 1, "1";
+            /// Number of rollers on each side of the roller-carriers.
+            N: Integer >= 1, "1";
+        }
+    };
+}
+#[allow(unused_imports, reason = "only what reads parameters.json and the guid need it")]
+pub(crate) use table;
+
+macro_rules! parameters {
+    ($($(#[$meaning:meta])* $name:ident: $kind:ident $compare:tt $limit:literal, $unit:literal;)+) => {
+        /// Inertias, stiffnesses, damping coefficients and the numbers of cam lobes and rollers.
+        #[allow(non_snake_case, reason = "the paper's symbols")]
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Parameters {
+            $($(#[$meaning])* #[doc = concat!("\n\nUnit: ", $unit)] pub $name: $kind,)+
+        }
+
+        impl Parameters {
+            /// No parameters: a direction in which none changes.
+            pub const ZERO: Self = Self { $($name: 0 as $kind,)+ };
+
+            /// With every measured value replaced, in the order of Table 1.
+            #[must_use]
+            pub fn map_reals(&self, mut change: impl FnMut(f64) -> f64) -> Self {
+                Self { $($name: self.$name.mapped(&mut change),)+ }
+            }
+
+            fn check_ranges(&self) -> Result<(), InvalidParameter> {
+                $(if !(f64::from(self.$name).is_finite() && self.$name $compare $kind::from($limit)) {
+                    return Err(InvalidParameter(format!(
+                        concat!(stringify!($name), " must be ", stringify!($compare), " ", $limit, ", it is {}"),
+                        self.$name
+                    )));
+                })+
+                Ok(())
+            }
+        }
+    };
+}
+table!(parameters);
+
+/// What [`Parameters::map_reals`] does to each kind.
+trait Mapped {
+    fn mapped(self, change: &mut impl FnMut(f64) -> f64) -> Self;
+}
+
+impl Mapped for Real {
+    fn mapped(self, change: &mut impl FnMut(f64) -> f64) -> Self {
+        change(self)
+    }
+}
+
+impl Mapped for Integer {
+    fn mapped(self, _: &mut impl FnMut(f64) -> f64) -> Self {
+        self
+    }
 }
 
 impl Parameters {
-    /// Table 1, or what the library was built with instead; read from `modelDescription/parameters.json`
-    /// when it is compiled.
-    pub const BUILT_IN: Self = include!(concat!(env!("OUT_DIR"), "/table_1.rs"));
-
     /// Transmission ratio from the motors' difference to roll: N / 2M of eq. (1).
     pub fn roll_ratio(&self) -> f64 {
         f64::from(self.N) / (2.0 * f64::from(self.M))
@@ -43,28 +98,13 @@ impl Parameters {
     /// # Errors
     /// Names the parameter and what it must be.
     pub fn check(&self) -> Result<(), InvalidParameter> {
-        let positive = [("J2", self.J2), ("J3", self.J3), ("H3", self.H3), ("k1", self.k1), ("k2", self.k2)];
-        for (name, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(InvalidParameter(format!("{name} must be > 0, it is {value}")));
-            }
-        }
-        for (name, value) in [("c1", self.c1), ("c2", self.c2), ("c3", self.c3)] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(InvalidParameter(format!("{name} must be >= 0, it is {value}")));
-            }
-        }
+        self.check_ranges()?;
         if self.c1 + self.c2 <= 0.0 {
             return Err(InvalidParameter(
                 "c1 and c2 must not both be 0: the massless shafts between the couplings need damping; \
                  set the larger one first or both in one call"
                     .into(),
             ));
-        }
-        for (name, value) in [("M", self.M), ("N", self.N)] {
-            if value < 1 {
-                return Err(InvalidParameter(format!("{name} must be >= 1, it is {value}")));
-            }
         }
         Ok(())
     }

@@ -12,8 +12,9 @@
 //! the last bit, and tiny steps lose nothing to `exp(A h)` being close to 1.
 
 use crate::decoupled::{Decoupled, PitchRoll, Subsystem};
-use crate::number::{DoubleDouble, Number};
+use crate::number::Number;
 use nalgebra::{Matrix3, Vector3};
+use twofloat::TwoFloat;
 
 /// The step matrices of one subsystem for one step size.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +34,7 @@ impl<T: Number> Propagator<T> {
     pub fn new(system: &Subsystem<T>, h: f64) -> Self {
         let scale = balance(&system.a);
         let a = rescaled(&system.a, scale);
-        let to_scale = |z: Vector3<T>| Vector3::new(z.x, z.y, z.z / scale.into());
+        let to_scale = |z: Vector3<T>| Vector3::new(z.x, z.y, z.z / scale);
         let doublings = doublings(&a, h);
         // In two factors, because one would underflow for the longest steps.
         let mut h = T::from(h * 0.5_f64.powi(doublings / 2) * 0.5_f64.powi(doublings - doublings / 2));
@@ -46,9 +47,9 @@ impl<T: Number> Propagator<T> {
         let mut ramp_term = (ah * b_rate + b_angle * h) * (h * T::from(0.5));
         let mut ramp = b_rate * h + ramp_term;
         for n in 2..=T::TAYLOR_ORDER {
-            growth_term = growth_term * ah / T::from(n.into());
+            growth_term = (growth_term * ah).map(|entry| entry / f64::from(n));
             growth += growth_term;
-            ramp_term = ah * ramp_term / T::from((n + 1).into());
+            ramp_term = (ah * ramp_term).map(|entry| entry / f64::from(n + 1));
             ramp += ramp_term;
         }
         // Both shafts turned, no velocity.
@@ -85,11 +86,11 @@ fn balance<T: Number>(a: &Matrix3<T>) -> f64 {
 
 /// The matrix for a velocity in units of `scale`.
 fn rescaled<T: Number>(a: &Matrix3<T>, scale: f64) -> Matrix3<T> {
-    let (mut b, scale) = (*a, T::from(scale));
-    b[(2, 0)] /= scale;
-    b[(2, 1)] /= scale;
-    b[(0, 2)] *= scale;
-    b[(1, 2)] *= scale;
+    let mut b = *a;
+    b[(2, 0)] = b[(2, 0)] / scale;
+    b[(2, 1)] = b[(2, 1)] / scale;
+    b[(0, 2)] *= scale.into();
+    b[(1, 2)] *= scale.into();
     b
 }
 
@@ -114,6 +115,12 @@ impl Rounded {
         Self { growth, ramp: exact.ramp.map(T::rounded), keeps_velocity: f64::from(u8::from(keeps)) }
     }
 
+    /// What is left at the end of the step of a jump of the motor angle by 1 at its begin.
+    fn after_jump(&self, system: &Subsystem) -> Vector3<f64> {
+        let jump = system.b_rate;
+        self.growth * jump + Vector3::new(jump.x, jump.y, jump.z * self.keeps_velocity)
+    }
+
     /// For the pitch and the roll subsystem.
     ///
     /// Up to 8 doublings cost an `f64` 3 digits at most. More may cost all of them: stiff testbeds have
@@ -125,9 +132,9 @@ impl Rounded {
             doublings(&rescaled(&s.a, balance(&s.a)), h) > 8 || -s.a[(2, 2)] * h > std::f64::consts::LN_2
         };
         if subsystems.iter().any(stiff) {
-            let exact = Subsystem::<DoubleDouble>::pitch_and_roll(&system.parameters);
+            let exact = Subsystem::<TwoFloat>::pitch_and_roll(&system.parameters);
             let rounded = exact.map(|subsystem| Self::new(&Propagator::new(&subsystem, h)));
-            // Above 1e300 a DoubleDouble is no number.
+            // A TwoFloat that leaves the range of f64 on its way is no number.
             if rounded.iter().all(Self::is_finite) {
                 return rounded;
             }
@@ -144,35 +151,42 @@ impl Rounded {
 /// sums and differences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepMatrices {
-    /// Step size, s; 0 marks an unused entry.
-    h: f64,
     half_growth: [[PitchRoll; 3]; 3],
     half_ramp: [PitchRoll; 3],
+    /// What a jump of the motor angle by 1 at the begin of the step adds to z at its end.
+    half_jump: [PitchRoll; 3],
     /// See [`Rounded`]; halved like the rest, and whether both are kept whole.
     half_kept: PitchRoll,
     keeps_velocities: bool,
+    /// Step size, s; 0 marks an unused entry.
+    h: f64,
 }
 
 impl StepMatrices {
     const UNUSED: Self = Self {
-        h: 0.0,
         half_growth: [[ZERO; 3]; 3],
         half_ramp: [ZERO; 3],
+        half_jump: [ZERO; 3],
         half_kept: ZERO,
         keeps_velocities: true,
+        h: 0.0,
     };
 
     /// The matrices for step size `h` in s.
     pub fn new(system: &Decoupled, h: f64) -> Self {
         let [pitch, roll] = Rounded::pitch_and_roll(system, h);
+        let beside = |pitch: Vector3<f64>, roll: Vector3<f64>| {
+            std::array::from_fn(|i| PitchRoll::new(pitch[i], roll[i]) * 0.5)
+        };
+        let column = |j| beside(pitch.growth.column(j).into(), roll.growth.column(j).into());
         let half_kept = PitchRoll::new(pitch.keeps_velocity, roll.keeps_velocity) * 0.5;
-        let growth = |i, j| PitchRoll::new(pitch.growth[(i, j)], roll.growth[(i, j)]) * 0.5;
         Self {
-            h,
-            half_growth: std::array::from_fn(|i| std::array::from_fn(|j| growth(i, j))),
-            half_ramp: std::array::from_fn(|i| PitchRoll::new(pitch.ramp[i], roll.ramp[i]) * 0.5),
+            half_growth: [0, 1, 2].map(column),
+            half_ramp: beside(pitch.ramp, roll.ramp),
+            half_jump: beside(pitch.after_jump(&system.pitch), roll.after_jump(&system.roll)),
             half_kept,
-            keeps_velocities: half_kept == PitchRoll::new(0.5, 0.5),
+            keeps_velocities: half_kept == PitchRoll::both(0.5),
+            h,
         }
     }
 
@@ -180,29 +194,38 @@ impl StepMatrices {
     /// adds to, from the sum and difference at the begin.
     #[inline]
     pub fn left_velocity(&self, v: PitchRoll) -> Option<PitchRoll> {
-        (!self.keeps_velocities).then(|| self.half_kept.component_mul(&v))
+        if self.keeps_velocities { None } else { self.left_velocity_of(v) }
+    }
+
+    #[cold]
+    fn left_velocity_of(&self, v: PitchRoll) -> Option<PitchRoll> {
+        Some(self.half_kept * v)
     }
 
     /// The change of `z = [q_I, q_II, v]` over the step, from sums and differences of the sides'
-    /// deviations `z - [1, 1, 0] u` from the motors at its begin, and of the motor rates w.
+    /// deviations `z - [1, 1, 0] u` from the motors at its begin, of the motor rates w, and of the jumps
+    /// of the motor angles.
     #[inline]
-    pub fn increment(&self, deviation: &[PitchRoll; 3], w: PitchRoll) -> [PitchRoll; 3] {
-        let row = |growth: &[PitchRoll; 3], ramp: &PitchRoll| {
-            (growth[0].component_mul(&deviation[0]) + growth[1].component_mul(&deviation[1]))
-                + (growth[2].component_mul(&deviation[2]) + ramp.component_mul(&w))
+    pub fn increment(&self, deviation: &[PitchRoll; 3], w: PitchRoll, jump: PitchRoll) -> [PitchRoll; 3] {
+        let [of_q_i, of_q_ii, of_v] = &self.half_growth;
+        let row = |i: usize| {
+            ((of_q_i[i] * deviation[0] + of_q_ii[i] * deviation[1])
+                + (of_v[i] * deviation[2] + self.half_ramp[i] * w))
+                + self.half_jump[i] * jump
         };
-        let (growth, ramp) = (&self.half_growth, &self.half_ramp);
-        [row(&growth[0], &ramp[0]), row(&growth[1], &ramp[1]), row(&growth[2], &ramp[2])]
+        [row(0), row(1), row(2)]
     }
 }
 
-const ZERO: PitchRoll = PitchRoll::new(0.0, 0.0);
+const ZERO: PitchRoll = PitchRoll::both(0.0);
 
 /// The step matrices of the step sizes used last. Masters use one step size or alternate among a few.
 #[derive(Clone, Debug)]
 pub struct StepCache {
+    /// One of the others, at a place that needs no looking up.
+    current: StepMatrices,
     entries: [StepMatrices; Self::SIZE],
-    current: usize,
+    oldest: usize,
 }
 
 impl StepCache {
@@ -210,26 +233,27 @@ impl StepCache {
 
     /// A cache without entries.
     pub const fn new() -> Self {
-        Self { entries: [StepMatrices::UNUSED; Self::SIZE], current: 0 }
+        Self { current: StepMatrices::UNUSED, entries: [StepMatrices::UNUSED; Self::SIZE], oldest: 0 }
     }
 
     /// The matrices for step size `h > 0`, computed if they are not at hand.
     #[inline]
     pub fn get(&mut self, system: &Decoupled, h: f64) -> &StepMatrices {
-        if self.entries[self.current].h != h {
+        if self.current.h != h {
             self.find_or_compute(system, h);
         }
-        &self.entries[self.current]
+        &self.current
     }
 
     #[cold]
     fn find_or_compute(&mut self, system: &Decoupled, h: f64) {
-        if let Some(found) = self.entries.iter().position(|entry| entry.h == h) {
-            self.current = found;
+        if let Some(found) = self.entries.iter().find(|entry| entry.h == h) {
+            self.current = *found;
             return;
         }
-        self.current = (self.current + 1) % Self::SIZE;
-        self.entries[self.current] = StepMatrices::new(system, h);
+        self.current = StepMatrices::new(system, h);
+        self.entries[self.oldest] = self.current;
+        self.oldest = (self.oldest + 1) % Self::SIZE;
     }
 }
 

@@ -19,8 +19,8 @@ fn shows(readme: &str, file: &str) {
 
 #[test]
 fn the_readmes_show_the_example() {
-    shows("crates/fmi2-export/README.md", "examples/lag-fmu/src/lib.rs");
-    shows("crates/fmi2-package/README.md", "examples/lag-fmu/build_fmu.rs");
+    shows("crates/fmu-export/README.md", "examples/lag-fmu/src/lib.rs");
+    shows("crates/fmu-package/README.md", "examples/lag-fmu/build_fmu.rs");
 }
 
 /// `[lints] workspace = true` would not survive a copy.

@@ -3,7 +3,6 @@
 use nalgebra::{Complex, Matrix2, Matrix4, Matrix6, Vector4};
 use prw_testbed::Parameters;
 use prw_testbed::energies::{Angles, kinetic_energy, potential_energy, sect};
-use prw_testbed::motor::RateSource;
 use prw_testbed::state_space::{
     angle_transfer_matrix, damping_matrix, force, mass_matrix, state_space, stiffness_matrix, transfer_matrix,
 };
@@ -162,14 +161,14 @@ fn erratum_table_1_counts_in_degrees() {
 fn erratum_excitation_of_sec_4_has_a_time_in_it() {
     let peak_roll = |rate: &dyn Fn(f64) -> f64| {
         let mut testbed = Testbed::new(TABLE_1).unwrap();
-        testbed.rate_source = RateSource::Omega;
+        testbed.motors.use_omega = true;
         let mut theta = 0.0;
         let mut peak = 0.0_f64;
         for k in 0..2000 {
             let omega = rate(1e-3 * f64::from(k));
-            for (motor, sign) in testbed.motors.iter_mut().zip([1.0, -1.0]) {
-                motor.set_theta(sign * theta);
-                motor.set_omega(sign * omega, RateSource::Omega);
+            for (motor, sign) in [(0, 1.0), (1, -1.0)] {
+                testbed.motors.set_theta(motor, sign * theta);
+                testbed.motors.set_omega(motor, sign * omega);
             }
             assert!(testbed.step(1e-3));
             theta += 1e-3 * omega;

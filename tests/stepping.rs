@@ -4,35 +4,25 @@
 use nalgebra::SMatrix;
 use proptest::prelude::*;
 use prw_testbed::energies::{Angles, dissipation, kinetic_energy, potential_energy};
-use prw_testbed::motor::{Motion, RateSource};
+use prw_testbed::motor::Motion;
 use prw_testbed::state_space::state_space;
 use prw_testbed::{Parameters, Testbed};
 
+#[allow(non_snake_case, reason = "the paper's symbols")]
 fn parameters() -> impl Strategy<Value = Parameters> {
-    // A factor of up to 5 around Table 1 for each.
-    (prop::array::uniform8(-1.6..1.6f64), 1..9i32, 1..15i32).prop_map(|(f, lobes, rollers)| {
-        let p = Parameters::BUILT_IN;
-        Parameters {
-            J2: p.J2 * f[0].exp(),
-            J3: p.J3 * f[1].exp(),
-            H3: p.H3 * f[2].exp(),
-            k1: p.k1 * f[3].exp(),
-            k2: p.k2 * f[4].exp(),
-            c1: p.c1 * f[5].exp(),
-            c2: p.c2 * f[6].exp(),
-            c3: p.c3 * f[7].exp(),
-            M: lobes,
-            N: rollers,
-        }
+    // A factor of up to 5 around Table 1 for each; more of them than there are parameters.
+    (prop::collection::vec(-1.6..1.6f64, 32), 1..9i32, 1..15i32).prop_map(|(exponents, M, N)| {
+        let mut exponents = exponents.into_iter();
+        let near = Parameters::BUILT_IN.map_reals(|value| value * exponents.next().unwrap().exp());
+        Parameters { M, N, ..near }
     })
 }
 
 /// Sets both motors' samples, with their rates as derivatives.
 fn sample(testbed: &mut Testbed, theta: [f64; 2], rates: [f64; 2]) {
-    for ((motor, theta), rate) in testbed.motors.iter_mut().zip(theta).zip(rates) {
-        motor.theta = theta;
-        motor.set_rate = Some(rate);
-        motor.is_sampled = true;
+    for motor in 0..2 {
+        testbed.motors.set_theta(motor, theta[motor]);
+        testbed.motors.set_rate(motor, rates[motor]);
     }
 }
 
@@ -129,7 +119,7 @@ fn a_testbed_at_rest_stays_at_rest() {
     let mut testbed = Testbed::new(Parameters::BUILT_IN).unwrap();
     let start = [0.7, -0.4, 0.7, -0.4, 0.0, 0.0];
     testbed.state = start;
-    (testbed.motors[0].theta, testbed.motors[1].theta) = (0.7, -0.4);
+    (testbed.motors.inputs[0].theta, testbed.motors.inputs[1].theta) = (0.7, -0.4);
     for i in 0..1000 {
         assert!(testbed.step(1e-3 * f64::from(1 + i % 7)));
     }
@@ -140,9 +130,9 @@ fn a_testbed_at_rest_stays_at_rest() {
 fn angle_jumps_pass_through_the_dampers() {
     // omega = 0 makes a zero-order hold; the jump's impulse is B2 d.
     let mut testbed = Testbed::new(Parameters::BUILT_IN).unwrap();
-    testbed.rate_source = RateSource::Omega;
+    testbed.motors.use_omega = true;
     assert!(testbed.step(1e-3));
-    testbed.motors[0].theta = 0.1;
+    testbed.motors.inputs[0].theta = 0.1;
     assert!(testbed.step(1e-12));
     let b = state_space(&Parameters::BUILT_IN).B;
     for (state, row) in testbed.state.iter().zip(0..) {

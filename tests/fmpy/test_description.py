@@ -10,7 +10,7 @@ import pytest
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from lagrange import PER_DEGREE, TABLE_1, table_1
+from lagrange import PER_DEGREE, REAL, TABLE_1, table_1
 
 STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 INPUTS = ("theta1", "theta2", "omega1", "omega2")
@@ -104,7 +104,7 @@ def test_derivatives_of_the_states(description, variables):
         assert d.name == f"der({d.derivative.name})"
 
 
-@pytest.mark.parametrize("name", ["J2", "J3", "H3", "k1", "k2", "c1", "c2", "c3"])
+@pytest.mark.parametrize("name", REAL)
 def test_real_parameters(variables, name):
     v = variables[name]
     assert (v.type, v.causality, v.variability, v.initial) == ("Real", "parameter", "fixed", "exact")

@@ -6,11 +6,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from lagrange import OUTPUTS, linear_model, table_1
+from lagrange import OUTPUTS, REAL, linear_model, table_1
 from reference import backward_slope, follow
 from slave import assert_close
-
-REAL = ("J2", "J3", "H3", "k1", "k2", "c1", "c2", "c3")
 
 
 def random_case(seed: int, points: int, decades: float):

@@ -12,10 +12,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from lagrange import OUTPUTS, linear_model, table_1
+from lagrange import OUTPUTS, REAL, linear_model, table_1
 from reference import augmented, exponential
 
-REAL = ("J2", "J3", "H3", "k1", "k2", "c1", "c2", "c3")
 STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 CASES = int(os.environ.get("PRW_EXTREME_CASES", "12"))
 #: Of the largest of these systems only 1 digit in 10^25 is left after scaling and squaring with as many.

@@ -29,6 +29,8 @@ TABLE_1 = {
     "N": "7",
 }
 PER_DEGREE = ("c1", "c2", "c3", "k1", "k2")
+#: The parameters that are measured, not counted.
+REAL = tuple(name for name in TABLE_1 if name not in ("M", "N"))
 
 # Order of the six angles in every quadratic form below.
 TH1, TH2, TH3, TH4, TH5, TH6 = range(6)

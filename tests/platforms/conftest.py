@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import fmpy
+import fmpy
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -34,7 +35,9 @@ class Runner:
 
 
 HERE = Path(__file__).parent
-WARNINGS = ("-std=c11", "-D_GNU_SOURCE", "-O2", "-Wall", "-Wextra", "-Werror", "-I", str(HERE.parent / "c"))
+#: The loader of fmu-export's tests, and the standard's own headers, which FMPy brings.
+INCLUDED = (HERE.parent.parent / "crates" / "fmu-export" / "tests" / "c", Path(fmpy.__file__).parent / "c-code")
+WARNINGS = ("-std=c11", "-D_GNU_SOURCE", "-O2", "-Wall", "-Wextra", "-Werror", *(f"-I{folder}" for folder in INCLUDED))
 RUNNERS = (
     Runner("linux64", ("cc", *WARNINGS), links=("-ldl", "-lm")),
     Runner(

@@ -1,7 +1,7 @@
 /* The experiment of Fig. 4 as an importer in C runs it: scenario LIBRARY.
    Prints a "name value..." for every number that the FMU calculates, and what it logs; the same on all platforms.
-   Compiled with tests/c/fmi2.h and variables.h, which conftest.py makes from the model description. */
-#include "fmi2.h"
+   Compiled with the standard's headers and variables.h, which conftest.py makes from the model description. */
+#include "fmu.h"
 #include "variables.h"
 
 #include <math.h>

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import lief
 import pytest
-from conftest import ROOT, library
+from conftest import INCLUDED, ROOT, library
 from targets import FOLDERS, GLIBC, MODEL, TARGETS
 
 #: kB
 LARGEST = 450
 
-FUNCTIONS = set(re.findall(r"F\(\w+, (fmi2\w+),", (ROOT / "tests" / "c" / "fmi2.h").read_text()))
+FUNCTIONS = {f"fmi2{name}" for name in re.findall(r"F\((\w+)\)", (INCLUDED[0] / "fmu.h").read_text())}
 
 #: glibc and nothing else; part of every Linux that is not musl's.
 LINUX_LIBRARIES = {"libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}

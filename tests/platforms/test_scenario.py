@@ -16,8 +16,8 @@ def run(run_c, unpacked, description):
         path = str(library(unpacked, runner.folder))
         if program == "scenario":
             return run_c(runner, HERE / "scenario.c", path)
-        # Of the Rust tests: layout of the types, Model Exchange, a hundred times loading and unloading.
-        return run_c(runner, HERE.parent / "c" / "drive.c", path, description.guid)
+        # Layout of the types, Model Exchange, a hundred times loading and unloading.
+        return run_c(runner, HERE / "drive.c", path, description.guid)
 
     return run
 

@@ -1,4 +1,4 @@
-/* What tests/c/fmi2.h needs of POSIX dlfcn.h, on Windows. */
+/* What fmu.h needs of POSIX dlfcn.h, on Windows. */
 #ifndef PRW_TEST_DLFCN_H
 #define PRW_TEST_DLFCN_H
 

@@ -1,10 +1,11 @@
 //! The way into every state of the state machines (sections 3.2.3 and 4.2.4).
 
-use crate::serialized::with_mode;
-use crate::support::Fmu;
-use fmi2_export::Interface;
-use fmi2_export::call_table::Mode::{self, *};
-use fmi2_export::types::{fmi2EventInfo, fmi2True};
+use crate::new;
+use fmu_export::Interface;
+use fmu_export::Mode::{self, *};
+use fmu_export::fmi2::types::{fmi2EventInfo, fmi2True};
+use fmu_run::Importer as Fmu;
+use fmu_run::serialized::with_mode;
 
 pub const INTERFACES: [Interface; 2] = [Interface::CoSimulation, Interface::ModelExchange];
 
@@ -26,7 +27,7 @@ pub fn all_modes() -> impl Iterator<Item = (Interface, Mode)> {
 /// A new instance in this mode. Nothing that an importer does leads to "step failed" and "error", for
 /// refusals leave the mode as it is; a saved state does.
 pub fn in_mode(interface: Interface, mode: Mode) -> Fmu {
-    let fmu = Fmu::new(interface);
+    let fmu = new(interface);
     if mode == Instantiated {
         return fmu;
     }

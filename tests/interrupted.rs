@@ -2,7 +2,7 @@
 #![cfg(unix)]
 #![allow(unsafe_code)]
 
-use crate::sequences::random_bytes;
+use fmu_run::careless::random_bytes;
 use std::fs;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::Path;
@@ -25,7 +25,7 @@ fn build_fmu(out: &Path) -> Command {
     let library = out.with_extension("dylib");
     let mut bytes = LIBRARY.map(u32::to_be_bytes).concat();
     bytes.extend(random_bytes(0, 2 * LIMIT as usize));
-    bytes.extend(crate::GUID.to_bytes());
+    bytes.extend(env!("FMU_GUID").as_bytes());
     fs::write(&library, bytes).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
     command.arg("--binary").arg(format!("darwin64={}", library.display())).arg("--out").arg(out);

@@ -1,18 +1,19 @@
 //! How the motors move between communication points in Co-Simulation, as far as an importer can tell.
 
 use crate::exact::{Random, STATES, advanced, distance, jumped, parameters, set_parameters};
-use crate::support::Fmu;
-use fmi2_export::Interface::CoSimulation;
-use prw_testbed::variables::vr;
+use crate::{new, vr};
+use fmu_export::Interface::CoSimulation;
+use fmu_run::Importer as Fmu;
+use prw_testbed::variables::Name;
 use prw_testbed::{Parameters, state_space::state_space};
 
-const THETA: [u32; 2] = [vr::theta1, vr::theta2];
-const OMEGA: [u32; 2] = [vr::omega1, vr::omega2];
+const THETA: [u32; 2] = [vr(Name::theta1), vr(Name::theta2)];
+const OMEGA: [u32; 2] = [vr(Name::omega1), vr(Name::omega2)];
 
 fn slave(p: &Parameters, use_omega: bool) -> Fmu {
-    let fmu = Fmu::new(CoSimulation);
+    let fmu = new(CoSimulation);
     set_parameters(&fmu, p);
-    fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &use_omega.into()));
+    fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &use_omega.into()));
     fmu.initialize(0.0);
     fmu
 }
@@ -83,11 +84,11 @@ fn the_order_of_setting_does_not_matter() {
         fmu.set(&OMEGA, &[1.0, 2.0]);
         fmu.step(0.0, 0.01);
         calls.iter().for_each(|call| call(&fmu));
-        (fmu.rates(THETA), fmu.get([vr::tau1, vr::tau2]))
+        (fmu.rates(THETA), fmu.get([vr(Name::tau1), vr(Name::tau2)]))
     };
     let omega = |fmu: &Fmu| fmu.set(&OMEGA, &[5.0, -6.0]);
     let derivative = |fmu: &Fmu| fmu.set_rates(THETA, [3.0, 4.0]);
-    let use_omega = |fmu: &Fmu| fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &1));
+    let use_omega = |fmu: &Fmu| fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &1));
 
     let one = after_a_step(true, &[&omega, &derivative]);
     assert_eq!(one.0, [3.0, 4.0], "a derivative comes before omega");
@@ -168,7 +169,10 @@ fn parabolas_have_exact_slopes() {
                 let from_states: f64 = (0..6).map(|i| system.C[(row, i)] * x[i]).sum();
                 from_states + (0..4).map(|i| system.D[(row, i)] * u[i]).sum::<f64>()
             };
-            assert!(distance(&fmu.get([vr::tau1, vr::tau2]), &[torque(4), torque(5)]) < 1e-11, "at {t}");
+            assert!(
+                distance(&fmu.get([vr(Name::tau1), vr(Name::tau2)]), &[torque(4), torque(5)]) < 1e-11,
+                "at {t}"
+            );
         }
         let h = random.between(0.005, 0.02);
         fmu.step(t, h);
@@ -180,8 +184,8 @@ fn parabolas_have_exact_slopes() {
 #[test]
 fn rest_at_an_angle() {
     for use_omega in [false, true] {
-        let fmu = Fmu::new(CoSimulation);
-        fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &use_omega.into()));
+        let fmu = new(CoSimulation);
+        fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &use_omega.into()));
         let start = [0.7, -0.4, 0.7, -0.4, 0.0, 0.0];
         fmu.set(&STATES, &start);
         fmu.enter_initialization(0.0, None);
@@ -192,7 +196,7 @@ fn rest_at_an_angle() {
             fmu.step(f64::from(i) * 0.01, 0.01);
         }
         assert_eq!(fmu.get(STATES), start);
-        assert_eq!(fmu.get([vr::tau1, vr::tau2]), [0.0, 0.0]);
+        assert_eq!(fmu.get([vr(Name::tau1), vr(Name::tau2)]), [0.0, 0.0]);
     }
 }
 
@@ -204,7 +208,7 @@ fn inputs_that_are_not_set_stay() {
     for i in 0..300 {
         fmu.step(f64::from(i) * 0.01, 0.01);
     }
-    assert!(distance(&fmu.get([vr::theta3, vr::pitch]), &[0.3, 0.3]) < 1e-9);
+    assert!(distance(&fmu.get([vr(Name::theta3), vr(Name::pitch)]), &[0.3, 0.3]) < 1e-9);
 }
 
 /// Higher orders are accepted, alone and together with order 1, and change nothing.
@@ -219,9 +223,10 @@ fn higher_orders_are_harmless() {
                 fmu.set_rates(THETA, [t.cos(), -t.sin()]);
             }
         }
-        let (vr, orders) = ([vr::theta1, vr::theta2, vr::omega1, vr::theta1], [2, 7, 1, i32::MAX]);
+        let (reference, orders) =
+            ([vr(Name::theta1), vr(Name::theta2), vr(Name::omega1), vr(Name::theta1)], [2, 7, 1, i32::MAX]);
         rich.ok(rich.fmi2SetRealInputDerivatives(
-            vr.as_ptr(),
+            reference.as_ptr(),
             4,
             orders.as_ptr(),
             [5.0, 6.0, 7.0, 8.0].as_ptr(),
@@ -229,6 +234,10 @@ fn higher_orders_are_harmless() {
         plain.step(t, 0.02);
         rich.step(t, 0.02);
         assert_eq!(plain.get(STATES), rich.get(STATES), "step {i}");
-        assert_eq!(plain.get([vr::tau1, vr::tau2]), rich.get([vr::tau1, vr::tau2]), "step {i}");
+        assert_eq!(
+            plain.get([vr(Name::tau1), vr(Name::tau2)]),
+            rich.get([vr(Name::tau1), vr(Name::tau2)]),
+            "step {i}"
+        );
     }
 }

@@ -3,30 +3,40 @@
 
 #![allow(non_snake_case, reason = "the paper's symbols")]
 
-use crate::support::Fmu;
+use crate::{TABLE, vr};
+use fmu_export::{BaseType, Causality, Variable};
+use fmu_run::Importer as Fmu;
 use nalgebra::SMatrix;
 use prw_testbed::Parameters;
+use prw_testbed::TestbedFmu;
 use prw_testbed::state_space::state_space;
-use prw_testbed::variables::vr;
+use prw_testbed::variables::Name;
 
-pub const INPUTS: [u32; 4] = [vr::theta1, vr::theta2, vr::omega1, vr::omega2];
-pub const STATES: [u32; 6] = [vr::theta3, vr::theta4, vr::theta5, vr::theta6, vr::omega5, vr::omega6];
+pub const INPUTS: [u32; 4] = [vr(Name::theta1), vr(Name::theta2), vr(Name::omega1), vr(Name::omega2)];
+pub const STATES: [u32; 6] = [
+    vr(Name::theta3),
+    vr(Name::theta4),
+    vr(Name::theta5),
+    vr(Name::theta6),
+    vr(Name::omega5),
+    vr(Name::omega6),
+];
 /// The derivatives, then the outputs.
 pub const UNKNOWNS: [u32; 14] = [
-    vr::der_theta3,
-    vr::der_theta4,
-    vr::der_theta5,
-    vr::der_theta6,
-    vr::der_omega5,
-    vr::der_omega6,
-    vr::tau1,
-    vr::tau2,
-    vr::pitch,
-    vr::roll,
-    vr::pitch_rate,
-    vr::roll_rate,
-    vr::theta3,
-    vr::theta4,
+    vr(Name::der_theta3),
+    vr(Name::der_theta4),
+    vr(Name::der_theta5),
+    vr(Name::der_theta6),
+    vr(Name::der_omega5),
+    vr(Name::der_omega6),
+    vr(Name::tau1),
+    vr(Name::tau2),
+    vr(Name::pitch),
+    vr(Name::roll),
+    vr(Name::pitch_rate),
+    vr(Name::roll_rate),
+    vr(Name::theta3),
+    vr(Name::theta4),
 ];
 
 /// The partial derivatives of [`UNKNOWNS`] with respect to [`STATES`], then [`INPUTS`]: A and B, the torque
@@ -76,22 +86,35 @@ pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Sets all parameters that eq. (11) has.
+/// Sets all parameters that eq. (11) has: all at once, because they are checked together.
 pub fn set_parameters(fmu: &Fmu, p: &Parameters) {
-    let real = [vr::J2, vr::J3, vr::H3, vr::k1, vr::k2, vr::c1, vr::c2, vr::c3];
-    fmu.set(&real, &[p.J2, p.J3, p.H3, p.k1, p.k2, p.c1, p.c2, p.c3]);
-    fmu.ok(fmu.fmi2SetInteger([vr::M, vr::N].as_ptr(), 2, [p.M, p.N].as_ptr()));
+    let (mut reals, mut integers) = (Vec::new(), Vec::new());
+    for (name, value) in prw_testbed::fingerprint::start(p) {
+        let vr = TABLE.iter().position(|variable| variable.name() == name).unwrap();
+        match TABLE[vr].base() {
+            BaseType::Real => reals.push((vr as u32, value.parse::<f64>().unwrap())),
+            _ => integers.push((vr as u32, value.parse::<i32>().unwrap())),
+        }
+    }
+    let ((real, values), (integer, counts)): ((Vec<_>, Vec<_>), (Vec<_>, Vec<_>)) =
+        (reals.into_iter().unzip(), integers.into_iter().unzip());
+    fmu.set(&real, &values);
+    fmu.ok(fmu.fmi2SetInteger(integer.as_ptr(), integer.len(), counts.as_ptr()));
+}
+
+/// The value references of the Real parameters.
+pub fn real_parameters() -> impl Iterator<Item = u32> {
+    let is_one =
+        |v: &Variable<TestbedFmu>| v.causality() == Causality::Parameter && v.base() == BaseType::Real;
+    (0..).zip(TABLE).filter(move |(_, variable)| is_one(variable)).map(|(vr, _)| vr)
 }
 
 /// A testbed unlike that of Table 1, another for each seed.
 pub fn parameters(seed: u64) -> Parameters {
     let mut random = Random(seed);
-    let mut near = |value: f64| value * random.between(-1.5, 1.5).exp();
-    let p = Parameters::BUILT_IN;
-    let (J2, J3, H3, k1, k2) = (near(p.J2), near(p.J3), near(p.H3), near(p.k1), near(p.k2));
-    let (c1, c2, c3) = (near(p.c1), near(p.c2), near(p.c3));
     let [M, N] = [8.0, 14.0].map(|end| random.between(1.0, end) as i32);
-    Parameters { J2, J3, H3, k1, k2, c1, c2, c3, M, N }
+    let near = Parameters::BUILT_IN.map_reals(|value| value * random.between(-1.5, 1.5).exp());
+    Parameters { M, N, ..near }
 }
 
 /// A sequence of numbers, the same in every run.

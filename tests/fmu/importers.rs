@@ -1,16 +1,23 @@
 //! The sequences of calls that real importers were seen to make, odd ones included. What is in their
 //! sources or traces is replayed here call by call; every answer must be `fmi2OK` unless said otherwise.
 
-use crate::exact::{INPUTS, STATES, distance};
+use crate::exact::{INPUTS, STATES, distance, parameters, set_parameters};
 use crate::modes::{enter_continuous_time, in_mode};
-use crate::support::{Arguments, Fmu, Status, call_all};
-use fmi2_export::Interface::{CoSimulation, ModelExchange};
-use fmi2_export::call_table::Mode::*;
-use fmi2_export::{BaseType, Causality};
-use prw_testbed::variables::{VARIABLES, vr};
+use crate::{TABLE, new, vr};
+use fmu_export::Interface::{CoSimulation, ModelExchange};
+use fmu_export::Mode::*;
+use fmu_export::Status;
+use fmu_export::{BaseType, Causality};
+use fmu_run::{Arguments, Functions, Importer as Fmu, Message};
+use prw_testbed::TestbedFmu;
+use prw_testbed::variables::Name;
 use std::ptr::null_mut;
 
-const OUTPUTS: [u32; 4] = [vr::tau1, vr::tau2, vr::pitch, vr::roll];
+fn instantiate(arguments: &Arguments) -> Result<Fmu, Vec<Message>> {
+    Fmu::instantiate(Functions::of::<TestbedFmu>(), arguments)
+}
+
+const OUTPUTS: [u32; 4] = [vr(Name::tau1), vr(Name::tau2), vr(Name::pitch), vr(Name::roll)];
 
 fn motors(t: f64) -> [f64; 4] {
     [(3.0 * t).sin(), (4.0 * t).cos() - 1.0, 3.0 * (3.0 * t).cos(), -4.0 * (4.0 * t).sin()]
@@ -19,7 +26,7 @@ fn motors(t: f64) -> [f64; 4] {
 /// What OpenModelica reads at the end of a step: all outputs and locals in one call.
 fn outputs_and_locals() -> Vec<u32> {
     let exposed = |causality| matches!(causality, Causality::Output | Causality::Local);
-    (0..).zip(VARIABLES).filter(|(_, variable)| exposed(variable.causality())).map(|(vr, _)| vr).collect()
+    (0..).zip(TABLE).filter(|(_, variable)| exposed(variable.causality())).map(|(vr, _)| vr).collect()
 }
 
 /// Model Exchange only; fixed parameters after the initialization, states while in event mode.
@@ -28,17 +35,15 @@ fn openmodelica() {
     let arguments = Arguments {
         logging_on: true,
         resource_location: Some(c"file:///tmp/not/there/resources"),
-        ..Arguments::new(ModelExchange)
+        ..Arguments::of::<TestbedFmu>(ModelExchange)
     };
-    let fmu = Fmu::instantiate(&arguments).unwrap();
+    let fmu = instantiate(&arguments).unwrap();
     fmu.set(&INPUTS, &motors(0.0));
     fmu.ok(fmu.fmi2SetupExperiment(0, 0.0, 0.0, 0, 1.0));
     fmu.ok(fmu.fmi2EnterInitializationMode());
     fmu.ok(fmu.fmi2ExitInitializationMode());
-    fmu.set(&[vr::J2, vr::J3, vr::H3, vr::k1, vr::k2, vr::c1], &[4e-3, 1e-2, 4e-2, 120.0, 44.0, 0.45]);
-    fmu.set(&[vr::c2, vr::c3], &[0.48, 0.38]);
-    fmu.ok(fmu.fmi2SetInteger([vr::M, vr::N].as_ptr(), 2, [4, 7].as_ptr()));
-    fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &0));
+    set_parameters(&fmu, &parameters(5));
+    fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &0));
     let mut x = [f64::NAN; 6];
     let mut rates = [f64::NAN; 6];
     fmu.ok(fmu.fmi2GetContinuousStates(x.as_mut_ptr(), 6));
@@ -63,10 +68,10 @@ fn openmodelica() {
 /// OMSimulator reads and writes one variable per call, all that are exposed, at every step.
 fn read_all_one_by_one(fmu: &Fmu) -> Vec<f64> {
     (0..)
-        .zip(VARIABLES)
+        .zip(TABLE)
         .map(|(vr, variable)| {
             let (mut real, mut integer) = (f64::NAN, -1);
-            match variable.kind().base_type() {
+            match variable.base() {
                 BaseType::Real => fmu.ok(fmu.fmi2GetReal(&vr, 1, &mut real)),
                 BaseType::Integer => fmu.ok(fmu.fmi2GetInteger(&vr, 1, &mut integer)),
                 _ => fmu.ok(fmu.fmi2GetBoolean(&vr, 1, &mut integer)),
@@ -85,9 +90,9 @@ fn omsimulator() {
         logging_on: true,
         environment: false,
         resource_location: Some(c"file:////tmp/oms-123/temp/0001_wrist/resources"),
-        ..Arguments::new(CoSimulation)
+        ..Arguments::of::<TestbedFmu>(CoSimulation)
     };
-    let fmu = Fmu::instantiate(&arguments).unwrap();
+    let fmu = instantiate(&arguments).unwrap();
     fmu.ok(fmu.fmi2SetupExperiment(1, 1e-4, 0.0, 0, 0.0));
     fmu.ok(fmu.fmi2EnterInitializationMode());
     for (vr, value) in INPUTS.into_iter().zip(motors(0.0)) {
@@ -105,8 +110,8 @@ fn omsimulator() {
                 fmu.set(&[vr], &[value]);
             }
             let [rate1, rate2] = [2, 3].map(|i| motors(t)[i]);
-            fmu.set_rates([vr::theta1], [rate1]);
-            fmu.set_rates([vr::theta2], [rate2]);
+            fmu.set_rates([vr(Name::theta1)], [rate1]);
+            fmu.set_rates([vr(Name::theta2)], [rate2]);
             fmu.step(t, 0.01);
             for vr in OUTPUTS {
                 assert!(fmu.rates([vr])[0].is_finite());
@@ -122,10 +127,10 @@ fn omsimulator() {
 /// It ignores a NULL from fmi2Instantiate and goes on with it: errors, no crash.
 #[test]
 fn omsimulator_without_instance() {
-    let arguments = Arguments { guid: Some(c"{stale}"), ..Arguments::new(CoSimulation) };
-    assert!(Fmu::instantiate(&arguments).is_err());
-    let fmu = Fmu::null();
-    for (function, status) in call_all(&fmu) {
+    let arguments = Arguments { guid: Some(c"{stale}".into()), ..Arguments::of::<TestbedFmu>(CoSimulation) };
+    assert!(instantiate(&arguments).is_err());
+    let fmu = Fmu::null(Functions::of::<TestbedFmu>());
+    for (function, status) in fmu.call_all() {
         assert_eq!(status, Status::Error, "{function}");
     }
 }
@@ -137,8 +142,8 @@ fn libcosim() {
     const STEP: i64 = 16_666_667;
     const SLAVES: usize = 6;
     let start = |number: usize| {
-        let fmu = Fmu::new(CoSimulation);
-        fmu.set(&[vr::theta1, vr::k1], &[0.1 * number as f64, 100.0 + number as f64]);
+        let fmu = new(CoSimulation);
+        fmu.set(&[vr(Name::theta1), vr(Name::k1)], &[0.1 * number as f64, 100.0 + number as f64]);
         fmu.ok(fmu.fmi2SetupExperiment(0, 0.0, 0.0, 0, 0.0));
         fmu.ok(fmu.fmi2EnterInitializationMode());
         fmu.ok(fmu.fmi2ExitInitializationMode());
@@ -174,20 +179,20 @@ fn libcosim() {
 /// FMPy with set_input_derivatives: derivatives while initializing, outputs right after it.
 #[test]
 fn fmpy() {
-    let fmu = Fmu::new(CoSimulation);
+    let fmu = new(CoSimulation);
     fmu.ok(fmu.fmi2SetupExperiment(0, 0.0, 0.0, 1, 0.1));
-    fmu.set(&[vr::k1, vr::theta3], &[110.0, 0.05]);
+    fmu.set(&[vr(Name::k1), vr(Name::theta3)], &[110.0, 0.05]);
     fmu.ok(fmu.fmi2EnterInitializationMode());
     let [theta1, theta2, rate1, rate2] = motors(0.0);
-    fmu.set(&[vr::theta1, vr::theta2], &[theta1, theta2]);
-    fmu.set_rates([vr::theta1, vr::theta2], [rate1, rate2]);
+    fmu.set(&[vr(Name::theta1), vr(Name::theta2)], &[theta1, theta2]);
+    fmu.set_rates([vr(Name::theta1), vr(Name::theta2)], [rate1, rate2]);
     fmu.ok(fmu.fmi2ExitInitializationMode());
     assert!(fmu.get(OUTPUTS)[0] != 0.0, "the sensors feel theta3 and the rate");
     let mut time = 0.0;
     while time < 0.1 - 1e-9 {
         let [theta1, theta2, rate1, rate2] = motors(time);
-        fmu.set(&[vr::theta1, vr::theta2], &[theta1, theta2]);
-        fmu.set_rates([vr::theta1, vr::theta2], [rate1, rate2]);
+        fmu.set(&[vr(Name::theta1), vr(Name::theta2)], &[theta1, theta2]);
+        fmu.set_rates([vr(Name::theta1), vr(Name::theta2)], [rate1, rate2]);
         fmu.step(time, 0.01);
         time += 0.01;
         fmu.get(OUTPUTS);
@@ -201,11 +206,11 @@ fn derivatives_of_the_initialization_are_used() {
     let [with, without] = [true, false].map(|given| {
         let fmu = in_mode(CoSimulation, Initialization);
         if given {
-            fmu.set_rates([vr::theta1, vr::theta2], [2.0, 0.0]);
+            fmu.set_rates([vr(Name::theta1), vr(Name::theta2)], [2.0, 0.0]);
         }
         fmu.ok(fmu.fmi2ExitInitializationMode());
         fmu.step(0.0, 0.01);
-        fmu.get([vr::theta3])
+        fmu.get([vr(Name::theta3)])
     });
     assert!(with[0] > 0.0 && without[0] == 0.0);
 }
@@ -219,20 +224,20 @@ fn maestro_and_pyfmi() {
     for i in 0..20 {
         let t = f64::from(i) * 0.01;
         let [theta1, theta2, rate1, rate2] = motors(t);
-        fmu.set(&[vr::theta1, vr::theta2], &[theta1, theta2]);
+        fmu.set(&[vr(Name::theta1), vr(Name::theta2)], &[theta1, theta2]);
         for (order, given) in [(1, [rate1, rate2]), (2, [-9.0 * theta1, -16.0 * theta2])] {
-            let vr = [vr::theta1, vr::theta2];
+            let vr = [vr(Name::theta1), vr(Name::theta2)];
             fmu.ok(fmu.fmi2SetRealInputDerivatives(vr.as_ptr(), 2, [order; 2].as_ptr(), given.as_ptr()));
         }
         fmu.step(t, 0.01);
-        for vr in [vr::der_theta3, vr::der_omega5, vr::pitch_rate, vr::roll_rate] {
+        for vr in [vr(Name::der_theta3), vr(Name::der_omega5), vr(Name::pitch_rate), vr(Name::roll_rate)] {
             for order in [1, 2] {
                 fmu.ok(fmu.fmi2GetRealOutputDerivatives(&vr, 1, &order, values.as_mut_ptr()));
                 assert!(values[0].is_finite());
             }
         }
         for order in [1, 2] {
-            let vr = [vr::tau1, vr::roll];
+            let vr = [vr(Name::tau1), vr(Name::roll)];
             fmu.ok(fmu.fmi2GetRealOutputDerivatives(
                 vr.as_ptr(),
                 2,
@@ -247,7 +252,7 @@ fn maestro_and_pyfmi() {
 /// communication points that are off by 3e-12; its fast restart begins again with a reset.
 #[test]
 fn fmikit() {
-    let fmu = Fmu::new(CoSimulation);
+    let fmu = new(CoSimulation);
     let run = || {
         fmu.ok(fmu.fmi2SetupExperiment(0, 0.0, 0.0, 1, 1.0));
         fmu.ok(fmu.fmi2EnterInitializationMode());

@@ -1,6 +1,6 @@
 /* Drives the FMU as a C importer does: drive LIBRARY GUID.
    Prints "name value" for what the Rust side of the test compares. */
-#include "fmi2.h"
+#include "fmu.h"
 
 enum { THETA1, THETA2, OMEGA1, OMEGA2, TAU1, TAU2, PITCH, ROLL };
 

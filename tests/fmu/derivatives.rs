@@ -1,14 +1,17 @@
 //! Derivatives that the FMU offers: with respect to variables (section 2.1.9) and to time (4.2.1).
 
-use crate::exact::{INPUTS, Random, STATES, UNKNOWNS, jacobian, parameters, set_parameters};
+use crate::exact::{INPUTS, Random, STATES, UNKNOWNS, jacobian, parameters, real_parameters, set_parameters};
 use crate::modes::in_mode;
-use crate::serialized::with_mode;
-use crate::support::Fmu;
-use fmi2_export::Interface::{CoSimulation, ModelExchange};
-use fmi2_export::call_table::Mode::*;
+use crate::{TABLE, new, vr};
+use fmu_export::Interface::{CoSimulation, ModelExchange};
+use fmu_export::Mode::*;
+use fmu_export::{BaseType, Causality, Variable};
+use fmu_run::Importer as Fmu;
+use fmu_run::serialized::with_mode;
 use nalgebra::SVector;
 use prw_testbed::Parameters;
-use prw_testbed::variables::{VARIABLES, vr};
+use prw_testbed::TestbedFmu;
+use prw_testbed::variables::Name;
 
 fn knowns() -> Vec<u32> {
     [&STATES[..], &INPUTS].concat()
@@ -44,16 +47,16 @@ fn pair_by_pair() {
             (ModelExchange, Event),
             (ModelExchange, ContinuousTime),
         ] {
-            let fmu = Fmu::new(interface);
+            let fmu = new(interface);
             set_parameters(&fmu, &p);
-            fmu.set(&[vr::theta1, vr::omega2, vr::theta3], &[0.3, -2.0, 0.1]);
-            fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &i32::from(seed % 2 == 1)));
+            fmu.set(&[vr(Name::theta1), vr(Name::omega2), vr(Name::theta3)], &[0.3, -2.0, 0.1]);
+            fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &i32::from(seed % 2 == 1)));
             fmu.restore(&with_mode(fmu.bytes(), mode));
             for (row, unknown) in UNKNOWNS.into_iter().enumerate() {
                 for (column, known) in knowns().into_iter().enumerate() {
                     let found = directional(&fmu, &[unknown], &[known], &[1.0])[0];
                     let expected = expected[(row, column)];
-                    let names = [unknown, known].map(|vr| VARIABLES[vr as usize].name());
+                    let names = [unknown, known].map(|vr| TABLE[vr as usize].name());
                     let error = (found - expected).abs();
                     assert!(
                         error <= 1e-13 * expected.abs(),
@@ -69,18 +72,18 @@ fn pair_by_pair() {
 /// with the error of a central difference of this width.
 #[test]
 fn with_respect_to_parameters() {
-    const PARAMETERS: [u32; 8] = [vr::J2, vr::J3, vr::H3, vr::k1, vr::k2, vr::c1, vr::c2, vr::c3];
     const WIDTH: f64 = 1e-4;
     for seed in 1..10 {
         let mut random = Random(seed);
         let fmu = in_mode(if seed % 2 == 0 { CoSimulation } else { ModelExchange }, Initialization);
         set_parameters(&fmu, &parameters(seed));
-        fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &1));
+        fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &1));
         for known in knowns() {
             fmu.set(&[known], &[random.between(-1.0, 1.0)]);
         }
-        for known in PARAMETERS {
-            let [start] = fmu.get([known]);
+        for known in real_parameters() {
+            // What is 0 is tried elsewhere.
+            let [start] = fmu.get([known]).map(|start| if start == 0.0 { 0.1 } else { start });
             let values = |value: f64| {
                 fmu.set(&[known], &[value]);
                 fmu.get(UNKNOWNS)
@@ -91,7 +94,7 @@ fn with_respect_to_parameters() {
             for (i, unknown) in UNKNOWNS.into_iter().enumerate() {
                 let expected = (above[i] - below[i]) / (2.0 * WIDTH * start);
                 let tolerance = 1e-6 * (expected.abs() + now[i].abs() / start);
-                let names = [unknown, known].map(|vr| VARIABLES[vr as usize].name());
+                let names = [unknown, known].map(|vr| TABLE[vr as usize].name());
                 assert!((found[i] - expected).abs() <= tolerance, "{names:?}: {} {expected}", found[i]);
             }
         }
@@ -113,9 +116,14 @@ fn several_at_once() {
             assert!((found - expected).abs() < 1e-14 * scale, "row {row}: {found} is not {expected}");
         }
     }
-    let unknown = [vr::tau1, vr::der_omega6, vr::tau1];
-    let found = directional(&fmu, &unknown, &[vr::omega1, vr::theta5, vr::omega1], &[2.0, 0.0, -1.0]);
-    let once = directional(&fmu, &unknown, &[vr::omega1], &[1.0]);
+    let unknown = [vr(Name::tau1), vr(Name::der_omega6), vr(Name::tau1)];
+    let found = directional(
+        &fmu,
+        &unknown,
+        &[vr(Name::omega1), vr(Name::theta5), vr(Name::omega1)],
+        &[2.0, 0.0, -1.0],
+    );
+    let once = directional(&fmu, &unknown, &[vr(Name::omega1)], &[1.0]);
     assert_eq!(found, once);
     assert_eq!(found[0], found[2]);
 }
@@ -126,8 +134,8 @@ fn no_knowns() {
     assert_eq!(directional(&in_mode(CoSimulation, StepComplete), &UNKNOWNS, &[], &[]), [0.0; 14]);
 }
 
-const THETA: [u32; 2] = [vr::theta1, vr::theta2];
-const OMEGA: [u32; 2] = [vr::omega1, vr::omega2];
+const THETA: [u32; 2] = [vr(Name::theta1), vr(Name::theta2)];
+const OMEGA: [u32; 2] = [vr(Name::omega1), vr(Name::omega2)];
 
 /// Where the motors' rates come from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,7 +147,8 @@ enum Rates {
 
 /// All that moves while the FMU steps.
 fn moving() -> Vec<u32> {
-    (0..).zip(VARIABLES).map(|(vr, _)| vr).filter(|vr| (vr::tau1..=vr::der_omega6).contains(vr)).collect()
+    let moves = |v: &Variable<TestbedFmu>| matches!(v.causality(), Causality::Output | Causality::Local);
+    (0..).zip(TABLE).filter(|(_, variable)| moves(variable)).map(|(vr, _)| vr).collect()
 }
 
 fn values(fmu: &Fmu, vr: &[u32]) -> Vec<f64> {
@@ -174,7 +183,7 @@ fn check_against_steps(fmu: &Fmu, time: f64, label: &str) {
             (-25.0 * y[0][i] + 48.0 * y[1][i] - 36.0 * y[2][i] + 16.0 * y[3][i] - 3.0 * y[4][i]) / (12.0 * H);
         // What rounding does to the difference, and what is left of the series.
         let tolerance = 1e-7 * (1.0 + y[0][i].abs() + expected.abs());
-        let name = VARIABLES[*vr as usize].name();
+        let name = TABLE[*vr as usize].name();
         assert!((found[i] - expected).abs() < tolerance, "{label}: {name}' is {expected}, not {}", found[i]);
     }
 }
@@ -185,9 +194,9 @@ fn check_against_steps(fmu: &Fmu, time: f64, label: &str) {
 fn output_derivatives_are_exact() {
     for rates in [Rates::Samples, Rates::Omega, Rates::Derivatives] {
         let p = parameters(9);
-        let fmu = Fmu::new(CoSimulation);
+        let fmu = new(CoSimulation);
         set_parameters(&fmu, &p);
-        fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &i32::from(rates == Rates::Omega)));
+        fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &i32::from(rates == Rates::Omega)));
         fmu.set(&STATES, &[0.1, -0.2, 0.3, 0.4, -1.0, 2.0]);
         fmu.initialize(0.0);
         let mut random = Random(10);
@@ -238,15 +247,15 @@ fn acceleration_of_samples() {
 #[test]
 fn derivatives_of_every_variable_and_order() {
     let fmu = in_mode(CoSimulation, StepComplete);
-    fmu.set(&[vr::theta1, vr::omega1], &[0.4, 1.0]);
+    fmu.set(&[vr(Name::theta1), vr(Name::omega1)], &[0.4, 1.0]);
     fmu.step(0.0, 0.05);
-    for (vr, variable) in (0..vr::M).zip(VARIABLES) {
+    for (place, variable) in (0..).zip(TABLE).filter(|(_, variable)| variable.base() == BaseType::Real) {
         for order in [1, 2, 3, i32::MAX] {
             let mut value = f64::NAN;
-            fmu.ok(fmu.fmi2GetRealOutputDerivatives(&vr, 1, &order, &mut value));
+            fmu.ok(fmu.fmi2GetRealOutputDerivatives(&place, 1, &order, &mut value));
             assert!(value.is_finite(), "{}, order {order}", variable.name());
             assert!(
-                value == 0.0 || (order == 1 && vr < vr::J2),
+                value == 0.0 || (order == 1 && variable.causality() != Causality::Parameter),
                 "{}, order {order}: {value}",
                 variable.name()
             );

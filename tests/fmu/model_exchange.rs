@@ -2,12 +2,13 @@
 
 use crate::exact::{INPUTS, Random, STATES, UNKNOWNS, distance, jacobian, parameters, set_parameters};
 use crate::modes::{enter_continuous_time, in_mode};
-use crate::support::Fmu;
-use fmi2_export::Interface::{CoSimulation, ModelExchange};
-use fmi2_export::call_table::Mode::*;
+use crate::{new, vr};
+use fmu_export::Interface::{CoSimulation, ModelExchange};
+use fmu_export::Mode::*;
+use fmu_run::Importer as Fmu;
 use nalgebra::SVector;
 use prw_testbed::Parameters;
-use prw_testbed::variables::vr;
+use prw_testbed::variables::Name;
 
 fn states(fmu: &Fmu) -> [f64; 6] {
     let mut x = [f64::NAN; 6];
@@ -31,9 +32,9 @@ fn equations() {
     let mut random = Random(3);
     for seed in 0..20 {
         let p = parameters(seed);
-        let fmu = Fmu::new(ModelExchange);
+        let fmu = new(ModelExchange);
         set_parameters(&fmu, &p);
-        fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &i32::from(seed % 2 == 0)));
+        fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &i32::from(seed % 2 == 0)));
         fmu.initialize(0.0);
         enter_continuous_time(&fmu);
         for _ in 0..5 {
@@ -79,7 +80,7 @@ fn both_ways_to_set_a_state() {
     set_states(&fmu, [0.0, 0.0, 0.25, 0.0, 0.0, 0.0]);
     let by_array = (states(&fmu), derivatives(&fmu));
     set_states(&fmu, [0.0; 6]);
-    fmu.set(&[vr::theta5], &[0.25]);
+    fmu.set(&[vr(Name::theta5)], &[0.25]);
     assert_eq!((states(&fmu), derivatives(&fmu)), by_array);
 }
 
@@ -109,7 +110,7 @@ const END: f64 = 0.5;
 
 /// Model Exchange with the classical Runge-Kutta method.
 fn integrated(p: &Parameters, steps: i32) -> [f64; 14] {
-    let fmu = Fmu::new(ModelExchange);
+    let fmu = new(ModelExchange);
     set_parameters(&fmu, p);
     fmu.initialize(0.0);
     enter_continuous_time(&fmu);
@@ -137,9 +138,9 @@ fn integrated(p: &Parameters, steps: i32) -> [f64; 14] {
 
 /// Co-Simulation of the same motion, from samples and with the rates given.
 fn simulated(p: &Parameters, steps: i32, use_omega: bool) -> [f64; 14] {
-    let fmu = Fmu::new(CoSimulation);
+    let fmu = new(CoSimulation);
     set_parameters(&fmu, p);
-    fmu.ok(fmu.fmi2SetBoolean(&vr::use_omega, 1, &use_omega.into()));
+    fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &use_omega.into()));
     fmu.initialize(0.0);
     let h = END / f64::from(steps);
     for step in 0..=steps {

@@ -1,0 +1,187 @@
+//! What the FMU of the testbed offers.
+
+use crate::fmu::TestbedFmu;
+use crate::instant::Instant;
+use crate::motor::Motions;
+use crate::pair::Pair;
+use crate::parameters::{InvalidParameter, Parameters};
+use crate::testbed::Testbed;
+use crate::variables::Name;
+use fmu_export::{
+    CoSimulation, DefaultExperiment, Error, Experiment, Info, InputDerivatives, Model, ModelExchange,
+    OutputDerivatives, Partials, Saved, Setup, StateVisitor, Step, Stepped, Variables, info, saved,
+};
+
+impl Saved for Pair {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        self[0].visit(visitor);
+        self[1].visit(visitor);
+    }
+}
+
+saved!(for Motions { angle, rate, acceleration });
+
+impl From<InvalidParameter> for Error {
+    fn from(error: InvalidParameter) -> Self {
+        Self::new(error.to_string())
+    }
+}
+
+impl Model for TestbedFmu {
+    const INFO: Info = Info {
+        description: "Testbed of the McGill pitch-roll wrist: a spherical epicyclic cam train driven by two \
+                      motors through flexible couplings",
+        copyright: "Copyright 2026 the pitch-roll wrist testbed authors",
+        default_experiment: DefaultExperiment {
+            start_time: 0.0,
+            stop_time: 2.0,
+            step_size: 1e-3,
+            tolerance: 1e-6,
+        },
+        smooth: true,
+        ..info!("PitchRollWristTestbed", "prw_testbed")
+    };
+
+    fn new(setup: &Setup) -> Result<Self, Error> {
+        let testbed = Testbed::new(Parameters::BUILT_IN)?;
+        Ok(Self { testbed, interface: setup.interface, torques: Pair::default() })
+    }
+
+    fn update(&mut self) -> Result<(), Error> {
+        let times = &mut self.testbed.motors.times;
+        if !times.are_possible() {
+            return Err(Error::new(
+                "the samples of a saved state must be 0 to 2, the steps between them > 0",
+            ));
+        }
+        times.update();
+        Ok(self.testbed.parameters_changed()?)
+    }
+
+    fn initialize(&mut self, _: &Experiment) -> Result<(), Error> {
+        self.testbed.motors.forget_samples();
+        Ok(())
+    }
+
+    #[inline]
+    fn calculate(&mut self, _time: f64) {
+        self.torques = self.torques_now();
+    }
+}
+
+impl CoSimulation for TestbedFmu {
+    #[inline]
+    fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+        if self.testbed.step(step.size) { Ok(Stepped::Done) } else { out_of_range() }
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn out_of_range() -> Result<Stepped, Error> {
+    Err(Error::new("the state would leave the range of numbers; look for extreme inputs or states"))
+}
+
+impl ModelExchange for TestbedFmu {}
+
+impl InputDerivatives for TestbedFmu {
+    /// Order 1 of theta is its slope over the next step. Higher orders, and derivatives of omega, are
+    /// not needed: between communication points the motors move on straight lines.
+    fn set_input_derivative(&mut self, of: Name, order: u32, value: f64) {
+        match (of, order) {
+            (Name::theta1, 1) => self.testbed.motors.set_rate(0, value),
+            (Name::theta2, 1) => self.testbed.motors.set_rate(1, value),
+            _ => {}
+        }
+    }
+}
+
+impl OutputDerivatives for TestbedFmu {
+    fn output_derivative(&self, of: Name, order: u32) -> f64 {
+        if order > 1 {
+            return 0.0;
+        }
+        self.at(of, &self.now().rates(self.system()))
+    }
+}
+
+impl Partials for TestbedFmu {
+    fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
+        Some(match unit_instant(known) {
+            Some(unit) => self.at(unknown, &unit),
+            None => self.change(unknown, &self.unit_change(known)),
+        })
+    }
+}
+
+/// The instant with 1 at a state or input and 0 elsewhere.
+fn unit_instant(known: Name) -> Option<Instant> {
+    let mut unit = Instant::default();
+    *match known {
+        Name::theta1 => &mut unit.motors.angle[0],
+        Name::theta2 => &mut unit.motors.angle[1],
+        Name::omega1 => &mut unit.motors.rate[0],
+        Name::omega2 => &mut unit.motors.rate[1],
+        Name::theta3 => &mut unit.x[0],
+        Name::theta4 => &mut unit.x[1],
+        Name::theta5 => &mut unit.x[2],
+        Name::theta6 => &mut unit.x[3],
+        Name::omega5 => &mut unit.x[4],
+        Name::omega6 => &mut unit.x[5],
+        _ => return None,
+    } = 1.0;
+    Some(unit)
+}
+
+impl TestbedFmu {
+    /// What a variable would be at an instant. All but parameters are linear in it.
+    fn at(&self, variable: Name, instant: &Instant) -> f64 {
+        let Instant { x, motors } = instant;
+        let system = self.system();
+        match variable {
+            Name::theta1 => motors.angle[0],
+            Name::theta2 => motors.angle[1],
+            Name::omega1 => motors.rate[0],
+            Name::omega2 => motors.rate[1],
+            Name::tau1 => instant.torques(system)[0],
+            Name::tau2 => instant.torques(system)[1],
+            Name::pitch => instant.pitch(system),
+            Name::roll => instant.roll(system),
+            Name::pitch_rate => instant.pitch_rate(system),
+            Name::roll_rate => instant.roll_rate(system),
+            Name::theta3 => x[0],
+            Name::theta4 => x[1],
+            Name::theta5 => x[2],
+            Name::theta6 => x[3],
+            Name::omega5 | Name::der_theta5 => x[4],
+            Name::omega6 | Name::der_theta6 => x[5],
+            Name::der_theta3 => instant.shaft_rates(system)[0],
+            Name::der_theta4 => instant.shaft_rates(system)[1],
+            Name::der_omega5 => instant.accelerations(system)[0],
+            Name::der_omega6 => instant.accelerations(system)[1],
+            _parameter => f64::NAN,
+        }
+    }
+
+    /// By how much a variable changes with the parameters.
+    fn change(&self, variable: Name, parameters: &Parameters) -> f64 {
+        let (now, system) = (self.now(), self.system());
+        match variable {
+            Name::tau1 => now.change_of_torques(system, parameters)[0],
+            Name::tau2 => now.change_of_torques(system, parameters)[1],
+            Name::der_theta3 => now.change_of_shaft_rates(system, parameters)[0],
+            Name::der_theta4 => now.change_of_shaft_rates(system, parameters)[1],
+            Name::der_omega5 => now.change_of_accelerations(system, parameters)[0],
+            Name::der_omega6 => now.change_of_accelerations(system, parameters)[1],
+            _state_or_rate => 0.0,
+        }
+    }
+
+    /// The direction in which one parameter changes by 1: the table knows where it lives.
+    fn unit_change(&self, parameter: Name) -> Parameters {
+        let mut unit = self.clone();
+        unit.testbed.parameters = Parameters::ZERO;
+        Self::TABLE[parameter as usize].set(&mut unit, &1.0.into());
+        unit.testbed.parameters
+    }
+}

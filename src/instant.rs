@@ -1,0 +1,119 @@
+//! What the equations say at one instant: sensor torques, rates and accelerations, and how these react to the
+//! parameters.
+//!
+//! With `q_I' = (c1 w + c2 v - k1 (q_I - u) - k2 (q_I - q_II)) / (c1 + c2)`, eq. (8) row 1, the sensor torque is
+//! `tau = k1 (q_I - u) + c1 (q_I' - w)`, eq. (9), and the motion of the SECT shafts splits into pitch and roll,
+//! `J v' = -tau - c v` (see [`decoupled`](crate::decoupled)).
+
+use crate::decoupled::{Decoupled, PitchRoll, Sides, sides, sum_difference};
+use crate::motor::{Motion, Motions};
+use crate::parameters::Parameters;
+use crate::testbed::{State, by_sides};
+
+/// State x and motion of the motors at one instant. All that is calculated from it is linear in it, so the same
+/// functions serve for values, for partial derivatives (at unit points) and for time derivatives (at a point's rates).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Instant {
+    /// State x of eq. (11).
+    pub x: State,
+    /// Motors: angles and rates are u of eq. (11).
+    pub motors: Motions,
+}
+
+/// Sensor torques, eq. (9), N.m.
+#[inline]
+pub fn torques(x: &State, motors: &Motions, system: &Decoupled) -> Sides {
+    let [q_i, q_ii, v] = by_sides(x);
+    system.side.torque(q_i, q_ii, v, *motors)
+}
+
+impl Instant {
+    /// Sensor torques, eq. (9), N.m.
+    pub fn torques(&self, system: &Decoupled) -> Sides {
+        torques(&self.x, &self.motors, system)
+    }
+
+    /// Rates of the massless shafts, eq. (11a), rad/s.
+    pub fn shaft_rates(&self, system: &Decoupled) -> Sides {
+        let [q_i, q_ii, v] = by_sides(&self.x);
+        system.side.shaft_rate(q_i, q_ii, v, self.motors)
+    }
+
+    /// Accelerations of the SECT input shafts, eq. (11a), rad/s2.
+    pub fn accelerations(&self, system: &Decoupled) -> Sides {
+        // M_II v_II' = -gamma - (load damping), split into pitch and roll.
+        let torque = sum_difference(self.torques(system)) * 0.5;
+        let [.., v] = by_sides(&self.x);
+        let rate = sum_difference(v) * 0.5;
+        sides((-torque - system.load_damping() * rate) / system.inertia())
+    }
+
+    /// Pitch angle theta7, eq. (1), rad.
+    #[inline]
+    pub fn pitch(&self, _: &Decoupled) -> f64 {
+        0.5 * (self.x[2] + self.x[3])
+    }
+
+    /// Roll angle theta8, eq. (1), rad.
+    #[inline]
+    pub fn roll(&self, system: &Decoupled) -> f64 {
+        system.roll_ratio * (self.x[2] - self.x[3])
+    }
+
+    /// How fast the pitch angle changes, rad/s.
+    #[inline]
+    pub fn pitch_rate(&self, _: &Decoupled) -> f64 {
+        0.5 * (self.x[4] + self.x[5])
+    }
+
+    /// How fast the roll angle changes, rad/s.
+    #[inline]
+    pub fn roll_rate(&self, system: &Decoupled) -> f64 {
+        system.roll_ratio * (self.x[4] - self.x[5])
+    }
+
+    /// How fast all of this changes, by eq. (11a).
+    pub fn rates(&self, system: &Decoupled) -> Self {
+        let [.., v] = by_sides(&self.x);
+        let [shafts, v, accelerations] =
+            [self.shaft_rates(system), v, self.accelerations(system)].map(Sides::array);
+        let x = [shafts[0], shafts[1], v[0], v[1], accelerations[0], accelerations[1]];
+        let Motions { rate, acceleration, .. } = self.motors;
+        Self { x, motors: Motion { angle: rate, rate: acceleration, ..Motion::default() } }
+    }
+
+    /// By how much [`shaft_rates`](Self::shaft_rates) change when the parameters change by little, `change` being the
+    /// direction.
+    pub fn change_of_shaft_rates(&self, system: &Decoupled, change: &Parameters) -> Sides {
+        let [q_i, q_ii, v] = by_sides(&self.x);
+        let Motions { angle, rate, .. } = self.motors;
+        let q_i_rate = self.shaft_rates(system);
+        let force = (angle - q_i) * change.k1
+            + (q_ii - q_i) * change.k2
+            + (rate - q_i_rate) * change.c1
+            + (v - q_i_rate) * change.c2;
+        force * (1.0 / (system.parameters.c1 + system.parameters.c2))
+    }
+
+    /// The same of [`torques`](Self::torques).
+    pub fn change_of_torques(&self, system: &Decoupled, change: &Parameters) -> Sides {
+        let [q_i, ..] = by_sides(&self.x);
+        let Motions { angle, rate, .. } = self.motors;
+        (q_i - angle) * change.k1
+            + (self.shaft_rates(system) - rate) * change.c1
+            + self.change_of_shaft_rates(system, change) * system.parameters.c1
+    }
+
+    /// The same of [`accelerations`](Self::accelerations).
+    pub fn change_of_accelerations(&self, system: &Decoupled, change: &Parameters) -> Sides {
+        let torque = sum_difference(self.change_of_torques(system, change)) * 0.5;
+        let [.., v] = by_sides(&self.x);
+        let rate = sum_difference(v) * 0.5;
+        let acceleration = sum_difference(self.accelerations(system)) * 0.5;
+        // The shares of J2, H3, J3 and c3 in the inertia and damping of pitch and of roll.
+        let roll_share = 2.0 * system.roll_ratio * system.roll_ratio;
+        let inertia = PitchRoll::new(change.J2 + 0.5 * change.H3, change.J2 + roll_share * change.J3);
+        let damping = PitchRoll::new(0.5 * change.c3, roll_share * change.c3);
+        sides((-torque - damping * rate - inertia * acceleration) / system.inertia())
+    }
+}

@@ -1,0 +1,75 @@
+//! Parameters that make no testbed are refused: one message that says what is wrong, and nothing changed.
+
+use crate::modes::{INTERFACES, in_mode};
+use crate::vr;
+use fmu_export::Interface::CoSimulation;
+use fmu_export::Mode::*;
+use fmu_export::Status;
+use fmu_run::Importer as Fmu;
+use prw_testbed::variables::Name;
+
+const NAN: f64 = f64::NAN;
+
+/// What is tried, the call, words of the message.
+type Case = (&'static str, fn(&Fmu) -> Status, &'static [&'static str]);
+
+#[track_caller]
+fn all_refused(fmu: &Fmu, cases: &[Case]) {
+    for (label, call, words) in cases {
+        let message = fmu.refused(label, call);
+        for word in *words {
+            assert!(message.contains(word), "{label}: '{word}' is not in: {message}");
+        }
+    }
+}
+
+/// Parameters out of their range, with what the message must tell.
+const PARAMETERS: &[Case] = &[
+    ("J2 = 0", |fmu| fmu.try_set(&[vr(Name::J2)], &[0.0]), &["J2", "> 0"]),
+    ("J3 < 0", |fmu| fmu.try_set(&[vr(Name::J3)], &[-0.1]), &["J3", "-0.1"]),
+    ("H3 = -0", |fmu| fmu.try_set(&[vr(Name::H3)], &[-0.0]), &["H3"]),
+    ("k1 = 0", |fmu| fmu.try_set(&[vr(Name::k1)], &[0.0]), &["k1", "> 0"]),
+    ("k2 < 0", |fmu| fmu.try_set(&[vr(Name::k2)], &[-1e-300]), &["k2"]),
+    ("c1 < 0", |fmu| fmu.try_set(&[vr(Name::c1)], &[-1.0]), &["c1", "0", "-1"]),
+    ("c2 < 0", |fmu| fmu.try_set(&[vr(Name::c2)], &[-1.0]), &["c2"]),
+    ("c3 < 0", |fmu| fmu.try_set(&[vr(Name::c3)], &[-1.0]), &["c3"]),
+    ("c1 = c2 = 0", |fmu| fmu.try_set(&[vr(Name::c1), vr(Name::c2)], &[0.0, 0.0]), &["c1 and c2"]),
+    ("k1 NaN", |fmu| fmu.try_set(&[vr(Name::k1)], &[NAN]), &["k1", "finite"]),
+    ("J2 good, J3 bad", |fmu| fmu.try_set(&[vr(Name::J2), vr(Name::J3)], &[0.1, -1.0]), &["J3"]),
+    ("theta1 good, k1 bad", |fmu| fmu.try_set(&[vr(Name::theta1), vr(Name::k1)], &[0.1, 0.0]), &["k1"]),
+    (
+        "too far apart",
+        |fmu| fmu.try_set(&[vr(Name::k1), vr(Name::c1), vr(Name::c2)], &[1e300, 1e-300, 0.0]),
+        &["too far apart"],
+    ),
+    ("M = 0", |fmu| fmu.fmi2SetInteger(&vr(Name::M), 1, &0), &["M", "1", "0"]),
+    ("N < 0", |fmu| fmu.fmi2SetInteger(&vr(Name::N), 1, &-7), &["N", "-7"]),
+    (
+        "N good, M bad",
+        |fmu| fmu.fmi2SetInteger([vr(Name::N), vr(Name::M)].as_ptr(), 2, [9, 0].as_ptr()),
+        &["M"],
+    ),
+    ("use_omega = 2", |fmu| fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &2), &["use_omega", "2"]),
+    ("use_omega = -1", |fmu| fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &-1), &["use_omega", "-1"]),
+];
+
+#[test]
+fn parameters_out_of_range() {
+    for interface in INTERFACES {
+        all_refused(&in_mode(interface, Instantiated), PARAMETERS);
+        all_refused(&in_mode(interface, Initialization), PARAMETERS);
+    }
+    all_refused(&in_mode(CoSimulation, StepComplete), PARAMETERS);
+}
+
+/// One of the dampings may be 0, in either order of setting them.
+#[test]
+fn one_damping_may_be_zero() {
+    let fmu = in_mode(CoSimulation, Instantiated);
+    for (zero, other) in [(vr(Name::c1), vr(Name::c2)), (vr(Name::c2), vr(Name::c1))] {
+        fmu.set(&[zero], &[0.0]);
+        let message = fmu.refused("the other damping too", |fmu| fmu.try_set(&[other], &[0.0]));
+        assert!(message.contains("c1 and c2"), "{message}");
+        fmu.set(&[zero], &[0.1]);
+    }
+}
