@@ -11,7 +11,8 @@ FUZZ_SECONDS ?= 600
 VENV := .venv
 DIST_VENV := .venv-dist
 PY   := $(VENV)/bin/python
-PIP_INSTALL := $(PY) -m pip install --progress-bar off
+# What is imported is compiled then; all of it takes longer than to install it.
+PIP_INSTALL := $(PY) -m pip install --progress-bar off --no-compile
 FMU  := target/fmu/prw_testbed.fmu
 
 # rustup's default place, before a cargo of the system that may be too old
@@ -25,7 +26,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-fmu fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist test-platforms test-reproducible study monte-carlo fuzz sanitize clean need-rust need-nightly
+.PHONY: help demo test test-rust test-fmu fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -48,7 +49,10 @@ help:
 	@echo 'make sanitize                the tests under address, leak, thread and real-time sanitizers and valgrind'
 	@echo 'make clean                   remove .venv, .venv-dist, target, out and dist'
 
-demo: need-rust $(VENV)/demo.stamp fmu
+# The network is waited for while the compiler works. What fails then runs again alone, for its message to come last.
+demo: need-rust need-python
+	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j2) $(VENV)/demo.stamp fmu || \
+	  $(MAKE) --no-print-directory $(VENV)/demo.stamp fmu
 	@$(VENV)/bin/prw simulate --fmu $(FMU) $(if $(INPUT),--input "$(INPUT)") $(ARGS)
 
 fmu: need-rust
@@ -56,7 +60,10 @@ fmu: need-rust
 
 test: test-rust test-fmu test-closed-loop
 
-test-rust: need-rust
+# C programs are compiled against the standard's headers, which FMPy brings.
+headers: $(VENV)/demo.stamp
+
+test-rust: need-rust headers
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(LOCKED) --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' $(CARGO) doc $(LOCKED) --workspace --no-deps --quiet
@@ -82,14 +89,11 @@ profile: $(VENV)/demo.stamp fmu
 figures: need-rust $(VENV)/demo.stamp fmu
 	@$(VENV)/bin/prw figures --fmu $(FMU) --commit
 
-# The pages' tables come from the model descriptions; the pages are part of the FMUs, and so of the guids in those.
+# The pages' tables come from the model descriptions.
 docs: need-rust $(VENV)/test.stamp
-	@$(describe)
+	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe
+	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --describe
 	@$(VENV)/bin/prw docs
-	@$(describe)
-
-describe = $(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe && \
-  $(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --describe
 
 # A controller FMU, the system of both, and the example FMU to copy.
 closed-loop-fmus: fmu
@@ -121,37 +125,31 @@ study: $(VENV)/study.stamp fmu
 monte-carlo: $(VENV)/study.stamp fmu
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --out out/monte_carlo.json $(ARGS)
 
-# libFuzzer keeps what is new in target/fuzz/corpus; fuzz/corpus has the committed beginnings.
+# libFuzzer keeps what is new in target/fuzz/corpus; crates/fmu-export/fuzz/corpus has the committed beginnings.
 fuzz: need-rust need-nightly
 	@$(CARGO) fuzz --version >/dev/null 2>&1 || \
 	  $(call stop,cargo-fuzz is missing; install it with: cargo install --locked cargo-fuzz)
 	@mkdir -p target/fuzz/corpus
-	$(CARGO) +nightly fuzz run --fuzz-dir fuzz --target-dir target/fuzz calls target/fuzz/corpus fuzz/corpus/calls \
+	$(CARGO) +nightly fuzz run --fuzz-dir crates/fmu-export/fuzz --target-dir target/fuzz calls target/fuzz/corpus crates/fmu-export/fuzz/corpus/calls \
 	  -- -max_len=4096 -max_total_time=$(FUZZ_SECONDS) -print_final_stats=1
 
 sanitize: need-rust need-nightly
 	@command -v valgrind >/dev/null || $(call stop,valgrind is missing; on Debian: apt install valgrind)
-	@tests/robustness/sanitize
+	@tests/sanitize
 
 clean:
 	rm -rf $(VENV) $(DIST_VENV) target out dist
 
 # The environments, made once; the stamps follow the requirement files.
 
-$(VENV)/made.stamp $(DIST_VENV)/made.stamp:
-	@command -v $(PYTHON) >/dev/null || \
-	  $(call stop,Python 3.9 or later is missing; on Debian: apt install python3 python3-venv)
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 9))' || \
-	  $(call stop,$(PYTHON) is too old: Python 3.9 or later is needed (make PYTHON=...))
-	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
-	  $(call stop,$(PYTHON) cannot make virtual environments; on Debian: apt install python3-venv)
+$(VENV)/made.stamp $(DIST_VENV)/made.stamp: | need-python
 	@echo 'creating $(@D) with $(PYTHON)'
 	@$(PYTHON) -m venv --clear $(@D)
 	@touch $@
 
 $(VENV)/demo.stamp: $(VENV)/made.stamp analysis/requirements.txt analysis/pyproject.toml
 	@echo 'installing the Python packages of the demo (once)'
-	@$(PIP_INSTALL) -r analysis/requirements.txt | sed '/^Ignoring /d'
+	@$(PIP_INSTALL) --quiet -r analysis/requirements.txt
 	@$(PIP_INSTALL) --quiet --no-deps --editable analysis
 	@touch $@
 
@@ -185,6 +183,14 @@ need-rust:
 	  $(call stop,Rust is missing; install it with rustup (https://rustup.rs))
 	@command -v cc >/dev/null || \
 	  $(call stop,the C compiler that Rust links with is missing; on Debian: apt install gcc libc6-dev)
+
+need-python:
+	@command -v $(PYTHON) >/dev/null || \
+	  $(call stop,Python 3.9 or later is missing; on Debian: apt install python3 python3-venv)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 9))' || \
+	  $(call stop,$(PYTHON) is too old: Python 3.9 or later is needed (make PYTHON=...))
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
+	  $(call stop,$(PYTHON) cannot make virtual environments; on Debian: apt install python3-venv)
 
 need-nightly:
 	@$(CARGO) +nightly --version >/dev/null 2>&1 || \

@@ -30,10 +30,14 @@ BESIDE_CRATES = (
     ("mingw-w64", "ZPL-2.1", "The mingw-w64 project", "Windows, start-up code"),
 )
 
+#: A line of a licence file that names one.
+HOLDER = re.compile(r"\s*Copyright\s+(?:\(c\)\s+|©\s+)?(?=[\dA-Z])(.+?)(?: or)?\.?\s*(?:\[.*\])?$")
+
 HEADER = """\
-Compiled into the libraries of this FMU. Where a package offers a choice of licences, the choice is shown;
-all those from crates.io are used under the Apache License, Version 2.0 (LICENSE-APACHE).
-Sources: https://crates.io/crates/PACKAGE/VERSION. For tools: bill-of-materials.cdx.json.
+Compiled into the libraries of this FMU. Where a package offers a choice of licences, the choice is shown.
+Those from crates.io are used under the Apache License, Version 2.0 (LICENSE-APACHE), if they are available
+under it; the licences of the others are at the end.
+Each is a published Rust crate of that name and version. For tools: bill-of-materials.cdx.json.
 
 """
 
@@ -70,7 +74,7 @@ def copyright_of(package: dict) -> str:
     for path in sorted(folder.iterdir()):
         if re.match(r"(licen[cs]e|copyright)", path.name, re.IGNORECASE) and path.is_file():
             for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-                match = re.match(r"\s*Copyright\s+(?:\(c\)\s+|©\s+)?(?=[\dA-Z])(.+?)\.?\s*(?:\[.*\])?$", line)
+                match = HOLDER.match(line)
                 if match and "owner" not in match[1] and match[1] not in lines and not re.fullmatch(r"[\d\s-]+", match[1]):
                     lines.append(match[1])
     authors = [re.sub(r"\s*<.*>", "", author) for author in package["authors"]]
@@ -80,6 +84,17 @@ def copyright_of(package: dict) -> str:
 def licence_of(package: dict) -> str:
     """The licence as an SPDX expression."""
     return package["license"].replace("/", " OR ")
+
+
+def other_licences() -> str:
+    """The licence files of the packages that are not available under the Apache License."""
+    texts = []
+    for package in packages():
+        if package["source"] and "Apache-2.0" not in licence_of(package):
+            for path in sorted(Path(package["manifest_path"]).parent.glob("LICEN[CS]E*")):
+                heading = f"==== {package['name']} {package['version']} ===="
+                texts.append(f"\n\n{heading}\n\n{path.read_text(encoding='utf-8')}")
+    return "".join(texts)
 
 
 def checksums() -> dict[tuple[str, str], str]:
@@ -137,7 +152,7 @@ def notice() -> str:
     table = [_row(rows, row) for row in rows]
     beside = [("beside packages", "licence", "copyright", "in the libraries for")]
     beside += [(name, licence, holder, where) for name, licence, holder, where in BESIDE_CRATES]
-    return HEADER + "".join(table) + "\n" + "".join(_row(beside, row) for row in beside) + FOOTER
+    return HEADER + "".join(table) + "\n" + "".join(_row(beside, row) for row in beside) + FOOTER + other_licences()
 
 
 def _row(rows: list[tuple[str, ...]], row: tuple[str, ...]) -> str:
