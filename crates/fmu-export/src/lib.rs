@@ -35,7 +35,7 @@ pub use model::{Error, Experiment, Model, Setup};
 pub use saved::{Saved, StateVisitor};
 pub use status::Status;
 pub use table::Variables;
-pub use types::{Attributes, BOOLEAN, BaseType, INTEGER, Item, NUMBER, STRING, TIME, Type};
+pub use types::{Attributes, BINARY, BOOLEAN, BaseType, INTEGER, Item, NUMBER, STRING, TIME, Type};
 pub use units::{BaseUnit, DisplayUnit, Unit};
 pub use value::{Enumeration, Scalar, Value};
 pub use variable::{Causality, Initial, Variability, Variable};

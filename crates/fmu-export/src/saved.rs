@@ -61,6 +61,27 @@ macro_rules! whole_numbers {
 
 whole_numbers!(i8 i16 i32 i64 u8 u16 u32);
 
+/// The same bits as an `i64`.
+impl Saved for u64 {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        let mut number = self.cast_signed();
+        visitor.integer(&mut number);
+        *self = number.cast_unsigned();
+    }
+}
+
+impl Saved for f32 {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        let mut number = f64::from(*self);
+        visitor.real(&mut number);
+        // What is no `f32` has not been written by one.
+        match number as f32 {
+            read if f64::from(read) == number => *self = read,
+            _ => visitor.invalid(),
+        }
+    }
+}
+
 impl<T: Saved, const N: usize> Saved for [T; N] {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         self.iter_mut().for_each(|value| value.visit(visitor));

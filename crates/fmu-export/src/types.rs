@@ -3,20 +3,74 @@
 use crate::units::{self, Unit};
 use std::fmt;
 
-/// The kinds of values that variables have.
+/// The kinds of values that variables have. FMI 2.0 has Real, Integer, Boolean, String and Enumeration only; FMI 3.0
+/// calls a Real Float64 and an Integer Int32, and has the others as well.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BaseType {
     /// A floating-point number, `f64` in Rust.
     Real,
+    /// A floating-point number, `f32` in Rust.
+    Float32,
     /// A whole number, `i32` in Rust.
     Integer,
+    /// A whole number, `i8` in Rust.
+    Int8,
+    /// A whole number, `u8` in Rust.
+    UInt8,
+    /// A whole number, `i16` in Rust.
+    Int16,
+    /// A whole number, `u16` in Rust.
+    UInt16,
+    /// A whole number, `u32` in Rust.
+    UInt32,
+    /// A whole number, `i64` in Rust.
+    Int64,
+    /// A whole number, `u64` in Rust.
+    UInt64,
     /// A truth value, `bool` in Rust.
     Boolean,
     /// A text, `String` in Rust.
     String,
+    /// Bytes, `Vec<u8>` in Rust.
+    Binary,
     /// One of a list of names, an enum in Rust made by [`enumeration!`](crate::enumeration).
     Enumeration,
+}
+
+impl BaseType {
+    /// Whether FMI 2.0 has it.
+    pub const fn is_in_fmi2(self) -> bool {
+        matches!(self, Self::Real | Self::Integer | Self::Boolean | Self::String | Self::Enumeration)
+    }
+
+    /// Whether it is a floating-point number.
+    pub const fn is_float(self) -> bool {
+        matches!(self, Self::Real | Self::Float32)
+    }
+
+    /// The smallest and the largest value of a whole number; `None` for the rest.
+    pub const fn range(self) -> Option<(i128, i128)> {
+        Some(match self {
+            Self::Int8 => (i8::MIN as i128, i8::MAX as i128),
+            Self::UInt8 => (0, u8::MAX as i128),
+            Self::Int16 => (i16::MIN as i128, i16::MAX as i128),
+            Self::UInt16 => (0, u16::MAX as i128),
+            Self::Integer => (i32::MIN as i128, i32::MAX as i128),
+            Self::UInt32 => (0, u32::MAX as i128),
+            Self::Int64 => (i64::MIN as i128, i64::MAX as i128),
+            Self::UInt64 => (0, u64::MAX as i128),
+            _ => return None,
+        })
+    }
+
+    /// The whole number, if this kind has it; an error when compiling otherwise.
+    const fn has(self, number: i128) -> i128 {
+        match self.range() {
+            Some((min, max)) if min <= number && number <= max => number,
+            _ => panic!("this kind of number has no such value"),
+        }
+    }
 }
 
 impl fmt::Display for BaseType {
@@ -48,8 +102,10 @@ pub struct Item {
 pub struct Type {
     /// Name, unlike any variable's; empty for a type that needs no definition.
     pub name: &'static str,
-    /// What kind of value.
+    /// What it says of its values.
     pub of: Attributes,
+    /// What kind of value.
+    pub base: BaseType,
 }
 
 /// What a type says besides its name.
@@ -71,15 +127,22 @@ pub enum Attributes {
     },
     /// Of a whole number, with its range, enforced for parameters.
     Integer {
-        /// Smallest value.
-        min: i32,
-        /// Largest value.
-        max: i32,
+        /// Smallest value; that of the kind of number if nothing else is said.
+        min: i128,
+        /// Largest value; that of the kind of number if nothing else is said.
+        max: i128,
     },
     /// Of a truth value.
     Boolean,
     /// Of a text.
     String,
+    /// Of bytes.
+    Binary {
+        /// What they are, for example `image/png`.
+        mime_type: &'static str,
+        /// The largest number of them, enforced for all that importers set.
+        max_size: usize,
+    },
     /// Of one of these.
     Enumeration(&'static [Item]),
 }
@@ -91,24 +154,44 @@ pub const TIME: Type = Type::real("Time", &units::S);
 /// A whole number of any size.
 pub const INTEGER: Type = Type::integer("");
 /// A truth value.
-pub const BOOLEAN: Type = Type { name: "", of: Attributes::Boolean };
+pub const BOOLEAN: Type = Type { name: "", of: Attributes::Boolean, base: BaseType::Boolean };
 /// A text.
-pub const STRING: Type = Type { name: "", of: Attributes::String };
+pub const STRING: Type = Type { name: "", of: Attributes::String, base: BaseType::String };
+/// Bytes of any meaning.
+pub const BINARY: Type = Type::binary("", "application/octet-stream");
 
 impl Type {
     /// A physical quantity of this name in this unit, without range and nominal value.
     pub const fn real(name: &'static str, unit: &'static Unit) -> Self {
-        Self { name, of: Attributes::Real { quantity: name, unit, min: None, max: None, nominal: None } }
+        let of = Attributes::Real { quantity: name, unit, min: None, max: None, nominal: None };
+        Self { name, of, base: BaseType::Real }
+    }
+
+    /// The same in single precision.
+    pub const fn float32(name: &'static str, unit: &'static Unit) -> Self {
+        Self { base: BaseType::Float32, ..Self::real(name, unit) }
     }
 
     /// A whole number.
     pub const fn integer(name: &'static str) -> Self {
-        Self { name, of: Attributes::Integer { min: i32::MIN, max: i32::MAX } }
+        Self::whole(name, BaseType::Integer)
+    }
+
+    /// A whole number of a kind, such as [`BaseType::UInt16`].
+    pub const fn whole(name: &'static str, base: BaseType) -> Self {
+        let Some((min, max)) = base.range() else { panic!("this kind of value is no whole number") };
+        Self { name, of: Attributes::Integer { min, max }, base }
+    }
+
+    /// Bytes of a MIME type, at most a mebibyte of them.
+    pub const fn binary(name: &'static str, mime_type: &'static str) -> Self {
+        let of = Attributes::Binary { mime_type, max_size: 1 << 20 };
+        Self { name, of, base: BaseType::Binary }
     }
 
     /// One of a list of names. [`enumeration!`](crate::enumeration) makes the list.
     pub const fn enumeration(name: &'static str, items: &'static [Item]) -> Self {
-        Self { name, of: Attributes::Enumeration(items) }
+        Self { name, of: Attributes::Enumeration(items), base: BaseType::Enumeration }
     }
 
     /// With a smallest value, for a Real.
@@ -139,31 +222,36 @@ impl Type {
         self
     }
 
-    /// With a smallest value, for an Integer.
+    /// With a smallest value, for a whole number.
     #[must_use]
-    pub const fn from(mut self, smallest: i32) -> Self {
-        let Attributes::Integer { min, .. } = &mut self.of else { panic!("from is for Integers") };
-        *min = smallest;
+    pub const fn from(mut self, smallest: i128) -> Self {
+        let base = self.base;
+        let Attributes::Integer { min, .. } = &mut self.of else { panic!("from is for whole numbers") };
+        *min = base.has(smallest);
         self
     }
 
-    /// With a largest value, for an Integer.
+    /// With a largest value, for a whole number.
     #[must_use]
-    pub const fn to(mut self, largest: i32) -> Self {
-        let Attributes::Integer { max, .. } = &mut self.of else { panic!("to is for Integers") };
-        *max = largest;
+    pub const fn to(mut self, largest: i128) -> Self {
+        let base = self.base;
+        let Attributes::Integer { max, .. } = &mut self.of else { panic!("to is for whole numbers") };
+        *max = base.has(largest);
+        self
+    }
+
+    /// With a largest number of bytes, at most a mebibyte.
+    #[must_use]
+    pub const fn max_size(mut self, largest: usize) -> Self {
+        let Attributes::Binary { max_size, .. } = &mut self.of else { panic!("max_size is for Binary") };
+        assert!(largest <= *max_size, "max_size: a mebibyte is the largest");
+        *max_size = largest;
         self
     }
 
     /// The kind of value.
     pub const fn base(&self) -> BaseType {
-        match self.of {
-            Attributes::Real { .. } => BaseType::Real,
-            Attributes::Integer { .. } => BaseType::Integer,
-            Attributes::Boolean => BaseType::Boolean,
-            Attributes::String => BaseType::String,
-            Attributes::Enumeration(_) => BaseType::Enumeration,
-        }
+        self.base
     }
 
     /// The nominal value of a Real, 1 if nothing else is said.

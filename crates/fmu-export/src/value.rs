@@ -8,14 +8,16 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Value {
-    /// Of a Real.
+    /// Of a Real or a Float32.
     Real(f64),
-    /// Of an Integer or an Enumeration.
-    Integer(i32),
+    /// Of a whole number of any kind or an Enumeration.
+    Integer(i128),
     /// Of a Boolean.
     Boolean(bool),
     /// Of a String.
     String(String),
+    /// Of a Binary.
+    Binary(Vec<u8>),
 }
 
 impl From<f64> for Value {
@@ -32,12 +34,14 @@ impl fmt::Display for Value {
             Self::Integer(value) => write!(f, "{value}"),
             Self::Boolean(value) => write!(f, "{value}"),
             Self::String(value) => write!(f, "{value}"),
+            Self::Binary(value) => value.iter().try_for_each(|byte| write!(f, "{byte:02X}")),
         }
     }
 }
 
 /// A Rust type that a variable's value may live in: `f64`, `i32`, `bool`, `String`, or an enum made by
-/// [`enumeration!`](crate::enumeration).
+/// [`enumeration!`](crate::enumeration); and `f32`, whole numbers from `i8` to `u64`, and `Vec<u8>`, which FMI 2.0
+/// has no variables for.
 pub trait Scalar: Saved {
     /// The kind of value it is for an importer.
     const BASE: BaseType;
@@ -102,9 +106,54 @@ macro_rules! scalar {
 }
 
 scalar! {
-    i32: Integer;
+    Vec<u8>: Binary;
     bool: Boolean;
     String: String;
+}
+
+impl Scalar for f32 {
+    const BASE: BaseType = BaseType::Float32;
+
+    fn value(&self) -> Value {
+        Value::Real(f64::from(*self))
+    }
+
+    fn assign(&mut self, value: &Value) {
+        if let Value::Real(value) = value {
+            *self = *value as f32;
+        }
+    }
+}
+
+macro_rules! whole_number {
+    ($($type:ty: $kind:ident;)+) => {
+        $(impl Scalar for $type {
+            const BASE: BaseType = BaseType::$kind;
+
+            fn value(&self) -> Value {
+                Value::Integer(i128::from(*self))
+            }
+
+            fn assign(&mut self, value: &Value) {
+                if let Value::Integer(value) = value
+                    && let Ok(value) = Self::try_from(*value)
+                {
+                    *self = value;
+                }
+            }
+        })+
+    };
+}
+
+whole_number! {
+    i8: Int8;
+    u8: UInt8;
+    i16: Int16;
+    u16: UInt16;
+    i32: Integer;
+    u32: UInt32;
+    i64: Int64;
+    u64: UInt64;
 }
 
 /// An enum that is an enumeration for importers. Made by [`enumeration!`](crate::enumeration).
@@ -189,12 +238,13 @@ macro_rules! enumeration {
             const BASE: $crate::BaseType = $crate::BaseType::Enumeration;
 
             fn value(&self) -> $crate::Value {
-                $crate::Value::Integer($crate::Enumeration::number(*self))
+                $crate::Value::Integer($crate::Enumeration::number(*self).into())
             }
 
             fn assign(&mut self, value: &$crate::Value) {
                 if let $crate::Value::Integer(number) = value
-                    && let ::core::option::Option::Some(item) = <Self as $crate::Enumeration>::from_number(*number)
+                    && let ::core::result::Result::Ok(number) = i32::try_from(*number)
+                    && let ::core::option::Option::Some(item) = <Self as $crate::Enumeration>::from_number(number)
                 {
                     *self = item;
                 }

@@ -140,7 +140,7 @@ impl<M> Variable<M> {
     /// Continuous for a Real, discrete for the rest.
     const fn moving(causality: Causality, of: &'static Type) -> Self {
         let variability = match of.base() {
-            BaseType::Real => Variability::Continuous,
+            base if base.is_float() => Variability::Continuous,
             _ => Variability::Discrete,
         };
         Self::new(causality, variability, of)
@@ -324,22 +324,24 @@ impl<M> Variable<M> {
         if !legal {
             return Some("what it is cannot be exact or approx as it is said to be here (section 2.2.7)");
         }
-        if matches!(self.variability, Continuous) && !matches!(self.of.base(), BaseType::Real) {
-            return Some("only a Real can be continuous (section 2.2.7)");
+        let is_real = matches!(self.of.base(), BaseType::Real);
+        if matches!(self.variability, Continuous) && !self.of.base().is_float() {
+            return Some("only a Real or Float32 can be continuous (section 2.2.7)");
         }
-        if self.state && !matches!(self.variability, Continuous) {
+        if self.state && !(matches!(self.variability, Continuous) && is_real) {
             return Some("only a continuous Real can be a state");
         }
         if self.reinit && !self.state {
             return Some("only a state can be changed by events (reinit)");
         }
-        if self.derivative_of.is_some()
-            && !(matches!(self.variability, Continuous) && matches!(self.of.base(), BaseType::Real))
-        {
+        if self.derivative_of.is_some() && !(matches!(self.variability, Continuous) && is_real) {
             return Some("only a continuous Real can be a derivative");
         }
         if self.depends_on.is_some() && !matches!(self.causality, Output | Local | CalculatedParameter) {
             return Some("only what is calculated depends on others");
+        }
+        if matches!(self.causality, Independent) && !is_real {
+            return Some("the time is a Real");
         }
         match self.read {
             None if !matches!(self.causality, Independent) => {
@@ -351,7 +353,8 @@ impl<M> Variable<M> {
             Some(Read { base, .. }) if base as u8 != self.of.base() as u8 => {
                 return Some(
                     "the Rust type of its value is not that of its type: f64 for a Real, i32 for an \
-                             Integer, bool for a Boolean, String for a String, an enumeration! for an Enumeration",
+                             Integer, bool for a Boolean, String for a String, an enumeration! for an Enumeration, \
+                     f32 for a Float32, i8 to u64 for an Int8 to UInt64, Vec<u8> for a Binary",
                 );
             }
             _ => {}

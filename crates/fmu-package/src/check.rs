@@ -267,7 +267,7 @@ fn check_value(what: &str, of: &Type, value: &Value) -> Result<()> {
         }
         (Attributes::Enumeration(items), Value::Integer(value)) => {
             let known: Vec<_> = items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
-            let is_known = items.iter().any(|item| item.value == *value);
+            let is_known = items.iter().any(|item| i128::from(item.value) == *value);
             ensure!(is_known, "{what} must be one of {}, it is {value}", known.join(", "));
         }
         (Attributes::String, Value::String(text)) => {

@@ -92,8 +92,8 @@ pub(crate) fn with_attributes(element: Element, of: &Type) -> Element {
             .with_some("max", max)
             .with_some("nominal", nominal),
         Attributes::Integer { min, max } => element
-            .with_some("min", (min != i32::MIN).then_some(min))
-            .with_some("max", (max != i32::MAX).then_some(max)),
+            .with_some("min", (Some(min) != of.base().range().map(|range| range.0)).then_some(min))
+            .with_some("max", (Some(max) != of.base().range().map(|range| range.1)).then_some(max)),
         _ => element,
     }
 }

@@ -143,10 +143,10 @@ fn draw_value(random: &mut fastrand::Rng, of: &Type, start: &Value, before: Opti
         }
         (Attributes::Integer { min, max }, &Value::Integer(start)) => {
             let (low, high) = (min.max(start.saturating_sub(3)), max.min(start.saturating_add(3)));
-            Value::Integer(random.i32(low..=high))
+            Value::Integer(random.i128(low..=high))
         }
         (Attributes::Enumeration(items), _) => {
-            let values = items.iter().map(|item| Value::Integer(item.value));
+            let values = items.iter().map(|item| Value::Integer(item.value.into()));
             let others: Vec<Value> = values.filter(|value| Some(value) != before).collect();
             return if others.is_empty() {
                 before.cloned()

@@ -112,7 +112,7 @@ pub unsafe fn fmi2GetInteger<M: Exported>(
     let (vr, values) = unsafe { (array(vr, count, "vr")?, output(values, count, "value")?) };
     instance.get(vr, WHOLE, |place, value| {
         if let Value::Integer(value) = value {
-            values[place].write(value);
+            values[place].write(fmi2Integer::try_from(value).unwrap_or_default());
         }
     })
 }
@@ -125,7 +125,7 @@ pub unsafe fn fmi2SetInteger<M: Exported>(
 ) -> Outcome {
     // SAFETY: by contract arrays of this length.
     let (vr, values) = unsafe { (array(vr, count, "vr")?, array(values, count, "value")?) };
-    instance.set(vr, WHOLE, values.iter().map(|value| Value::Integer(*value)))
+    instance.set(vr, WHOLE, values.iter().map(|value| Value::Integer((*value).into())))
 }
 
 pub unsafe fn fmi2GetBoolean<M: Exported>(

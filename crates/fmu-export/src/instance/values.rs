@@ -149,10 +149,13 @@ pub(super) fn check_value<M>(variable: &Variable<M>, value: &Value) -> Outcome {
             refuse(format!("{name} must be between {min} and {max}, it is {value}"))
         }
         (Attributes::Enumeration(items), Value::Integer(value))
-            if items.iter().all(|item| item.value != *value) =>
+            if items.iter().all(|item| i128::from(item.value) != *value) =>
         {
             let known: Vec<_> = items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
             refuse(format!("{name} must be one of {}, it is {value}", known.join(", ")))
+        }
+        (Attributes::Binary { max_size, .. }, Value::Binary(value)) if value.len() > *max_size => {
+            refuse(format!("{name} must not have more than {max_size} bytes, it has {}", value.len()))
         }
         _ => Ok(()),
     }
