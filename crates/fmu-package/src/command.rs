@@ -2,8 +2,8 @@
 
 use crate::cargo::LibraryBuild;
 use crate::changes::Changes;
-use crate::describe::describe;
 use crate::files::write_atomically;
+use crate::fmi2::describe;
 use crate::library::check_platform;
 use crate::pack::{Library, pack};
 use crate::packages::Neighbourhood;

@@ -1,4 +1,4 @@
-//! Definitions of units and types (sections 2.2.2 and 2.2.3).
+//! Definitions of units and types (sections 2.2.2 and 2.2.3 of FMI 2.0, 2.4.3 and 2.4.4 of FMI 3.0).
 
 use crate::xml::Element;
 use anyhow::{Result, ensure};
@@ -53,7 +53,11 @@ fn not_zero(offset: f64) -> Option<f64> {
 /// Those of these types that have a name, in the order of their first use.
 ///
 /// Fails when two different types share a name, or a type and a variable do.
-pub(crate) fn type_definitions(types: &[&Type], variables: &[&str]) -> Result<Option<Element>> {
+pub(crate) fn type_definitions(
+    types: &[&Type],
+    variables: &[&str],
+    definition: fn(&Type) -> Element,
+) -> Result<Option<Element>> {
     let mut named: Vec<&Type> = Vec::new();
     for of in types.iter().filter(|of| !of.name.is_empty()) {
         let name = of.name;
@@ -66,19 +70,18 @@ pub(crate) fn type_definitions(types: &[&Type], variables: &[&str]) -> Result<Op
             None => named.push(of),
         }
     }
-    let definition = |of: &Type| {
-        let element = with_attributes(Element::new(of.base().to_string()), of);
-        let items = if let Attributes::Enumeration(items) = of.of { items } else { &[] };
-        let item = |item: &fmu_export::Item| {
-            Element::new("Item")
-                .with("name", item.name)
-                .with("value", item.value)
-                .with_some("description", filled(item.description))
-        };
-        let element = element.containing(items.iter().map(item));
-        Element::new("SimpleType").with("name", of.name).containing([element])
-    };
     Ok(list("TypeDefinitions", named.into_iter().map(definition)))
+}
+
+/// The items of an Enumeration.
+pub(crate) fn items(of: &Type) -> impl Iterator<Item = Element> {
+    let items = if let Attributes::Enumeration(items) = of.of { items } else { &[] };
+    items.iter().map(|item| {
+        Element::new("Item")
+            .with("name", item.name)
+            .with("value", item.value)
+            .with_some("description", filled(item.description))
+    })
 }
 
 /// The element with what its type says: quantity, unit, range, nominal value.

@@ -2,7 +2,8 @@
 //!
 //! ## Inside
 //!
-//! * [`describe()`] checks the model and writes the description; [`structure`] has the dependencies.
+//! * [`fmi2::describe`] and [`fmi3::describe`] check the model and write the description; [`structure`] has the
+//!   dependencies.
 //! * [`LibraryBuild`] compiles the library with cargo, [`pack()`] makes the FMU, [`Builder`] does all of it.
 //! * [`Fingerprint`], [`Sources`] and [`build_script`] are for the guid; they are all there is without features, for
 //!   build scripts.
@@ -13,8 +14,8 @@
 //! |---|---|
 //! | the guid | `fingerprint`, `folder`, `content`, `packages`, `sources`, `variant` |
 //! | files | `xml`, `files` |
-//! | the description | `changes`, `check`, `sample`, `structure`, `definitions`, `describe` |
-//! | the FMU | `platform`, `cargo`, `pack` |
+//! | the description | `changes`, `check`, `sample`, `structure`, `definitions`, `describe`, `fmi2`, `fmi3` |
+//! | the FMU | `version`, `platform`, `cargo`, `pack` |
 //! | the command | `library`, `terminal`, `command` |
 
 #![cfg_attr(not(feature = "command"), allow(rustdoc::broken_intra_doc_links))]
@@ -42,6 +43,10 @@ mod definitions;
 #[cfg(feature = "package")]
 mod describe;
 #[cfg(feature = "package")]
+pub mod fmi2;
+#[cfg(feature = "package")]
+pub mod fmi3;
+#[cfg(feature = "package")]
 mod pack;
 #[cfg(feature = "package")]
 mod platform;
@@ -49,6 +54,8 @@ mod platform;
 mod sample;
 #[cfg(feature = "package")]
 pub mod structure;
+#[cfg(feature = "package")]
+mod version;
 
 #[cfg(feature = "command")]
 mod command;
@@ -68,7 +75,7 @@ pub use command::{BuildOptions, Builder};
 pub use {
     cargo::LibraryBuild,
     changes::Changes,
-    describe::describe,
     pack::{Library, pack},
     platform::Platform,
+    version::Fmi,
 };

@@ -1,4 +1,4 @@
-//! Which variable depends on which, and how (section 2.2.8).
+//! Which variable depends on which, and how (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
 //!
 //! A live model is evaluated at points drawn around its start values, always the same ones. If its equations
 //! are [smooth](fmu_export::Info::smooth), what does not react at any of them does not depend, and a factor that
@@ -7,6 +7,7 @@
 
 use crate::changes::Changes;
 use crate::check::{check, is_exact, is_known};
+use crate::fmi3::time_reference;
 use crate::sample::{FactorSample, Point, Sampler};
 use anyhow::{Result, bail, ensure};
 use fmu_export::{BaseType, Causality, Exported, Initial, Value, Variability, Variable};
@@ -64,6 +65,20 @@ impl ModelStructure {
     /// When the model contradicts itself, reacts to what it has not declared, or refuses every set of
     /// parameters near its start values.
     pub fn of<M: Exported>(tunable_parameters: bool) -> Result<Self> {
+        Self::with::<M>(tunable_parameters, None)
+    }
+
+    /// The same as FMI 3.0 wants it: outputs and derivatives of states depend on parameters, too, and everything on
+    /// the time, also where that is no variable of the model.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub fn of_fmi3<M: Exported>(tunable_parameters: bool) -> Result<Self> {
+        Self::with::<M>(tunable_parameters, Some(time_reference::<M>()))
+    }
+
+    /// With `time`, its value reference, for FMI 3.0.
+    fn with<M: Exported>(tunable_parameters: bool, time: Option<u32>) -> Result<Self> {
         let starts = check::<M>(&Changes::default())?;
         // Others keep their states to themselves.
         let has_states = M::MODEL_EXCHANGE.is_some() || M::PARTIALS;
@@ -71,18 +86,22 @@ impl ModelStructure {
         let states = if has_states { M::STATES } else { &[] };
         let derivatives: Vec<u32> = states.iter().map(|state| state.derivative).collect();
         let states: Vec<u32> = states.iter().map(|state| state.state).collect();
-        let knowns = find::<M>(|variable| {
+        let unlisted = time.filter(|time| known::<M>(*time).is_none());
+        let mut knowns = find::<M>(|variable| {
             matches!(variable.causality(), Causality::Input | Causality::Independent)
                 || has_states && variable.is_state()
+                || time.is_some() && variable.causality() == Causality::Parameter
         });
+        knowns.extend(unlisted);
         let calculated = find::<M>(|variable| variable.causality() == Causality::CalculatedParameter);
         let mut initial_unknowns = [&outputs[..], &calculated, &states, &derivatives].concat();
         initial_unknowns
             .retain(|vr| matches!(variable::<M>(*vr).initial(), Some(Initial::Approx | Initial::Calculated)));
         initial_unknowns.sort_unstable();
         initial_unknowns.dedup();
-        let initial_knowns =
+        let mut initial_knowns =
             find::<M>(|variable| is_known(variable) && (!variable.is_state() || is_exact(variable)));
+        initial_knowns.extend(unlisted);
 
         let mut sampler = Sampler::<M>::new(starts, tunable_parameters);
         sampler.running = true;
@@ -117,6 +136,11 @@ fn variable<M: Exported>(vr: u32) -> &'static Variable<M> {
     &M::TABLE[vr as usize]
 }
 
+/// `None` for a time that is no variable of the model.
+fn known<M: Exported>(vr: u32) -> Option<&'static Variable<M>> {
+    M::TABLE.get(vr as usize)
+}
+
 fn find<M: Exported>(is_it: impl Fn(&Variable<M>) -> bool) -> Vec<u32> {
     (0..).zip(M::TABLE).filter(|(_, variable)| is_it(variable)).map(|(vr, _)| vr).collect()
 }
@@ -125,7 +149,10 @@ fn find<M: Exported>(is_it: impl Fn(&Variable<M>) -> bool) -> Vec<u32> {
 fn with_declared<M: Exported>(found: Unknown, knowns: &[u32]) -> Result<Unknown> {
     let unknown = variable::<M>(found.vr);
     let declared: Option<Vec<u32>> = unknown.dependencies().map(Iterator::collect);
-    let is_declared = |known: u32| declared.as_ref().is_none_or(|declared| declared.contains(&known));
+    // Nobody can name a time that is no variable.
+    let is_unlisted = |vr: u32| known::<M>(vr).is_none();
+    let is_declared =
+        |known: u32| is_unlisted(known) || declared.as_ref().is_none_or(|declared| declared.contains(&known));
     if let Some((known, _)) = found.dependencies.iter().find(|(known, _)| !is_declared(*known)) {
         let known = variable::<M>(*known).name();
         bail!("{} reacts to {known}, which its depends_on does not name", unknown.name());
@@ -133,12 +160,11 @@ fn with_declared<M: Exported>(found: Unknown, knowns: &[u32]) -> Result<Unknown>
     if unknown.variability() == Variability::Constant {
         return Ok(found);
     }
+    // Strings are not tried.
+    let is_tried = |vr: u32| known::<M>(vr).is_none_or(|known| known.base() != BaseType::String);
     let kind = |known: u32| match found.dependencies.iter().find(|(found, _)| *found == known) {
         Some((_, kind)) if M::INFO.smooth => Some(*kind),
-        // Strings are not tried.
-        None if M::INFO.smooth && declared.is_none() && variable::<M>(known).base() != BaseType::String => {
-            None
-        }
+        None if M::INFO.smooth && (declared.is_none() || is_unlisted(known)) && is_tried(known) => None,
         _ => is_declared(known).then_some(DependencyKind::Dependent),
     };
     let dependencies = knowns.iter().filter_map(|&known| Some((known, kind(known)?))).collect();
@@ -153,12 +179,15 @@ fn by_derivative<M: Exported>(
     knowns: &[u32],
 ) -> Result<Vec<Unknown>> {
     let samples = if M::PARTIALS { sampler.factor_samples()? } else { Vec::new() };
+    // By parameters, models know their derivatives while initializing.
+    let is_variable = |of: &Variable<M>| {
+        of.base() == BaseType::Real
+            && !matches!(of.causality(), Causality::Independent | Causality::Parameter)
+    };
     let partials = |unknown: u32, known: u32| {
-        let [unknown_of, known_of] = [unknown, known].map(variable::<M>);
         let differentiable = M::PARTIALS
-            && unknown_of.base() == BaseType::Real
-            && known_of.base() == BaseType::Real
-            && known_of.causality() != Causality::Independent;
+            && variable::<M>(unknown).base() == BaseType::Real
+            && self::known::<M>(known).is_some_and(is_variable);
         let partial = |sample: &FactorSample<M>| {
             sample.model.exported_partial(M::NAMES[unknown as usize], M::NAMES[known as usize])
         };
@@ -256,12 +285,13 @@ impl<M: Exported> Sampler<M> {
     /// Changes one known at many points and looks at the unknowns.
     fn reactions(&mut self, known: u32, unknowns: &[u32]) -> Result<Reactions> {
         let mut reactions = Reactions { changes: Vec::new(), values: Vec::new() };
-        let time = variable::<M>(known).causality() == Causality::Independent;
+        let known_of = self::known::<M>(known);
+        let time = known_of.is_none_or(|known| known.causality() == Causality::Independent);
+        let is_known = |of: &Variable<M>| known_of.is_some_and(|known| known.name() == of.name());
         let value = |model: &M, vr: u32| variable::<M>(vr).value(model).unwrap_or(Value::Real(0.0));
         for _ in 0..16 {
             let (point, before) = self.draw(None, true, |_| true)?;
-            let (changed, after) = self
-                .draw(Some(&point), time, |variable| variable.name() == self::variable::<M>(known).name())?;
+            let (changed, after) = self.draw(Some(&point), time, is_known)?;
             if changed == point {
                 continue;
             }
@@ -281,7 +311,7 @@ impl<M: Exported> Sampler<M> {
 
 /// By how much a Real that is set differs.
 fn difference(from: &Point, to: &Point, vr: u32) -> Option<f64> {
-    match (&from.values[vr as usize], &to.values[vr as usize]) {
+    match (from.values.get(vr as usize)?, to.values.get(vr as usize)?) {
         (Some(Value::Real(from)), Some(Value::Real(to))) => Some(to - from),
         _ => None,
     }

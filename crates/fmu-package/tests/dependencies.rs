@@ -1,9 +1,10 @@
 //! The dependencies of models with branches and memory, where no trying near the start values can find them.
 
 use fmu_export::*;
+use fmu_package::Changes;
+use fmu_package::fmi2::describe;
 use fmu_package::structure::DependencyKind::Dependent;
 use fmu_package::structure::{ModelStructure, Unknown};
-use fmu_package::{Changes, describe};
 
 #[derive(Clone, Default)]
 struct Branches {

@@ -3,9 +3,10 @@
 use fmi_schema::fmi2::{DependenciesKind, Fmi2ModelDescription, ScalarVariableElement};
 use fmi_schema::traits::FmiModelDescription;
 use fmu_export::*;
+use fmu_package::fmi2::describe;
 use fmu_package::structure::DependencyKind::{self, Constant, Dependent, Fixed, Tunable};
 use fmu_package::structure::{ModelStructure, Unknown};
-use fmu_package::{Changes, NO_GUID, describe};
+use fmu_package::{Changes, NO_GUID};
 
 const SHARE: Type = Type::real("Share", &units::ONE).min(0.0).max(1.0);
 const COUNT: Type = Type::integer("Count").from(-9).to(3);

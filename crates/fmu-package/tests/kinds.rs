@@ -1,9 +1,10 @@
 //! All that a variable can be in FMI 2.0 comes out as the standard has it.
 
 use fmu_export::*;
+use fmu_package::Changes;
+use fmu_package::fmi2::describe;
 use fmu_package::structure::DependencyKind::{Constant, Dependent};
 use fmu_package::structure::{ModelStructure, Unknown};
-use fmu_package::{Changes, describe};
 
 enumeration! {
     /// What the heater does.

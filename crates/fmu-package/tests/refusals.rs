@@ -1,8 +1,9 @@
 //! Models that make no sense are refused by name; what the compiler refuses already is tested in fmu-export.
 
 use fmu_export::*;
+use fmu_package::Changes;
+use fmu_package::fmi2::describe;
 use fmu_package::structure::ModelStructure;
-use fmu_package::{Changes, describe};
 
 const SHARE: Type = Type::real("Share", &units::ONE).min(0.0).max(1.0);
 const ABOVE: Type = Type::real("Above", &units::ONE).min(3.0);

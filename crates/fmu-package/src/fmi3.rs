@@ -1,0 +1,166 @@
+//! The model description of FMI 3.0 (section 2.4).
+//!
+//! A variable has the same value reference as in FMI 2.0, its place in the table. Behind the table come variables that
+//! only FMI 3.0 asks for: the [time](time_reference), where it is no variable of the model, and the
+//! [event indicators](indicator_reference).
+
+use crate::changes::Changes;
+use crate::check::check;
+use crate::definitions::{filled, items, type_definitions, unit_definitions, with_attributes};
+use crate::describe::{default_experiment, is_reinit, log_categories, root, with_dependencies, with_facts};
+use crate::structure::{ModelStructure, Unknown};
+use crate::xml::Element;
+use anyhow::{Result, ensure};
+use fmu_export::{BaseType, Causality, Exported, Interface, Type, Value, Variable};
+
+/// The text of `modelDescription.xml` for a model as FMU of FMI 3.0.
+///
+/// # Errors
+/// As [`fmi2::describe`](crate::fmi2::describe), and when a variable has the name of one that FMI 3.0 asks for.
+pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
+    let starts = check::<M>(changes)?;
+    let structure = ModelStructure::of_fmi3::<M>(changes.tunable_parameters)?;
+    let types: Vec<_> = M::TABLE.iter().map(Variable::of).collect();
+    let names: Vec<_> = M::TABLE.iter().map(Variable::name).collect();
+    let generated = generated::<M>();
+    for name in generated.iter().filter_map(|variable| variable.attribute("name")) {
+        ensure!(
+            !names.contains(&name),
+            "{name} is the name of a variable that FMI 3.0 asks for; declare the time as independent, rename what else \
+             has the name"
+        );
+    }
+    let variables = M::TABLE.iter().zip(starts).zip(0..);
+    let variables = variables.map(|((of, start), vr)| variable(of, vr, start, changes)).chain(generated);
+
+    let children = [
+        M::MODEL_EXCHANGE.map(|_| interface::<M>(Interface::ModelExchange)),
+        M::CO_SIMULATION.map(|_| interface::<M>(Interface::CoSimulation)),
+        unit_definitions(&types)?,
+        type_definitions(&types, &names, type_definition)?,
+        log_categories(),
+        Some(default_experiment::<M>()),
+        Some(Element::new("ModelVariables").containing(variables)),
+        Some(model_structure::<M>(&structure)),
+    ];
+    let root = root::<M>("3.0", "instantiationToken", changes);
+    root.containing(children.into_iter().flatten()).document()
+}
+
+/// The value reference of the time: its place in the table, or behind it if it is no variable of the model.
+pub fn time_reference<M: Exported>() -> u32 {
+    let is_time = |variable: &Variable<M>| variable.causality() == Causality::Independent;
+    place(M::TABLE.iter().position(is_time).unwrap_or(M::TABLE.len()))
+}
+
+/// The value reference of an event indicator, counted from 0: behind the table and the place of the time.
+pub fn indicator_reference<M: Exported>(indicator: usize) -> u32 {
+    place(M::TABLE.len() + 1 + indicator)
+}
+
+/// No table is longer than value references go.
+fn place(place: usize) -> u32 {
+    place.try_into().unwrap_or(u32::MAX)
+}
+
+/// The variables that are not in the table. Every FMU has a time (section 2.4.7.4); indicators that no variable stands
+/// for get one of their own (section 2.4.8).
+fn generated<M: Exported>() -> Vec<Element> {
+    let variable = |name: String, vr: u32, description: &str, causality: &str| {
+        Element::new("Float64")
+            .with("name", name)
+            .with("valueReference", vr)
+            .with("description", description)
+            .with("causality", causality)
+            .with("variability", "continuous")
+    };
+    let time = time_reference::<M>();
+    let time =
+        (time == place(M::TABLE.len())).then(|| variable("time".to_owned(), time, "Time", "independent"));
+    let indicator = |number: usize| {
+        let name = format!("eventIndicator[{}]", number + 1);
+        variable(
+            name,
+            indicator_reference::<M>(number),
+            "An event happens where it changes its sign",
+            "local",
+        )
+        .with("initial", "calculated")
+    };
+    time.into_iter().chain((0..indicators::<M>()).map(indicator)).collect()
+}
+
+fn indicators<M: Exported>() -> usize {
+    M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators)
+}
+
+/// The element of an interface type, with what the FMU can do through it (sections 2.4.2, 3.4 and 4.4).
+fn interface<M: Exported>(interface: Interface) -> Element {
+    let element = |name: &str| {
+        Element::new(name)
+            .with("modelIdentifier", M::INFO.identifier)
+            .with("canGetAndSetFMUState", true)
+            .with("canSerializeFMUState", true)
+            .with("providesDirectionalDerivatives", M::PARTIALS)
+            .with("providesAdjointDerivatives", M::PARTIALS)
+    };
+    match interface {
+        Interface::ModelExchange => {
+            let told = M::MODEL_EXCHANGE.is_some_and(|offer| offer.step_completed);
+            element("ModelExchange").with("needsCompletedIntegratorStep", told)
+        }
+        Interface::CoSimulation => {
+            let variable_step_size = M::CO_SIMULATION.is_some_and(|offer| offer.variable_step_size);
+            element("CoSimulation")
+                .with("canHandleVariableCommunicationStepSize", variable_step_size)
+                .with("maxOutputDerivativeOrder", M::OUTPUT_DERIVATIVES)
+        }
+    }
+}
+
+/// The name of the element of a variable.
+fn name(base: BaseType) -> String {
+    match base {
+        BaseType::Real => "Float64".to_owned(),
+        BaseType::Integer => "Int32".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+fn type_definition(of: &Type) -> Element {
+    let element = Element::new(format!("{}Type", name(of.base()))).with("name", of.name);
+    with_attributes(element, of).containing(items(of))
+}
+
+/// As in FMI 2.0, what a type says is repeated at the variable.
+fn variable<M: Exported>(of: &Variable<M>, vr: u32, start: Option<Value>, changes: &Changes) -> Element {
+    let variable_type = of.of();
+    // Lists of texts would not come apart again.
+    let is_text = of.base() == BaseType::String;
+    let (attribute, child) = if is_text { (None, start) } else { (start, None) };
+    let element = Element::new(name(of.base()));
+    let element = with_facts(element, of, vr, changes.tunable_parameters)
+        .with_some("declaredType", filled(variable_type.name))
+        .with_some("start", attribute)
+        .with_some("derivative", of.differentiates())
+        .with_some("reinit", is_reinit(of));
+    with_attributes(element, variable_type)
+        .containing(child.map(|start| Element::new("Start").with("value", start)))
+}
+
+fn model_structure<M: Exported>(structure: &ModelStructure) -> Element {
+    let unknowns = [
+        ("Output", &structure.outputs),
+        ("ContinuousStateDerivative", &structure.derivatives),
+        ("InitialUnknown", &structure.initial_unknowns),
+    ];
+    let unknowns = unknowns.into_iter().flat_map(|(name, list)| list.iter().map(|of| unknown(name, of)));
+    // Without a list of dependencies they depend on everything.
+    let indicator =
+        |number| Element::new("EventIndicator").with("valueReference", indicator_reference::<M>(number));
+    Element::new("ModelStructure").containing(unknowns).containing((0..indicators::<M>()).map(indicator))
+}
+
+fn unknown(name: &str, of: &Unknown) -> Element {
+    with_dependencies(Element::new(name).with("valueReference", of.vr), of, |vr| vr)
+}
