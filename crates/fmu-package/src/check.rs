@@ -124,6 +124,7 @@ fn check_type(of: &Type) -> Result<()> {
         Attributes::Real { quantity, unit, min, max, nominal } => {
             ensure!(is_line(quantity), "its quantity '{}' is more than one line", quantity.escape_debug());
             for (what, limit) in [("min", min), ("max", max)] {
+                let limit = limit.map(|limit| rounded(of.base(), limit));
                 ensure!(limit.is_none_or(f64::is_finite), "{what} must be a finite number");
             }
             if let (Some(min), Some(max)) = (min, max) {
@@ -158,7 +159,23 @@ fn check_type(of: &Type) -> Result<()> {
             }
             Ok(())
         }
+        Attributes::Binary { mime_type, .. } => {
+            ensure!(
+                is_text(mime_type),
+                "its MIME type '{}' is empty or more than one line",
+                mime_type.escape_debug()
+            );
+            Ok(())
+        }
         _ => Ok(()),
+    }
+}
+
+/// The number as variables of the type have it.
+pub(crate) fn rounded(base: BaseType, number: f64) -> f64 {
+    match base {
+        BaseType::Float32 => f64::from(number as f32),
+        _ => number,
     }
 }
 
@@ -256,10 +273,10 @@ fn check_value(what: &str, of: &Type, value: &Value) -> Result<()> {
         (Attributes::Real { min, max, .. }, Value::Real(value)) => {
             ensure!(value.is_finite(), "{what} must be a finite number, it is {value}");
             if let Some(min) = min {
-                ensure!(*value >= min, "{what} must be >= {min}, it is {value}");
+                ensure!(*value >= rounded(of.base(), min), "{what} must be >= {min}, it is {value}");
             }
             if let Some(max) = max {
-                ensure!(*value <= max, "{what} must be <= {max}, it is {value}");
+                ensure!(*value <= rounded(of.base(), max), "{what} must be <= {max}, it is {value}");
             }
         }
         (Attributes::Integer { min, max }, Value::Integer(value)) => {
@@ -269,6 +286,10 @@ fn check_value(what: &str, of: &Type, value: &Value) -> Result<()> {
             let known: Vec<_> = items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
             let is_known = items.iter().any(|item| i128::from(item.value) == *value);
             ensure!(is_known, "{what} must be one of {}, it is {value}", known.join(", "));
+        }
+        (Attributes::Binary { max_size, .. }, Value::Binary(bytes)) => {
+            let size = bytes.len();
+            ensure!(size <= max_size, "{what} must have at most {max_size} bytes, it has {size}");
         }
         (Attributes::String, Value::String(text)) => {
             // Lines and tabs are all that XML 1.0 has of them.

@@ -84,7 +84,7 @@ pub(crate) fn items(of: &Type) -> impl Iterator<Item = Element> {
     })
 }
 
-/// The element with what its type says: quantity, unit, range, nominal value.
+/// The element with what its type says: quantity, unit, range, nominal value, kind of bytes.
 pub(crate) fn with_attributes(element: Element, of: &Type) -> Element {
     match of.of {
         Attributes::Real { quantity, unit, min, max, nominal } => element
@@ -97,6 +97,9 @@ pub(crate) fn with_attributes(element: Element, of: &Type) -> Element {
         Attributes::Integer { min, max } => element
             .with_some("min", (Some(min) != of.base().range().map(|range| range.0)).then_some(min))
             .with_some("max", (Some(max) != of.base().range().map(|range| range.1)).then_some(max)),
+        Attributes::Binary { mime_type, max_size } => {
+            element.with("mimeType", mime_type).with("maxSize", max_size)
+        }
         _ => element,
     }
 }

@@ -7,7 +7,7 @@ use crate::describe::{default_experiment, is_reinit, log_categories, root, with_
 use crate::structure::{ModelStructure, Unknown};
 use crate::xml::Element;
 use anyhow::{Result, ensure};
-use fmu_export::{BaseType, Exported, Interface, Type, Value, Variable};
+use fmu_export::{Exported, Interface, Type, Value, Variable};
 
 /// The text of `modelDescription.xml` for a model as FMU of FMI 2.0.
 ///
@@ -19,7 +19,7 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
     for variable in M::TABLE {
         let base = variable.base();
         ensure!(
-            is_known(base),
+            base.is_in_fmi2(),
             "{} is {base}, which FMI 2.0 lacks; add --fmi 3 to make an FMU for FMI 3.0 only",
             variable.name()
         );
@@ -44,12 +44,6 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
         Some(model_structure(&structure)),
     ];
     root.containing(children.into_iter().flatten()).document()
-}
-
-/// Whether FMI 2.0 has the type.
-fn is_known(base: BaseType) -> bool {
-    use BaseType::*;
-    matches!(base, Real | Integer | Boolean | String | Enumeration)
 }
 
 /// The element of an interface type, with what the FMU can do through it (sections 3.3.1 and 4.3.1).

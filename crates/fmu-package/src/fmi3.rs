@@ -135,9 +135,13 @@ fn type_definition(of: &Type) -> Element {
 /// As in FMI 2.0, what a type says is repeated at the variable.
 fn variable<M: Exported>(of: &Variable<M>, vr: u32, start: Option<Value>, changes: &Changes) -> Element {
     let variable_type = of.of();
-    // Lists of texts would not come apart again.
-    let is_text = of.base() == BaseType::String;
-    let (attribute, child) = if is_text { (None, start) } else { (start, None) };
+    let start = start.map(|start| match start {
+        // As short as single precision allows.
+        Value::Real(value) if of.base() == BaseType::Float32 => (value as f32).to_string(),
+        other => other.to_string(),
+    });
+    let is_element = matches!(of.base(), BaseType::String | BaseType::Binary);
+    let (child, attribute) = if is_element { (start, None) } else { (None, start) };
     let element = Element::new(name(of.base()));
     let element = with_facts(element, of, vr, changes.tunable_parameters)
         .with_some("declaredType", filled(variable_type.name))

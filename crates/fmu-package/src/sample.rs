@@ -1,6 +1,6 @@
 //! Points at which a model is asked.
 
-use crate::check::{Starts, interfaces};
+use crate::check::{Starts, interfaces, rounded};
 use anyhow::{Result, bail};
 use fmu_export::{
     Attributes, Causality, Error, Experiment, Exported, Initial, Interface, Setup, Type, Value, Variability,
@@ -132,14 +132,15 @@ fn set<M: Exported>(model: &mut M, point: &Point, which: impl Fn(&Variable<M>) -
     model.update()
 }
 
-/// A value in the range of the type, near the start value; another one than before where possible. `None` for a
-/// String, of which nobody knows what else it could be.
+/// A value in the range of the type, near the start value; another one than before where possible. `None` for
+/// texts and bytes, of which nobody knows what else they could be.
 fn draw_value(random: &mut fastrand::Rng, of: &Type, start: &Value, before: Option<&Value>) -> Option<Value> {
     Some(match (of.of, start) {
         (Attributes::Real { min, max, nominal, .. }, &Value::Real(start)) => {
             let reach = if start == 0.0 { nominal.unwrap_or(1.0) } else { 0.5 * start.abs() };
             let value = start + reach * (2.0 * random.f64() - 1.0);
-            Value::Real(value.clamp(min.unwrap_or(f64::MIN), max.unwrap_or(f64::MAX)))
+            let value = value.clamp(min.unwrap_or(f64::MIN), max.unwrap_or(f64::MAX));
+            Value::Real(rounded(of.base(), value))
         }
         (Attributes::Integer { min, max }, &Value::Integer(start)) => {
             let (low, high) = (min.max(start.saturating_sub(3)), max.min(start.saturating_add(3)));

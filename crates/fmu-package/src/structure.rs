@@ -160,8 +160,10 @@ fn with_declared<M: Exported>(found: Unknown, knowns: &[u32]) -> Result<Unknown>
     if unknown.variability() == Variability::Constant {
         return Ok(found);
     }
-    // Strings are not tried.
-    let is_tried = |vr: u32| known::<M>(vr).is_none_or(|known| known.base() != BaseType::String);
+    // Texts and bytes are not tried.
+    let is_tried = |vr: u32| {
+        known::<M>(vr).is_none_or(|known| !matches!(known.base(), BaseType::String | BaseType::Binary))
+    };
     let kind = |known: u32| match found.dependencies.iter().find(|(found, _)| *found == known) {
         Some((_, kind)) if M::INFO.smooth => Some(*kind),
         None if M::INFO.smooth && (declared.is_none() || is_unlisted(known)) && is_tried(known) => None,
