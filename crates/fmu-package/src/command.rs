@@ -2,15 +2,17 @@
 
 use crate::cargo::LibraryBuild;
 use crate::changes::Changes;
+use crate::connectors::{Terminal, terminals};
 use crate::files::write_atomically;
-use crate::fmi2::describe;
 use crate::library::check_platform;
-use crate::pack::{Library, pack};
+use crate::pack::{Library, Parts, pack};
 use crate::packages::Neighbourhood;
 use crate::platform::Platform;
 use crate::sources::Sources;
 use crate::terminal::short;
 use crate::variant::{NO_GUID, Variant};
+use crate::version::Fmi;
+use crate::{fmi2, fmi3};
 use anyhow::{Context, Result, bail, ensure};
 use fmu_export::Exported;
 use std::ffi::OsString;
@@ -24,19 +26,22 @@ pub struct BuildOptions {
     /// Declare the parameters tunable instead of fixed (OpenModelica does not let users change those)
     #[arg(long)]
     pub tunable: bool,
-    /// Folder for what is made [default: target/fmu of the workspace]
+    /// Make the FMU for FMI 2.0 or for FMI 3.0 only
+    #[arg(long, value_enum, value_name = "VERSION", hide_possible_values = true)]
+    pub fmi: Option<Fmi>,
+    /// Folder for what is made, with a folder fmi3 for FMI 3.0 [default: target/fmu of the workspace]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Write only modelDescription.xml, into the folder modelDescription of the sources or DIR
+    /// Write only modelDescription.xml of FMI 2.0, into the folder modelDescription of the sources or DIR
     #[arg(long, conflicts_with_all = ["target", "binary"])]
     pub describe: bool,
     /// Compile for this Rust target instead of this machine; repeat it for several
     #[arg(long, value_name = "TRIPLE")]
     pub target: Vec<String>,
-    /// Put in this compiled library, for example win64=model.dll; repeat it for several
+    /// Put in this compiled library, for example win64=model.dll or x86_64-windows=model.dll; repeat it for several
     #[arg(long, value_name = "PLATFORM=PATH", value_parser = binary)]
     pub binary: Vec<(String, PathBuf)>,
-    /// Accept a library for another processor than its platform names (importers on ARM look in linux64)
+    /// Accept a library for another processor than its platform names (with FMI 2.0, importers on ARM look in linux64)
     #[arg(long, requires = "binary")]
     pub any_processor: bool,
 }
@@ -59,6 +64,11 @@ pub struct Builder {
     pub sources: Sources,
     /// What this program was compiled from: `env!("FMU_SOURCES")`.
     pub compiled_from: &'static str,
+    /// The versions that FMUs are made for if nothing else is said. The description of the first is kept with the
+    /// sources.
+    pub fmi: Vec<Fmi>,
+    /// The terminals of the FMU for FMI 3.0.
+    pub terminals: Vec<Terminal>,
     /// The cargo profile of the library.
     pub profile: &'static str,
     /// Start values that differ from the ones this program was compiled with, see [`Variant::start`].
@@ -84,6 +94,8 @@ impl Builder {
             command: "cargo run --release --bin build_fmu",
             sources: Sources::of_package(folder),
             compiled_from,
+            fmi: vec![Fmi::V2, Fmi::V3],
+            terminals: Vec::new(),
             profile: "release",
             start: Vec::new(),
             start_from: None,
@@ -104,10 +116,29 @@ impl Builder {
             _ => M::INFO.identifier.to_owned(),
         };
         let guid = variant.guid();
-        let describe = |guid: &str| {
+        let describe = |fmi: Fmi, guid: &str| {
             let changes = Changes { guid: Some(guid.to_owned()), ..Changes::from(&variant) };
-            describe::<M>(&changes).with_context(|| described.clone())
+            let text = match fmi {
+                Fmi::V2 => fmi2::describe::<M>(&changes),
+                Fmi::V3 => fmi3::describe::<M>(&changes),
+            };
+            text.with_context(|| described.clone())
         };
+        let versions = options.fmi.map_or_else(|| self.fmi.clone(), |fmi| vec![fmi]);
+        ensure!(
+            !options.any_processor || versions == [Fmi::V2],
+            "FMI 3.0 has a folder for every processor; --any-processor goes with --fmi 2 only"
+        );
+        let content = self.sources.content_files()?;
+        let mut descriptions = Vec::new();
+        for &fmi in &versions {
+            let guid = if options.describe { NO_GUID } else { &guid };
+            let terminals = match fmi {
+                Fmi::V2 => None,
+                Fmi::V3 => terminals::<M>(&self.terminals, &content)?,
+            };
+            descriptions.push((fmi, describe(fmi, guid)?, terminals));
+        }
         let committed = self.sources.folder.join(DESCRIPTION);
         let is_default = self.is_default && !options.tunable;
         if options.describe {
@@ -116,11 +147,12 @@ impl Builder {
                 None if is_default => committed,
                 None => bail!("{DESCRIPTION} is for the defaults; name another folder with --out"),
             };
+            let (_, description, _) =
+                descriptions.first().context("there is no version to describe it for")?;
             // Kept with the sources, it must not change whenever they do.
-            return write_description(&path, &describe(NO_GUID)?);
+            return write_description(&path, description);
         }
 
-        let description = describe(&guid)?;
         let libraries = self.libraries(options)?;
         for library in &libraries {
             check_library(library, &guid, options.any_processor)?;
@@ -130,13 +162,21 @@ impl Builder {
             None => Neighbourhood::of(&self.sources.folder)?.workspace.join("target/fmu"),
         };
         let identifier = M::INFO.identifier;
-        let fmu = folder.join(format!("{identifier}.fmu"));
-        let size = pack(&fmu, identifier, &description, &libraries, &self.sources.content_files()?)?;
-
-        let mut platforms: Vec<String> =
-            libraries.iter().map(|library| library.platform.to_string()).collect();
-        platforms.sort();
-        println!("{}: {} kB, {}", short(&fmu), size.div_ceil(1000), platforms.join(", "));
+        for (fmi, description, terminals) in &descriptions {
+            let folder = match fmi {
+                Fmi::V2 => folder.clone(),
+                Fmi::V3 => folder.join("fmi3"),
+            };
+            let fmu = folder.join(format!("{identifier}.fmu"));
+            let (libraries, content) = (&libraries, &content);
+            let terminals = terminals.as_deref();
+            let size =
+                pack(&fmu, &Parts { fmi: *fmi, identifier, description, terminals, libraries, content })?;
+            let mut platforms: Vec<_> =
+                libraries.iter().map(|library| library.platform.folder(*fmi)).collect();
+            platforms.sort_unstable();
+            println!("{}: {} kB, {}", short(&fmu), size.div_ceil(1000), platforms.join(", "));
+        }
         let start = match &self.start_from {
             Some(file) => format!(", parameters from {}", short(file)),
             None => String::new(),
@@ -144,8 +184,10 @@ impl Builder {
         let tunable = if options.tunable { ", tunable" } else { "" };
         println!("guid {guid}{start}{tunable}");
         if is_default
-            && let Ok(text) = fs::read(&committed)
-            && text != describe(NO_GUID)?.as_bytes()
+            && let Some((fmi, description, _)) = descriptions.first()
+            && self.fmi.first() == Some(fmi)
+            && let Ok(text) = fs::read_to_string(&committed)
+            && text != description.replace(&guid, NO_GUID)
         {
             eprintln!(
                 "note: {DESCRIPTION} in the sources is out of date; write it anew with\n      {} -- --describe",

@@ -15,7 +15,7 @@
 //! | the guid | `fingerprint`, `folder`, `content`, `packages`, `sources`, `variant` |
 //! | files | `xml`, `files` |
 //! | the description | `changes`, `check`, `sample`, `structure`, `definitions`, `describe`, `fmi2`, `fmi3` |
-//! | the FMU | `version`, `platform`, `cargo`, `pack` |
+//! | the FMU | `connectors`, `version`, `platform`, `cargo`, `pack` |
 //! | the command | `library`, `terminal`, `command` |
 
 #![cfg_attr(not(feature = "command"), allow(rustdoc::broken_intra_doc_links))]
@@ -38,6 +38,8 @@ mod cargo;
 mod changes;
 #[cfg(feature = "package")]
 mod check;
+#[cfg(feature = "package")]
+mod connectors;
 #[cfg(feature = "package")]
 mod definitions;
 #[cfg(feature = "package")]
@@ -75,7 +77,8 @@ pub use command::{BuildOptions, Builder};
 pub use {
     cargo::LibraryBuild,
     changes::Changes,
-    pack::{Library, pack},
+    connectors::{Terminal, terminals},
+    pack::{Library, Parts, pack},
     platform::Platform,
     version::Fmi,
 };

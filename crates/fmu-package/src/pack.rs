@@ -1,8 +1,9 @@
-//! Makes the FMU, a zip file (section 2.3). The same content gives the same bytes, on every machine.
+//! Makes the FMU, a zip file (section 2.3 of FMI 2.0, 2.5.1 of FMI 3.0). The same content gives the same bytes, on every machine.
 
 use crate::content::ContentFile;
 use crate::files::{write_atomically, zip};
 use crate::platform::Platform;
+use crate::version::Fmi;
 use anyhow::{Context, Result, ensure};
 use std::fs;
 use std::io::Write;
@@ -17,33 +18,57 @@ pub struct Library {
     pub path: PathBuf,
 }
 
+/// What an FMU is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Parts<'a> {
+    /// The version that the description is for.
+    pub fmi: Fmi,
+    /// The `modelIdentifier`.
+    pub identifier: &'a str,
+    /// The text of `modelDescription.xml`.
+    pub description: &'a str,
+    /// The text of `terminalsAndIcons/terminalsAndIcons.xml`, if there is one.
+    pub terminals: Option<&'a str>,
+    /// The libraries, one for each platform.
+    pub libraries: &'a [Library],
+    /// What goes in as it is, under the names of FMI 2.0.
+    pub content: &'a [ContentFile],
+}
+
 /// Writes the FMU to `destination` and tells its size in bytes. If anything goes wrong, a file that was
 /// there before stays as it was.
 ///
 /// # Errors
 /// When there is no library, there are two for one platform, a file cannot be read, or the destination
 /// cannot be written.
-pub fn pack(
-    destination: &Path,
-    model_identifier: &str,
-    description: &str,
-    libraries: &[Library],
-    content: &[ContentFile],
-) -> Result<u64> {
+pub fn pack(destination: &Path, parts: &Parts) -> Result<u64> {
+    let Parts { fmi, identifier, description, terminals, libraries, content } = *parts;
     ensure!(!libraries.is_empty(), "an FMU needs at least one library");
     let mut entries = vec![("modelDescription.xml".to_owned(), description.as_bytes().to_vec())];
+    entries.extend(terminals.map(|text| (TERMINALS.to_owned(), text.as_bytes().to_vec())));
     for Library { platform, path } in libraries {
-        let name = format!("binaries/{platform}/{}", platform.library_name(model_identifier));
-        entries.push((name, read(path).with_context(|| format!("the library for {platform} is missing"))?));
+        let folder = platform.folder(fmi);
+        let name = format!("binaries/{folder}/{}", platform.library_name(identifier));
+        entries.push((name, read(path).with_context(|| format!("the library for {folder} is missing"))?));
     }
+    let has_icon = content.iter().any(|file| file.name == ICON);
     for ContentFile { name, path } in content {
-        entries.push((name.clone(), read(path)?));
+        let name = match (fmi, name.as_str()) {
+            // FMI 3.0 has another place for it.
+            (Fmi::V3, "model.png") if has_icon => continue,
+            (Fmi::V3, "model.png") => ICON,
+            (_, name) => name,
+        };
+        entries.push((name.to_owned(), read(path)?));
     }
     // The description first, where tools that stream look for it; the rest by name.
     entries[1..].sort();
     let zip = zip(&entries)?;
     write_atomically(destination, |file| Ok(file.write_all(&zip)?))
 }
+
+const TERMINALS: &str = "terminalsAndIcons/terminalsAndIcons.xml";
+const ICON: &str = "terminalsAndIcons/icon.png";
 
 fn read(path: &Path) -> Result<Vec<u8>> {
     fs::read(path).with_context(|| format!("cannot read {}", path.display()))

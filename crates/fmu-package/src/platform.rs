@@ -1,5 +1,6 @@
-//! The folders of `binaries/` (section 2.3).
+//! The folders of `binaries/` (section 2.3 of FMI 2.0, 2.5.1.4.1 of FMI 3.0).
 
+use crate::version::Fmi;
 use anyhow::{Result, bail};
 use std::fmt;
 
@@ -9,22 +10,22 @@ pub struct Platform {
     /// Processor and operating system as Rust names them.
     architecture: &'static str,
     system: &'static str,
-    folder: &'static str,
+    /// In FMI 2.0 and in FMI 3.0.
+    folders: [&'static str; 2],
     library_suffix: &'static str,
 }
 
-/// Section 2.3 has names for x86; for the rest it refers to the platform tuples of FMI 3.0, section
-/// 2.5.1.4.1.
+/// FMI 2.0 has names for x86; for the rest it refers to the platform tuples of FMI 3.0.
 #[rustfmt::skip]
 const PLATFORMS: [Platform; 8] = [
-    Platform { architecture: "x86_64", system: "linux", folder: "linux64", library_suffix: ".so" },
-    Platform { architecture: "x86", system: "linux", folder: "linux32", library_suffix: ".so" },
-    Platform { architecture: "aarch64", system: "linux", folder: "aarch64-linux", library_suffix: ".so" },
-    Platform { architecture: "x86_64", system: "windows", folder: "win64", library_suffix: ".dll" },
-    Platform { architecture: "x86", system: "windows", folder: "win32", library_suffix: ".dll" },
-    Platform { architecture: "aarch64", system: "windows", folder: "aarch64-windows", library_suffix: ".dll" },
-    Platform { architecture: "x86_64", system: "macos", folder: "darwin64", library_suffix: ".dylib" },
-    Platform { architecture: "aarch64", system: "macos", folder: "aarch64-darwin", library_suffix: ".dylib" },
+    Platform { architecture: "x86_64", system: "linux", folders: ["linux64", "x86_64-linux"], library_suffix: ".so" },
+    Platform { architecture: "x86", system: "linux", folders: ["linux32", "x86-linux"], library_suffix: ".so" },
+    Platform { architecture: "aarch64", system: "linux", folders: ["aarch64-linux", "aarch64-linux"], library_suffix: ".so" },
+    Platform { architecture: "x86_64", system: "windows", folders: ["win64", "x86_64-windows"], library_suffix: ".dll" },
+    Platform { architecture: "x86", system: "windows", folders: ["win32", "x86-windows"], library_suffix: ".dll" },
+    Platform { architecture: "aarch64", system: "windows", folders: ["aarch64-windows", "aarch64-windows"], library_suffix: ".dll" },
+    Platform { architecture: "x86_64", system: "macos", folders: ["darwin64", "x86_64-darwin"], library_suffix: ".dylib" },
+    Platform { architecture: "aarch64", system: "macos", folders: ["aarch64-darwin", "aarch64-darwin"], library_suffix: ".dylib" },
 ];
 
 impl Platform {
@@ -60,15 +61,26 @@ impl Platform {
         Self::of(architecture, system)
     }
 
-    /// The platform with this folder name.
+    /// The platform with this folder name, that of FMI 2.0 or that of FMI 3.0.
     ///
     /// # Errors
     /// When there is none; the message lists the names.
     pub fn of_folder(folder: &str) -> Result<Self> {
-        Self::find(|platform| platform.folder == folder).ok_or_else(|| {
-            let known = PLATFORMS.map(|platform| platform.folder).join(", ");
-            anyhow::anyhow!("'{folder}' is no platform of FMI 2.0; platforms are {known}")
+        Self::find(|platform| platform.folders.contains(&folder)).ok_or_else(|| {
+            let known = PLATFORMS.map(|platform| platform.folders[0]).join(", ");
+            let in_fmi3 = PLATFORMS.map(|platform| platform.folders[1]).join(", ");
+            anyhow::anyhow!(
+                "'{folder}' is no platform of FMI 2.0 or FMI 3.0; platforms are {known}, or as FMI 3.0 has them {in_fmi3}"
+            )
         })
+    }
+
+    /// The name of the folder.
+    pub fn folder(self, fmi: Fmi) -> &'static str {
+        self.folders[match fmi {
+            Fmi::V2 => 0,
+            Fmi::V3 => 1,
+        }]
     }
 
     /// The name of the library file of a model, which importers derive from the `modelIdentifier`.
@@ -95,34 +107,41 @@ impl Platform {
     }
 }
 
-/// The name of the folder.
+/// The name of the folder in FMI 2.0.
 impl fmt::Display for Platform {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.folder)
+        f.write_str(self.folder(Fmi::V2))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::Platform;
+    use crate::version::Fmi;
 
     #[test]
     fn targets_have_their_folders() {
-        for (triple, folder, library) in [
-            ("x86_64-unknown-linux-gnu", "linux64", "m.so"),
-            ("aarch64-unknown-linux-gnu", "aarch64-linux", "m.so"),
-            ("x86_64-pc-windows-gnu", "win64", "m.dll"),
-            ("x86_64-pc-windows-msvc", "win64", "m.dll"),
-            ("i686-pc-windows-msvc", "win32", "m.dll"),
-            ("x86_64-apple-darwin", "darwin64", "m.dylib"),
-            ("aarch64-apple-darwin", "aarch64-darwin", "m.dylib"),
+        for (triple, folder, in_fmi3, library) in [
+            ("x86_64-unknown-linux-gnu", "linux64", "x86_64-linux", "m.so"),
+            ("aarch64-unknown-linux-gnu", "aarch64-linux", "aarch64-linux", "m.so"),
+            ("x86_64-pc-windows-gnu", "win64", "x86_64-windows", "m.dll"),
+            ("x86_64-pc-windows-msvc", "win64", "x86_64-windows", "m.dll"),
+            ("i686-pc-windows-msvc", "win32", "x86-windows", "m.dll"),
+            ("x86_64-apple-darwin", "darwin64", "x86_64-darwin", "m.dylib"),
+            ("aarch64-apple-darwin", "aarch64-darwin", "aarch64-darwin", "m.dylib"),
         ] {
             let platform = Platform::of_target(triple).unwrap();
             assert_eq!(
-                (platform.to_string().as_str(), platform.library_name("m").as_str()),
-                (folder, library)
+                (
+                    platform.to_string().as_str(),
+                    platform.folder(Fmi::V3),
+                    platform.library_name("m").as_str()
+                ),
+                (folder, in_fmi3, library)
             );
-            assert_eq!(Platform::of_folder(folder).unwrap(), platform);
+            for folder in [folder, in_fmi3] {
+                assert_eq!(Platform::of_folder(folder).unwrap(), platform);
+            }
         }
     }
 
@@ -132,6 +151,9 @@ mod tests {
             assert!(Platform::of_target(triple).is_err(), "{triple}");
         }
         let error = Platform::of_folder("linux").unwrap_err().to_string();
-        assert!(error.contains("'linux'") && error.contains("linux64"), "{error}");
+        assert!(
+            error.contains("'linux'") && error.contains("linux64") && error.contains("x86-linux"),
+            "{error}"
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use anyhow::bail;
 use fmu_package::files::write_atomically;
-use fmu_package::{ContentFile, Library, Platform, pack};
+use fmu_package::{ContentFile, Fmi, Library, Parts, Platform, pack};
 use std::fs;
 use std::io::{Cursor, Read, Write};
 use std::path::{Path, PathBuf};
@@ -31,10 +31,17 @@ impl Sources {
         Library { platform: Platform::of_folder(platform).unwrap(), path: self.path(name) }
     }
 
+    fn content(&self, names: &[&str]) -> Vec<ContentFile> {
+        names.iter().map(|name| ContentFile { name: (*name).into(), path: self.path("index.html") }).collect()
+    }
+
     fn pack(&self, destination: &Path, libraries: &[Library]) -> anyhow::Result<u64> {
-        let content =
-            [ContentFile { name: "documentation/index.html".into(), path: self.path("index.html") }];
-        pack(destination, "toy", "<xml/>", libraries, &content)
+        let content = self.content(&["documentation/index.html"]);
+        pack(destination, &self.parts(Fmi::V2, libraries, &content))
+    }
+
+    fn parts<'a>(&self, fmi: Fmi, libraries: &'a [Library], content: &'a [ContentFile]) -> Parts<'a> {
+        Parts { fmi, identifier: "toy", description: "<xml/>", terminals: None, libraries, content }
     }
 
     fn pack_both(&self, destination: &Path) -> u64 {
@@ -75,6 +82,31 @@ fn it_is_the_zip_that_importers_want() {
     let mut text = String::new();
     zip.by_name("binaries/win64/toy.dll").unwrap().read_to_string(&mut text).unwrap();
     assert_eq!(text, "other code");
+}
+
+#[test]
+fn in_fmi_3_folders_and_icon_have_other_names() {
+    let sources = Sources::new();
+    let fmu = sources.path("toy.fmu");
+    let libraries = [sources.library("win64", "lib.dll"), sources.library("x86_64-linux", "lib.so")];
+    let names = |content: &[&str]| {
+        let content = sources.content(content);
+        let parts = sources.parts(Fmi::V3, &libraries, &content);
+        pack(&fmu, &Parts { terminals: Some("<terminals/>"), ..parts }).unwrap();
+        let zip = ZipArchive::new(Cursor::new(fs::read(&fmu).unwrap())).unwrap();
+        zip.file_names().map(|name| name.unwrap().into_owned()).collect::<Vec<_>>()
+    };
+    let expected = [
+        "modelDescription.xml",
+        "binaries/x86_64-linux/toy.so",
+        "binaries/x86_64-windows/toy.dll",
+        "documentation/licenses/license.txt",
+        "terminalsAndIcons/icon.png",
+        "terminalsAndIcons/terminalsAndIcons.xml",
+    ];
+    assert_eq!(names(&["documentation/licenses/license.txt", "model.png"]), expected);
+    let both = ["documentation/licenses/license.txt", "model.png", "terminalsAndIcons/icon.png"];
+    assert_eq!(names(&both), expected);
 }
 
 #[test]
