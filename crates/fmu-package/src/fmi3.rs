@@ -129,7 +129,9 @@ fn name(base: BaseType) -> String {
 
 fn type_definition(of: &Type) -> Element {
     let element = Element::new(format!("{}Type", name(of.base()))).with("name", of.name);
-    with_attributes(element, of).containing(items(of))
+    // FMPy 0.3 does not read a BinaryType that says more; the variables do.
+    let element = if of.base() == BaseType::Binary { element } else { with_attributes(element, of) };
+    element.containing(items(of))
 }
 
 /// As in FMI 2.0, what a type says is repeated at the variable.

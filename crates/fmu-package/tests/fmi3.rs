@@ -178,7 +178,7 @@ fn every_kind_of_variable_is_described() {
     <Float32Type name="Single" quantity="Single" unit="1" max="0.1"/>
     <UInt8Type name="Byte" max="200"/>
     <UInt64Type name="Huge" min="1"/>
-    <BinaryType name="Picture" mimeType="image/png" maxSize="4"/>
+    <BinaryType name="Picture"/>
     <EnumerationType name="Heater">
       <Item name="Off" value="0" description="Nothing"/>
       <Item name="Low" value="2" description="Warms &lt;gently&gt;"/>
