@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use clap::Parser;
-use fmu_package::{BuildOptions, Builder};
+use fmu_package::{BuildOptions, Builder, Terminal};
 use prw_testbed::TestbedFmu;
 use prw_testbed::fingerprint::{self, PARAMETERS};
 use prw_testbed::parameter_file;
@@ -12,7 +12,8 @@ use std::process::ExitCode;
 /// The folder of `Cargo.toml`.
 const PROJECT: &str = env!("CARGO_MANIFEST_DIR");
 
-/// Builds the FMU of the pitch-roll wrist testbed, target/fmu/prw_testbed.fmu.
+/// Builds the FMU of the pitch-roll wrist testbed: target/fmu/prw_testbed.fmu for FMI 2.0 and
+/// target/fmu/fmi3/prw_testbed.fmu for FMI 3.0.
 #[derive(Parser)]
 #[command(
     override_usage = "cargo run --release --bin build_fmu [-- OPTIONS]",
@@ -20,6 +21,7 @@ const PROJECT: &str = env!("CARGO_MANIFEST_DIR");
   --parameters mine.json --out mine    an FMU with other start values, in mine/
   --tunable --out tunable              parameters can be changed while Simulink runs
   --describe                           after a change of the variables, before a commit
+  --fmi 3                              for FMI 3.0 only
   --target x86_64-pc-windows-gnu       a Windows FMU, if rustup has that target
   --binary linux64=a.so --binary win64=b.dll
                                        one FMU from libraries that were compiled elsewhere"
@@ -45,6 +47,7 @@ fn run(options: &Options) -> Result<()> {
     let builder = Builder {
         sources: fingerprint::sources(PROJECT),
         profile: "library",
+        terminals: terminals(),
         start: fingerprint::start(&parameter_file::read(&file)?),
         is_default: other.is_none(),
         start_from: Some(file),
@@ -52,4 +55,26 @@ fn run(options: &Options) -> Result<()> {
         ..Builder::new(env!("CARGO_PKG_NAME"), PROJECT, env!("FMU_SOURCES"))
     };
     builder.run::<TestbedFmu>(&options.build)
+}
+
+/// Where the testbed is connected.
+fn terminals() -> Vec<Terminal> {
+    vec![
+        Terminal::plug("motor1")
+            .description("Shaft of motor 1, with sensor 1")
+            .signal("theta", "theta1")
+            .signal("omega", "omega1")
+            .signal("tau", "tau1"),
+        Terminal::plug("motor2")
+            .description("Shaft of motor 2, with sensor 2")
+            .signal("theta", "theta2")
+            .signal("omega", "omega2")
+            .signal("tau", "tau2"),
+        Terminal::bus("output_shaft")
+            .description("Output shaft of the wrist")
+            .signal("pitch", "pitch")
+            .signal("roll", "roll")
+            .signal("pitch_rate", "pitch_rate")
+            .signal("roll_rate", "roll_rate"),
+    ]
 }

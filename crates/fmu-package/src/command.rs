@@ -27,7 +27,7 @@ pub struct BuildOptions {
     #[arg(long)]
     pub tunable: bool,
     /// Make the FMU for FMI 2.0 or for FMI 3.0 only
-    #[arg(long, value_enum, value_name = "VERSION", hide_possible_values = true)]
+    #[arg(long, value_enum, value_name = "2|3", hide_possible_values = true)]
     pub fmi: Option<Fmi>,
     /// Folder for what is made, with a folder fmi3 for FMI 3.0 [default: target/fmu of the workspace]
     #[arg(long, value_name = "DIR")]

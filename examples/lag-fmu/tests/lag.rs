@@ -22,9 +22,29 @@ fn build_fmu_makes_an_fmu() {
     let output =
         Command::new(env!("CARGO_BIN_EXE_build_fmu_lag")).arg("--out").arg(folder.path()).output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    assert!(folder.path().join("lag.fmu").is_file());
+    for name in ["lag.fmu", "fmi3/lag.fmu"] {
+        assert!(folder.path().join(name).is_file(), "{name}");
+    }
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(text.contains("lag.fmu") && text.contains("guid {"), "{text}");
+    assert!(text.contains("lag.fmu") && text.contains("fmi3") && text.contains("guid {"), "{text}");
+}
+
+#[test]
+fn build_fmu_makes_one_version_if_told_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut build_fmu = Command::new(env!("CARGO_BIN_EXE_build_fmu_lag"));
+    let output = build_fmu.args(["--fmi", "3", "--out"]).arg(folder.path()).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    assert!(folder.path().join("fmi3/lag.fmu").is_file());
+    assert!(!folder.path().join("lag.fmu").exists());
+
+    let mut build_fmu = Command::new(env!("CARGO_BIN_EXE_build_fmu_lag"));
+    let output = build_fmu.args(["--binary", "linux64=a.so", "--any-processor"]).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(
+        text,
+        "error: FMI 3.0 has a folder for every processor; --any-processor goes with --fmi 2 only\n"
+    );
 }
 
 /// As it would be kept with the sources: without what changes with each of them.
@@ -37,4 +57,14 @@ fn build_fmu_describes_the_model() {
     let text = std::fs::read_to_string(folder.path().join("modelDescription.xml")).unwrap();
     assert!(text.contains("guid=\"{00000000-0000-0000-0000-000000000000}\""), "{text}");
     assert!(text.contains("<Unknown index=\"3\" dependencies=\"1 2\""), "{text}");
+
+    let mut build_fmu = Command::new(env!("CARGO_BIN_EXE_build_fmu_lag"));
+    let output = build_fmu.args(["--describe", "--fmi", "3", "--out"]).arg(folder.path()).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let text = std::fs::read_to_string(folder.path().join("modelDescription.xml")).unwrap();
+    assert!(text.contains("instantiationToken=\"{00000000-0000-0000-0000-000000000000}\""), "{text}");
+    assert!(
+        text.contains("<ContinuousStateDerivative valueReference=\"2\" dependencies=\"0 1 3\""),
+        "{text}"
+    );
 }
