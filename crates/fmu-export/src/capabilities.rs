@@ -7,6 +7,10 @@ pub trait CoSimulation: Model {
     /// Whether steps may have any size, also one unlike the last.
     const VARIABLE_STEP_SIZE: bool = true;
 
+    /// Whether steps may stop at events ([`Stepped::Event`]), which [`ModelExchange::event`] handles: at the begin of
+    /// the simulation, too, and in FMI 3.0 whenever the importer likes (`hasEventMode`).
+    const EVENTS: bool = false;
+
     /// Goes on from a communication point.
     ///
     /// # Errors
@@ -28,9 +32,16 @@ pub struct Step {
 pub enum Stepped {
     /// At the next communication point.
     Done,
-    /// At an earlier time, s, which the model has reached: the importer is told (`fmi2Discard`) and goes back to a
-    /// saved state or ends the simulation.
+    /// At an earlier time, s, which the model has reached: the importer is told. In FMI 2.0 (`fmi2Discard`) it goes
+    /// back to a saved state or ends the simulation. In FMI 3.0 (`earlyReturn`) it goes on from there; if it has not
+    /// allowed it, the step ends with an error.
     Early(f64),
+    /// At an event, at an earlier time, s, which the model has reached, or at the next communication point. Only if
+    /// [`EVENTS`](CoSimulation::EVENTS) says so.
+    ///
+    /// An importer of FMI 3.0 that wants to handles the event itself (`eventHandlingNeeded`). Otherwise, and in FMI
+    /// 2.0, this crate does: it calls [`ModelExchange::event`], and the rest of the step follows.
+    Event(f64),
     /// At an earlier time, s, or the next point: the model wants to end the simulation.
     Terminate(f64),
 }

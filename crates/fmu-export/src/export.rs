@@ -50,6 +50,8 @@ pub trait Exported: Model {
 pub struct CoSimulationOffer {
     /// Steps may have any size.
     pub variable_step_size: bool,
+    /// Steps may stop at events.
+    pub events: bool,
 }
 
 /// What the model description says of a Model Exchange model.
@@ -61,7 +63,8 @@ pub struct ModelExchangeOffer {
     pub step_completed: bool,
 }
 
-/// Exports a [`Model`] with its capabilities as an FMU: the functions of FMI 2.0 as symbols of the library.
+/// Exports a [`Model`] with its capabilities as an FMU: the functions of FMI 2.0 and of FMI 3.0 as symbols of the
+/// library.
 ///
 /// Goes once into the library crate of an FMU, which must be a `cdylib`. The symbols live in the crate that calls
 /// the macro, so several FMU crates can share a workspace.
@@ -74,6 +77,7 @@ macro_rules! export_fmu {
     ($model:ty : $first:ident $(+ $next:ident)*) => {
         $crate::offer!($model: $first $(+ $next)*);
         $crate::fmi2_symbols!($model);
+        $crate::fmi3_symbols!($model);
     };
 }
 
@@ -109,6 +113,7 @@ macro_rules! offer {
         const CO_SIMULATION: ::core::option::Option<$crate::CoSimulationOffer> =
             ::core::option::Option::Some($crate::CoSimulationOffer {
                 variable_step_size: <Self as $crate::CoSimulation>::VARIABLE_STEP_SIZE,
+                events: <Self as $crate::CoSimulation>::EVENTS,
             });
 
         #[inline]
@@ -175,6 +180,12 @@ macro_rules! offer {
         }
 
         const _: () = {
+            if let ::core::option::Option::Some(offer) = <$model as $crate::Exported>::CO_SIMULATION {
+                ::core::assert!(
+                    !offer.events || <$model as $crate::Exported>::MODEL_EXCHANGE.is_some(),
+                    "EVENTS needs ModelExchange, whose function event handles them"
+                );
+            }
             $crate::offer! { @must_agree $model, CoSimulation, CO_SIMULATION.is_some() }
             $crate::offer! { @must_agree $model, ModelExchange, MODEL_EXCHANGE.is_some() }
             $crate::offer! { @must_agree $model, Partials, PARTIALS }

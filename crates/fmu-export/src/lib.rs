@@ -6,14 +6,17 @@
 //! the inside out: `instance` has what each call checks and does, free of pointers and of versions of FMI; [`fmi2`]
 //! has the C functions of the standard, its table of allowed calls, and all `unsafe`.
 
+mod boundary;
 mod capabilities;
 mod export;
 pub mod fmi2;
+pub mod fmi3;
 mod info;
 mod instance;
 mod log;
 mod mode;
 mod model;
+mod rule;
 mod saved;
 mod settable;
 mod status;
@@ -30,8 +33,9 @@ pub use capabilities::{
 pub use export::{CoSimulationOffer, Exported, ModelExchangeOffer};
 pub use info::{DefaultExperiment, Info};
 pub use log::{Category, Log};
-pub use mode::{Interface, Mode, Situations};
+pub use mode::{Interface, Mode, Situations, Standard};
 pub use model::{Error, Experiment, Model, Setup};
+pub use rule::Rule;
 pub use saved::{Saved, StateVisitor};
 pub use status::Status;
 pub use table::Variables;

@@ -4,6 +4,7 @@
 //! for `#r1#` in it. So the text is complete before it is handed over, free of `%` and of `#`, and there are no
 //! further arguments.
 
+use crate::mode::Standard;
 use crate::status::Status;
 use std::ffi::{CStr, CString};
 
@@ -136,24 +137,31 @@ impl Clone for Log {
 #[derive(Debug)]
 pub(crate) struct Logger {
     enabled: u8,
+    /// What is shown where nothing else is said.
+    always: u8,
     waiting: Vec<Message>,
 }
 
 impl Logger {
-    /// Section 2.1.3: errors are always shown, the rest (`fmi2Discard` too) on demand.
-    pub fn new(logging_on: bool) -> Self {
-        let mut logger = Self { enabled: 0, waiting: Vec::new() };
+    /// Errors are always shown, the rest (a discard too) on demand (section 2.1.3 of FMI 2.0, 2.3.1 of FMI 3.0);
+    /// warnings are in FMI 2.0 only.
+    pub fn new(standard: Standard, logging_on: bool) -> Self {
+        let errors = Category::Error.bit() | Category::Fatal.bit();
+        let always = match standard {
+            Standard::Fmi2 => errors | Category::Warning.bit(),
+            Standard::Fmi3 => errors,
+        };
+        let mut logger = Self { enabled: 0, always, waiting: Vec::new() };
         logger.set_all(logging_on);
         logger
     }
 
-    /// `fmi2SetDebugLogging` without a list: everything, or errors and warnings only.
+    /// Without a list: everything, or what is always shown.
     pub fn set_all(&mut self, on: bool) {
-        let always = Category::Error.bit() | Category::Fatal.bit() | Category::Warning.bit();
-        self.enabled = if on { Category::All.bit() } else { always };
+        self.enabled = if on { Category::All.bit() } else { self.always };
     }
 
-    /// `fmi2SetDebugLogging` with a list: switches just these.
+    /// With a list: switches just these.
     pub fn set(&mut self, categories: u8, on: bool) {
         if on {
             self.enabled |= categories;

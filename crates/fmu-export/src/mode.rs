@@ -2,6 +2,24 @@
 
 use std::fmt;
 
+/// The standard that an importer speaks with an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standard {
+    /// FMI 2.0.
+    Fmi2 = 0,
+    /// FMI 3.0.
+    Fmi3 = 1,
+}
+
+impl fmt::Display for Standard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Fmi2 => "FMI 2.0",
+            Self::Fmi3 => "FMI 3.0",
+        })
+    }
+}
+
 /// The type of interface that an instance was made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
@@ -29,9 +47,9 @@ pub enum Mode {
     Instantiated = 1,
     /// Initialization Mode.
     Initialization = 2,
-    /// Co-Simulation: at a communication point.
+    /// Co-Simulation: at a communication point. FMI 3.0 calls it Step Mode.
     StepComplete = 4,
-    /// Co-Simulation: a step ended early, or the model wants to end the simulation.
+    /// Co-Simulation: a step ended early, or the model wants to end the simulation. In FMI 2.0 only.
     StepFailed = 8,
     /// Event Mode.
     Event = 16,
@@ -39,7 +57,7 @@ pub enum Mode {
     ContinuousTime = 32,
     /// After the end of the simulation.
     Terminated = 64,
-    /// The standard's state after an error. No call leads here, because a refused call changes nothing; a
+    /// The state of FMI 2.0 after an error. No call leads here, because a refused call changes nothing; a
     /// serialized state may.
     Error = 128,
     /// After a panic.
@@ -72,24 +90,24 @@ impl fmt::Display for Mode {
     }
 }
 
-/// A set of modes for each interface type.
+/// A set of modes for each standard and interface type: 16 bits for each of the four pairs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Situations(u32);
+pub struct Situations(u64);
 
-/// Where the modes of Model Exchange begin.
-const MODEL_EXCHANGE: u32 = 16;
-
-/// The one bit of an interface type and a mode.
+/// Where the bits of a standard and interface type begin.
 #[inline]
-const fn bit(interface: Interface, mode: Mode) -> u32 {
-    match interface {
-        Interface::CoSimulation => mode as u32,
-        Interface::ModelExchange => (mode as u32) << MODEL_EXCHANGE,
-    }
+const fn column(standard: Standard, interface: Interface) -> u32 {
+    16 * (2 * standard as u32 + interface as u32)
+}
+
+/// The one bit of a standard, an interface type and a mode.
+#[inline]
+const fn bit(standard: Standard, interface: Interface, mode: Mode) -> u64 {
+    (mode as u64) << column(standard, interface)
 }
 
 /// The bits of the letters.
-const fn bits(letters: &str) -> u32 {
+const fn bits(letters: &str) -> u64 {
     let mut set = 0;
     let mut rest = letters.as_bytes();
     while let [letter, tail @ ..] = rest {
@@ -97,7 +115,7 @@ const fn bits(letters: &str) -> u32 {
         while MODES[known].1 != *letter {
             known += 1; // Past the end for a letter that is none: an error when the table is compiled.
         }
-        set |= MODES[known].0 as u32;
+        set |= MODES[known].0 as u64;
         rest = tail;
     }
     set
@@ -109,14 +127,17 @@ impl Situations {
 
     /// The modes with these letters: I instantiated, N initialization, C step complete, F step failed, M event,
     /// K continuous time, T terminated, E error.
-    pub const fn new(co_simulation: &str, model_exchange: &str) -> Self {
-        Self(bits(co_simulation) | bits(model_exchange) << MODEL_EXCHANGE)
+    pub const fn new(standard: Standard, co_simulation: &str, model_exchange: &str) -> Self {
+        Self(
+            bits(co_simulation) << column(standard, Interface::CoSimulation)
+                | bits(model_exchange) << column(standard, Interface::ModelExchange),
+        )
     }
 
     /// Whether an instance of this type in this mode is among them.
     #[inline]
-    pub const fn contain(self, interface: Interface, mode: Mode) -> bool {
-        self.0 & bit(interface, mode) != 0
+    pub const fn contain(self, standard: Standard, interface: Interface, mode: Mode) -> bool {
+        self.0 & bit(standard, interface, mode) != 0
     }
 
     /// Both sets together.
@@ -128,27 +149,31 @@ impl Situations {
     /// These for the interface types that the other set has any mode of.
     #[must_use]
     pub const fn where_any(self, other: Self) -> Self {
-        let half = (1 << MODEL_EXCHANGE) - 1;
-        let co_simulation = if other.0 & half == 0 { 0 } else { half };
-        let model_exchange = if other.0 & !half == 0 { 0 } else { !half };
-        Self(self.0 & (co_simulation | model_exchange))
+        let (mut mask, mut column) = (0, 0xffff);
+        while column != 0 {
+            if other.0 & column != 0 {
+                mask |= column;
+            }
+            column <<= 16;
+        }
+        Self(self.0 & mask)
     }
 
     /// The names of the modes of an interface type.
-    pub fn names(self, interface: Interface) -> String {
-        let known = MODES.into_iter().filter(|(mode, ..)| self.contain(interface, *mode));
+    pub fn names(self, standard: Standard, interface: Interface) -> String {
+        let known = MODES.into_iter().filter(|(mode, ..)| self.contain(standard, interface, *mode));
         let names: Vec<_> = known.map(|(.., name)| name).collect();
         if names.is_empty() { "no state".to_owned() } else { names.join(", ") }
     }
 }
 
-/// Where an instance is: its interface type and its mode, as one bit that a set is asked for.
+/// Where an instance is: its standard, its interface type and its mode, as one bit that a set is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Situation(u32);
+pub(crate) struct Situation(u64);
 
 impl Situation {
-    pub const fn new(interface: Interface, mode: Mode) -> Self {
-        Self(bit(interface, mode))
+    pub const fn new(standard: Standard, interface: Interface, mode: Mode) -> Self {
+        Self(bit(standard, interface, mode))
     }
 
     #[inline]
@@ -158,4 +183,5 @@ impl Situation {
 }
 
 /// The modes that instances can be in, short of fatal.
-pub(crate) const POSSIBLE: Situations = Situations::new("INCFTE", "INMKTE");
+pub(crate) const POSSIBLE: Situations = Situations::new(Standard::Fmi2, "INCFTE", "INMKTE")
+    .and(Situations::new(Standard::Fmi3, "INCMT", "INMKT"));

@@ -1,20 +1,28 @@
 //! Where a variable may be set: what the standard says, and apart from it what is tolerated because importers do it.
 
-use crate::mode::Situations;
+use crate::mode::{Situations, Standard};
 use crate::variable::{Causality, Initial, Variability};
 
-/// Where an importer may set a variable, standard and tolerated together.
+/// Where an importer may set a variable, in both standards, with what is tolerated.
 pub(crate) const fn settable(
     causality: Causality,
     variability: Variability,
     initial: Option<Initial>,
     state: bool,
+    reinit: bool,
 ) -> Situations {
-    standard(causality, variability, initial, state).and(tolerated(causality))
+    let of_both = in_both(Standard::Fmi2, causality, variability, initial, state)
+        .and(in_both(Standard::Fmi3, causality, variability, initial, state))
+        .and(tolerated(Standard::Fmi2, causality))
+        .and(tolerated(Standard::Fmi3, causality));
+    of_both.and(in_event_mode(causality, variability, state, reinit))
 }
 
-/// Footnotes 1, 3, 4, 5 and 6 of the tables in sections 3.2.3 and 4.2.4 of FMI 2.0.
-pub(crate) const fn standard(
+/// Footnotes 1, 3, 4, 5 and 6 of the tables in sections 3.2.3 and 4.2.4 of FMI 2.0; the states of FMI 3.0 (sections
+/// 2.3.2, 2.3.3, 2.3.5, 3.2.1 and 4.2.1) say the same. Inputs before the initialization are of FMI 3.0, see
+/// [`tolerated`].
+const fn in_both(
+    standard: Standard,
     causality: Causality,
     variability: Variability,
     initial: Option<Initial>,
@@ -28,26 +36,41 @@ pub(crate) const fn standard(
 
     let mut set = Situations::NONE;
     if exact || approx {
-        set = set.and(Situations::new("I", "I")); // footnote 1
+        set = set.and(Situations::new(standard, "I", "I")); // footnote 1
     }
     if exact || input {
-        set = set.and(Situations::new("N", "N")); // footnote 3
+        set = set.and(Situations::new(standard, "N", "N")); // footnote 3
     }
     if input || tunable {
-        set = set.and(Situations::new("C", "M")); // footnotes 6 and 4
+        set = set.and(Situations::new(standard, "C", "M")); // footnotes 6 and 4
     }
     if state || input && matches!(variability, Variability::Continuous) {
-        set = set.and(Situations::new("", "K")); // footnote 5
+        set = set.and(Situations::new(standard, "", "K")); // footnote 5
     }
     set
 }
 
-/// Inputs before the initialization (OpenModelica, libcosim), parameters after it (OpenModelica, and users who
-/// tune).
-pub(crate) const fn tolerated(causality: Causality) -> Situations {
+/// What only FMI 3.0 has (section 2.3.5): the Event Mode of Co-Simulation, and states that events leave alone.
+const fn in_event_mode(
+    causality: Causality,
+    variability: Variability,
+    state: bool,
+    reinit: bool,
+) -> Situations {
+    match (causality, variability) {
+        // A fixed parameter is tolerated, as in step mode.
+        (Causality::Input, _) | (Causality::Parameter, _) => Situations::new(Standard::Fmi3, "M", ""),
+        _ if state && !reinit => Situations::new(Standard::Fmi3, "", "M"),
+        _ => Situations::NONE,
+    }
+}
+
+/// Inputs before the initialization (OpenModelica, libcosim; FMI 3.0 allows it, section 2.3.2), parameters after it
+/// (OpenModelica, and users who tune).
+const fn tolerated(standard: Standard, causality: Causality) -> Situations {
     match causality {
-        Causality::Input => Situations::new("I", "I"),
-        Causality::Parameter => Situations::new("C", "M"),
+        Causality::Input => Situations::new(standard, "I", "I"),
+        Causality::Parameter => Situations::new(standard, "C", "M"),
         _ => Situations::NONE,
     }
 }

@@ -286,7 +286,7 @@ impl<M> Variable<M> {
         if let Some(fault) = self.fault() {
             refuse(name, fault);
         }
-        self.settable = settable(self.causality, self.variability, self.initial, self.state);
+        self.settable = settable(self.causality, self.variability, self.initial, self.state, self.reinit);
         if !matches!(self.causality, Causality::Parameter) && matches!(self.of.base(), BaseType::Real) {
             self.takes_reals = self.settable;
         }

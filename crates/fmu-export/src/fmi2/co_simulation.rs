@@ -3,8 +3,8 @@
 //! # Safety
 //! As in the [module above](super): each argument is what the standard says it is.
 
-use super::arrays::{array, output, place};
 use super::types::*;
+use crate::boundary::{array, output, place};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, no_status, refuse};
 

@@ -3,7 +3,8 @@
 //! From this list come the table of allowed calls, the symbols of the library, and the table of function pointers
 //! that importers in Rust use.
 
-use crate::mode::Situations;
+use crate::mode::Standard;
+use crate::rule::Rule;
 
 /// Passes the list of functions on to another macro: `name (arguments) CS ME tolerated;` for each, after whatever
 /// tokens are given behind the macro's name.
@@ -86,30 +87,6 @@ macro_rules! fmi2_functions {
     } };
 }
 
-/// One row of the table of allowed calls.
-#[derive(Clone, Copy, Debug)]
-pub struct Rule {
-    /// The function's name.
-    pub name: &'static str,
-    /// Where the standard allows the call.
-    pub standard: Situations,
-    /// Where the call is tolerated beyond the standard.
-    pub tolerated: Situations,
-}
-
-impl Rule {
-    const fn new(name: &'static str, co_simulation: &str, model_exchange: &str, tolerated: &str) -> Self {
-        let standard = Situations::new(co_simulation, model_exchange);
-        let tolerated = Situations::new(tolerated, tolerated).where_any(standard);
-        Self { name, standard, tolerated }
-    }
-
-    /// Where the call is accepted.
-    pub const fn accepted(&self) -> Situations {
-        self.standard.and(self.tolerated)
-    }
-}
-
 macro_rules! rules {
     ($($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+) => {
         /// The functions that work on an instance.
@@ -118,7 +95,7 @@ macro_rules! rules {
         pub enum Function { $($function),+ }
 
         /// The table of allowed calls, in the order of [`Function`].
-        pub const ALLOWED: &[Rule] = &[$(Rule::new(stringify!($function), $cs, $me, $tolerated)),+];
+        pub const ALLOWED: &[Rule] = &[$(Rule::new(Standard::Fmi2, stringify!($function), $cs, $me, $tolerated)),+];
     };
 }
 

@@ -1,7 +1,7 @@
 //! FMI 2.0: C types, allowed calls, C functions. The only place with pointers and `unsafe`.
 //!
 //! Each C function exists once, generic over the model and under its C name. Those that work on an instance are all
-//! called in the same way (`call.rs`): find the instance, ask the table of allowed calls, run the function's body,
+//! called in the same way ([`call`](crate::boundary)): find the instance, ask the table of allowed calls, run the function's body,
 //! turn a refusal or a panic into a status, deliver what is to be logged. No panic leaves this module.
 //!
 //! # Safety
@@ -24,8 +24,6 @@
 #[macro_use]
 mod functions;
 
-mod arrays;
-mod call;
 mod co_simulation;
 mod common;
 mod instances;
@@ -33,10 +31,11 @@ mod model_exchange;
 mod pointers;
 pub mod types;
 
-pub use functions::{ALLOWED, Function, Rule};
+pub use functions::{ALLOWED, Function};
 pub use instances::{fmi2FreeInstance, fmi2GetTypesPlatform, fmi2GetVersion, fmi2Instantiate};
 pub use pointers::Functions;
 
+use crate::boundary::call;
 use crate::export::Exported;
 use types::*;
 
@@ -49,7 +48,7 @@ macro_rules! c_functions {
             pub unsafe extern "C" fn $function<M: Exported>(c: fmi2Component $(, $argument: $type)*) -> Status {
                 // SAFETY: the importer keeps the contract of this module, for the component and all arguments.
                 unsafe {
-                    call::call::<M>(c, Function::$function, |instance| bodies::$function(instance $(, $argument)*))
+                    call::<M>(c, Function::$function.rule(), |instance| bodies::$function(instance $(, $argument)*))
                 }
             }
         )+

@@ -3,14 +3,13 @@
 //! # Safety
 //! As in the [module above](super): each argument is what the standard says it is.
 
-use super::arrays::{array, output, place};
 use super::types::*;
+use crate::boundary::{array, output, place};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
 
 pub unsafe fn fmi2EnterEventMode<M: Exported>(instance: &mut Instance<M>) -> Outcome {
-    instance.enter_event_mode();
-    Ok(())
+    instance.enter_event_mode()
 }
 
 pub unsafe fn fmi2NewDiscreteStates<M: Exported>(

@@ -5,10 +5,67 @@ use super::{Instance, Outcome, refuse, refuse_with};
 use crate::capabilities::{Step, Stepped};
 use crate::export::Exported;
 use crate::mode::Mode;
+use crate::status::Status;
+
+/// Where a step has led in FMI 3.0.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reached {
+    /// The importer must handle an event.
+    pub event: bool,
+    pub terminate: bool,
+    pub early: bool,
+    pub time: f64,
+}
+
+/// In one step, and rounds of one event: more than this is an endless loop.
+const MOST_EVENTS: u32 = 10_000;
 
 impl<M: Exported> Instance<M> {
+    /// A step of FMI 2.0 (section 4.2.2 there).
     #[inline]
     pub fn do_step(&mut self, point: f64, step_size: f64) -> Outcome {
+        match self.step(point, step_size)? {
+            Stepped::Done => Ok(()),
+            early => self.ended_early(early, point + step_size),
+        }
+    }
+
+    /// A step of FMI 3.0 (section 4.2.1 there).
+    #[inline]
+    pub fn do_step_to(&mut self, point: f64, step_size: f64) -> Outcome<Reached> {
+        if self.state.ended {
+            return refuse("the model has ended the simulation; terminate");
+        }
+        let stepped = self.step(point, step_size)?;
+        let (time, end) = (self.state.time, point + step_size);
+        let early = time < end;
+        match stepped {
+            Stepped::Early(_) if early && !self.importer.early_return => {
+                // The text wants an error, unless all is as it was before; and after an error this mode.
+                self.enter(Mode::Terminated);
+                return refuse_with(|| {
+                    format!(
+                        "the step to {end} ended early, at {time}, which earlyReturnAllowed has ruled out; \
+                         set a saved state or reset"
+                    )
+                });
+            }
+            Stepped::Terminate(_) => {
+                self.state.ended = true;
+                self.logger.log(Status::Ok, format!("the model ends the simulation at {time}"));
+            }
+            _ => {}
+        }
+        Ok(Reached {
+            event: matches!(stepped, Stepped::Event(_)),
+            terminate: matches!(stepped, Stepped::Terminate(_)),
+            early: early && self.importer.early_return,
+            time,
+        })
+    }
+
+    #[inline]
+    fn step(&mut self, point: f64, step_size: f64) -> Outcome<Stepped> {
         let end = point + step_size;
         // False for what is no number, too.
         if !(point > f64::NEG_INFINITY && end > point && end < f64::INFINITY) {
@@ -31,33 +88,79 @@ impl<M: Exported> Instance<M> {
                 format!("the step would end at {end}, after the stop time {stop_time}")
             });
         }
-        match self.state.model.exported_step(Step { time: point, size: step_size })? {
-            Stepped::Done => {
+        let stepped = self.state.model.exported_step(Step { time: point, size: step_size })?;
+        self.state.stale = true;
+        if let Stepped::Done = stepped {
+            self.state.time = end;
+            return Ok(stepped);
+        }
+        Ok(self.through_events(stepped, point, end))
+    }
+
+    /// The rest of a step that has not simply reached its end: over the events that the importer does not handle.
+    #[cold]
+    fn through_events(&mut self, mut stepped: Stepped, point: f64, end: f64) -> Stepped {
+        self.state.time = point;
+        let mut events = 0;
+        loop {
+            let (Stepped::Early(time) | Stepped::Terminate(time) | Stepped::Event(time)) = stepped else {
                 self.state.time = end;
-                self.state.stale = true;
-                Ok(())
+                return stepped;
+            };
+            self.state.time = if time >= self.state.time && time <= end { time } else { end };
+            self.state.stale = true;
+            let time = self.state.time;
+            let Stepped::Event(_) = stepped else { return stepped };
+            if self.importer.event_mode && (time == end || self.importer.early_return) {
+                return stepped;
             }
-            early => self.ended_early(early, point, end),
+            events += 1;
+            let handled = match events {
+                MOST_EVENTS => refuse(format!("more than {MOST_EVENTS} events in one step")),
+                _ => self.handle_event(),
+            };
+            stepped = match handled {
+                Ok(()) if self.state.ended => Stepped::Terminate(time),
+                Ok(()) if time == end => Stepped::Done,
+                Ok(()) => match self.state.model.exported_step(Step { time, size: end - time }) {
+                    Ok(stepped) => stepped,
+                    Err(error) => self.stuck(time, &error.to_string()),
+                },
+                Err(refusal) => self.stuck(time, &refusal.message),
+            };
+            self.state.stale = true;
         }
     }
 
+    /// A part of the step is done, so it cannot be refused any more: it ends early.
+    fn stuck(&mut self, time: f64, why: &str) -> Stepped {
+        self.logger.log(Status::Warning, format!("the step cannot go on at {time}: {why}"));
+        Stepped::Early(time)
+    }
+
+    /// The event iteration, for importers that leave it to the model in Co-Simulation.
+    pub(super) fn handle_event(&mut self) -> Outcome {
+        for _ in 0..MOST_EVENTS {
+            if !self.event()?.again {
+                return Ok(());
+            }
+        }
+        refuse(format!("the event at {} does not come to an end", self.state.time))
+    }
+
     #[cold]
-    fn ended_early(&mut self, stepped: Stepped, point: f64, end: f64) -> Outcome {
-        let (time, terminate) = match stepped {
-            Stepped::Done => (end, false),
-            Stepped::Early(time) => (time, false),
-            Stepped::Terminate(time) => (time, true),
-        };
-        self.state.time = if time >= point && time <= end { time } else { end };
-        self.state.stale = true;
-        self.state.ended = terminate;
-        self.enter(Mode::StepFailed);
+    fn ended_early(&mut self, stepped: Stepped, end: f64) -> Outcome {
         let time = self.state.time;
-        discard(if terminate {
-            format!("the model ends the simulation at {time}")
-        } else {
-            format!("the step to {end} ended early, at {time}; set a saved state or terminate")
-        })
+        self.enter(Mode::StepFailed);
+        if let Stepped::Terminate(_) = stepped {
+            self.state.ended = true;
+            return discard(format!("the model ends the simulation at {time}"));
+        }
+        discard(format!("the step to {end} ended early, at {time}; set a saved state or terminate"))
+    }
+
+    pub fn enter_step_mode(&mut self) {
+        self.enter(Mode::StepComplete);
     }
 
     pub fn last_successful_time(&self) -> f64 {
@@ -72,7 +175,7 @@ impl<M: Exported> Instance<M> {
 
 #[cold]
 #[inline(never)]
-fn refuse_step(point: f64, step_size: f64) -> Outcome {
+fn refuse_step<T>(point: f64, step_size: f64) -> Outcome<T> {
     if point.is_finite() && step_size > 0.0 && step_size.is_finite() && (point + step_size).is_finite() {
         return refuse(format!("the step size {step_size} vanishes beside the communication point {point}"));
     }

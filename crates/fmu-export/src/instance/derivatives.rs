@@ -1,27 +1,47 @@
 //! Derivatives with respect to variables and to time (sections 2.1.9 and 4.2.1).
 
-use super::{Instance, Outcome, finite, refuse, variable};
+use super::{Instance, Outcome, finite, refuse};
 use crate::export::Exported;
-use crate::mode::Mode;
+use crate::mode::{Mode, Standard};
 use crate::types::BaseType;
 use crate::variable::{Causality, Variability, Variable};
 use std::mem::MaybeUninit;
 
+/// Which way partial derivatives are summed up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Direction {
+    /// What changes of the knowns make of the unknowns.
+    Forward,
+    /// The transposed: what the knowns contribute to changes of the unknowns.
+    Adjoint,
+}
+
 impl<M: Exported> Instance<M> {
-    pub fn directional_derivative(
+    /// The partial derivatives of unknowns with respect to knowns, times the seed: by rows for a directional
+    /// derivative, by columns for an adjoint one.
+    pub fn derivatives(
         &mut self,
         unknowns: &[u32],
         knowns: &[u32],
         seed: &[f64],
         result: &mut [MaybeUninit<f64>],
+        direction: Direction,
     ) -> Outcome {
         if !M::PARTIALS {
-            return refuse(
-                "this FMU has no directional derivatives (providesDirectionalDerivative is false)",
-            );
+            return refuse(match (self.standard(), direction) {
+                (Standard::Fmi2, _) => {
+                    "this FMU has no directional derivatives (providesDirectionalDerivative is false)"
+                }
+                (_, Direction::Forward) => {
+                    "this FMU has no directional derivatives (providesDirectionalDerivatives is false)"
+                }
+                (_, Direction::Adjoint) => {
+                    "this FMU has no adjoint derivatives (providesAdjointDerivatives is false)"
+                }
+            });
         }
         for vr in unknowns {
-            let variable = variable::<M>(*vr, BaseType::Real)?;
+            let variable = self.variable(*vr, BaseType::Real)?;
             if variable.causality() != Causality::Output && !variable.is_state_derivative() {
                 return refuse(format!(
                     "{} is no unknown: neither output nor state derivative",
@@ -29,24 +49,32 @@ impl<M: Exported> Instance<M> {
                 ));
             }
         }
-        for (vr, seed) in knowns.iter().zip(seed) {
-            let variable = variable::<M>(*vr, BaseType::Real)?;
+        for vr in knowns {
+            let variable = self.variable(*vr, BaseType::Real)?;
             let parameter =
                 variable.causality() == Causality::Parameter && self.mode() == Mode::Initialization;
             if variable.causality() != Causality::Input && !variable.is_state() && !parameter {
                 return refuse(format!("{} is no known: neither input nor state", variable.name()));
             }
+        }
+        let (seeded, wanted) = match direction {
+            Direction::Forward => (knowns, unknowns),
+            Direction::Adjoint => (unknowns, knowns),
+        };
+        for (vr, seed) in seeded.iter().zip(seed) {
             if !seed.is_finite() {
-                return refuse(format!(
-                    "the seed of {} must be a finite number, it is {seed}",
-                    variable.name()
-                ));
+                let name = M::TABLE[*vr as usize].name();
+                return refuse(format!("the seed of {name} must be a finite number, it is {seed}"));
             }
         }
         let model = self.calculated();
-        for (unknown, result) in unknowns.iter().map(|vr| *vr as usize).zip(result) {
+        for (wanted, result) in wanted.iter().zip(result) {
             let mut sum = 0.0;
-            for (known, seed) in knowns.iter().map(|vr| *vr as usize).zip(seed) {
+            for (seeded, seed) in seeded.iter().zip(seed) {
+                let (unknown, known) = match direction {
+                    Direction::Forward => (*wanted as usize, *seeded as usize),
+                    Direction::Adjoint => (*seeded as usize, *wanted as usize),
+                };
                 let Some(partial) = model.exported_partial(M::NAMES[unknown], M::NAMES[known]) else {
                     return refuse(format!(
                         "the derivative of {} with respect to {} is not provided",
@@ -56,7 +84,7 @@ impl<M: Exported> Instance<M> {
                 };
                 sum += partial * seed;
             }
-            result.write(finite(&M::TABLE[unknown], sum)?);
+            result.write(finite(&M::TABLE[*wanted as usize], sum)?);
         }
         Ok(())
     }
@@ -66,7 +94,7 @@ impl<M: Exported> Instance<M> {
             return refuse("this FMU does not use input derivatives (canInterpolateInputs is false)");
         }
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {
-            let variable = variable::<M>(*vr, BaseType::Real)?;
+            let variable = self.variable(*vr, BaseType::Real)?;
             if variable.causality() != Causality::Input || variable.variability() != Variability::Continuous {
                 return refuse(format!("{} is no continuous input", variable.name()));
             }
@@ -96,12 +124,15 @@ impl<M: Exported> Instance<M> {
             return refuse("this FMU has no output derivatives (maxOutputDerivativeOrder is 0)");
         }
         for (vr, order) in vr.iter().zip(orders) {
-            check_order(variable::<M>(*vr, BaseType::Real)?, *order)?;
+            check_order(self.variable(*vr, BaseType::Real)?, *order)?;
         }
         let model = self.calculated();
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {
-            let variable = &M::TABLE[*vr as usize];
-            value.write(finite(variable, derivative(model, *vr as usize, order.unsigned_abs()))?);
+            let place = *vr as usize;
+            value.write(match M::TABLE.get(place) {
+                Some(variable) => finite(variable, derivative(model, place, order.unsigned_abs()))?,
+                None => derivative_of_time(*order),
+            });
         }
         Ok(())
     }
@@ -111,9 +142,13 @@ impl<M: Exported> Instance<M> {
 fn derivative<M: Exported>(model: &M, place: usize, order: u32) -> f64 {
     match M::TABLE[place].causality() {
         Causality::Parameter | Causality::CalculatedParameter => 0.0,
-        Causality::Independent => f64::from(u8::from(order == 1)),
+        Causality::Independent => derivative_of_time(order.cast_signed()),
         _ => model.exported_output_derivative(M::NAMES[place], order),
     }
+}
+
+fn derivative_of_time(order: i32) -> f64 {
+    f64::from(u8::from(order == 1))
 }
 
 fn check_order<M>(variable: &Variable<M>, order: i32) -> Outcome {

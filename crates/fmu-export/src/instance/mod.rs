@@ -3,6 +3,7 @@
 //! Every method checks all its arguments before it changes anything; a refusal leaves the instance as it was.
 
 mod co_simulation;
+mod dependencies;
 mod derivatives;
 mod model_exchange;
 mod refusal;
@@ -11,26 +12,46 @@ mod serialized;
 mod values;
 
 pub(crate) use co_simulation::no_status;
+pub(crate) use derivatives::Direction;
 pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
 pub(crate) use saved_states::SavedState;
 
 use crate::export::Exported;
 use crate::log::Logger;
-use crate::mode::{Interface, Mode, Situation};
+use crate::mode::{Interface, Mode, Situation, Standard};
 use crate::model::{Error, Experiment, Setup};
 use crate::status::Status;
-use crate::types::BaseType;
-use crate::variable::Variable;
+use crate::types::{BaseType, TIME};
+use crate::variable::{Causality, Variable};
 
 /// An instance of model `M`.
 pub(crate) struct Instance<M> {
     pub logger: Logger,
-    /// The states of the standards' state machines and the interface type, as one bit; follows from both.
+    /// The state of the standards' state machines, the standard and the interface type, as one bit; follows from
+    /// them.
     situation: Situation,
+    importer: Importer,
     setup: Setup,
     state: State<M>,
     /// Texts that the importer reads until the next call.
     pub texts: Vec<std::ffi::CString>,
+    /// Bytes that the importer reads until the next call.
+    pub bytes: Vec<Vec<u8>>,
+}
+
+/// What an importer has said when it made an instance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Importer {
+    pub standard: Standard,
+    /// It handles events in Co-Simulation.
+    pub event_mode: bool,
+    /// It copes with steps that end early. Those of FMI 2.0 end with `fmi2Discard`.
+    pub early_return: bool,
+}
+
+impl Importer {
+    /// One of FMI 2.0.
+    pub const FMI2: Self = Self { standard: Standard::Fmi2, event_mode: false, early_return: true };
 }
 
 /// What a saved state brings back.
@@ -75,7 +96,7 @@ impl<M: Exported> State<M> {
 
 /// Life cycle (sections 2.1.5 and 2.1.6); the other rooms have a file each.
 impl<M: Exported> Instance<M> {
-    pub fn new(setup: Setup, logging_on: bool) -> Outcome<Self> {
+    pub fn new(setup: Setup, importer: Importer, logging_on: bool) -> Outcome<Self> {
         match setup.interface {
             Interface::ModelExchange if M::MODEL_EXCHANGE.is_none() => {
                 return refuse("this FMU has no Model Exchange");
@@ -85,13 +106,18 @@ impl<M: Exported> Instance<M> {
             }
             _ => {}
         }
+        if importer.event_mode && M::CO_SIMULATION.is_none_or(|offer| !offer.events) {
+            return refuse("this FMU has no event mode in Co-Simulation (hasEventMode is false)");
+        }
         let state = State::new(&setup)?;
         let mut instance = Self {
-            logger: Logger::new(logging_on),
-            situation: Situation::new(setup.interface, state.mode),
+            logger: Logger::new(importer.standard, logging_on),
+            situation: Situation::new(importer.standard, setup.interface, state.mode),
+            importer,
             setup,
             state,
             texts: Vec::new(),
+            bytes: Vec::new(),
         };
         instance.logger.log(Status::Ok, "instantiated");
         Ok(instance)
@@ -99,6 +125,10 @@ impl<M: Exported> Instance<M> {
 
     pub fn interface(&self) -> Interface {
         self.setup.interface
+    }
+
+    pub fn standard(&self) -> Standard {
+        self.importer.standard
     }
 
     pub fn mode(&self) -> Mode {
@@ -112,7 +142,7 @@ impl<M: Exported> Instance<M> {
 
     fn enter(&mut self, mode: Mode) {
         self.state.mode = mode;
-        self.situation = Situation::new(self.setup.interface, mode);
+        self.situation = Situation::new(self.importer.standard, self.setup.interface, mode);
     }
 
     /// Replaces everything that a saved state holds.
@@ -167,12 +197,29 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    pub fn exit_initialization_mode(&mut self) {
-        self.enter(match self.setup.interface {
-            Interface::CoSimulation => Mode::StepComplete,
+    /// Both in one, as FMI 3.0 has it.
+    pub fn enter_initialization_mode_at(&mut self, experiment: Experiment) -> Outcome {
+        let before = (self.state.experiment, self.state.time);
+        self.setup_experiment(experiment)?;
+        self.enter_initialization_mode().inspect_err(|_| {
+            (self.state.experiment, self.state.time) = before;
+        })
+    }
+
+    pub fn exit_initialization_mode(&mut self) -> Outcome {
+        let mode = match self.setup.interface {
+            Interface::CoSimulation if self.importer.event_mode => Mode::Event,
+            Interface::CoSimulation => {
+                if M::CO_SIMULATION.is_some_and(|offer| offer.events) {
+                    self.handle_event()?;
+                }
+                Mode::StepComplete
+            }
             Interface::ModelExchange => Mode::Event,
-        });
+        };
+        self.enter(mode);
         self.logger.log(Status::Ok, "initialized");
+        Ok(())
     }
 
     pub fn terminate(&mut self) {
@@ -208,13 +255,44 @@ impl<M: Exported> Instance<M> {
     }
 }
 
-/// The variable of this value reference, if it has the type.
-#[inline]
-fn variable<M: Exported>(vr: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
-    match M::TABLE.get(vr as usize) {
-        Some(variable) if variable.base() == base => Ok(variable),
-        other => refuse_variable(vr, other, base),
+impl<M: Exported> Instance<M> {
+    /// The variable of this value reference.
+    #[inline]
+    fn find(&self, vr: u32) -> Option<&'static Variable<M>> {
+        match M::TABLE.get(vr as usize) {
+            None if self.importer.standard == Standard::Fmi3 => implicit_time(vr),
+            found => found,
+        }
     }
+
+    /// The variable of this value reference, if it has the type.
+    #[inline]
+    fn variable(&self, vr: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
+        match self.find(vr) {
+            Some(variable) if variable.base() == base => Ok(variable),
+            other => refuse_variable(vr, other, base),
+        }
+    }
+}
+
+struct Implicit<M>(std::marker::PhantomData<M>);
+
+impl<M: 'static> Implicit<M> {
+    const TIME: &'static Variable<M> = &Variable::independent(&TIME).finished("time", "Simulation time");
+}
+
+/// The time, which FMI 3.0 asks for in every model (section 2.4.7.4): with the value reference behind the last one of
+/// the table, if the table has none.
+#[cold]
+fn implicit_time<M: Exported>(vr: u32) -> Option<&'static Variable<M>> {
+    let (place, variable) = independent::<M>();
+    (vr == place).then_some(variable)
+}
+
+/// The independent variable as FMI 3.0 has it, with its value reference.
+pub(crate) fn independent<M: crate::Variables>() -> (u32, &'static Variable<M>) {
+    let of_table = (0..).zip(M::TABLE).find(|(_, variable)| variable.causality() == Causality::Independent);
+    of_table.unwrap_or((M::TABLE.len() as u32, Implicit::TIME))
 }
 
 #[cold]

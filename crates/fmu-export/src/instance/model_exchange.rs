@@ -3,14 +3,24 @@
 use super::{Instance, Outcome, finite, refuse};
 use crate::capabilities::{Event, StepCompleted};
 use crate::export::Exported;
-use crate::mode::Mode;
+use crate::mode::{Interface, Mode};
 use crate::table::StateOfTable;
 use std::mem::MaybeUninit;
 
 impl<M: Exported> Instance<M> {
-    pub fn enter_event_mode(&mut self) {
+    pub fn enter_event_mode(&mut self) -> Outcome {
+        if self.interface() == Interface::CoSimulation && !self.importer.event_mode {
+            return refuse("the instance was made without event mode (eventModeUsed was false)");
+        }
         self.enter(Mode::Event);
+        Ok(())
     }
+
+    /// The number of event indicators.
+    pub const INDICATORS: usize = match M::MODEL_EXCHANGE {
+        Some(offer) => offer.indicators,
+        None => 0,
+    };
 
     /// One round of the event iteration.
     pub fn event(&mut self) -> Outcome<Event> {
@@ -94,7 +104,7 @@ impl<M: Exported> Instance<M> {
     }
 
     pub fn get_event_indicators(&mut self, indicators: &mut [MaybeUninit<f64>]) -> Outcome {
-        let count = M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators);
+        let count = Self::INDICATORS;
         if indicators.len() != count {
             let number = if count == 0 { "no".to_owned() } else { count.to_string() };
             return refuse(format!("there are {number} event indicators, not {}", indicators.len()));

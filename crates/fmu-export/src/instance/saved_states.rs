@@ -2,33 +2,49 @@
 
 use super::{Instance, Outcome, State, refuse, serialized};
 use crate::export::Exported;
-use crate::mode::Interface;
+use crate::mode::{Interface, Mode, Standard};
+use std::fmt;
 
-/// A saved state, tied to the interface type it came from.
+/// Where a saved state comes from, and what it is tied to: the state machines differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Origin(pub Standard, pub Interface);
+
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} of {}", self.1, self.0)
+    }
+}
+
+/// A saved state.
 pub(crate) struct SavedState<M> {
-    interface: Interface,
+    origin: Origin,
     state: State<M>,
 }
 
 impl<M: Exported> Instance<M> {
+    fn origin(&self) -> Origin {
+        Origin(self.standard(), self.interface())
+    }
+
     pub fn save(&self) -> SavedState<M> {
-        SavedState { interface: self.interface(), state: self.state.clone() }
+        SavedState { origin: self.origin(), state: self.state.clone() }
     }
 
     /// Saves into a state that exists already, without allocation if the model clones without.
     pub fn save_into(&self, saved: &mut SavedState<M>) {
-        saved.interface = self.interface();
+        saved.origin = self.origin();
         saved.state.clone_from(&self.state);
     }
 
     pub fn restore(&mut self, saved: &SavedState<M>) -> Outcome {
-        if saved.interface != self.interface() {
+        if saved.origin != self.origin() {
             return refuse(format!(
                 "the state comes from {}, this instance is {}",
-                saved.interface,
-                self.interface()
+                saved.origin,
+                self.origin()
             ));
         }
+        self.check_event_mode(&saved.state)?;
         self.state.clone_from(&saved.state);
         self.enter(self.state.mode);
         Ok(())
@@ -40,11 +56,23 @@ impl<M: Exported> Instance<M> {
 
     /// Fills `bytes`, which must have the length that [`serialized_size`](Self::serialized_size) tells.
     pub fn serialize(&self, saved: &SavedState<M>, bytes: &mut [u8]) {
-        serialized::write(&saved.state, saved.interface, bytes);
+        serialized::write(&saved.state, saved.origin, bytes);
     }
 
     pub fn deserialize(&self, bytes: &[u8]) -> Outcome<SavedState<M>> {
-        let state = serialized::read(bytes, self.interface(), &self.state).or_else(refuse)?;
-        Ok(SavedState { interface: self.interface(), state })
+        let state = serialized::read(bytes, self.origin(), &self.state).or_else(refuse)?;
+        self.check_event_mode(&state)?;
+        Ok(SavedState { origin: self.origin(), state })
+    }
+
+    /// In Co-Simulation not every instance has an event mode.
+    fn check_event_mode(&self, state: &State<M>) -> Outcome {
+        if self.interface() == Interface::CoSimulation
+            && state.mode == Mode::Event
+            && !self.importer.event_mode
+        {
+            return refuse("the state is one of event mode, which this instance was made without");
+        }
+        Ok(())
     }
 }

@@ -1,9 +1,10 @@
 //! Saved states as bytes, with version and checksum.
 
 use super::State;
+use super::saved_states::Origin;
 use super::values::check_value;
 use crate::export::Exported;
-use crate::mode::{Interface, Mode, POSSIBLE};
+use crate::mode::{Mode, POSSIBLE};
 use crate::saved::{Saved, StateVisitor};
 
 impl<M: Exported> State<M> {
@@ -29,7 +30,7 @@ impl<M: Exported> State<M> {
 
 /// Begins every serialized state; the last digit is the version of the layout.
 const MAGIC: &[u8; 8] = b"fmustat2";
-/// The magic, a hash of the guid, the interface type.
+/// The magic, a hash of the guid, the standard and the interface type.
 const HEADER_LENGTH: usize = 8 + 8 + 1;
 const CHECKSUM_LENGTH: usize = 8;
 
@@ -41,12 +42,12 @@ pub(super) fn size<M: Exported>(state: &State<M>) -> usize {
 }
 
 /// Fills `bytes`, which must have the length that [`size`] tells.
-pub(super) fn write<M: Exported>(state: &State<M>, interface: Interface, bytes: &mut [u8]) {
+pub(super) fn write<M: Exported>(state: &State<M>, origin: Origin, bytes: &mut [u8]) {
     let (content, checksum) = bytes.split_at_mut(bytes.len() - CHECKSUM_LENGTH);
     let mut writer = Writer { rest: &mut *content };
     writer.put(MAGIC);
     writer.put(&guid_hash::<M>());
-    writer.put(&[interface as u8]);
+    writer.put(&[origin.byte()]);
     state.clone().visit(&mut writer);
     checksum.copy_from_slice(&fnv1a(content).to_le_bytes());
 }
@@ -54,7 +55,7 @@ pub(super) fn write<M: Exported>(state: &State<M>, interface: Interface, bytes: 
 /// Rebuilds a state from bytes that may come from anywhere. `template` is any state of the model.
 pub(super) fn read<M: Exported>(
     bytes: &[u8],
-    interface: Interface,
+    origin: Origin,
     template: &State<M>,
 ) -> Result<State<M>, String> {
     let version = MAGIC.len() - 1;
@@ -74,10 +75,14 @@ pub(super) fn read<M: Exported>(
     if fnv1a(content).to_le_bytes() != *checksum {
         return Err("the saved state is damaged or has the wrong length (its checksum is wrong)".into());
     }
-    if content[16] != interface as u8 {
-        return Err(
-            "the saved state comes from the other interface type (Co-Simulation or Model Exchange)".into()
-        );
+    let byte = content[16];
+    if byte != origin.byte() {
+        return Err(match byte ^ origin.byte() {
+            1 => {
+                "the saved state comes from the other interface type (Co-Simulation or Model Exchange)".into()
+            }
+            _ => format!("the saved state does not come from an instance of {}", origin.0),
+        });
     }
     let mut reader = Reader { rest: &content[HEADER_LENGTH..], valid: true };
     let mut state = template.clone();
@@ -85,7 +90,7 @@ pub(super) fn read<M: Exported>(
     if !reader.rest.is_empty() {
         return Err("the saved state has the wrong length".into());
     }
-    if !reader.valid || !POSSIBLE.contain(interface, state.mode) {
+    if !reader.valid || !POSSIBLE.contain(origin.0, origin.1, state.mode) {
         return Err("the saved state holds impossible values".into());
     }
     for variable in M::TABLE.iter().filter(|variable| variable.has_start()) {
@@ -96,6 +101,12 @@ pub(super) fn read<M: Exported>(
     state.model.update().map_err(|error| error.to_string())?;
     state.stale = true;
     Ok(state)
+}
+
+impl Origin {
+    fn byte(self) -> u8 {
+        2 * self.0 as u8 + self.1 as u8
+    }
 }
 
 fn guid_hash<M: Exported>() -> [u8; 8] {

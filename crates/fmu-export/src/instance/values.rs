@@ -1,6 +1,6 @@
 //! Values (section 2.1.7).
 
-use super::{Instance, Outcome, finite, refuse, refuse_with, variable};
+use super::{Instance, Outcome, finite, refuse, refuse_with};
 use crate::export::Exported;
 use crate::types::{Attributes, BaseType};
 use crate::value::Value;
@@ -11,14 +11,14 @@ impl<M: Exported> Instance<M> {
     #[inline]
     pub fn get_reals(&mut self, vr: &[u32], values: &mut [MaybeUninit<f64>]) -> Outcome {
         for vr in vr {
-            variable::<M>(*vr, BaseType::Real)?;
+            self.variable(*vr, BaseType::Real)?;
         }
         let time = self.state.time;
         let model = self.calculated();
         // 0 as long as all values are finite: one question at the end costs less than one for each.
         let mut none = 0.0;
         for (vr, value) in vr.iter().zip(&mut *values) {
-            let read = M::TABLE[*vr as usize].real(model).unwrap_or(time);
+            let read = M::TABLE.get(*vr as usize).and_then(|of| of.real(model)).unwrap_or(time);
             none += read * 0.0;
             value.write(read);
         }
@@ -29,8 +29,7 @@ impl<M: Exported> Instance<M> {
     #[inline(never)]
     fn refuse_reals(&mut self, vr: &[u32]) -> Outcome {
         let model = self.calculated();
-        for vr in vr {
-            let variable = &M::TABLE[*vr as usize];
+        for variable in vr.iter().filter_map(|vr| M::TABLE.get(*vr as usize)) {
             finite(variable, variable.real(model).unwrap_or_default())?;
         }
         Ok(())
@@ -67,13 +66,14 @@ impl<M: Exported> Instance<M> {
         let time = self.state.time;
         let model = self.calculated();
         for (place, vr) in vr.iter().enumerate() {
-            each(place, M::TABLE[*vr as usize].value(model).unwrap_or(Value::Real(time)));
+            let value = M::TABLE.get(*vr as usize).and_then(|of| of.value(model));
+            each(place, value.unwrap_or(Value::Real(time)));
         }
         Ok(())
     }
 
     fn variable_of(&self, vr: u32, bases: &[BaseType]) -> Outcome<&'static Variable<M>> {
-        match M::TABLE.get(vr as usize) {
+        match self.find(vr) {
             Some(variable) if bases.contains(&variable.base()) => Ok(variable),
             other => super::refuse_variable(vr, other, bases[0]),
         }
@@ -111,19 +111,19 @@ impl<M: Exported> Instance<M> {
 
     /// The name of a variable that has the type.
     pub fn name(&self, vr: u32, base: BaseType) -> Outcome<&'static str> {
-        Ok(variable::<M>(vr, base)?.name())
+        Ok(self.variable(vr, base)?.name())
     }
 
     fn check_settable(&self, variable: &Variable<M>) -> Outcome {
         if self.situation().is_in(variable.settable) {
             return Ok(());
         }
-        let (interface, mode) = (self.interface(), self.mode());
+        let (standard, interface, mode) = (self.standard(), self.interface(), self.mode());
         refuse_with(|| {
             format!(
                 "{} cannot be set in state '{mode}' of {interface}; it can be set in: {}",
                 variable.name(),
-                variable.settable.names(interface)
+                variable.settable.names(standard, interface)
             )
         })
     }

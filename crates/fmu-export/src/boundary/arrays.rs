@@ -1,6 +1,8 @@
-//! The importer's arrays and places.
+//! The importer's arrays, places and strings.
 
 use crate::instance::{Outcome, refuse};
+use libc::c_char;
+use std::ffi::CStr;
 use std::mem::MaybeUninit;
 
 /// The importer's array of `length` values, to be read.
@@ -8,7 +10,7 @@ use std::mem::MaybeUninit;
 /// # Safety
 /// `pointer` is NULL or points to `length` values that stay as they are for `'a`.
 #[inline]
-pub(super) unsafe fn array<'a, T>(pointer: *const T, length: usize, argument: &str) -> Outcome<&'a [T]> {
+pub(crate) unsafe fn array<'a, T>(pointer: *const T, length: usize, argument: &str) -> Outcome<&'a [T]> {
     if length == 0 {
         return Ok(&[]);
     }
@@ -22,7 +24,7 @@ pub(super) unsafe fn array<'a, T>(pointer: *const T, length: usize, argument: &s
 /// # Safety
 /// `pointer` is NULL or points to `length` values that nobody else uses for `'a`.
 #[inline]
-pub(super) unsafe fn output<'a, T>(
+pub(crate) unsafe fn output<'a, T>(
     pointer: *mut T,
     length: usize,
     argument: &str,
@@ -40,12 +42,21 @@ pub(super) unsafe fn output<'a, T>(
 ///
 /// # Safety
 /// `pointer` is NULL or points to a value that nobody else uses for `'a`.
-pub(super) unsafe fn place<'a, T>(pointer: *mut T, argument: &str) -> Outcome<&'a mut MaybeUninit<T>> {
+pub(crate) unsafe fn place<'a, T>(pointer: *mut T, argument: &str) -> Outcome<&'a mut MaybeUninit<T>> {
     if pointer.is_null() || !pointer.is_aligned() {
         return refuse(format!("the pointer {argument} is NULL or not aligned"));
     }
     // SAFETY: not NULL and aligned; that it points to a value is the caller's promise.
     Ok(unsafe { &mut *pointer.cast() })
+}
+
+/// The importer's string.
+///
+/// # Safety
+/// `pointer` is NULL or a string with a zero byte at its end that stays as it is for `'a`.
+pub(crate) unsafe fn string<'a>(pointer: *const c_char) -> Option<&'a CStr> {
+    // SAFETY: the caller's promise.
+    (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) })
 }
 
 #[inline]

@@ -1,14 +1,17 @@
 //! What every call on an instance has in common.
 
-use super::functions::Function;
-use super::types::*;
 use crate::export::Exported;
+use crate::fmi2::types::fmi2CallbackLogger;
+use crate::fmi3::types::fmi3LogMessageCallback;
 use crate::instance::{Instance, Outcome, Refusal};
 use crate::log::Message;
-use crate::mode::Mode;
+use crate::mode::{Mode, Situations};
+use crate::rule::Rule;
+use crate::status::Status;
+use libc::c_void;
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
-use std::ffi::{CStr, CString};
+use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 #[cfg(panic = "abort")]
@@ -19,35 +22,46 @@ compile_error!("an FMU must not end the importer's process: build with panic = \
 /// Processors fetch cache lines of 64 bytes in pairs: instances side by side on the heap share none, so that
 /// threads that step them do not take them from each other.
 #[repr(align(128))]
-pub(super) struct Component<M> {
+pub(crate) struct Component<M> {
     /// Whether the importer's log callback is running: it must not call back.
     pub delivering: Cell<bool>,
     pub instance: UnsafeCell<Instance<M>>,
     pub importer: ImporterLog,
 }
 
-/// The importer's log callback and what it wants back with every call. Copied, because the callbacks structure may go
-/// after `fmi2Instantiate`.
-pub(super) struct ImporterLog {
-    pub logger: Option<fmi2CallbackLogger>,
-    pub environment: fmi2ComponentEnvironment,
+/// The importer's log callback, as its standard has it.
+#[derive(Clone, Copy)]
+pub(crate) enum Callback {
+    Fmi2(fmi2CallbackLogger),
+    Fmi3(fmi3LogMessageCallback),
+}
+
+/// The importer's log callback, if it has one, and what it wants back with every call. Copied, because the callbacks
+/// structure of FMI 2.0 may go after `fmi2Instantiate`.
+pub(crate) struct ImporterLog {
+    pub callback: Option<Callback>,
+    pub environment: *mut c_void,
     pub instance_name: CString,
 }
 
 impl ImporterLog {
     pub fn deliver(&self, message: &Message) {
-        if let Some(logger) = self.logger {
-            let text = message.printable();
-            // SAFETY: the importer's promise that the logger works until the instance is freed; all strings end with
-            // a zero byte, and the message holds no format directive that would ask for further arguments.
-            unsafe {
-                logger(
+        let Some(callback) = self.callback else { return };
+        let (category, text) = (message.category().as_ptr(), message.printable());
+        // SAFETY: the importer's promise that the logger works until the instance is freed; all strings end with a
+        // zero byte, and the message holds no format directive that would ask the variadic one for further arguments.
+        unsafe {
+            match callback {
+                Callback::Fmi2(logger) => logger(
                     self.environment,
                     self.instance_name.as_ptr(),
                     message.status,
-                    message.category().as_ptr(),
+                    category,
                     text.as_ptr(),
-                );
+                ),
+                Callback::Fmi3(logger) => {
+                    logger(self.environment, message.status, category, text.as_ptr());
+                }
             }
         }
     }
@@ -56,11 +70,11 @@ impl ImporterLog {
 /// Runs a function's body on the instance behind `c` if the table of allowed calls has it.
 ///
 /// # Safety
-/// `c` as in the module's contract.
+/// `c` as in the contract of the standard's module.
 #[inline(always)]
-pub(super) unsafe fn call<M: Exported>(
-    c: fmi2Component,
-    function: Function,
+pub(crate) unsafe fn call<M: Exported>(
+    c: *mut c_void,
+    rule: &'static Rule,
     body: impl FnOnce(&mut Instance<M>) -> Outcome,
 ) -> Status {
     // SAFETY: by contract NULL or a living component of this model. Shared, because the log callback of a call that
@@ -76,8 +90,8 @@ pub(super) unsafe fn call<M: Exported>(
     // anything is delivered.
     let instance = unsafe { &mut *component.instance.get() };
     let outcome = catch_unwind(AssertUnwindSafe(|| {
-        if !instance.situation().is_in(function.rule().accepted()) {
-            return refuse_call(instance, function);
+        if !instance.situation().is_in(rule.accepted()) {
+            return refuse_call(instance, rule.accepted());
         }
         let outcome = body(instance);
         instance.listen();
@@ -85,14 +99,14 @@ pub(super) unsafe fn call<M: Exported>(
     }));
     match outcome {
         Ok(Ok(())) if instance.logger.is_empty() => Status::Ok,
-        other => finish(component, function, other),
+        other => finish(component, rule.name, other),
     }
 }
 
 #[cold]
-fn refuse_call<M: Exported>(instance: &Instance<M>, function: Function) -> Outcome {
+fn refuse_call<M: Exported>(instance: &Instance<M>, accepted: Situations) -> Outcome {
     let (interface, mode) = (instance.interface(), instance.mode());
-    let allowed = function.rule().accepted().names(interface);
+    let allowed = accepted.names(instance.standard(), interface);
     let message = format!("not allowed in state '{mode}' of {interface}; allowed in: {allowed}");
     let status = if mode == Mode::Fatal { Status::Fatal } else { Status::Error };
     Err(Box::new(Refusal { status, message }))
@@ -104,8 +118,7 @@ type Ended = Result<Outcome, Box<dyn Any + Send>>;
 /// The end of a call that is not simply OK: says what there is to say.
 #[cold]
 #[inline(never)]
-fn finish<M: Exported>(component: &Component<M>, function: Function, ended: Ended) -> Status {
-    let name = function.rule().name;
+fn finish<M: Exported>(component: &Component<M>, name: &str, ended: Ended) -> Status {
     let status = match &ended {
         Ok(Ok(())) => Status::Ok,
         Ok(Err(refusal)) => refusal.status,
@@ -144,7 +157,7 @@ fn finish<M: Exported>(component: &Component<M>, function: Function, ended: Ende
 }
 
 /// Drops what a panic carries. If that panics as well, what the second one carries is left to itself.
-pub(super) fn forget_panic(ended: Result<(), Box<dyn Any + Send>>) {
+pub(crate) fn forget_panic(ended: Result<(), Box<dyn Any + Send>>) {
     if let Err(panic) = ended
         && let Err(second) = catch_unwind(AssertUnwindSafe(|| drop(panic)))
     {
@@ -152,19 +165,10 @@ pub(super) fn forget_panic(ended: Result<(), Box<dyn Any + Send>>) {
     }
 }
 
-pub(super) fn panic_message(panic: &(dyn Any + Send)) -> &str {
+pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> &str {
     panic
         .downcast_ref::<&str>()
         .copied()
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("no message")
-}
-
-/// The importer's string.
-///
-/// # Safety
-/// `pointer` is NULL or a string with a zero byte at its end that stays as it is for `'a`.
-pub(super) unsafe fn string<'a>(pointer: fmi2String) -> Option<&'a CStr> {
-    // SAFETY: the caller's promise.
-    (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) })
 }

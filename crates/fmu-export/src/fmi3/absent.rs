@@ -1,0 +1,39 @@
+//! What no model has here, refused with the reason: clocks, structural parameters, Scheduled Execution.
+
+use super::types::*;
+use crate::export::Exported;
+use crate::instance::{Instance, Outcome, refuse};
+
+macro_rules! absent {
+    ($reason:literal: $($function:ident($($type:ty),*);)+) => {
+        $(
+            pub unsafe fn $function<M: Exported>(_: &mut Instance<M> $(, _: $type)*) -> Outcome {
+                refuse($reason)
+            }
+        )+
+    };
+}
+
+absent! { "this FMU has no clocks":
+    fmi3GetClock(*const fmi3ValueReference, usize, *mut fmi3Clock);
+    fmi3SetClock(*const fmi3ValueReference, usize, *const fmi3Clock);
+    fmi3GetIntervalDecimal(*const fmi3ValueReference, usize, *mut fmi3Float64, *mut fmi3IntervalQualifier);
+    fmi3GetIntervalFraction(
+        *const fmi3ValueReference, usize, *mut fmi3UInt64, *mut fmi3UInt64, *mut fmi3IntervalQualifier
+    );
+    fmi3GetShiftDecimal(*const fmi3ValueReference, usize, *mut fmi3Float64);
+    fmi3GetShiftFraction(*const fmi3ValueReference, usize, *mut fmi3UInt64, *mut fmi3UInt64);
+    fmi3SetIntervalDecimal(*const fmi3ValueReference, usize, *const fmi3Float64);
+    fmi3SetIntervalFraction(*const fmi3ValueReference, usize, *const fmi3UInt64, *const fmi3UInt64);
+    fmi3SetShiftDecimal(*const fmi3ValueReference, usize, *const fmi3Float64);
+    fmi3SetShiftFraction(*const fmi3ValueReference, usize, *const fmi3UInt64, *const fmi3UInt64);
+}
+
+absent! { "this FMU has no structural parameters":
+    fmi3EnterConfigurationMode();
+    fmi3ExitConfigurationMode();
+}
+
+absent! { "this FMU has no Scheduled Execution":
+    fmi3ActivateModelPartition(fmi3ValueReference, fmi3Float64);
+}

@@ -1,0 +1,63 @@
+//! Co-Simulation (section 4.2).
+//!
+//! # Safety
+//! As in the [module above](super): each argument is what the standard says it is.
+
+use super::common::same;
+use super::types::*;
+use crate::boundary::{array, output, place};
+use crate::export::Exported;
+use crate::instance::{Instance, Outcome};
+
+pub unsafe fn fmi3EnterStepMode<M: Exported>(instance: &mut Instance<M>) -> Outcome {
+    instance.enter_step_mode();
+    Ok(())
+}
+
+pub unsafe fn fmi3GetOutputDerivatives<M: Exported>(
+    instance: &mut Instance<M>,
+    vr: *const fmi3ValueReference,
+    count: usize,
+    order: *const fmi3Int32,
+    value: *mut fmi3Float64,
+    value_count: usize,
+) -> Outcome {
+    // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
+    let (vr, order, value) = unsafe {
+        (
+            array(vr, count, "valueReferences")?,
+            array(order, count, "orders")?,
+            output(value, value_count, "values")?,
+        )
+    };
+    same("values", count, value_count)?;
+    instance.get_output_derivatives(vr, order, value)
+}
+
+#[inline]
+pub unsafe fn fmi3DoStep<M: Exported>(
+    instance: &mut Instance<M>,
+    current_communication_point: fmi3Float64,
+    communication_step_size: fmi3Float64,
+    _no_set_fmu_state_prior_to_current_point: fmi3Boolean,
+    event_handling_needed: *mut fmi3Boolean,
+    terminate_simulation: *mut fmi3Boolean,
+    early_return: *mut fmi3Boolean,
+    last_successful_time: *mut fmi3Float64,
+) -> Outcome {
+    // SAFETY: by contract each NULL or a pointer to a value.
+    let (event_handling_needed, terminate_simulation, early_return, last_successful_time) = unsafe {
+        (
+            place(event_handling_needed, "eventHandlingNeeded")?,
+            place(terminate_simulation, "terminateSimulation")?,
+            place(early_return, "earlyReturn")?,
+            place(last_successful_time, "lastSuccessfulTime")?,
+        )
+    };
+    let reached = instance.do_step_to(current_communication_point, communication_step_size)?;
+    event_handling_needed.write(reached.event.into());
+    terminate_simulation.write(reached.terminate.into());
+    early_return.write(reached.early.into());
+    last_successful_time.write(reached.time);
+    Ok(())
+}

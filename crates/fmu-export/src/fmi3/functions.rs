@@ -1,0 +1,185 @@
+//! The functions of FMI 3.0 that work on an instance, listed once: arguments, and where each may be called.
+//!
+//! From this list come the table of allowed calls, the symbols of the library, and the table of function pointers
+//! that importers in Rust use.
+
+use crate::mode::Standard;
+use crate::rule::Rule;
+
+/// Passes the list of functions on to another macro: `name (arguments) CS ME tolerated;` for each, after whatever
+/// tokens are given behind the macro's name.
+///
+/// The letters are the states of sections 2.3, 3.2 and 4.2: I instantiated, N Initialization Mode, C Step Mode, M Event
+/// Mode, K Continuous-Time Mode, T terminated. In fatal nothing is allowed. For `fmi3Set...` the table has the states;
+/// which variable can be set in which of them is said by [`settable`](crate::settable).
+///
+/// An error changes nothing here, so that the importer may go on where the text has the instance go to terminated
+/// (section 2.3.1).
+///
+/// In no state: fmi3ExitConfigurationMode and fmi3ActivateModelPartition, whose states cannot be entered. Refused where
+/// the text allows them, with the reason: clocks, fmi3EnterConfigurationMode (no structural parameters),
+/// fmi3EvaluateDiscreteStates.
+///
+/// Tolerated, for interface types that have the function:
+///   fmi3SetTime while initializing and in event mode, fmi3SetContinuousStates in event mode, as in FMI 2.0;
+///   the two numbers and the nominal values in every state: they never change.
+#[doc(hidden)]
+#[macro_export]
+#[rustfmt::skip]
+macro_rules! fmi3_functions {
+    ($with:path $(, $($before:tt)*)?) => { $with! { $($($before)*)?
+        // function                            CS       ME       tolerated
+        fmi3SetDebugLogging                    "INCMT"  "INMKT"  ""
+            (logging_on: fmi3Boolean, n: usize, categories: *const fmi3String);
+        fmi3EnterInitializationMode            "I"      "I"      ""
+            (tolerance_defined: fmi3Boolean, tolerance: fmi3Float64, start_time: fmi3Float64,
+             stop_time_defined: fmi3Boolean, stop_time: fmi3Float64);
+        fmi3ExitInitializationMode             "N"      "N"      "" ();
+        fmi3EnterEventMode                     "C"      "K"      "" ();
+        fmi3Terminate                          "CM"     "MK"     "" ();
+        fmi3Reset                              "INCMT"  "INMKT"  "" ();
+        fmi3GetFloat32                         "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3Float32, n_value: usize);
+        fmi3GetFloat64                         "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3Float64, n_value: usize);
+        fmi3GetInt8                            "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3Int8, n_value: usize);
+        fmi3GetUInt8                           "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3UInt8, n_value: usize);
+        fmi3GetInt16                           "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3Int16, n_value: usize);
+        fmi3GetUInt16                          "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3UInt16, n_value: usize);
+        fmi3GetInt32                           "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3Int32, n_value: usize);
+        fmi3GetUInt32                          "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3UInt32, n_value: usize);
+        fmi3GetInt64                           "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3Int64, n_value: usize);
+        fmi3GetUInt64                          "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3UInt64, n_value: usize);
+        fmi3GetBoolean                         "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3Boolean, n_value: usize);
+        fmi3GetString                          "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3String, n_value: usize);
+        fmi3GetBinary                          "INCMT"  "INMKT"  ""
+            (vr: *const fmi3ValueReference, n: usize, size: *mut usize, value: *mut fmi3Binary, n_value: usize);
+        fmi3GetClock                           "M"      "M"      ""
+            (vr: *const fmi3ValueReference, n: usize, value: *mut fmi3Clock);
+        fmi3SetFloat32                         "INCM"   "INMK"   ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Float32, n_value: usize);
+        fmi3SetFloat64                         "INCM"   "INMK"   ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Float64, n_value: usize);
+        fmi3SetInt8                            "INCM"   "INM"    ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Int8, n_value: usize);
+        fmi3SetUInt8                           "INCM"   "INM"    ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3UInt8, n_value: usize);
+        fmi3SetInt16                           "INCM"   "INM"    ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Int16, n_value: usize);
+        fmi3SetUInt16                          "INCM"   "INM"    ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3UInt16, n_value: usize);
+        fmi3SetInt32                           "INCM"   "INM"    ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Int32, n_value: usize);
+        fmi3SetUInt32                          "INCM"   "INM"    ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3UInt32, n_value: usize);
+        fmi3SetInt64                           "INCM"   "INM"    ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Int64, n_value: usize);
+        fmi3SetUInt64                          "INCM"   "INM"    ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3UInt64, n_value: usize);
+        fmi3SetBoolean                         "INCM"   "INM"    ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Boolean, n_value: usize);
+        fmi3SetString                          "INCM"   "INM"    ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3String, n_value: usize);
+        fmi3SetBinary                          "INCM"   "INM"    ""
+            (vr: *const fmi3ValueReference, n: usize, size: *const usize, value: *const fmi3Binary, n_value: usize);
+        fmi3SetClock                           "M"      "M"      ""
+            (vr: *const fmi3ValueReference, n: usize, value: *const fmi3Clock);
+        fmi3GetNumberOfVariableDependencies    "INCMT"  "INMKT"  "" (vr: fmi3ValueReference, n: *mut usize);
+        fmi3GetVariableDependencies            "INCMT"  "INMKT"  ""
+            (dependent: fmi3ValueReference, elements: *mut usize, independents: *mut fmi3ValueReference,
+             elements_of_independents: *mut usize, kinds: *mut fmi3DependencyKind, n: usize);
+        fmi3GetFMUState                        "INCMT"  "INMKT"  "" (state: *mut fmi3FMUState);
+        fmi3SetFMUState                        "INCMT"  "INMKT"  "" (state: fmi3FMUState);
+        fmi3FreeFMUState                       "INCMT"  "INMKT"  "" (state: *mut fmi3FMUState);
+        fmi3SerializedFMUStateSize             "INCMT"  "INMKT"  "" (state: fmi3FMUState, size: *mut usize);
+        fmi3SerializeFMUState                  "INCMT"  "INMKT"  ""
+            (state: fmi3FMUState, bytes: *mut fmi3Byte, size: usize);
+        fmi3DeserializeFMUState                "INCMT"  "INMKT"  ""
+            (bytes: *const fmi3Byte, size: usize, state: *mut fmi3FMUState);
+        fmi3GetDirectionalDerivative           "NCMT"   "NMKT"   ""
+            (unknown: *const fmi3ValueReference, n_unknown: usize, known: *const fmi3ValueReference, n_known: usize,
+             seed: *const fmi3Float64, n_seed: usize, sensitivity: *mut fmi3Float64, n_sensitivity: usize);
+        fmi3GetAdjointDerivative               "NCMT"   "NMKT"   ""
+            (unknown: *const fmi3ValueReference, n_unknown: usize, known: *const fmi3ValueReference, n_known: usize,
+             seed: *const fmi3Float64, n_seed: usize, sensitivity: *mut fmi3Float64, n_sensitivity: usize);
+        fmi3EnterConfigurationMode             "IC"     "IM"     "" ();
+        fmi3ExitConfigurationMode              ""       ""       "" ();
+        fmi3GetIntervalDecimal                 "NM"     "NM"     ""
+            (vr: *const fmi3ValueReference, n: usize, interval: *mut fmi3Float64,
+             qualifier: *mut fmi3IntervalQualifier);
+        fmi3GetIntervalFraction                "NM"     "NM"     ""
+            (vr: *const fmi3ValueReference, n: usize, counter: *mut fmi3UInt64, resolution: *mut fmi3UInt64,
+             qualifier: *mut fmi3IntervalQualifier);
+        fmi3GetShiftDecimal                    "N"      "N"      ""
+            (vr: *const fmi3ValueReference, n: usize, shift: *mut fmi3Float64);
+        fmi3GetShiftFraction                   "N"      "N"      ""
+            (vr: *const fmi3ValueReference, n: usize, counter: *mut fmi3UInt64, resolution: *mut fmi3UInt64);
+        fmi3SetIntervalDecimal                 "N"      "N"      ""
+            (vr: *const fmi3ValueReference, n: usize, interval: *const fmi3Float64);
+        fmi3SetIntervalFraction                "N"      "N"      ""
+            (vr: *const fmi3ValueReference, n: usize, counter: *const fmi3UInt64, resolution: *const fmi3UInt64);
+        fmi3SetShiftDecimal                    "N"      "N"      ""
+            (vr: *const fmi3ValueReference, n: usize, shift: *const fmi3Float64);
+        fmi3SetShiftFraction                   "N"      "N"      ""
+            (vr: *const fmi3ValueReference, n: usize, counter: *const fmi3UInt64, resolution: *const fmi3UInt64);
+        fmi3EvaluateDiscreteStates             "M"      "M"      "" ();
+        fmi3UpdateDiscreteStates               "M"      "M"      ""
+            (again: *mut fmi3Boolean, terminate: *mut fmi3Boolean, nominals_changed: *mut fmi3Boolean,
+             states_changed: *mut fmi3Boolean, next_defined: *mut fmi3Boolean, next: *mut fmi3Float64);
+        fmi3EnterContinuousTimeMode            ""       "M"      "" ();
+        fmi3CompletedIntegratorStep            ""       "K"      ""
+            (no_set_state_prior: fmi3Boolean, enter_event_mode: *mut fmi3Boolean, terminate: *mut fmi3Boolean);
+        fmi3SetTime                            ""       "K"      "NM" (time: fmi3Float64);
+        fmi3SetContinuousStates                ""       "K"      "M" (x: *const fmi3Float64, nx: usize);
+        fmi3GetContinuousStateDerivatives      ""       "NMKT"   "" (derivatives: *mut fmi3Float64, nx: usize);
+        fmi3GetEventIndicators                 ""       "NMKT"   "" (indicators: *mut fmi3Float64, ni: usize);
+        fmi3GetContinuousStates                ""       "NMKT"   "" (x: *mut fmi3Float64, nx: usize);
+        fmi3GetNominalsOfContinuousStates      ""       "NMKT"   "I" (nominals: *mut fmi3Float64, nx: usize);
+        fmi3GetNumberOfEventIndicators         ""       "IM"     "NKT" (n: *mut usize);
+        fmi3GetNumberOfContinuousStates        ""       "IM"     "NKT" (n: *mut usize);
+        fmi3EnterStepMode                      "M"      ""       "" ();
+        fmi3GetOutputDerivatives               "CT"     ""       ""
+            (vr: *const fmi3ValueReference, n: usize, order: *const fmi3Int32, value: *mut fmi3Float64,
+             n_value: usize);
+        fmi3DoStep                             "C"      ""       ""
+            (point: fmi3Float64, step_size: fmi3Float64, no_set_state_prior: fmi3Boolean,
+             event_handling_needed: *mut fmi3Boolean, terminate: *mut fmi3Boolean, early_return: *mut fmi3Boolean,
+             last_successful_time: *mut fmi3Float64);
+        fmi3ActivateModelPartition             ""       ""       ""
+            (clock: fmi3ValueReference, activation_time: fmi3Float64);
+    } };
+}
+
+macro_rules! rules {
+    ($($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+) => {
+        /// The functions that work on an instance.
+        #[allow(non_camel_case_types, missing_docs)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Function { $($function),+ }
+
+        /// The table of allowed calls, in the order of [`Function`].
+        pub const ALLOWED: &[Rule] = &[
+            $(Rule::new(Standard::Fmi3, stringify!($function), $cs, $me, $tolerated)),+
+        ];
+    };
+}
+
+fmi3_functions!(rules);
+
+impl Function {
+    /// The function's row of the table.
+    #[inline]
+    pub const fn rule(self) -> &'static Rule {
+        &ALLOWED[self as usize]
+    }
+}

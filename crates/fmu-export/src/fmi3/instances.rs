@@ -1,0 +1,127 @@
+//! The functions that need no instance: version, making and freeing (sections 2.2.4 and 2.3.1).
+
+use super::types::*;
+use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};
+use crate::export::Exported;
+use crate::instance::{Importer, Outcome, refuse};
+use crate::mode::{Interface, Standard};
+
+/// `fmi3GetVersion`
+pub extern "C" fn fmi3GetVersion() -> fmi3String {
+    c"3.0".as_ptr()
+}
+
+/// `fmi3InstantiateModelExchange`. The importer owns the result until it calls `fmi3FreeInstance`.
+pub unsafe extern "C" fn fmi3InstantiateModelExchange<M: Exported>(
+    instance_name: fmi3String,
+    instantiation_token: fmi3String,
+    resource_path: fmi3String,
+    _visible: fmi3Boolean,
+    logging_on: fmi3Boolean,
+    environment: fmi3InstanceEnvironment,
+    log_message: Option<fmi3LogMessageCallback>,
+) -> fmi3Instance {
+    let importer = Importer { standard: Standard::Fmi3, event_mode: false, early_return: false };
+    let call = Call {
+        function: "fmi3InstantiateModelExchange",
+        texts: [instance_name, instantiation_token, resource_path],
+        logging_on,
+        environment,
+        log_message,
+    };
+    // SAFETY: the module's contract.
+    unsafe { make::<M>(&call, Ok(Interface::ModelExchange), importer) }
+}
+
+/// `fmi3InstantiateCoSimulation`. The importer owns the result until it calls `fmi3FreeInstance`.
+pub unsafe extern "C" fn fmi3InstantiateCoSimulation<M: Exported>(
+    instance_name: fmi3String,
+    instantiation_token: fmi3String,
+    resource_path: fmi3String,
+    _visible: fmi3Boolean,
+    logging_on: fmi3Boolean,
+    event_mode_used: fmi3Boolean,
+    early_return_allowed: fmi3Boolean,
+    _required_intermediate_variables: *const fmi3ValueReference,
+    required_count: usize,
+    environment: fmi3InstanceEnvironment,
+    log_message: Option<fmi3LogMessageCallback>,
+    _intermediate_update: Option<fmi3IntermediateUpdateCallback>,
+) -> fmi3Instance {
+    let importer = Importer {
+        standard: Standard::Fmi3,
+        event_mode: event_mode_used != fmi3False,
+        early_return: early_return_allowed != fmi3False,
+    };
+    let interface = match required_count {
+        0 => Ok(Interface::CoSimulation),
+        _ => refuse(
+            "requiredIntermediateVariables must be empty: this FMU has no intermediate update \
+             (providesIntermediateUpdate is false)",
+        ),
+    };
+    let call = Call {
+        function: "fmi3InstantiateCoSimulation",
+        texts: [instance_name, instantiation_token, resource_path],
+        logging_on,
+        environment,
+        log_message,
+    };
+    // SAFETY: the module's contract.
+    unsafe { make::<M>(&call, interface, importer) }
+}
+
+/// `fmi3InstantiateScheduledExecution`: refused.
+pub unsafe extern "C" fn fmi3InstantiateScheduledExecution<M: Exported>(
+    instance_name: fmi3String,
+    instantiation_token: fmi3String,
+    resource_path: fmi3String,
+    _visible: fmi3Boolean,
+    logging_on: fmi3Boolean,
+    environment: fmi3InstanceEnvironment,
+    log_message: Option<fmi3LogMessageCallback>,
+    _clock_update: Option<fmi3ClockUpdateCallback>,
+    _lock_preemption: Option<fmi3LockPreemptionCallback>,
+    _unlock_preemption: Option<fmi3UnlockPreemptionCallback>,
+) -> fmi3Instance {
+    let importer = Importer { standard: Standard::Fmi3, event_mode: false, early_return: false };
+    let call = Call {
+        function: "fmi3InstantiateScheduledExecution",
+        texts: [instance_name, instantiation_token, resource_path],
+        logging_on,
+        environment,
+        log_message,
+    };
+    // SAFETY: the module's contract.
+    unsafe { make::<M>(&call, refuse("this FMU has no Scheduled Execution"), importer) }
+}
+
+/// What the three have in common.
+struct Call {
+    function: &'static str,
+    /// Name, token, resources.
+    texts: [fmi3String; 3],
+    logging_on: fmi3Boolean,
+    environment: fmi3InstanceEnvironment,
+    log_message: Option<fmi3LogMessageCallback>,
+}
+
+/// # Safety
+/// The texts are NULL or strings; the callback works until the instance is freed.
+unsafe fn make<M: Exported>(call: &Call, interface: Outcome<Interface>, importer: Importer) -> fmi3Instance {
+    // SAFETY: the caller's promise.
+    let [name, guid, resources] = call.texts.map(|text| unsafe { string(text) });
+    let log = || ImporterLog {
+        callback: call.log_message.map(Callback::Fmi3),
+        environment: call.environment,
+        instance_name: name.unwrap_or(c"").to_owned(),
+    };
+    let logging_on = call.logging_on != fmi3False;
+    instantiate::<M>(call.function, log, Arguments { name, guid, resources, logging_on, interface, importer })
+}
+
+/// `fmi3FreeInstance`. Takes the instance back; NULL is ignored, and so is a call out of the log callback.
+pub unsafe extern "C" fn fmi3FreeInstance<M: Exported>(c: fmi3Instance) {
+    // SAFETY: the module's contract.
+    unsafe { free::<M>(c) }
+}
