@@ -3,7 +3,7 @@
 use fmu_export::fmi2::Functions;
 use fmu_export::fmi2::types::*;
 use fmu_export::{Exported, Interface};
-use std::ffi::{CStr, CString};
+use std::ffi::{CStr, CString, c_char, c_void};
 use std::mem::ManuallyDrop;
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;
@@ -23,10 +23,10 @@ pub struct Message {
 
 /// The importer's log; its address is the component environment.
 #[derive(Debug, Default)]
-struct Log(Mutex<Vec<Message>>);
+pub(crate) struct Log(Mutex<Vec<Message>>);
 
 impl Log {
-    fn take(&self) -> Vec<Message> {
+    pub(crate) fn take(&self) -> Vec<Message> {
         std::mem::take(&mut self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
     }
 }
@@ -40,7 +40,20 @@ unsafe extern "C" fn remember(
     category: fmi2String,
     message: fmi2String,
 ) {
-    // SAFETY: section 2.1.5: each is NULL or a zero-terminated string.
+    // SAFETY: section 2.1.5: NULL or zero-terminated strings, and NULL or the log.
+    unsafe { remember_message(environment, instance_name, status, category, message) }
+}
+
+/// # Safety
+/// The environment is NULL or a `Log` that lives, the texts are NULL or strings.
+pub(crate) unsafe fn remember_message(
+    environment: *mut c_void,
+    instance_name: *const c_char,
+    status: Status,
+    category: *const c_char,
+    message: *const c_char,
+) {
+    // SAFETY: the caller's promise.
     let text = |pointer: fmi2String| match unsafe { pointer.as_ref() } {
         // SAFETY: not NULL, and a string.
         Some(_) => unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned(),
@@ -201,7 +214,7 @@ impl Importer {
 }
 
 /// 0, or NULL.
-trait Zero {
+pub(crate) trait Zero {
     const ZERO: Self;
 }
 
@@ -209,7 +222,7 @@ macro_rules! zero {
     ($($type:ty: $zero:expr),+) => { $(impl Zero for $type { const ZERO: Self = $zero; })+ };
 }
 
-zero!(i32: 0, usize: 0, f64: 0.0);
+zero!(u8: 0, i32: 0, u32: 0, usize: 0, f64: 0.0);
 
 impl<T> Zero for *const T {
     const ZERO: Self = null();

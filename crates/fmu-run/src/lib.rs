@@ -1,4 +1,5 @@
-//! Loads FMUs and calls them: the functions of FMI 2.0 as methods, on an instance that frees itself.
+//! Loads FMUs and calls them: the functions of FMI 2.0 as methods, on an instance that frees itself; in [`fmi3`]
+//! those of FMI 3.0.
 //!
 //! [`load`] takes the shared library of any FMU; [`Functions::of`](fmu_export::fmi2::Functions::of) those of a model in
 //! the same program. [`testing`] has what tests of FMUs need, [`serialized`] the bytes of saved states, [`c_programs`]
@@ -8,6 +9,7 @@
 pub mod c_programs;
 #[cfg(feature = "careless")]
 pub mod careless;
+pub mod fmi3;
 mod importer;
 mod library;
 #[cfg(feature = "realtime")]

@@ -1,6 +1,6 @@
 //! The bytes of a saved state of fmu-export, written from a description of the layout and not with its code, so that
 //! tests find what the code gets wrong: 7 bytes of magic and one for the version, the hash of the guid, the interface
-//! type, then the mode, whether the simulation has ended, time, start time, stop time, tolerance, the values and the
+//! type (and 2 more for FMI 3.0), then the mode, whether the simulation has ended, time, start time, stop time, tolerance, the values and the
 //! memory of the table; at the end FNV-1a of all that. Whole numbers have 64 bits, little-endian; what may be missing
 //! has a truth value of one byte before it.
 

@@ -6,82 +6,99 @@ use crate::{Importer, Message};
 use fmu_export::Category;
 use fmu_export::fmi2::types::*;
 use std::ffi::CStr;
-use std::ptr::null_mut;
+
+/// Shorthands that assert, for the importers of all standards: answers, refusals, saved states.
+macro_rules! shorthands {
+    ($importer:ty, $prefix:literal: $get:ident $set:ident $free:ident $size:ident $serialize:ident $deserialize:ident) => {
+        #[allow(clippy::missing_panics_doc, reason = "that is what they are for")]
+        impl $importer {
+            /// Asserts OK.
+            #[track_caller]
+            pub fn ok(&self, status: Status) {
+                assert_eq!(status, Status::Ok, "log: {:#?}", self.take_log());
+            }
+
+            /// The promises about a refused call: an error, one clean message that names the function, and
+            /// an instance that is as it was. Returns the message.
+            #[track_caller]
+            pub fn refused(&self, label: &str, call: impl FnOnce(&Self) -> Status) -> String {
+                let before = self.serialized();
+                self.take_log();
+                let status = call(self);
+                let log = self.take_log();
+                assert_eq!(status, Status::Error, "{label} is not refused");
+                let [message] = log.as_slice() else { panic!("{label}: one message expected, not {log:#?}") };
+                assert_eq!(
+                    (message.status, message.category.as_str()),
+                    (Status::Error, "logStatusError"),
+                    "{label}"
+                );
+                $crate::testing::assert_clean(message);
+                assert!(message.text.starts_with($prefix), "{label}: which function? {}", message.text);
+                assert_eq!(before, self.serialized(), "{label} changed the instance");
+                self.take_log();
+                message.text.clone()
+            }
+
+            /// The state as bytes; `None` if the FMU does not serialize.
+            pub fn serialized(&self) -> Option<Vec<u8>> {
+                let mut state = std::ptr::null_mut();
+                if self.$get(&mut state) != Status::Ok {
+                    return None;
+                }
+                let mut size = 0;
+                let mut bytes = Vec::new();
+                let mut status = self.$size(state, &mut size);
+                if status == Status::Ok {
+                    bytes.resize(size, 0);
+                    status = self.$serialize(state, bytes.as_mut_ptr().cast(), size);
+                }
+                self.forget(state);
+                (status == Status::Ok).then_some(bytes)
+            }
+
+            /// The state as bytes.
+            #[track_caller]
+            pub fn bytes(&self) -> Vec<u8> {
+                self.serialized().expect("the FMU serializes its state")
+            }
+
+            /// Continues from a serialized state.
+            #[track_caller]
+            pub fn restore(&self, bytes: &[u8]) {
+                let mut state = std::ptr::null_mut();
+                self.ok(self.$deserialize(bytes.as_ptr().cast(), bytes.len(), &mut state));
+                self.ok(self.$set(state));
+                self.forget(state);
+            }
+
+            /// A new saved state.
+            #[track_caller]
+            pub fn save(&self) -> *mut std::ffi::c_void {
+                let mut state = std::ptr::null_mut();
+                self.ok(self.$get(&mut state));
+                state
+            }
+
+            /// Frees a saved state.
+            #[track_caller]
+            pub fn forget(&self, mut state: *mut std::ffi::c_void) {
+                self.ok(self.$free(&mut state));
+                assert!(state.is_null(), "the handle is cleared");
+            }
+        }
+    };
+}
+pub(crate) use shorthands;
+
+shorthands! { Importer, "fmi2":
+    fmi2GetFMUstate fmi2SetFMUstate fmi2FreeFMUstate
+    fmi2SerializedFMUstateSize fmi2SerializeFMUstate fmi2DeSerializeFMUstate
+}
 
 /// Shorthands that assert.
 #[allow(clippy::missing_panics_doc, reason = "that is what they are for")]
 impl Importer {
-    /// Asserts `fmi2OK`.
-    #[track_caller]
-    pub fn ok(&self, status: Status) {
-        assert_eq!(status, Status::Ok, "log: {:#?}", self.take_log());
-    }
-
-    /// The promises about a refused call: `fmi2Error`, one clean message that names the function, and
-    /// an instance that is as it was. Returns the message.
-    #[track_caller]
-    pub fn refused(&self, label: &str, call: impl FnOnce(&Self) -> Status) -> String {
-        let before = self.serialized();
-        self.take_log();
-        let status = call(self);
-        let log = self.take_log();
-        assert_eq!(status, Status::Error, "{label} is not refused");
-        let [message] = log.as_slice() else { panic!("{label}: one message expected, not {log:#?}") };
-        assert_eq!((message.status, message.category.as_str()), (Status::Error, "logStatusError"), "{label}");
-        assert_clean(message);
-        assert!(message.text.starts_with("fmi2"), "{label}: which function? {}", message.text);
-        assert_eq!(before, self.serialized(), "{label} changed the instance");
-        self.take_log();
-        message.text.clone()
-    }
-
-    /// The state as bytes; `None` if the FMU does not serialize.
-    pub fn serialized(&self) -> Option<Vec<u8>> {
-        let mut state = null_mut();
-        if self.fmi2GetFMUstate(&mut state) != Status::Ok {
-            return None;
-        }
-        let mut size = 0;
-        let mut bytes = Vec::new();
-        let mut status = self.fmi2SerializedFMUstateSize(state, &mut size);
-        if status == Status::Ok {
-            bytes.resize(size, 0);
-            status = self.fmi2SerializeFMUstate(state, bytes.as_mut_ptr().cast(), size);
-        }
-        self.forget(state);
-        (status == Status::Ok).then_some(bytes)
-    }
-
-    /// The state as bytes.
-    #[track_caller]
-    pub fn bytes(&self) -> Vec<u8> {
-        self.serialized().expect("the FMU serializes its state")
-    }
-
-    /// Continues from a serialized state.
-    #[track_caller]
-    pub fn restore(&self, bytes: &[u8]) {
-        let mut state = null_mut();
-        self.ok(self.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut state));
-        self.ok(self.fmi2SetFMUstate(state));
-        self.forget(state);
-    }
-
-    /// A new saved state.
-    #[track_caller]
-    pub fn save(&self) -> fmi2FMUstate {
-        let mut state = null_mut();
-        self.ok(self.fmi2GetFMUstate(&mut state));
-        state
-    }
-
-    /// Frees a saved state.
-    #[track_caller]
-    pub fn forget(&self, mut state: fmi2FMUstate) {
-        self.ok(self.fmi2FreeFMUstate(&mut state));
-        assert!(state.is_null(), "the handle is cleared");
-    }
-
     /// From instantiated to initialization mode.
     #[track_caller]
     pub fn enter_initialization(&self, start_time: f64, stop_time: Option<f64>) {

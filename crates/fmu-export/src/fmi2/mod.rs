@@ -1,7 +1,7 @@
 //! FMI 2.0: C types, allowed calls, C functions. The only place with pointers and `unsafe`.
 //!
 //! Each C function exists once, generic over the model and under its C name. Those that work on an instance are all
-//! called in the same way ([`call`](crate::boundary)): find the instance, ask the table of allowed calls, run the function's body,
+//! called in the same way (`boundary`): find the instance, ask the table of allowed calls, run the function's body,
 //! turn a refusal or a panic into a status, deliver what is to be logged. No panic leaves this module.
 //!
 //! # Safety
