@@ -75,8 +75,8 @@ fn generated<M: Exported>() -> Vec<Element> {
             .with("variability", "continuous")
     };
     let time = time_reference::<M>();
-    let time =
-        (time == place(M::TABLE.len())).then(|| variable("time".to_owned(), time, "Time", "independent"));
+    let time = (time == place(M::TABLE.len()))
+        .then(|| variable("time".to_owned(), time, "Simulation time", "independent"));
     let indicator = |number: usize| {
         let name = format!("eventIndicator[{}]", number + 1);
         variable(
@@ -111,9 +111,15 @@ fn interface<M: Exported>(interface: Interface) -> Element {
         }
         Interface::CoSimulation => {
             let variable_step_size = M::CO_SIMULATION.is_some_and(|offer| offer.variable_step_size);
+            let events = M::CO_SIMULATION.is_some_and(|offer| offer.events);
             element("CoSimulation")
                 .with("canHandleVariableCommunicationStepSize", variable_step_size)
                 .with("maxOutputDerivativeOrder", M::OUTPUT_DERIVATIVES)
+                .with("providesIntermediateUpdate", false)
+                .with("canReturnEarlyAfterIntermediateUpdate", false)
+                // Any step may, if the importer allows it.
+                .with("mightReturnEarlyFromDoStep", true)
+                .with("hasEventMode", events)
         }
     }
 }

@@ -133,6 +133,8 @@ impl ModelExchange for Room {
 }
 
 impl CoSimulation for Room {
+    const EVENTS: bool = true;
+
     fn step(&mut self, _: Step) -> Result<Stepped, Error> {
         Ok(Stepped::Done)
     }
@@ -165,7 +167,7 @@ fn every_kind_of_variable_is_described() {
     for part in [
         "<fmiModelDescription\n  fmiVersion=\"3.0\"\n  modelName=\"Room\"\n  instantiationToken=\"{room}\"\n",
         r#"  <ModelExchange modelIdentifier="room" canGetAndSetFMUState="true" canSerializeFMUState="true" providesDirectionalDerivatives="false" providesAdjointDerivatives="false" needsCompletedIntegratorStep="true"/>"#,
-        r#"  <CoSimulation modelIdentifier="room" canGetAndSetFMUState="true" canSerializeFMUState="true" providesDirectionalDerivatives="false" providesAdjointDerivatives="false" canHandleVariableCommunicationStepSize="true" maxOutputDerivativeOrder="2""#,
+        r#"  <CoSimulation modelIdentifier="room" canGetAndSetFMUState="true" canSerializeFMUState="true" providesDirectionalDerivatives="false" providesAdjointDerivatives="false" canHandleVariableCommunicationStepSize="true" maxOutputDerivativeOrder="2" providesIntermediateUpdate="false" canReturnEarlyAfterIntermediateUpdate="false" mightReturnEarlyFromDoStep="true" hasEventMode="true"/>"#,
         r#"
     <Unit name="degC">
       <BaseUnit K="1" offset="273.15"/>
@@ -213,7 +215,7 @@ fn every_kind_of_variable_is_described() {
         r#"causality="output" variability="constant" initial="exact" start="7"/>"#,
         // What is not in the table.
         r#"
-    <Float64 name="time" valueReference="21" description="Time" causality="independent" variability="continuous"/>
+    <Float64 name="time" valueReference="21" description="Simulation time" causality="independent" variability="continuous"/>
     <Float64 name="eventIndicator[1]" valueReference="22" description="An event happens where it changes its sign" causality="local" variability="continuous" initial="calculated"/>
     <Float64 name="eventIndicator[2]" valueReference="23" description="An event happens where it changes its sign" causality="local" variability="continuous" initial="calculated"/>
   </ModelVariables>"#,
