@@ -7,7 +7,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The folder with the standard's `fmi2Functions.h`: `FMI2_HEADERS`, or that of the pip package fmpy in the `.venv` of
+/// The folder with the standards' `fmi2Functions.h` and `fmi3Functions.h`: `FMI2_HEADERS`, or that of the pip package fmpy in the `.venv` of
 /// this folder or one above it.
 ///
 /// # Panics
@@ -18,11 +18,9 @@ pub fn headers(folder: &Path) -> PathBuf {
         let versions = std::fs::read_dir(folder.join(".venv/lib")).into_iter().flatten().flatten();
         versions.map(|version| version.path().join("site-packages/fmpy/c-code"))
     });
-    named
-        .into_iter()
-        .chain(in_venvs)
-        .find(|folder| folder.join("fmi2Functions.h").exists())
-        .expect("the headers of FMI 2.0 are missing; run: make headers (or set FMI2_HEADERS to their folder)")
+    named.into_iter().chain(in_venvs).find(|folder| folder.join("fmi2Functions.h").exists()).expect(
+        "the headers of FMI 2.0 and 3.0 are missing; run: make headers (or set FMI2_HEADERS to their folder)",
+    )
 }
 
 /// The shared library of this name: Cargo puts it beside the test, one folder up, or among the examples there.

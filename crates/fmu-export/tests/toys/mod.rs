@@ -1,4 +1,5 @@
-//! Toy models that together show all that FMI 2.0 allows. Each is short, and complete.
+//! Toy models that together show all that FMI 2.0 allows, and `Palette` and `Ticker` what FMI 3.0
+//! has more. Each is short, and complete.
 #![allow(dead_code, missing_docs, unused_imports, reason = "not every test uses every toy")]
 
 pub mod ball;
@@ -6,13 +7,17 @@ pub mod counter;
 pub mod faulty;
 pub mod fuse;
 pub mod oscillator;
+pub mod palette;
 pub mod sum;
 pub mod talker;
+pub mod ticker;
 
 pub use ball::Ball;
 pub use counter::Counter;
 pub use faulty::Faulty;
 pub use fuse::Fuse;
 pub use oscillator::Oscillator;
+pub use palette::Palette;
 pub use sum::Sum;
 pub use talker::Talker;
+pub use ticker::Ticker;

@@ -183,6 +183,17 @@ macro_rules! methods {
                 }
             )+
 
+            /// Calls the one of this name, with zeros and NULL for arguments.
+            ///
+            /// # Panics
+            /// When there is none.
+            pub fn call_with_zeros(&self, name: &str) -> Status {
+                match name {
+                    $(stringify!($function) => self.$function($(<$type as Zero>::ZERO),*),)+
+                    _ => panic!("there is no function {name}"),
+                }
+            }
+
             /// Calls each of them, with zeros and NULL for arguments.
             pub fn call_all(&self) -> Vec<(&'static str, Status)> {
                 vec![$((stringify!($function), self.$function($(<$type as Zero>::ZERO),*))),+]

@@ -1,0 +1,187 @@
+//! Every function in every state, against the states of FMI 3.0 (sections 2.3, 3.2 and 4.2), typed in here once more:
+//! as in the text state by state.
+
+use crate::toys::*;
+use fmu_export::Interface::{self, CoSimulation, ModelExchange};
+use fmu_export::Mode::{self, *};
+use fmu_export::fmi3::ALLOWED;
+use fmu_export::fmi3::types::*;
+use fmu_export::{Exported, Standard};
+use fmu_run::fmi3::{Arguments, FUNCTIONS, Importer};
+
+/// Section 2.3.1, super state FMU State Settable.
+const EVERYWHERE: &str = "SetDebugLogging Reset GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize \
+    SerializeFMUState DeserializeFMUState";
+
+/// Its states, with what Model Exchange and what Co-Simulation have more. `Set{VariableType}` and
+/// `Get{VariableType}` stand for all types.
+const STATES: [(Mode, &str, &str, &str); 6] = [
+    (
+        Instantiated,
+        "Set* Get* EnterConfigurationMode EnterInitializationMode GetNumberOfVariableDependencies \
+         GetVariableDependencies",
+        "GetNumberOfContinuousStates GetNumberOfEventIndicators",
+        "",
+    ),
+    (
+        Initialization,
+        "Set* Get* GetDirectionalDerivative GetAdjointDerivative GetShiftDecimal GetShiftFraction \
+         GetIntervalDecimal GetIntervalFraction SetShiftDecimal SetShiftFraction SetIntervalDecimal \
+         SetIntervalFraction ExitInitializationMode GetNumberOfVariableDependencies GetVariableDependencies",
+        "GetContinuousStateDerivatives GetContinuousStates GetNominalsOfContinuousStates GetEventIndicators",
+        "",
+    ),
+    (
+        Event,
+        "Set* Get* SetClock GetClock GetIntervalDecimal GetIntervalFraction GetDirectionalDerivative \
+         GetAdjointDerivative EvaluateDiscreteStates UpdateDiscreteStates GetNumberOfVariableDependencies \
+         GetVariableDependencies Terminate",
+        "GetContinuousStates GetContinuousStateDerivatives GetEventIndicators GetNumberOfContinuousStates \
+         GetNumberOfEventIndicators EnterConfigurationMode EnterContinuousTimeMode \
+         GetNominalsOfContinuousStates",
+        "EnterStepMode",
+    ),
+    (
+        ContinuousTime,
+        "SetFloat32 SetFloat64 Get* SetTime SetContinuousStates GetContinuousStates \
+         GetContinuousStateDerivatives GetEventIndicators CompletedIntegratorStep EnterEventMode \
+         GetDirectionalDerivative GetAdjointDerivative GetNumberOfVariableDependencies \
+         GetVariableDependencies GetNominalsOfContinuousStates Terminate",
+        "",
+        "",
+    ),
+    (
+        StepComplete,
+        "Set* Get* GetOutputDerivatives GetDirectionalDerivative GetAdjointDerivative DoStep EnterEventMode \
+         EnterConfigurationMode GetNumberOfVariableDependencies GetVariableDependencies Terminate",
+        "",
+        "",
+    ),
+    (
+        Terminated,
+        "Get* GetDirectionalDerivative GetAdjointDerivative GetNumberOfVariableDependencies \
+         GetVariableDependencies",
+        "GetContinuousStateDerivatives GetContinuousStates GetNominalsOfContinuousStates GetEventIndicators",
+        "GetOutputDerivatives",
+    ),
+];
+
+/// The calls beyond the standard, in Model Exchange.
+const TOLERATED: [(&str, &[Mode]); 5] = [
+    ("SetTime", &[Initialization, Event]),
+    ("SetContinuousStates", &[Event]),
+    ("GetNominalsOfContinuousStates", &[Instantiated]),
+    ("GetNumberOfContinuousStates", &[Initialization, ContinuousTime, Terminated]),
+    ("GetNumberOfEventIndicators", &[Initialization, ContinuousTime, Terminated]),
+];
+
+const TYPES: [&str; 13] = [
+    "Float32", "Float64", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64",
+    "Boolean", "String", "Binary",
+];
+
+fn standard(function: &str, interface: Interface, mode: Mode) -> bool {
+    let name = function.strip_prefix("fmi3").unwrap();
+    let is_of_type = |prefix: &str| name.strip_prefix(prefix).is_some_and(|of| TYPES.contains(&of));
+    let fits = |entry: &str| match entry {
+        "Get*" => is_of_type("Get"),
+        "Set*" => is_of_type("Set"),
+        entry => entry == name,
+    };
+    let (_, both, in_model_exchange, in_co_simulation) =
+        STATES.into_iter().find(|(state, ..)| *state == mode).unwrap();
+    let more = if interface == ModelExchange { in_model_exchange } else { in_co_simulation };
+    [EVERYWHERE, both, more].into_iter().flat_map(str::split_whitespace).any(fits)
+}
+
+fn tolerated(function: &str, interface: Interface, mode: Mode) -> bool {
+    let name = function.strip_prefix("fmi3").unwrap();
+    interface == ModelExchange
+        && TOLERATED.into_iter().any(|(tolerated, modes)| tolerated == name && modes.contains(&mode))
+}
+
+pub fn modes_of(interface: Interface) -> [Mode; 5] {
+    match interface {
+        CoSimulation => [Instantiated, Initialization, Event, StepComplete, Terminated],
+        ModelExchange => [Instantiated, Initialization, Event, ContinuousTime, Terminated],
+    }
+}
+
+/// A new instance in this mode, with event mode if it can.
+pub fn in_mode<M: Exported>(interface: Interface, mode: Mode) -> Importer {
+    let event_mode = M::CO_SIMULATION.is_some_and(|offer| offer.events);
+    let fmu = Importer::with::<M>(&Arguments {
+        event_mode_used: event_mode.into(),
+        early_return_allowed: fmi3True,
+        ..Arguments::of::<M>(interface)
+    });
+    if mode == Instantiated {
+        return fmu;
+    }
+    fmu.enter_initialization(0.0, None);
+    if mode == Initialization {
+        return fmu;
+    }
+    fmu.ok(fmu.fmi3ExitInitializationMode());
+    match mode {
+        Terminated => fmu.ok(fmu.fmi3Terminate()),
+        StepComplete if event_mode => fmu.ok(fmu.fmi3EnterStepMode()),
+        ContinuousTime => fmu.ok(fmu.fmi3EnterContinuousTimeMode()),
+        _ => {}
+    }
+    fmu
+}
+
+fn every_function_in_every_state<M: Exported>() {
+    for interface in [CoSimulation, ModelExchange] {
+        for mode in modes_of(interface) {
+            let has_event_mode = M::CO_SIMULATION.is_some_and(|offer| offer.events);
+            if (interface, mode) == (CoSimulation, Event) && !has_event_mode {
+                continue;
+            }
+            for function in FUNCTIONS {
+                let label = format!("{function} in {mode} of {interface}");
+                let fmu = in_mode::<M>(interface, mode);
+                let before = fmu.bytes();
+                fmu.take_log();
+                let status = fmu.call_with_zeros(function);
+                let log = fmu.take_log();
+                let is_refused_by_state =
+                    log.iter().any(|message| message.text.contains("not allowed in state"));
+                let accepted = standard(function, interface, mode) || tolerated(function, interface, mode);
+                assert_eq!(is_refused_by_state, !accepted, "{label}: {log:?}");
+                if status != Status::Ok {
+                    assert_eq!((status, log.len()), (Status::Error, 1), "{label}: {log:?}");
+                    assert!(log[0].text.starts_with(&format!("{function}: ")), "{label}: {log:?}");
+                    assert_eq!(before, fmu.bytes(), "{label} changed the instance");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn calls() {
+    every_function_in_every_state::<Ticker>();
+    every_function_in_every_state::<Palette>();
+}
+
+#[test]
+fn table() {
+    assert_eq!(ALLOWED.len(), FUNCTIONS.len());
+    for rule in ALLOWED {
+        for interface in [CoSimulation, ModelExchange] {
+            for mode in modes_of(interface) {
+                let label = format!("{} in {mode} of {interface}", rule.name);
+                let contain = |set: fmu_export::Situations| set.contain(Standard::Fmi3, interface, mode);
+                assert_eq!(contain(rule.standard), standard(rule.name, interface, mode), "{label}");
+                assert_eq!(
+                    contain(rule.tolerated),
+                    tolerated(rule.name, interface, mode),
+                    "{label}, tolerated"
+                );
+                assert!(!rule.accepted().contain(Standard::Fmi2, interface, mode), "{label}, in FMI 2.0");
+            }
+        }
+    }
+}

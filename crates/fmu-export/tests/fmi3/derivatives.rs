@@ -1,0 +1,109 @@
+//! Partial derivatives, derivatives of outputs, and what depends on what.
+
+use crate::toys::oscillator::Name::{self, *};
+use crate::toys::{Oscillator, Sum};
+use fmu_export::Interface::*;
+use fmu_export::fmi3::types::*;
+use fmu_run::fmi3::Importer;
+
+const UNKNOWNS: [Name; 5] = [position, der_position, der_velocity, spring_force, energy];
+const KNOWNS: [Name; 3] = [force, position, velocity];
+
+fn moving() -> Importer {
+    let fmu = Importer::of::<Oscillator>(ModelExchange);
+    fmu.set(&[position as u32, velocity as u32], &[0.25, -3.0]);
+    fmu.initialize(0.0);
+    fmu
+}
+
+/// The adjoint derivative is the transposed of the directional one, bit for bit.
+#[test]
+fn adjoint_is_transposed() {
+    let fmu = moving();
+    for unknown in UNKNOWNS.map(|name| name as u32) {
+        for known in KNOWNS.map(|name| name as u32) {
+            let (mut forward, mut adjoint) = (f64::NAN, f64::NAN);
+            fmu.ok(fmu.fmi3GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut forward, 1));
+            fmu.ok(fmu.fmi3GetAdjointDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut adjoint, 1));
+            assert_eq!(forward.to_bits(), adjoint.to_bits());
+        }
+    }
+    // And of all at once: seeds that are powers of two add up without rounding.
+    let (unknowns, knowns) = (UNKNOWNS.map(|name| name as u32), KNOWNS.map(|name| name as u32));
+    let (rows, columns) = ([1.0, 2.0, -4.0, 0.5, 0.25], [1.0, -2.0, 8.0]);
+    let (mut forward, mut adjoint) = ([f64::NAN; 5], [f64::NAN; 3]);
+    let (u, k) = (unknowns.as_ptr(), knowns.as_ptr());
+    fmu.ok(fmu.fmi3GetDirectionalDerivative(u, 5, k, 3, columns.as_ptr(), 3, forward.as_mut_ptr(), 5));
+    fmu.ok(fmu.fmi3GetAdjointDerivative(u, 5, k, 3, rows.as_ptr(), 5, adjoint.as_mut_ptr(), 3));
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (one, other) = (product(&rows, &forward), product(&adjoint, &columns));
+    assert!((one - other).abs() < 1e-12 * one.abs(), "{one} {other}");
+}
+
+#[test]
+fn lengths_and_kinds() {
+    let fmu = moving();
+    let (u, k, mut out) = (energy as u32, position as u32, 0.0);
+    fmu.refused("seeds", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 0, &mut out, 1));
+    fmu.refused("results", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 1, &mut out, 0));
+    fmu.refused("seeds", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 0, &1.0, 0, &mut out, 0));
+    fmu.refused("no known", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &u, 1, &1.0, 1, &mut out, 1));
+    fmu.refused("no seed", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 1, &f64::NAN, 1, &mut out, 1));
+    let sum = Importer::of::<Sum>(CoSimulation);
+    sum.initialize(0.0);
+    let text =
+        sum.refused("no partials", |fmu| fmu.fmi3GetAdjointDerivative(&1, 1, &0, 1, &1.0, 1, &mut out, 1));
+    assert!(text.contains("providesAdjointDerivatives is false"), "{text}");
+}
+
+#[test]
+fn of_outputs() {
+    let fmu = Importer::of::<Oscillator>(CoSimulation);
+    fmu.set(&[position as u32, velocity as u32], &[0.25, -3.0]);
+    fmu.initialize(0.0);
+    let time = Oscillator::TABLE.len() as u32;
+    let (vr, orders, mut values) = ([position as u32, time, time], [1, 1, 2], [f64::NAN; 3]);
+    fmu.ok(fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 3, orders.as_ptr(), values.as_mut_ptr(), 3));
+    assert_eq!(values, [-3.0, 1.0, 0.0]);
+    fmu.refused("order 0", |fmu| fmu.fmi3GetOutputDerivatives(&time, 1, &0, &mut 0.0, 1));
+}
+
+use fmu_export::Variables;
+
+fn dependencies(fmu: &Importer, of: u32) -> Vec<u32> {
+    let mut count = usize::MAX;
+    fmu.ok(fmu.fmi3GetNumberOfVariableDependencies(of, &mut count));
+    let (mut own, mut vr, mut other, mut kinds) =
+        (vec![9; count], vec![0; count], vec![9; count], vec![9; count]);
+    fmu.ok(fmu.fmi3GetVariableDependencies(
+        of,
+        own.as_mut_ptr(),
+        vr.as_mut_ptr(),
+        other.as_mut_ptr(),
+        kinds.as_mut_ptr(),
+        count,
+    ));
+    assert!(own.iter().chain(&other).all(|element| *element == 0), "scalars");
+    assert!(kinds.iter().all(|kind| *kind == fmi3Dependent));
+    vr
+}
+
+#[test]
+fn on_what() {
+    let fmu = Importer::of::<Oscillator>(ModelExchange);
+    let time = Oscillator::TABLE.len() as u32;
+    let initial = |name: Name| dependencies(&fmu, name as u32);
+    assert_eq!(initial(spring_force), [position, stiffness, springs].map(|name| name as u32));
+    assert_eq!(initial(position), [], "it has a start value");
+    let all = [force, position, velocity, mass, stiffness, springs, damping, damped].map(|name| name as u32);
+    assert_eq!(initial(energy), [&all[..], &[time]].concat());
+    fmu.initialize(0.0);
+    let now = |name: Name| dependencies(&fmu, name as u32);
+    assert_eq!(now(spring_force), [position as u32]);
+    assert_eq!(now(der_position), [velocity as u32]);
+    assert_eq!(now(energy), [force as u32, position as u32, velocity as u32, time]);
+    assert_eq!(now(force), []);
+    assert_eq!(dependencies(&fmu, time), []);
+    let mut count = 0;
+    fmu.refused("which", |fmu| fmu.fmi3GetNumberOfVariableDependencies(time + 1, &mut count));
+}

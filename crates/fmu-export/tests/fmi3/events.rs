@@ -1,0 +1,170 @@
+//! Events: of Model Exchange, of Co-Simulation with event mode and without, and steps that end early.
+
+use crate::toys::ticker::Name;
+use crate::toys::*;
+use fmu_export::Interface::*;
+use fmu_export::fmi3::types::*;
+use fmu_run::fmi3::{Arguments, Importer, Stepped, Updated};
+
+const SUM: u32 = Name::sum as u32;
+const AMOUNT: u32 = Name::amount as u32;
+
+fn ticker(event_mode_used: fmi3Boolean, early_return_allowed: fmi3Boolean) -> Importer {
+    let arguments =
+        Arguments { event_mode_used, early_return_allowed, ..Arguments::of::<Ticker>(CoSimulation) };
+    let fmu = Importer::with::<Ticker>(&arguments);
+    fmu.initialize(0.0);
+    fmu
+}
+
+#[test]
+fn in_model_exchange() {
+    let fmu = Importer::of::<Ball>(ModelExchange);
+    fmu.set(&[0, 1], &[0.0, -2.0]);
+    fmu.initialize(0.0);
+    let (mut states, mut indicators) = (0, 0);
+    fmu.ok(fmu.fmi3GetNumberOfContinuousStates(&mut states));
+    fmu.ok(fmu.fmi3GetNumberOfEventIndicators(&mut indicators));
+    assert_eq!((states, indicators), (2, 1));
+    let bounced = fmu.update();
+    assert_eq!(bounced, Updated { states_changed: true, nominals_changed: true, ..Updated::default() });
+    let (mut x, mut rates, mut nominals, mut z) = ([f64::NAN; 2], [f64::NAN; 2], [f64::NAN; 2], f64::NAN);
+    fmu.ok(fmu.fmi3GetContinuousStates(x.as_mut_ptr(), 2));
+    assert_eq!(x, [0.0, 1.4]);
+    fmu.ok(fmu.fmi3EnterContinuousTimeMode());
+    fmu.ok(fmu.fmi3SetTime(0.1));
+    fmu.ok(fmu.fmi3SetContinuousStates([-0.1, -1.0].as_ptr(), 2));
+    fmu.ok(fmu.fmi3GetContinuousStateDerivatives(rates.as_mut_ptr(), 2));
+    assert_eq!(rates, [-1.0, -9.81]);
+    fmu.ok(fmu.fmi3GetEventIndicators(&mut z, 1));
+    assert_eq!(z, -0.1);
+    fmu.ok(fmu.fmi3GetNominalsOfContinuousStates(nominals.as_mut_ptr(), 2));
+    assert!(nominals.iter().all(|nominal| *nominal > 0.0));
+    let (mut event, mut terminate) = (9, 9);
+    fmu.ok(fmu.fmi3CompletedIntegratorStep(fmi3True, &mut event, &mut terminate));
+    assert_eq!((event, terminate), (fmi3True, fmi3False));
+    fmu.ok(fmu.fmi3EnterEventMode());
+    assert!(fmu.update().states_changed);
+    fmu.ok(fmu.fmi3Terminate());
+}
+
+/// Section 2.3.5: states without reinit may be set in event mode.
+#[test]
+fn states_in_event_mode() {
+    let fmu = Importer::of::<Oscillator>(ModelExchange);
+    fmu.initialize(0.0);
+    fmu.set(&[1], &[0.5]);
+    assert_eq!(fmu.get([1]), [0.5]);
+}
+
+#[test]
+fn the_importer_handles_them() {
+    let fmu = ticker(fmi3True, fmi3True);
+    fmu.refused("no step in event mode", |fmu| fmu.try_step(0.0, 1.0).unwrap_err());
+    assert_eq!(fmu.update(), Updated { next: Some(0.25), ..Updated::default() });
+    fmu.ok(fmu.fmi3EnterStepMode());
+    let at = |time: f64, early_return: bool| {
+        Ok(Stepped {
+            event_handling_needed: true,
+            terminate: false,
+            early_return,
+            last_successful_time: time,
+        })
+    };
+    assert_eq!(fmu.try_step(0.0, 1.0), at(0.25, true));
+    assert_eq!(fmu.get([SUM]), [1.0], "nothing has happened yet");
+    fmu.ok(fmu.fmi3EnterEventMode());
+    fmu.set(&[AMOUNT], &[10.0]);
+    assert_eq!(fmu.update().next, Some(0.5));
+    assert_eq!(fmu.get([SUM]), [11.0]);
+    fmu.ok(fmu.fmi3EnterStepMode());
+    // An event at the end of a step is not early.
+    assert_eq!(fmu.try_step(0.25, 0.25), at(0.5, false));
+}
+
+/// Where it does not, they are handled within the step; FMI 2.0 has the same values.
+#[test]
+fn the_library_handles_them() {
+    for (event_mode, early) in [(fmi3False, fmi3False), (fmi3False, fmi3True)] {
+        let fmu = ticker(event_mode, early);
+        assert_eq!(fmu.get([SUM]), [1.0], "the tick at the begin");
+        fmu.step(0.0, 0.6);
+        assert_eq!(fmu.get([SUM]), [3.0]);
+        fmu.refused("no event mode", |fmu| fmu.fmi3EnterEventMode());
+    }
+    let fmu = fmu_run::Importer::of::<Ticker>(CoSimulation);
+    fmu.initialize(0.0);
+    fmu.step(0.0, 0.6);
+    assert_eq!(fmu.get([SUM]), [3.0]);
+    // With event mode, but without early return: those within the step.
+    let fmu = ticker(fmi3True, fmi3False);
+    fmu.update();
+    fmu.ok(fmu.fmi3EnterStepMode());
+    fmu.step(0.0, 0.6);
+    assert_eq!(fmu.get([SUM]), [3.0]);
+    assert!(fmu.try_step(0.6, 0.15).unwrap().event_handling_needed);
+}
+
+#[test]
+fn an_event_ends_the_simulation() {
+    let fmu = Importer::of::<Ticker>(CoSimulation);
+    fmu.ok(fmu.fmi3SetInt32(&(Name::last as u32), 1, &3, 1));
+    fmu.initialize(0.0);
+    let stepped = fmu.try_step(0.0, 1.0).unwrap();
+    assert_eq!((stepped.terminate, stepped.last_successful_time), (true, 0.5));
+    fmu.refused("it has ended", |fmu| fmu.try_step(0.5, 1.0).unwrap_err());
+    fmu.ok(fmu.fmi3Terminate());
+}
+
+fn fuse(early_return_allowed: fmi3Boolean) -> Importer {
+    let arguments = Arguments { early_return_allowed, ..Arguments::of::<Fuse>(CoSimulation) };
+    let fmu = Importer::with::<Fuse>(&arguments);
+    fmu.initialize(0.0);
+    fmu
+}
+
+#[test]
+fn early_return() {
+    let fmu = fuse(fmi3True);
+    let stepped = fmu.try_step(0.0, 10.0).unwrap();
+    let early = Stepped {
+        event_handling_needed: false,
+        terminate: false,
+        early_return: true,
+        last_successful_time: 8.0,
+    };
+    assert_eq!(stepped, early);
+    // It goes on from there, until it melts.
+    let stepped = fmu.try_step(8.0, 20.0).unwrap();
+    assert_eq!(stepped, Stepped { terminate: true, last_successful_time: 18.0, ..early });
+    fmu.refused("it has melted", |fmu| fmu.try_step(18.0, 1.0).unwrap_err());
+    fmu.ok(fmu.fmi3Reset());
+    fmu.initialize(0.0);
+    fmu.step(0.0, 1.0);
+}
+
+/// An error, and after it the state that the standard has for that; a saved state helps.
+#[test]
+fn early_return_that_is_not_allowed() {
+    let fmu = fuse(fmi3False);
+    let before = fmu.save();
+    assert_eq!(fmu.try_step(0.0, 10.0), Err(Status::Error));
+    let log = fmu.take_log();
+    assert!(log[0].text.contains("ended early, at 8, which earlyReturnAllowed has ruled out"), "{log:?}");
+    assert_eq!(fmu.get([1]), [100.0], "for debugging");
+    fmu.refused("it is terminated", |fmu| fmu.try_step(8.0, 1.0).unwrap_err());
+    fmu.ok(fmu.fmi3SetFMUState(before));
+    fmu.step(0.0, 8.0);
+    // The end of the simulation is said without.
+    let stepped = fmu.try_step(8.0, 20.0).unwrap();
+    assert_eq!((stepped.terminate, stepped.early_return), (true, false));
+    assert_eq!(stepped.last_successful_time, 18.0);
+    fmu.forget(before);
+}
+
+#[test]
+fn event_mode_must_be_offered() {
+    let arguments = Arguments { event_mode_used: fmi3True, ..Arguments::of::<Fuse>(CoSimulation) };
+    let log = Importer::instantiate(fmu_run::fmi3::Functions::of::<Fuse>(), &arguments).unwrap_err();
+    assert!(log[0].text.contains("hasEventMode is false"), "{log:?}");
+}

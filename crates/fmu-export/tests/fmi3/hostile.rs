@@ -1,0 +1,207 @@
+//! Arguments that no importer should pass, a logger that calls back, and models that break.
+
+use crate::call_table::{in_mode, modes_of};
+use crate::toys::*;
+use fmu_export::Interface::*;
+use fmu_export::fmi3::types::*;
+use fmu_export::{Exported, Mode};
+use fmu_run::fmi3::{Arguments, FUNCTIONS, Functions, Importer};
+use std::cell::RefCell;
+use std::ffi::CStr;
+use std::ptr::{null, null_mut};
+
+fn refusal(arguments: &Arguments) -> String {
+    let log = Importer::instantiate(Functions::of::<Sum>(), arguments).unwrap_err();
+    let [message] = log.as_slice() else { panic!("one message: {log:?}") };
+    assert_eq!((message.status, message.category.as_str()), (Status::Error, "logStatusError"));
+    message.text.clone()
+}
+
+#[test]
+fn instances_that_are_refused() {
+    let good = Arguments::of::<Sum>(CoSimulation);
+    let cases = [
+        (Arguments { instance_name: Some(c" \t"), ..good.clone() }, "the instance needs a name"),
+        (Arguments { instance_name: None, ..good.clone() }, "the instance needs a name"),
+        (Arguments { instantiation_token: None, ..good.clone() }, "the instantiationToken NULL is not"),
+        (Arguments { interface: ModelExchange, ..good.clone() }, "this FMU has no Model Exchange"),
+        (
+            Arguments { required_intermediate_variables: &[0], ..good },
+            "requiredIntermediateVariables must be empty",
+        ),
+    ];
+    for (arguments, expected) in cases {
+        let text = refusal(&arguments);
+        assert!(text.starts_with("fmi3Instantiate") && text.contains(expected), "{text}");
+        let silent = Arguments { logger: false, ..arguments };
+        assert_eq!(Importer::instantiate(Functions::of::<Sum>(), &silent).unwrap_err(), []);
+    }
+}
+
+#[test]
+fn scheduled_execution_is_refused() {
+    thread_local!(static LOG: RefCell<Vec<(Status, String)>> = const { RefCell::new(Vec::new()) });
+    unsafe extern "C" fn remember(
+        _: fmi3InstanceEnvironment,
+        status: Status,
+        _: fmi3String,
+        text: fmi3String,
+    ) {
+        // SAFETY: a string.
+        let text = unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned();
+        LOG.with_borrow_mut(|log| log.push((status, text)));
+    }
+    let functions = Functions::of::<Sum>();
+    // SAFETY: strings, NULL and a logger.
+    let instance = unsafe {
+        (functions.fmi3InstantiateScheduledExecution)(
+            c"name".as_ptr(),
+            c"{sum}".as_ptr(),
+            null(),
+            0,
+            0,
+            null_mut(),
+            Some(remember),
+            None,
+            None,
+            None,
+        )
+    };
+    assert!(instance.is_null());
+    let log = LOG.take();
+    assert_eq!(log.len(), 1);
+    assert!(log[0].1.contains("this FMU has no Scheduled Execution"), "{log:?}");
+}
+
+#[test]
+fn without_an_instance() {
+    let nothing = Importer::null(Functions::of::<Sum>());
+    for (function, status) in nothing.call_all() {
+        assert_eq!(status, Status::Error, "{function}");
+    }
+    // SAFETY: a string that the library keeps.
+    assert_eq!(unsafe { CStr::from_ptr((nothing.functions().fmi3GetVersion)()) }, c"3.0");
+}
+
+/// NULL and zeros in every state: an answer, and a number of messages that an importer can read.
+#[test]
+fn zeros() {
+    fn zeros<M: Exported>() {
+        for interface in [CoSimulation, ModelExchange] {
+            for mode in modes_of(interface) {
+                in_mode::<M>(interface, mode).call_all();
+            }
+        }
+    }
+    zeros::<Palette>();
+    zeros::<Oscillator>();
+    zeros::<Ticker>();
+}
+
+#[test]
+fn instances_of_the_other_standard() {
+    let old = fmu_run::Importer::of::<Sum>(CoSimulation);
+    let functions = Functions::of::<Sum>();
+    // SAFETY: an instance of the same model, alive.
+    let status = unsafe { (functions.fmi3Reset)(old.component()) };
+    assert_eq!(status, Status::Error);
+    old.take_log();
+}
+
+#[test]
+fn what_no_model_has() {
+    let fmu = in_mode::<Ticker>(CoSimulation, Mode::Event);
+    for (function, reason) in [
+        ("fmi3GetClock", "this FMU has no clocks"),
+        ("fmi3SetClock", "this FMU has no clocks"),
+        ("fmi3GetIntervalDecimal", "this FMU has no clocks"),
+        ("fmi3EvaluateDiscreteStates", "providesEvaluateDiscreteStates is false"),
+    ] {
+        let text = fmu.refused(function, |fmu| fmu.call_with_zeros(function));
+        assert!(text.contains(reason), "{text}");
+    }
+    let fmu = Importer::of::<Ticker>(ModelExchange);
+    let text = fmu.refused("configuration", |fmu| fmu.fmi3EnterConfigurationMode());
+    assert!(text.contains("this FMU has no structural parameters"), "{text}");
+    fmu.refused("partitions", |fmu| fmu.fmi3ActivateModelPartition(0, 0.0));
+}
+
+/// Section 2.3.1: without logging there are errors only; with it, and for single categories, more.
+#[test]
+fn logging() {
+    let fmu = Importer::of::<Talker>(CoSimulation);
+    let volume = Talker::TABLE.iter().position(|of| of.name() == "volume").unwrap() as u32;
+    fmu.set(&[volume], &[10.5]);
+    assert_eq!(fmu.take_log(), [], "a warning is no error");
+    fmu.ok(fmu.fmi3SetDebugLogging(fmi3True, 1, &c"logStatusWarning".as_ptr()));
+    fmu.set(&[volume], &[10.6]);
+    assert_eq!(fmu.take_log().len(), 1);
+    fmu.ok(fmu.fmi3SetDebugLogging(fmi3True, 0, null()));
+    fmu.initialize(0.0);
+    assert!(fmu.take_log().iter().any(|message| message.text == "initialized"));
+    fmu.refused("no category", |fmu| fmu.fmi3SetDebugLogging(fmi3True, 1, &c"logNothing".as_ptr()));
+}
+
+use fmu_export::Variables;
+
+thread_local!(static INSTANCE: RefCell<(fmi3Instance, Vec<Status>)> =
+    const { RefCell::new((null_mut(), Vec::new())) });
+
+/// A logger that calls back, and frees the instance.
+unsafe extern "C" fn call_back(_: fmi3InstanceEnvironment, _: Status, _: fmi3String, _: fmi3String) {
+    let functions = Functions::of::<Sum>();
+    let instance = INSTANCE.with_borrow(|known| known.0);
+    // SAFETY: NULL or an instance, alive.
+    let status = unsafe {
+        (functions.fmi3FreeInstance)(instance);
+        (functions.fmi3Reset)(instance)
+    };
+    INSTANCE.with_borrow_mut(|known| known.1.push(status));
+}
+
+#[test]
+fn a_logger_that_calls_back() {
+    let functions = Functions::of::<Sum>();
+    // SAFETY: strings, NULL and a logger that outlives the instance.
+    let instance = unsafe {
+        (functions.fmi3InstantiateCoSimulation)(
+            c"name".as_ptr(),
+            c"{sum}".as_ptr(),
+            null(),
+            0,
+            0,
+            0,
+            0,
+            null(),
+            0,
+            null_mut(),
+            Some(call_back),
+            None,
+        )
+    };
+    assert!(!instance.is_null());
+    INSTANCE.with_borrow_mut(|known| known.0 = instance);
+    // SAFETY: an instance, alive.
+    unsafe {
+        assert_eq!((functions.fmi3EnterStepMode)(instance), Status::Error);
+        assert_eq!(INSTANCE.with_borrow(|known| known.1.clone()), [Status::Error], "refused, and not freed");
+        assert_eq!((functions.fmi3Reset)(instance), Status::Ok);
+        (functions.fmi3FreeInstance)(instance);
+    }
+}
+
+/// A model that panics breaks its instance, and no other.
+#[test]
+fn a_model_that_breaks() {
+    let fmu = Importer::of::<Faulty>(CoSimulation);
+    fmu.initialize(0.0);
+    let fault = Faulty::TABLE.iter().position(|of| of.name() == "fault").unwrap() as u32;
+    fmu.ok(fmu.fmi3SetInt32(&fault, 1, &(faulty::Fault::Step as i32), 1));
+    assert_eq!(fmu.try_step(0.0, 0.1), Err(Status::Fatal));
+    let log = fmu.take_log();
+    assert!(log[0].text.starts_with("fmi3DoStep: internal failure"), "{log:?}");
+    for function in FUNCTIONS {
+        assert_eq!(fmu.call_with_zeros(function), Status::Fatal, "{function}");
+    }
+    fmu.take_log();
+}

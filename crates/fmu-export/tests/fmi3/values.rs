@@ -1,0 +1,209 @@
+//! Values of every type.
+
+use crate::toys::palette::{Colour, Name};
+use crate::toys::{Counter, Palette, Talker};
+use fmu_export::fmi3::independent;
+use fmu_export::fmi3::types::*;
+use fmu_export::{Causality, Enumeration, Exported, Interface::*, Variables};
+use fmu_run::fmi3::Importer;
+use std::ffi::CStr;
+use std::ptr::{null, null_mut};
+
+fn palette() -> Importer {
+    let fmu = Importer::of::<Palette>(CoSimulation);
+    fmu.initialize(0.0);
+    fmu
+}
+
+macro_rules! every_number {
+    ($fmu:ident: $($name:ident $get:ident $set:ident [$($value:expr),+];)+) => {
+        $(for value in [$($value),+] {
+            let vr = Name::$name as u32;
+            $fmu.ok($fmu.$set(&vr, 1, &value, 1));
+            let mut read = value - value;
+            $fmu.ok($fmu.$get(&vr, 1, &mut read, 1));
+            assert_eq!(read, value, stringify!($name));
+        })+
+    };
+}
+
+#[test]
+fn numbers() {
+    let fmu = palette();
+    every_number! { fmu:
+        float64 fmi3GetFloat64 fmi3SetFloat64 [1e300, -0.1];
+        float32 fmi3GetFloat32 fmi3SetFloat32 [f32::MAX, -0.1];
+        int8 fmi3GetInt8 fmi3SetInt8 [i8::MIN, i8::MAX];
+        uint8 fmi3GetUInt8 fmi3SetUInt8 [0, u8::MAX];
+        int16 fmi3GetInt16 fmi3SetInt16 [i16::MIN, i16::MAX];
+        uint16 fmi3GetUInt16 fmi3SetUInt16 [1024, u16::MAX];
+        int32 fmi3GetInt32 fmi3SetInt32 [i32::MIN, i32::MAX];
+        uint32 fmi3GetUInt32 fmi3SetUInt32 [0, u32::MAX];
+        int64 fmi3GetInt64 fmi3SetInt64 [i64::MIN, i64::MAX];
+        uint64 fmi3GetUInt64 fmi3SetUInt64 [0, u64::MAX];
+    }
+    // All of them survive.
+    let bytes = fmu.bytes();
+    let other = palette();
+    other.restore(&bytes);
+    assert_eq!(other.bytes(), bytes);
+}
+
+#[test]
+fn ranges() {
+    let fmu = palette();
+    let port = Name::uint16 as u32;
+    let text = fmu.refused("a port", |fmu| fmu.fmi3SetUInt16(&port, 1, &80, 1));
+    assert!(text.contains("uint16 must be between 1024 and 65535, it is 80"), "{text}");
+    let fmu = Importer::of::<Palette>(CoSimulation);
+    let shade = Name::shade as u32;
+    let text = fmu.refused("a shade", |fmu| fmu.fmi3SetFloat32(&shade, 1, &8.5, 1));
+    assert!(text.contains("shade must not be above 8, it is 8.5"), "{text}");
+    let text = fmu.refused("no number", |fmu| fmu.fmi3SetFloat32(&shade, 1, &f32::NAN, 1));
+    assert!(text.contains("must be a finite number"), "{text}");
+}
+
+/// Every function of values with every variable: it has those of its type, and an Enumeration is an Int64.
+#[test]
+fn wrong_types() {
+    let fmu = palette();
+    let (mut number, mut text, mut bytes, mut size) = (0_u64, null(), null(), 0);
+    for (vr, variable) in (0_u32..).zip(Palette::TABLE) {
+        let number = &raw mut number;
+        let answers = [
+            ("Real", fmu.fmi3GetFloat64(&vr, 1, number.cast(), 1)),
+            ("Float32", fmu.fmi3GetFloat32(&vr, 1, number.cast(), 1)),
+            ("Int8", fmu.fmi3GetInt8(&vr, 1, number.cast(), 1)),
+            ("UInt8", fmu.fmi3GetUInt8(&vr, 1, number.cast(), 1)),
+            ("Int16", fmu.fmi3GetInt16(&vr, 1, number.cast(), 1)),
+            ("UInt16", fmu.fmi3GetUInt16(&vr, 1, number.cast(), 1)),
+            ("Integer", fmu.fmi3GetInt32(&vr, 1, number.cast(), 1)),
+            ("UInt32", fmu.fmi3GetUInt32(&vr, 1, number.cast(), 1)),
+            ("Int64", fmu.fmi3GetInt64(&vr, 1, number.cast(), 1)),
+            ("UInt64", fmu.fmi3GetUInt64(&vr, 1, number, 1)),
+            ("Boolean", fmu.fmi3GetBoolean(&vr, 1, number.cast(), 1)),
+            ("String", fmu.fmi3GetString(&vr, 1, &mut text, 1)),
+            ("Binary", fmu.fmi3GetBinary(&vr, 1, &mut size, &mut bytes, 1)),
+        ];
+        for (of, status) in answers {
+            let base = variable.base().to_string();
+            let fits = of == base || of == "Int64" && base == "Enumeration";
+            assert_eq!(status == Status::Ok, fits, "{of}: {}", variable.name());
+        }
+    }
+    fmu.take_log();
+}
+
+#[test]
+fn fmi2_refuses_what_it_lacks() {
+    let fmu = fmu_run::Importer::of::<Palette>(CoSimulation);
+    fmu.initialize(0.0);
+    for (vr, variable) in (0..).zip(Palette::TABLE).filter(|(_, variable)| !variable.base().is_in_fmi2()) {
+        let (mut real, mut whole, mut text) = (0.0, 0, null());
+        for status in [
+            fmu.fmi2GetReal(&vr, 1, &mut real),
+            fmu.fmi2GetInteger(&vr, 1, &mut whole),
+            fmu.fmi2GetBoolean(&vr, 1, &mut whole),
+            fmu.fmi2GetString(&vr, 1, &mut text),
+            fmu.fmi2SetInteger(&vr, 1, &1),
+        ] {
+            assert_eq!(status, Status::Error, "{}", variable.name());
+        }
+    }
+    fmu.take_log();
+}
+
+#[test]
+fn truths() {
+    let (fmu, vr) = (palette(), Name::boolean as u32);
+    fmu.ok(fmu.fmi3SetBoolean(&vr, 1, &1, 1));
+    let mut read = 7;
+    fmu.ok(fmu.fmi3GetBoolean(&vr, 1, &mut read, 1));
+    assert_eq!(read, fmi3True);
+    let text = fmu.refused("a truth", |fmu| fmu.fmi3SetBoolean(&vr, 1, &2, 1));
+    assert!(text.contains("boolean must be 0 (false) or 1 (true), it is 2"), "{text}");
+}
+
+#[test]
+fn texts() {
+    let (fmu, vr) = (palette(), Name::string as u32);
+    fmu.ok(fmu.fmi3SetString(&vr, 1, &c"Gödel".as_ptr(), 1));
+    let mut read = null();
+    fmu.ok(fmu.fmi3GetString(&vr, 1, &mut read, 1));
+    // SAFETY: a string of the FMU's, valid until the next call.
+    assert_eq!(unsafe { CStr::from_ptr(read) }, c"Gödel");
+    fmu.refused("no text", |fmu| fmu.fmi3SetString(&vr, 1, &null(), 1));
+    fmu.refused("no UTF-8", |fmu| fmu.fmi3SetString(&vr, 1, &c"\xff".as_ptr(), 1));
+}
+
+#[test]
+fn bytes() {
+    let (fmu, vr) = (palette(), Name::binary as u32);
+    let read = || {
+        let (mut size, mut value) = (usize::MAX, null());
+        fmu.ok(fmu.fmi3GetBinary(&vr, 1, &mut size, &mut value, 1));
+        // SAFETY: bytes of the FMU's, valid until the next call.
+        unsafe { std::slice::from_raw_parts(value, size) }.to_vec()
+    };
+    assert_eq!(read(), []);
+    fmu.ok(fmu.fmi3SetBinary(&vr, 1, &3, &[1, 0, 255].as_ptr(), 1));
+    assert_eq!(read(), [1, 0, 255]);
+    let text = fmu.refused("too many", |fmu| fmu.fmi3SetBinary(&vr, 1, &17, &[0; 17].as_ptr(), 1));
+    assert!(text.contains("binary must not have more than 16 bytes, it has 17"), "{text}");
+    fmu.refused("no bytes", |fmu| fmu.fmi3SetBinary(&vr, 1, &3, &null(), 1));
+    fmu.refused("no sizes", |fmu| fmu.fmi3SetBinary(&vr, 1, null(), &[0; 3].as_ptr(), 1));
+    fmu.refused("endless", |fmu| fmu.fmi3SetBinary(&vr, 1, &usize::MAX, &[0; 3].as_ptr(), 1));
+    fmu.ok(fmu.fmi3SetBinary(&vr, 1, &0, &null(), 1));
+    assert_eq!(read(), []);
+}
+
+#[test]
+fn enumerations() {
+    let (fmu, mut read) = (palette(), 0);
+    fmu.ok(fmu.fmi3GetInt64(&(Name::colour as u32), 1, &mut read, 1));
+    assert_eq!(read, i64::from(Colour::Red.number()));
+    let fmu = Importer::of::<Talker>(CoSimulation);
+    let mood = Talker::TABLE.iter().position(|variable| variable.name() == "mood").unwrap() as u32;
+    fmu.ok(fmu.fmi3SetInt64(&mood, 1, &7, 1));
+    let text = fmu.refused("no mood", |fmu| fmu.fmi3SetInt64(&mood, 1, &3, 1));
+    assert!(text.contains("it is 3"), "{text}");
+    fmu.refused("beyond Int32", |fmu| fmu.fmi3SetInt64(&mood, 1, &(7 + (1 << 32)), 1));
+}
+
+/// As many values as variables: all are scalars.
+#[test]
+fn counts() {
+    let (fmu, vr) = (palette(), Name::float64 as u32);
+    let mut values = [0.0; 2];
+    for count in [0, 2, usize::MAX] {
+        let text = fmu.refused("get", |fmu| fmu.fmi3GetFloat64(&vr, 1, values.as_mut_ptr(), count));
+        assert!(text.contains("there are 1 values, the array has"), "{text}");
+        fmu.refused("set", |fmu| fmu.fmi3SetFloat64(&vr, 1, values.as_ptr(), count));
+    }
+    fmu.refused("texts", |fmu| fmu.fmi3GetString(&(Name::string as u32), 1, null_mut(), 0));
+}
+
+/// Every model has a time: its own, or one behind all others.
+#[test]
+fn time() {
+    fn check<M: Exported>(expected: Option<u32>) {
+        let (vr, variable) = independent::<M>();
+        assert_eq!(vr, expected.unwrap_or(M::TABLE.len() as u32));
+        assert_eq!((variable.name(), variable.causality()), ("time", Causality::Independent));
+        let fmu = Importer::of::<M>(CoSimulation);
+        fmu.initialize(2.0);
+        assert_eq!(fmu.get([vr]), [2.0]);
+        fmu.step(2.0, 0.5);
+        assert_eq!(fmu.get([vr]), [2.5]);
+        fmu.refused("the time is no input", |fmu| fmu.try_set(&[vr], &[1.0]));
+        fmu.refused("what is behind it", |fmu| fmu.try_set(&[M::TABLE.len() as u32 + 1], &[1.0]));
+    }
+    check::<Palette>(None);
+    check::<Counter>(None);
+    let of_talker = Talker::TABLE.iter().position(|variable| variable.causality() == Causality::Independent);
+    check::<Talker>(of_talker.map(|place| place as u32));
+    // There is none in FMI 2.0.
+    let fmu = fmu_run::Importer::of::<Palette>(CoSimulation);
+    fmu.initialize(0.0);
+    fmu.refused("the time", |fmu| fmu.fmi2GetReal(&(Palette::TABLE.len() as u32), 1, &mut 0.0));
+}

@@ -1,0 +1,61 @@
+//! A clock whose steps stop at its ticks.
+
+use fmu_export::*;
+
+/// Ticks in every period; each tick adds the input.
+#[derive(Clone)]
+pub struct Ticker {
+    amount: f64,
+    sum: f64,
+    last: i32,
+    next: f64,
+    ticks: i32,
+}
+
+variables! { for Ticker, memory in next;
+    /// What a tick adds
+    amount = input(&NUMBER).discrete() in amount;
+    /// What all ticks have added
+    sum = output(&NUMBER).discrete().exact() in sum;
+    /// How many there were
+    ticks = output(&INTEGER).exact() in ticks;
+    /// After so many it ends
+    last = parameter(&INTEGER) in last;
+}
+
+const PERIOD: f64 = 0.25;
+
+impl Model for Ticker {
+    const INFO: Info = Info { guid: "{ticker}", ..info!("Ticker", "ticker") };
+
+    fn new(_: &Setup) -> Result<Self, Error> {
+        Ok(Self { amount: 1.0, sum: 0.0, last: 1000, next: 0.0, ticks: 0 })
+    }
+
+    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Error> {
+        self.next = experiment.start_time;
+        Ok(())
+    }
+}
+
+impl ModelExchange for Ticker {
+    fn event(&mut self, time: f64) -> Result<Event, Error> {
+        if time >= self.next {
+            self.sum += self.amount;
+            self.ticks += 1;
+            self.next += PERIOD;
+        }
+        let terminate = self.ticks >= self.last;
+        Ok(Event { again: time >= self.next, next: Some(self.next), terminate, ..Event::default() })
+    }
+}
+
+impl CoSimulation for Ticker {
+    const EVENTS: bool = true;
+
+    fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+        if step.time + step.size >= self.next { Ok(Stepped::Event(self.next)) } else { Ok(Stepped::Done) }
+    }
+}
+
+offer!(Ticker: CoSimulation + ModelExchange);
