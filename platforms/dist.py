@@ -1,4 +1,5 @@
-"""Makes dist/: the FMU for all platforms, the FMU for importers on ARM Linux, checksums, bill of materials.
+"""Makes dist/: the FMUs for all platforms, for FMI 2.0 and FMI 3.0, the FMU of FMI 2.0 for importers on ARM Linux,
+checksums, bill of materials.
 
     python platforms/dist.py [--libraries FOLDER]
 
@@ -18,7 +19,7 @@ from pathlib import Path
 
 import bill_of_materials
 from libraries import compile_library, universal
-from targets import ARM_FOLDERS, FOLDERS, MODEL, NATIVE_WINDOWS, ROOT, TARGETS, WINDOWS, Target
+from targets import ARM_FOLDERS, FMI3_FOLDERS, FOLDERS, MODEL, NATIVE_WINDOWS, ROOT, TARGETS, WINDOWS, Target
 from toolchain import say
 
 DIST = ROOT / "dist"
@@ -34,9 +35,11 @@ def main() -> None:
     (ROOT / "target").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(dir=ROOT / "target") as made:
         folder = Path(made)
-        pack(folder, FOLDERS, libraries)
-        pack(folder / "arm", ARM_FOLDERS, libraries, "--any-processor")
+        pack(folder, 2, FOLDERS, libraries)
+        pack(folder / "arm", 2, ARM_FOLDERS, libraries, "--any-processor")
         (folder / "arm" / f"{MODEL}.fmu").rename(folder / f"{MODEL}-linux-arm64.fmu")
+        pack(folder, 3, FMI3_FOLDERS, libraries)
+        (folder / "fmi3" / f"{MODEL}.fmu").rename(folder / f"{MODEL}-fmi3.fmu")
         shutil.copyfile(bill_of_materials.BILL, folder / bill_of_materials.BILL.name)
         if compilers:
             (folder / "compilers.txt").write_text("".join(f"{line}\n" for line in compilers), encoding="utf-8")
@@ -74,10 +77,12 @@ def compiled_elsewhere(folder: Path) -> tuple[dict[Target, Path], list[str]]:
     return libraries, []
 
 
-def pack(out: Path, folders: dict[str, tuple[Target, ...]], libraries: dict[Target, Path], *options: str) -> None:
-    """Packs an FMU with a library in each of these folders of `binaries/`."""
+def pack(
+    out: Path, fmi: int, folders: dict[str, tuple[Target, ...]], libraries: dict[Target, Path], *options: str
+) -> None:
+    """Packs an FMU for this version of FMI with a library in each of these folders of `binaries/`."""
     command = ["cargo", "run", "--locked", "--release", "--quiet", "--bin", "build_fmu", "--"]
-    command += ["--out", str(out), *options]
+    command += ["--fmi", str(fmi), "--out", str(out), *options]
     for folder, targets in folders.items():
         parts = [libraries[target] for target in targets]
         path = parts[0] if len(parts) == 1 else universal(out / f"{folder}.dylib", parts)

@@ -46,7 +46,7 @@ TARGETS = (LINUX, LINUX_ARM, WINDOWS, MAC, MAC_ARM)
 #: What a runner of its own kind compiles instead, see .github/workflows.
 NATIVE_WINDOWS = Target("x86_64-pc-windows-msvc", ".dll")
 
-#: The folders of `binaries/` and what each holds; two targets make a universal library. FMI 2.0.5 names
+#: The folders of `binaries/` in FMI 2.0 and what each holds; two targets make a universal library. FMI 2.0.5 names
 #: the ARM folders as FMI 3.0 does; importers on ARM Macs look in darwin64.
 FOLDERS = {
     "linux64": (LINUX,),
@@ -56,8 +56,17 @@ FOLDERS = {
     "aarch64-darwin": (MAC_ARM,),
 }
 
-#: Importers on ARM Linux look in linux64, where an FMU for both cannot have it.
+#: With FMI 2.0, importers on ARM Linux look in linux64, where an FMU for both cannot have it.
 ARM_FOLDERS = {"linux64": (LINUX_ARM,)}
+
+#: FMI 3.0 has a name for each.
+FMI3_FOLDERS = {
+    "x86_64-linux": (LINUX,),
+    "aarch64-linux": (LINUX_ARM,),
+    "x86_64-windows": (WINDOWS,),
+    "x86_64-darwin": (MAC,),
+    "aarch64-darwin": (MAC_ARM,),
+}
 
 
 def target(triple: str) -> Target:

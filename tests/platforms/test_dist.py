@@ -14,10 +14,11 @@ from conftest import DIST, ROOT
 from cyclonedx.schema import SchemaVersion
 from cyclonedx.validation.json import JsonStrictValidator
 from fmpy.validation import validate_fmu
-from targets import FOLDERS, MODEL
+from targets import FMI3_FOLDERS, FOLDERS, MODEL, TARGETS
 
 BILL = "bill-of-materials.cdx.json"
 ARM = f"{MODEL}-linux-arm64.fmu"
+FMI3 = f"{MODEL}-fmi3.fmu"
 
 
 def names(fmu) -> set[str]:
@@ -28,7 +29,7 @@ def names(fmu) -> set[str]:
 
 def test_the_sums_are_right():
     listed = dict(reversed(line.split("  ")) for line in (DIST / "SHA256SUMS").read_text().splitlines())
-    assert {f"{MODEL}.fmu", ARM, BILL} <= set(listed)
+    assert {f"{MODEL}.fmu", ARM, FMI3, BILL} <= set(listed)
     for name, digest in listed.items():
         assert hashlib.sha256((DIST / name).read_bytes()).hexdigest() == digest, name
 
@@ -52,7 +53,26 @@ def test_the_other_for_importers_on_arm(fmu):
     assert all(arm.read(name) == both.read(name) for name in others)
 
 
-@pytest.mark.parametrize("name", [f"{MODEL}.fmu", ARM])
+def test_one_fmu_of_fmi_3_for_all(fmu):
+    """The same libraries and documentation, under the names of FMI 3.0; of macOS each processor has its own."""
+    three, two = zipfile.ZipFile(DIST / FMI3), zipfile.ZipFile(fmu)
+    binaries = {name for name in names(DIST / FMI3) if name.startswith("binaries/")}
+    assert binaries == {f"binaries/{folder}/{MODEL}{targets[0].suffix}" for folder, targets in FMI3_FOLDERS.items()}
+    assert {target for targets in FMI3_FOLDERS.values() for target in targets} == set(TARGETS)
+    in_fmi2 = {targets: folder for folder, targets in FOLDERS.items()}
+    same = {folder: in_fmi2[targets] for folder, targets in FMI3_FOLDERS.items() if targets in in_fmi2}
+    assert set(FMI3_FOLDERS) - set(same) == {"x86_64-darwin"}
+    for folder, other in same.items():
+        library = f"{MODEL}{FMI3_FOLDERS[folder][0].suffix}"
+        assert three.read(f"binaries/{folder}/{library}") == two.read(f"binaries/{other}/{library}"), folder
+    assert three.read("terminalsAndIcons/icon.png") == two.read("model.png")
+    documents = {name for name in two.namelist() if name.startswith("documentation/")}
+    assert documents == {name for name in three.namelist() if name.startswith("documentation/")}
+    assert all(two.read(name) == three.read(name) for name in documents)
+    assert fmpy.read_model_description(str(DIST / FMI3), validate=True).fmiVersion == "3.0"
+
+
+@pytest.mark.parametrize("name", [f"{MODEL}.fmu", ARM, FMI3])
 def test_nothing_to_complain(name):
     assert validate_fmu(str(DIST / name)) == []
 
