@@ -1,4 +1,4 @@
-//! Builds target/fmu/lag.fmu. See `--help`.
+//! Builds target/fmu/lag.fmu for FMI 2.0 and target/fmu/fmi3/lag.fmu for FMI 3.0. See `--help`.
 
 use clap::Parser;
 use fmu_package::{BuildOptions, Builder, terminal};

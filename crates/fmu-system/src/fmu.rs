@@ -35,6 +35,8 @@ impl Fmu {
     pub fn read(bytes: Vec<u8>) -> Result<Self> {
         let text = String::from_utf8(unzip(&bytes, "modelDescription.xml")?)?;
         let description = Element::parse(&text).context("its modelDescription.xml cannot be read")?;
+        let version = description.attribute("fmiVersion").unwrap_or_default();
+        ensure!(!version.starts_with("3."), "it is for FMI {version}; systems are of FMUs for FMI 2.0");
         let units = description.children_of("UnitDefinitions").map(unit).collect();
         let types: BTreeMap<&str, &Element> = description
             .children_of("TypeDefinitions")
