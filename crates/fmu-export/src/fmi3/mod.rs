@@ -5,7 +5,7 @@
 //! Scheduled Execution.
 //!
 //! Every model has a time, as the standard asks for: the independent variable of the table, or one behind all others
-//! ([`independent`]).
+//! ([`independent`]). Behind it there is a local variable for each event indicator ([`indicator`]).
 //!
 //! # Safety
 //!
@@ -45,6 +45,11 @@ use types::*;
 /// the table for a value reference.
 pub fn independent<M: Variables>() -> (u32, &'static Variable<M>) {
     crate::instance::independent::<M>()
+}
+
+/// The value reference of an event indicator, counted from 0: behind the table and a place for the time.
+pub fn indicator<M: Variables>(number: usize) -> u32 {
+    (M::TABLE.len() + 1 + number) as u32
 }
 
 /// The C functions: what every call has in common, around the bodies in the files of this folder.

@@ -125,6 +125,9 @@ impl<M: Exported> Instance<M> {
         }
         for (vr, order) in vr.iter().zip(orders) {
             check_order(self.variable(*vr, BaseType::Real)?, *order)?;
+            if super::indicator::<M>(*vr).is_some() {
+                return refuse("event indicators have no output derivatives");
+            }
         }
         let model = self.calculated();
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {

@@ -21,8 +21,9 @@ use crate::log::Logger;
 use crate::mode::{Interface, Mode, Situation, Standard};
 use crate::model::{Error, Experiment, Setup};
 use crate::status::Status;
-use crate::types::{BaseType, TIME};
-use crate::variable::{Causality, Variable};
+use crate::types::{BaseType, NUMBER, TIME};
+use crate::value::Value;
+use crate::variable::{Causality, Read, Variable};
 
 /// An instance of model `M`.
 pub(crate) struct Instance<M> {
@@ -260,7 +261,7 @@ impl<M: Exported> Instance<M> {
     #[inline]
     fn find(&self, vr: u32) -> Option<&'static Variable<M>> {
         match M::TABLE.get(vr as usize) {
-            None if self.importer.standard == Standard::Fmi3 => implicit_time(vr),
+            None if self.importer.standard == Standard::Fmi3 => implicit(vr),
             found => found,
         }
     }
@@ -279,14 +280,35 @@ struct Implicit<M>(std::marker::PhantomData<M>);
 
 impl<M: 'static> Implicit<M> {
     const TIME: &'static Variable<M> = &Variable::independent(&TIME).finished("time", "Simulation time");
+
+    /// Any of them: who reads it has its value from the model.
+    const INDICATOR: &'static Variable<M> = &Variable::local(&NUMBER)
+        .calculated(Read { base: BaseType::Real, real: |_| f64::NAN, value: |_| Value::Real(f64::NAN) })
+        .finished("eventIndicator", "An event happens where it changes its sign");
 }
 
-/// The time, which FMI 3.0 asks for in every model (section 2.4.7.4): with the value reference behind the last one of
-/// the table, if the table has none.
+/// What FMI 3.0 asks for in every model, behind the table: with the value reference behind the last one of the table the
+/// time (section 2.4.7.4), if the table has none; then the event indicators (section 2.4.8).
 #[cold]
-fn implicit_time<M: Exported>(vr: u32) -> Option<&'static Variable<M>> {
+fn implicit<M: Exported>(vr: u32) -> Option<&'static Variable<M>> {
     let (place, variable) = independent::<M>();
-    (vr == place).then_some(variable)
+    let variable = (vr == place).then_some(variable);
+    variable.or_else(|| indicator::<M>(vr).map(|_| Implicit::INDICATOR))
+}
+
+/// Which of the event indicators has this value reference.
+fn indicator<M: Exported>(vr: u32) -> Option<usize> {
+    let place = (vr as usize).checked_sub(M::TABLE.len() + 1)?;
+    (place < Instance::<M>::INDICATORS).then_some(place)
+}
+
+/// The value of a variable behind the table.
+#[cold]
+fn implicit_value<M: Exported>(model: &M, time: f64, vr: u32) -> f64 {
+    let Some(place) = indicator::<M>(vr) else { return time };
+    let mut indicators = vec![0.0; Instance::<M>::INDICATORS];
+    model.exported_indicators(&mut indicators);
+    indicators[place]
 }
 
 /// The independent variable as FMI 3.0 has it, with its value reference.

@@ -1,6 +1,6 @@
 //! Values (section 2.1.7).
 
-use super::{Instance, Outcome, finite, refuse, refuse_with};
+use super::{Instance, Outcome, finite, implicit_value, refuse, refuse_with};
 use crate::export::Exported;
 use crate::types::{Attributes, BaseType};
 use crate::value::Value;
@@ -18,7 +18,10 @@ impl<M: Exported> Instance<M> {
         // 0 as long as all values are finite: one question at the end costs less than one for each.
         let mut none = 0.0;
         for (vr, value) in vr.iter().zip(&mut *values) {
-            let read = M::TABLE.get(*vr as usize).and_then(|of| of.real(model)).unwrap_or(time);
+            let read = match M::TABLE.get(*vr as usize) {
+                Some(of) => of.real(model).unwrap_or(time),
+                None => implicit_value(model, time, *vr),
+            };
             none += read * 0.0;
             value.write(read);
         }
@@ -29,8 +32,11 @@ impl<M: Exported> Instance<M> {
     #[inline(never)]
     fn refuse_reals(&mut self, vr: &[u32]) -> Outcome {
         let model = self.calculated();
-        for variable in vr.iter().filter_map(|vr| M::TABLE.get(*vr as usize)) {
-            finite(variable, variable.real(model).unwrap_or_default())?;
+        for vr in vr {
+            match M::TABLE.get(*vr as usize) {
+                Some(variable) => finite(variable, variable.real(model).unwrap_or_default())?,
+                None => finite(super::Implicit::<M>::INDICATOR, implicit_value(model, 0.0, *vr))?,
+            };
         }
         Ok(())
     }

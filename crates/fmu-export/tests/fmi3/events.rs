@@ -3,7 +3,7 @@
 use crate::toys::ticker::Name;
 use crate::toys::*;
 use fmu_export::Interface::*;
-use fmu_export::fmi3::types::*;
+use fmu_export::fmi3::{indicator, types::*};
 use fmu_run::fmi3::{Arguments, Importer, Stepped, Updated};
 
 const SUM: u32 = Name::sum as u32;
@@ -38,6 +38,11 @@ fn in_model_exchange() {
     assert_eq!(rates, [-1.0, -9.81]);
     fmu.ok(fmu.fmi3GetEventIndicators(&mut z, 1));
     assert_eq!(z, -0.1);
+    // Section 2.4.8: a variable stands for it.
+    let vr = indicator::<Ball>(0);
+    assert_eq!(fmu.get([vr]), [-0.1]);
+    fmu.refused("a calculated local", |fmu| fmu.fmi3SetFloat64(&vr, 1, &1.0, 1));
+    fmu.refused("no variable", |fmu| fmu.fmi3GetFloat64(&(vr + 1), 1, &mut 0.0, 1));
     fmu.ok(fmu.fmi3GetNominalsOfContinuousStates(nominals.as_mut_ptr(), 2));
     assert!(nominals.iter().all(|nominal| *nominal > 0.0));
     let (mut event, mut terminate) = (9, 9);
