@@ -1,8 +1,8 @@
 //! The model description of FMI 3.0 (section 2.4).
 //!
 //! A variable has the same value reference as in FMI 2.0, its place in the table. Behind the table come variables that
-//! only FMI 3.0 asks for: the [time](time_reference), where it is no variable of the model, and the
-//! [event indicators](indicator_reference).
+//! only FMI 3.0 asks for: the [time](independent), where it is no variable of the model, and the
+//! [event indicators](indicator).
 
 use crate::changes::Changes;
 use crate::check::check;
@@ -11,7 +11,8 @@ use crate::describe::{default_experiment, is_reinit, log_categories, root, with_
 use crate::structure::{ModelStructure, Unknown};
 use crate::xml::Element;
 use anyhow::{Result, ensure};
-use fmu_export::{BaseType, Causality, Exported, Interface, Type, Value, Variable};
+use fmu_export::fmi3::{independent, indicator};
+use fmu_export::{BaseType, Exported, Interface, Type, Value, Variable};
 
 /// The text of `modelDescription.xml` for a model as FMU of FMI 3.0.
 ///
@@ -47,22 +48,6 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
     root.containing(children.into_iter().flatten()).document()
 }
 
-/// The value reference of the time: its place in the table, or behind it if it is no variable of the model.
-pub fn time_reference<M: Exported>() -> u32 {
-    let is_time = |variable: &Variable<M>| variable.causality() == Causality::Independent;
-    place(M::TABLE.iter().position(is_time).unwrap_or(M::TABLE.len()))
-}
-
-/// The value reference of an event indicator, counted from 0: behind the table and the place of the time.
-pub fn indicator_reference<M: Exported>(indicator: usize) -> u32 {
-    place(M::TABLE.len() + 1 + indicator)
-}
-
-/// No table is longer than value references go.
-fn place(place: usize) -> u32 {
-    place.try_into().unwrap_or(u32::MAX)
-}
-
 /// The variables that are not in the table. Every FMU has a time (section 2.4.7.4); indicators that no variable stands
 /// for get one of their own (section 2.4.8).
 fn generated<M: Exported>() -> Vec<Element> {
@@ -74,20 +59,17 @@ fn generated<M: Exported>() -> Vec<Element> {
             .with("causality", causality)
             .with("variability", "continuous")
     };
-    let time = time_reference::<M>();
-    let time = (time == place(M::TABLE.len()))
-        .then(|| variable("time".to_owned(), time, "Simulation time", "independent"));
-    let indicator = |number: usize| {
+    let (time, of) = independent::<M>();
+    let time = M::TABLE
+        .get(time as usize)
+        .is_none()
+        .then(|| variable(of.name().to_owned(), time, of.description(), "independent"));
+    let of_indicator = |number: usize| {
         let name = format!("eventIndicator[{}]", number + 1);
-        variable(
-            name,
-            indicator_reference::<M>(number),
-            "An event happens where it changes its sign",
-            "local",
-        )
-        .with("initial", "calculated")
+        let description = "An event happens where it changes its sign";
+        variable(name, indicator::<M>(number), description, "local").with("initial", "calculated")
     };
-    time.into_iter().chain((0..indicators::<M>()).map(indicator)).collect()
+    time.into_iter().chain((0..indicators::<M>()).map(of_indicator)).collect()
 }
 
 fn indicators<M: Exported>() -> usize {
@@ -168,9 +150,8 @@ fn model_structure<M: Exported>(structure: &ModelStructure) -> Element {
     ];
     let unknowns = unknowns.into_iter().flat_map(|(name, list)| list.iter().map(|of| unknown(name, of)));
     // Without a list of dependencies they depend on everything.
-    let indicator =
-        |number| Element::new("EventIndicator").with("valueReference", indicator_reference::<M>(number));
-    Element::new("ModelStructure").containing(unknowns).containing((0..indicators::<M>()).map(indicator))
+    let of_indicator = |number| Element::new("EventIndicator").with("valueReference", indicator::<M>(number));
+    Element::new("ModelStructure").containing(unknowns).containing((0..indicators::<M>()).map(of_indicator))
 }
 
 fn unknown(name: &str, of: &Unknown) -> Element {

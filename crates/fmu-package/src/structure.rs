@@ -7,9 +7,9 @@
 
 use crate::changes::Changes;
 use crate::check::{check, is_exact, is_known};
-use crate::fmi3::time_reference;
 use crate::sample::{FactorSample, Point, Sampler};
 use anyhow::{Result, bail, ensure};
+use fmu_export::fmi3::independent;
 use fmu_export::{BaseType, Causality, Exported, Initial, Value, Variability, Variable};
 use std::fmt;
 
@@ -74,7 +74,7 @@ impl ModelStructure {
     /// # Errors
     /// As [`of`](Self::of).
     pub fn of_fmi3<M: Exported>(tunable_parameters: bool) -> Result<Self> {
-        Self::with::<M>(tunable_parameters, Some(time_reference::<M>()))
+        Self::with::<M>(tunable_parameters, Some(independent::<M>().0))
     }
 
     /// With `time`, its value reference, for FMI 3.0.

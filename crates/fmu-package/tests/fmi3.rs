@@ -1,5 +1,6 @@
 //! The description for FMI 3.0: every kind of variable, what only FMI 3.0 asks for, the structure.
 
+use fmu_export::fmi3::{independent, indicator};
 use fmu_export::*;
 use fmu_package::structure::DependencyKind::{Constant, Dependent};
 use fmu_package::structure::{ModelStructure, Unknown};
@@ -234,7 +235,7 @@ fn every_kind_of_variable_is_described() {
         has(&text, part);
     }
     assert_eq!(text, self::text(), "made twice");
-    let references = (fmi3::time_reference::<Room>(), fmi3::indicator_reference::<Room>(1));
+    let references = (independent::<Room>().0, indicator::<Room>(1));
     assert_eq!(references, (21, 23));
 }
 
@@ -249,7 +250,7 @@ fn every_output_has_its_dependencies() {
     };
     let structure = ModelStructure::of_fmi3::<Room>(false).unwrap();
     let place = |name: Name| name as u32;
-    let time = fmi3::time_reference::<Room>();
+    let time = independent::<Room>().0;
     assert_eq!(of(&structure.outputs, Name::temperature), [(place(Name::temperature), Constant)]);
     assert_eq!(of(&structure.outputs, Name::wave), [(time, Dependent)]);
     assert_eq!(of(&structure.outputs, Name::double), [(place(Name::single), Dependent)]);
