@@ -4,5 +4,6 @@
 #[path = "../toys/mod.rs"]
 mod toys;
 
+mod fmi3;
 mod sequences;
 mod threads;

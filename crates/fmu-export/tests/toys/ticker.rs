@@ -41,8 +41,11 @@ impl Model for Ticker {
 impl ModelExchange for Ticker {
     fn event(&mut self, time: f64) -> Result<Event, Error> {
         if time >= self.next {
+            if !(self.sum + self.amount).is_finite() {
+                return Err(Error::new("the sum leaves the range of numbers"));
+            }
             self.sum += self.amount;
-            self.ticks += 1;
+            self.ticks = self.ticks.saturating_add(1);
             self.next += PERIOD;
         }
         let terminate = self.ticks >= self.last;

@@ -9,6 +9,7 @@
 
 mod arguments;
 mod call;
+pub mod fmi3;
 
 use crate::serialized::{sealed, time};
 use crate::{Arguments, Functions, Importer};
@@ -226,7 +227,7 @@ impl<M: Exported> Session<'_, M> {
         let call = Call { function, arguments };
         slot.fmu.take_log();
         let answer = call.run(&slot.fmu);
-        check_log(&slot.fmu);
+        check_messages(slot.fmu.take_log());
         let unasked = function == "fmi2CompletedIntegratorStep"
             && M::MODEL_EXCHANGE.is_none_or(|offer| !offer.step_completed);
         assert!(!unasked || answer.values.iter().all(|flag| *flag == 0), "{answer:?}");
@@ -301,7 +302,7 @@ impl<M: Exported> Session<'_, M> {
                 ("fmi2DeSerializeFMUstate", status)
             }
         };
-        check_log(fmu);
+        check_messages(fmu.take_log());
         assert!([Status::Ok, Status::Error].contains(&status), "{function} answers {status:?}");
         if function == "fmi2SetFMUstate" && status == Status::Ok {
             slot.start_over();
@@ -361,8 +362,7 @@ fn damage(bytes: &mut Vec<u8>, u: &mut Unstructured) -> Result<()> {
 }
 
 /// Messages that every importer shows as they are, and one at most about what is refused.
-fn check_log(fmu: &Importer) {
-    let messages = fmu.take_log();
+fn check_messages(messages: Vec<crate::Message>) {
     let refusals = messages.iter().filter(|message| ![Status::Ok, Status::Warning].contains(&message.status));
     assert!(refusals.count() <= 1, "{messages:#?}");
     for message in messages {

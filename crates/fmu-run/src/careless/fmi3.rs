@@ -1,0 +1,483 @@
+//! The careless importer of FMI 3.0: the same promises, and the same arguments where a function has its like in FMI 2.0.
+
+use super::arguments::{CallArguments, Variables};
+use super::{Tally, check_messages, damage, offered, place};
+use crate::fmi3::{Arguments, FUNCTIONS, Functions, Importer};
+use crate::serialized::time;
+use arbitrary::{Result, Unstructured};
+use fmu_export::fmi3::types::*;
+use fmu_export::{Exported, Interface};
+use std::ffi::CStr;
+use std::marker::PhantomData;
+use std::ptr::{null, null_mut};
+
+/// Makes the calls that the bytes stand for and counts them.
+///
+/// # Panics
+/// At the first broken promise.
+pub fn run<M: Exported>(bytes: &[u8], tally: &mut Tally) {
+    let mut session = Session::<M> {
+        instances: [const { None }; 2],
+        states: [null_mut(); 2],
+        saved: Vec::new(),
+        variables: Variables::of::<M>(),
+        tally,
+        model: PhantomData,
+    };
+    let mut u = Unstructured::new(bytes);
+    while !u.is_empty() && session.act(&mut u).is_ok() {}
+    session.end();
+}
+
+struct Session<'a, M> {
+    instances: [Option<Slot>; 2],
+    states: [fmi3FMUState; 2],
+    saved: Vec<u8>,
+    variables: Variables,
+    tally: &'a mut Tally,
+    model: PhantomData<M>,
+}
+
+/// An instance, where it was last saved, and what was done since.
+struct Slot {
+    fmu: Importer,
+    made_of: Arguments<'static>,
+    saved: Vec<u8>,
+    since: Vec<(Call, Answer)>,
+}
+
+#[derive(Clone, Debug)]
+struct Call {
+    function: &'static str,
+    arguments: CallArguments,
+}
+
+/// What a call answered, as bits.
+#[derive(Clone, Debug, PartialEq)]
+struct Answer {
+    status: Status,
+    values: Vec<u64>,
+}
+
+/// What is in an array of texts before the FMU writes.
+const UNTOUCHED_TEXT: &CStr = c"untouched";
+
+/// Calls that are remembered for a replay.
+const MEMORY: usize = 40;
+
+/// What importers call most, by interface type.
+const STEPS: [&str; 8] = [
+    "fmi3DoStep",
+    "fmi3DoStep",
+    "fmi3DoStep",
+    "fmi3SetFloat64",
+    "fmi3GetFloat64",
+    "fmi3EnterEventMode",
+    "fmi3UpdateDiscreteStates",
+    "fmi3EnterStepMode",
+];
+const INTEGRATION: [&str; 9] = [
+    "fmi3SetTime",
+    "fmi3SetContinuousStates",
+    "fmi3SetFloat64",
+    "fmi3GetFloat64",
+    "fmi3GetContinuousStateDerivatives",
+    "fmi3CompletedIntegratorStep",
+    "fmi3EnterEventMode",
+    "fmi3UpdateDiscreteStates",
+    "fmi3EnterContinuousTimeMode",
+];
+
+/// The function of FMI 2.0 with arguments like these.
+fn like(function: &str) -> &str {
+    match function {
+        "fmi3GetFloat64" => "fmi2GetReal",
+        "fmi3SetFloat64" => "fmi2SetReal",
+        "fmi3GetBoolean" | "fmi3SetBoolean" => "fmi2GetBoolean",
+        "fmi3GetString" | "fmi3SetString" => "fmi2GetString",
+        "fmi3DoStep" => "fmi2DoStep",
+        "fmi3GetOutputDerivatives" => "fmi2GetRealOutputDerivatives",
+        "fmi3GetDirectionalDerivative" | "fmi3GetAdjointDerivative" => "fmi2GetDirectionalDerivative",
+        "fmi3GetContinuousStateDerivatives" => "fmi2GetDerivatives",
+        "fmi3GetEventIndicators" => "fmi2GetEventIndicators",
+        name if name.contains("Int") => "fmi2GetInteger",
+        name => name,
+    }
+}
+
+/// The functions of saved states have handles besides arguments: the session calls them.
+fn has_handles(function: &str) -> bool {
+    function.contains("FMUState")
+}
+
+impl Call {
+    /// Whether the state must be the same after this answer. A step that ends early where it must not has got somewhere.
+    fn must_not_change(&self, status: Status, log: &[crate::Message]) -> bool {
+        let early = log.iter().any(|message| message.text.contains("earlyReturnAllowed has ruled out"));
+        status != Status::Ok && !early || self.function.starts_with("fmi3Get")
+    }
+
+    /// Calls the function. Panics if it answers what it must not.
+    fn run(&self, fmu: &Importer) -> Answer {
+        let (a, mut values) = (&self.arguments, Vec::new());
+        let (vr, n) = (a.pointer(0, &a.vr), a.count(a.vr.len()));
+        // At times another number of values.
+        let m = if a.kind == 3 { n.saturating_add(1) } else { n };
+        let room = a.vr.len() + 2;
+        let truth = |flag: fmi3Boolean| {
+            assert!(flag <= 1, "{flag} is no truth value: {self:?}");
+            u64::from(flag)
+        };
+        macro_rules! get {
+            ($get:ident, $untouched:expr, $bits:expr) => {{
+                let mut out = vec![$untouched; room];
+                let status = fmu.$get(vr, n, a.output(1, &mut out), m);
+                assert!(out[a.vr.len()..].iter().all(|value| *value == $untouched), "{self:?}");
+                if status == Status::Ok {
+                    values.extend(out[..a.vr.len()].iter().map($bits));
+                }
+                status
+            }};
+        }
+        macro_rules! set {
+            ($set:ident, $source:ident, $convert:expr) => {{
+                let mut source: Vec<_> = a.$source.iter().map($convert).collect();
+                source.resize(room, source.first().copied().unwrap_or_default());
+                fmu.$set(vr, n, a.pointer(1, &source), m)
+            }};
+        }
+        macro_rules! real {
+            ($call:ident) => {{
+                let mut out = vec![f64::INFINITY; room];
+                let status = fmu.$call(a.output(1, &mut out), n);
+                assert!(out[a.vr.len()..].iter().all(|value| *value == f64::INFINITY), "{self:?}");
+                if status == Status::Ok {
+                    values.extend(out[..a.vr.len()].iter().map(|value| finite(*value)));
+                }
+                status
+            }};
+        }
+        let [first, second, third] = a.numbers;
+        let status = match self.function {
+            "fmi3SetDebugLogging" => {
+                fmu.fmi3SetDebugLogging(a.flags[0] as u8, n, a.pointer(0, &a.categories))
+            }
+            "fmi3EnterInitializationMode" => fmu.fmi3EnterInitializationMode(
+                (a.flags[0] == 3).into(),
+                third,
+                first,
+                (a.flags[1] == 3).into(),
+                first + 1e4,
+            ),
+            "fmi3GetFloat32" => get!(fmi3GetFloat32, f32::INFINITY, |value| u64::from(value.to_bits())),
+            "fmi3GetFloat64" => get!(fmi3GetFloat64, f64::INFINITY, |value| finite(*value)),
+            "fmi3GetInt8" => get!(fmi3GetInt8, 77, |value| *value as u64),
+            "fmi3GetUInt8" => get!(fmi3GetUInt8, 77, |value| u64::from(*value)),
+            "fmi3GetInt16" => get!(fmi3GetInt16, 77, |value| *value as u64),
+            "fmi3GetUInt16" => get!(fmi3GetUInt16, 77, |value| u64::from(*value)),
+            "fmi3GetInt32" => get!(fmi3GetInt32, 77, |value| *value as u64),
+            "fmi3GetUInt32" => get!(fmi3GetUInt32, 77, |value| u64::from(*value)),
+            "fmi3GetInt64" => get!(fmi3GetInt64, 77, |value| *value as u64),
+            "fmi3GetUInt64" => get!(fmi3GetUInt64, 77, |value| *value),
+            "fmi3GetBoolean" => get!(fmi3GetBoolean, 77, |value| truth(*value)),
+            "fmi3GetString" => get!(fmi3GetString, UNTOUCHED_TEXT.as_ptr(), |text: &fmi3String| {
+                assert!(!text.is_null() && *text != UNTOUCHED_TEXT.as_ptr());
+                // SAFETY: not NULL; a string of the FMU's, valid until the next call.
+                let bytes = unsafe { CStr::from_ptr(*text) }.to_bytes();
+                u64::from_le_bytes(crate::serialized::fnv1a(bytes))
+            }),
+            "fmi3GetBinary" => {
+                let (mut sizes, mut out) = (vec![0; room], vec![null(); room]);
+                fmu.fmi3GetBinary(vr, n, sizes.as_mut_ptr(), out.as_mut_ptr(), m)
+            }
+            "fmi3SetFloat32" => set!(fmi3SetFloat32, reals, |value| *value as f32),
+            "fmi3SetFloat64" => set!(fmi3SetFloat64, reals, |value| *value),
+            "fmi3SetInt8" => set!(fmi3SetInt8, integers, |value| *value as i8),
+            "fmi3SetUInt8" => set!(fmi3SetUInt8, integers, |value| *value as u8),
+            "fmi3SetInt16" => set!(fmi3SetInt16, integers, |value| *value as i16),
+            "fmi3SetUInt16" => set!(fmi3SetUInt16, integers, |value| *value as u16),
+            "fmi3SetInt32" => set!(fmi3SetInt32, integers, |value| *value),
+            "fmi3SetUInt32" => set!(fmi3SetUInt32, integers, |value| *value as u32),
+            "fmi3SetInt64" => set!(fmi3SetInt64, integers, |value| i64::from(*value)),
+            "fmi3SetUInt64" => set!(fmi3SetUInt64, integers, |value| *value as u64),
+            "fmi3SetBoolean" => set!(fmi3SetBoolean, integers, |value| *value as u8),
+            "fmi3SetString" => {
+                let mut texts = a.texts.clone();
+                texts.resize(room, null());
+                fmu.fmi3SetString(vr, n, a.pointer(1, &texts), m)
+            }
+            "fmi3GetNumberOfVariableDependencies" | "fmi3GetVariableDependencies" => {
+                let (of, mut count) = (a.vr.first().copied().unwrap_or(u32::MAX), 0);
+                let status = fmu.fmi3GetNumberOfVariableDependencies(of, &mut count);
+                values.push(count as u64);
+                if status != Status::Ok || self.function == "fmi3GetNumberOfVariableDependencies" {
+                    status
+                } else {
+                    let (mut own, mut kinds) = (vec![9; count + 1], vec![0; count + 1]);
+                    let (mut known, mut other) = (vec![0; count + 1], vec![0; count + 1]);
+                    let count = if a.kind == 3 { count + 1 } else { count };
+                    let (own, known) = (own.as_mut_ptr(), known.as_mut_ptr());
+                    fmu.fmi3GetVariableDependencies(
+                        of,
+                        own,
+                        known,
+                        other.as_mut_ptr(),
+                        kinds.as_mut_ptr(),
+                        count,
+                    )
+                }
+            }
+            "fmi3GetDirectionalDerivative" | "fmi3GetAdjointDerivative" => {
+                let forward = self.function == "fmi3GetDirectionalDerivative";
+                let (wanted, seeds) = if forward { (n, a.known.len()) } else { (a.known.len(), n) };
+                let mut out = vec![f64::INFINITY; wanted.min(room + a.known.len()) + 1];
+                let (seed, known) = (a.pointer(2, &a.reals), a.pointer(3, &a.known));
+                let call = if forward {
+                    Importer::fmi3GetDirectionalDerivative
+                } else {
+                    Importer::fmi3GetAdjointDerivative
+                };
+                let status =
+                    call(fmu, vr, n, known, a.known.len(), seed, seeds, a.output(1, &mut out), wanted);
+                if status == Status::Ok {
+                    values.extend(out[..wanted].iter().map(|value| finite(*value)));
+                }
+                status
+            }
+            "fmi3UpdateDiscreteStates" => {
+                let (mut flags, mut next) = ([2; 5], f64::NAN);
+                let [x, y, z, v, w] = &mut flags;
+                let status = fmu.fmi3UpdateDiscreteStates(x, y, z, v, w, &mut next);
+                if status == Status::Ok {
+                    values.extend(flags.map(truth));
+                    values.push(finite(next));
+                }
+                status
+            }
+            "fmi3CompletedIntegratorStep" => {
+                let (mut event, mut terminate) = (2, 2);
+                let status = fmu.fmi3CompletedIntegratorStep(1, &mut event, &mut terminate);
+                if status == Status::Ok {
+                    values.extend([event, terminate].map(truth));
+                }
+                status
+            }
+            "fmi3SetTime" => fmu.fmi3SetTime(first),
+            "fmi3SetContinuousStates" => fmu.fmi3SetContinuousStates(a.pointer(0, &a.reals), n),
+            "fmi3GetContinuousStateDerivatives" => real!(fmi3GetContinuousStateDerivatives),
+            "fmi3GetEventIndicators" => real!(fmi3GetEventIndicators),
+            "fmi3GetContinuousStates" => real!(fmi3GetContinuousStates),
+            "fmi3GetNominalsOfContinuousStates" => real!(fmi3GetNominalsOfContinuousStates),
+            "fmi3GetOutputDerivatives" => {
+                let mut out = vec![f64::INFINITY; room];
+                let orders = a.pointer(2, &a.orders);
+                let status = fmu.fmi3GetOutputDerivatives(vr, n, orders, a.output(1, &mut out), m);
+                if status == Status::Ok {
+                    values.extend(out[..a.vr.len()].iter().map(|value| finite(*value)));
+                }
+                status
+            }
+            "fmi3DoStep" => {
+                let (mut event, mut terminate, mut early, mut end) = (2, 2, 2, f64::NAN);
+                let status =
+                    fmu.fmi3DoStep(first, second, 1, &mut event, &mut terminate, &mut early, &mut end);
+                if status == Status::Ok {
+                    values.extend([event, terminate, early].map(truth));
+                    values.push(finite(end));
+                    assert!(second > 0.0 && end >= first && end <= first + second, "{end}: {self:?}");
+                    assert!(early == 0 || end < first + second, "not early: {self:?}");
+                }
+                status
+            }
+            "fmi3GetNumberOfEventIndicators" => count(&mut values, |n| fmu.fmi3GetNumberOfEventIndicators(n)),
+            "fmi3GetNumberOfContinuousStates" => {
+                count(&mut values, |n| fmu.fmi3GetNumberOfContinuousStates(n))
+            }
+            name => fmu.call_with_zeros(name),
+        };
+        assert!([Status::Ok, Status::Error].contains(&status), "{status:?}: {self:?}");
+        Answer { status, values }
+    }
+}
+
+fn count(values: &mut Vec<u64>, call: impl FnOnce(*mut usize) -> Status) -> Status {
+    let mut number = usize::MAX;
+    let status = call(&mut number);
+    values.push(number as u64);
+    status
+}
+
+fn finite(value: f64) -> u64 {
+    assert!(value.is_finite(), "{value} is no number to answer");
+    value.to_bits()
+}
+
+impl<M: Exported> Session<'_, M> {
+    fn count(&mut self, function: &'static str, status: Status) {
+        let column = if status == Status::Ok { 0 } else { 2 };
+        self.tally.entry(function).or_default()[column] += 1;
+    }
+
+    fn act(&mut self, u: &mut Unstructured) -> Result<()> {
+        let index = u.int_in_range(0..=self.instances.len() - 1)?;
+        let kind = u.int_in_range(0..=63_u8)?;
+        let Some(slot) = &self.instances[index] else { return self.instantiate(index, u) };
+        let steps = slot.made_of.interface == Interface::CoSimulation;
+        match kind {
+            0 => self.instantiate(index, u)?,
+            1..=4 => self.initialize(index),
+            5..=7 => self.replay(index, u.arbitrary()?),
+            8..=13 => self.handle(index, u)?,
+            14..=42 => {
+                let function = if steps { *u.choose(&STEPS)? } else { *u.choose(&INTEGRATION)? };
+                self.call(index, function, u)?;
+            }
+            _ => {
+                let function = *u.choose(FUNCTIONS)?;
+                let ends = ["fmi3Reset", "fmi3Terminate"].contains(&function);
+                if !has_handles(function) && (!ends || u.ratio(1, 8)?) {
+                    self.call(index, function, u)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn instantiate(&mut self, index: usize, u: &mut Unstructured) -> Result<()> {
+        self.instances[index] = None;
+        let both = M::CO_SIMULATION.is_some() && M::MODEL_EXCHANGE.is_some();
+        let any = *u.choose(&[Interface::CoSimulation, Interface::ModelExchange])?;
+        let mut made_of = Arguments::of::<M>(if both { any } else { offered::<M>() });
+        let has_events = M::CO_SIMULATION.is_some_and(|offer| offer.events);
+        made_of.logging_on = u.int_in_range(0..=2)?;
+        made_of.early_return_allowed = u.int_in_range(0..=1)?;
+        made_of.event_mode_used = (has_events && u.arbitrary()?).into();
+        let fmu = Importer::with::<M>(&made_of);
+        let saved = fmu.bytes();
+        self.instances[index] = Some(Slot { fmu, made_of, saved, since: Vec::new() });
+        if u.ratio(7, 8)? {
+            self.initialize(index);
+        }
+        Ok(())
+    }
+
+    /// The calls that random ones seldom make in this order.
+    fn initialize(&mut self, index: usize) {
+        let Some(slot) = &mut self.instances[index] else { return };
+        let statuses = [
+            ("fmi3Reset", slot.fmu.fmi3Reset()),
+            ("fmi3EnterInitializationMode", slot.fmu.fmi3EnterInitializationMode(0, 0.0, 0.0, 0, 0.0)),
+            ("fmi3ExitInitializationMode", slot.fmu.fmi3ExitInitializationMode()),
+        ];
+        slot.start_over();
+        for (function, status) in statuses {
+            self.count(function, status);
+        }
+    }
+
+    fn call(&mut self, index: usize, function: &'static str, u: &mut Unstructured) -> Result<()> {
+        let Some(slot) = &mut self.instances[index] else { return Ok(()) };
+        let before = slot.fmu.bytes();
+        let arguments = CallArguments::decode(u, like(function), time(&before), &self.variables)?;
+        let call = Call { function, arguments };
+        slot.fmu.take_log();
+        let answer = call.run(&slot.fmu);
+        let log = slot.fmu.take_log();
+        if call.must_not_change(answer.status, &log) {
+            assert_eq!(before, slot.fmu.bytes(), "changed by a call that answered {answer:?}: {call:?}");
+        }
+        check_messages(log);
+        let status = answer.status;
+        slot.since.push((call, answer));
+        if slot.since.len() == MEMORY {
+            self.replay(index, false);
+        }
+        self.count(function, status);
+        Ok(())
+    }
+
+    /// Makes the calls since the last saved state again, in this instance or in a new one.
+    fn replay(&mut self, index: usize, elsewhere: bool) {
+        let Some(slot) = &mut self.instances[index] else { return };
+        let end = slot.fmu.bytes();
+        let other = elsewhere.then(|| Importer::with::<M>(&slot.made_of));
+        let fmu = other.as_ref().unwrap_or(&slot.fmu);
+        fmu.restore(&slot.saved);
+        for (call, answer) in &slot.since {
+            assert_eq!(call.run(fmu), *answer, "another answer from the same state: {call:?}");
+        }
+        assert_eq!(fmu.bytes(), end, "another end from the same state");
+        slot.start_over();
+    }
+
+    /// The six functions of saved states. States go from any instance to any other.
+    fn handle(&mut self, index: usize, u: &mut Unstructured) -> Result<()> {
+        let which = u.int_in_range(0..=self.states.len() - 1)?;
+        let Some(slot) = &mut self.instances[index] else { return Ok(()) };
+        let (fmu, state) = (&slot.fmu, &mut self.states[which]);
+        let before = fmu.bytes();
+        fmu.take_log();
+        let (function, status) = match u.int_in_range(0..=6_u8)? {
+            0 | 1 => ("fmi3GetFMUState", fmu.fmi3GetFMUState(place(state, u)?)),
+            2 => ("fmi3SetFMUState", fmu.fmi3SetFMUState(*state)),
+            3 => ("fmi3FreeFMUState", fmu.fmi3FreeFMUState(place(state, u)?)),
+            4 => {
+                let mut size = 0;
+                ("fmi3SerializedFMUStateSize", fmu.fmi3SerializedFMUStateSize(*state, place(&mut size, u)?))
+            }
+            5 => {
+                let mut bytes = before.clone();
+                if u.ratio(1, 4)? {
+                    bytes.resize(u.int_in_range(0..=1000)?, 0);
+                }
+                let status = fmu.fmi3SerializeFMUState(*state, bytes.as_mut_ptr(), bytes.len());
+                if status == Status::Ok {
+                    self.saved = bytes;
+                }
+                ("fmi3SerializeFMUState", status)
+            }
+            _ => {
+                damage(&mut self.saved, u)?;
+                let old = *state;
+                let (bytes, size) = (self.saved.as_ptr(), self.saved.len());
+                let status = fmu.fmi3DeserializeFMUState(bytes, size, place(state, u)?);
+                assert!(status == Status::Ok || *state == old, "a handle changed by a refused call");
+                ("fmi3DeserializeFMUState", status)
+            }
+        };
+        check_messages(fmu.take_log());
+        assert!([Status::Ok, Status::Error].contains(&status), "{function} answers {status:?}");
+        if function == "fmi3SetFMUState" && status == Status::Ok {
+            slot.start_over();
+        } else {
+            assert_eq!(before, fmu.bytes(), "changed by {function}, which answered {status:?}");
+        }
+        self.count(function, status);
+        Ok(())
+    }
+
+    /// Replays what is left, then frees everything, states after their instances too.
+    fn end(mut self) {
+        for index in 0..self.instances.len() {
+            self.replay(index, index % 2 == 0);
+            self.instances[index] = None;
+        }
+        let stranger = Importer::of::<M>(offered::<M>());
+        for state in self.states {
+            stranger.forget(state);
+        }
+        // What must survive that there is no instance.
+        for (function, status) in Importer::null(Functions::of::<M>()).call_all() {
+            assert_eq!(status, Status::Error, "{function} without an instance");
+            self.count(function, status);
+        }
+    }
+}
+
+impl Slot {
+    /// Remembers calls from here on.
+    fn start_over(&mut self) {
+        self.saved = self.fmu.bytes();
+        self.since.clear();
+    }
+}
