@@ -282,7 +282,7 @@ mod tests {
             (3.0, 1.0, 1.0)
         );
         assert_eq!(Type::integer("Count").from(-1).to(9).of, Attributes::Integer { min: -1, max: 9 });
-        assert_eq!(INTEGER.of, Attributes::Integer { min: i32::MIN, max: i32::MAX });
+        assert_eq!(INTEGER.of, Attributes::Integer { min: i32::MIN.into(), max: i32::MAX.into() });
     }
 
     #[test]
