@@ -3,8 +3,9 @@
 //! ## Inside
 //!
 //! What an author writes: [`Model`] with a table of [`variables!`], the capabilities, [`export_fmu!`]. Below it, from
-//! the inside out: `instance` has what each call checks and does, free of pointers and of versions of FMI; [`fmi2`]
-//! has the C functions of the standard, its table of allowed calls, and all `unsafe`.
+//! the inside out: `instance` has what each call checks and does, free of pointers and of versions of FMI; `boundary`
+//! what C functions have in common; [`fmi2`] and [`fmi3`] the C functions of the standards, each with its table of allowed
+//! calls. All `unsafe` is in these three.
 
 mod boundary;
 mod capabilities;

@@ -139,6 +139,8 @@ pub(crate) struct Logger {
     enabled: u8,
     /// What is shown where nothing else is said.
     always: u8,
+    /// What nobody can switch off: errors in FMI 3.0 (section 2.3.1), nothing in FMI 2.0.
+    fixed: u8,
     waiting: Vec<Message>,
 }
 
@@ -147,11 +149,11 @@ impl Logger {
     /// warnings are in FMI 2.0 only.
     pub fn new(standard: Standard, logging_on: bool) -> Self {
         let errors = Category::Error.bit() | Category::Fatal.bit();
-        let always = match standard {
-            Standard::Fmi2 => errors | Category::Warning.bit(),
-            Standard::Fmi3 => errors,
+        let (always, fixed) = match standard {
+            Standard::Fmi2 => (errors | Category::Warning.bit(), 0),
+            Standard::Fmi3 => (errors, errors),
         };
-        let mut logger = Self { enabled: 0, always, waiting: Vec::new() };
+        let mut logger = Self { enabled: 0, always, fixed, waiting: Vec::new() };
         logger.set_all(logging_on);
         logger
     }
@@ -166,7 +168,7 @@ impl Logger {
         if on {
             self.enabled |= categories;
         } else {
-            self.enabled &= !categories;
+            self.enabled &= !categories | self.fixed;
         }
     }
 

@@ -139,6 +139,8 @@ fn logging() {
     fmu.ok(fmu.fmi3SetDebugLogging(fmi3True, 0, null()));
     fmu.initialize(0.0);
     assert!(fmu.take_log().iter().any(|message| message.text == "initialized"));
+    // Errors cannot be switched off.
+    fmu.ok(fmu.fmi3SetDebugLogging(fmi3False, 1, &c"logAll".as_ptr()));
     fmu.refused("no category", |fmu| fmu.fmi3SetDebugLogging(fmi3True, 1, &c"logNothing".as_ptr()));
 }
 
