@@ -209,7 +209,7 @@ fn wrong_requests_are_refused_in_one_line() {
         (&["--binary", &format!("win64={library}")], "it is for darwin64, not for win64"),
         (&["--binary", &format!("aarch64-darwin={library}")], "add --any-processor"),
         (
-            &["--any-processor", "--binary", &format!("aarch64-darwin={library}")],
+            &["--fmi", "2", "--any-processor", "--binary", &format!("aarch64-darwin={library}")],
             "was not compiled from these sources and parameters",
         ),
         (&["--binary", &format!("darwin64={library}")], "was not compiled from these sources and parameters"),

@@ -82,7 +82,7 @@ def test_the_bill_of_materials(fmu):
     assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(text) is None
     assert zipfile.ZipFile(fmu).read(f"documentation/licenses/{BILL}").decode() == text
     components = {component["name"]: component for component in json.loads(text)["components"]}
-    assert {"nalgebra", "libc", "fmi2-export", "std"} <= set(components)
+    assert {"nalgebra", "libc", "fmu-export", "std"} <= set(components)
     # What only packs the FMU is not in it.
     assert not {"clap", "zip", "serde_json", "anyhow"} & set(components)
 

@@ -84,7 +84,8 @@ pub struct Event {
     pub terminate: bool,
     /// The orders of magnitude of the states have changed.
     pub nominals_changed: bool,
-    /// The event has changed states.
+    /// The event has changed states. Say so as well when it makes the derivatives jump: FMPy, for one, restarts its
+    /// integrator only then.
     pub states_changed: bool,
     /// When the next event is due, s.
     pub next: Option<f64>,

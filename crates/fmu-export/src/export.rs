@@ -100,7 +100,7 @@ macro_rules! offer {
             impl<T: $crate::$capability> Is<T> {
                 const IMPLEMENTED: bool = true;
             }
-            if <Is<$model>>::IMPLEMENTED != (<$model as $crate::Exported>::$($offered)+) {
+            if <Is<$model>>::IMPLEMENTED && !(<$model as $crate::Exported>::$($offered)+) {
                 ::core::panic!(::core::concat!(
                     ::core::stringify!($model), " implements ", ::core::stringify!($capability),
                     ": name it in export_fmu! as well"

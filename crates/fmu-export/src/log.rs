@@ -94,7 +94,7 @@ impl Message {
 }
 
 /// A model's messages to the user. A field of the model; [`Model::log`](crate::Model::log) hands it out, and what is
-/// in it is delivered at the end of the call.
+/// in it is delivered at the end of the call, `%`, `#` and control characters as `_`: importers give them a meaning.
 ///
 /// ```
 /// # let mut log = fmu_export::Log::default();

@@ -46,6 +46,9 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// was read from bytes: checks what concerns several values and prepares what depends on them. Ranges of single
     /// parameters have been checked.
     ///
+    /// Many importers, FMPy among them, set one parameter a call: a pair of values that fits must be reached over pairs
+    /// that fit as well.
+    ///
     /// Not called after inputs, states or start values of outputs have been set.
     ///
     /// # Errors
@@ -67,7 +70,8 @@ pub trait Model: Variables + Clone + Send + Sync {
     #[inline]
     fn calculate(&mut self, _time: f64) {}
 
-    /// The model's messages to the user, if it has any: a [`Log`] among its fields.
+    /// The model's messages to the user, if it has any: a [`Log`] among its fields. What is in a log that this does
+    /// not hand out is never delivered.
     #[inline]
     fn log(&mut self) -> Option<&mut Log> {
         None

@@ -351,11 +351,7 @@ impl<M> Variable<M> {
                 return Some("its value is the time: it has neither in nor by");
             }
             Some(Read { base, .. }) if base as u8 != self.of.base() as u8 => {
-                return Some(
-                    "the Rust type of its value is not that of its type: f64 for a Real, i32 for an \
-                             Integer, bool for a Boolean, String for a String, an enumeration! for an Enumeration, \
-                     f32 for a Float32, i8 to u64 for an Int8 to UInt64, Vec<u8> for a Binary",
-                );
+                return Some(wrong_type(self.of.base()));
             }
             _ => {}
         }
@@ -495,6 +491,26 @@ pub fn read<M, T>(model: &M, calculate: impl Fn(&M) -> T) -> T {
 /// Ends the compilation with a message: a variable's name and what is wrong with it.
 pub(crate) const fn refuse(name: &str, fault: &str) -> ! {
     panic!("{}", Message::new(name, fault).text())
+}
+
+/// What to say of a value whose Rust type is not that of the variable's type.
+const fn wrong_type(base: BaseType) -> &'static str {
+    match base {
+        BaseType::Real => "it is a Real, so its value must be an f64",
+        BaseType::Float32 => "it is a Float32, so its value must be an f32",
+        BaseType::Integer => "it is an Integer, so its value must be an i32",
+        BaseType::Int8 => "it is an Int8, so its value must be an i8",
+        BaseType::UInt8 => "it is a UInt8, so its value must be a u8",
+        BaseType::Int16 => "it is an Int16, so its value must be an i16",
+        BaseType::UInt16 => "it is a UInt16, so its value must be a u16",
+        BaseType::UInt32 => "it is a UInt32, so its value must be a u32",
+        BaseType::Int64 => "it is an Int64, so its value must be an i64",
+        BaseType::UInt64 => "it is a UInt64, so its value must be a u64",
+        BaseType::Boolean => "it is a Boolean, so its value must be a bool",
+        BaseType::String => "it is a String, so its value must be a String",
+        BaseType::Binary => "it is a Binary, so its value must be a Vec<u8>",
+        BaseType::Enumeration => "it is an Enumeration, so its value must be an enum made by enumeration!",
+    }
 }
 
 /// The text of such a message.

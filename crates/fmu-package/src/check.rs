@@ -41,6 +41,7 @@ pub(crate) fn check<M: Exported>(changes: &Changes) -> Result<Starts> {
     );
     check_derivatives::<M>()?;
     let mut starts = check_starts::<M>()?;
+    check_indicators::<M>()?;
     check_changes::<M>(changes, &mut starts)?;
     Ok(starts)
 }
@@ -260,6 +261,23 @@ fn check_starts<M: Exported>() -> Result<Starts> {
         }
     }
     Ok(all.swap_remove(0).1)
+}
+
+/// An indicator that is never filled in would be an event that never happens.
+fn check_indicators<M: Exported>() -> Result<()> {
+    let Some(offer) = M::MODEL_EXCHANGE else { return Ok(()) };
+    let mut model = new_model::<M>(Interface::ModelExchange)?;
+    model.calculate(0.0);
+    let fill = |mark: f64| {
+        let mut indicators = vec![mark; offer.indicators];
+        model.exported_indicators(&mut indicators);
+        indicators
+    };
+    let forgotten = fill(1.0).iter().zip(fill(2.0)).position(|(one, two)| (*one, two) == (1.0, 2.0));
+    match forgotten {
+        Some(place) => bail!("{}: indicators() does not fill in indicator {place}", M::INFO.name),
+        None => Ok(()),
+    }
 }
 
 fn new_model<M: Exported>(interface: Interface) -> Result<M> {

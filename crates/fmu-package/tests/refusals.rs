@@ -423,3 +423,35 @@ fn models_that_start_in_some_odd_way_are_refused() {
     refused::<unwritable::Toy>("the start value of text has a character that XML has not: \"a\\u{1}\"");
     refused::<self_refusing::Toy>("these start values make no model: no is no");
 }
+
+#[test]
+fn an_indicator_that_is_never_filled_in_is_refused() {
+    #[derive(Clone)]
+    pub struct Toy {
+        level: f64,
+    }
+
+    variables! { for Toy;
+        /// U
+        u = input(&NUMBER) in level;
+    }
+
+    impl Model for Toy {
+        const INFO: Info = Info::new("Toy", "toy", "{toy}");
+
+        fn new(_: &Setup) -> Result<Self, Error> {
+            Ok(Self { level: 1.0 })
+        }
+    }
+
+    impl ModelExchange for Toy {
+        const INDICATORS: usize = 2;
+
+        fn indicators(&self, indicators: &mut [f64]) {
+            indicators[0] = self.level;
+        }
+    }
+
+    offer!(Toy: ModelExchange);
+    refused::<Toy>("Toy: indicators() does not fill in indicator 1");
+}

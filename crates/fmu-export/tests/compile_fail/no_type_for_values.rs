@@ -1,4 +1,4 @@
-//! No variable is a u64.
+//! No variable is a character.
 use fmu_export::*;
 
 #[derive(Clone)]
@@ -10,7 +10,7 @@ pub struct Toy {
 
 variables! { for Toy;
     /// An output
-    y = output(&INTEGER) by |_| 7_u64;
+    y = output(&INTEGER) by |_| '7';
 }
 
 fn main() {}
