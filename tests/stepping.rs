@@ -126,6 +126,86 @@ fn a_testbed_at_rest_stays_at_rest() {
     assert_eq!(testbed.state, start);
 }
 
+/// What is left of earlier steps is used for its own parameters and its own step size only.
+#[test]
+fn the_past_does_not_matter() {
+    let p = Parameters::BUILT_IN;
+    let other = Parameters { k1: 2.0 * p.k1, ..p };
+    let step = |testbed: &mut Testbed, h: f64| {
+        testbed.state = [0.1, -0.2, 0.15, 0.05, 1.0, -2.0];
+        testbed.motors = Default::default();
+        sample(testbed, [0.1, 0.3], [3.0, -1.0]);
+        assert!(testbed.step(h));
+        testbed.state
+    };
+    let fresh = |p: Parameters, h| step(&mut Testbed::new(p).unwrap(), h);
+    // More sizes than are remembered, some of them nearly the same.
+    let sizes = || (0..12).flat_map(|i| [1e-3 + 1e-10 * f64::from(i), 1e-3, 1e-3 * f64::from(i % 3 + 1)]);
+
+    let mut testbed = Testbed::new(p).unwrap();
+    for h in sizes() {
+        assert_eq!(step(&mut testbed, h), fresh(p, h), "{h}");
+    }
+    let saved = testbed.clone();
+    testbed.parameters = other;
+    testbed.parameters_changed().unwrap();
+    for h in sizes() {
+        assert_eq!(step(&mut testbed, h), fresh(other, h), "{h} after the parameters have changed");
+    }
+    testbed.clone_from(&saved);
+    for h in sizes() {
+        assert_eq!(step(&mut testbed, h), fresh(p, h), "{h} after a saved testbed is back");
+    }
+}
+
+/// Without damping of the load nothing holds a testbed back that turns as a whole: it does so to the last digits,
+/// however stiff it is and however long the step.
+#[test]
+fn a_testbed_that_turns_goes_on_turning() {
+    let mut worst = 0.0_f64;
+    for exponents in (0..4).flat_map(|k| (0..4).map(move |c| [k, c])) {
+        let [k, c] = exponents.map(|exponent| 1e3_f64.powi(exponent));
+        let built_in = Parameters::BUILT_IN;
+        let p = Parameters {
+            k1: built_in.k1 * k,
+            k2: built_in.k2 * k,
+            c1: built_in.c1 * c * 1e-3,
+            c2: built_in.c2 * c * 1e-3,
+            c3: 0.0,
+            ..built_in
+        };
+        for h in [1e-4, 1e-3, 1e-2, 0.1, 1.0] {
+            let omega = [3.0, -1.0];
+            let mut testbed = Testbed::new(p).unwrap();
+            testbed.state = [0.0, 0.0, 0.0, 0.0, omega[0], omega[1]];
+            sample(&mut testbed, [0.0; 2], omega);
+            assert!(testbed.step(h));
+            for (motor, omega) in omega.into_iter().enumerate() {
+                let [q_i, q_ii, v] = [0, 2, 4].map(|place| testbed.state[place + motor]);
+                let error = [q_i / h, q_ii / h, v].map(|rate| ((rate - omega) / omega).abs());
+                worst = error.into_iter().fold(worst, f64::max);
+            }
+        }
+    }
+    assert!(worst < 1e-14, "{worst:e}");
+}
+
+/// With next to no springs a velocity fades like the exponential function, to the last digits of the little that is left.
+#[test]
+fn what_is_left_of_a_velocity_has_all_digits() {
+    let built_in = Parameters::BUILT_IN;
+    let p = Parameters { k1: 1e-20, k2: 1e-20, c3: 1.0, ..built_in };
+    let mut testbed = Testbed::new(p).unwrap();
+    let rate = (testbed.system().side.damping + 0.5 * p.c3) / (p.J2 + 0.5 * p.H3);
+    for fading in [0.1, 0.6, 0.8, 3.0, 10.0, 20.0] {
+        testbed.state = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0];
+        testbed.motors = Default::default();
+        assert!(testbed.step(fading / rate));
+        let left = testbed.state[4] / (-fading).exp();
+        assert!((left - 1.0).abs() < 1e-14 * (1.0 + fading), "{fading}: {left}");
+    }
+}
+
 #[test]
 fn angle_jumps_pass_through_the_dampers() {
     // omega = 0 makes a zero-order hold; the jump's impulse is B2 d.

@@ -132,6 +132,24 @@ fn state_between_inputs_and_step() {
     }
 }
 
+/// What was read before the state was saved is read again, whatever was calculated in between.
+#[test]
+fn values_come_back() {
+    let run = Run::new(Rates::Samples);
+    let fmu = run.start();
+    run.go(&fmu, 0..3);
+    let mut state = fmu.save();
+    for i in 3..6 {
+        run.go(&fmu, i..i + 1);
+        let expected = observe(&fmu);
+        fmu.ok(fmu.fmi2GetFMUstate(&mut state));
+        run.go(&fmu, i + 1..i + 3);
+        fmu.ok(fmu.fmi2SetFMUstate(state));
+        assert_eq!(observe(&fmu), expected, "after step {i}");
+    }
+    fmu.forget(state);
+}
+
 /// fmi2Reset leaves nothing of a run behind (section 2.1.6).
 #[test]
 fn reset_is_a_new_beginning() {

@@ -14,9 +14,11 @@ macro_rules! for_every_toy {
         $function::<crate::toys::Talker>($($argument),*);
         $function::<crate::toys::Sum>($($argument),*);
         $function::<crate::toys::Fuse>($($argument),*);
+        $function::<crate::toys::Lazy>($($argument),*);
     }};
 }
 
+mod calculated;
 mod call_table;
 mod derivatives;
 mod early_steps;

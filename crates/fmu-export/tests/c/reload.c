@@ -3,7 +3,7 @@
 #include "fmu.h"
 #include <unistd.h>
 
-enum { LIBRARIES = 4, INSTANCES = 3, STEPS = 8, GUID_LENGTH = 64 };
+enum { LIBRARIES = 4, INSTANCES = 3, STEPS = 8, VARIABLES = 16, GUID_LENGTH = 64 };
 
 /* The functions of one library. */
 struct fmu {
@@ -34,6 +34,8 @@ static void learn_guid(fmi2ComponentEnvironment guid, fmi2String instance, fmi2S
 static void use(struct fmu *fmu) {
     char guid[GUID_LENGTH] = "";
     fmi2CallbackFunctions callbacks = {learn_guid, NULL, NULL, NULL, guid};
+    fmi2ValueReference vr;
+    fmi2String text;
     int i, k;
     CHECK(!fmu->fmi2Instantiate("none", fmi2CoSimulation, "{}", "", &callbacks, 0, 0) && guid[0] == '{');
     callbacks.componentEnvironment = NULL;
@@ -44,6 +46,8 @@ static void use(struct fmu *fmu) {
         CHECK(fmu->fmi2EnterInitializationMode(c) == fmi2OK && fmu->fmi2ExitInitializationMode(c) == fmi2OK);
         for (k = 0; k < STEPS; ++k) CHECK(fmu->fmi2DoStep(c, k / 512.0, 1 / 512.0, 1) == fmi2OK);
         CHECK(fmu->fmi2DoStep(c, -1, 1, 1) == fmi2Error);
+        /* Variables that are no texts are refused. */
+        for (vr = 0; vr < VARIABLES; ++vr) fmu->fmi2GetString(c, &vr, 1, &text);
         CHECK(fmu->fmi2GetFMUstate(c, &fmu->states[i]) == fmi2OK);
         fmu->instances[i] = c;
     }

@@ -8,13 +8,14 @@ use std::time::{Duration, Instant};
 type Session = fn(&[u8], &mut Tally);
 
 /// All toys but the faulty one.
-const TOYS: [(&str, Session); 6] = [
+const TOYS: [(&str, Session); 7] = [
     ("oscillator", run::<Oscillator>),
     ("ball", run::<Ball>),
     ("counter", run::<Counter>),
     ("talker", run::<Talker>),
     ("sum", run::<Sum>),
     ("fuse", run::<Fuse>),
+    ("lazy", run::<Lazy>),
 ];
 
 /// Sequences from seeds 0, 1, ... for some seconds, `ROBUSTNESS_SECONDS` if that is set, and at least 3 of them for each

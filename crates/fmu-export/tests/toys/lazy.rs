@@ -1,0 +1,114 @@
+//! A model that calculates once what is read, and works with it in events.
+
+use fmu_export::*;
+
+/// Calculates the sum of all that it has, and remembers it.
+#[derive(Clone)]
+pub struct Lazy {
+    real: f64,
+    whole: i32,
+    truth: bool,
+    text: String,
+    weight: f64,
+    state: f64,
+    slope: f64,
+    sum: f64,
+}
+
+variables! { for Lazy, memory in slope;
+    /// A summand
+    real = input(&NUMBER) in real;
+    /// Another
+    whole = input(&INTEGER) in whole;
+    /// 1 more, and steps end half-way
+    truth = input(&BOOLEAN) in truth;
+    /// Its length
+    text = input(&STRING) in text;
+    /// A parameter
+    weight = parameter(&NUMBER) in weight;
+    /// A state
+    state = output(&NUMBER).state() in state;
+    /// Its rate, which is the sum as well
+    der_state as "der(state)" = local(&NUMBER).derivative_of(state) by |lazy| lazy.sum;
+    /// The sum as it was calculated
+    sum = output(&NUMBER) by |lazy| lazy.sum;
+    /// The same without the time, calculated when it is read
+    summands = local(&NUMBER) by |lazy| lazy.summands();
+    /// The time
+    time = independent(&TIME);
+}
+
+impl Lazy {
+    fn summands(&self) -> f64 {
+        let whole = f64::from(self.whole) + f64::from(u8::from(self.truth)) + self.text.len() as f64;
+        self.real + whole + self.weight + self.state + self.slope
+    }
+}
+
+impl Model for Lazy {
+    const INFO: Info = Info { guid: "{lazy}", ..info!("Lazy", "lazy") };
+
+    fn new(_: &Setup) -> Result<Self, Error> {
+        let (real, whole, truth, text) = (1.0, 2, false, "abc".to_owned());
+        Ok(Self { real, whole, truth, text, weight: 4.0, state: 5.0, slope: 0.0, sum: f64::NAN })
+    }
+
+    fn calculate(&mut self, time: f64) {
+        self.sum = self.summands() + time;
+    }
+}
+
+impl CoSimulation for Lazy {
+    fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+        self.state += 1.0;
+        Ok(if self.truth { Stepped::Early(step.time + 0.5 * step.size) } else { Stepped::Done })
+    }
+}
+
+impl ModelExchange for Lazy {
+    const INDICATORS: usize = 1;
+    const STEP_COMPLETED: bool = true;
+
+    fn indicators(&self, indicators: &mut [f64]) {
+        indicators[0] = self.sum;
+    }
+
+    fn event(&mut self, _: f64) -> Result<Event, Error> {
+        if !self.sum.is_finite() {
+            return Err(Error::new("the sum leaves the range of numbers"));
+        }
+        self.state = self.sum;
+        Ok(Event { states_changed: true, ..Event::default() })
+    }
+
+    fn step_completed(&mut self, _: f64) -> StepCompleted {
+        if self.sum.is_finite() {
+            self.state = self.sum;
+        }
+        StepCompleted::default()
+    }
+
+    fn nominals(&self, nominals: &mut [f64]) {
+        nominals[0] = self.sum;
+    }
+}
+
+impl Partials for Lazy {
+    fn partial(&self, _: Name, _: Name) -> Option<f64> {
+        Some(self.sum)
+    }
+}
+
+impl InputDerivatives for Lazy {
+    fn set_input_derivative(&mut self, _: Name, _: u32, value: f64) {
+        self.slope = value;
+    }
+}
+
+impl OutputDerivatives for Lazy {
+    fn output_derivative(&self, _: Name, _: u32) -> f64 {
+        self.sum
+    }
+}
+
+offer!(Lazy: CoSimulation + ModelExchange + Partials + InputDerivatives + OutputDerivatives);
