@@ -131,6 +131,10 @@ impl Model for Room {
 impl ModelExchange for Room {
     const INDICATORS: usize = 2;
     const STEP_COMPLETED: bool = true;
+
+    fn indicators(&self, indicators: &mut [f64]) {
+        indicators.fill(0.0);
+    }
 }
 
 impl CoSimulation for Room {
@@ -323,6 +327,10 @@ macro_rules! clocks {
 
             impl ModelExchange for Clock {
                 const INDICATORS: usize = 1;
+
+                fn indicators(&self, indicators: &mut [f64]) {
+                    indicators.fill(0.0);
+                }
             }
 
             offer!(Clock: ModelExchange);

@@ -1,0 +1,129 @@
+"""The FMU for FMI 3.0: valid for FMPy, and bit for bit the testbed of the FMU for FMI 2.0."""
+
+from __future__ import annotations
+
+import shutil
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+from fmpy.fmi3 import FMU3Slave
+from fmpy.validation import validate_fmu
+
+from lagrange import OUTPUTS
+
+#: Let go with the couplings wound up, while both motors turn.
+START = {"theta3": 0.5, "theta4": -0.3, "theta5": 0.1, "theta6": 0.4, "omega5": 3.0, "omega6": -2.0, "k1": 130.0}
+MOTORS = np.array(
+    [(t, 0.2 * np.sin(9 * t), 0.1 * t, 1.8 * np.cos(9 * t), 0.1) for t in np.linspace(0, 0.3, 301)],
+    dtype=[(name, float) for name in ("time", "theta1", "theta2", "omega1", "omega2")],
+)
+
+
+@pytest.fixture(scope="module")
+def fmu3(fmu):
+    """The packed FMU for FMI 3.0."""
+    path = fmu.parent / "fmi3" / fmu.name
+    if not path.is_file():
+        pytest.exit(f"{path} is missing; build it with `make fmu`", returncode=1)
+    return path
+
+
+@pytest.fixture
+def testbed3(fmu3):
+    """An instance for Co-Simulation of FMI 3.0, in initialization mode, and its value references by name."""
+    description = fmpy.read_model_description(str(fmu3))
+    folder = fmpy.extract(str(fmu3))
+    instance = FMU3Slave(
+        guid=description.guid,
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        unzipDirectory=folder,
+        instanceName="testbed",
+    )
+    instance.instantiate(loggingOn=True)
+    instance.enterInitializationMode(startTime=0.0)
+    yield instance, {v.name: v.valueReference for v in description.modelVariables}
+    instance.freeInstance()
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def test_fmpy_finds_no_problem(fmu3):
+    assert fmpy.read_model_description(str(fmu3), validate=True).fmiVersion == "3.0"
+    assert validate_fmu(str(fmu3)) == []
+
+
+def test_the_variables_are_the_same(fmu, fmu3):
+    """Names, value references, causality, variability, start values, units and ranges; the time is one more."""
+
+    def variables(path):
+        kind = {"Real": "Float64", "Integer": "Int32"}
+        return {
+            v.name: (
+                v.valueReference,
+                kind.get(v.type, v.type),
+                v.causality,
+                v.variability,
+                v.initial,
+                v.start,
+                v.declaredType and (v.declaredType.unit, v.declaredType.min, v.declaredType.max),
+            )
+            for v in fmpy.read_model_description(str(path)).modelVariables
+        }
+
+    two, three = variables(fmu), variables(fmu3)
+    assert [name for name in three if name not in two] == ["time"]
+    assert {name: three[name] for name in two} == two
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"fmi_type": "CoSimulation"},
+        {"fmi_type": "ModelExchange", "solver": "Euler", "step_size": 1e-4},
+        {"fmi_type": "ModelExchange", "solver": "CVode", "relative_tolerance": 1e-8},
+    ],
+    ids=["co-simulation", "euler", "cvode"],
+)
+def test_results_are_the_same_bits(fmu, fmu3, options):
+    def run(path):
+        return simulate_fmu(
+            str(path), stop_time=0.3, output_interval=1e-3, start_values=START, input=MOTORS,
+            output=list(OUTPUTS), **options,
+        )  # fmt: skip
+
+    two, three = run(fmu), run(fmu3)
+    assert np.ptp(two[OUTPUTS[0]]) > 0.1
+    for name in ("time", *OUTPUTS):
+        assert np.array_equal(two[name], three[name]), name
+
+
+def test_the_same_partial_derivatives_both_ways(testbed3, make_slave):
+    """Of all outputs by all inputs: as in FMI 2.0, and the adjoint ones are the transpose."""
+    instance, references = testbed3
+    slave = make_slave()
+    slave.start()
+    instance.exitInitializationMode()
+    inputs = ("theta1", "theta2", "omega1", "omega2")
+    outputs, knowns = ([references[name] for name in names] for names in (OUTPUTS, inputs))
+    two = [slave.fmi.getDirectionalDerivative(outputs, [known], [1.0]) for known in knowns]
+    forward = [instance.getDirectionalDerivative(outputs, [known], [1.0], len(outputs)) for known in knowns]
+    adjoint = [instance.getAdjointDerivative([output], knowns, [1.0], len(knowns)) for output in outputs]
+    assert np.any(two)
+    assert np.array_equal(forward, two)
+    assert np.array_equal(np.transpose(adjoint), two)
+
+
+def test_a_state_can_be_saved_and_restored(testbed3):
+    instance, references = testbed3
+    outputs = [references[name] for name in OUTPUTS]
+    instance.setFloat64([references["omega1"]], [2.0])
+    instance.exitInitializationMode()
+    instance.doStep(0.0, 0.01)
+    state = instance.getFMUState()
+    instance.doStep(0.01, 0.02)
+    once = instance.getFloat64(outputs)
+    instance.setFMUState(state)
+    instance.doStep(0.01, 0.02)
+    assert instance.getFloat64(outputs) == once
+    instance.freeFMUState(state)
