@@ -159,7 +159,7 @@ fn the_past_does_not_matter() {
 }
 
 /// Without damping of the load nothing holds a testbed back that turns as a whole: it does so to the last digits,
-/// however stiff it is and however long the step.
+/// however stiff it is, however little damped and however long the step.
 #[test]
 fn a_testbed_that_turns_goes_on_turning() {
     let mut worst = 0.0_f64;
@@ -169,8 +169,7 @@ fn a_testbed_that_turns_goes_on_turning() {
         let p = Parameters {
             k1: built_in.k1 * k,
             k2: built_in.k2 * k,
-            c1: built_in.c1 * c * 1e-3,
-            c2: built_in.c2 * c * 1e-3,
+            c1: built_in.c1 * c * 1e-6,
             c3: 0.0,
             ..built_in
         };
@@ -187,7 +186,7 @@ fn a_testbed_that_turns_goes_on_turning() {
             }
         }
     }
-    assert!(worst < 1e-14, "{worst:e}");
+    assert!(worst < 3e-15, "{worst:e}");
 }
 
 /// With next to no springs a velocity fades like the exponential function, to the last digits of the little that is left.

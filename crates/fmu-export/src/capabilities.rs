@@ -103,7 +103,8 @@ pub struct StepCompleted {
 /// The model knows its partial derivatives (section 2.1.9): directional and adjoint ones follow.
 pub trait Partials: Model {
     /// The partial derivative of one Real variable with respect to another, now. The unknown is an output or a
-    /// state's derivative, the known an input, a state or, while initializing, a parameter.
+    /// state's derivative, the known an input, a state or a parameter, in FMI 2.0 while
+    /// initializing, in FMI 3.0 at any time.
     ///
     /// `None` if the model does not know it: the importer is then refused.
     fn partial(&self, unknown: Self::Name, known: Self::Name) -> Option<f64>;

@@ -51,8 +51,10 @@ impl<M: Exported> Instance<M> {
         }
         for vr in knowns {
             let variable = self.variable(*vr, BaseType::Real)?;
-            let parameter =
-                variable.causality() == Causality::Parameter && self.mode() == Mode::Initialization;
+            // Parameters may be set at any time, whether the description calls them tunable or not. FMI 2.0 (section
+            // 2.1.9) has them among the knowns in initialization mode alone.
+            let parameter = variable.causality() == Causality::Parameter
+                && (self.standard() == Standard::Fmi3 || self.mode() == Mode::Initialization);
             if variable.causality() != Causality::Input && !variable.is_state() && !parameter {
                 return refuse(format!("{} is no known: neither input nor state", variable.name()));
             }

@@ -56,6 +56,19 @@ fn lengths_and_kinds() {
     assert!(text.contains("providesAdjointDerivatives is false"), "{text}");
 }
 
+/// Which may be set at any time.
+#[test]
+fn with_respect_to_parameters() {
+    let fmu = moving();
+    let (u, mut forward, mut adjoint) = (spring_force as u32, f64::NAN, f64::NAN);
+    let k = stiffness as u32;
+    fmu.ok(fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &2.0, 1, &mut forward, 1));
+    fmu.ok(fmu.fmi3GetAdjointDerivative(&u, 1, &k, 1, &2.0, 1, &mut adjoint, 1));
+    assert_eq!((forward, adjoint), (-0.5, -0.5), "force = -stiffness springs position");
+    let k = springs as u32;
+    fmu.refused("Int32", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 1, &mut forward, 1));
+}
+
 #[test]
 fn of_outputs() {
     let fmu = Importer::of::<Oscillator>(CoSimulation);
