@@ -10,22 +10,39 @@ use std::mem::MaybeUninit;
 impl<M: Exported> Instance<M> {
     #[inline]
     pub fn get_reals(&mut self, vr: &[u32], values: &mut [MaybeUninit<f64>]) -> Outcome {
-        for vr in vr {
-            self.variable(*vr, BaseType::Real)?;
+        let in_table = |vr: &u32| M::TABLE.get(*vr as usize).is_some_and(|of| of.base() == BaseType::Real);
+        if !vr.iter().all(in_table) {
+            return self.get_reals_and_implicit(vr, values);
         }
         let time = self.state.time;
         let model = self.calculated();
         // 0 as long as all values are finite: one question at the end costs less than one for each.
         let mut none = 0.0;
         for (vr, value) in vr.iter().zip(&mut *values) {
-            let read = match M::TABLE.get(*vr as usize) {
-                Some(of) => of.real(model).unwrap_or(time),
-                None => implicit_value(model, time, *vr),
-            };
+            let read = M::TABLE[*vr as usize].real(model).unwrap_or(time);
             none += read * 0.0;
             value.write(read);
         }
         if none == 0.0 { Ok(()) } else { self.refuse_reals(vr) }
+    }
+
+    /// With the time and the event indicators of FMI 3.0, which are not in the table.
+    #[cold]
+    #[inline(never)]
+    fn get_reals_and_implicit(&mut self, vr: &[u32], values: &mut [MaybeUninit<f64>]) -> Outcome {
+        for vr in vr {
+            self.variable(*vr, BaseType::Real)?;
+        }
+        let time = self.state.time;
+        let model = self.calculated();
+        for (vr, value) in vr.iter().zip(values) {
+            let (variable, read) = match M::TABLE.get(*vr as usize) {
+                Some(variable) => (variable, variable.real(model).unwrap_or(time)),
+                None => (super::Implicit::<M>::INDICATOR, implicit_value(model, time, *vr)),
+            };
+            value.write(finite(variable, read)?);
+        }
+        Ok(())
     }
 
     #[cold]
@@ -33,10 +50,8 @@ impl<M: Exported> Instance<M> {
     fn refuse_reals(&mut self, vr: &[u32]) -> Outcome {
         let model = self.calculated();
         for vr in vr {
-            match M::TABLE.get(*vr as usize) {
-                Some(variable) => finite(variable, variable.real(model).unwrap_or_default())?,
-                None => finite(super::Implicit::<M>::INDICATOR, implicit_value(model, 0.0, *vr))?,
-            };
+            let variable = &M::TABLE[*vr as usize];
+            finite(variable, variable.real(model).unwrap_or_default())?;
         }
         Ok(())
     }
