@@ -10,6 +10,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
+from packaging.version import Version
 
 from lagrange import OUTPUTS
 
@@ -94,8 +95,13 @@ def test_results_are_the_same_bits(fmu, fmu3, options):
 
     two, three = run(fmu), run(fmu3)
     assert np.ptp(two[OUTPUTS[0]]) > 0.1
+    # FMPy before 0.3.22 has steps for FMI 3.0 in Co-Simulation that differ in the last digits.
+    same_steps = "CoSimulation" not in options.values() or Version(fmpy.__version__) >= Version("0.3.22")
     for name in ("time", *OUTPUTS):
-        assert np.array_equal(two[name], three[name]), name
+        if same_steps:
+            assert np.array_equal(two[name], three[name]), name
+        else:
+            np.testing.assert_allclose(three[name], two[name], rtol=0, atol=1e-11, err_msg=name)
 
 
 def test_the_same_partial_derivatives_both_ways(testbed3, make_slave):
