@@ -23,7 +23,7 @@ pub struct Answer {
 /// What lies behind the last element of an array that the FMU writes, and in it before.
 const UNTOUCHED: u64 = 0x7ff8_dead_beef_0000;
 const UNTOUCHED_INTEGER: i32 = i32::MIN + 77;
-const UNTOUCHED_TEXT: &CStr = c"untouched";
+static UNTOUCHED_TEXT: &CStr = c"untouched";
 
 /// The functions of saved states have handles besides arguments: the session calls them.
 fn has_handles(function: &str) -> bool {

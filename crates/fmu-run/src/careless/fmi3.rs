@@ -60,7 +60,7 @@ struct Answer {
 }
 
 /// What is in an array of texts before the FMU writes.
-const UNTOUCHED_TEXT: &CStr = c"untouched";
+static UNTOUCHED_TEXT: &CStr = c"untouched";
 
 /// Calls that are remembered for a replay.
 const MEMORY: usize = 40;
