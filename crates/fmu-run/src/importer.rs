@@ -4,7 +4,7 @@ use fmu_export::fmi2::Functions;
 use fmu_export::fmi2::types::*;
 use fmu_export::{Exported, Interface};
 use std::ffi::{CStr, CString, c_char, c_void};
-use std::mem::ManuallyDrop;
+use std::ops::Deref;
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;
 
@@ -181,8 +181,8 @@ impl Importer {
     ///
     /// # Safety
     /// The component is NULL or from these functions, and alive for as long as this is used.
-    pub unsafe fn borrowed(functions: Functions, component: fmi2Component) -> ManuallyDrop<Self> {
-        ManuallyDrop::new(Self { functions, component, log: Box::default() })
+    pub unsafe fn borrowed(functions: Functions, component: fmi2Component) -> Borrowed {
+        Borrowed(Self { functions, component, log: Box::default() })
     }
 
     /// What an importer has that ignored a NULL from `fmi2Instantiate`.
@@ -210,6 +210,23 @@ impl Importer {
         let texts = [(self.functions.fmi2GetVersion)(), (self.functions.fmi2GetTypesPlatform)()];
         // SAFETY: both are strings that the library keeps.
         texts.map(|text| unsafe { CStr::from_ptr(text) })
+    }
+}
+
+/// An instance that somebody else frees, see [`Importer::borrowed`].
+pub struct Borrowed(Importer);
+
+impl Deref for Borrowed {
+    type Target = Importer;
+
+    fn deref(&self) -> &Importer {
+        &self.0
+    }
+}
+
+impl Drop for Borrowed {
+    fn drop(&mut self) {
+        self.0.component = null_mut(); // whose freeing does nothing
     }
 }
 

@@ -18,5 +18,5 @@ pub mod serialized;
 pub mod testing;
 
 pub use fmu_export::fmi2::Functions;
-pub use importer::{Arguments, FUNCTIONS, Importer, Message};
+pub use importer::{Arguments, Borrowed, FUNCTIONS, Importer, Message};
 pub use library::{Library, load};
