@@ -107,7 +107,7 @@ fn loggers() {
 #[cfg(target_os = "linux")]
 #[test]
 fn loading_and_unloading_leaves_nothing_behind() {
-    const ROUNDS: i64 = 1000;
+    const ROUNDS: i64 = 3000;
     let program = program("reload");
     for names in [&["oscillator"][..], &["oscillator", "talker"]] {
         let mut command = command(&program);
