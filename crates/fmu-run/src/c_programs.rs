@@ -92,3 +92,23 @@ pub fn command(program: &Path) -> Command {
     command.args(words);
     command
 }
+
+/// Lets `reload.c` load, use and unload libraries again and again.
+///
+/// The memory must grow by less than 100 bytes a round over the last nine tenths of the rounds. Counting pages has a noise
+/// of some 100 KiB, however many rounds there are. An instance forgotten in each would be 50 times as much; `make
+/// sanitize` has valgrind look for every byte.
+///
+/// # Panics
+/// When it grows by more.
+pub fn reload(program: &Path, names: &[&str]) {
+    const ROUNDS: i64 = 3000;
+    let mut command = command(program);
+    command.arg(ROUNDS.to_string()).args(names.iter().map(|name| library(name)));
+    let printed = output(&mut command, "the compiled program does not run");
+    println!("{names:?}: {printed}");
+    let memory: Vec<i64> = printed.lines().map(|line| line.parse().expect("a number")).collect();
+    let [begin, end] = memory[..] else { panic!("two numbers expected: {printed}") };
+    let growth = (end - begin) * 1024;
+    assert!(growth < 100 * ROUNDS, "{names:?}: {growth} bytes more");
+}

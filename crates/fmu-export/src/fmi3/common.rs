@@ -157,17 +157,16 @@ pub unsafe fn fmi3GetDirectionalDerivative<M: Exported>(
     sensitivity_count: usize,
 ) -> Outcome {
     // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
-    let (unknown, known, seed, sensitivity) = unsafe {
-        (
-            array(unknown, unknown_count, "unknowns")?,
-            array(known, known_count, "knowns")?,
-            array(seed, seed_count, "seed")?,
-            output(sensitivity, sensitivity_count, "sensitivity")?,
+    unsafe {
+        derivatives(
+            instance,
+            (unknown, unknown_count),
+            (known, known_count),
+            (seed, seed_count),
+            (sensitivity, sensitivity_count),
+            Direction::Forward,
         )
-    };
-    same("knowns", known_count, seed_count)?;
-    same("unknowns", unknown_count, sensitivity_count)?;
-    instance.derivatives(unknown, known, seed, sensitivity, Direction::Forward)
+    }
 }
 
 pub unsafe fn fmi3GetAdjointDerivative<M: Exported>(
@@ -182,6 +181,29 @@ pub unsafe fn fmi3GetAdjointDerivative<M: Exported>(
     sensitivity_count: usize,
 ) -> Outcome {
     // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
+    unsafe {
+        derivatives(
+            instance,
+            (unknown, unknown_count),
+            (known, known_count),
+            (seed, seed_count),
+            (sensitivity, sensitivity_count),
+            Direction::Adjoint,
+        )
+    }
+}
+
+/// # Safety
+/// Arrays of these lengths; the written one does not overlap the others.
+unsafe fn derivatives<M: Exported>(
+    instance: &mut Instance<M>,
+    (unknown, unknown_count): (*const fmi3ValueReference, usize),
+    (known, known_count): (*const fmi3ValueReference, usize),
+    (seed, seed_count): (*const fmi3Float64, usize),
+    (sensitivity, sensitivity_count): (*mut fmi3Float64, usize),
+    direction: Direction,
+) -> Outcome {
+    // SAFETY: this function's contract.
     let (unknown, known, seed, sensitivity) = unsafe {
         (
             array(unknown, unknown_count, "unknowns")?,
@@ -190,9 +212,13 @@ pub unsafe fn fmi3GetAdjointDerivative<M: Exported>(
             output(sensitivity, sensitivity_count, "sensitivity")?,
         )
     };
-    same("unknowns", unknown_count, seed_count)?;
-    same("knowns", known_count, sensitivity_count)?;
-    instance.derivatives(unknown, known, seed, sensitivity, Direction::Adjoint)
+    let (seeded, wanted) = match direction {
+        Direction::Forward => (("knowns", known_count), ("unknowns", unknown_count)),
+        Direction::Adjoint => (("unknowns", unknown_count), ("knowns", known_count)),
+    };
+    same(seeded.0, seeded.1, seed_count)?;
+    same(wanted.0, wanted.1, sensitivity_count)?;
+    instance.derivatives(unknown, known, seed, sensitivity, direction)
 }
 
 pub unsafe fn fmi3EvaluateDiscreteStates<M: Exported>(_: &mut Instance<M>) -> Outcome {

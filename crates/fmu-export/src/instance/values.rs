@@ -12,7 +12,7 @@ impl<M: Exported> Instance<M> {
     pub fn get_reals(&mut self, vr: &[u32], values: &mut [MaybeUninit<f64>]) -> Outcome {
         let in_table = |vr: &u32| M::TABLE.get(*vr as usize).is_some_and(|of| of.base() == BaseType::Real);
         if !vr.iter().all(in_table) {
-            return self.get_reals_and_implicit(vr, values);
+            return self.get_reals_one_by_one(vr, values);
         }
         let time = self.state.time;
         let model = self.calculated();
@@ -23,13 +23,14 @@ impl<M: Exported> Instance<M> {
             none += read * 0.0;
             value.write(read);
         }
-        if none == 0.0 { Ok(()) } else { self.refuse_reals(vr) }
+        if none == 0.0 { Ok(()) } else { self.get_reals_one_by_one(vr, values) }
     }
 
-    /// With the time and the event indicators of FMI 3.0, which are not in the table.
+    /// With the time and the event indicators of FMI 3.0, which are not in the table; the first value that is not finite
+    /// is named.
     #[cold]
     #[inline(never)]
-    fn get_reals_and_implicit(&mut self, vr: &[u32], values: &mut [MaybeUninit<f64>]) -> Outcome {
+    fn get_reals_one_by_one(&mut self, vr: &[u32], values: &mut [MaybeUninit<f64>]) -> Outcome {
         for vr in vr {
             self.variable(*vr, BaseType::Real)?;
         }
@@ -41,17 +42,6 @@ impl<M: Exported> Instance<M> {
                 None => (super::Implicit::<M>::INDICATOR, implicit_value(model, time, *vr)),
             };
             value.write(finite(variable, read)?);
-        }
-        Ok(())
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn refuse_reals(&mut self, vr: &[u32]) -> Outcome {
-        let model = self.calculated();
-        for vr in vr {
-            let variable = &M::TABLE[*vr as usize];
-            finite(variable, variable.real(model).unwrap_or_default())?;
         }
         Ok(())
     }

@@ -2,13 +2,10 @@
 
 use crate::toys::*;
 use fmu_run::FUNCTIONS;
-use fmu_run::careless::{Tally, random_bytes, run};
-use std::time::{Duration, Instant};
-
-type Session = fn(&[u8], &mut Tally);
+use fmu_run::careless::{RunBytes, Tally, run, run_seeds};
 
 /// All toys but the faulty one.
-const TOYS: [(&str, Session); 7] = [
+const TOYS: [(&str, RunBytes); 7] = [
     ("oscillator", run::<Oscillator>),
     ("ball", run::<Ball>),
     ("counter", run::<Counter>),
@@ -18,26 +15,9 @@ const TOYS: [(&str, Session); 7] = [
     ("lazy", run::<Lazy>),
 ];
 
-/// Sequences from seeds 0, 1, ... for some seconds, `ROBUSTNESS_SECONDS` if that is set, and at least 3 of them for each
-/// toy, so that the checks below do not depend on the machine.
 #[test]
 fn no_sequence_of_calls_breaks_a_promise() {
-    let seconds = std::env::var("ROBUSTNESS_SECONDS").map_or(3, |text| text.parse().expect("a number"));
-    let end = Instant::now() + Duration::from_secs(seconds);
-    let mut tally = Tally::new();
-    let mut seed = 0;
-    while seed < 3 || Instant::now() < end {
-        for (toy, session) in TOYS {
-            println!("{toy}, seed {seed}"); // for who looks into a failure
-            session(&random_bytes(seed, 1 << 16), &mut tally);
-        }
-        seed += 1;
-    }
-    let calls: u64 = tally.values().flatten().sum();
-    println!("{calls} calls in {seed} sequences of each toy; OK, discarded, refused:");
-    for (function, counts) in &tally {
-        println!("{function:36}{counts:9?}");
-    }
+    let tally = run_seeds(3, &TOYS);
     assert_eq!(tally.len(), 44, "every function is called");
     let never = |column: usize, expected: &[&str]| {
         for name in FUNCTIONS {

@@ -22,6 +22,7 @@ use std::collections::BTreeMap;
 use std::ffi::CString;
 use std::marker::PhantomData;
 use std::ptr::{null, null_mut};
+use std::time::{Duration, Instant};
 
 /// How often each function was called, by status: OK, discarded, refused.
 pub type Tally = BTreeMap<&'static str, [u64; 3]>;
@@ -46,6 +47,34 @@ pub fn run<M: Exported>(bytes: &[u8], tally: &mut Tally) {
         }
     }
     session.end();
+}
+
+/// One sequence of calls, made from bytes: [`run`] or [`fmi3::run`] of a model.
+pub type RunBytes = fn(&[u8], &mut Tally);
+
+/// Sequences of every model from seeds 0, 1, ... for some seconds, `ROBUSTNESS_SECONDS` if that is set, and of at least
+/// some seeds, so that what is checked of the counts does not depend on the machine. Prints the counts.
+///
+/// # Panics
+/// When a sequence breaks a promise, or `ROBUSTNESS_SECONDS` is no number.
+pub fn run_seeds(at_least: u64, models: &[(&str, RunBytes)]) -> Tally {
+    let seconds = std::env::var("ROBUSTNESS_SECONDS").map_or(3, |text| text.parse().expect("a number"));
+    let end = Instant::now() + Duration::from_secs(seconds);
+    let mut tally = Tally::new();
+    let mut seed = 0;
+    while seed < at_least || Instant::now() < end {
+        for (model, session) in models {
+            println!("{model}, seed {seed}"); // for who looks into a failure
+            session(&random_bytes(seed, 1 << 16), &mut tally);
+        }
+        seed += 1;
+    }
+    let calls: u64 = tally.values().flatten().sum();
+    println!("{calls} calls in {seed} sequences of each model; OK, discarded, refused:");
+    for (function, counts) in &tally {
+        println!("{function:40}{counts:9?}");
+    }
+    tally
 }
 
 /// Bytes that look random and are the same in every run (splitmix64).
