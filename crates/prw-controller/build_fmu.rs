@@ -2,7 +2,7 @@
 
 use clap::Parser;
 use fmu_package::terminal::exit;
-use fmu_package::{BuildOptions, Builder};
+use fmu_package::{BuildOptions, Builder, Terminal};
 use prw_controller::{Controller, sources::sources};
 use std::process::ExitCode;
 
@@ -19,7 +19,30 @@ fn main() -> ExitCode {
         command: "cargo run --release -p prw_controller --bin build_controller",
         sources: sources(),
         profile: "library",
+        terminals: terminals(),
         ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"), env!("FMU_SOURCES"))
     };
     exit(builder.run::<Controller>(&Options::parse().build))
+}
+
+/// Where the controller is connected: its motors and its sensors go to the terminals of the testbed that are called the
+/// same.
+fn terminals() -> Vec<Terminal> {
+    let motor = |name, theta, omega, tau| {
+        Terminal::plug(name).signal("theta", theta).signal("omega", omega).signal("tau", tau)
+    };
+    vec![
+        motor("motor1", "theta1", "omega1", "tau1").description("Motor 1 and its torque sensor"),
+        motor("motor2", "theta2", "omega2", "tau2").description("Motor 2 and its torque sensor"),
+        Terminal::bus("output_shaft")
+            .description("Measured motion of the wrist")
+            .signal("pitch", "pitch")
+            .signal("roll", "roll")
+            .signal("pitch_rate", "pitch_rate")
+            .signal("roll_rate", "roll_rate"),
+        Terminal::bus("reference")
+            .description("Where the wrist is to go")
+            .signal("pitch", "pitch_ref")
+            .signal("roll", "roll_ref"),
+    ]
 }

@@ -76,8 +76,46 @@ def run(make, duration: float, reference, measure=lambda t, values: values, **pa
     return STEP * np.arange(1, n + 1), np.array(wrist), np.array(motors)
 
 
-def test_the_validator_has_nothing_to_say(controller_fmu):
-    assert validate_fmu(str(controller_fmu)) == []
+@pytest.fixture(scope="module", params=["fmi2", "fmi3"])
+def either_fmu(request, controller_fmu):
+    """The controller's FMU for FMI 2.0 and for FMI 3.0."""
+    return controller_fmu if request.param == "fmi2" else controller_fmu.parent / "fmi3" / controller_fmu.name
+
+
+def test_the_validator_has_nothing_to_say(either_fmu):
+    assert validate_fmu(str(either_fmu)) == []
+
+
+def moved_by_fmpy(fmu, **options) -> np.ndarray:
+    """The motors' motion (samples, 4) at each sample; all inputs follow a straight line, which every importer knows."""
+    time = np.arange(0.0, 1.0 + STEP / 2, STEP)
+    slopes = {"pitch_ref": 0.5, "roll_ref": -0.8, "pitch": 0.3, "roll": -0.6, "pitch_rate": 0.1, "tau1": 0.2, "tau2": 0.1}
+    inputs = np.zeros(len(time), dtype=[("time", float), *((name, float) for name in (*slopes, "roll_rate"))])
+    inputs["time"] = time
+    for name, slope in slopes.items():
+        inputs[name] = slope * time
+    result = fmpy.simulate_fmu(
+        str(fmu), stop_time=1.0, output_interval=STEP, step_size=STEP, input=inputs, output=MOTORS, **options
+    )
+    moments = np.round(result["time"] / STEP).astype(int)
+    # Before and after an event there are two rows; the motion is the same in both.
+    last = np.searchsorted(moments, np.arange(len(time)), side="right") - 1
+    return np.array([[row[name] for name in MOTORS] for row in result[last]])
+
+
+@pytest.mark.parametrize("solver", ["Euler", "CVode"])
+def test_model_exchange_moves_the_motors_as_co_simulation_does(either_fmu, solver):
+    expected = moved_by_fmpy(either_fmu, fmi_type="CoSimulation")
+    assert np.abs(expected).max(axis=0).min() > 0.05
+    moved = moved_by_fmpy(either_fmu, fmi_type="ModelExchange", solver=solver)
+    np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-13)
+
+
+def test_the_samples_are_events_that_fmpy_handles(controller_fmu):
+    fmu = controller_fmu.parent / "fmi3" / controller_fmu.name
+    expected = moved_by_fmpy(fmu, fmi_type="CoSimulation")
+    moved = moved_by_fmpy(fmu, fmi_type="CoSimulation", use_event_mode=True, early_return_allowed=True)
+    np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-13)
     fmpy.read_model_description(str(controller_fmu), validate=True)
 
 

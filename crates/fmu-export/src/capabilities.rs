@@ -7,15 +7,29 @@ pub trait CoSimulation: Model {
     /// Whether steps may have any size, also one unlike the last.
     const VARIABLE_STEP_SIZE: bool = true;
 
-    /// Whether steps may stop at events ([`Stepped::Event`]), which [`ModelExchange::event`] handles: at the begin of
-    /// the simulation, too, and in FMI 3.0 whenever the importer likes (`hasEventMode`).
-    const EVENTS: bool = false;
+    /// Whether steps stop at events ([`Stepped::Event`]), which [`ModelExchange::event`] handles. An importer of FMI 3.0
+    /// may then have an event mode (`hasEventMode`), at the begin of the simulation and whenever it likes.
+    const EVENTS: Events = Events::None;
 
     /// Goes on from a communication point.
     ///
     /// # Errors
     /// When the step cannot be carried out; the model must then be as it was before.
     fn step(&mut self, step: Step) -> Result<Stepped, Error>;
+}
+
+/// Whether the steps of Co-Simulation stop at events.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Events {
+    /// There are none.
+    None,
+    /// They do. For importers that handle no events, those of FMI 2.0 among them, this crate does: at the begin of the
+    /// simulation and wherever a step stops, at once.
+    Stop,
+    /// They do where [`Step::stop_at_events`] says so. For importers that handle no events, the model goes through them
+    /// in its step; `event` is not called. For models that wait for the inputs of the next step, as a sampled
+    /// controller.
+    StopIfHandled,
 }
 
 /// A step from a communication point to the next.
@@ -25,6 +39,15 @@ pub struct Step {
     pub time: f64,
     /// The step size, s; finite and above 0.
     pub size: f64,
+    /// Whether the step is to stop at the first event, also at one at its end.
+    pub stop_at_events: bool,
+}
+
+impl Step {
+    /// A step that need not stop at events.
+    pub fn new(time: f64, size: f64) -> Self {
+        Self { time, size, stop_at_events: false }
+    }
 }
 
 /// How a step ended.
@@ -40,7 +63,7 @@ pub enum Stepped {
     /// [`EVENTS`](CoSimulation::EVENTS) says so.
     ///
     /// An importer of FMI 3.0 that wants to handles the event itself (`eventHandlingNeeded`). Otherwise, and in FMI
-    /// 2.0, this crate does: it calls [`ModelExchange::event`], and the rest of the step follows.
+    /// 2.0, this crate does: it calls [`ModelExchange::event`], and the rest of the step follows as another step.
     Event(f64),
     /// At an earlier time, s, or the next point: the model wants to end the simulation.
     Terminate(f64),

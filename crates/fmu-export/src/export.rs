@@ -1,6 +1,6 @@
 //! From a model with capabilities to an FMU: [`export_fmu!`](crate::export_fmu).
 
-use crate::capabilities::{Event, Step, StepCompleted, Stepped};
+use crate::capabilities::{Event, Events, Step, StepCompleted, Stepped};
 use crate::model::{Error, Model};
 
 /// A model with what it offers. Implemented by [`offer!`](crate::offer), which takes everything from the
@@ -50,8 +50,15 @@ pub trait Exported: Model {
 pub struct CoSimulationOffer {
     /// Steps may have any size.
     pub variable_step_size: bool,
-    /// Steps may stop at events.
-    pub events: bool,
+    /// Whether steps stop at events.
+    pub events: Events,
+}
+
+impl CoSimulationOffer {
+    /// Whether an importer of FMI 3.0 can handle events.
+    pub const fn has_event_mode(&self) -> bool {
+        !matches!(self.events, Events::None)
+    }
 }
 
 /// What the model description says of a Model Exchange model.
@@ -182,7 +189,7 @@ macro_rules! offer {
         const _: () = {
             if let ::core::option::Option::Some(offer) = <$model as $crate::Exported>::CO_SIMULATION {
                 ::core::assert!(
-                    !offer.events || <$model as $crate::Exported>::MODEL_EXCHANGE.is_some(),
+                    !offer.has_event_mode() || <$model as $crate::Exported>::MODEL_EXCHANGE.is_some(),
                     "EVENTS needs ModelExchange, whose function event handles them"
                 );
             }

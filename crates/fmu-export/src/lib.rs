@@ -28,8 +28,8 @@ mod value;
 mod variable;
 
 pub use capabilities::{
-    CoSimulation, Event, InputDerivatives, ModelExchange, OutputDerivatives, Partials, Step, StepCompleted,
-    Stepped,
+    CoSimulation, Event, Events, InputDerivatives, ModelExchange, OutputDerivatives, Partials, Step,
+    StepCompleted, Stepped,
 };
 pub use export::{CoSimulationOffer, Exported, ModelExchangeOffer};
 pub use info::{DefaultExperiment, Info};

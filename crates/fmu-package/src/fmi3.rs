@@ -93,7 +93,7 @@ fn interface<M: Exported>(interface: Interface) -> Element {
         }
         Interface::CoSimulation => {
             let variable_step_size = M::CO_SIMULATION.is_some_and(|offer| offer.variable_step_size);
-            let events = M::CO_SIMULATION.is_some_and(|offer| offer.events);
+            let events = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
             element("CoSimulation")
                 .with("canHandleVariableCommunicationStepSize", variable_step_size)
                 .with("maxOutputDerivativeOrder", M::OUTPUT_DERIVATIVES)

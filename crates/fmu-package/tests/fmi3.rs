@@ -138,7 +138,7 @@ impl ModelExchange for Room {
 }
 
 impl CoSimulation for Room {
-    const EVENTS: bool = true;
+    const EVENTS: Events = Events::Stop;
 
     fn step(&mut self, _: Step) -> Result<Stepped, Error> {
         Ok(Stepped::Done)

@@ -94,7 +94,7 @@ pub struct Controller {
     pub schedule: Schedule,
     /// When the last sample was taken, s.
     pub sampled_at: f64,
-    /// The current communication point, s.
+    /// The time of the motors' [`motion`](Self::motion), s: in Co-Simulation the communication point.
     pub now: f64,
 }
 
@@ -163,26 +163,71 @@ impl Controller {
     #[must_use]
     pub fn step(&mut self, time: f64, h: f64) -> bool {
         let end = time + h;
-        let rounding = (0.01 * h.min(self.schedule.period)).min(1e-9) + 8.0 * f64::EPSILON * end.abs();
-        let due = ((end - rounding - self.schedule.epoch) / self.schedule.period).ceil();
-        if due - self.schedule.next > MOST_SAMPLES || due.abs() > LAST_SAMPLE {
+        let due = self.due_before(end - self.rounding(end, h));
+        if !self.can_take(due) {
             return false;
         }
         let (inputs, slopes) = (self.inputs, self.slopes);
         while self.schedule.next < due {
-            let now = self.schedule.time_of(self.schedule.next);
-            self.motors = self.motors.map(|motor| motor.after(now - self.sampled_at));
-            self.sample(&inputs.after(&slopes, (now - time).max(0.0)));
-            self.schedule.next += 1.0;
-            self.sampled_at = now;
+            self.take_sample(|now| inputs.after(&slopes, (now - time).max(0.0)));
         }
         self.now = end;
         self.slopes = Inputs::default();
         true
     }
 
-    /// Takes a sample: the control law.
-    fn sample(&mut self, inputs: &Inputs) {
+    /// When the next sample is due, s, if that is before the end of a step from `time` to `time + h` (s) or at its end.
+    pub fn sample_within(&self, time: f64, h: f64) -> Option<f64> {
+        let (next, end) = (self.next_sample(), time + h);
+        (next <= end + self.rounding(end, h)).then_some(next.min(end))
+    }
+
+    /// When the next sample is due, s.
+    pub fn next_sample(&self) -> f64 {
+        self.schedule.time_of(self.schedule.next)
+    }
+
+    /// Takes the samples that are due at `time` (s), with the inputs as they are.
+    ///
+    /// Returns false, with nothing changed, if a master would wait long for it.
+    #[must_use]
+    pub fn take_samples(&mut self, time: f64) -> bool {
+        let due = self.due_before(time + self.rounding(time, self.schedule.period));
+        if !self.can_take(due) {
+            return false;
+        }
+        let inputs = self.inputs;
+        while self.schedule.next < due {
+            self.take_sample(|_| inputs);
+        }
+        true
+    }
+
+    /// How far the times of masters may be off.
+    fn rounding(&self, time: f64, h: f64) -> f64 {
+        (0.01 * h.min(self.schedule.period)).min(1e-9) + 8.0 * f64::EPSILON * time.abs()
+    }
+
+    /// The number of the first sample that is not due before `time`.
+    fn due_before(&self, time: f64) -> f64 {
+        ((time - self.schedule.epoch) / self.schedule.period).ceil()
+    }
+
+    fn can_take(&self, due: f64) -> bool {
+        due - self.schedule.next <= MOST_SAMPLES && due.abs() <= LAST_SAMPLE
+    }
+
+    /// Takes the next sample, with the inputs at its time.
+    fn take_sample(&mut self, inputs: impl Fn(f64) -> Inputs) {
+        let now = self.next_sample();
+        self.motors = self.motors.map(|motor| motor.after(now - self.sampled_at));
+        self.control(&inputs(now));
+        self.schedule.next += 1.0;
+        self.sampled_at = now;
+    }
+
+    /// The control law.
+    fn control(&mut self, inputs: &Inputs) {
         let p = &self.parameters;
         let kinematics = Kinematics::new(p.M, p.N);
         let rigid = kinematics.wrist(self.motors.map(|motor| motor.angle));

@@ -5,8 +5,8 @@ use crate::motor::Motor;
 use crate::parameters::{InvalidParameter, Parameters};
 use crate::variables::Name;
 use fmu_export::{
-    CoSimulation, DefaultExperiment, Error, Experiment, Info, InputDerivatives, Model, OutputDerivatives,
-    Partials, Setup, Step, Stepped, Variables, info, saved,
+    CoSimulation, DefaultExperiment, Error, Event, Events, Experiment, Info, InputDerivatives, Model,
+    ModelExchange, OutputDerivatives, Partials, Setup, Step, Stepped, Variables, info, saved,
 };
 
 saved!(for Inputs { reference, angle, rate, torque });
@@ -22,8 +22,7 @@ impl From<InvalidParameter> for Error {
 impl Model for Controller {
     const INFO: Info = Info {
         description: "Sampled controller for the pitch-roll wrist testbed: moves its two motors so that the wrist \
-                      takes a pitch and a roll angle. Co-Simulation only, because a sampled controller has no \
-                      continuous states",
+                      takes a pitch and a roll angle",
         copyright: "Copyright (c) 2026 The pitch-roll wrist testbed authors",
         default_experiment: DefaultExperiment {
             start_time: 0.0,
@@ -46,16 +45,41 @@ impl Model for Controller {
         self.start(experiment.start_time);
         Ok(())
     }
+
+    fn calculate(&mut self, time: f64) {
+        self.now = time;
+    }
 }
 
 impl CoSimulation for Controller {
+    /// A sample at the end of a step waits for the inputs of the next one.
+    const EVENTS: Events = Events::StopIfHandled;
+
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+        if step.stop_at_events
+            && let Some(time) = self.sample_within(step.time, step.size)
+        {
+            return Ok(Stepped::Event(time));
+        }
         if self.step(step.time, step.size) {
             return Ok(Stepped::Done);
         }
         Err(Error::new(
             "the step holds so many samples that it would take more than a second; take a smaller step or a longer \
              sample_time",
+        ))
+    }
+}
+
+/// No states: between its samples, which are time events, the motors' motion is known.
+impl ModelExchange for Controller {
+    fn event(&mut self, time: f64) -> Result<Event, Error> {
+        if self.take_samples(time) {
+            return Ok(Event { next: Some(self.next_sample()), ..Event::default() });
+        }
+        Err(Error::new(
+            "so many samples are due that they would take more than a second; handle the time events when they are due \
+             or take a longer sample_time",
         ))
     }
 }

@@ -17,4 +17,4 @@ pub mod wrist;
 pub use controller::Controller;
 pub use parameters::Parameters;
 
-fmu_export::export_fmu!(Controller: CoSimulation + InputDerivatives + OutputDerivatives + Partials);
+fmu_export::export_fmu!(Controller: CoSimulation + ModelExchange + InputDerivatives + OutputDerivatives + Partials);

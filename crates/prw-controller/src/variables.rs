@@ -28,7 +28,7 @@ const ANGLE_LIMIT: Type = not_negative("AngleLimit", &units::RAD);
 const COUNT: Type = Type::integer("Integer_from_1").from(1);
 
 variables! {
-    for Controller, memory in slopes, motors, integral, damping, correction, on_goal, schedule, sampled_at, now;
+    for Controller, memory in slopes, motors, integral, damping, correction, on_goal, schedule, sampled_at;
 
     /// Pitch angle to go to
     pitch_ref = input(&ANGLE) in inputs.reference[0];
@@ -54,13 +54,13 @@ variables! {
     /// Angle of motor 2; its start value is where the motor stands when the simulation begins
     theta2 = output(&ANGLE).exact().depends_on(&[]) in motors[1].angle by |c| c.motion()[1].angle;
     /// Angular velocity of motor 1
-    omega1 = output(&RATE).derivative_of(theta1).depends_on(&[]) by |c| c.motion()[0].rate;
+    omega1 = output(&RATE).depends_on(&[]) by |c| c.motion()[0].rate;
     /// Angular velocity of motor 2
-    omega2 = output(&RATE).derivative_of(theta2).depends_on(&[]) by |c| c.motion()[1].rate;
+    omega2 = output(&RATE).depends_on(&[]) by |c| c.motion()[1].rate;
     /// What the control adds to pitch_ref, as of the last sample
-    pitch_correction = output(&ANGLE).depends_on(&[]) by |c| c.correction[0];
+    pitch_correction = output(&ANGLE).discrete().depends_on(&[]) by |c| c.correction[0];
     /// What the control adds to roll_ref, as of the last sample
-    roll_correction = output(&ANGLE).depends_on(&[]) by |c| c.correction[1];
+    roll_correction = output(&ANGLE).discrete().depends_on(&[]) by |c| c.correction[1];
 
     /// Time between samples, whatever the communication step size
     sample_time = parameter(&SAMPLE_TIME) in parameters.sample_time;

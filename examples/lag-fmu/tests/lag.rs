@@ -9,7 +9,7 @@ fn steps_are_exact() {
     let mut lag = Lag::new(&Setup::new(Interface::CoSimulation)).unwrap();
     Lag::TABLE[Name::u as usize].set(&mut lag, &Value::Real(2.0));
     for k in 0..10 {
-        let step = Step { time: f64::from(k) * 0.3, size: 0.3 };
+        let step = Step::new(f64::from(k) * 0.3, 0.3);
         assert_eq!(lag.step(step).unwrap(), Stepped::Done);
     }
     let Some(Value::Real(x)) = Lag::TABLE[Name::x as usize].value(&lag) else { panic!("x is a Real") };

@@ -2,9 +2,10 @@
 
 use super::refusal::discard;
 use super::{Instance, Outcome, refuse, refuse_with};
-use crate::capabilities::{Step, Stepped};
+use crate::capabilities::{Events, Step, Stepped};
 use crate::export::Exported;
 use crate::mode::Mode;
+use crate::model::Error;
 use crate::status::Status;
 
 /// Where a step has led in FMI 3.0.
@@ -88,13 +89,20 @@ impl<M: Exported> Instance<M> {
                 format!("the step would end at {end}, after the stop time {stop_time}")
             });
         }
-        let stepped = self.state.model.exported_step(Step { time: point, size: step_size })?;
+        let stepped = self.exported_step(point, step_size)?;
         self.state.stale = true;
         if let Stepped::Done = stepped {
             self.state.time = end;
             return Ok(stepped);
         }
         Ok(self.through_events(stepped, point, end))
+    }
+
+    #[inline]
+    fn exported_step(&mut self, time: f64, size: f64) -> Result<Stepped, Error> {
+        let stops = M::CO_SIMULATION.is_some_and(|offer| offer.events == Events::Stop);
+        let stop_at_events = stops || self.importer.event_mode;
+        self.state.model.exported_step(Step { time, size, stop_at_events })
     }
 
     /// The rest of a step that has not simply reached its end: over the events that the importer does not handle.
@@ -122,7 +130,7 @@ impl<M: Exported> Instance<M> {
             stepped = match handled {
                 Ok(()) if self.state.ended => Stepped::Terminate(time),
                 Ok(()) if time == end => Stepped::Done,
-                Ok(()) => match self.state.model.exported_step(Step { time, size: end - time }) {
+                Ok(()) => match self.exported_step(time, end - time) {
                     Ok(stepped) => stepped,
                     Err(error) => self.stuck(time, &error.to_string()),
                 },

@@ -16,6 +16,7 @@ pub(crate) use derivatives::Direction;
 pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
 pub(crate) use saved_states::SavedState;
 
+use crate::capabilities::Events;
 use crate::export::Exported;
 use crate::log::Logger;
 use crate::mode::{Interface, Mode, Situation, Standard};
@@ -107,7 +108,7 @@ impl<M: Exported> Instance<M> {
             }
             _ => {}
         }
-        if importer.event_mode && M::CO_SIMULATION.is_none_or(|offer| !offer.events) {
+        if importer.event_mode && M::CO_SIMULATION.is_none_or(|offer| !offer.has_event_mode()) {
             return refuse("this FMU has no event mode in Co-Simulation (hasEventMode is false)");
         }
         let state = State::new(&setup)?;
@@ -211,7 +212,7 @@ impl<M: Exported> Instance<M> {
         let mode = match self.setup.interface {
             Interface::CoSimulation if self.importer.event_mode => Mode::Event,
             Interface::CoSimulation => {
-                if M::CO_SIMULATION.is_some_and(|offer| offer.events) {
+                if M::CO_SIMULATION.is_some_and(|offer| offer.events == Events::Stop) {
                     self.handle_event()?;
                 }
                 Mode::StepComplete

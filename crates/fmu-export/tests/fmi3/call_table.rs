@@ -109,7 +109,7 @@ pub fn modes_of(interface: Interface) -> [Mode; 5] {
 
 /// A new instance in this mode, with event mode if it can.
 pub fn in_mode<M: Exported>(interface: Interface, mode: Mode) -> Importer {
-    let event_mode = M::CO_SIMULATION.is_some_and(|offer| offer.events);
+    let event_mode = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
     let fmu = Importer::with::<M>(&Arguments {
         event_mode_used: event_mode.into(),
         early_return_allowed: fmi3True,
@@ -135,7 +135,7 @@ pub fn in_mode<M: Exported>(interface: Interface, mode: Mode) -> Importer {
 fn every_function_in_every_state<M: Exported>() {
     for interface in [CoSimulation, ModelExchange] {
         for mode in modes_of(interface) {
-            let has_event_mode = M::CO_SIMULATION.is_some_and(|offer| offer.events);
+            let has_event_mode = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
             if (interface, mode) == (CoSimulation, Event) && !has_event_mode {
                 continue;
             }

@@ -54,7 +54,7 @@ impl ModelExchange for Ticker {
 }
 
 impl CoSimulation for Ticker {
-    const EVENTS: bool = true;
+    const EVENTS: Events = Events::Stop;
 
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         if step.time + step.size >= self.next { Ok(Stepped::Event(self.next)) } else { Ok(Stepped::Done) }

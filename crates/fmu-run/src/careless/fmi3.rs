@@ -348,7 +348,7 @@ impl<M: Exported> Session<'_, M> {
         let both = M::CO_SIMULATION.is_some() && M::MODEL_EXCHANGE.is_some();
         let any = *u.choose(&[Interface::CoSimulation, Interface::ModelExchange])?;
         let mut made_of = Arguments::of::<M>(if both { any } else { offered::<M>() });
-        let has_events = M::CO_SIMULATION.is_some_and(|offer| offer.events);
+        let has_events = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
         made_of.logging_on = u.int_in_range(0..=2)?;
         made_of.early_return_allowed = u.int_in_range(0..=1)?;
         made_of.event_mode_used = (has_events && u.arbitrary()?).into();

@@ -1,0 +1,210 @@
+//! The samples as events: whoever handles them, the motors take the same path, bit for bit.
+
+use fmu_export::Interface::{CoSimulation, ModelExchange};
+use fmu_export::fmi2::types::{fmi2EventInfo, fmi2False, fmi2True};
+use fmu_export::fmi3::types::{fmi3Boolean, fmi3False, fmi3True};
+use fmu_run::fmi3::{Arguments, Stepped, Updated};
+use prw_controller::Controller;
+use prw_controller::variables::Name;
+
+const INPUTS: [u32; 8] = [
+    Name::pitch_ref as u32,
+    Name::roll_ref as u32,
+    Name::pitch as u32,
+    Name::roll as u32,
+    Name::pitch_rate as u32,
+    Name::roll_rate as u32,
+    Name::tau1 as u32,
+    Name::tau2 as u32,
+];
+const OUTPUTS: [u32; 6] = [
+    Name::theta1 as u32,
+    Name::theta2 as u32,
+    Name::omega1 as u32,
+    Name::omega2 as u32,
+    Name::pitch_correction as u32,
+    Name::roll_correction as u32,
+];
+const KD: u32 = Name::Kd as u32;
+const SAMPLE_TIME: u32 = Name::sample_time as u32;
+// Their sums are exact.
+const START: f64 = 0.125;
+const PERIOD: f64 = 1.0 / 128.0;
+const SAMPLES: u32 = 200;
+
+/// What the controller reads, all of it moving.
+fn inputs(time: f64) -> [f64; 8] {
+    let wave = |amplitude: f64, frequency: f64| amplitude * (frequency * time).sin();
+    [
+        0.5 + wave(0.2, 3.0),
+        wave(0.7, 2.0),
+        wave(0.4, 2.9),
+        wave(0.6, 1.9),
+        wave(1.2, 3.1),
+        wave(1.1, 2.1),
+        wave(0.3, 7.0),
+        wave(0.3, 5.0),
+    ]
+}
+
+fn time_of(sample: u32) -> f64 {
+    START + f64::from(sample) * PERIOD
+}
+
+fn bits(outputs: [f64; 6]) -> [u64; 6] {
+    outputs.map(f64::to_bits)
+}
+
+/// The outputs at each communication point, a sample apart; nobody but the controller knows of samples.
+fn steps_of_fmi2() -> Vec<[f64; 6]> {
+    let fmu = fmu_run::Importer::of::<Controller>(CoSimulation);
+    fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
+    fmu.initialize(START);
+    let outputs = |sample| {
+        let (time, next) = (time_of(sample), time_of(sample + 1));
+        fmu.set(&INPUTS, &inputs(time));
+        fmu.step(time, next - time);
+        fmu.get(OUTPUTS)
+    };
+    let path: Vec<_> = (0..SAMPLES).map(outputs).collect();
+    assert!(path.iter().any(|outputs| outputs[0].abs() > 0.3 && outputs[5] != 0.0), "it moves: {path:?}");
+    path
+}
+
+fn with(event_mode_used: fmi3Boolean, early_return_allowed: fmi3Boolean) -> fmu_run::fmi3::Importer {
+    let arguments =
+        Arguments { event_mode_used, early_return_allowed, ..Arguments::of::<Controller>(CoSimulation) };
+    let fmu = fmu_run::fmi3::Importer::with::<Controller>(&arguments);
+    fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
+    fmu.initialize(START);
+    fmu
+}
+
+#[test]
+fn without_event_mode() {
+    let fmu = with(fmi3False, fmi3False);
+    for (sample, expected) in (0..).zip(steps_of_fmi2()) {
+        let (time, next) = (time_of(sample), time_of(sample + 1));
+        fmu.set(&INPUTS, &inputs(time));
+        fmu.step(time, next - time);
+        assert_eq!(bits(fmu.get(OUTPUTS)), bits(expected), "at {next}");
+    }
+}
+
+/// Steps of one sample, which end at an event, and long ones, which end early.
+#[test]
+fn in_event_mode() {
+    for (early_return_allowed, samples_a_step) in [(fmi3False, 1), (fmi3True, 1), (fmi3True, 1000)] {
+        let fmu = with(fmi3True, early_return_allowed);
+        for (sample, expected) in (0..).zip(steps_of_fmi2()) {
+            let (time, next) = (time_of(sample), time_of(sample + 1));
+            fmu.set(&INPUTS, &inputs(time));
+            assert_eq!(fmu.update().next, Some(next));
+            fmu.ok(fmu.fmi3EnterStepMode());
+            let stepped = Stepped {
+                event_handling_needed: true,
+                terminate: false,
+                early_return: samples_a_step > 1,
+                last_successful_time: next,
+            };
+            assert_eq!(fmu.try_step(time, time_of(sample + samples_a_step) - time), Ok(stepped));
+            assert_eq!(bits(fmu.get(OUTPUTS)), bits(expected), "at {next}");
+            fmu.ok(fmu.fmi3EnterEventMode());
+        }
+    }
+}
+
+/// The importer handles the events at its communication points only: between them the inputs stand still, as for
+/// importers that know of no events.
+#[test]
+fn in_event_mode_with_samples_within_a_step() {
+    let (fmu, unaware) = (with(fmi3True, fmi3False), with(fmi3False, fmi3False));
+    for point in 0..40 {
+        let (time, next) = (time_of(5 * point), time_of(5 * (point + 1)));
+        fmu.set(&INPUTS, &inputs(time));
+        unaware.set(&INPUTS, &inputs(time));
+        fmu.update();
+        fmu.ok(fmu.fmi3EnterStepMode());
+        assert!(fmu.try_step(time, next - time).unwrap().event_handling_needed);
+        unaware.step(time, next - time);
+        assert_eq!(bits(fmu.get(OUTPUTS)), bits(unaware.get(OUTPUTS)), "at {next}");
+        fmu.ok(fmu.fmi3EnterEventMode());
+    }
+}
+
+/// Whoever does not handle the event that a step ended with has it handled by the next step.
+#[test]
+fn an_event_that_nobody_handles() {
+    let (fmu, unaware) = (with(fmi3True, fmi3False), with(fmi3False, fmi3False));
+    fmu.set(&INPUTS, &inputs(START));
+    fmu.ok(fmu.fmi3EnterStepMode());
+    for sample in 0..50 {
+        let (time, next) = (time_of(sample), time_of(sample + 1));
+        fmu.set(&INPUTS, &inputs(time));
+        unaware.set(&INPUTS, &inputs(time));
+        assert!(fmu.try_step(time, next - time).unwrap().event_handling_needed);
+        unaware.step(time, next - time);
+        assert_eq!(bits(fmu.get(OUTPUTS)), bits(unaware.get(OUTPUTS)), "at {next}");
+    }
+}
+
+const NOTHING_SAID: fmi2EventInfo = fmi2EventInfo {
+    new_discrete_states_needed: 9,
+    terminate_simulation: 9,
+    nominals_of_continuous_states_changed: 9,
+    values_of_continuous_states_changed: 9,
+    next_event_time_defined: 9,
+    next_event_time: f64::NAN,
+};
+
+#[test]
+fn in_model_exchange_of_fmi2() {
+    let fmu = fmu_run::Importer::of::<Controller>(ModelExchange);
+    fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
+    fmu.initialize(START);
+    for (sample, expected) in (0..).zip(steps_of_fmi2()) {
+        let (time, next) = (time_of(sample), time_of(sample + 1));
+        fmu.set(&INPUTS, &inputs(time));
+        let mut said = NOTHING_SAID;
+        fmu.ok(fmu.fmi2NewDiscreteStates(&mut said));
+        assert_eq!((said.next_event_time_defined, said.next_event_time), (fmi2True, next));
+        assert_eq!((said.new_discrete_states_needed, said.terminate_simulation), (fmi2False, fmi2False));
+        fmu.ok(fmu.fmi2EnterContinuousTimeMode());
+        // A solver may look ahead and come back.
+        for share in [0.5, 1.0, 0.25, 1.0] {
+            fmu.ok(fmu.fmi2SetTime(time + share * PERIOD));
+            fmu.set(&INPUTS, &inputs(time + share * PERIOD));
+            if share == 1.0 {
+                assert_eq!(bits(fmu.get(OUTPUTS)), bits(expected), "at {next}");
+            }
+        }
+        fmu.ok(fmu.fmi2EnterEventMode());
+    }
+}
+
+#[test]
+fn in_model_exchange_of_fmi3() {
+    let fmu = fmu_run::fmi3::Importer::of::<Controller>(ModelExchange);
+    fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
+    fmu.initialize(START);
+    for (sample, expected) in (0..).zip(steps_of_fmi2()) {
+        let (time, next) = (time_of(sample), time_of(sample + 1));
+        fmu.set(&INPUTS, &inputs(time));
+        assert_eq!(fmu.update(), Updated { next: Some(next), ..Updated::default() });
+        fmu.ok(fmu.fmi3EnterContinuousTimeMode());
+        fmu.ok(fmu.fmi3SetTime(next));
+        assert_eq!(bits(fmu.get(OUTPUTS)), bits(expected), "at {next}");
+        fmu.ok(fmu.fmi3EnterEventMode());
+    }
+}
+
+/// An importer that forgets the time events for hours is told so.
+#[test]
+fn too_many_samples_at_once() {
+    let fmu = fmu_run::Importer::of::<Controller>(ModelExchange);
+    fmu.initialize(0.0);
+    fmu.ok(fmu.fmi2SetTime(1e6));
+    let mut said = NOTHING_SAID;
+    let message = fmu.refused("an hour of samples", |fmu| fmu.fmi2NewDiscreteStates(&mut said));
+    assert!(message.contains("sample_time"), "{message}");
+}
