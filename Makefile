@@ -74,9 +74,9 @@ test-rust: need-rust headers
 	  set -ex; $(CARGO) test $(LOCKED) --workspace; \
 	fi
 
-test-fmu: $(VENV)/test.stamp fmu
+test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check
-	$(PY) -m pytest -q -p no:cacheprovider tests/oracle tests/fmpy tests/analysis
+	$(PY) -m pytest -q -p no:cacheprovider tests/oracle tests/fmu_run tests/fmpy tests/analysis
 
 # Ratios of one run; quiet the machine first.
 bench: $(VENV)/demo.stamp fmu
@@ -148,7 +148,15 @@ $(VENV)/made.stamp $(DIST_VENV)/made.stamp: | need-python
 	@$(PYTHON) -m venv --clear $(@D)
 	@touch $@
 
-$(VENV)/demo.stamp: $(VENV)/made.stamp analysis/requirements.txt analysis/pyproject.toml
+FMU_RUN := $(wildcard crates/fmu-run/*.toml crates/fmu-run/python/*.toml $(addprefix crates/fmu-run/,\
+  src/*.rs src/fmi3/*.rs src/batch/*.rs python/src/*.rs python/fmu_run/*))
+
+$(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | need-rust
+	@echo 'compiling fmu-run, which runs FMUs for Python (once)'
+	@$(PIP_INSTALL) --quiet --no-deps ./crates/fmu-run
+	@touch $@
+
+$(VENV)/demo.stamp: $(VENV)/made.stamp $(VENV)/fmu_run.stamp analysis/requirements.txt analysis/pyproject.toml
 	@echo 'installing the Python packages of the demo (once)'
 	@$(PIP_INSTALL) --quiet -r analysis/requirements.txt
 	@$(PIP_INSTALL) --quiet --no-deps --editable analysis
@@ -187,9 +195,9 @@ need-rust:
 
 need-python:
 	@command -v $(PYTHON) >/dev/null || \
-	  $(call stop,Python 3.9 or later is missing; on Debian: apt install python3 python3-venv)
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 9))' || \
-	  $(call stop,$(PYTHON) is too old: Python 3.9 or later is needed (make PYTHON=...))
+	  $(call stop,Python 3.11 or later is missing; on Debian: apt install python3 python3-venv)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  $(call stop,$(PYTHON) is too old: Python 3.11 or later is needed (make PYTHON=...))
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
 	  $(call stop,$(PYTHON) cannot make virtual environments; on Debian: apt install python3-venv)
 

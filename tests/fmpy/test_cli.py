@@ -175,7 +175,7 @@ def test_other_complaints(prw, tmp_path):
         assert result.stderr.count("\n") == 1 and result.stdout == ""
     (tmp_path / "huge.csv").write_text("time,theta1,theta2\n0,0,0\n1e-3,1e308,0\n2e-3,-1e308,0\n")
     result = prw("simulate", "--input", "huge.csv")
-    assert result.returncode == 1 and "the FMU stopped at time 0.001: " in result.stderr
+    assert result.returncode == 1 and "the FMU stopped at 0.001 s: " in result.stderr
     assert result.stderr.count("\n") == 1 and not (tmp_path / "out").exists()
     result = prw("simulate", "--input", "good.csv", "--out", "taken")
     assert result.returncode == 1 and "taken" in result.stderr and result.stderr.count("\n") == 1

@@ -3,7 +3,7 @@
 use fmu_export::fmi2::Functions;
 use fmu_export::fmi2::types::*;
 use fmu_export::{Exported, Interface};
-use std::ffi::{CStr, CString, c_char, c_void};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ops::Deref;
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;
@@ -21,6 +21,19 @@ pub struct Message {
     pub text: String,
 }
 
+/// The answer of a library that may be anybody's: what is no status is an error, and so is `fmi2Pending`, as nothing here
+/// waits for steps.
+#[inline]
+pub(crate) fn status(code: c_int) -> Status {
+    match code {
+        0 => Status::Ok,
+        1 => Status::Warning,
+        2 => Status::Discard,
+        4 => Status::Fatal,
+        _ => Status::Error,
+    }
+}
+
 /// The importer's log; its address is the component environment.
 #[derive(Debug, Default)]
 pub(crate) struct Log(Mutex<Vec<Message>>);
@@ -36,7 +49,7 @@ impl Log {
 unsafe extern "C" fn remember(
     environment: fmi2ComponentEnvironment,
     instance_name: fmi2String,
-    status: Status,
+    status: c_int,
     category: fmi2String,
     message: fmi2String,
 ) {
@@ -49,7 +62,7 @@ unsafe extern "C" fn remember(
 pub(crate) unsafe fn remember_message(
     environment: *mut c_void,
     instance_name: *const c_char,
-    status: Status,
+    status: c_int,
     category: *const c_char,
     message: *const c_char,
 ) {
@@ -59,6 +72,7 @@ pub(crate) unsafe fn remember_message(
         Some(_) => unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned(),
         None => String::new(),
     };
+    let status = self::status(status);
     let [instance_name, category, text] = [instance_name, category, message].map(text);
     // SAFETY: NULL or the `Log` that was handed to fmi2Instantiate and lives as long as the instance.
     if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
@@ -256,10 +270,16 @@ macro_rules! methods {
         impl Importer {
             $(
                 #[allow(clippy::not_unsafe_ptr_arg_deref, reason = "see the SAFETY comment")]
+                #[inline]
                 pub fn $function(&self $(, $argument: $type)*) -> Status {
                     // SAFETY: the component is NULL or alive. Pointers are passed on as they are: who uses this type
-                    // passes NULL or pointers to as many values as it says, as in C.
-                    unsafe { (self.functions.$function)(self.component $(, $argument)*) }
+                    // passes NULL or pointers to as many values as it says, as in C. There an enumeration is returned
+                    // as an int is, and a foreign library may return any.
+                    status(unsafe {
+                        let function: unsafe extern "C" fn(fmi2Component $(, $type)*) -> c_int =
+                            std::mem::transmute(self.functions.$function);
+                        function(self.component $(, $argument)*)
+                    })
                 }
             )+
 

@@ -1,6 +1,7 @@
 //! The shared library of an FMU.
 
 use fmu_export::fmi2::Functions;
+use fmu_export::fmi2::types::*;
 use std::path::Path;
 
 /// A loaded library. It must outlive its instances.
@@ -13,7 +14,8 @@ pub struct Library {
 
 macro_rules! find_all {
     ($($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+) => {
-        /// Finds every function.
+        /// Finds the functions. An FMU need not have those of an interface type that it does not offer: calls of these
+        /// are errors.
         ///
         /// # Safety
         /// As of [`load`].
@@ -25,7 +27,15 @@ macro_rules! find_all {
                     fmi2GetVersion: *library.get(b"fmi2GetVersion")?,
                     fmi2Instantiate: *library.get(b"fmi2Instantiate")?,
                     fmi2FreeInstance: *library.get(b"fmi2FreeInstance")?,
-                    $($function: *library.get(stringify!($function).as_bytes())?,)+
+                    $($function: match library.get(stringify!($function).as_bytes()) {
+                        Ok(found) => *found,
+                        Err(_) => {
+                            unsafe extern "C" fn absent(_: fmi2Component $(, _: $type)*) -> Status {
+                                Status::Error
+                            }
+                            absent
+                        }
+                    },)+
                 })
             }
         }
@@ -41,7 +51,7 @@ fmu_export::fmi2_functions!(find_all);
 /// is loaded is sound.
 ///
 /// # Errors
-/// When it cannot be loaded, or lacks a function; the message names it.
+/// When it cannot be loaded, or lacks a function that needs no instance; the message names it.
 pub unsafe fn load(path: &Path) -> Result<Library, libloading::Error> {
     // SAFETY: the caller's promise.
     let library = unsafe { libloading::Library::new(path) }?;

@@ -3,11 +3,14 @@ model."""
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
-from typing import Dict, Mapping, NamedTuple, Sequence
+from typing import Dict, List, Mapping, NamedTuple, Sequence
 
+import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
+from fmpy.simulation import instantiate_fmu
 
 from prw.errors import UserError
 from prw.motion import Motion
@@ -41,18 +44,24 @@ class Matrices(NamedTuple):
 
 
 class Model(Testbed):
-    """One instance of the testbed FMU for many runs. Between runs it is reset, not loaded again.
+    """The testbed FMU as a function of its parameters.
 
     A context manager like Testbed; raises UserError as it does.
     """
+
+    _slave = None
 
     def __init__(self, fmu: Path):
         """Unpack, load and instantiate the FMU file `fmu`."""
         super().__init__(fmu)
         self.fmu = fmu
-        self._values: Mapping[str, float] = {}
         self.parameters: Dict[str, Parameter] = {}
         self.counts: Dict[str, int] = {}
+        self._said: List[str] = []
+        self._description = fmpy.read_model_description(str(fmu))
+        self._references = {v.name: v.valueReference for v in self._description.modelVariables}
+        self._folder = fmpy.extract(str(fmu))
+        self._slave = instantiate_fmu(self._folder, self._description, fmi_type="CoSimulation", logger=self._hear)
         shown = {
             (unit.name, display.name): 1 / display.factor
             for unit in self._description.unitDefinitions
@@ -95,13 +104,21 @@ class Model(Testbed):
     def run(
         self, motion: Motion, values: Mapping[str, float], outputs: Sequence[str] = OUTPUTS, state=None
     ) -> Dict[str, np.ndarray]:
-        """Reset the FMU, give it the parameters `values` (SI, by name; others keep their start values) and let it
-        follow `motion`, as Testbed.respond does. state: (6,) initial x; default: at rest at the motors' first
+        """Give the FMU the parameters `values` (SI, by name; others keep their start values) and let it follow
+        `motion`, as Testbed.respond does. state: (6,) initial x; default: at rest at the motors' first
         angles."""
-        self._values = dict(values)
+        start = dict(values)
         if state is not None:
-            self._values.update(zip(STATES, map(float, state)))
-        return self.respond(motion, outputs)
+            start.update(zip(STATES, map(float, state)))
+        return self.respond(motion, outputs, start)
+
+    def close(self) -> None:
+        """Free the instance, unload the library and remove the unpacked files. Harmless when called again."""
+        slave, self._slave = self._slave, None
+        if slave is not None:
+            slave.freeInstance()
+            shutil.rmtree(self._folder, ignore_errors=True)
+        super().close()
 
     def matrices(self, values: Mapping[str, float]) -> Matrices:
         """The FMU's linear model with the parameters `values` (SI, by name), from fmi2GetDirectionalDerivative."""
@@ -112,12 +129,12 @@ class Model(Testbed):
         try:
             slave.reset()
             slave.setupExperiment()
-            self._set(values)
+            slave.setReal([reference[name] for name in values], list(values.values()))
             slave.enterInitializationMode()
             slave.exitInitializationMode()
             columns = [slave.getDirectionalDerivative(unknowns, [reference[name]], [1.0]) for name in STATES + INPUTS]
         except FMICallException as error:
-            raise UserError(f"{self.fmu}: {self._why(error)}") from None
+            raise UserError(f"{self.fmu}: {self._said[-1] if self._said else error}") from None
         table = np.array(columns).T
         # A state is no unknown of FMI's directional derivatives, and its row of C needs none.
         whole = np.zeros((len(OUTPUTS), table.shape[1]))
@@ -129,16 +146,8 @@ class Model(Testbed):
         n = len(STATES)
         return Matrices(table[:n, :n], table[:n, n:], whole[:, :n], whole[:, n:])
 
-    def _initialize(self, motion: Motion, rates: bool) -> None:
-        self._refusals.clear()
-        self._slave.reset()
-        super()._initialize(motion, rates)
-
-    def _set(self, values: Mapping[str, float]) -> None:
-        # What rest is at the motors' angles comes from Testbed; parameters and another initial state go over it.
-        if "theta3" in values:
-            values = {**values, **self._values}
-        super()._set(values)
+    def _hear(self, _environment, _instance, _status, _category, message) -> None:
+        self._said.append((message or b"").decode("utf-8", "replace").strip())
 
 
 def stack(matrices: Sequence[Matrices]) -> Matrices:

@@ -8,15 +8,15 @@ pub use library::{Library, load};
 pub use testing::{Stepped, Updated};
 
 use crate::Message;
-use crate::importer::{Log, Zero, remember_message};
+use crate::importer::{Log, Zero, remember_message, status};
 use fmu_export::fmi3::types::*;
 use fmu_export::{Exported, Interface};
-use std::ffi::{CStr, CString};
+use std::ffi::{CStr, CString, c_int};
 use std::ptr::{null, null_mut};
 
 unsafe extern "C" fn remember(
     environment: fmi3InstanceEnvironment,
-    status: Status,
+    status: c_int,
     category: fmi3String,
     message: fmi3String,
 ) {
@@ -98,7 +98,10 @@ impl Importer {
             true => (&raw const *log).cast_mut().cast(),
             false => null_mut(),
         };
-        let callback = arguments.logger.then_some(remember as fmi3LogMessageCallback);
+        let remember: unsafe extern "C" fn(_, _, _, _) = remember;
+        // SAFETY: in C an enumeration is passed as an int is.
+        let callback =
+            arguments.logger.then(|| unsafe { std::mem::transmute::<_, fmi3LogMessageCallback>(remember) });
         let required = arguments.required_intermediate_variables;
         // SAFETY: NULL or living values, all of them.
         let instance = unsafe {
@@ -176,10 +179,16 @@ macro_rules! methods {
         impl Importer {
             $(
                 #[allow(clippy::not_unsafe_ptr_arg_deref, reason = "see the SAFETY comment")]
+                #[inline]
                 pub fn $function(&self $(, $argument: $type)*) -> Status {
                     // SAFETY: the instance is NULL or alive. Pointers are passed on as they are: who uses this type
-                    // passes NULL or pointers to as many values as it says, as in C.
-                    unsafe { (self.functions.$function)(self.instance $(, $argument)*) }
+                    // passes NULL or pointers to as many values as it says, as in C. There an enumeration is returned
+                    // as an int is, and a foreign library may return any.
+                    status(unsafe {
+                        let function: unsafe extern "C" fn(fmi3Instance $(, $type)*) -> c_int =
+                            std::mem::transmute(self.functions.$function);
+                        function(self.instance $(, $argument)*)
+                    })
                 }
             )+
 

@@ -1,0 +1,96 @@
+//! Many runs of one FMU.
+
+mod measure;
+mod plan;
+mod run;
+mod slave;
+
+pub use measure::Measure;
+pub use run::Watch;
+
+use crate::error::Error;
+use crate::fmu::Fmu;
+
+/// What is to be run. A value for each run is what makes it many runs; without one it is a single run.
+///
+/// In each run all start values are set before the initialization, inputs of the first time in it. At each time the inputs
+/// are set, the outputs read, and the step to the next time is taken.
+#[derive(Clone, Debug, Default)]
+pub struct Batch<'a> {
+    /// The communication points, s: finite, each after the one before, two at least.
+    pub time: &'a [f64],
+    /// Inputs and what they do. Others stay at their start values.
+    pub inputs: Vec<(&'a str, Course<'a>)>,
+    /// Time derivatives of order 1 of inputs, set with them (FMI 2.0 alone has these).
+    pub input_derivatives: Vec<(&'a str, Course<'a>)>,
+    /// Start values of parameters, states, inputs and so on.
+    pub start: Vec<(&'a str, Start<'a>)>,
+    /// What is read; any variable that is a number.
+    pub outputs: Vec<&'a str>,
+    /// Outputs are kept at the first time and at each of this many from there; `None` keeps no courses.
+    pub every: Option<usize>,
+    /// What is calculated on the way, of each output, over all times.
+    pub measures: Vec<Measure>,
+    /// How many threads; `None` takes as many as the machine has processors.
+    pub threads: Option<usize>,
+    /// Read outputs as each step leaves them, before the next inputs are set, as section 4.2.4 of FMI 2.0 has it to the
+    /// letter, and FMPy. What depends on inputs at once, without a step, is then late by a step.
+    pub read_before_set: bool,
+}
+
+/// What an input does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Course<'a> {
+    /// The same value always.
+    Constant(f64),
+    /// A value for each time, the same in each run.
+    Shared(&'a [f64]),
+    /// A course for each run, one after the other: runs times times.
+    EachRun(&'a [f64]),
+}
+
+/// A start value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start<'a> {
+    /// The same number in each run; 0 and 1 for Booleans.
+    Same(f64),
+    /// The same text in each run.
+    Text(&'a str),
+    /// A number for each run.
+    EachRun(&'a [f64]),
+}
+
+/// What came of a [`Batch`].
+#[derive(Clone, Debug, Default)]
+pub struct Runs {
+    /// The number of runs.
+    pub count: usize,
+    /// How many times are [kept](Batch::every): the length of a course.
+    pub kept: usize,
+    /// Courses: runs, outputs, times, the last fastest. Those of runs that were refused are not a number.
+    pub courses: Vec<f64>,
+    /// Measures: runs, outputs, measures, the last fastest. Those of runs that were refused are not a number.
+    pub measures: Vec<f64>,
+    /// The runs that were refused, in their order, and why, in the words of the FMU.
+    pub errors: Vec<(usize, String)>,
+}
+
+impl Fmu {
+    /// Carries out the runs.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when what is asked for does not fit the FMU or itself, [`Error::Fmu`] when there are no
+    /// instances of it, [`Error::Cancelled`]. A run that the FMU refuses is no error here, see [`Runs::errors`].
+    pub fn run(&self, batch: &Batch, watch: &Watch) -> Result<Runs, Error> {
+        let plan = plan::Plan::of(self, batch)?;
+        run::run(self, &plan, watch)
+    }
+
+    /// The number of runs that a batch asks for.
+    ///
+    /// # Errors
+    /// [`Error::Request`], as [`run`](Self::run).
+    pub fn count(&self, batch: &Batch) -> Result<usize, Error> {
+        Ok(plan::Plan::of(self, batch)?.runs)
+    }
+}

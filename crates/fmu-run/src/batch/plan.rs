@@ -1,0 +1,305 @@
+//! From names to value references: a batch that fits the FMU.
+
+use super::{Batch, Course, Measure, Start};
+use crate::description::Variable;
+use crate::error::Error;
+use crate::fmu::Fmu;
+use fmu_export::BaseType;
+use std::ffi::CString;
+
+/// A batch after all checks.
+pub(super) struct Plan<'a> {
+    pub time: &'a [f64],
+    pub runs: usize,
+    pub real_inputs: Inputs<'a>,
+    pub other_inputs: Vec<(BaseType, u32, Values<'a>)>,
+    pub derivatives: Inputs<'a>,
+    pub start: Vec<(BaseType, u32, Values<'a>)>,
+    pub texts: Vec<(u32, CString)>,
+    pub outputs: Vec<Output>,
+    /// The value references of the outputs that are Real.
+    pub real_outputs: Vec<u32>,
+    pub every: Option<usize>,
+    pub measures: &'a [Measure],
+    pub threads: usize,
+    pub read_before_set: bool,
+}
+
+/// Inputs that are set by one call.
+#[derive(Default)]
+pub(super) struct Inputs<'a> {
+    pub references: Vec<u32>,
+    pub values: Vec<Values<'a>>,
+}
+
+/// Values by run and time.
+#[derive(Clone, Copy)]
+pub(super) struct Values<'a> {
+    values: &'a [f64],
+    constant: f64,
+    /// From one run to the next, and from one time to the next; 0 where it makes no difference.
+    of_run: usize,
+    of_time: usize,
+}
+
+impl Values<'_> {
+    /// The value in a run at a time, by their numbers.
+    #[inline]
+    pub fn at(&self, run: usize, time: usize) -> f64 {
+        self.values.get(run * self.of_run + time * self.of_time).copied().unwrap_or(self.constant)
+    }
+}
+
+/// Where an output's value comes from.
+pub(super) enum Output {
+    /// The one with this number among those that are Real.
+    Real(usize),
+    Other(BaseType, u32),
+}
+
+fn request<T>(message: String) -> Result<T, Error> {
+    Err(Error::Request(message))
+}
+
+impl<'a> Plan<'a> {
+    pub fn of(fmu: &Fmu, batch: &'a Batch) -> Result<Self, Error> {
+        let time = checked_time(batch.time)?;
+        let runs = runs(batch)?;
+        let mut plan = Self {
+            time,
+            runs,
+            real_inputs: Inputs::default(),
+            other_inputs: Vec::new(),
+            derivatives: Inputs::default(),
+            start: Vec::new(),
+            texts: Vec::new(),
+            outputs: Vec::new(),
+            real_outputs: Vec::new(),
+            every: batch.every,
+            measures: &batch.measures,
+            threads: threads(fmu, batch.threads)?.min(runs.max(1)),
+            read_before_set: batch.read_before_set,
+        };
+        if batch.every == Some(0) {
+            return request("every must be at least 1".to_owned());
+        }
+        plan.find_inputs(fmu, batch)?;
+        plan.find_start(fmu, batch)?;
+        for name in &batch.outputs {
+            let of = number(fmu, name)?;
+            let output = match of.base {
+                BaseType::Real => {
+                    plan.real_outputs.push(of.reference);
+                    Output::Real(plan.real_outputs.len() - 1)
+                }
+                base => Output::Other(base, of.reference),
+            };
+            plan.outputs.push(output);
+        }
+        Ok(plan)
+    }
+
+    fn find_inputs(&mut self, fmu: &Fmu, batch: &'a Batch) -> Result<(), Error> {
+        let description = fmu.description();
+        let mut seen = Vec::new();
+        for (name, course) in &batch.inputs {
+            let of = number(fmu, name)?;
+            let settable = matches!(of.causality.as_str(), "input" | "parameter");
+            if !settable || of.variability.as_deref() == Some("fixed") {
+                return request(format!(
+                    "{name} is no input but {} {}; give it a start value",
+                    article(of.variability.as_deref().unwrap_or(&of.causality)),
+                    of.causality
+                ));
+            }
+            once(&mut seen, name, "inputs")?;
+            let values = self.course(name, of.base, *course)?;
+            match of.base {
+                BaseType::Real => {
+                    self.real_inputs.references.push(of.reference);
+                    self.real_inputs.values.push(values);
+                }
+                base => self.other_inputs.push((base, of.reference, values)),
+            }
+        }
+        if !batch.input_derivatives.is_empty() && !description.input_derivatives {
+            return request(format!(
+                "{} takes no input derivatives (canInterpolateInputs of FMI 2.0)",
+                description.model_name
+            ));
+        }
+        let mut seen = Vec::new();
+        for (name, course) in &batch.input_derivatives {
+            let of = number(fmu, name)?;
+            if of.base != BaseType::Real || of.causality != "input" {
+                return request(format!("{name} is no Real input; only these have input derivatives"));
+            }
+            once(&mut seen, name, "input derivatives")?;
+            self.derivatives.references.push(of.reference);
+            self.derivatives.values.push(self.course(name, of.base, *course)?);
+        }
+        Ok(())
+    }
+
+    fn find_start(&mut self, fmu: &Fmu, batch: &'a Batch) -> Result<(), Error> {
+        let mut seen = Vec::new();
+        for (name, start) in &batch.start {
+            let of = find(fmu, name)?;
+            once(&mut seen, name, "start values")?;
+            let values = match *start {
+                Start::Text(text) => {
+                    if of.base != BaseType::String {
+                        return request(format!("{name} is a number, its start value cannot be {text:?}"));
+                    }
+                    let Ok(text) = CString::new(text) else {
+                        return request(format!(
+                            "the start value of {name} must not contain a character NUL"
+                        ));
+                    };
+                    self.texts.push((of.reference, text));
+                    continue;
+                }
+                Start::Same(value) => Values { values: &[], constant: value, of_run: 0, of_time: 0 },
+                Start::EachRun(values) => Values { values, constant: 0.0, of_run: 1, of_time: 0 },
+            };
+            let of = number(fmu, name)?;
+            let all = if values.of_run == 0 { std::slice::from_ref(&values.constant) } else { values.values };
+            fits(name, of.base, all)?;
+            self.start.push((of.base, of.reference, values));
+        }
+        Ok(())
+    }
+
+    fn course(&self, name: &str, base: BaseType, course: Course<'a>) -> Result<Values<'a>, Error> {
+        let times = self.time.len();
+        let shared = Values { values: &[], constant: 0.0, of_run: 0, of_time: 0 };
+        match course {
+            Course::Constant(value) => {
+                fits(name, base, &[value])?;
+                Ok(Values { constant: value, ..shared })
+            }
+            Course::Shared(values) => {
+                if values.len() != times {
+                    return request(format!("{name} has {} values for {times} times", values.len()));
+                }
+                fits(name, base, values)?;
+                Ok(Values { values, of_time: 1, ..shared })
+            }
+            Course::EachRun(values) => {
+                fits(name, base, values)?;
+                Ok(Values { values, of_run: times, of_time: 1, ..shared })
+            }
+        }
+    }
+}
+
+fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
+    if time.len() < 2 {
+        return request(format!(
+            "time has {} values; a run goes from one time to another at least",
+            time.len()
+        ));
+    }
+    if let Some(place) = time.iter().position(|time| !time.is_finite()) {
+        return request(format!("time[{place}] is {}; times must be finite", time[place]));
+    }
+    if let Some(place) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+        let [before, after] = [time[place], time[place + 1]];
+        return request(format!(
+            "time[{}] is {after}, which is not after time[{place}], {before}",
+            place + 1
+        ));
+    }
+    Ok(time)
+}
+
+/// The number of runs, which all that have a value for each run agree on.
+fn runs(batch: &Batch) -> Result<usize, Error> {
+    let mut found: Option<(&str, usize)> = None;
+    let courses =
+        batch.inputs.iter().chain(&batch.input_derivatives).filter_map(|(name, course)| match course {
+            Course::EachRun(values) => Some((*name, values.len(), batch.time.len())),
+            _ => None,
+        });
+    let starts = batch.start.iter().filter_map(|(name, start)| match start {
+        Start::EachRun(values) => Some((*name, values.len(), 1)),
+        _ => None,
+    });
+    for (name, length, times) in courses.chain(starts) {
+        if length % times != 0 {
+            return request(format!("{name} has {length} values, which is no multiple of the {times} times"));
+        }
+        let runs = length / times;
+        match found {
+            Some((other, count)) if count != runs => {
+                return request(format!("{other} is given for {count} runs, {name} for {runs}"));
+            }
+            _ => found = Some((name, runs)),
+        }
+    }
+    Ok(found.map_or(1, |(_, runs)| runs))
+}
+
+fn threads(fmu: &Fmu, asked: Option<usize>) -> Result<usize, Error> {
+    if asked == Some(0) {
+        return request("threads must be at least 1".to_owned());
+    }
+    if fmu.description().once_per_process {
+        return Ok(1);
+    }
+    Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)))
+}
+
+fn find<'f>(fmu: &'f Fmu, name: &str) -> Result<&'f Variable, Error> {
+    let description = fmu.description();
+    if let Some(found) = description.variable(name) {
+        return Ok(found);
+    }
+    let names = description.variables.iter().map(|variable| variable.name.as_str());
+    let near = names.min_by_key(|known| strsim::levenshtein(&known.to_lowercase(), &name.to_lowercase()));
+    let hint = near.map_or(String::new(), |near| format!("; did you mean {near:?}?"));
+    request(format!("{} has no variable {name:?}{hint}", description.model_name))
+}
+
+/// The variable of this name, if it is a number.
+fn number<'f>(fmu: &'f Fmu, name: &str) -> Result<&'f Variable, Error> {
+    let of = find(fmu, name)?;
+    if matches!(of.base, BaseType::String | BaseType::Binary) {
+        return request(format!("{name} is no number"));
+    }
+    Ok(of)
+}
+
+fn once<'a>(seen: &mut Vec<&'a str>, name: &'a str, where_: &str) -> Result<(), Error> {
+    if seen.contains(&name) {
+        return request(format!("{name} is twice among the {where_}"));
+    }
+    seen.push(name);
+    Ok(())
+}
+
+fn article(word: &str) -> String {
+    let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
+    format!("{} {word}", if vowel { "an" } else { "a" })
+}
+
+/// Whole numbers and Booleans take no other values. What a Real takes is the FMU's to say.
+fn fits(name: &str, base: BaseType, values: &[f64]) -> Result<(), Error> {
+    let (low, high) = match base {
+        BaseType::Boolean => (0.0, 1.0),
+        BaseType::Enumeration => (f64::from(i32::MIN), f64::from(i32::MAX)),
+        base => match base.range() {
+            Some((low, high)) => (low as f64, high as f64),
+            None => return Ok(()),
+        },
+    };
+    match values.iter().find(|value| value.fract() != 0.0 || !(low..=high).contains(*value)) {
+        None => Ok(()),
+        Some(value) if base == BaseType::Boolean => {
+            request(format!("{name} is a Boolean and cannot be {value}"))
+        }
+        Some(value) => {
+            request(format!("{name} is a whole number from {low} to {high} and cannot be {value}"))
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! What the model description says, as far as running the FMU needs it.
+
+use fmu_export::BaseType;
+use roxmltree::{Document, Node};
+use std::collections::HashMap;
+
+/// An edition of the standard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standard {
+    /// FMI 2.0.
+    Fmi2,
+    /// FMI 3.0.
+    Fmi3,
+}
+
+/// A variable of an FMU.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// Its name.
+    pub name: String,
+    /// Its value reference.
+    pub reference: u32,
+    /// Its type; an Int32 of FMI 3.0 is an Integer, a Float64 a Real.
+    pub base: BaseType,
+    /// `input`, `output`, `parameter` and so on; `local` if nothing is said.
+    pub causality: String,
+    /// `fixed`, `tunable`, `discrete` or `continuous`, if it is said.
+    pub variability: Option<String>,
+    /// Its start value as it is written, if it has one.
+    pub start: Option<String>,
+    /// Its unit, if it has one.
+    pub unit: Option<String>,
+    /// What it means.
+    pub description: String,
+}
+
+/// The model description of an FMU, as far as running it needs it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    /// The edition of the standard.
+    pub standard: Standard,
+    /// The name of the model.
+    pub model_name: String,
+    /// `guid` of FMI 2.0, `instantiationToken` of FMI 3.0.
+    pub token: String,
+    /// What the library is called.
+    pub identifier: String,
+    /// One instance in a process is all there may be.
+    pub once_per_process: bool,
+    /// It takes input derivatives (FMI 2.0, `canInterpolateInputs`).
+    pub input_derivatives: bool,
+    /// In the order of the model description.
+    pub variables: Vec<Variable>,
+    places: HashMap<String, usize>,
+}
+
+impl Description {
+    /// Reads a `modelDescription.xml`.
+    ///
+    /// # Errors
+    /// A sentence on what is wrong, or missing for Co-Simulation.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let document =
+            Document::parse(text).map_err(|error| format!("modelDescription.xml is no XML: {error}"))?;
+        let root = document.root_element();
+        let version = root.attribute("fmiVersion").unwrap_or_default();
+        let standard = match version {
+            "2.0" => Standard::Fmi2,
+            version if version.starts_with("3.") => Standard::Fmi3,
+            _ => return Err(format!("its fmiVersion is {version:?}; 2.0 and 3.0 can be run")),
+        };
+        let slave = child(root, "CoSimulation")
+            .ok_or("it has no Co-Simulation, only Model Exchange, which needs a solver")?;
+        let needed = |node: Node, name: &str| {
+            node.attribute(name)
+                .map(str::to_owned)
+                .ok_or_else(|| format!("modelDescription.xml: {} lacks {name}", node.tag_name().name()))
+        };
+        let is_true = |name| matches!(slave.attribute(name), Some("true" | "1"));
+        if is_true("needsExecutionTool") {
+            return Err(
+                "it needs another program to run (needsExecutionTool), which is not started here".to_owned()
+            );
+        }
+        let (token, variables) = match standard {
+            Standard::Fmi2 => ("guid", variables_of_fmi2(root)),
+            Standard::Fmi3 => ("instantiationToken", variables_of_fmi3(root)),
+        };
+        let variables = variables?;
+        Ok(Self {
+            standard,
+            model_name: needed(root, "modelName")?,
+            token: needed(root, token)?,
+            identifier: needed(slave, "modelIdentifier")?,
+            once_per_process: is_true("canBeInstantiatedOnlyOncePerProcess"),
+            input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
+            places: variables.iter().enumerate().map(|(place, of)| (of.name.clone(), place)).collect(),
+            variables,
+        })
+    }
+
+    /// The variable of this name.
+    pub fn variable(&self, name: &str) -> Option<&Variable> {
+        self.places.get(name).map(|place| &self.variables[*place])
+    }
+}
+
+fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
+    node.children().find(|child| child.has_tag_name(name))
+}
+
+/// Each is a `ScalarVariable` with an element for its type (section 2.2.7 of FMI 2.0).
+fn variables_of_fmi2(root: Node) -> Result<Vec<Variable>, String> {
+    let mut found = Vec::new();
+    for node in elements(root) {
+        let of_type = node.children().find_map(|child| Some((child, base_of_fmi2(child.tag_name().name())?)));
+        let (of_type, base) =
+            of_type.ok_or_else(|| format!("modelDescription.xml: {} has no type", name_of(node)))?;
+        found.push(variable(node, of_type, base)?);
+    }
+    Ok(found)
+}
+
+/// The element's name is the type (section 2.4.7 of FMI 3.0). Arrays and clocks are passed over: nothing here sets or
+/// reads them.
+fn variables_of_fmi3(root: Node) -> Result<Vec<Variable>, String> {
+    let mut found = Vec::new();
+    for node in elements(root) {
+        if let Some(base) = base_of_fmi3(node.tag_name().name())
+            && child(node, "Dimension").is_none()
+        {
+            found.push(variable(node, node, base)?);
+        }
+    }
+    Ok(found)
+}
+
+fn elements<'a>(root: Node<'a, 'a>) -> impl Iterator<Item = Node<'a, 'a>> {
+    child(root, "ModelVariables").into_iter().flat_map(|node| node.children()).filter(Node::is_element)
+}
+
+fn name_of<'a>(node: Node<'a, 'a>) -> &'a str {
+    node.attribute("name").unwrap_or("a variable without a name")
+}
+
+fn variable(node: Node, of_type: Node, base: BaseType) -> Result<Variable, String> {
+    let reference = node.attribute("valueReference").and_then(|text| text.parse().ok());
+    let text = |name: &str| node.attribute(name).map(str::to_owned);
+    let start = match base {
+        // Section 2.4.7.5 of FMI 3.0: texts have theirs in an element.
+        BaseType::String if of_type.attribute("start").is_none() => {
+            child(of_type, "Start").and_then(|start| start.attribute("value"))
+        }
+        _ => of_type.attribute("start"),
+    };
+    Ok(Variable {
+        name: name_of(node).to_owned(),
+        reference: reference
+            .ok_or_else(|| format!("modelDescription.xml: {} has no value reference", name_of(node)))?,
+        base,
+        causality: text("causality").unwrap_or_else(|| "local".to_owned()),
+        variability: text("variability"),
+        start: start.map(str::to_owned),
+        unit: of_type.attribute("unit").map(str::to_owned),
+        description: text("description").unwrap_or_default(),
+    })
+}
+
+fn base_of_fmi2(name: &str) -> Option<BaseType> {
+    Some(match name {
+        "Real" => BaseType::Real,
+        "Integer" => BaseType::Integer,
+        "Boolean" => BaseType::Boolean,
+        "String" => BaseType::String,
+        "Enumeration" => BaseType::Enumeration,
+        _ => return None,
+    })
+}
+
+fn base_of_fmi3(name: &str) -> Option<BaseType> {
+    Some(match name {
+        "Float64" => BaseType::Real,
+        "Float32" => BaseType::Float32,
+        "Int32" => BaseType::Integer,
+        "Int8" => BaseType::Int8,
+        "UInt8" => BaseType::UInt8,
+        "Int16" => BaseType::Int16,
+        "UInt16" => BaseType::UInt16,
+        "UInt32" => BaseType::UInt32,
+        "Int64" => BaseType::Int64,
+        "UInt64" => BaseType::UInt64,
+        "Boolean" => BaseType::Boolean,
+        "String" => BaseType::String,
+        "Binary" => BaseType::Binary,
+        "Enumeration" => BaseType::Enumeration,
+        _ => return None,
+    })
+}

@@ -1,0 +1,147 @@
+//! An FMU that has been unpacked and loaded.
+
+use crate::description::{Description, Standard};
+use crate::error::Error;
+use crate::{fmi3, library};
+use std::env::consts::{ARCH, DLL_SUFFIX, OS};
+use std::ffi::{CString, OsStr};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// An FMU for Co-Simulation, unpacked and loaded once, for any number of runs.
+#[derive(Debug)]
+pub struct Fmu {
+    description: Description,
+    // Unloaded before its folder goes.
+    pub(crate) library: Library,
+    pub(crate) resources: CString,
+    _folder: TempDir,
+}
+
+#[derive(Debug)]
+pub(crate) enum Library {
+    Fmi2(Box<library::Library>),
+    Fmi3(Box<fmi3::Library>),
+}
+
+impl Fmu {
+    /// Unpacks an FMU and loads its library.
+    ///
+    /// # Safety
+    /// The library's functions have the types of the standard, and what it does when it is loaded and called is sound.
+    ///
+    /// # Errors
+    /// [`Error::Fmu`], when the file is no FMU for Co-Simulation, or has no library for this platform.
+    pub unsafe fn open(path: &Path) -> Result<Self, Error> {
+        let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
+        let folder = unpacked(path).map_err(fail)?;
+        let file = folder.path().join("modelDescription.xml");
+        let text = std::fs::read_to_string(&file)
+            .map_err(|_| fail("there is no readable modelDescription.xml in it; it is no FMU".to_owned()))?;
+        let description = Description::parse(&text).map_err(fail)?;
+        let library = library_of(folder.path(), &description).map_err(fail)?;
+        // SAFETY: the caller's promise.
+        let loaded = unsafe {
+            match description.standard {
+                Standard::Fmi2 => library::load(&library).map(|library| Library::Fmi2(library.into())),
+                Standard::Fmi3 => fmi3::load(&library).map(|library| Library::Fmi3(library.into())),
+            }
+        };
+        let library = loaded.map_err(|error| fail(format!("its library cannot be loaded: {error}")))?;
+        let resources = folder.path().join("resources");
+        Ok(Self {
+            resources: location(&resources, description.standard),
+            description,
+            library,
+            _folder: folder,
+        })
+    }
+
+    /// What the model description says.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+}
+
+fn unpacked(path: &Path) -> Result<TempDir, String> {
+    let file = File::open(path).map_err(|error| format!("cannot be opened ({error})"))?;
+    let mut archive =
+        zip::ZipArchive::new(file).map_err(|error| format!("is no FMU, which is a zip file ({error})"))?;
+    let folder = tempfile::Builder::new()
+        .prefix("fmu-run-")
+        .tempdir()
+        .map_err(|error| format!("there is no room to unpack it ({error})"))?;
+    // Entries that would leave the folder are refused.
+    archive.extract(folder.path()).map_err(|error| format!("cannot be unpacked ({error})"))?;
+    Ok(folder)
+}
+
+/// The folders of `binaries/` where a library for this machine may lie. Those of FMI 2.0 know no processors; many FMUs
+/// for ARM have theirs there all the same.
+fn folders(standard: Standard) -> Vec<String> {
+    let system = if OS == "macos" { "darwin" } else { OS };
+    let tuple = format!("{ARCH}-{system}");
+    let short = match (system, usize::BITS) {
+        ("windows", bits) => format!("win{bits}"),
+        (system, bits) => format!("{system}{bits}"),
+    };
+    match (standard, ARCH) {
+        (Standard::Fmi3, _) => vec![tuple],
+        (Standard::Fmi2, "x86_64" | "x86") => vec![short, tuple],
+        (Standard::Fmi2, _) => vec![tuple, short],
+    }
+}
+
+fn library_of(folder: &Path, description: &Description) -> Result<PathBuf, String> {
+    let name = format!("{}{DLL_SUFFIX}", description.identifier);
+    let folders = folders(description.standard);
+    let binaries = folder.join("binaries");
+    if let Some(found) =
+        folders.iter().map(|folder| binaries.join(folder).join(&name)).find(|path| path.is_file())
+    {
+        return Ok(found);
+    }
+    let mut others: Vec<_> = std::fs::read_dir(&binaries)
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .collect();
+    others.sort();
+    let others = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
+    Err(format!("has no library for this platform (binaries/{}/{name}); it has: {others}", folders[0]))
+}
+
+/// The folder as importers write it: a URI in FMI 2.0 (section 2.1.5), a path with an end in FMI 3.0 (section 2.3.1).
+fn location(resources: &Path, standard: Standard) -> CString {
+    let text = match standard {
+        Standard::Fmi2 => uri(resources.as_os_str()),
+        Standard::Fmi3 => format!("{}{}", resources.display(), std::path::MAIN_SEPARATOR),
+    };
+    CString::new(text).unwrap_or_default()
+}
+
+fn uri(path: &OsStr) -> String {
+    let mut uri = "file://".to_owned();
+    let path = path.to_string_lossy().replace('\\', "/");
+    if !path.starts_with('/') {
+        uri.push('/');
+    }
+    for byte in path.bytes() {
+        match byte {
+            b'/' | b':' | b'-' | b'.' | b'_' | b'~' => uri.push(byte.into()),
+            byte if byte.is_ascii_alphanumeric() => uri.push(byte.into()),
+            byte => uri.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    uri
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn locations() {
+        assert_eq!(super::uri("/tmp/a b/%".as_ref()), "file:///tmp/a%20b/%25");
+        assert_eq!(super::uri(r"C:\temp\r".as_ref()), "file:///C:/temp/r");
+    }
+}

@@ -1,0 +1,200 @@
+"""What does not fit, FMUs that misbehave, and what stops runs."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import time as clock
+import zipfile
+
+import fmu_run
+import numpy as np
+import pytest
+
+TIME = np.linspace(0.0, 1.0, 11)
+
+
+@pytest.fixture
+def fmu(testbed):
+    with fmu_run.Fmu(testbed) as opened:
+        yield opened
+
+
+@pytest.mark.parametrize(
+    "request_, complaint",
+    [
+        ({"inputs": {"thet1": 0.0}}, 'has no variable "thet1"; did you mean "theta1"?'),
+        ({"outputs": ["Roll_Rate"]}, 'has no variable "Roll_Rate"; did you mean "roll_rate"?'),
+        ({"inputs": {"theta1": np.zeros(4)}}, "theta1 has the shape (4,); it must be (11,), (runs, 11) or a number"),
+        ({"inputs": {"theta1": np.zeros((2, 2, 11))}}, "theta1 has the shape (2, 2, 11)"),
+        ({"inputs": {"theta1": ["a"] * 11}}, "theta1: these are no numbers"),
+        ({"inputs": {"k1": TIME}}, "k1 is no input but a fixed parameter; give it a start value"),
+        ({"inputs": {"roll": TIME}}, "roll is no input but a continuous output"),
+        ({"start": {"k1": [[1.0]]}}, "the start value of k1 has the shape (1, 1); it must be (runs,) or a number"),
+        ({"start": {"k1": "stiff"}}, 'k1 is a number, its start value cannot be "stiff"'),
+        ({"start": {"M": 2.5}}, "M is a whole number from -2147483648 to 2147483647 and cannot be 2.5"),
+        ({"start": {"use_omega": 2}}, "use_omega is a Boolean and cannot be 2"),
+        ({"start": {"k1": [1, 2], "k2": [1, 2, 3]}}, "k1 is given for 2 runs, k2 for 3"),
+        ({"start": {"k1": [1, 2]}, "inputs": {"theta1": np.zeros((3, 11))}}, "theta1 is given for 3 runs, k1 for 2"),
+        ({"measures": ["pek"]}, 'there is no measure "pek"; there are min, max, peak, time_of_peak, mean, rms, end'),
+        ({"every": 0}, "every must be at least 1"),
+        ({"threads": 0}, "threads must be at least 1"),
+        ({"time": [0.0]}, "time has 1 values"),
+        ({"time": [[0.0, 1.0]]}, "time must have one dimension"),
+        ({"time": [0.0, 0.1, np.nan]}, "time[2] is NaN; times must be finite"),
+        ({"time": [0.0, 0.2, 0.2]}, "time[2] is 0.2, which is not after time[1], 0.2"),
+    ],
+)
+def test_what_does_not_fit(fmu, request_, complaint):
+    with pytest.raises(ValueError, match=re.escape(complaint)):
+        fmu.run(**{"time": TIME, "outputs": ["roll"], **request_})
+
+
+def test_input_derivatives_of_fmi3(fmu):
+    slopes = {"theta1": np.zeros(11)}
+    if fmu.fmi_version == "2.0":
+        with pytest.raises(ValueError, match="k1 is no Real input"):
+            fmu.run(TIME, outputs=["roll"], input_derivatives={"k1": 1.0})
+    else:
+        with pytest.raises(ValueError, match="PitchRollWristTestbed takes no input derivatives"):
+            fmu.run(TIME, outputs=["roll"], input_derivatives=slopes)
+
+
+def test_refused_runs_leave_the_others_alone(fmu):
+    stiffness = np.array([100.0, -1.0, 100.0, np.nan, 100.0])
+    runs = fmu.run(TIME, inputs={"theta1": TIME}, start={"k1": stiffness}, outputs=["roll"], every=1, measures=["peak"])
+    assert runs.errors.keys() == {1, 3}
+    assert runs.errors[1].endswith("k1 must not be below 0, it is -1")
+    assert runs.ok.tolist() == [True, False, True, False, True]
+    assert np.isnan(runs["roll"][1]).all() and np.isnan(runs["roll", "peak"][3])
+    np.testing.assert_array_equal(runs["roll"][0], runs["roll"][4])
+    with pytest.raises(fmu_run.FmuError, match=r"run 1: .*k1 must not be below 0.* \(2 of 5 runs failed\)"):
+        runs.check()
+    # An input that is refused half way: the time is told.
+    angle = np.where(TIME > 0.45, np.inf, 0.0)
+    one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"])
+    assert re.match(r"at 0\.5 s: .*theta1", one.errors[0]), one.errors
+
+
+@pytest.mark.parametrize(
+    "content, complaint",
+    [
+        (None, "cannot be opened"),
+        ({}, "no readable modelDescription.xml"),
+        ({"modelDescription.xml": "<a"}, "is no XML"),
+        ({"modelDescription.xml": '<fmiModelDescription fmiVersion="1.0"/>'}, 'its fmiVersion is "1.0"'),
+        ({"modelDescription.xml": '<fmiModelDescription fmiVersion="2.0"><ModelExchange/></fmiModelDescription>'}, "no Co-Simulation"),
+        ({"../outside": "x"}, "cannot be unpacked|no readable modelDescription.xml"),
+        ("text", "is no FMU, which is a zip file"),
+    ],
+)
+def test_files_that_are_no_fmu(tmp_path, content, complaint):
+    path = tmp_path / "some.fmu"
+    if isinstance(content, str):
+        path.write_text(content)
+    elif content is not None:
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, text in content.items():
+                archive.writestr(name, text)
+    with pytest.raises(fmu_run.FmuError, match=complaint) as raised:
+        fmu_run.Fmu(path)
+    assert str(raised.value).startswith(f"{path}: ")
+    assert not (tmp_path / "outside").exists() and not (tmp_path.parent / "outside").exists()
+
+
+def test_no_library_for_this_platform(tmp_path, testbed):
+    path = tmp_path / "foreign.fmu"
+    with zipfile.ZipFile(testbed) as whole, zipfile.ZipFile(path, "w") as archive:
+        for name in whole.namelist():
+            moved = re.sub("binaries/[^/]+/", "binaries/vax-vms/", name)
+            archive.writestr(moved, whole.read(name))
+    with pytest.raises(fmu_run.FmuError, match="has no library for this platform .*; it has: vax-vms"):
+        fmu_run.Fmu(path)
+
+
+def test_an_fmu_that_is_closed(testbed):
+    fmu = fmu_run.Fmu(testbed)
+    fmu.close()
+    fmu.close()
+    with pytest.raises(fmu_run.FmuError, match="the FMU is closed"):
+        fmu.run(TIME, outputs=["roll"])
+
+
+MOODS = {
+    "good": None,
+    "silent error": "at 0.5 s: fmi2DoStep was answered with Error, without a message",
+    "pending": "at 0.5 s: fmi2DoStep was answered with Error, without a message",
+    "fatal": "at 0.5 s: fmi2DoStep was answered with Fatal, without a message",
+    "discard": "at 0.5 s: fmi2DoStep: no more of this after %s",
+    "no status": "at 0.5 s: fmi2DoStep was answered with Error, without a message",
+    "no reset": None,
+    "warning": None,
+}
+
+
+def test_an_unruly_fmu(unruly):
+    with fmu_run.Fmu(unruly) as fmu:
+        moods = np.repeat(np.arange(len(MOODS)), 3)
+        runs = fmu.run(TIME, start={"mood": moods}, outputs=["y", "instances"], threads=4)
+    expected = {run: MOODS[list(MOODS)[mood]] for run, mood in enumerate(moods) if MOODS[list(MOODS)[mood]]}
+    assert runs.errors == expected
+    np.testing.assert_allclose(runs["y"][runs.ok], 4.0 + np.tile(TIME, (9, 1)), atol=1e-15)
+    # It may be there only once in a process; one that was fatal could not even be freed.
+    assert np.nanmax(runs["instances"]) <= 1 + 3
+
+
+def test_other_types(unruly):
+    with fmu_run.Fmu(unruly) as fmu:
+        assert fmu.variables["label"].type == "String" and fmu.variables["count"].start == "3"
+        counts = np.arange(11) - 5
+        runs = fmu.run(
+            TIME,
+            inputs={"count": counts, "flag": counts > 0},
+            start={"label": "seven77", "slope": 2},
+            outputs=["y", "count", "flag"],
+        ).check()
+        with pytest.raises(ValueError, match="label is no number"):
+            fmu.run(TIME, outputs=["label"])
+    np.testing.assert_array_equal(runs["count"][0], counts)
+    np.testing.assert_array_equal(runs["flag"][0], counts > 0)
+    np.testing.assert_allclose(runs["y"][0], 7 + 2 * TIME, atol=1e-15)
+
+
+LONG = """
+import sys, numpy as np, fmu_run
+with fmu_run.Fmu(sys.argv[1]) as fmu:
+    time = np.linspace(0, 100, 100001)
+    print("begun", flush=True)
+    try:
+        fmu.run(time, start={"k1": np.full(100000, 90.0)}, outputs=["roll"], measures=["peak"])
+    except KeyboardInterrupt:
+        print("interrupted", flush=True)
+"""
+
+
+def test_ctrl_c_stops_between_runs(testbed):
+    process = subprocess.Popen([sys.executable, "-c", LONG, testbed], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "begun\n"
+    clock.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    assert process.communicate(timeout=30)[0] == "interrupted\n"
+    assert process.returncode == 0
+
+
+def test_progress(testbed):
+    told = []
+    time = np.linspace(0, 20, 20001)
+    with fmu_run.Fmu(testbed) as fmu:
+        start = {"k1": np.full(400, 90.0)}
+        fmu.run(time, start=start, outputs=["roll"], measures=["peak"], progress=lambda done, all_: told.append((done, all_)))
+        assert told and all(all_ == 400 for _, all_ in told) and told == sorted(told)
+
+        def stop(done, runs):
+            raise RuntimeError("enough")
+
+        with pytest.raises(RuntimeError, match="enough"):
+            fmu.run(time, start=start, outputs=["roll"], measures=["peak"], progress=stop)
+        # It can go on.
+        assert fmu.run(TIME, outputs=["roll"]).count == 1

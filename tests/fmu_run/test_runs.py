@@ -1,0 +1,157 @@
+"""fmu_run against FMPy's bare calls, and against NumPy where it calculates itself."""
+
+from __future__ import annotations
+
+import shutil
+
+import fmpy
+import fmu_run
+import numpy as np
+import pytest
+from fmpy.simulation import instantiate_fmu
+
+OUTPUTS = ["tau1", "pitch", "roll", "pitch_rate", "theta3", "M"]
+INPUTS = ["theta1", "theta2", "omega1", "omega2"]
+
+
+def motion(samples: int = 400, scale: float = 1.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Uneven times (samples,) s that begin at 0.3, and what the motors do at them."""
+    time = 0.3 + np.cumsum(np.random.default_rng(3).uniform(2e-4, 3e-3, samples))
+    angles = [scale * 0.4 * np.sin(9 * time), -scale * 0.3 * np.cos(14 * time)]
+    rates = [scale * 3.6 * np.cos(9 * time), scale * 4.2 * np.sin(14 * time)]
+    return time, dict(zip(INPUTS, [*angles, *rates]))
+
+
+def by_fmpy(path, time, inputs, start, outputs, slopes=None, read_before_set=False) -> dict[str, np.ndarray]:
+    """One run, call by call, with FMPy's classes for the C functions."""
+    description = fmpy.read_model_description(str(path))
+    of = {v.name: v for v in description.modelVariables}
+    folder = fmpy.extract(str(path))
+    slave = instantiate_fmu(folder, description, fmi_type="CoSimulation")
+    is_fmi2 = description.fmiVersion == "2.0"
+    getters = {"Real": "getReal", "Integer": "getInteger", "Boolean": "getBoolean"}
+    getters |= {"Float64": "getFloat64", "Int32": "getInt32", "Enumeration": "getInteger" if is_fmi2 else "getInt64"}
+
+    def put(values):
+        for name, value in values.items():
+            getattr(slave, getters[of[name].type].replace("get", "set"))([of[name].valueReference], [value])
+
+    def get(name):
+        return getattr(slave, getters[of[name].type])([of[name].valueReference])[0]
+
+    if is_fmi2:
+        slave.setupExperiment(startTime=time[0], stopTime=time[-1])
+    put(start)
+    slave.enterInitializationMode(**({} if is_fmi2 else {"startTime": time[0], "stopTime": time[-1]}))
+    put({name: values[0] for name, values in inputs.items()})
+    slave.exitInitializationMode()
+    rows = []
+    for k, t in enumerate(time):
+        if read_before_set:
+            rows.append([get(name) for name in outputs])
+        put({name: values[k] for name, values in inputs.items()})
+        for name, values in (slopes or {}).items():
+            slave.setRealInputDerivatives([of[name].valueReference], [1], [values[k]])
+        if not read_before_set:
+            rows.append([get(name) for name in outputs])
+        if k + 1 < len(time):
+            slave.doStep(currentCommunicationPoint=t, communicationStepSize=time[k + 1] - t)
+    slave.terminate()
+    slave.freeInstance()
+    shutil.rmtree(folder)
+    return dict(zip(outputs, np.array(rows, dtype=float).T))
+
+
+def same(runs, expected, run=0):
+    assert list(runs) == list(expected)
+    for name, course in expected.items():
+        assert np.abs(course).max() > 0, name
+        np.testing.assert_array_equal(runs[name][run], course, err_msg=name)
+
+
+@pytest.mark.parametrize("read_before_set", [False, True])
+def test_the_testbed(testbed, read_before_set):
+    time, inputs = motion()
+    start = {"use_omega": True, "k1": 77.0, "theta3": 0.1, "N": 5}
+    expected = by_fmpy(testbed, time, inputs, start, OUTPUTS, read_before_set=read_before_set)
+    with fmu_run.Fmu(testbed) as fmu:
+        runs = fmu.run(time, inputs=inputs, start=start, outputs=OUTPUTS, read_before_set=read_before_set)
+    same(runs, expected)
+    np.testing.assert_array_equal(runs.time, time)
+
+
+def test_the_controller(controller):
+    time, inputs = motion()
+    inputs = dict(zip(["pitch_ref", "roll_ref", "pitch", "tau1"], inputs.values()))
+    outputs = ["theta1", "theta2", "omega1", "pitch_correction"]
+    expected = by_fmpy(controller, time, inputs, {"Kp": 0.5}, outputs)
+    with fmu_run.Fmu(controller) as fmu:
+        same(fmu.run(time, inputs=inputs, start={"Kp": 0.5}, outputs=outputs), expected)
+
+
+def test_input_derivatives(testbed2):
+    time, inputs = motion()
+    slopes = {"theta1": inputs.pop("omega1"), "theta2": inputs.pop("omega2")}
+    expected = by_fmpy(testbed2, time, inputs, {}, OUTPUTS, slopes)
+    with fmu_run.Fmu(testbed2) as fmu:
+        same(fmu.run(time, inputs=inputs, input_derivatives=slopes, outputs=OUTPUTS), expected)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 7])
+def test_each_run_has_its_own_values(testbed, threads):
+    scales = np.linspace(0.5, 1.5, 20)
+    stiffness = np.linspace(60.0, 200.0, 20)
+    time, _ = motion()
+    courses = [motion(scale=scale)[1] for scale in scales]
+    inputs = {name: np.stack([course[name] for course in courses]) for name in INPUTS}
+    inputs["omega2"] = courses[0]["omega2"]
+    with fmu_run.Fmu(testbed) as fmu:
+        start = {"k1": stiffness, "k2": 100, "use_omega": True}
+        runs = fmu.run(time, inputs=inputs, start=start, outputs=OUTPUTS, threads=threads)
+    assert runs["roll"].shape == (20, len(time)) and runs.count == 20 and runs.ok.all()
+    for run in (0, 7, 19):
+        one = courses[run] | {"omega2": courses[0]["omega2"]}
+        start = {"k1": stiffness[run], "k2": 100.0, "use_omega": True}
+        same(runs, by_fmpy(testbed, time, one, start, OUTPUTS), run)
+
+
+def test_measures_and_what_is_kept(testbed):
+    time, inputs = motion()
+    with fmu_run.Fmu(testbed) as fmu:
+        whole = fmu.run(time, inputs=inputs, start={"k1": [80.0, 90.0]}, outputs=["roll", "M"])
+        runs = fmu.run(
+            time,
+            inputs=inputs,
+            start={"k1": [80.0, 90.0]},
+            outputs=["roll", "M"],
+            every=7,
+            measures=["min", "max", "peak", "time_of_peak", "mean", "rms", "end"],
+        )
+        measured = fmu.run(time, inputs=inputs, start={"k1": [80.0, 90.0]}, outputs=["roll"], measures=["peak"])
+    np.testing.assert_array_equal(runs.time, time[::7])
+    np.testing.assert_array_equal(runs["roll"], whole["roll"][:, ::7])
+    course = whole["roll"]
+    np.testing.assert_array_equal(runs["roll", "min"], course.min(axis=1))
+    np.testing.assert_array_equal(runs["roll", "max"], course.max(axis=1))
+    np.testing.assert_array_equal(runs["roll", "peak"], np.abs(course).max(axis=1))
+    np.testing.assert_array_equal(runs["roll", "time_of_peak"], time[np.abs(course).argmax(axis=1)])
+    np.testing.assert_allclose(runs["roll", "mean"], course.mean(axis=1), rtol=1e-13)
+    np.testing.assert_allclose(runs["roll", "rms"], np.sqrt((course**2).mean(axis=1)), rtol=1e-13)
+    np.testing.assert_array_equal(runs["roll", "end"], course[:, -1])
+    np.testing.assert_array_equal(runs["M", "mean"], [4, 4])
+    np.testing.assert_array_equal(measured["roll", "peak"], runs["roll", "peak"])
+    assert len(measured) == 0 and len(measured.time) == 0
+    with pytest.raises(KeyError, match="every=1"):
+        measured["roll"]
+
+
+def test_many_short_runs_leave_nothing_behind(testbed, tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    time, inputs = motion(20)
+    with fmu_run.Fmu(testbed) as fmu:
+        assert len(list(tmp_path.iterdir())) == 1
+        stiffness = np.tile([50.0, 100.0, 150.0], 2000)
+        peaks = fmu.run(time, inputs=inputs, start={"k1": stiffness}, outputs=["tau1"], measures=["peak"])
+        # No run knows of the one before it in its instance.
+        np.testing.assert_array_equal(np.ptp(peaks["tau1", "peak"].reshape(-1, 3), axis=0), 0.0)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,119 @@
+/* An FMU for Co-Simulation alone that does what its parameter says, and lacks all that it need not have. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi2Functions.h"
+
+enum { MOOD, COUNT, FLAG, SLOPE, Y, INSTANCES };
+enum { GOOD, SILENT_ERROR, PENDING, FATAL, DISCARD, NO_STATUS, NO_RESET, WARNING };
+
+typedef struct {
+    fmi2CallbackFunctions callbacks;
+    int mood, count, flag;
+    double slope, y;
+    char label[64];
+} Instance;
+
+static int alive, most;
+
+const char *fmi2GetTypesPlatform(void) { return "default"; }
+const char *fmi2GetVersion(void) { return "2.0"; }
+
+static void as_new(Instance *i) {
+    i->mood = GOOD, i->count = 3, i->flag = 0, i->slope = 1.0, i->y = 0.0;
+    strcpy(i->label, "none");
+}
+
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
+    (void)name, (void)resources, (void)visible, (void)logging;
+    if (type != fmi2CoSimulation || strcmp(guid, "{unruly}") != 0) return NULL;
+    Instance *i = calloc(1, sizeof *i);
+    if (i == NULL) return NULL;
+    i->callbacks = *callbacks;
+    as_new(i);
+    if (++alive > most) most = alive;
+    return i;
+}
+
+void fmi2FreeInstance(fmi2Component c) {
+    if (c != NULL) alive--;
+    free(c);
+}
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real start,
+                               fmi2Boolean has_stop, fmi2Real stop) {
+    (void)c, (void)has_tolerance, (void)tolerance, (void)start, (void)has_stop, (void)stop;
+    return fmi2OK;
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return c != NULL ? fmi2OK : fmi2Error; }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return c != NULL ? fmi2OK : fmi2Error; }
+fmi2Status fmi2Terminate(fmi2Component c) { return c != NULL ? fmi2OK : fmi2Error; }
+
+fmi2Status fmi2Reset(fmi2Component c) {
+    Instance *i = c;
+    if (i->mood == NO_RESET) return fmi2Error;
+    as_new(i);
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[]) {
+    Instance *i = c;
+    for (size_t k = 0; k < n; k++) *(vr[k] == MOOD ? &i->mood : &i->count) = value[k];
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[]) {
+    (void)vr;
+    for (size_t k = 0; k < n; k++) ((Instance *)c)->flag = value[k];
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
+    (void)vr;
+    for (size_t k = 0; k < n; k++) ((Instance *)c)->slope = value[k];
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String value[]) {
+    (void)vr;
+    for (size_t k = 0; k < n; k++) strncpy(((Instance *)c)->label, value[k], 63);
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
+    Instance *i = c;
+    for (size_t k = 0; k < n; k++) value[k] = vr[k] == Y ? i->y + (double)strlen(i->label) : i->slope;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[]) {
+    Instance *i = c;
+    for (size_t k = 0; k < n; k++) value[k] = vr[k] == INSTANCES ? most : vr[k] == MOOD ? i->mood : i->count;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[]) {
+    (void)vr;
+    for (size_t k = 0; k < n; k++) value[k] = ((Instance *)c)->flag;
+    return fmi2OK;
+}
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_set_state) {
+    (void)no_set_state;
+    Instance *i = c;
+    i->y += i->slope * size;
+    if (time < 0.45) return fmi2OK;
+    switch (i->mood) {
+    case SILENT_ERROR: return fmi2Error;
+    case PENDING: return fmi2Pending;
+    case FATAL: return fmi2Fatal;
+    case NO_STATUS: return (fmi2Status)77;
+    case WARNING: i->callbacks.logger(i->callbacks.componentEnvironment, "x", fmi2Warning, "w", "a warning"); return fmi2Warning;
+    case DISCARD:
+        i->callbacks.logger(i->callbacks.componentEnvironment, "unruly", fmi2Discard, "logAll", "no more of this after %s", "half");
+        return fmi2Discard;
+    }
+    return fmi2OK;
+}
