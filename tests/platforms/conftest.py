@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import fmpy
-import fmpy
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -20,15 +19,19 @@ sys.path.insert(0, str(ROOT / "platforms"))
 import toolchain  # noqa: E402
 from targets import FOLDERS, MODEL  # noqa: E402
 
+#: The FMU for FMI 3.0.
+FMI3 = f"{MODEL}-fmi3.fmu"
+
 #: Debian's package wine64 alone has it only there.
 WINE = "/usr/lib/wine/wine64"
 
 
 @dataclass(frozen=True)
 class Runner:
-    """How C programs are compiled and started for a platform."""
+    """How C programs are compiled and started for a platform, and its folders of `binaries/` in FMI 2.0 and 3.0."""
 
     folder: str
+    fmi3_folder: str
     compiler: tuple[str, ...]
     start: tuple[str, ...] = ()
     links: tuple[str, ...] = ()
@@ -39,13 +42,15 @@ HERE = Path(__file__).parent
 INCLUDED = (HERE.parent.parent / "crates" / "fmu-export" / "tests" / "c", Path(fmpy.__file__).parent / "c-code")
 WARNINGS = ("-std=c11", "-D_GNU_SOURCE", "-O2", "-Wall", "-Wextra", "-Werror", *(f"-I{folder}" for folder in INCLUDED))
 RUNNERS = (
-    Runner("linux64", ("cc", *WARNINGS), links=("-ldl", "-lm")),
+    Runner("linux64", "x86_64-linux", ("cc", *WARNINGS), links=("-ldl", "-lm")),
     Runner(
         "win64",
+        "x86_64-windows",
         ("x86_64-w64-mingw32-gcc", *WARNINGS, "-D__USE_MINGW_ANSI_STDIO=1", "-I", str(HERE / "windows")),
         start=(WINE,),
     ),
     Runner(
+        "aarch64-linux",
         "aarch64-linux",
         ("aarch64-linux-gnu-gcc", *WARNINGS),
         start=("qemu-aarch64", "-L", "/usr/aarch64-linux-gnu"),
@@ -67,13 +72,23 @@ def fmu() -> Path:
     return DIST / f"{MODEL}.fmu"
 
 
-@pytest.fixture(scope="session")
-def unpacked(fmu, tmp_path_factory) -> Path:
-    """The folder of the unpacked FMU."""
-    folder = tmp_path_factory.mktemp("fmu")
+def unpack(fmu: Path, folder: Path) -> Path:
+    """Unpacks an FMU into a folder."""
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def unpacked(fmu, tmp_path_factory) -> Path:
+    """The folder of the unpacked FMU."""
+    return unpack(fmu, tmp_path_factory.mktemp("fmu"))
+
+
+@pytest.fixture(scope="session")
+def unpacked_fmi3(tmp_path_factory) -> Path:
+    """The folder of the unpacked FMU for FMI 3.0."""
+    return unpack(DIST / FMI3, tmp_path_factory.mktemp("fmi3"))
 
 
 @pytest.fixture(scope="session")
@@ -113,7 +128,7 @@ def folder(request) -> str:
 
 @pytest.fixture(scope="session")
 def include(description, tmp_path_factory) -> Path:
-    """A folder with variables.h: guid, value references, and what depends on what."""
+    """A folder with variables.h: guid, value references, and what depends on what; FMI 3.0 has the same."""
     by_name = {variable.name: variable for variable in description.modelVariables}
     outputs = [unknown.variable for unknown in description.outputs]
     derivatives = [unknown.variable for unknown in description.derivatives]
@@ -137,14 +152,16 @@ def run_c(include, wine, tmp_path_factory):
     """Compiles a C file for a platform and runs it; gives what it prints."""
     programs, outputs = {}, {}
 
-    def run(runner: Runner, source: Path, *arguments: str) -> str:
-        if (runner, source) not in programs:
+    def run(runner: Runner, source: Path, *arguments: str, options: tuple[str, ...] = (), **environment: str) -> str:
+        if (runner, source, options) not in programs:
             program = tmp_path_factory.mktemp(runner.folder) / f"{source.stem}.exe"
-            subprocess.run([*runner.compiler, "-I", include, "-o", program, source, *runner.links], check=True)
-            programs[runner, source] = program
-        program = programs[runner, source]
+            command = [*runner.compiler, *options, "-I", include, "-o", program, source, *runner.links]
+            subprocess.run(command, check=True)
+            programs[runner, source, options] = program
+        program = programs[runner, source, options]
         if (program, arguments) not in outputs:
-            process = subprocess.run([*runner.start, program, *arguments], env=wine, capture_output=True, text=True)
+            command = [*runner.start, program, *arguments]
+            process = subprocess.run(command, env={**wine, **environment}, capture_output=True, text=True)
             assert process.returncode == 0, f"{runner.folder}: {process.stderr[-2000:]}{process.stdout[-2000:]}"
             outputs[program, arguments] = process.stdout
         return outputs[program, arguments]

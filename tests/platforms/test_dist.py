@@ -10,7 +10,7 @@ import zipfile
 
 import fmpy
 import pytest
-from conftest import DIST, ROOT
+from conftest import DIST, FMI3, ROOT
 from cyclonedx.schema import SchemaVersion
 from cyclonedx.validation.json import JsonStrictValidator
 from fmpy.validation import validate_fmu
@@ -18,7 +18,6 @@ from targets import FMI3_FOLDERS, FOLDERS, MODEL, TARGETS
 
 BILL = "bill-of-materials.cdx.json"
 ARM = f"{MODEL}-linux-arm64.fmu"
-FMI3 = f"{MODEL}-fmi3.fmu"
 
 
 def names(fmu) -> set[str]:
@@ -65,6 +64,8 @@ def test_one_fmu_of_fmi_3_for_all(fmu):
     for folder, other in same.items():
         library = f"{MODEL}{FMI3_FOLDERS[folder][0].suffix}"
         assert three.read(f"binaries/{folder}/{library}") == two.read(f"binaries/{other}/{library}"), folder
+    # The Intel half of the universal library.
+    assert three.read(f"binaries/x86_64-darwin/{MODEL}.dylib") in two.read(f"binaries/darwin64/{MODEL}.dylib")
     assert three.read("terminalsAndIcons/icon.png") == two.read("model.png")
     documents = {name for name in two.namelist() if name.startswith("documentation/")}
     assert documents == {name for name in three.namelist() if name.startswith("documentation/")}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from conftest import HERE, RUNNERS, disagreement, library, parse
 
@@ -9,10 +11,13 @@ REFERENCE = RUNNERS[0]
 
 
 @pytest.fixture
-def run(run_c, unpacked, description):
+def run(run_c, unpacked, unpacked_fmi3, description):
     """Runs a program with the library for its platform."""
 
     def run(program, runner):
+        if program == "scenario for FMI 3.0":
+            path = str(library(unpacked_fmi3, runner.fmi3_folder))
+            return run_c(runner, HERE / "scenario.c", path, options=("-DFMI3",))
         path = str(library(unpacked, runner.folder))
         if program == "scenario":
             return run_c(runner, HERE / "scenario.c", path)
@@ -22,12 +27,23 @@ def run(run_c, unpacked, description):
     return run
 
 
-@pytest.mark.parametrize("program", ["scenario", "drive"])
+@pytest.mark.parametrize("program", ["scenario", "scenario for FMI 3.0", "drive"])
 def test_every_number_agrees(program, foreign, run, capsys):
     largest, count = disagreement(run(program, foreign), run(program, REFERENCE))
     with capsys.disabled():
         print(f"\n{program} on {foreign.folder}: {count} numbers, largest relative difference {largest:.2g} ", end="")
     assert largest <= 1e-12
+
+
+@pytest.mark.parametrize("runner", RUNNERS, ids=lambda runner: runner.folder)
+def test_fmi_3_gives_the_same_bits(runner, run):
+    """All digits of every number, and as many refusals; only version and messages differ."""
+    two, three = run("scenario", runner).splitlines(), run("scenario for FMI 3.0", runner).splitlines()
+    assert two[0] == "version 2.0, platform default" and three[0] == "version 3.0 of FMI"
+    assert sum(line.startswith("outputs ") for line in three) == 2 * 2000
+    assert sum(line.startswith("integrated ") for line in three) == 2 * 200
+    said = re.compile(r"^version .*|(?<=^log 3 logStatusError: ).*")
+    assert [said.sub("", line) for line in three] == [said.sub("", line) for line in two]
 
 
 def test_it_is_the_experiment_of_fig_4(run):

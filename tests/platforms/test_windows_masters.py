@@ -2,9 +2,10 @@
 
 * libcosim for Windows (from libcosimpy's wheel), with FMI Library in it: unpacks the FMU and steps it. What runs
   it is in C, because no Python for Windows is to be had as a package.
-* FMPy's program for Windows that loads an FMU and serves it to FMPy elsewhere (its "remoting").
+* Ecos for Windows (from ecospy's wheel), for FMI 2.0 and 3.0, in the same way.
+* FMPy's program for Windows that loads an FMU and serves it to FMPy elsewhere (its "remoting"). It knows no FMI 3.0.
 
-Both are compiled with Microsoft's compiler.
+All are compiled with Microsoft's compiler.
 """
 
 from __future__ import annotations
@@ -18,7 +19,10 @@ import zipfile
 import fmpy.util
 import numpy as np
 import pytest
-from conftest import HERE, ROOT, RUNNERS, WINE, disagreement
+from conftest import DIST, FMI3, HERE, ROOT, RUNNERS, WINE, disagreement
+
+#: The platforms of wheels.
+LINUX, WINDOWS = "manylinux_2_28_x86_64", "win_amd64"
 
 
 @pytest.fixture
@@ -63,24 +67,31 @@ def test_fmpys_server_for_windows(kind, simulate, served, fmu, capsys):
     assert np.abs(here["roll"]).max() > 0.05
 
 
+def wheel(package: str, platform: str, requirements: str = "requirements.txt") -> zipfile.ZipFile:
+    """The wheel of a package for a platform, of the version that the other tests use."""
+    (pinned,) = re.findall(rf"^{package}==[\d.]+", (ROOT / "tests" / requirements).read_text(), re.MULTILINE)
+    folder = ROOT / "target" / "wheels" / platform
+    file = f"{pinned.replace('==', '-')}-*.whl"
+    if not list(folder.glob(file)):
+        command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
+        command += ["--only-binary=:all:", "--python-version", "3.12", "--platform", platform]
+        subprocess.run([*command, "--dest", folder, pinned], check=True)
+    (path,) = folder.glob(file)
+    return zipfile.ZipFile(path)
+
+
+def windows_path(path) -> str:
+    """The path of a file as Wine has it."""
+    return "Z:" + str(path).replace("/", "\\")
+
+
 @pytest.fixture
-def libcosim():
-    """libcosim for Linux and for Windows, from wheels of the version that the other tests use."""
-    (pinned,) = re.findall(r"^libcosimpy==[\d.]+", (ROOT / "tests" / "requirements.txt").read_text(), re.MULTILINE)
-    paths = {}
-    for name, platform, library in (
-        ("linux64", "manylinux_2_28_x86_64", "libcosimc.so"),
-        ("win64", "win_amd64", "cosimc.dll"),
-    ):
-        folder = ROOT / "target" / "libcosim" / name
-        if not list(folder.glob(f"{pinned.replace('==', '-')}*.whl")):
-            command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
-            command += ["--only-binary=:all:", "--python-version", "3.12", "--platform", platform]
-            subprocess.run([*command, "--dest", folder, pinned], check=True)
-        (wheel,) = folder.glob("*.whl")
-        with zipfile.ZipFile(wheel) as archive:
-            paths[name] = archive.extract(f"libcosimpy/libcosimc/{library}", folder)
-    return paths
+def libcosim(tmp_path):
+    """libcosim for Linux and for Windows."""
+    return {
+        name: wheel("libcosimpy", platform).extract(f"libcosimpy/libcosimc/{library}", tmp_path)
+        for name, platform, library in (("linux64", LINUX, "libcosimc.so"), ("win64", WINDOWS, "cosimc.dll"))
+    }
 
 
 def test_libcosim_for_windows(libcosim, run_c, fmu, capsys):
@@ -90,7 +101,37 @@ def test_libcosim_for_windows(libcosim, run_c, fmu, capsys):
         return "\n".join(line for line in said.splitlines() if line.startswith("outputs "))
 
     here, there = (runner for runner in RUNNERS if runner.folder in libcosim)
-    largest, count = disagreement(outputs(there, "Z:" + str(fmu).replace("/", "\\")), outputs(here, str(fmu)))
+    largest, count = disagreement(outputs(there, windows_path(fmu)), outputs(here, str(fmu)))
     with capsys.disabled():
         print(f"\nlibcosim for Windows: {count} numbers, largest relative difference {largest:.2g} ", end="")
+    assert count == 200 * 8 and largest <= 1e-12
+
+
+@pytest.fixture
+def ecos(tmp_path):
+    """The libraries of Ecos for Linux and for Windows, after those that they need; and the program that it unpacks with."""
+    both, tbb = (wheel(name, LINUX, "closed_loop/requirements.txt") for name in ("ecospy", "tbb"))
+    (needed,) = [name for name in tbb.namelist() if name.endswith("/libtbb.so.12")]
+    subprocess.run([*RUNNERS[1].compiler, "-o", tmp_path / "unzip.exe", HERE / "windows" / "unzip.c"], check=True)
+    return {
+        "linux64": (tbb.extract(needed, tmp_path), both.extract("ecospy/binaries/libecosc.so", tmp_path)),
+        "win64": (both.extract("ecospy/binaries/libecosc.dll", tmp_path),),
+    }
+
+
+def test_ecos_for_windows(ecos, run_c, fmu, unpacked, unpacked_fmi3, tmp_path, capsys):
+    def outputs(version, runner):
+        path, folder = {2: (fmu, unpacked), 3: (DIST / FMI3, unpacked_fmi3)}[version]
+        named = windows_path(path) if runner.start else str(path)
+        environment = {"WINEPATH": windows_path(tmp_path), "UNPACKED": windows_path(folder)}
+        said = run_c(runner, HERE / "ecos.c", named, *ecos[runner.folder], **environment)
+        assert ("Loading FMI version 3..." in said) == (version == 3)
+        return "\n".join(line for line in said.splitlines() if line.startswith("outputs "))
+
+    here, there = (runner for runner in RUNNERS if runner.folder in ecos)
+    three = outputs(3, there)
+    assert three == outputs(2, there)
+    largest, count = disagreement(three, outputs(3, here))
+    with capsys.disabled():
+        print(f"\nFMI 3.0 in Ecos for Windows: {count} numbers, largest relative difference {largest:.2g} ", end="")
     assert count == 200 * 8 and largest <= 1e-12
