@@ -2,11 +2,15 @@
 //! nobody has written yet. Valgrind sees more of it than the assertions; `make sanitize` lets it look.
 #![allow(missing_docs)]
 
+#[path = "../toys/mod.rs"]
 mod toys;
+
+mod fmi3;
 
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::*;
 use fmu_export::{Exported, Model};
+use fmu_run::either::Either;
 use fmu_run::{Functions, Importer};
 use std::cell::{Cell, RefCell};
 use std::ffi::CString;
@@ -196,17 +200,23 @@ fn memory_that_was_never_written_in_model_exchange() {
 /// Instances and saved states of models with memory on the heap, freed in any order, also one inside of the other's life.
 #[test]
 fn freed_in_any_order() {
-    fn check<M: Exported>() {
-        let [one, other] = [(); 2].map(|()| Importer::of::<M>(CoSimulation));
-        let (first, second) = (one.save(), other.save());
-        one.ok(one.fmi2SetFMUstate(second));
+    fn check<F: Either, M: Exported>() {
+        let [one, other] = [(); 2].map(|()| F::initialized::<M>());
+        let (mut first, mut second) = (null_mut(), null_mut());
+        one.save_into(&mut first);
+        other.save_into(&mut second);
+        one.go_back(second);
         drop(one);
-        other.ok(other.fmi2SetFMUstate(first));
-        other.forget(first);
-        other.forget(second);
-        other.initialize(0.0);
+        other.go_back(first);
+        other.free(first);
+        other.free(second);
+        other.advance(0.0, 0.1);
     }
-    check::<Talker>();
-    check::<Oscillator>();
-    check::<Counter>();
+    fn check_both<M: Exported>() {
+        check::<Importer, M>();
+        check::<fmu_run::fmi3::Importer, M>();
+    }
+    check_both::<Talker>();
+    check_both::<Oscillator>();
+    check_both::<Counter>();
 }
