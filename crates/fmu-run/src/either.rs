@@ -11,6 +11,14 @@ pub trait Either: Send {
     /// A new instance, initialized at time 0.
     fn initialized<M: Exported>() -> Self
     where
+        Self: Sized,
+    {
+        Self::initialized_at::<M>(0.0)
+    }
+
+    /// A new instance, initialized at this time.
+    fn initialized_at<M: Exported>(start_time: f64) -> Self
+    where
         Self: Sized;
 
     /// Reads Reals.
@@ -22,7 +30,7 @@ pub trait Either: Send {
     /// Sets a Boolean.
     fn decide(&self, vr: u32, value: bool);
 
-    /// A step to its end.
+    /// A step to its end, which is the time of the FMU then, to the last bit.
     fn advance(&self, point: f64, step_size: f64);
 
     /// Sets the time derivatives of up to 8 inputs; FMI 3.0 has no function for it.
@@ -48,9 +56,9 @@ pub trait Either: Send {
 }
 
 impl Either for Importer {
-    fn initialized<M: Exported>() -> Self {
+    fn initialized_at<M: Exported>(start_time: f64) -> Self {
         let fmu = Self::of::<M>(Interface::CoSimulation);
-        fmu.initialize(0.0);
+        fmu.initialize(start_time);
         fmu
     }
 
@@ -68,7 +76,11 @@ impl Either for Importer {
     }
 
     fn advance(&self, point: f64, step_size: f64) {
+        const LAST_SUCCESSFUL_TIME: i32 = 2;
         self.step(point, step_size);
+        let mut time = f64::NAN;
+        self.ok(self.fmi2GetRealStatus(LAST_SUCCESSFUL_TIME, &mut time));
+        assert_eq!(time, point + step_size);
     }
 
     fn write_rates(&self, vr: &[u32], values: &[f64]) {
@@ -107,9 +119,9 @@ impl Either for Importer {
 }
 
 impl Either for fmi3::Importer {
-    fn initialized<M: Exported>() -> Self {
+    fn initialized_at<M: Exported>(start_time: f64) -> Self {
         let fmu = Self::of::<M>(Interface::CoSimulation);
-        fmu.initialize(0.0);
+        fmu.initialize(start_time);
         fmu
     }
 
