@@ -377,7 +377,11 @@ impl<M: Exported> Session<'_, M> {
             if u.ratio(1, 2)? {
                 made_of.instantiation_token = u.choose(&texts)?.map(CString::from);
             }
-            made_of.instance_name = *u.choose(&texts)?;
+            // None that is accepted differs: a model may show its name, which comes along with the states of others.
+            made_of.instance_name = match *u.choose(&texts)? {
+                Some(name) if !name.to_bytes().trim_ascii().is_empty() => Some(c"instance"),
+                refused => refused,
+            };
             made_of.resource_path = *u.choose(&texts)?;
             made_of.required_intermediate_variables = if u.ratio(1, 8)? { &[0] } else { &[] };
         }
