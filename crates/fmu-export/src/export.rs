@@ -124,8 +124,7 @@ macro_rules! offer {
             let stepped = $crate::CoSimulation::step(self, step);
             // The importer may count on it.
             ::core::assert!(
-                <Self as $crate::CoSimulation>::ENDS_EARLY
-                    || <Self as $crate::CoSimulation>::EVENTS
+                <Self as $crate::Exported>::CO_SIMULATION.is_some_and(|offer| offer.ends_early)
                     || ::core::matches!(
                         stepped,
                         ::core::result::Result::Ok($crate::Stepped::Done) | ::core::result::Result::Err(_)
