@@ -1,12 +1,12 @@
 //! What runs in a control loop neither allocates nor enters the kernel nor locks. `make sanitize` runs the same loop
 //! under the RealtimeSanitizer.
 
-use fmu_export::Interface::CoSimulation;
-use fmu_export::fmi2::types::*;
-use fmu_run::Importer;
+use fmu_run::either::Either;
 use fmu_run::realtime::*;
+use fmu_run::{Importer, fmi3};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
+use std::ffi::c_void;
 use std::path::Path;
 use std::ptr::null_mut;
 
@@ -18,28 +18,27 @@ const fn vr(name: Name) -> u32 {
 }
 
 /// A controller's turn: what masters call between two samples.
-struct Loop {
-    fmu: Importer,
-    state: fmi2FMUstate,
+struct Loop<F: Either> {
+    fmu: F,
+    state: *mut c_void,
     time: f64,
 }
 
-impl Loop {
+impl<F: Either> Loop<F> {
     fn new() -> Self {
-        let fmu = Importer::of::<TestbedFmu>(CoSimulation);
-        fmu.initialize(0.0);
-        let state = fmu.save();
+        let (fmu, mut state) = (F::initialized::<TestbedFmu>(), null_mut());
+        fmu.save_into(&mut state);
         Self { fmu, state, time: 0.0 }
     }
 
     /// One step of size `h`, with a fresh state saved into an old one.
     fn turn(&mut self, h: f64) {
         let Self { fmu, state, time } = self;
-        fmu.set(&[vr(Name::theta1), vr(Name::theta2)], &[time.sin(), 0.3 * *time]);
-        fmu.set_rates([vr(Name::theta1), vr(Name::theta2)], [time.cos(), 0.3]);
-        fmu.step(*time, h);
-        fmu.get([vr(Name::tau1), vr(Name::tau2), vr(Name::pitch), vr(Name::roll)]);
-        fmu.ok(fmu.fmi2GetFMUstate(state));
+        fmu.write(&[vr(Name::theta1), vr(Name::theta2)], &[time.sin(), 0.3 * *time]);
+        fmu.write_rates(&[vr(Name::theta1), vr(Name::theta2)], &[time.cos(), 0.3]);
+        fmu.advance(*time, h);
+        fmu.read(&[vr(Name::tau1), vr(Name::tau2), vr(Name::pitch), vr(Name::roll)], &mut [0.0; 4]);
+        fmu.save_into(state);
         *time += h;
     }
 
@@ -47,19 +46,11 @@ impl Loop {
     /// state.
     fn change(&self, k1: f64) {
         let fmu = &self.fmu;
-        fmu.set(&[vr(Name::k1)], &[k1]);
-        fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &fmi2True));
-        fmu.ok(fmu.fmi2SetFMUstate(self.state));
-        fmu.rates([vr(Name::tau1), vr(Name::theta3)]);
-        let (tau, theta, mut gain) = ([vr(Name::tau1)], [vr(Name::theta1)], [0.0]);
-        fmu.ok(fmu.fmi2GetDirectionalDerivative(
-            tau.as_ptr(),
-            1,
-            theta.as_ptr(),
-            1,
-            [1.0].as_ptr(),
-            gain.as_mut_ptr(),
-        ));
+        fmu.write(&[vr(Name::k1)], &[k1]);
+        fmu.decide(vr(Name::use_omega), true);
+        fmu.go_back(self.state);
+        [vr(Name::tau1), vr(Name::theta3)].iter().for_each(|output| _ = fmu.read_rate(*output));
+        fmu.read_partial(vr(Name::tau1), vr(Name::theta1));
     }
 
     /// A thousand turns with one step size, a thousand with a new one each, changes in between. The
@@ -76,16 +67,21 @@ impl Loop {
     }
 }
 
-impl Drop for Loop {
+impl<F: Either> Drop for Loop<F> {
     fn drop(&mut self) {
-        self.fmu.forget(std::mem::replace(&mut self.state, null_mut()));
+        self.fmu.free(std::mem::replace(&mut self.state, null_mut()));
     }
+}
+
+fn does_not_allocate<F: Either>() {
+    let mut control = Loop::<F>::new();
+    assert_eq!(allocations(|| control.run()), 0);
 }
 
 #[test]
 fn the_loop_does_not_allocate() {
-    let mut control = Loop::new();
-    assert_eq!(allocations(|| control.run()), 0);
+    does_not_allocate::<Importer>();
+    does_not_allocate::<fmi3::Importer>();
     assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(1)))), 2, "allocations are counted");
 }
 
@@ -98,10 +94,11 @@ fn the_library_has_nothing_to_lock() {
 #[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
 #[test]
 fn the_loop_makes_no_system_call() {
-    let mut control = Loop::new();
+    let (mut old, mut new) = (Loop::<Importer>::new(), Loop::<fmi3::Importer>::new());
     assert!(
         matches!(without_kernel(&mut || drop(std::fs::metadata("/"))), Ended::Killed(_)),
         "they are caught"
     );
-    assert_eq!(without_kernel(&mut || control.run()), Ended::Exited(0));
+    assert_eq!(without_kernel(&mut || old.run()), Ended::Exited(0));
+    assert_eq!(without_kernel(&mut || new.run()), Ended::Exited(0));
 }

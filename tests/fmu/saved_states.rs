@@ -7,8 +7,9 @@ use crate::{TABLE, new, vr};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Status;
-use fmu_run::Importer as Fmu;
 use fmu_run::serialized::{MODE, TIME, sealed, with, with_mode};
+use fmu_run::{Importer as Fmu, fmi3};
+use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 use std::ops::Range;
 use std::ptr::null_mut;
@@ -222,6 +223,28 @@ fn refused_bytes(fmu: &Fmu, bytes: &[u8]) -> String {
     assert!(state.is_null());
     assert!(message.starts_with("fmi2DeSerializeFMUstate: "), "{message}");
     message
+}
+
+/// One library serves both standards; a state stays within its own.
+#[test]
+fn states_of_the_other_standard() {
+    let (old, new) = (in_mode(CoSimulation, StepComplete), fmi3::Importer::of::<TestbedFmu>(CoSimulation));
+    new.initialize(0.0);
+    let message = refused_bytes(&old, &new.bytes());
+    assert!(message.contains("comes from Co-Simulation of FMI 3.0"), "{message}");
+    let states = [old.save(), new.save()];
+    let message = old.refused("a state of FMI 3.0", |fmu| fmu.fmi2SetFMUstate(states[1]));
+    assert!(message.contains("comes from Co-Simulation of FMI 3.0"), "{message}");
+    let (bytes, mut state) = (old.bytes(), null_mut());
+    for message in [
+        new.refused("a state of FMI 2.0", |fmu| fmu.fmi3SetFMUState(states[0])),
+        new.refused("bytes of FMI 2.0", |fmu| {
+            fmu.fmi3DeserializeFMUState(bytes.as_ptr(), bytes.len(), &mut state)
+        }),
+    ] {
+        assert!(message.contains("comes from Co-Simulation of FMI 2.0"), "{message}");
+    }
+    states.into_iter().for_each(|state| new.forget(state));
 }
 
 /// A right checksum around parameters that make no testbed.

@@ -4,3 +4,4 @@
 mod oscillator;
 
 fmu_export::fmi2_symbols!(oscillator::Oscillator);
+fmu_export::fmi3_symbols!(oscillator::Oscillator);

@@ -4,3 +4,4 @@
 mod talker;
 
 fmu_export::fmi2_symbols!(talker::Talker);
+fmu_export::fmi3_symbols!(talker::Talker);

@@ -11,6 +11,11 @@ pub trait CoSimulation: Model {
     /// may then have an event mode (`hasEventMode`), at the begin of the simulation and whenever it likes.
     const EVENTS: Events = Events::None;
 
+    /// Whether steps may end early ([`Stepped::Early`], [`Stepped::Terminate`]). Importers of FMI 3.0 are told
+    /// (`mightReturnEarlyFromDoStep`): those that cannot cope with it need not refuse a model whose steps, but for
+    /// errors, always reach their end.
+    const ENDS_EARLY: bool = false;
+
     /// Goes on from a communication point.
     ///
     /// # Errors
@@ -55,7 +60,8 @@ impl Step {
 pub enum Stepped {
     /// At the next communication point.
     Done,
-    /// At an earlier time, s, which the model has reached: the importer is told. In FMI 2.0 (`fmi2Discard`) it goes
+    /// At an earlier time, s, which the model has reached: the importer is told. Only if
+    /// [`ENDS_EARLY`](CoSimulation::ENDS_EARLY) or [`EVENTS`](CoSimulation::EVENTS) says so. In FMI 2.0 (`fmi2Discard`) it goes
     /// back to a saved state or ends the simulation. In FMI 3.0 (`earlyReturn`) it goes on from there; if it has not
     /// allowed it, the step ends with an error.
     Early(f64),
@@ -65,7 +71,7 @@ pub enum Stepped {
     /// An importer of FMI 3.0 that wants to handles the event itself (`eventHandlingNeeded`). Otherwise, and in FMI
     /// 2.0, this crate does: it calls [`ModelExchange::event`], and the rest of the step follows as another step.
     Event(f64),
-    /// At an earlier time, s, or the next point: the model wants to end the simulation.
+    /// At an earlier time, s, or the next point: the model wants to end the simulation. Only if it may end early.
     Terminate(f64),
 }
 

@@ -52,6 +52,8 @@ pub struct CoSimulationOffer {
     pub variable_step_size: bool,
     /// Whether steps stop at events.
     pub events: Events,
+    /// Steps may end early, at events or elsewhere.
+    pub ends_early: bool,
 }
 
 impl CoSimulationOffer {
@@ -121,11 +123,23 @@ macro_rules! offer {
             ::core::option::Option::Some($crate::CoSimulationOffer {
                 variable_step_size: <Self as $crate::CoSimulation>::VARIABLE_STEP_SIZE,
                 events: <Self as $crate::CoSimulation>::EVENTS,
+                ends_early: <Self as $crate::CoSimulation>::ENDS_EARLY
+                    || !::core::matches!(<Self as $crate::CoSimulation>::EVENTS, $crate::Events::None),
             });
 
         #[inline]
         fn exported_step(&mut self, step: $crate::Step) -> ::core::result::Result<$crate::Stepped, $crate::Error> {
-            $crate::CoSimulation::step(self, step)
+            let stepped = $crate::CoSimulation::step(self, step);
+            // The importer may count on it.
+            ::core::assert!(
+                <Self as $crate::Exported>::CO_SIMULATION.is_some_and(|offer| offer.ends_early)
+                    || ::core::matches!(
+                        stepped,
+                        ::core::result::Result::Ok($crate::Stepped::Done) | ::core::result::Result::Err(_)
+                    ),
+                "a step ended early although the model does not say `const ENDS_EARLY: bool = true`"
+            );
+            stepped
         }
     };
     (@capability ModelExchange) => {

@@ -1,15 +1,16 @@
-//! C programs that load shared libraries as importers do, compiled with the standard's own headers; and the functions'
-//! types, compared with those headers by the C compiler.
+//! C programs that load shared libraries as importers do, compiled with the standards' own headers; and the types of the
+//! functions of FMI 2.0, compared with those headers by the C compiler (of FMI 3.0: `tests/fmi3/headers.rs`).
 #![cfg(unix)]
 #![allow(missing_docs)]
 
 mod toys;
 
-use fmu_export::Interface::{CoSimulation, ModelExchange};
+use fmu_export::Interface::ModelExchange;
 use fmu_export::Model;
 use fmu_export::fmi2::types::*;
 use fmu_run::c_programs::{check_syntax, command, compile, headers, library, output, reload};
-use fmu_run::{FUNCTIONS, Importer};
+use fmu_run::either::Either;
+use fmu_run::{FUNCTIONS, Importer, fmi3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::mem::offset_of;
@@ -17,8 +18,18 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use toys::{Oscillator, oscillator::Name};
 
-const WITHOUT_COMPONENT: [&str; 4] =
-    ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instantiate", "fmi2FreeInstance"];
+/// The functions that work on no instance, of both standards.
+const WITHOUT_INSTANCE: [&str; 9] = [
+    "fmi2GetTypesPlatform",
+    "fmi2GetVersion",
+    "fmi2Instantiate",
+    "fmi2FreeInstance",
+    "fmi3GetVersion",
+    "fmi3InstantiateModelExchange",
+    "fmi3InstantiateCoSimulation",
+    "fmi3InstantiateScheduledExecution",
+    "fmi3FreeInstance",
+];
 
 fn program(name: &str) -> PathBuf {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/c").join(name).with_extension("c");
@@ -33,15 +44,17 @@ fn run(name: &str) -> String {
 
 const OUTPUTS: [Name; 4] = [Name::position, Name::velocity, Name::spring_force, Name::energy];
 
+/// The lines `name value` that a program prints.
+fn values(printed: &str) -> BTreeMap<&str, f64> {
+    let pairs = printed.lines().map(|line| line.split_once(' ').unwrap());
+    pairs.map(|(name, value)| (name, value.parse().unwrap())).collect()
+}
+
 /// What the FMU writes in C is what it writes in Rust, and the types have the same layout.
 #[test]
 fn drive() {
     let printed = run("drive");
-    let mut values: BTreeMap<&str, f64> = printed
-        .lines()
-        .map(|line| line.split_once(' ').unwrap())
-        .map(|(k, v)| (k, v.parse().unwrap()))
-        .collect();
+    let mut values = values(&printed);
     for (name, expected) in [
         ("sizeof_callbacks", size_of::<fmi2CallbackFunctions>()),
         ("offset_environment", offset_of!(fmi2CallbackFunctions, component_environment)),
@@ -57,8 +70,19 @@ fn drive() {
     ] {
         assert_eq!(values.remove(name), Some(expected as f64), "{name}");
     }
-    assert_eq!(OUTPUTS.map(|name| name as u32), [1, 2, 5, 6], "as the C program has them");
-    for (prefix, expected) in [("cs", co_simulation()), ("me", model_exchange())] {
+    same_runs::<Importer>(values);
+}
+
+/// The same of FMI 3.0, whose types `tests/fmi3/headers.rs` compares.
+#[test]
+fn drive3() {
+    same_runs::<fmi3::Importer>(values(&run("drive3")));
+}
+
+/// Both runs of a program come to the same ends as in Rust.
+fn same_runs<F: Either>(mut values: BTreeMap<&str, f64>) {
+    assert_eq!(OUTPUTS.map(|name| name as u32), [1, 2, 5, 6], "as the C programs have them");
+    for (prefix, expected) in [("cs", co_simulation::<F>()), ("me", model_exchange())] {
         for (i, expected) in expected.into_iter().enumerate() {
             assert_eq!(values.remove(format!("{prefix}{i}").as_str()), Some(expected), "{prefix}{i}");
         }
@@ -66,18 +90,18 @@ fn drive() {
     assert!(values.is_empty(), "{values:?}");
 }
 
-/// The Co-Simulation run of drive.c.
-fn co_simulation() -> [f64; 4] {
-    let fmu = Importer::of::<Oscillator>(CoSimulation);
-    fmu.initialize(0.0);
+/// The Co-Simulation run of the programs.
+fn co_simulation<F: Either>() -> [f64; 4] {
+    let (fmu, mut values) = (F::initialized::<Oscillator>(), [f64::NAN; 4]);
     for i in (0..64).map(f64::from) {
-        fmu.set(&[Name::force as u32], &[i / 64.0]);
-        fmu.step(i / 64.0, 1.0 / 64.0);
+        fmu.write(&[Name::force as u32], &[i / 64.0]);
+        fmu.advance(i / 64.0, 1.0 / 64.0);
     }
-    fmu.get(OUTPUTS.map(|name| name as u32))
+    fmu.read(&OUTPUTS.map(|name| name as u32), &mut values);
+    values
 }
 
-/// The Model Exchange run of drive.c.
+/// The Model Exchange run of the programs; FMI 3.0 has the same bits (`tests/fmi3/same.rs`).
 fn model_exchange() -> [f64; 4] {
     let fmu = Importer::of::<Oscillator>(ModelExchange);
     fmu.initialize(0.0);
@@ -110,7 +134,7 @@ fn loading_and_unloading_leaves_nothing_behind() {
     reload(&program, &["oscillator", "talker"]);
 }
 
-/// The library exports the 44 functions of FMI 2.0 and nothing else.
+/// The library exports the 44 functions of FMI 2.0, the 75 of FMI 3.0 and nothing else.
 #[test]
 fn exported_symbols() {
     let flags: &[&str] = if cfg!(target_os = "macos") { &["-gU"] } else { &["-D", "--defined-only"] };
@@ -118,18 +142,21 @@ fn exported_symbols() {
         output(Command::new("nm").args(flags).arg(library("oscillator")), "this test needs nm (binutils)");
     let symbol = |line: &str| line.rsplit(' ').next().unwrap().trim_start_matches('_').to_owned();
     let exported: BTreeSet<_> = printed.lines().map(symbol).collect();
-    let expected: BTreeSet<_> =
-        FUNCTIONS.iter().chain(&WITHOUT_COMPONENT).map(|name| (*name).to_owned()).collect();
-    assert_eq!(expected.len(), 44);
+    let expected = FUNCTIONS.iter().chain(fmi3::FUNCTIONS).chain(&WITHOUT_INSTANCE);
+    let expected: BTreeSet<_> = expected.map(|name| (*name).to_owned()).collect();
+    assert_eq!(expected.len(), 44 + 75);
     assert_eq!(exported, expected);
-    // And the standard's header declares just these.
-    let header =
-        std::fs::read_to_string(headers(Path::new(env!("CARGO_MANIFEST_DIR"))).join("fmi2Functions.h"))
-            .unwrap();
-    let declared = header.lines().filter_map(|line| line.trim().strip_prefix("FMI2_Export fmi2"));
-    let declared: BTreeSet<_> = declared
-        .map(|line| format!("fmi2{}", line.trim_end_matches(';').rsplit_once("fmi2").unwrap().1))
-        .collect();
+    // And the standards' headers declare just these.
+    let headers = headers(Path::new(env!("CARGO_MANIFEST_DIR")));
+    let mut declared = BTreeSet::new();
+    for version in ["2", "3"] {
+        let header = std::fs::read_to_string(headers.join(format!("fmi{version}Functions.h"))).unwrap();
+        let lines = header
+            .lines()
+            .map(str::trim)
+            .filter(|line| line.starts_with(&format!("FMI{version}_Export fmi")));
+        declared.extend(lines.map(|line| line.trim_end_matches(';').rsplit_once(' ').unwrap().1.to_owned()));
+    }
     assert_eq!(declared, expected);
 }
 

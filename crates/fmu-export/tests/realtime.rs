@@ -4,10 +4,10 @@
 
 mod toys;
 
-use fmu_export::Interface::CoSimulation;
-use fmu_export::fmi2::types::*;
-use fmu_run::Importer;
+use fmu_run::either::Either;
 use fmu_run::realtime::*;
+use fmu_run::{Importer, fmi3};
+use std::ffi::c_void;
 use std::path::Path;
 use std::ptr::null_mut;
 use toys::{Oscillator, oscillator::Name};
@@ -20,40 +20,38 @@ const STIFFNESS: u32 = Name::stiffness as u32;
 const OUTPUTS: [u32; 3] = [Name::position as u32, Name::spring_force as u32, Name::energy as u32];
 
 /// A controller's turn: what masters call between two samples.
-struct Loop {
-    fmu: Importer,
-    state: fmi2FMUstate,
+struct Loop<F: Either> {
+    fmu: F,
+    state: *mut c_void,
     time: f64,
 }
 
-impl Loop {
+impl<F: Either> Loop<F> {
     fn new() -> Self {
-        let fmu = Importer::of::<Oscillator>(CoSimulation);
-        fmu.initialize(0.0);
-        let state = fmu.save();
+        let (fmu, mut state) = (F::initialized::<Oscillator>(), null_mut());
+        fmu.save_into(&mut state);
         Self { fmu, state, time: 0.0 }
     }
 
     /// One step of size `h`, with a fresh state saved into an old one.
     fn turn(&mut self, h: f64) {
         let Self { fmu, state, time } = self;
-        fmu.set(&[FORCE], &[time.sin()]);
-        fmu.set_rates([FORCE], [time.cos()]);
-        fmu.step(*time, h);
-        fmu.get(OUTPUTS);
-        fmu.ok(fmu.fmi2GetFMUstate(state));
+        fmu.write(&[FORCE], &[time.sin()]);
+        fmu.write_rates(&[FORCE], &[time.cos()]);
+        fmu.advance(*time, h);
+        fmu.read(&OUTPUTS, &mut [0.0; 3]);
+        fmu.save_into(state);
         *time += h;
     }
 
     /// What a master does less often: another parameter, back to a saved state, derivatives.
     fn change(&self, stiffness: f64) {
         let fmu = &self.fmu;
-        fmu.set(&[STIFFNESS], &[stiffness]);
-        fmu.ok(fmu.fmi2SetBoolean(&(Name::damped as u32), 1, &fmi2True));
-        fmu.ok(fmu.fmi2SetFMUstate(self.state));
-        fmu.rates(OUTPUTS);
-        let (unknown, known) = (Name::der_velocity as u32, FORCE);
-        fmu.ok(fmu.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, &mut 0.0));
+        fmu.write(&[STIFFNESS], &[stiffness]);
+        fmu.decide(Name::damped as u32, true);
+        fmu.go_back(self.state);
+        OUTPUTS.iter().for_each(|output| _ = fmu.read_rate(*output));
+        fmu.read_partial(Name::der_velocity as u32, FORCE);
     }
 
     /// A thousand turns with one step size, a thousand with a new one each, changes in between.
@@ -69,16 +67,21 @@ impl Loop {
     }
 }
 
-impl Drop for Loop {
+impl<F: Either> Drop for Loop<F> {
     fn drop(&mut self) {
-        self.fmu.forget(std::mem::replace(&mut self.state, null_mut()));
+        self.fmu.free(std::mem::replace(&mut self.state, null_mut()));
     }
+}
+
+fn does_not_allocate<F: Either>() {
+    let mut control = Loop::<F>::new();
+    assert_eq!(allocations(|| control.run()), 0);
 }
 
 #[test]
 fn the_loop_does_not_allocate() {
-    let mut control = Loop::new();
-    assert_eq!(allocations(|| control.run()), 0);
+    does_not_allocate::<Importer>();
+    does_not_allocate::<fmi3::Importer>();
     assert_eq!(allocations(|| drop(std::hint::black_box(Box::new(1)))), 2);
 }
 
@@ -94,14 +97,15 @@ fn the_library_has_nothing_to_lock() {
 #[test]
 fn the_loop_makes_no_system_call() {
     const SIGSYS: i32 = 31;
-    let mut control = Loop::new();
     assert_eq!(without_kernel(&mut || ()), Ended::Exited(0));
     assert_eq!(
         without_kernel(&mut || drop(std::fs::metadata("/"))),
         Ended::Killed(SIGSYS),
         "they are caught"
     );
-    assert_eq!(without_kernel(&mut || control.run()), Ended::Exited(0));
+    let (mut old, mut new) = (Loop::<Importer>::new(), Loop::<fmi3::Importer>::new());
+    assert_eq!(without_kernel(&mut || old.run()), Ended::Exited(0));
+    assert_eq!(without_kernel(&mut || new.run()), Ended::Exited(0));
 }
 
 #[cfg(rtsan)]

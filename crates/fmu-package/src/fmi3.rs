@@ -94,13 +94,13 @@ fn interface<M: Exported>(interface: Interface) -> Element {
         Interface::CoSimulation => {
             let variable_step_size = M::CO_SIMULATION.is_some_and(|offer| offer.variable_step_size);
             let events = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
+            let ends_early = M::CO_SIMULATION.is_some_and(|offer| offer.ends_early);
             element("CoSimulation")
                 .with("canHandleVariableCommunicationStepSize", variable_step_size)
                 .with("maxOutputDerivativeOrder", M::OUTPUT_DERIVATIVES)
                 .with("providesIntermediateUpdate", false)
                 .with("canReturnEarlyAfterIntermediateUpdate", false)
-                // Any step may, if the importer allows it.
-                .with("mightReturnEarlyFromDoStep", true)
+                .with("mightReturnEarlyFromDoStep", ends_early)
                 .with("hasEventMode", events)
         }
     }

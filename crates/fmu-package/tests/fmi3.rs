@@ -304,6 +304,62 @@ fn other_start_values_are_possible_for_every_type() {
     }
 }
 
+/// Models whose steps always reach their end, may end early, or stop at events.
+macro_rules! steps {
+    ($($case:ident: $($fact:ident: $type:ty = $value:expr)?;)+) => { $(
+        mod $case {
+            use super::*;
+
+            #[derive(Clone)]
+            pub struct Steps {
+                u: f64,
+            }
+
+            variables! { for Steps;
+                /// Input
+                u = input(&NUMBER) in u;
+            }
+
+            impl Model for Steps {
+                const INFO: Info = Info::new("Steps", "steps", "{steps}");
+
+                fn new(_: &Setup) -> Result<Self, Error> {
+                    Ok(Self { u: 0.0 })
+                }
+            }
+
+            impl CoSimulation for Steps {
+                $(const $fact: $type = $value;)?
+
+                fn step(&mut self, _: Step) -> Result<Stepped, Error> {
+                    Ok(Stepped::Done)
+                }
+            }
+
+            impl ModelExchange for Steps {}
+
+            offer!(Steps: CoSimulation + ModelExchange);
+        }
+    )+ };
+}
+
+steps! {
+    whole:;
+    early: ENDS_EARLY: bool = true;
+    eventful: EVENTS: Events = Events::StopIfHandled;
+}
+
+#[test]
+fn whether_steps_end_early_is_told() {
+    let says = |text: anyhow::Result<String>, early: bool, events: bool| {
+        let part = format!("mightReturnEarlyFromDoStep=\"{early}\" hasEventMode=\"{events}\"");
+        has(&text.unwrap(), &part);
+    };
+    says(fmi3::describe::<whole::Steps>(&Changes::default()), false, false);
+    says(fmi3::describe::<early::Steps>(&Changes::default()), true, false);
+    says(fmi3::describe::<eventful::Steps>(&Changes::default()), true, true);
+}
+
 /// A model with a time of its own, or something else of that name.
 macro_rules! clocks {
     ($($case:ident: { $($table:tt)+ })+) => { $(

@@ -195,8 +195,9 @@ impl Importer {
     ///
     /// # Safety
     /// The component is NULL or from these functions, and alive for as long as this is used.
-    pub unsafe fn borrowed(functions: Functions, component: fmi2Component) -> Borrowed {
-        Borrowed(Self { functions, component, log: Box::default() })
+    pub unsafe fn borrowed(functions: Functions, component: fmi2Component) -> Borrowed<Self> {
+        let importer = Self { functions, component, log: Box::default() };
+        Borrowed { importer, forget: |importer| importer.component = null_mut() }
     }
 
     /// What an importer has that ignored a NULL from `fmi2Instantiate`.
@@ -227,20 +228,24 @@ impl Importer {
     }
 }
 
-/// An instance that somebody else frees, see [`Importer::borrowed`].
-pub struct Borrowed(Importer);
+/// An instance of either standard that somebody else frees, see [`Importer::borrowed`].
+pub struct Borrowed<F> {
+    pub(crate) importer: F,
+    /// Leaves NULL in its place, whose freeing does nothing.
+    pub(crate) forget: fn(&mut F),
+}
 
-impl Deref for Borrowed {
-    type Target = Importer;
+impl<F> Deref for Borrowed<F> {
+    type Target = F;
 
-    fn deref(&self) -> &Importer {
-        &self.0
+    fn deref(&self) -> &F {
+        &self.importer
     }
 }
 
-impl Drop for Borrowed {
+impl<F> Drop for Borrowed<F> {
     fn drop(&mut self) {
-        self.0.component = null_mut(); // whose freeing does nothing
+        (self.forget)(&mut self.importer);
     }
 }
 

@@ -6,8 +6,8 @@
 //! itself, [`Importer`]; in [`fmi3`] those of FMI 3.0.
 //!
 //! [`load`] takes the shared library of any FMU; [`Functions::of`](fmu_export::fmi2::Functions::of) those of a model in
-//! the same program. [`testing`] has what tests of FMUs need, [`serialized`] the bytes of saved states, [`c_programs`]
-//! what tests with C programs need. With the feature `careless` there is an importer that makes any calls in any order,
+//! the same program. [`testing`] has what tests of FMUs need, [`either`] what they do in both
+//! standards, [`serialized`] the bytes of saved states, [`c_programs`] what tests with C programs need. With the feature `careless` there is an importer that makes any calls in any order,
 //! with `realtime` a check that code may run in a control loop.
 
 mod batch;
@@ -15,6 +15,7 @@ pub mod c_programs;
 #[cfg(feature = "careless")]
 pub mod careless;
 mod description;
+pub mod either;
 mod error;
 pub mod fmi3;
 mod fmu;

@@ -5,20 +5,36 @@
 #[path = "../../tests/toys/mod.rs"]
 mod toys;
 
-use fmu_run::careless::{Tally, run};
+use fmu_run::careless::{RunBytes, Tally, fmi3, run};
 use libfuzzer_sys::fuzz_target;
 use std::sync::atomic::{AtomicU64, Ordering};
 use toys::*;
 
+/// The toys in FMI 2.0, then in FMI 3.0. What is new goes to the end: the committed bytes count on the places.
+///
 /// Any exported model can stand here: `run::<prw_testbed::TestbedFmu>` with that crate among the dependencies.
-const MODELS: [fn(&[u8], &mut Tally); 6] =
-    [run::<Oscillator>, run::<Ball>, run::<Counter>, run::<Talker>, run::<Sum>, run::<Fuse>];
+const MODELS: [RunBytes; 14] = [
+    run::<Oscillator>,
+    run::<Ball>,
+    run::<Counter>,
+    run::<Talker>,
+    run::<Sum>,
+    run::<Fuse>,
+    fmi3::run::<Oscillator>,
+    fmi3::run::<Ball>,
+    fmi3::run::<Counter>,
+    fmi3::run::<Talker>,
+    fmi3::run::<Sum>,
+    fmi3::run::<Fuse>,
+    fmi3::run::<Ticker>,
+    fmi3::run::<Palette>,
+];
 
 static CALLS: AtomicU64 = AtomicU64::new(0);
 const REPORT_EVERY: u64 = 1_000_000;
 
 fuzz_target!(|bytes: &[u8]| {
-    // The last byte says which model; the calls are read from the front.
+    // The last byte says which model and standard; the calls are read from the front.
     let Some((which, calls)) = bytes.split_last() else { return };
     let mut tally = Tally::new();
     MODELS[usize::from(*which) % MODELS.len()](calls, &mut tally);

@@ -1,4 +1,4 @@
-//! The functions that need no instance: version, making and freeing (sections 2.2.4 and 2.3.1).
+//! The functions that need no instance: version, making and freeing (sections 2.2.5 and 2.3.1).
 
 use super::types::*;
 use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};

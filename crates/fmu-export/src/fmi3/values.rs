@@ -1,4 +1,4 @@
-//! Values of variables (section 2.2.6).
+//! Values of variables (section 2.2.7.2).
 //!
 //! # Safety
 //! As in the [module above](super): each argument is what the standard says it is.
@@ -119,7 +119,7 @@ numbers! {
     fmi3GetUInt16 fmi3SetUInt16 fmi3UInt16: UInt16, Integer, whole;
     fmi3GetInt32 fmi3SetInt32 fmi3Int32: Integer, Integer, whole;
     fmi3GetUInt32 fmi3SetUInt32 fmi3UInt32: UInt32, Integer, whole;
-    // An Enumeration goes through the functions of Int64 (section 2.4.7.3).
+    // An Enumeration goes through the functions of Int64 (section 2.2.7.2).
     fmi3GetInt64 fmi3SetInt64 fmi3Int64: Int64 | Enumeration, Integer, whole;
     fmi3GetUInt64 fmi3SetUInt64 fmi3UInt64: UInt64, Integer, whole;
 }

@@ -1,4 +1,5 @@
-//! Derivatives with respect to variables and to time (sections 2.1.9 and 4.2.1).
+//! Derivatives with respect to variables (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0) and to time (section 4.2.1 of FMI
+//! 2.0, 4.1.2 of FMI 3.0).
 
 use super::{Instance, Outcome, finite, refuse};
 use crate::export::Exported;

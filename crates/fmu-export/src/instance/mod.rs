@@ -96,7 +96,7 @@ impl<M: Exported> State<M> {
     }
 }
 
-/// Life cycle (sections 2.1.5 and 2.1.6); the other rooms have a file each.
+/// Life cycle (sections 2.1.5 and 2.1.6 of FMI 2.0, 2.3 of FMI 3.0); the other rooms have a file each.
 impl<M: Exported> Instance<M> {
     pub fn new(setup: Setup, importer: Importer, logging_on: bool) -> Outcome<Self> {
         match setup.interface {

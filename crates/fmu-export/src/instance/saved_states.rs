@@ -1,13 +1,42 @@
-//! Saved states (section 2.1.8).
+//! Saved states (section 2.1.8 of FMI 2.0, 2.2.7.4 of FMI 3.0).
 
 use super::{Instance, Outcome, State, refuse, serialized};
 use crate::export::Exported;
 use crate::mode::{Interface, Mode, Standard};
 use std::fmt;
 
-/// Where a saved state comes from, and what it is tied to: the state machines differ.
+/// Where a saved state comes from, and what it is tied to: what is allowed next is another question in each standard and
+/// interface type, and some modes are in one of them only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Origin(pub Standard, pub Interface);
+
+impl Origin {
+    const ALL: [Self; 4] = [
+        Self(Standard::Fmi2, Interface::ModelExchange),
+        Self(Standard::Fmi2, Interface::CoSimulation),
+        Self(Standard::Fmi3, Interface::ModelExchange),
+        Self(Standard::Fmi3, Interface::CoSimulation),
+    ];
+
+    /// As serialized states have it.
+    pub fn byte(self) -> u8 {
+        2 * self.0 as u8 + self.1 as u8
+    }
+
+    pub fn from_byte(byte: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|origin| origin.byte() == byte)
+    }
+
+    /// Why an instance does not take a state from elsewhere.
+    pub fn check(self, own: Self) -> Result<(), String> {
+        if self == own {
+            return Ok(());
+        }
+        Err(format!(
+            "the state comes from {self}, this instance is {own}; states stay within their standard and interface type"
+        ))
+    }
+}
 
 impl fmt::Display for Origin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -37,13 +66,7 @@ impl<M: Exported> Instance<M> {
     }
 
     pub fn restore(&mut self, saved: &SavedState<M>) -> Outcome {
-        if saved.origin != self.origin() {
-            return refuse(format!(
-                "the state comes from {}, this instance is {}",
-                saved.origin,
-                self.origin()
-            ));
-        }
+        saved.origin.check(self.origin()).or_else(refuse)?;
         self.check_event_mode(&saved.state)?;
         self.state.clone_from(&saved.state);
         self.enter(self.state.mode);

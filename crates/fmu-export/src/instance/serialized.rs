@@ -75,15 +75,10 @@ pub(super) fn read<M: Exported>(
     if fnv1a(content).to_le_bytes() != *checksum {
         return Err("the saved state is damaged or has the wrong length (its checksum is wrong)".into());
     }
-    let byte = content[16];
-    if byte != origin.byte() {
-        return Err(match byte ^ origin.byte() {
-            1 => {
-                "the saved state comes from the other interface type (Co-Simulation or Model Exchange)".into()
-            }
-            _ => format!("the saved state does not come from an instance of {}", origin.0),
-        });
-    }
+    let Some(from) = Origin::from_byte(content[16]) else {
+        return Err("the saved state holds impossible values".into());
+    };
+    from.check(origin)?;
     let mut reader = Reader { rest: &content[HEADER_LENGTH..], valid: true };
     let mut state = template.clone();
     state.visit(&mut reader);
@@ -101,12 +96,6 @@ pub(super) fn read<M: Exported>(
     state.model.update().map_err(|error| error.to_string())?;
     state.stale = true;
     Ok(state)
-}
-
-impl Origin {
-    fn byte(self) -> u8 {
-        2 * self.0 as u8 + self.1 as u8
-    }
 }
 
 fn guid_hash<M: Exported>() -> [u8; 8] {

@@ -1,4 +1,4 @@
-//! Values (section 2.1.7).
+//! Values (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI 3.0).
 
 use super::{Instance, Outcome, finite, implicit_value, refuse, refuse_with};
 use crate::export::Exported;

@@ -3,7 +3,7 @@
 use crate::toys::{Fuse, fuse::Name};
 use fmu_export::Interface::CoSimulation;
 use fmu_export::fmi2::types::*;
-use fmu_run::Importer;
+use fmu_run::{Importer, fmi3};
 
 const TEMPERATURE: u32 = Name::temperature as u32;
 /// `fmi2LastSuccessfulTime` and `fmi2Terminated`.
@@ -90,4 +90,49 @@ fn silence() {
     fmu.initialize(0.0);
     assert_eq!(fmu.try_step(0.0, 10.0), Status::Discard);
     assert_eq!(fmu.take_log(), []);
+}
+
+/// Ends every step early and does not say so.
+mod hasty {
+    use fmu_export::*;
+
+    #[derive(Clone)]
+    pub struct Hasty {
+        u: f64,
+    }
+
+    variables! { for Hasty;
+        /// Input
+        u = input(&NUMBER) in u;
+    }
+
+    impl Model for Hasty {
+        const INFO: Info = Info::new("Hasty", "hasty", "{hasty}");
+
+        fn new(_: &Setup) -> Result<Self, Error> {
+            Ok(Self { u: 0.0 })
+        }
+    }
+
+    impl CoSimulation for Hasty {
+        fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+            Ok(Stepped::Early(step.time))
+        }
+    }
+
+    offer!(Hasty: CoSimulation);
+}
+
+/// What the description says of the FMU holds, or its author hears of it.
+#[test]
+fn an_early_end_that_the_model_has_not_announced() {
+    let (old, new) =
+        (Importer::of::<hasty::Hasty>(CoSimulation), fmi3::Importer::of::<hasty::Hasty>(CoSimulation));
+    old.initialize(0.0);
+    new.initialize(0.0);
+    assert_eq!(old.try_step(0.0, 1.0), Status::Fatal);
+    assert_eq!(new.try_step(0.0, 1.0), Err(Status::Fatal));
+    for log in [old.take_log(), new.take_log()] {
+        assert!(log.len() == 1 && log[0].text.contains("const ENDS_EARLY: bool = true"), "{log:?}");
+    }
 }

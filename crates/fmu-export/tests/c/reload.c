@@ -1,24 +1,33 @@
-/* Loads FMUs, uses them all at once, frees everything in ever new order and unloads: reload ROUNDS LIBRARY...
+/* Loads FMUs, uses them all at once and in both standards, frees everything in ever new order and unloads:
+   reload ROUNDS LIBRARY...
    Prints the resident memory in KiB after a tenth of the rounds and at the end. */
-#include "fmu.h"
+#include "fmu3.h"
 #include <unistd.h>
 
 enum { LIBRARIES = 4, INSTANCES = 3, STEPS = 8, VARIABLES = 16, GUID_LENGTH = 64 };
 
-/* The functions of one library. */
+/* The functions of one library, and as many instances of FMI 3.0 as of FMI 2.0. */
 struct fmu {
 #define MEMBER(name) fmi2##name##TYPE *fmi2##name;
     FMI2_FUNCTIONS(MEMBER)
 #undef MEMBER
+#define MEMBER(name) fmi3##name##TYPE *fmi3##name;
+    FMI3_FUNCTIONS(MEMBER)
+#undef MEMBER
     void *library;
     fmi2Component instances[INSTANCES];
     fmi2FMUstate states[INSTANCES];
+    fmi3Instance instances3[INSTANCES];
+    fmi3FMUState states3[INSTANCES];
 };
 
 static struct fmu open_fmu(const char *path) {
-    struct fmu fmu = {.library = load(path)};
+    struct fmu fmu = {.library = load_both(path)};
 #define COPY(name) fmu.fmi2##name = fmi2##name;
     FMI2_FUNCTIONS(COPY)
+#undef COPY
+#define COPY(name) fmu.fmi3##name = fmi3##name;
+    FMI3_FUNCTIONS(COPY)
 #undef COPY
     return fmu;
 }
@@ -29,6 +38,26 @@ static void learn_guid(fmi2ComponentEnvironment guid, fmi2String instance, fmi2S
     const char *own = strstr(message, "library's {");
     (void)instance, (void)status, (void)category;
     if (own && guid) sscanf(own, "library's %63[^:]", (char *)guid);
+}
+
+/* An instance of FMI 3.0, without a logger. */
+static void use3(struct fmu *fmu, const char *token, int i) {
+    fmi3Boolean event, terminate, early;
+    fmi3Float64 last;
+    fmi3ValueReference vr;
+    fmi3String text;
+    int k;
+    fmi3Instance c = fmu->fmi3InstantiateCoSimulation("some", token, "", false, false, false, false, NULL, 0, NULL,
+                                                      NULL, NULL);
+    CHECK(c);
+    CHECK(fmu->fmi3EnterInitializationMode(c, false, 0, 0, false, 0) == fmi3OK);
+    CHECK(fmu->fmi3ExitInitializationMode(c) == fmi3OK);
+    for (k = 0; k < STEPS; ++k)
+        CHECK(fmu->fmi3DoStep(c, k / 512.0, 1 / 512.0, true, &event, &terminate, &early, &last) == fmi3OK);
+    CHECK(fmu->fmi3DoStep(c, -1, 1, true, &event, &terminate, &early, &last) == fmi3Error);
+    for (vr = 0; vr < VARIABLES; ++vr) fmu->fmi3GetString(c, &vr, 1, &text, 1);
+    CHECK(fmu->fmi3GetFMUState(c, &fmu->states3[i]) == fmi3OK);
+    fmu->instances3[i] = c;
 }
 
 static void use(struct fmu *fmu) {
@@ -50,6 +79,7 @@ static void use(struct fmu *fmu) {
         for (vr = 0; vr < VARIABLES; ++vr) fmu->fmi2GetString(c, &vr, 1, &text);
         CHECK(fmu->fmi2GetFMUstate(c, &fmu->states[i]) == fmi2OK);
         fmu->instances[i] = c;
+        use3(fmu, guid, i);
     }
 }
 
@@ -60,8 +90,11 @@ static void free_all(struct fmu *fmu, int first) {
         int own = (first + i) % INSTANCES, other = (own + first) % INSTANCES;
         CHECK(fmu->fmi2FreeFMUstate(fmu->instances[own], &fmu->states[other]) == fmi2OK && !fmu->states[other]);
         fmu->fmi2FreeInstance(fmu->instances[own]);
+        CHECK(fmu->fmi3FreeFMUState(fmu->instances3[other], &fmu->states3[own]) == fmi3OK && !fmu->states3[own]);
+        fmu->fmi3FreeInstance(fmu->instances3[other]);
     }
     fmu->fmi2FreeInstance(NULL);
+    fmu->fmi3FreeInstance(NULL);
 }
 
 static long resident(void) {

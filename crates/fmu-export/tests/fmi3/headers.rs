@@ -8,17 +8,19 @@ use std::process::Command;
 #[test]
 fn types() {
     use fmu_export::fmi3::types::*;
-    let sizes = [
-        ("fmi3Status", size_of::<Status>()),
-        ("fmi3Boolean", size_of::<fmi3Boolean>()),
-        ("fmi3Clock", size_of::<fmi3Clock>()),
-        ("fmi3DependencyKind", size_of::<fmi3DependencyKind>()),
-        ("fmi3IntervalQualifier", size_of::<fmi3IntervalQualifier>()),
-        ("fmi3ValueReference", size_of::<fmi3ValueReference>()),
-        ("fmi3Float32", size_of::<fmi3Float32>()),
-        ("fmi3UInt64", size_of::<fmi3UInt64>()),
-        ("fmi3Binary", size_of::<fmi3Binary>()),
-    ];
+    #[allow(non_camel_case_types, reason = "as in C")]
+    type fmi3Status = Status;
+    macro_rules! sizes {
+        ($($name:ident)+) => { [$((stringify!($name), size_of::<$name>())),+] };
+    }
+    let sizes = sizes! {
+        fmi3Status fmi3Boolean fmi3Clock fmi3DependencyKind fmi3IntervalQualifier
+        fmi3Instance fmi3InstanceEnvironment fmi3FMUState fmi3ValueReference
+        fmi3Float32 fmi3Float64 fmi3Int8 fmi3UInt8 fmi3Int16 fmi3UInt16 fmi3Int32 fmi3UInt32 fmi3Int64 fmi3UInt64
+        fmi3Char fmi3String fmi3Byte fmi3Binary
+        fmi3LogMessageCallback fmi3ClockUpdateCallback fmi3IntermediateUpdateCallback
+        fmi3LockPreemptionCallback fmi3UnlockPreemptionCallback
+    };
     let mut program = String::from("#include \"fmi3Functions.h\"\n");
     for (name, size) in sizes {
         writeln!(program, "_Static_assert(sizeof({name}) == {size}, \"{name}\");").unwrap();

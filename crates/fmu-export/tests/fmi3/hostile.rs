@@ -1,11 +1,11 @@
-//! Arguments that no importer should pass, a logger that calls back, and models that break.
+//! Arguments that no importer should pass. (Loggers that call back: `tests/soundness`; models that break: `tests/panics`.)
 
 use crate::call_table::{in_mode, modes_of};
 use crate::toys::*;
 use fmu_export::Interface::*;
 use fmu_export::fmi3::types::*;
-use fmu_export::{Exported, Mode};
-use fmu_run::fmi3::{Arguments, FUNCTIONS, Functions, Importer};
+use fmu_export::{Exported, Mode, Variables};
+use fmu_run::fmi3::{Arguments, Functions, Importer};
 use std::cell::RefCell;
 use std::ffi::CStr;
 use std::ptr::{null, null_mut};
@@ -142,68 +142,4 @@ fn logging() {
     // Errors cannot be switched off.
     fmu.ok(fmu.fmi3SetDebugLogging(fmi3False, 1, &c"logAll".as_ptr()));
     fmu.refused("no category", |fmu| fmu.fmi3SetDebugLogging(fmi3True, 1, &c"logNothing".as_ptr()));
-}
-
-use fmu_export::Variables;
-
-thread_local!(static INSTANCE: RefCell<(fmi3Instance, Vec<Status>)> =
-    const { RefCell::new((null_mut(), Vec::new())) });
-
-/// A logger that calls back, and frees the instance.
-unsafe extern "C" fn call_back(_: fmi3InstanceEnvironment, _: Status, _: fmi3String, _: fmi3String) {
-    let functions = Functions::of::<Sum>();
-    let instance = INSTANCE.with_borrow(|known| known.0);
-    // SAFETY: NULL or an instance, alive.
-    let status = unsafe {
-        (functions.fmi3FreeInstance)(instance);
-        (functions.fmi3Reset)(instance)
-    };
-    INSTANCE.with_borrow_mut(|known| known.1.push(status));
-}
-
-#[test]
-fn a_logger_that_calls_back() {
-    let functions = Functions::of::<Sum>();
-    // SAFETY: strings, NULL and a logger that outlives the instance.
-    let instance = unsafe {
-        (functions.fmi3InstantiateCoSimulation)(
-            c"name".as_ptr(),
-            c"{sum}".as_ptr(),
-            null(),
-            0,
-            0,
-            0,
-            0,
-            null(),
-            0,
-            null_mut(),
-            Some(call_back),
-            None,
-        )
-    };
-    assert!(!instance.is_null());
-    INSTANCE.with_borrow_mut(|known| known.0 = instance);
-    // SAFETY: an instance, alive.
-    unsafe {
-        assert_eq!((functions.fmi3EnterStepMode)(instance), Status::Error);
-        assert_eq!(INSTANCE.with_borrow(|known| known.1.clone()), [Status::Error], "refused, and not freed");
-        assert_eq!((functions.fmi3Reset)(instance), Status::Ok);
-        (functions.fmi3FreeInstance)(instance);
-    }
-}
-
-/// A model that panics breaks its instance, and no other.
-#[test]
-fn a_model_that_breaks() {
-    let fmu = Importer::of::<Faulty>(CoSimulation);
-    fmu.initialize(0.0);
-    let fault = Faulty::TABLE.iter().position(|of| of.name() == "fault").unwrap() as u32;
-    fmu.ok(fmu.fmi3SetInt32(&fault, 1, &(faulty::Fault::Step as i32), 1));
-    assert_eq!(fmu.try_step(0.0, 0.1), Err(Status::Fatal));
-    let log = fmu.take_log();
-    assert!(log[0].text.starts_with("fmi3DoStep: internal failure"), "{log:?}");
-    for function in FUNCTIONS {
-        assert_eq!(fmu.call_with_zeros(function), Status::Fatal, "{function}");
-    }
-    fmu.take_log();
 }

@@ -5,7 +5,7 @@ use fmu_run::careless::fmi3::run;
 use fmu_run::careless::{RunBytes, run_seeds};
 use fmu_run::fmi3::FUNCTIONS;
 
-const TOYS: [(&str, RunBytes); 8] = [
+pub const TOYS: [(&str, RunBytes); 8] = [
     ("oscillator", run::<Oscillator>),
     ("ball", run::<Ball>),
     ("counter", run::<Counter>),
@@ -40,5 +40,8 @@ fn no_sequence_of_calls_breaks_a_promise() {
     for name in FUNCTIONS {
         assert_eq!(tally[name][0] == 0, NEVER.contains(name), "{name}: {:?}", tally[name]);
         assert!(tally[name][2] > 0, "{name} is never refused");
+    }
+    for name in ["fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange"] {
+        assert!(tally[name][0] > 0 && tally[name][2] > 0, "{name}: {:?}", tally[name]);
     }
 }

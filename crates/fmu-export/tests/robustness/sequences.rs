@@ -29,7 +29,7 @@ fn no_sequence_of_calls_breaks_a_promise() {
     never(2, &[]);
 }
 
-/// What libFuzzer found worth keeping, for every toy.
+/// What libFuzzer found worth keeping, for every toy in both standards.
 #[test]
 fn the_corpus_breaks_no_promise() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/fuzz/corpus/calls");
@@ -37,7 +37,7 @@ fn the_corpus_breaks_no_promise() {
     for entry in std::fs::read_dir(folder).expect("the corpus is committed") {
         let path = entry.expect("a readable folder").path();
         let bytes = std::fs::read(&path).expect("a readable file");
-        for (toy, session) in TOYS {
+        for (toy, session) in TOYS.iter().chain(&crate::fmi3::TOYS) {
             println!("{toy}, {}", path.display());
             session(&bytes, &mut tally);
         }

@@ -1,32 +1,35 @@
 //! Masters create, step and free instances on pools of threads.
 
 use crate::toys::{Oscillator, oscillator::Name};
-use fmu_export::Interface::{CoSimulation, ModelExchange};
-use fmu_run::Importer;
+use fmu_export::Interface::ModelExchange;
+use fmu_run::either::Either;
+use fmu_run::{Importer, fmi3};
 use std::sync::Mutex;
 
 const THREADS: usize = 4;
 const INSTANCES: usize = 8;
 const TURNS: usize = 400;
 
-/// An instance on its way through the pool.
+/// An instance on its way through the pool: with an even number one of FMI 2.0, with an odd one of FMI 3.0.
 struct Job {
-    fmu: Importer,
+    fmu: Box<dyn Either>,
     number: usize,
     steps: usize,
 }
 
 impl Job {
     fn new(number: usize) -> Self {
-        let fmu = Importer::of::<Oscillator>(CoSimulation);
-        fmu.initialize(0.0);
+        let fmu: Box<dyn Either> = match number % 2 {
+            0 => Box::new(Importer::initialized::<Oscillator>()),
+            _ => Box::new(fmi3::Importer::initialized::<Oscillator>()),
+        };
         Self { fmu, number, steps: 0 }
     }
 
     fn step(&mut self) {
         let time = self.steps as f64 / 256.0;
-        self.fmu.set(&[Name::force as u32], &[(time * self.number as f64).sin() + time]);
-        self.fmu.step(time, 1.0 / 256.0);
+        self.fmu.write(&[Name::force as u32], &[(time * self.number as f64).sin() + time]);
+        self.fmu.advance(time, 1.0 / 256.0);
         self.steps += 1;
     }
 
@@ -34,7 +37,7 @@ impl Job {
     fn bytes(number: usize, steps: usize) -> Vec<u8> {
         let mut job = Self::new(number);
         (0..steps).for_each(|_| job.step());
-        job.fmu.bytes()
+        job.fmu.to_bytes()
     }
 }
 
@@ -54,6 +57,7 @@ fn instances_go_from_thread_to_thread() {
             if turn % 37 == thread {
                 *job = Job::new(job.number);
                 drop(Importer::of::<Oscillator>(ModelExchange));
+                drop(fmi3::Importer::of::<Oscillator>(ModelExchange));
             }
         }
     };
@@ -62,8 +66,9 @@ fn instances_go_from_thread_to_thread() {
         threads.into_iter().for_each(|thread| thread.join().unwrap());
     });
     let jobs: Vec<_> = pool.into_iter().map(|job| job.into_inner().unwrap()).collect();
-    assert!(jobs.iter().any(|job| job.steps > 0));
+    // In both standards.
+    assert!((0..2).all(|odd| jobs.iter().any(|job| job.number % 2 == odd && job.steps > 0)));
     for Job { fmu, number, steps } in jobs {
-        assert_eq!(fmu.bytes(), Job::bytes(number, steps), "instance {number} after {steps} steps");
+        assert_eq!(fmu.to_bytes(), Job::bytes(number, steps), "instance {number} after {steps} steps");
     }
 }

@@ -29,6 +29,8 @@ impl Model for Fuse {
 }
 
 impl CoSimulation for Fuse {
+    const ENDS_EARLY: bool = true;
+
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         let (start, end) = (self.temperature, self.temperature + self.load * step.size);
         if !end.is_finite() {

@@ -59,6 +59,8 @@ impl Model for Lazy {
 }
 
 impl CoSimulation for Lazy {
+    const ENDS_EARLY: bool = true;
+
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         self.state += 1.0;
         Ok(if self.truth { Stepped::Early(step.time + 0.5 * step.size) } else { Stepped::Done })

@@ -17,6 +17,8 @@ pub struct Variables {
     whole: Vec<u32>,
     booleans: Vec<u32>,
     texts: Vec<u32>,
+    /// The types that FMI 3.0 alone has functions for, by the ends of their names.
+    typed: [(&'static str, Vec<u32>); 10],
     states: usize,
     indicators: usize,
 }
@@ -28,6 +30,7 @@ impl Variables {
             places.map(|(vr, _)| vr).collect::<Vec<u32>>()
         };
         let real = |variable: &fmu_export::Variable<M>| variable.base() == BaseType::Real;
+        let bases = |bases: &[BaseType]| those(&|variable| bases.contains(&variable.base()));
         Self {
             all: M::TABLE.len() as u32,
             reals: those(&real),
@@ -40,6 +43,18 @@ impl Variables {
             whole: those(&|variable| [BaseType::Integer, BaseType::Enumeration].contains(&variable.base())),
             booleans: those(&|variable| variable.base() == BaseType::Boolean),
             texts: those(&|variable| variable.base() == BaseType::String),
+            typed: [
+                ("Float32", bases(&[BaseType::Float32])),
+                ("UInt8", bases(&[BaseType::UInt8])),
+                ("Int8", bases(&[BaseType::Int8])),
+                ("UInt16", bases(&[BaseType::UInt16])),
+                ("Int16", bases(&[BaseType::Int16])),
+                ("UInt32", bases(&[BaseType::UInt32])),
+                ("Int32", bases(&[BaseType::Integer])),
+                ("UInt64", bases(&[BaseType::UInt64])),
+                ("Int64", bases(&[BaseType::Int64, BaseType::Enumeration])),
+                ("Binary", bases(&[BaseType::Binary])),
+            ],
             states: M::STATES.len(),
             indicators: M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators),
         }
@@ -56,7 +71,10 @@ impl Variables {
             name if name.ends_with("Integer") => &self.whole,
             name if name.ends_with("Boolean") => &self.booleans,
             name if name.ends_with("String") => &self.texts,
-            _ => &self.reals,
+            name => match self.typed.iter().find(|(end, _)| name.ends_with(end)) {
+                Some((_, fitting)) => fitting,
+                None => &self.reals,
+            },
         };
         let fits = u.ratio(15, 16)? && !fitting.is_empty();
         array(count, || {

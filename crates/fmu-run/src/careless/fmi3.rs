@@ -7,9 +7,10 @@ use crate::serialized::time;
 use arbitrary::{Result, Unstructured};
 use fmu_export::fmi3::types::*;
 use fmu_export::{Exported, Interface};
-use std::ffi::CStr;
+use std::ffi::{CStr, CString};
 use std::marker::PhantomData;
 use std::ptr::{null, null_mut};
+use std::slice::from_mut;
 
 /// Makes the calls that the bytes stand for and counts them.
 ///
@@ -93,14 +94,11 @@ fn like(function: &str) -> &str {
     match function {
         "fmi3GetFloat64" => "fmi2GetReal",
         "fmi3SetFloat64" => "fmi2SetReal",
-        "fmi3GetBoolean" | "fmi3SetBoolean" => "fmi2GetBoolean",
-        "fmi3GetString" | "fmi3SetString" => "fmi2GetString",
         "fmi3DoStep" => "fmi2DoStep",
         "fmi3GetOutputDerivatives" => "fmi2GetRealOutputDerivatives",
         "fmi3GetDirectionalDerivative" | "fmi3GetAdjointDerivative" => "fmi2GetDirectionalDerivative",
         "fmi3GetContinuousStateDerivatives" => "fmi2GetDerivatives",
         "fmi3GetEventIndicators" => "fmi2GetEventIndicators",
-        name if name.contains("Int") => "fmi2GetInteger",
         name => name,
     }
 }
@@ -187,8 +185,16 @@ impl Call {
                 u64::from_le_bytes(crate::serialized::fnv1a(bytes))
             }),
             "fmi3GetBinary" => {
-                let (mut sizes, mut out) = (vec![0; room], vec![null(); room]);
-                fmu.fmi3GetBinary(vr, n, sizes.as_mut_ptr(), out.as_mut_ptr(), m)
+                let (mut sizes, mut out) = (vec![usize::MAX; room], vec![null(); room]);
+                let status = fmu.fmi3GetBinary(vr, n, a.output(2, &mut sizes), a.output(1, &mut out), m);
+                let written = if status == Status::Ok { a.vr.len() } else { 0 };
+                assert!(sizes[written..].iter().all(|size| *size == usize::MAX), "{self:?}");
+                for (size, bytes) in sizes[..written].iter().zip(&out) {
+                    // SAFETY: as many bytes of the FMU's, valid until the next call.
+                    let bytes = unsafe { std::slice::from_raw_parts(*bytes, *size) };
+                    values.push(u64::from_le_bytes(crate::serialized::fnv1a(bytes)));
+                }
+                status
             }
             "fmi3SetFloat32" => set!(fmi3SetFloat32, reals, |value| *value as f32),
             "fmi3SetFloat64" => set!(fmi3SetFloat64, reals, |value| *value),
@@ -206,6 +212,16 @@ impl Call {
                 texts.resize(room, null());
                 fmu.fmi3SetString(vr, n, a.pointer(1, &texts), m)
             }
+            "fmi3SetBinary" => {
+                // Some are longer than any variable here allows.
+                const LONGEST: usize = 24;
+                let mut bytes: Vec<u8> = a.reals.iter().flat_map(|value| value.to_le_bytes()).collect();
+                bytes.resize(bytes.len() + LONGEST, 7);
+                let sizes = (0..room).map(|at| a.integers.get(at).map_or(0, |n| *n as usize % (LONGEST + 1)));
+                let sizes: Vec<_> = sizes.collect();
+                let binaries = vec![bytes.as_ptr(); room];
+                fmu.fmi3SetBinary(vr, n, a.pointer(2, &sizes), a.pointer(1, &binaries), m)
+            }
             "fmi3GetNumberOfVariableDependencies" | "fmi3GetVariableDependencies" => {
                 let (of, mut count) = (a.vr.first().copied().unwrap_or(u32::MAX), 0);
                 let status = fmu.fmi3GetNumberOfVariableDependencies(of, &mut count);
@@ -216,15 +232,9 @@ impl Call {
                     let (mut own, mut kinds) = (vec![9; count + 1], vec![0; count + 1]);
                     let (mut known, mut other) = (vec![0; count + 1], vec![0; count + 1]);
                     let count = if a.kind == 3 { count + 1 } else { count };
-                    let (own, known) = (own.as_mut_ptr(), known.as_mut_ptr());
-                    fmu.fmi3GetVariableDependencies(
-                        of,
-                        own,
-                        known,
-                        other.as_mut_ptr(),
-                        kinds.as_mut_ptr(),
-                        count,
-                    )
+                    let (own, known) = (a.output(0, &mut own), a.output(1, &mut known));
+                    let (other, kinds) = (a.output(2, &mut other), a.output(3, &mut kinds));
+                    fmu.fmi3GetVariableDependencies(of, own, known, other, kinds, count)
                 }
             }
             "fmi3GetDirectionalDerivative" | "fmi3GetAdjointDerivative" => {
@@ -246,8 +256,10 @@ impl Call {
             }
             "fmi3UpdateDiscreteStates" => {
                 let (mut flags, mut next) = ([2; 5], f64::NAN);
-                let [x, y, z, v, w] = &mut flags;
-                let status = fmu.fmi3UpdateDiscreteStates(x, y, z, v, w, &mut next);
+                let [x, y, z, v, w] = flags.each_mut().map(from_mut);
+                let (x, w, next_time) = (a.output(0, x), a.output(1, w), a.output(2, from_mut(&mut next)));
+                let (y, z, v) = (y.as_mut_ptr(), z.as_mut_ptr(), v.as_mut_ptr());
+                let status = fmu.fmi3UpdateDiscreteStates(x, y, z, v, w, next_time);
                 if status == Status::Ok {
                     values.extend(flags.map(truth));
                     values.push(finite(next));
@@ -256,7 +268,9 @@ impl Call {
             }
             "fmi3CompletedIntegratorStep" => {
                 let (mut event, mut terminate) = (2, 2);
-                let status = fmu.fmi3CompletedIntegratorStep(1, &mut event, &mut terminate);
+                let (to_event, to_terminate) =
+                    (a.output(0, from_mut(&mut event)), a.output(1, from_mut(&mut terminate)));
+                let status = fmu.fmi3CompletedIntegratorStep(1, to_event, to_terminate);
                 if status == Status::Ok {
                     values.extend([event, terminate].map(truth));
                 }
@@ -279,8 +293,10 @@ impl Call {
             }
             "fmi3DoStep" => {
                 let (mut event, mut terminate, mut early, mut end) = (2, 2, 2, f64::NAN);
-                let status =
-                    fmu.fmi3DoStep(first, second, 1, &mut event, &mut terminate, &mut early, &mut end);
+                let (to_event, to_terminate) =
+                    (a.output(0, from_mut(&mut event)), a.output(1, from_mut(&mut terminate)));
+                let (to_early, to_end) = (a.output(2, from_mut(&mut early)), a.output(3, from_mut(&mut end)));
+                let status = fmu.fmi3DoStep(first, second, 1, to_event, to_terminate, to_early, to_end);
                 if status == Status::Ok {
                     values.extend([event, terminate, early].map(truth));
                     values.push(finite(end));
@@ -289,9 +305,11 @@ impl Call {
                 }
                 status
             }
-            "fmi3GetNumberOfEventIndicators" => count(&mut values, |n| fmu.fmi3GetNumberOfEventIndicators(n)),
+            "fmi3GetNumberOfEventIndicators" => {
+                count(a, &mut values, |n| fmu.fmi3GetNumberOfEventIndicators(n))
+            }
             "fmi3GetNumberOfContinuousStates" => {
-                count(&mut values, |n| fmu.fmi3GetNumberOfContinuousStates(n))
+                count(a, &mut values, |n| fmu.fmi3GetNumberOfContinuousStates(n))
             }
             name => fmu.call_with_zeros(name),
         };
@@ -300,9 +318,9 @@ impl Call {
     }
 }
 
-fn count(values: &mut Vec<u64>, call: impl FnOnce(*mut usize) -> Status) -> Status {
+fn count(a: &CallArguments, values: &mut Vec<u64>, call: impl FnOnce(*mut usize) -> Status) -> Status {
     let mut number = usize::MAX;
-    let status = call(&mut number);
+    let status = call(a.output(0, from_mut(&mut number)));
     values.push(number as u64);
     status
 }
@@ -352,11 +370,36 @@ impl<M: Exported> Session<'_, M> {
         made_of.logging_on = u.int_in_range(0..=2)?;
         made_of.early_return_allowed = u.int_in_range(0..=1)?;
         made_of.event_mode_used = (has_events && u.arbitrary()?).into();
-        let fmu = Importer::with::<M>(&made_of);
-        let saved = fmu.bytes();
-        self.instances[index] = Some(Slot { fmu, made_of, saved, since: Vec::new() });
-        if u.ratio(7, 8)? {
-            self.initialize(index);
+        if u.ratio(1, 8)? {
+            let texts = [None, Some(c""), Some(c" \t"), Some(c"%s%n#r1#"), Some(c"instance"), Some(c"\xff")];
+            made_of.interface = any;
+            made_of.event_mode_used = u.int_in_range(0..=2)?;
+            if u.ratio(1, 2)? {
+                made_of.instantiation_token = u.choose(&texts)?.map(CString::from);
+            }
+            // None that is accepted differs: a model may show its name, which comes along with the states of others.
+            made_of.instance_name = match *u.choose(&texts)? {
+                Some(name) if !name.to_bytes().trim_ascii().is_empty() => Some(c"instance"),
+                refused => refused,
+            };
+            made_of.resource_path = *u.choose(&texts)?;
+            made_of.required_intermediate_variables = if u.ratio(1, 8)? { &[0] } else { &[] };
+        }
+        let made = Importer::instantiate(Functions::of::<M>(), &made_of);
+        let function = match made_of.interface {
+            Interface::ModelExchange => "fmi3InstantiateModelExchange",
+            Interface::CoSimulation => "fmi3InstantiateCoSimulation",
+        };
+        self.count(function, if made.is_ok() { Status::Ok } else { Status::Error });
+        match made {
+            Ok(fmu) => {
+                let saved = fmu.bytes();
+                self.instances[index] = Some(Slot { fmu, made_of, saved, since: Vec::new() });
+                if u.ratio(7, 8)? {
+                    self.initialize(index);
+                }
+            }
+            Err(log) => check_messages(log),
         }
         Ok(())
     }
@@ -430,7 +473,8 @@ impl<M: Exported> Session<'_, M> {
                 if u.ratio(1, 4)? {
                     bytes.resize(u.int_in_range(0..=1000)?, 0);
                 }
-                let status = fmu.fmi3SerializeFMUState(*state, bytes.as_mut_ptr(), bytes.len());
+                let pointer = if u.ratio(1, 16)? { null_mut() } else { bytes.as_mut_ptr() };
+                let status = fmu.fmi3SerializeFMUState(*state, pointer, bytes.len());
                 if status == Status::Ok {
                     self.saved = bytes;
                 }
@@ -439,7 +483,8 @@ impl<M: Exported> Session<'_, M> {
             _ => {
                 damage(&mut self.saved, u)?;
                 let old = *state;
-                let (bytes, size) = (self.saved.as_ptr(), self.saved.len());
+                let bytes = if u.ratio(1, 16)? { null() } else { self.saved.as_ptr() };
+                let size = self.saved.len();
                 let status = fmu.fmi3DeserializeFMUState(bytes, size, place(state, u)?);
                 assert!(status == Status::Ok || *state == old, "a handle changed by a refused call");
                 ("fmi3DeserializeFMUState", status)

@@ -7,8 +7,8 @@ pub use fmu_export::fmi3::Functions;
 pub use library::{Library, load};
 pub use testing::{Stepped, Updated};
 
-use crate::Message;
 use crate::importer::{Log, Zero, remember_message, status};
+use crate::{Borrowed, Message};
 use fmu_export::fmi3::types::*;
 use fmu_export::{Exported, Interface};
 use std::ffi::{CStr, CString, c_int};
@@ -149,6 +149,15 @@ impl Importer {
     pub fn with<M: Exported>(arguments: &Arguments) -> Self {
         Self::instantiate(Functions::of::<M>(), arguments)
             .unwrap_or_else(|log| panic!("there is no instance: {log:?}"))
+    }
+
+    /// An instance that somebody else has, to call and not to free: as a log callback knows it.
+    ///
+    /// # Safety
+    /// The instance is NULL or from these functions, and alive for as long as this is used.
+    pub unsafe fn borrowed(functions: Functions, instance: fmi3Instance) -> Borrowed<Self> {
+        let importer = Self { functions, instance, log: Box::default() };
+        Borrowed { importer, forget: |importer| importer.instance = null_mut() }
     }
 
     /// What an importer has that ignored a NULL.
