@@ -79,7 +79,7 @@ test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) -m pytest -q -p no:cacheprovider tests/oracle tests/fmu_run tests/fmpy tests/analysis
 
 # Ratios of one run; quiet the machine first.
-bench: $(VENV)/demo.stamp fmu
+bench: $(VENV)/demo.stamp closed-loop-fmus
 	@benches/run $(FMU) $(PY)
 
 # Instructions of a step, counted by callgrind.

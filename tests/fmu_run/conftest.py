@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
-import zipfile
 from pathlib import Path
 
-import fmpy
 import pytest
+from unruly import build
 
 ROOT = Path(__file__).resolve().parents[2]
 FMUS = ROOT / "target" / "fmu"
@@ -41,16 +39,4 @@ def controller(request) -> Path:
 @pytest.fixture(scope="session")
 def unruly(tmp_path_factory) -> Path:
     """An FMU in C, compiled here, whose parameter `mood` says how it misbehaves (unruly.c)."""
-    folder = tmp_path_factory.mktemp("unruly")
-    library = folder / "unruly.so"
-    headers = Path(fmpy.__file__).parent / "c-code"
-    source = Path(__file__).with_name("unruly.c")
-    subprocess.run(
-        ["cc", "-std=c99", "-Wall", "-Wextra", "-O2", "-shared", "-fPIC", "-I", headers, source, "-o", library],
-        check=True,
-    )
-    fmu = folder / "unruly.fmu"
-    with zipfile.ZipFile(fmu, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.write(Path(__file__).with_name("unruly.xml"), "modelDescription.xml")
-        archive.write(library, "binaries/linux64/unruly.so")
-    return fmu
+    return build(tmp_path_factory.mktemp("unruly"))

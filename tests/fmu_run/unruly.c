@@ -1,4 +1,5 @@
-/* An FMU for Co-Simulation alone that does what its parameter says, and lacks all that it need not have. */
+/* An FMU for Co-Simulation alone that does what its parameter says, and lacks all that it need not have: compiled with
+ * COMPLETE it has what FMPy asks for before it loads an FMU. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -117,3 +118,29 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
     }
     return fmi2OK;
 }
+
+#ifdef COMPLETE
+#define REFUSED(function, ...) \
+    fmi2Status function(__VA_ARGS__) { return fmi2Error; }
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+REFUSED(fmi2SetDebugLogging, fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[])
+REFUSED(fmi2GetString, fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String value[])
+REFUSED(fmi2GetFMUstate, fmi2Component c, fmi2FMUstate *state)
+REFUSED(fmi2SetFMUstate, fmi2Component c, fmi2FMUstate state)
+REFUSED(fmi2FreeFMUstate, fmi2Component c, fmi2FMUstate *state)
+REFUSED(fmi2SerializedFMUstateSize, fmi2Component c, fmi2FMUstate state, size_t *size)
+REFUSED(fmi2SerializeFMUstate, fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+REFUSED(fmi2DeSerializeFMUstate, fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+REFUSED(fmi2GetDirectionalDerivative, fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
+        const fmi2ValueReference known[], size_t n_known, const fmi2Real seed[], fmi2Real value[])
+REFUSED(fmi2SetRealInputDerivatives, fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
+        const fmi2Real value[])
+REFUSED(fmi2GetRealOutputDerivatives, fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
+        fmi2Real value[])
+REFUSED(fmi2CancelStep, fmi2Component c)
+REFUSED(fmi2GetStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
+REFUSED(fmi2GetRealStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
+REFUSED(fmi2GetIntegerStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
+REFUSED(fmi2GetBooleanStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
+REFUSED(fmi2GetStringStatus, fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
+#endif

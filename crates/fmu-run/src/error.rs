@@ -13,6 +13,16 @@ pub enum Error {
     Cancelled,
 }
 
+impl Error {
+    /// What is asked for fits into no memory.
+    pub fn too_much() -> Self {
+        Self::Request(
+            "the courses need more memory than there is; take measures, keep fewer times (every), or split the runs"
+                .to_owned(),
+        )
+    }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -1,8 +1,8 @@
 //! The part of the Python package `fmu_run` that is written in Rust: `fmu_run._native`. What users see is in
 //! `fmu_run/__init__.py`.
 
-use fmu_run::{Batch, Course, Error, Fmu, Runs, Start, Watch};
-use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use fmu_run::{Batch, Course, Error, Fmu, Start, Watch};
+use numpy::{PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -113,10 +113,22 @@ impl Loaded {
             threads,
             read_before_set,
         };
-        let runs = carry_out(py, &fmu, &batch, progress.as_ref())?;
-        let shape = |each| [runs.count, outputs.len(), each];
-        let array = |values: Vec<f64>, each| PyArray1::from_vec(py, values).reshape(shape(each));
-        Ok((array(runs.courses, runs.kept)?, array(runs.measures, batch.measures.len())?, runs.errors))
+        let size = fmu.size(&batch).map_err(python)?;
+        if size.courses().is_none() || size.measures().is_none() {
+            return Err(python(Error::too_much()));
+        }
+        // NumPy's memory, for which it asks the kernel for large pages.
+        let numpy = py.import("numpy")?;
+        let array = |each: usize| -> PyResult<Bound<'py, PyArray3<f64>>> {
+            Ok(numpy.call_method1("zeros", ((size.runs, size.outputs, each),))?.cast_into()?)
+        };
+        let (courses, measures) = (array(size.kept)?, array(size.measures)?);
+        let errors = {
+            let (mut courses, mut measures) = (courses.readwrite(), measures.readwrite());
+            let room = [courses.as_slice_mut()?, measures.as_slice_mut()?];
+            carry_out(py, &fmu, &batch, size.runs, room, progress.as_ref())?
+        };
+        Ok((courses, measures, errors))
     }
 }
 
@@ -156,20 +168,26 @@ fn starts<'a>(given: &'a [(String, StartValue)]) -> PyResult<Vec<(&'a str, Start
 }
 
 /// The runs, in other threads; this one listens to Python.
-fn carry_out(py: Python, fmu: &Fmu, batch: &Batch, progress: Option<&Py<PyAny>>) -> PyResult<Runs> {
-    let total = fmu.count(batch).map_err(python)?;
+fn carry_out(
+    py: Python,
+    fmu: &Fmu,
+    batch: &Batch,
+    total: usize,
+    [courses, measures]: [&mut [f64]; 2],
+    progress: Option<&Py<PyAny>>,
+) -> PyResult<Vec<(usize, String)>> {
     let watch = Watch::default();
     let (sender, receiver) = channel();
     // Messages may be sent to one thread only.
     let receiver = Mutex::new(receiver);
     std::thread::scope(|scope| {
-        scope.spawn(|| sender.send(fmu.run(batch, &watch)));
+        scope.spawn(|| sender.send(fmu.run_into(batch, &watch, courses, measures)));
         let mut raised = None;
         loop {
             let waited =
                 py.detach(|| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK));
             match waited {
-                Ok(runs) => return raised.map_or_else(|| runs.map_err(python), Err),
+                Ok(errors) => return raised.map_or_else(|| errors.map_err(python), Err),
                 Err(RecvTimeoutError::Disconnected) => {
                     return Err(FmuError::new_err("the thread of the runs has panicked"));
                 }

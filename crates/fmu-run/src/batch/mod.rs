@@ -60,13 +60,41 @@ pub enum Start<'a> {
     EachRun(&'a [f64]),
 }
 
+/// How much comes of a [`Batch`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Size {
+    /// The number of runs.
+    pub runs: usize,
+    /// The number of outputs.
+    pub outputs: usize,
+    /// How many times are [kept](Batch::every): the length of a course.
+    pub kept: usize,
+    /// The number of measures.
+    pub measures: usize,
+}
+
+impl Size {
+    /// The number of all values of all courses; `None` if no memory holds so many.
+    pub fn courses(&self) -> Option<usize> {
+        self.values(self.kept)
+    }
+
+    /// The number of all measures; `None` if no memory holds so many.
+    pub fn measures(&self) -> Option<usize> {
+        self.values(self.measures)
+    }
+
+    fn values(&self, each: usize) -> Option<usize> {
+        let count = self.runs.checked_mul(self.outputs)?.checked_mul(each)?;
+        (count <= isize::MAX as usize / size_of::<f64>()).then_some(count)
+    }
+}
+
 /// What came of a [`Batch`].
 #[derive(Clone, Debug, Default)]
 pub struct Runs {
-    /// The number of runs.
-    pub count: usize,
-    /// How many times are [kept](Batch::every): the length of a course.
-    pub kept: usize,
+    /// The shape of what follows.
+    pub size: Size,
     /// Courses: runs, outputs, times, the last fastest. Those of runs that were refused are not a number.
     pub courses: Vec<f64>,
     /// Measures: runs, outputs, measures, the last fastest. Those of runs that were refused are not a number.
@@ -82,15 +110,43 @@ impl Fmu {
     /// [`Error::Request`] when what is asked for does not fit the FMU or itself, [`Error::Fmu`] when there are no
     /// instances of it, [`Error::Cancelled`]. A run that the FMU refuses is no error here, see [`Runs::errors`].
     pub fn run(&self, batch: &Batch, watch: &Watch) -> Result<Runs, Error> {
-        let plan = plan::Plan::of(self, batch)?;
-        run::run(self, &plan, watch)
+        let size = self.size(batch)?;
+        let [mut courses, mut measures] = [zeros(size.courses())?, zeros(size.measures())?];
+        let errors = self.run_into(batch, watch, &mut courses, &mut measures)?;
+        Ok(Runs { size, courses, measures, errors })
     }
 
-    /// The number of runs that a batch asks for.
+    /// Carries out the runs, into memory of the caller, as [`Runs`] has it; returns [`Runs::errors`].
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    ///
+    /// # Panics
+    /// When there is too little room.
+    pub fn run_into(
+        &self,
+        batch: &Batch,
+        watch: &Watch,
+        courses: &mut [f64],
+        measures: &mut [f64],
+    ) -> Result<Vec<(usize, String)>, Error> {
+        let plan = plan::Plan::of(self, batch)?;
+        run::run(self, &plan, watch, courses, measures)
+    }
+
+    /// How much comes of a batch.
     ///
     /// # Errors
     /// [`Error::Request`], as [`run`](Self::run).
-    pub fn count(&self, batch: &Batch) -> Result<usize, Error> {
-        Ok(plan::Plan::of(self, batch)?.runs)
+    pub fn size(&self, batch: &Batch) -> Result<Size, Error> {
+        let plan = plan::Plan::of(self, batch)?;
+        Ok(Size { runs: plan.runs, outputs: plan.outputs, kept: plan.kept(), measures: plan.measures.len() })
+    }
+}
+
+fn zeros(count: Option<usize>) -> Result<Vec<f64>, Error> {
+    match count {
+        Some(count) if Vec::<f64>::new().try_reserve_exact(count).is_ok() => Ok(vec![0.0; count]),
+        _ => Err(Error::too_much()),
     }
 }

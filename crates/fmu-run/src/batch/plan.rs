@@ -16,9 +16,10 @@ pub(super) struct Plan<'a> {
     pub derivatives: Inputs<'a>,
     pub start: Vec<(BaseType, u32, Values<'a>)>,
     pub texts: Vec<(u32, CString)>,
-    pub outputs: Vec<Output>,
-    /// The value references of the outputs that are Real.
-    pub real_outputs: Vec<u32>,
+    pub outputs: usize,
+    /// The value references of the outputs that are Real, read by one call, and the place of each among all.
+    pub real_outputs: (Vec<u32>, Vec<usize>),
+    pub other_outputs: Vec<(BaseType, u32, usize)>,
     pub every: Option<usize>,
     pub measures: &'a [Measure],
     pub threads: usize,
@@ -42,19 +43,30 @@ pub(super) struct Values<'a> {
     of_time: usize,
 }
 
-impl Values<'_> {
-    /// The value in a run at a time, by their numbers.
-    #[inline]
-    pub fn at(&self, run: usize, time: usize) -> f64 {
-        self.values.get(run * self.of_run + time * self.of_time).copied().unwrap_or(self.constant)
+impl<'a> Values<'a> {
+    /// Those of a run, by time.
+    pub fn of_run(&self, run: usize) -> ByTime<'a> {
+        let values = &self.values[(run * self.of_run).min(self.values.len())..];
+        match self.of_time {
+            0 => ByTime { values: &[], constant: values.first().copied().unwrap_or(self.constant) },
+            _ => ByTime { values, constant: self.constant },
+        }
     }
 }
 
-/// Where an output's value comes from.
-pub(super) enum Output {
-    /// The one with this number among those that are Real.
-    Real(usize),
-    Other(BaseType, u32),
+/// Values of one run.
+#[derive(Clone, Copy)]
+pub(super) struct ByTime<'a> {
+    values: &'a [f64],
+    constant: f64,
+}
+
+impl ByTime<'_> {
+    /// The value at the time of this number.
+    #[inline]
+    pub fn at(&self, time: usize) -> f64 {
+        self.values.get(time).copied().unwrap_or(self.constant)
+    }
 }
 
 fn request<T>(message: String) -> Result<T, Error> {
@@ -73,8 +85,9 @@ impl<'a> Plan<'a> {
             derivatives: Inputs::default(),
             start: Vec::new(),
             texts: Vec::new(),
-            outputs: Vec::new(),
-            real_outputs: Vec::new(),
+            outputs: batch.outputs.len(),
+            real_outputs: Default::default(),
+            other_outputs: Vec::new(),
             every: batch.every,
             measures: &batch.measures,
             threads: threads(fmu, batch.threads)?.min(runs.max(1)),
@@ -85,18 +98,22 @@ impl<'a> Plan<'a> {
         }
         plan.find_inputs(fmu, batch)?;
         plan.find_start(fmu, batch)?;
-        for name in &batch.outputs {
+        for (place, name) in batch.outputs.iter().enumerate() {
             let of = number(fmu, name)?;
-            let output = match of.base {
+            match of.base {
                 BaseType::Real => {
-                    plan.real_outputs.push(of.reference);
-                    Output::Real(plan.real_outputs.len() - 1)
+                    plan.real_outputs.0.push(of.reference);
+                    plan.real_outputs.1.push(place);
                 }
-                base => Output::Other(base, of.reference),
-            };
-            plan.outputs.push(output);
+                base => plan.other_outputs.push((base, of.reference, place)),
+            }
         }
         Ok(plan)
+    }
+
+    /// How many times are kept.
+    pub fn kept(&self) -> usize {
+        self.every.map_or(0, |every| self.time.len().div_ceil(every))
     }
 
     fn find_inputs(&mut self, fmu: &Fmu, batch: &'a Batch) -> Result<(), Error> {

@@ -1,8 +1,7 @@
 //! Carries out a plan: threads over instances, each reset from run to run.
 
-use super::Runs;
 use super::measure::Measured;
-use super::plan::{Inputs, Output, Plan, Values};
+use super::plan::{ByTime, Plan, Values};
 use super::slave::{Refusal, Slave};
 use crate::description::Standard;
 use crate::error::Error;
@@ -35,10 +34,16 @@ impl Watch {
     }
 }
 
-pub(super) fn run(fmu: &Fmu, plan: &Plan, watch: &Watch) -> Result<Runs, Error> {
+pub(super) fn run(
+    fmu: &Fmu,
+    plan: &Plan,
+    watch: &Watch,
+    courses: &mut [f64],
+    measures: &mut [f64],
+) -> Result<Vec<(usize, String)>, Error> {
     match fmu.description().standard {
-        Standard::Fmi2 => on_threads::<Importer>(fmu, plan, watch),
-        Standard::Fmi3 => on_threads::<fmi3::Importer>(fmu, plan, watch),
+        Standard::Fmi2 => on_threads::<Importer>(fmu, plan, watch, courses, measures),
+        Standard::Fmi3 => on_threads::<fmi3::Importer>(fmu, plan, watch, courses, measures),
     }
 }
 
@@ -49,27 +54,27 @@ struct Row<'a> {
     measures: &'a mut [f64],
 }
 
-fn on_threads<S: Slave + Send>(fmu: &Fmu, plan: &Plan, watch: &Watch) -> Result<Runs, Error> {
-    let kept = plan.every.map_or(0, |every| plan.time.len().div_ceil(every));
-    let (course, measured) = (plan.outputs.len() * kept, plan.outputs.len() * plan.measures.len());
-    let mut runs = Runs {
-        count: plan.runs,
-        kept,
-        courses: zeros(plan.runs, course)?,
-        measures: zeros(plan.runs, measured)?,
-        errors: Vec::new(),
-    };
+fn on_threads<S: Slave + Send>(
+    fmu: &Fmu,
+    plan: &Plan,
+    watch: &Watch,
+    courses: &mut [f64],
+    measures: &mut [f64],
+) -> Result<Vec<(usize, String)>, Error> {
+    let (course, measured) = (plan.outputs * plan.kept(), plan.outputs * plan.measures.len());
+    let room = courses.len() >= plan.runs * course && measures.len() >= plan.runs * measured;
+    assert!(room, "there is too little room for {} runs", plan.runs);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(plan.threads)
         .build()
         .map_err(|error| Error::Fmu(format!("no threads can be made: {error}")))?;
-    let rows = split(&mut runs.courses, course).zip(split(&mut runs.measures, measured));
+    let rows = split(courses, course).zip(split(measures, measured));
     let rows = rows.take(plan.runs).enumerate();
     let rows = Mutex::new(rows.map(|(run, (courses, measures))| Row { run, courses, measures }));
     let next = || rows.lock().unwrap_or_else(std::sync::PoisonError::into_inner).next();
     // One instance a thread, whoever takes the next run.
     let found = pool.broadcast(|_| {
-        let mut worker = Worker::<S> { fmu, plan, instance: None, scratch: Scratch::of(plan) };
+        let mut worker = Worker::<S> { fmu, plan, instance: None, room: Room::of(plan) };
         let mut errors = Vec::new();
         while !watch.is_cancelled()
             && let Some(row) = next()
@@ -86,20 +91,9 @@ fn on_threads<S: Slave + Send>(fmu: &Fmu, plan: &Plan, watch: &Watch) -> Result<
     if watch.is_cancelled() && watch.done() < plan.runs {
         return Err(Error::Cancelled);
     }
-    runs.errors = found.into_iter().flatten().collect();
-    runs.errors.sort_unstable_by_key(|(run, _)| *run);
-    Ok(runs)
-}
-
-fn zeros(runs: usize, each: usize) -> Result<Vec<f64>, Error> {
-    let count = runs.checked_mul(each).filter(|count| *count <= isize::MAX as usize / 8);
-    let room = count.is_some_and(|count| Vec::<f64>::new().try_reserve_exact(count).is_ok());
-    match count {
-        Some(count) if room => Ok(vec![0.0; count]),
-        _ => Err(Error::Request(format!(
-            "{runs} runs of {each} numbers need more memory than there is; take measures, or keep fewer times (every)"
-        ))),
-    }
+    let mut errors: Vec<_> = found.into_iter().flatten().collect();
+    errors.sort_unstable_by_key(|(run, _)| *run);
+    Ok(errors)
 }
 
 /// Parts of the same length, of which there are enough also when that is 0.
@@ -117,26 +111,47 @@ struct Worker<'a, S> {
     fmu: &'a Fmu,
     plan: &'a Plan<'a>,
     instance: Option<S>,
-    scratch: Scratch,
+    room: Room<'a>,
 }
 
-struct Scratch {
-    inputs: Vec<f64>,
-    derivatives: Vec<f64>,
+struct Room<'a> {
+    /// What the inputs of this run do.
+    inputs: Vec<ByTime<'a>>,
+    derivatives: Vec<ByTime<'a>>,
+    others: Vec<(BaseType, u32, ByTime<'a>)>,
+    /// What goes to the FMU in one call, and comes from it.
+    set: Vec<f64>,
+    slopes: Vec<f64>,
     orders: Vec<i32>,
-    reals: Vec<f64>,
+    got: Vec<f64>,
+    /// The outputs of a time, in their order.
+    row: Vec<f64>,
     measured: Vec<Measured>,
 }
 
-impl Scratch {
-    fn of(plan: &Plan) -> Self {
+impl<'a> Room<'a> {
+    fn of(plan: &Plan<'a>) -> Self {
         Self {
-            inputs: vec![0.0; plan.real_inputs.references.len()],
-            derivatives: vec![0.0; plan.derivatives.references.len()],
+            inputs: Vec::new(),
+            derivatives: Vec::new(),
+            others: Vec::new(),
+            set: vec![0.0; plan.real_inputs.references.len()],
+            slopes: vec![0.0; plan.derivatives.references.len()],
             orders: vec![1; plan.derivatives.references.len()],
-            reals: vec![0.0; plan.real_outputs.len()],
-            measured: vec![Measured::NOTHING; plan.outputs.len()],
+            got: vec![0.0; plan.real_outputs.0.len()],
+            row: vec![0.0; plan.outputs],
+            measured: vec![Measured::NOTHING; plan.outputs],
         }
+    }
+
+    fn begin(&mut self, plan: &Plan<'a>, run: usize) {
+        let of_run = |values: &Vec<Values<'a>>| values.iter().map(|values| values.of_run(run)).collect();
+        self.inputs = of_run(&plan.real_inputs.values);
+        self.derivatives = of_run(&plan.derivatives.values);
+        let others = plan.other_inputs.iter();
+        self.others =
+            others.map(|(base, reference, values)| (*base, *reference, values.of_run(run))).collect();
+        self.measured.fill(Measured::NOTHING);
     }
 }
 
@@ -144,11 +159,12 @@ impl<S: Slave> Worker<'_, S> {
     fn run(&mut self, row: Row) -> Result<(), String> {
         let instance = self.instance()?;
         let Row { run, courses, measures } = row;
-        let done = follow(self.plan, &instance, &mut self.scratch, run, courses);
+        self.room.begin(self.plan, run);
+        let done = follow(self.plan, &instance, &mut self.room, run, courses);
         let done = done.and_then(|()| instance.terminate().map_err(|refusal| (None, refusal)));
         let Err((time, refusal)) = done else {
             for (measured, row) in
-                self.scratch.measured.iter().zip(measures.chunks_mut(self.plan.measures.len().max(1)))
+                self.room.measured.iter().zip(measures.chunks_mut(self.plan.measures.len().max(1)))
             {
                 for (value, measure) in row.iter_mut().zip(self.plan.measures) {
                     *value = measured.measure(*measure);
@@ -188,49 +204,42 @@ type Refused = (Option<f64>, Refusal);
 fn follow<S: Slave>(
     plan: &Plan,
     instance: &S,
-    scratch: &mut Scratch,
+    room: &mut Room,
     run: usize,
     courses: &mut [f64],
 ) -> Result<(), Refused> {
-    let (first, last) = (plan.time[0], plan.time[plan.time.len() - 1]);
-    start(plan, instance, scratch, run, first, last).map_err(|refusal| (None, refusal))?;
-    scratch.measured.fill(Measured::NOTHING);
+    start(plan, instance, room, run).map_err(|refusal| (None, refusal))?;
     let measures = !plan.measures.is_empty();
-    let every = plan.every.unwrap_or(usize::MAX);
-    let kept = plan.every.map_or(0, |every| plan.time.len().div_ceil(every));
-    let (mut until_kept, mut place) = (0, 0);
-    for (k, &time) in plan.time.iter().enumerate() {
+    // The places in a course that are filled, and how many times go by until the next is.
+    let (kept, mut place, mut wait) = (plan.kept(), 0, 0);
+    let times = plan.time;
+    for (k, &time) in times.iter().enumerate() {
         let at = |refusal| (Some(time), refusal);
         if !plan.read_before_set {
-            set_inputs(plan, instance, scratch, run, k).map_err(at)?;
+            set_inputs(plan, instance, room, k).map_err(at)?;
         }
-        let keep = until_kept == 0 && plan.every.is_some();
+        let keep = wait == 0 && place < kept;
         if keep || measures {
-            if !plan.real_outputs.is_empty() {
-                instance.get_reals(&plan.real_outputs, &mut scratch.reals).map_err(at)?;
-            }
-            for (number, output) in plan.outputs.iter().enumerate() {
-                let value = match *output {
-                    Output::Real(place) => scratch.reals[place],
-                    Output::Other(base, reference) => instance.get_number(base, reference).map_err(at)?,
-                };
-                if keep {
-                    courses[number * kept + place] = value;
-                }
-                if measures {
-                    scratch.measured[number].add(time, value);
-                }
-            }
+            read(plan, instance, room).map_err(at)?;
         }
         if keep {
+            // Not by chunks, whose number would be calculated anew each time.
+            for (output, value) in room.row.iter().enumerate() {
+                courses[output * kept + place] = *value;
+            }
             place += 1;
-            until_kept = every;
+            wait = plan.every.unwrap_or(1);
         }
-        until_kept -= 1;
+        wait = wait.saturating_sub(1);
+        if measures {
+            for (measured, value) in room.measured.iter_mut().zip(&room.row) {
+                measured.add(time, *value);
+            }
+        }
         if plan.read_before_set {
-            set_inputs(plan, instance, scratch, run, k).map_err(at)?;
+            set_inputs(plan, instance, room, k).map_err(at)?;
         }
-        if let Some(next) = plan.time.get(k + 1) {
+        if let Some(next) = times.get(k + 1) {
             instance.step(time, next - time).map_err(at)?;
         }
     }
@@ -238,72 +247,64 @@ fn follow<S: Slave>(
 }
 
 /// Start values before the initialization, inputs in it: so both editions of the standard allow it.
-fn start<S: Slave>(
-    plan: &Plan,
-    instance: &S,
-    scratch: &mut Scratch,
-    run: usize,
-    first: f64,
-    last: f64,
-) -> Result<(), Refusal> {
+fn start<S: Slave>(plan: &Plan, instance: &S, room: &mut Room, run: usize) -> Result<(), Refusal> {
+    let (first, last) = (plan.time[0], plan.time[plan.time.len() - 1]);
     instance.set_up(first, last)?;
     for (reference, text) in &plan.texts {
         instance.set_text(*reference, text)?;
     }
-    set_others(instance, &plan.start, run, 0)?;
+    for (base, reference, values) in &plan.start {
+        instance.set_number(*base, *reference, values.of_run(run).at(0))?;
+    }
     instance.initialize(first, last)?;
-    set_values(plan, instance, scratch, run, 0)?;
+    set_values(plan, instance, room, 0)?;
     instance.initialized()
 }
 
 #[inline]
-fn set_inputs<S: Slave>(
-    plan: &Plan,
-    instance: &S,
-    scratch: &mut Scratch,
-    run: usize,
-    time: usize,
-) -> Result<(), Refusal> {
-    set_values(plan, instance, scratch, run, time)?;
-    let Inputs { references, values } = &plan.derivatives;
-    if references.is_empty() {
+fn set_inputs<S: Slave>(plan: &Plan, instance: &S, room: &mut Room, time: usize) -> Result<(), Refusal> {
+    set_values(plan, instance, room, time)?;
+    if room.derivatives.is_empty() {
         return Ok(());
     }
-    fill(&mut scratch.derivatives, values, run, time);
-    instance.set_input_derivatives(references, &scratch.orders, &scratch.derivatives)
+    fill(&mut room.slopes, &room.derivatives, time);
+    instance.set_input_derivatives(&plan.derivatives.references, &room.orders, &room.slopes)
 }
 
 #[inline]
-fn set_values<S: Slave>(
-    plan: &Plan,
-    instance: &S,
-    scratch: &mut Scratch,
-    run: usize,
-    time: usize,
-) -> Result<(), Refusal> {
-    let Inputs { references, values } = &plan.real_inputs;
-    if !references.is_empty() {
-        fill(&mut scratch.inputs, values, run, time);
-        instance.set_reals(references, &scratch.inputs)?;
+fn set_values<S: Slave>(plan: &Plan, instance: &S, room: &mut Room, time: usize) -> Result<(), Refusal> {
+    if !room.inputs.is_empty() {
+        fill(&mut room.set, &room.inputs, time);
+        instance.set_reals(&plan.real_inputs.references, &room.set)?;
     }
-    set_others(instance, &plan.other_inputs, run, time)
+    for (base, reference, values) in &room.others {
+        instance.set_number(*base, *reference, values.at(time))?;
+    }
+    Ok(())
 }
 
 #[inline]
-fn fill(buffer: &mut [f64], values: &[Values], run: usize, time: usize) {
+fn fill(buffer: &mut [f64], values: &[ByTime], time: usize) {
     for (slot, values) in buffer.iter_mut().zip(values) {
-        *slot = values.at(run, time);
+        *slot = values.at(time);
     }
 }
 
+/// The outputs into their row.
 #[inline]
-fn set_others<S: Slave>(
-    instance: &S,
-    others: &[(BaseType, u32, Values)],
-    run: usize,
-    time: usize,
-) -> Result<(), Refusal> {
-    others.iter().try_for_each(|(base, reference, values)| {
-        instance.set_number(*base, *reference, values.at(run, time))
-    })
+fn read<S: Slave>(plan: &Plan, instance: &S, room: &mut Room) -> Result<(), Refusal> {
+    let (references, places) = &plan.real_outputs;
+    if plan.other_outputs.is_empty() {
+        return if references.is_empty() { Ok(()) } else { instance.get_reals(references, &mut room.row) };
+    }
+    if !references.is_empty() {
+        instance.get_reals(references, &mut room.got)?;
+    }
+    for (place, value) in places.iter().zip(&room.got) {
+        room.row[*place] = *value;
+    }
+    for (base, reference, place) in &plan.other_outputs {
+        room.row[*place] = instance.get_number(*base, *reference)?;
+    }
+    Ok(())
 }
