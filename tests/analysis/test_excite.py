@@ -44,7 +44,7 @@ def test_the_expected_errors_are_those_of_many_fits(model):
     planned = design.plan(motion, channels)
     point = np.log([model.starts[name] for name in what.names])
     expected = np.sqrt(np.diag(np.linalg.inv(design.information(model, [planned], what, point, noise))))
-    response = planned.pick(model.run(planned.motion(), {}))
+    response = planned.simulate(model, [model.starts])[0]
     random = np.random.default_rng(0)
     found = []
     for _ in range(16):

@@ -1,11 +1,11 @@
-"""What `prw identify` does: read, fit, judge, confirm with the FMU itself, report."""
+"""What `prw identify` does: read, fit, judge, report."""
 
 from __future__ import annotations
 
 import argparse
 import re
 from pathlib import Path
-from typing import List, Sequence
+from typing import List
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -14,18 +14,15 @@ from prw.errors import UserError
 from prw.identify import options
 from prw.identify.advice import advice
 from prw.channels import MEASURED, QUANTITIES, factor, si_unit
-from prw.identify.experiment import LONGEST_STEP, Experiment, prepare
+from prw.identify.experiment import LONGEST_STEP, prepare
 from prw.identify.exports import write_json, write_parameters, write_ssv, write_text
-from prw.identify.fit import Prior, Solution, Task, fit
+from prw.identify.fit import Prior, Task, fit
 from prw.identify.measurements import read
 from prw.identify.model import Model
 from prw.identify.report import page
 from prw.identify.results import Findings, numbers
 from prw.identify.statistics import certainty
 
-#: The FMU's own run and the recurrence that stands in for it agree to this fraction of a channel's range, or something
-#: is wrong.
-AGREEMENT = 1e-8
 #: From this standard error on, a number is no estimate.
 HOPELESS = 1.0
 
@@ -47,9 +44,8 @@ def identify(arguments: argparse.Namespace) -> None:
         experiments = [prepare(m, quantum, step) for m in measured]
         solution = fit(model, experiments, task, arguments.starts, arguments.seed)
         sure = certainty(solution)
-        confirmed = confirm(model, experiments, solution)
         hints = advice(model, experiments, solution) if sure.undetermined else []
-        findings = Findings(model, arguments.files, measured, experiments, solution, sure, confirmed, hints)
+        findings = Findings(model, arguments.files, measured, experiments, solution, sure, hints)
         _write(arguments.out, findings)
     print("\n".join(_summary(arguments, findings)))
     if sure.undetermined:
@@ -82,24 +78,6 @@ def task_of(arguments: argparse.Namespace, model: Model) -> Task:
         not getattr(arguments, "no_offsets", False),
         not getattr(arguments, "rest", False),
     )
-
-
-def confirm(model: Model, experiments: Sequence[Experiment], solution: Solution) -> float:
-    """Run the FMU itself with the estimates, and compare with what the fit took it to answer: the largest difference
-    in terms of a channel's range. Raises UserError where that is not rounding."""
-    worst = 0.0
-    for i, experiment in enumerate(experiments):
-        state = experiment.rest() + solution.evaluation.states[i]
-        response = model.run(experiment.motion(), solution.values, state=state)
-        found = experiment.pick(response) + solution.evaluation.offsets[i]
-        scale = np.maximum(np.ptp(found, axis=0), 1e-12)
-        worst = max(worst, float((np.abs(found - solution.evaluation.modelled[i]) / scale).max()))
-    if not worst < AGREEMENT:
-        raise UserError(
-            f"{model.fmu}: its run differs from its linear model by {worst:.1e} of a channel's range; "
-            "this FMU does not follow the testbed's stepping rules and cannot be identified with"
-        )
-    return worst
 
 
 def _quantum(text) -> float:
@@ -143,9 +121,6 @@ def _summary(arguments: argparse.Namespace, findings: Findings) -> List[str]:
         "noise       " + ", ".join(f"{name} {value:.2g} {si_unit(name)}" for name, value in solution.noise.items())
     )
     lines += [f"note        {note}" for note in findings.notes()]
-    lines.append(
-        f"checked     the FMU's own run agrees with the fit's to {findings.confirmed:.0e} of a channel's range"
-    )
     names = ["report.html", "report.json"] + ([] if sure.undetermined else ["identified.json", "identified.ssv"])
     lines.append(f"wrote       {', '.join(str(arguments.out / name) for name in names)}")
     if not sure.undetermined:

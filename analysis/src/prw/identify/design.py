@@ -74,8 +74,8 @@ def information(
 ) -> np.ndarray:
     """What experiments, made or yet to be made, would tell about the logarithms of task.names: (p, p), without
     priors."""
-    models = stack([model.matrices(task.values(logarithms))])
-    ready = [replace(experiment, values=experiment.simulate(models)[0]) for experiment in experiments]
+    values = [task.values(logarithms)]
+    ready = [replace(experiment, values=experiment.simulate(model, values)[0]) for experiment in experiments]
     fitter = Fitter(model, ready, task)
     fitter.noise = {name: noise[name] for name in fitter.channels}
     logarithms = np.asarray(logarithms, dtype=float)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Dict, Optional, Sequence, Tuple
+from dataclasses import dataclass, replace
+from typing import Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from prw.identify import propagate
 from prw.identify.measurements import Measurements
-from prw.identify.model import Matrices
+from prw.identify.model import Model
 from prw.identify.path import Path, smooth
 from prw.motion import Motion
-from prw.testbed import OUTPUTS
 
 #: The FMU follows a motor's tangent over a step, which raises a motion's amplitude by (2 pi f h)^2 / 6: at 0.125 ms by
 #: 0.006 % at 25 Hz and by 0.1 % at 100 Hz.
@@ -68,13 +66,23 @@ class Experiment:
         """The state (6,) of rest at the motors' first angles."""
         return np.concatenate([self.theta[0], self.theta[0], [0.0, 0.0]])
 
-    def simulate(self, models: Matrices, state: Optional[np.ndarray] = None) -> np.ndarray:
-        """The channels (m, n, len(channels)) of m stacked models, from the initial state (6,) or rest."""
-        return self.follow(models, self.theta, self.omega, state)
+    def simulate(
+        self, model: Model, values: Sequence[Mapping[str, float]], state: Optional[np.ndarray] = None
+    ) -> np.ndarray:
+        """The channels (m, n, len(channels)) with m sets of parameters, from the initial state (6,) or rest."""
+        return self.follow(model, values, self.theta, self.omega, state)
 
-    def follow(self, models: Matrices, theta, omega, state: Optional[np.ndarray] = None) -> np.ndarray:
+    def follow(
+        self,
+        model: Model,
+        values: Sequence[Mapping[str, float]],
+        theta: np.ndarray,
+        omega: np.ndarray,
+        state: Optional[np.ndarray] = None,
+    ) -> np.ndarray:
         """The same with the motors at other angles and rates (N, 2) at the communication points."""
-        found = propagate.outputs(self._of(models), self.step, theta, omega, max(self.every, 1), state)
+        motion = replace(self.motion(), theta=theta, omega=omega)
+        found = model.follow(motion, self.channels, values, max(self.every, 1), state)
         return found if self.every else np.stack([self.between @ table for table in found])
 
     def wander(self, random: np.random.Generator) -> tuple:
@@ -86,21 +94,13 @@ class Experiment:
             np.column_stack([path.derivative()(points) for path in drawn]),
         )
 
-    def transients(self, models: Matrices) -> np.ndarray:
-        """What the initial state adds to the channels, (n, len(channels), 6), for one stacked model."""
+    def transients(self, model: Model, values: Mapping[str, float]) -> np.ndarray:
+        """What the initial state adds to the channels, (n, len(channels), 6), with one set of parameters."""
+        time = self.motion().time
         if self.every:
-            return propagate.transients(self._of(models), self.step * self.every, len(self.time))[0]
-        table = propagate.transients(self._of(models), self.step, len(self.theta))[0]
+            return model.transients(time[:: self.every], self.channels, values)
+        table = model.transients(time, self.channels, values)
         return (self.between @ table.reshape(len(table), -1)).reshape(len(self.time), -1, 6)
-
-    def pick(self, response: Dict[str, np.ndarray]) -> np.ndarray:
-        """The channels (n, len(channels)) out of what the FMU answered to motion()."""
-        table = np.column_stack([response[name] for name in self.channels])
-        return table[:: self.every] if self.every else self.between @ table
-
-    def _of(self, models: Matrices) -> Matrices:
-        rows = [OUTPUTS.index(name) for name in self.channels]
-        return Matrices(models.A, models.B, np.ascontiguousarray(models.C[:, rows]), models.D[:, rows])
 
 
 def prepare(measured: Measurements, quantum: float = 0.0, longest_step: float = LONGEST_STEP) -> Experiment:

@@ -16,11 +16,12 @@ from dataclasses import dataclass
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
+from scipy.fft import rfft
 from scipy.optimize import least_squares
 
 from prw.errors import UserError
 from prw.identify.experiment import Experiment
-from prw.identify.model import Matrices, Model, stack
+from prw.identify.model import Model
 from prw.identify.path import quantum_of, rounding
 from prw.progress import Progress
 
@@ -129,15 +130,15 @@ class Fitter:
         key = (logarithms.tobytes(), tuple(self.noise.items()))
         if self._at is not None and self._at[0] == key:
             return self._at[1]
-        models = self._matrices([logarithms])
+        values = self.task.values(logarithms)
         self._projections = []
         result = Evaluation([], [], [], [])
         for experiment in self.experiments:
             weights = self._weights(experiment)
-            simulated = experiment.simulate(models)[0]
+            simulated = experiment.simulate(self.model, [values])[0]
             self.evaluations += 1
             difference = np.where(weights > 0, np.nan_to_num(experiment.values) - simulated, 0.0)
-            transients = experiment.transients(models) if self.task.initial else None
+            transients = experiment.transients(self.model, values) if self.task.initial else None
             nuisance = _Nuisance(weights, experiment.bins(), transients, self.task.offsets)
             residual, offsets, state = nuisance.solve(difference)
             self._projections.append(nuisance)
@@ -150,12 +151,12 @@ class Fitter:
 
     def jacobians(self, logarithms: np.ndarray) -> List[np.ndarray]:
         """Derivatives of the weighted model spectra by the logarithms, nuisances taken out: (2 b, c, p) each."""
-        evaluation, models = self.evaluate(logarithms), self._neighbours(logarithms)
+        evaluation, neighbours = self.evaluate(logarithms), self._neighbours(logarithms)
         found = []
         for experiment, state, nuisance in zip(self.experiments, evaluation.states, self._projections):
             start = experiment.rest() + state if self.task.initial else None
-            found.append(nuisance.project(_slopes(experiment.simulate(models, start))))
-            self.evaluations += len(models.A)
+            found.append(nuisance.project(_slopes(experiment.simulate(self.model, neighbours, start))))
+            self.evaluations += len(neighbours)
         return found
 
     def spurious(self, logarithms: np.ndarray, draws: int = 3) -> np.ndarray:
@@ -164,11 +165,11 @@ class Fitter:
         With equal motors, say, the difference of two encoders' steps seems to roll the wrist a little. It does not,
         and what the fit concludes from it about J3 is wrong; here the same noise is drawn without any motion."""
         self.evaluate(logarithms)
-        models, random = self._neighbours(logarithms), np.random.default_rng(0)
+        neighbours, random = self._neighbours(logarithms), np.random.default_rng(0)
         total = np.zeros((len(logarithms), len(logarithms)))
         for experiment, nuisance in zip(self.experiments, self._projections):
             for _ in range(draws if experiment.paths else 0):
-                table = experiment.follow(models, *experiment.wander(random))
+                table = experiment.follow(self.model, neighbours, *experiment.wander(random))
                 flat = nuisance.project(_slopes(table)).reshape(-1, len(logarithms))
                 total += flat.T @ flat / draws
         return total
@@ -177,11 +178,11 @@ class Fitter:
         """What noise like that of the motors' samples, and like the steps of quantised channels, does to the residuals:
         for each draw, spectra (2 b, c) for each experiment, weighted, nuisances taken out."""
         evaluation, random = self.evaluate(logarithms), np.random.default_rng(1)
-        models, found = self._matrices([logarithms]), []
+        values, found = self.task.values(logarithms), []
         for experiment, nuisance, modelled in zip(self.experiments, self._projections, evaluation.modelled):
             quanta = self._quanta(experiment)
             for draw in range(draws):
-                table = experiment.follow(models, *experiment.wander(random))[0]
+                table = experiment.follow(self.model, [values], *experiment.wander(random))[0]
                 for i, quantum in quanta.items():
                     table[:, i] += rounding(modelled[:, i], quantum, random)
                 found.append((draw, nuisance.project(table)))
@@ -273,13 +274,10 @@ class Fitter:
     def _weights(self, experiment: Experiment) -> np.ndarray:
         return np.isfinite(experiment.values) / np.array([self.noise[name] for name in experiment.channels])
 
-    def _neighbours(self, logarithms: np.ndarray) -> Matrices:
-        """The models a little further, and a little back, in the direction of each parameter: 2 p of them."""
+    def _neighbours(self, logarithms: np.ndarray) -> List[Dict[str, float]]:
+        """The parameters a little further, and a little back, in the direction of each: 2 p sets."""
         steps = DIFFERENCE * np.eye(len(logarithms))
-        return self._matrices(np.vstack([logarithms + steps, logarithms - steps]))
-
-    def _matrices(self, points) -> Matrices:
-        return stack([self.model.matrices(self.task.values(x)) for x in points])
+        return [self.task.values(x) for x in np.vstack([logarithms + steps, logarithms - steps])]
 
 
 def _slopes(table: np.ndarray) -> np.ndarray:
@@ -309,7 +307,7 @@ class _Nuisance:
         # A unitary transform: where all frequencies are kept, sums of squares are those of the samples.
         n = len(table)
         w = self._weights.reshape(self._weights.shape + (1,) * (table.ndim - 2))
-        found = np.fft.rfft(table * w, axis=0, norm="ortho")[: self._bins] * np.sqrt(2)
+        found = rfft(table * w, axis=0, norm="ortho", workers=-1)[: self._bins] * np.sqrt(2)
         found[0] /= np.sqrt(2)
         if n % 2 == 0 and self._bins == n // 2 + 1:
             found[-1] /= np.sqrt(2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
-from typing import Dict, List, Mapping, NamedTuple, Sequence
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence
 
 import fmpy
 import numpy as np
@@ -14,7 +14,7 @@ from fmpy.simulation import instantiate_fmu
 
 from prw.errors import UserError
 from prw.motion import Motion
-from prw.testbed import OUTPUTS, Testbed
+from prw.testbed import OUTPUTS, Testbed, driven_by, stopped
 
 STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 INPUTS = ("theta1", "theta2", "omega1", "omega2")
@@ -119,6 +119,39 @@ class Model(Testbed):
             slave.freeInstance()
             shutil.rmtree(self._folder, ignore_errors=True)
         super().close()
+
+    def follow(
+        self,
+        motion: Motion,
+        channels: Sequence[str],
+        values: Sequence[Mapping[str, float]],
+        every: int = 1,
+        state: Optional[np.ndarray] = None,
+    ) -> np.ndarray:
+        """What the FMU answers to `motion` with m sets of parameters (SI, by name; each with the same names): the channels
+        (m, k, len(channels)) at every `every`-th of the times. state: (6,) initial x; default: at rest at the motors'
+        first angles."""
+        start: Dict[str, np.ndarray] = {name: np.array([each[name] for each in values]) for name in values[0]}
+        start.update(zip(STATES, np.asarray(() if state is None else state, dtype=float)))
+        return self._courses(motion, channels, every, start)
+
+    def transients(
+        self, time: np.ndarray, channels: Sequence[str], values: Mapping[str, float]
+    ) -> np.ndarray:
+        """What each initial state adds to the channels at `time` (k,): (k, len(channels), 6). That is linear, so the motors
+        rest at 0, and between two times the FMU is exact."""
+        still = np.zeros((len(time), 2))
+        table = self._courses(
+            Motion("rest", time, still, still), channels, 1, {**values, **dict(zip(STATES, np.eye(len(STATES))))}
+        )
+        return np.moveaxis(table, 0, -1)
+
+    def _courses(self, motion: Motion, channels: Sequence[str], every: int, start: Mapping) -> np.ndarray:
+        """(runs, times, channels)"""
+        runs = self.loaded.run(motion.time, outputs=channels, every=every, **driven_by(motion, start))
+        for why in runs.errors.values():
+            raise UserError(f"{self.fmu}: {stopped(why)}")
+        return np.stack([runs[name] for name in channels], axis=2)
 
     def matrices(self, values: Mapping[str, float]) -> Matrices:
         """The FMU's linear model with the parameters `values` (SI, by name), from fmi2GetDirectionalDerivative."""

@@ -95,7 +95,9 @@ def _figure(time: np.ndarray, measured: np.ndarray, modelled: np.ndarray, residu
         "svg.fonttype": "none",
     }
     with matplotlib.rc_context(style):
-        figure = Figure(figsize=(6.4, 4.6), layout="constrained")
+        # Margins by hand: to find them, matplotlib draws everything twice.
+        figure = Figure(figsize=(6.4, 4.6))
+        figure.subplots_adjust(left=0.12, right=0.985, top=0.945, bottom=0.09, hspace=0.55, wspace=0.24)
         axes = figure.subplot_mosaic([["all", "all"], ["close", "correlation"], ["residual", "residual"]])
         # The liveliest second, where measured and modelled can be told apart.
         centre = time[np.argmax(np.abs(measured - measured.mean()))]

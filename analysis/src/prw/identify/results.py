@@ -39,8 +39,7 @@ class ChannelFit(NamedTuple):
 
 @dataclass(frozen=True)
 class Findings:
-    """The fit of `files`, with what it was made of. confirmed: largest difference between the FMU's own run and the
-    fit, in terms of a channel's range. hints: what would settle open combinations."""
+    """The fit of `files`, with what it was made of. hints: what would settle open combinations."""
 
     model: Model
     files: Sequence[Path]
@@ -48,7 +47,6 @@ class Findings:
     experiments: Sequence[Experiment]
     solution: Solution
     sure: Certainty
-    confirmed: float
     hints: Sequence[str]
 
     def residual(self, i: int) -> np.ndarray:
@@ -196,6 +194,5 @@ def numbers(findings: Findings) -> Dict[str, Any]:
         "misfit": solution.misfit,
         "starts": solution.tried,
         "simulations": solution.evaluations,
-        "fmu_run_differs_by": findings.confirmed,
         "notes": findings.notes(),
     }

@@ -14,8 +14,7 @@ from typing import List, Mapping, NamedTuple, Sequence
 
 import numpy as np
 from scipy.ndimage import convolve1d
-from scipy.signal.windows import hann
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from prw.identify.fit import Solution
 from prw.identify.profile import ends
@@ -98,7 +97,7 @@ def certainty(solution: Solution, level: float = 0.95) -> Certainty:
     whiteness = errors / np.sqrt(np.diag(white))
     if open_ones:
         errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(honest))))
-    low, high = ends(solution, white, errors, norm.ppf(0.5 + level / 2))
+    low, high = ends(solution, white, errors, ndtri(0.5 + level / 2))
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     unit = np.outer(spread, spread)
     return Certainty(
@@ -163,7 +162,7 @@ def correlated(jacobian: np.ndarray, residual: np.ndarray, white: np.ndarray) ->
     # E |spectrum|^2 is 2 where noise is white and weighted with its strength, but 1 at frequency 0.
     cross = spectrum[:, :, None] * spectrum[:, None, :].conj() / 2
     cross[0] = cross[1]
-    window = hann(NEIGHBOURS + 2)[1:-1]
+    window = np.hanning(NEIGHBOURS + 2)[1:-1]
     total = convolve1d(cross * weight[:, None, None], window, axis=0, mode="mirror")
     density = total / convolve1d(weight, window, mode="mirror")[:, None, None]
     # The real part of a complex number of variance R has R / 2, and J^H R J counts both parts.
