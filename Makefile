@@ -26,7 +26,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-fmu fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -36,6 +36,7 @@ help:
 	@echo 'make fmu                     build the FMU                          -> $(FMU)'
 	@echo '                             and that for FMI 3.0                   -> target/fmu/fmi3/prw_testbed.fmu'
 	@echo 'make test                    check and test everything'
+	@echo 'make test-newest-fmpy        the tests with FMPy again, with its newest version'
 	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
 	@echo 'make profile                 count the instructions of a step, with callgrind'
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
@@ -73,6 +74,11 @@ test-rust: need-rust headers
 	else \
 	  set -ex; $(CARGO) test $(LOCKED) --workspace; \
 	fi
+
+# Everyone else gets the newest FMPy, these environments the oldest that is supported.
+test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
+	@$(PIP_INSTALL) --quiet --upgrade --no-deps --target target/newest-fmpy fmpy
+	PYTHONPATH=target/newest-fmpy $(PY) -m pytest -q -p no:cacheprovider tests/fmpy tests/fmu_run
 
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check

@@ -21,7 +21,7 @@ from prw.sweep.study import Study, chunks
 from prw.sweep.workers import on_cluster, on_this_machine
 
 #: A chunk is kept when it is done, and is the unit of what an interruption loses.
-LONGEST_CHUNK = 64
+LONGEST_CHUNK = 256
 #: So many chunks for each worker, so that all finish about at the same time.
 CHUNKS_PER_WORKER = 8
 MOST_RUNS = 10_000_000
