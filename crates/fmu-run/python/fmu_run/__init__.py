@@ -171,7 +171,7 @@ class Fmu:
         progress: called with the number of finished runs and of all, ten times a second.
 
         A run that the FMU refuses does not stop the others, see `Runs.errors` and `Runs.check`. Raises ValueError for what
-        does not fit the FMU or itself, FmuError if the FMU makes no instances. Ctrl-C stops after the runs under way.
+        does not fit the FMU or itself, FmuError if the FMU is closed. Ctrl-C stops after the runs under way.
         """
         times = _array("time", time)
         if times.ndim != 1:

@@ -107,8 +107,9 @@ impl Fmu {
     /// Carries out the runs.
     ///
     /// # Errors
-    /// [`Error::Request`] when what is asked for does not fit the FMU or itself, [`Error::Fmu`] when there are no
-    /// instances of it, [`Error::Cancelled`]. A run that the FMU refuses is no error here, see [`Runs::errors`].
+    /// [`Error::Request`] when what is asked for does not fit the FMU or itself, [`Error::Fmu`] when there are no threads,
+    /// [`Error::Cancelled`]. A run that the FMU refuses, or makes no instance for, is no error here, see
+    /// [`Runs::errors`].
     pub fn run(&self, batch: &Batch, watch: &Watch) -> Result<Runs, Error> {
         let size = self.size(batch)?;
         let [mut courses, mut measures] = [zeros(size.courses())?, zeros(size.measures())?];
@@ -131,7 +132,7 @@ impl Fmu {
         measures: &mut [f64],
     ) -> Result<Vec<(usize, String)>, Error> {
         let plan = plan::Plan::of(self, batch)?;
-        run::run(self, &plan, watch, courses, measures)
+        run::run(self, &plan, watch, [courses, measures])
     }
 
     /// How much comes of a batch.

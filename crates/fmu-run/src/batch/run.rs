@@ -34,16 +34,16 @@ impl Watch {
     }
 }
 
+/// Fills the courses and the measures; returns the refused runs.
 pub(super) fn run(
     fmu: &Fmu,
     plan: &Plan,
     watch: &Watch,
-    courses: &mut [f64],
-    measures: &mut [f64],
+    into: [&mut [f64]; 2],
 ) -> Result<Vec<(usize, String)>, Error> {
     match fmu.description().standard {
-        Standard::Fmi2 => on_threads::<Importer>(fmu, plan, watch, courses, measures),
-        Standard::Fmi3 => on_threads::<fmi3::Importer>(fmu, plan, watch, courses, measures),
+        Standard::Fmi2 => on_threads::<Importer>(fmu, plan, watch, into),
+        Standard::Fmi3 => on_threads::<fmi3::Importer>(fmu, plan, watch, into),
     }
 }
 
@@ -58,8 +58,7 @@ fn on_threads<S: Slave + Send>(
     fmu: &Fmu,
     plan: &Plan,
     watch: &Watch,
-    courses: &mut [f64],
-    measures: &mut [f64],
+    [courses, measures]: [&mut [f64]; 2],
 ) -> Result<Vec<(usize, String)>, Error> {
     let (course, measured) = (plan.outputs * plan.kept(), plan.outputs * plan.measures.len());
     let room = courses.len() >= plan.runs * course && measures.len() >= plan.runs * measured;
