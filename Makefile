@@ -13,6 +13,8 @@ DIST_VENV := .venv-dist
 PY   := $(VENV)/bin/python
 # What is imported is compiled then; all of it takes longer than to install it.
 PIP_INSTALL := $(PY) -m pip install --progress-bar off --no-compile
+# A process for each core; `.venv/bin/python -m pytest -x FILE` runs a part.
+PYTEST := $(PY) -m pytest -q -p no:cacheprovider -n auto --dist worksteal
 FMU  := target/fmu/prw_testbed.fmu
 
 # rustup's default place, before a cargo of the system that may be too old
@@ -78,11 +80,11 @@ test-rust: need-rust headers
 # Everyone else gets the newest FMPy, these environments the oldest that is supported.
 test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 	@$(PIP_INSTALL) --quiet --upgrade --no-deps --target target/newest-fmpy fmpy
-	PYTHONPATH=target/newest-fmpy $(PY) -m pytest -q -p no:cacheprovider tests/fmpy tests/fmu_run
+	PYTHONPATH=target/newest-fmpy $(PYTEST) tests/fmpy tests/fmu_run
 
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check
-	$(PY) -m pytest -q -p no:cacheprovider tests/oracle tests/fmu_run tests/fmpy tests/analysis
+	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/analysis
 
 # Ratios of one run; quiet the machine first.
 bench: $(VENV)/demo.stamp closed-loop-fmus
@@ -112,7 +114,7 @@ closed-loop: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
 	@$(VENV)/bin/prw closed-loop $(ARGS)
 
 test-closed-loop: $(VENV)/closed-loop.stamp closed-loop-fmus
-	$(PY) -m pytest -q -p no:cacheprovider tests/closed_loop
+	$(PYTEST) tests/closed_loop
 
 # The tools for other platforms have an environment of their own. What is not a Python package is installed
 # where that is possible, else named. BUILD_STD=1 compiles std with Debian's Rust, as is done without rustup.
