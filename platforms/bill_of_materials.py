@@ -3,8 +3,8 @@
     python platforms/bill_of_materials.py            writes the lists anew
     python platforms/bill_of_materials.py --check    fails if they are out of date
 
-Those in modelDescription/licenses/ go into the FMU, those in crates/fmu-run/python/ into the wheels: third-party.txt for
-people and bill-of-materials.cdx.json (CycloneDX 1.6) for tools. Needs cargo and nothing else.
+Those in modelDescription/licenses/ go into the FMU, those in crates/fmu-run/python/ into the wheels: third-party.txt
+for people and bill-of-materials.cdx.json (CycloneDX 1.6) for tools. Needs cargo and nothing else.
 """
 
 from __future__ import annotations
