@@ -28,7 +28,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -45,7 +45,8 @@ help:
 	@echo 'make docs                    write the documentation in the FMUs anew, and what README has of it'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make dist                    the FMUs for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
-	@echo 'make test-platforms          run what is in dist/ on Linux, Windows (Wine) and ARM (QEMU), check the rest'
+	@echo 'make wheels                  the Python package fmu-run for the same systems, ready to install -> dist/wheels/'
+	@echo 'make test-platforms          run both on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make dist/ again elsewhere and compare every byte'
 	@echo 'make study                   set up prw identify, excite and sweep  (see analysis/tutorial.md)'
 	@echo 'make monte-carlo             200 identifications of simulated rigs -> out/monte_carlo.json'
@@ -121,7 +122,11 @@ test-closed-loop: $(VENV)/closed-loop.stamp closed-loop-fmus
 dist: need-rust $(DIST_VENV)/dist.stamp
 	@$(DIST_VENV)/bin/python platforms/dist.py
 
-test-platforms: dist $(DIST_VENV)/test.stamp
+# One for each system, for Python 3.11 and later.
+wheels: need-rust $(DIST_VENV)/dist.stamp
+	@$(DIST_VENV)/bin/python platforms/wheels.py
+
+test-platforms: dist wheels $(DIST_VENV)/test.stamp
 	$(DIST_VENV)/bin/python -m pytest -q -p no:cacheprovider tests/platforms
 
 test-reproducible: dist

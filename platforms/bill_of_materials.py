@@ -1,10 +1,10 @@
-"""Lists what is compiled into the libraries of the FMU, with versions and licences.
+"""Lists what is compiled into the libraries of the FMU and of fmu-run for Python, with versions and licences.
 
     python platforms/bill_of_materials.py            writes the lists anew
     python platforms/bill_of_materials.py --check    fails if they are out of date
 
-They are kept in modelDescription/licenses/ and go into the FMU: third-party.txt for people and
-bill-of-materials.cdx.json (CycloneDX 1.6) for tools. Needs cargo and nothing else.
+Those in modelDescription/licenses/ go into the FMU, those in crates/fmu-run/python/ into the wheels: third-party.txt
+for people and bill-of-materials.cdx.json (CycloneDX 1.6) for tools. Needs cargo and nothing else.
 """
 
 from __future__ import annotations
@@ -15,12 +15,35 @@ import re
 import subprocess
 import sys
 import uuid
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from targets import MODEL, ROOT, TARGETS
 
-BILL = ROOT / "modelDescription" / "licenses" / "bill-of-materials.cdx.json"
-NOTICE = ROOT / "modelDescription" / "licenses" / "third-party.txt"
+
+@dataclass(frozen=True)
+class Product:
+    """What the libraries go into, the package that they are compiled from, and where the lists are kept."""
+
+    name: str
+    package: str
+    folder: Path
+
+    @property
+    def bill(self) -> Path:
+        """The list for tools."""
+        return self.folder / "bill-of-materials.cdx.json"
+
+    @property
+    def notice(self) -> Path:
+        """The list for people."""
+        return self.folder / "third-party.txt"
+
+
+FMU = Product("FMU", MODEL, ROOT / "modelDescription" / "licenses")
+WHEEL = Product("package", "fmu-run-python", ROOT / "crates" / "fmu-run" / "python")
+PRODUCTS = (FMU, WHEEL)
 
 #: Compiled in, but no packages of Cargo.lock: name, licence, copyright, where it is.
 BESIDE_CRATES = (
@@ -31,10 +54,10 @@ BESIDE_CRATES = (
 )
 
 #: A line of a licence file that names one.
-HOLDER = re.compile(r"\s*Copyright\s+(?:\(c\)\s+|©\s+)?(?=[\dA-Z])(.+?)(?: or)?\.?\s*(?:\[.*\])?$")
+HOLDER = re.compile(r"\s*Copyright\s+(?:\(c\)\s+|©\s+)?(?=[\dA-Z])(.+?)(?: or)?[.,]?\s*(?:\[.*\])?$")
 
 HEADER = """\
-Compiled into the libraries of this FMU. Where a package offers a choice of licences, the choice is shown.
+Compiled into the libraries of this {name}. Where a package offers a choice of licences, the choice is shown.
 Those from crates.io are used under the Apache License, Version 2.0 (LICENSE-APACHE), if they are available
 under it; the licences of the others are at the end.
 Each is a published Rust crate of that name and version. For tools: bill-of-materials.cdx.json.
@@ -43,17 +66,19 @@ Each is a published Rust crate of that name and version. For tools: bill-of-mate
 
 FOOTER = """
 What the Rust standard library contains of others is listed in the file COPYRIGHT-library.html of every Rust
-distribution. libgcc is linked under the GCC Runtime Library Exception, which asks nothing of this FMU.
+distribution. libgcc is linked under the GCC Runtime Library Exception, which asks nothing of this {name}.
 """
 
 
-def packages() -> list[dict]:
+@lru_cache(maxsize=None)
+def packages(product: Product) -> list[dict]:
     """The packages that are compiled into a library for any target, as cargo describes them."""
     names = set()
     for target in TARGETS:
         # Without build scripts and procedural macros: they run, but nothing of them gets in.
-        command = ["cargo", "tree", "--locked", "--no-default-features", "--package", MODEL, "--target", target.triple]
-        lines = _cargo([*command, "--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"])
+        command = ["cargo", "tree", "--locked", "--no-default-features", "--package", product.package]
+        command += ["--target", target.triple, "--edges", "normal,no-proc-macro"]
+        lines = _cargo([*command, "--prefix", "none", "--format", "{p}"])
         names.update(tuple(line.split()[:2]) for line in lines.splitlines() if line)
     metadata = json.loads(_cargo(["cargo", "metadata", "--locked", "--format-version", "1"]))
     found = [p for p in metadata["packages"] if (p["name"], f"v{p['version']}") in names]
@@ -86,10 +111,10 @@ def licence_of(package: dict) -> str:
     return package["license"].replace("/", " OR ")
 
 
-def other_licences() -> str:
+def other_licences(product: Product) -> str:
     """The licence files of the packages that are not available under the Apache License."""
     texts = []
-    for package in packages():
+    for package in packages(product):
         if package["source"] and "Apache-2.0" not in licence_of(package):
             for path in sorted(Path(package["manifest_path"]).parent.glob("LICEN[CS]E*")):
                 heading = f"==== {package['name']} {package['version']} ===="
@@ -104,11 +129,11 @@ def checksums() -> dict[tuple[str, str], str]:
     return {(name, version): checksum for name, version, checksum in re.findall(pattern, text)}
 
 
-def bill() -> str:
+def bill(product: Product) -> str:
     """The list for tools."""
     sums = checksums()
-    model, components = None, []
-    for package in packages():
+    main, components = None, []
+    for package in packages(product):
         name, version = package["name"], package["version"]
         component = {
             "type": "library",
@@ -121,8 +146,8 @@ def bill() -> str:
             component["copyright"] = copyright_of(package)
             component["purl"] = component["bom-ref"]
             component["hashes"] = [{"alg": "SHA-256", "content": sums[name, version]}]
-        if name == MODEL:
-            model = component
+        if name == product.package:
+            main = component
         else:
             components.append(component)
     for name, licence, holder, where in BESIDE_CRATES:
@@ -136,23 +161,24 @@ def bill() -> str:
                 "copyright": holder,
             }
         )
-    content = {"metadata": {"component": model}, "components": components}
+    content = {"metadata": {"component": main}, "components": components}
     # The serial number follows from the content, so that it stays when the content does.
     serial = uuid.uuid5(uuid.NAMESPACE_URL, json.dumps(content, sort_keys=True))
     head = {"bomFormat": "CycloneDX", "specVersion": "1.6", "serialNumber": f"urn:uuid:{serial}", "version": 1}
     return json.dumps({**head, **content}, indent=2, ensure_ascii=False) + "\n"
 
 
-def notice() -> str:
+def notice(product: Product) -> str:
     """The list for people."""
     rows = [("package", "version", "licence", "copyright")]
-    for package in packages():
+    for package in packages(product):
         if package["source"]:
             rows.append((package["name"], package["version"], licence_of(package), copyright_of(package)))
     table = [_row(rows, row) for row in rows]
     beside = [("beside packages", "licence", "copyright", "in the libraries for")]
     beside += [(name, licence, holder, where) for name, licence, holder, where in BESIDE_CRATES]
-    return HEADER + "".join(table) + "\n" + "".join(_row(beside, row) for row in beside) + FOOTER + other_licences()
+    lists = "".join(table) + "\n" + "".join(_row(beside, row) for row in beside)
+    return HEADER.format(name=product.name) + lists + FOOTER.format(name=product.name) + other_licences(product)
 
 
 def _row(rows: list[tuple[str, ...]], row: tuple[str, ...]) -> str:
@@ -160,17 +186,21 @@ def _row(rows: list[tuple[str, ...]], row: tuple[str, ...]) -> str:
     return "  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() + "\n"
 
 
+def _lists() -> list[tuple[Path, str]]:
+    return [(path, text) for p in PRODUCTS for path, text in ((p.bill, bill(p)), (p.notice, notice(p)))]
+
+
 def check() -> None:
     """Stops if a list is out of date."""
-    for path, text in ((BILL, bill()), (NOTICE, notice())):
+    for path, text in _lists():
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
             name = path.relative_to(ROOT).as_posix()
             raise SystemExit(f"error: {name} is out of date; write it anew: python3 platforms/bill_of_materials.py")
 
 
 def write() -> None:
-    """Writes both lists."""
-    for path, text in ((BILL, bill()), (NOTICE, notice())):
+    """Writes the lists."""
+    for path, text in _lists():
         if path.is_file() and path.read_text(encoding="utf-8") == text:
             print(f"{path.relative_to(ROOT)} is up to date")
             continue

@@ -40,7 +40,8 @@ def main() -> None:
         (folder / "arm" / f"{MODEL}.fmu").rename(folder / f"{MODEL}-linux-arm64.fmu")
         pack(folder, 3, FMI3_FOLDERS, libraries)
         (folder / "fmi3" / f"{MODEL}.fmu").rename(folder / f"{MODEL}-fmi3.fmu")
-        shutil.copyfile(bill_of_materials.BILL, folder / bill_of_materials.BILL.name)
+        bill = bill_of_materials.FMU.bill
+        shutil.copyfile(bill, folder / bill.name)
         if compilers:
             (folder / "compilers.txt").write_text("".join(f"{line}\n" for line in compilers), encoding="utf-8")
         files = sorted(path for path in folder.iterdir() if path.is_file() and path.suffix != ".dylib")

@@ -15,6 +15,7 @@ import sys
 import sysconfig
 from pathlib import Path
 
+import macos_linker
 import mingw_linker
 import toolchain as tools
 from targets import GLIBC, MODEL, ROOT, Target, target
@@ -22,21 +23,30 @@ from targets import GLIBC, MODEL, ROOT, Target, target
 
 def compile_library(target: Target) -> tuple[Path, str]:
     """The library and a line that says what compiled it."""
-    toolchain = tools.toolchain(target)
-    environment, flags, glibc = link(target)
+    toolchain, environment, glibc = prepare(target, f"@rpath/{MODEL}{target.suffix}")
     command = [tools.zigbuild() if glibc else "cargo", "rustc", *toolchain.flags]
     command += ["--lib", "--crate-type", "cdylib", "--profile", "library", "--locked"]
     command += ["--no-default-features", "--package", MODEL, "--target", target.triple + (f".{GLIBC}" if glibc else "")]
-    flags += [f"--remap-path-prefix={path}={name}" for path, name in remap(toolchain)]
-    environment = {**os.environ, **toolchain.environment, **environment}
-    # Separated by what no path contains.
-    environment["CARGO_ENCODED_RUSTFLAGS"] = "\x1f".join(flags)
     if subprocess.run(command, cwd=ROOT, env=environment).returncode:
         raise SystemExit(f"error: the library for {target.triple} could not be compiled; the messages are above")
     return target_folder() / target.triple / "library" / target.library, toolchain.description
 
 
-def link(target: Target) -> tuple[dict[str, str], list[str], bool]:
+def prepare(target: Target, name: str = "") -> tuple[tools.Toolchain, dict[str, str], bool]:
+    """What compiles for a target from here: toolchain, environment, and whether zig links.
+
+    name: what a macOS library is to be called by those who link to it.
+    """
+    toolchain = tools.toolchain(target)
+    environment, flags, glibc = link(target, name)
+    flags += [f"--remap-path-prefix={path}={shown}" for path, shown in remap(toolchain)]
+    environment = {**os.environ, **toolchain.environment, **environment}
+    # Separated by what no path contains.
+    environment["CARGO_ENCODED_RUSTFLAGS"] = "\x1f".join(flags)
+    return toolchain, environment, glibc
+
+
+def link(target: Target, name: str) -> tuple[dict[str, str], list[str], bool]:
     """How to link for a target from here: environment, rustc's flags, and whether zig does it."""
     if "linux" in target.triple:
         # cargo-zigbuild looks for zig and, when it is called as the linker, for itself.
@@ -48,13 +58,13 @@ def link(target: Target) -> tuple[dict[str, str], list[str], bool]:
     if target.triple.endswith("-windows-msvc"):
         return {}, ["-Ctarget-feature=+crt-static", "-Clink-arg=/Brepro"], False
 
-    name = f"@rpath/{MODEL}{target.suffix}"
     # -S -x: what `strip` would do, but before the library is signed.
-    arguments = ["-install_name", name, "-dead_strip_dylibs", "-S", "-x"]
+    arguments = [*(["-install_name", name] if name else []), "-dead_strip_dylibs", "-S", "-x"]
     environment = {"CARGO_PROFILE_LIBRARY_STRIP": "false", "MACOSX_DEPLOYMENT_TARGET": target.macos}
     if sys.platform == "darwin":
         return environment, [f"-Clink-arg=-Wl,{','.join(arguments)}"], False
-    environment[f"{target.environment}LINKER"] = tools.rust_lld()
+    environment[f"{target.environment}LINKER"] = macos_linker.__file__
+    environment["PRW_RUST_LLD"] = tools.rust_lld()
     environment["SDKROOT"] = str(tools.macos_sdk())
     return environment, ["-Clinker-flavor=ld64.lld", *(f"-Clink-arg={a}" for a in arguments)], False
 

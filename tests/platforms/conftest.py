@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
+import tempfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +17,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 DIST = Path(os.environ.get("DIST", ROOT / "dist"))
 sys.path.insert(0, str(ROOT / "platforms"))
+
+# It asserts for the tests.
+pytest.register_assert_rewrite("headers")
 
 import toolchain  # noqa: E402
 from targets import FOLDERS, MODEL  # noqa: E402
@@ -167,6 +172,33 @@ def run_c(include, wine, tmp_path_factory):
         return outputs[program, arguments]
 
     return run
+
+
+def downloaded(package: str, requirements: Path, platform: str, python: str = "3.12") -> Path:
+    """The file of a package for a platform, of the version in `requirements`; "sdist" is its sources'."""
+    # With a sum, if it has one.
+    pattern = rf"^({package}==([\d.]+)(?: --hash=\S+)?)"
+    ((pinned, version),) = re.findall(pattern, requirements.read_text(), re.MULTILINE)
+    folder = ROOT / "target" / "wheels" / platform
+    file = f"{package.replace('-', '_')}-{version}[-.]*"
+    if not list(folder.glob(file)):
+        command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
+        if platform == "sdist":
+            command += [f"--no-binary={package}"]
+        else:
+            command += ["--only-binary=:all:", "--python-version", python, "--platform", platform]
+        folder.mkdir(parents=True, exist_ok=True)
+        # Only in a file may a sum stand beside a version.
+        with tempfile.NamedTemporaryFile("w", suffix=".txt") as wanted:
+            print(pinned, file=wanted, flush=True)
+            subprocess.run([*command, "--dest", folder, "-r", wanted.name], check=True)
+    (path,) = folder.glob(file)
+    return path
+
+
+def windows_path(path) -> str:
+    """The path of a file as Wine has it."""
+    return "Z:" + str(path).replace("/", "\\")
 
 
 def parse(text: str) -> list[tuple[str, list[float]]]:

@@ -1,7 +1,6 @@
 """Programs that others wrote for Windows load the FMU there, under Wine.
 
-* libcosim for Windows (from libcosimpy's wheel), with FMI Library in it: unpacks the FMU and steps it. What runs
-  it is in C, because no Python for Windows is to be had as a package.
+* libcosim for Windows (from libcosimpy's wheel), with FMI Library in it: unpacks the FMU and steps it, called from C.
 * Ecos for Windows (from ecospy's wheel), for FMI 2.0 and 3.0, in the same way.
 * FMPy's program for Windows that loads an FMU and serves it to FMPy elsewhere (its "remoting"). It knows no FMI 3.0.
 
@@ -11,7 +10,6 @@ All are compiled with Microsoft's compiler.
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
 import zipfile
@@ -19,7 +17,7 @@ import zipfile
 import fmpy.util
 import numpy as np
 import pytest
-from conftest import DIST, FMI3, HERE, ROOT, RUNNERS, WINE, disagreement
+from conftest import DIST, FMI3, HERE, ROOT, RUNNERS, WINE, disagreement, downloaded, windows_path
 
 #: The platforms of wheels.
 LINUX, WINDOWS = "manylinux_2_28_x86_64", "win_amd64"
@@ -69,20 +67,7 @@ def test_fmpys_server_for_windows(kind, simulate, served, fmu, capsys):
 
 def wheel(package: str, platform: str, requirements: str = "requirements.txt") -> zipfile.ZipFile:
     """The wheel of a package for a platform, of the version that the other tests use."""
-    (pinned,) = re.findall(rf"^{package}==[\d.]+", (ROOT / "tests" / requirements).read_text(), re.MULTILINE)
-    folder = ROOT / "target" / "wheels" / platform
-    file = f"{pinned.replace('==', '-')}-*.whl"
-    if not list(folder.glob(file)):
-        command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
-        command += ["--only-binary=:all:", "--python-version", "3.12", "--platform", platform]
-        subprocess.run([*command, "--dest", folder, pinned], check=True)
-    (path,) = folder.glob(file)
-    return zipfile.ZipFile(path)
-
-
-def windows_path(path) -> str:
-    """The path of a file as Wine has it."""
-    return "Z:" + str(path).replace("/", "\\")
+    return zipfile.ZipFile(downloaded(package, ROOT / "tests" / requirements, platform))
 
 
 @pytest.fixture
