@@ -46,54 +46,86 @@ impl FromStr for Measure {
     }
 }
 
-/// What is remembered of a course.
-#[derive(Clone, Copy, Debug)]
+/// What is remembered of the courses of all outputs, as far as the measures need it.
+#[derive(Clone, Debug)]
 pub(super) struct Measured {
-    min: f64,
-    max: f64,
-    peak: f64,
-    time_of_peak: f64,
-    sum: f64,
-    squares: f64,
-    end: f64,
+    extremes: bool,
+    peaks: bool,
+    sums: bool,
     count: f64,
+    min: Vec<f64>,
+    max: Vec<f64>,
+    peak: Vec<f64>,
+    time_of_peak: Vec<f64>,
+    sum: Vec<f64>,
+    squares: Vec<f64>,
+    end: Vec<f64>,
 }
 
 impl Measured {
-    pub const NOTHING: Self = Self {
-        min: f64::INFINITY,
-        max: f64::NEG_INFINITY,
-        peak: -1.0,
-        time_of_peak: f64::NAN,
-        sum: 0.0,
-        squares: 0.0,
-        end: f64::NAN,
-        count: 0.0,
-    };
-
-    #[inline]
-    pub fn add(&mut self, time: f64, value: f64) {
-        let magnitude = value.abs();
-        if magnitude > self.peak {
-            (self.peak, self.time_of_peak) = (magnitude, time);
+    pub fn new(measures: &[Measure], outputs: usize) -> Self {
+        let needs = |of: &[Measure]| measures.iter().any(|measure| of.contains(measure));
+        let zeros = vec![0.0; outputs];
+        Self {
+            extremes: needs(&[Measure::Min, Measure::Max]),
+            peaks: needs(&[Measure::Peak, Measure::TimeOfPeak]),
+            sums: needs(&[Measure::Mean, Measure::Rms]),
+            count: 0.0,
+            min: zeros.clone(),
+            max: zeros.clone(),
+            peak: zeros.clone(),
+            time_of_peak: zeros.clone(),
+            sum: zeros.clone(),
+            squares: zeros.clone(),
+            end: zeros,
         }
-        self.min = self.min.min(value);
-        self.max = self.max.max(value);
-        self.sum += value;
-        self.squares += value * value;
-        self.end = value;
-        self.count += 1.0;
     }
 
-    pub fn measure(&self, measure: Measure) -> f64 {
+    /// Forgets the run before.
+    pub fn begin(&mut self) {
+        self.count = 0.0;
+        self.min.fill(f64::INFINITY);
+        self.max.fill(f64::NEG_INFINITY);
+        self.peak.fill(-1.0);
+        self.sum.fill(0.0);
+        self.squares.fill(0.0);
+    }
+
+    /// The outputs at a time.
+    #[inline]
+    pub fn add(&mut self, time: f64, row: &[f64]) {
+        self.count += 1.0;
+        if self.extremes {
+            for ((min, max), value) in self.min.iter_mut().zip(&mut self.max).zip(row) {
+                *min = if *value < *min { *value } else { *min };
+                *max = if *value > *max { *value } else { *max };
+            }
+        }
+        if self.peaks {
+            for ((peak, when), value) in self.peak.iter_mut().zip(&mut self.time_of_peak).zip(row) {
+                if value.abs() > *peak {
+                    (*peak, *when) = (value.abs(), time);
+                }
+            }
+        }
+        if self.sums {
+            for ((sum, squares), value) in self.sum.iter_mut().zip(&mut self.squares).zip(row) {
+                *sum += value;
+                *squares += value * value;
+            }
+        }
+        self.end.copy_from_slice(row);
+    }
+
+    pub fn measure(&self, measure: Measure, output: usize) -> f64 {
         match measure {
-            Measure::Min => self.min,
-            Measure::Max => self.max,
-            Measure::Peak => self.peak,
-            Measure::TimeOfPeak => self.time_of_peak,
-            Measure::Mean => self.sum / self.count,
-            Measure::Rms => (self.squares / self.count).sqrt(),
-            Measure::End => self.end,
+            Measure::Min => self.min[output],
+            Measure::Max => self.max[output],
+            Measure::Peak => self.peak[output],
+            Measure::TimeOfPeak => self.time_of_peak[output],
+            Measure::Mean => self.sum[output] / self.count,
+            Measure::Rms => (self.squares[output] / self.count).sqrt(),
+            Measure::End => self.end[output],
         }
     }
 }

@@ -125,7 +125,7 @@ struct Room<'a> {
     got: Vec<f64>,
     /// The outputs of a time, in their order.
     row: Vec<f64>,
-    measured: Vec<Measured>,
+    measured: Measured,
 }
 
 impl<'a> Room<'a> {
@@ -139,7 +139,7 @@ impl<'a> Room<'a> {
             orders: vec![1; plan.derivatives.references.len()],
             got: vec![0.0; plan.real_outputs.0.len()],
             row: vec![0.0; plan.outputs],
-            measured: vec![Measured::NOTHING; plan.outputs],
+            measured: Measured::new(plan.measures, plan.outputs),
         }
     }
 
@@ -150,7 +150,7 @@ impl<'a> Room<'a> {
         let others = plan.other_inputs.iter();
         self.others =
             others.map(|(base, reference, values)| (*base, *reference, values.of_run(run))).collect();
-        self.measured.fill(Measured::NOTHING);
+        self.measured.begin();
     }
 }
 
@@ -162,11 +162,9 @@ impl<S: Slave> Worker<'_, S> {
         let done = follow(self.plan, &instance, &mut self.room, run, courses);
         let done = done.and_then(|()| instance.terminate().map_err(|refusal| (None, refusal)));
         let Err((time, refusal)) = done else {
-            for (measured, row) in
-                self.room.measured.iter().zip(measures.chunks_mut(self.plan.measures.len().max(1)))
-            {
+            for (output, row) in measures.chunks_mut(self.plan.measures.len().max(1)).enumerate() {
                 for (value, measure) in row.iter_mut().zip(self.plan.measures) {
-                    *value = measured.measure(*measure);
+                    *value = self.room.measured.measure(*measure, output);
                 }
             }
             self.instance = Some(instance);
@@ -231,9 +229,7 @@ fn follow<S: Slave>(
         }
         wait = wait.saturating_sub(1);
         if measures {
-            for (measured, value) in room.measured.iter_mut().zip(&room.row) {
-                measured.add(time, *value);
-            }
+            room.measured.add(time, &room.row);
         }
         if plan.read_before_set {
             set_inputs(plan, instance, room, k).map_err(at)?;
