@@ -31,7 +31,9 @@ TIME = np.arange(SAMPLES) * STEP
 class Case:
     """An FMU with a course for its inputs (samples, n) and names of its outputs."""
 
-    def __init__(self, name: str, fmu: Path, inputs: dict[str, np.ndarray], outputs: list[str], folder: Path, runs: int):
+    def __init__(
+        self, name: str, fmu: Path, inputs: dict[str, np.ndarray], outputs: list[str], folder: Path, runs: int
+    ):
         self.name, self.fmu, self.inputs, self.outputs, self.runs = name, fmu, inputs, outputs, runs
         self.folder = folder / name
         self.description = fmpy.read_model_description(str(fmu))
@@ -54,12 +56,16 @@ class Case:
         library = self.folder / "binaries" / "linux64" / f"{identifier}.so"
         lists = (",".join(map(str, references)) for references in self.references)
         command = [ROOT / "target/bench/loop", library, self.description.guid, self.runs, SAMPLES, STEP, *lists]
-        done = subprocess.run([str(word) for word in command], input=self.table.tobytes(), capture_output=True, check=True)
+        done = subprocess.run(
+            [str(word) for word in command], input=self.table.tobytes(), capture_output=True, check=True
+        )
         return float(done.stderr), np.frombuffer(done.stdout).reshape(SAMPLES, -1)
 
     def by_fmu_run(self, threads: int, **kept) -> tuple[float, fmu_run.Runs]:
         begin = time.perf_counter()
-        runs = self.loaded.run(TIME, inputs=self.inputs, start=self.start, outputs=self.outputs, threads=threads, **kept)
+        runs = self.loaded.run(
+            TIME, inputs=self.inputs, start=self.start, outputs=self.outputs, threads=threads, **kept
+        )
         return time.perf_counter() - begin, runs.check()
 
     def by_fmpy(self) -> tuple[float, np.ndarray]:
@@ -118,7 +124,9 @@ def row(case: Case) -> str:
 
 
 def main() -> None:
-    print("| FMU | one thread / C, outputs stored | one thread / C, measures | two threads, throughput | FMPy / one thread | FMPy / two |")
+    print(
+        "| FMU | one thread / C, outputs stored | one thread / C, measures | two threads, throughput | FMPy / one thread | FMPy / two |"
+    )
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         for case in cases(Path(folder)):

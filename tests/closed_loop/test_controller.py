@@ -89,7 +89,15 @@ def test_the_validator_has_nothing_to_say(either_fmu):
 def moved_by_fmpy(fmu, **options) -> np.ndarray:
     """The motors' motion (samples, 4) at each sample; all inputs follow a straight line, which every importer knows."""
     time = np.arange(0.0, 1.0 + STEP / 2, STEP)
-    slopes = {"pitch_ref": 0.5, "roll_ref": -0.8, "pitch": 0.3, "roll": -0.6, "pitch_rate": 0.1, "tau1": 0.2, "tau2": 0.1}
+    slopes = {
+        "pitch_ref": 0.5,
+        "roll_ref": -0.8,
+        "pitch": 0.3,
+        "roll": -0.6,
+        "pitch_rate": 0.1,
+        "tau1": 0.2,
+        "tau2": 0.1,
+    }
     inputs = np.zeros(len(time), dtype=[("time", float), *((name, float) for name in (*slopes, "roll_rate"))])
     inputs["time"] = time
     for name, slope in slopes.items():

@@ -85,7 +85,10 @@ def test_refused_runs_leave_the_others_alone(fmu):
         ({}, "no readable modelDescription.xml"),
         ({"modelDescription.xml": "<a"}, "is no XML"),
         ({"modelDescription.xml": '<fmiModelDescription fmiVersion="1.0"/>'}, 'its fmiVersion is "1.0"'),
-        ({"modelDescription.xml": '<fmiModelDescription fmiVersion="2.0"><ModelExchange/></fmiModelDescription>'}, "no Co-Simulation"),
+        (
+            {"modelDescription.xml": '<fmiModelDescription fmiVersion="2.0"><ModelExchange/></fmiModelDescription>'},
+            "no Co-Simulation",
+        ),
         ({"../outside": "x"}, "cannot be unpacked|no readable modelDescription.xml"),
         ("text", "is no FMU, which is a zip file"),
     ],
@@ -188,7 +191,13 @@ def test_progress(testbed):
     time = np.linspace(0, 20, 20001)
     with fmu_run.Fmu(testbed) as fmu:
         start = {"k1": np.full(400, 90.0)}
-        fmu.run(time, start=start, outputs=["roll"], measures=["peak"], progress=lambda done, all_: told.append((done, all_)))
+        fmu.run(
+            time,
+            start=start,
+            outputs=["roll"],
+            measures=["peak"],
+            progress=lambda done, all_: told.append((done, all_)),
+        )
         assert told and all(all_ == 400 for _, all_ in told) and told == sorted(told)
 
         def stop(done, runs):

@@ -148,9 +148,7 @@ def _faded(time: np.ndarray, wave: np.ndarray) -> np.ndarray:
     slope = np.where(inside, 30 * x**2 * (1 - x) ** 2 / FADE, 0.0) * sign
     bend = np.where(inside, 60 * x * (1 - x) * (1 - 2 * x) / FADE**2, 0.0)
     angle, rate, acceleration = wave
-    return np.stack(
-        [gain * angle, gain * rate + slope * angle, gain * acceleration + 2 * slope * rate + bend * angle]
-    )
+    return np.stack([gain * angle, gain * rate + slope * angle, gain * acceleration + 2 * slope * rate + bend * angle])
 
 
 def _assemble(name: str, time: np.ndarray, waves, pattern: str, limits: Limits) -> Motion:

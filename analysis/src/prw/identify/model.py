@@ -73,9 +73,7 @@ class Model(Testbed):
             if v.type == "Real":
                 unit, display = v.unit, v.displayUnit or v.unit
                 factor = shown.get((unit, display), 1.0)
-                self.parameters[v.name] = Parameter(
-                    v.name, float(v.start), unit, display, factor, v.description or ""
-                )
+                self.parameters[v.name] = Parameter(v.name, float(v.start), unit, display, factor, v.description or "")
             elif v.type == "Integer":
                 self.counts[v.name] = int(v.start)
         if self._description.coSimulation.providesDirectionalDerivative is not True:
@@ -135,9 +133,7 @@ class Model(Testbed):
         start.update(zip(STATES, np.asarray(() if state is None else state, dtype=float)))
         return self._courses(motion, channels, every, start)
 
-    def transients(
-        self, time: np.ndarray, channels: Sequence[str], values: Mapping[str, float]
-    ) -> np.ndarray:
+    def transients(self, time: np.ndarray, channels: Sequence[str], values: Mapping[str, float]) -> np.ndarray:
         """What each initial state adds to the channels at `time` (k,): (k, len(channels), 6). That is linear, so the motors
         rest at 0, and between two times the FMU is exact."""
         still = np.zeros((len(time), 2))

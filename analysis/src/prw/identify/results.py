@@ -113,9 +113,7 @@ class Findings:
                     f"{name} came out {abs(off):.1f} standard deviations off its prior; data and prior disagree"
                 )
         if (sure.whiteness > UNLIKE).any() and not sure.undetermined:
-            lines.append(
-                "the noise is not white (quantised angles do that); the standard errors take it into account"
-            )
+            lines.append("the noise is not white (quantised angles do that); the standard errors take it into account")
         return list(dict.fromkeys(lines))
 
     def _actual(self, name: str) -> float:

@@ -54,9 +54,7 @@ class Combination(NamedTuple):
         if len(self.shares) == 1:
             return f"{next(iter(self.shares))} has hardly any effect on what was measured"
         names = list(self.shares)
-        return (
-            f"{', '.join(names[:-1])} and {names[-1]} cannot be told apart: {moves} together change next to nothing"
-        )
+        return f"{', '.join(names[:-1])} and {names[-1]} cannot be told apart: {moves} together change next to nothing"
 
 
 class Certainty(NamedTuple):

@@ -46,9 +46,7 @@ def add_parser(subparsers) -> None:
         metavar="NAME=[VALUE:]PERCENT%",
         help="log-normal about VALUE in SI (default: the start value). May be repeated",
     )
-    parser.add_argument(
-        "--runs", type=int, default=1000, metavar="N", help="draws of --random (default: %(default)s)"
-    )
+    parser.add_argument("--runs", type=int, default=1000, metavar="N", help="draws of --random (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
     parser.add_argument(
         "--input", type=Path, metavar="FILE", help="motor recording, as for `prw simulate` (default: that of Fig. 4)"

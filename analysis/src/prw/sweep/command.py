@@ -102,8 +102,6 @@ def _steps(name: str, text: str, starts: Dict[str, float]) -> np.ndarray:
         if len(parts) != 3 or count < 1 or not np.isfinite([low, high]).all():
             raise ValueError
     except (ValueError, IndexError):
-        raise UserError(
-            f"--grid {name}={text}: write {name}=LOW:HIGH:N with a whole number N of at least 1"
-        ) from None
+        raise UserError(f"--grid {name}={text}: write {name}=LOW:HIGH:N with a whole number N of at least 1") from None
     # Values that the FMU refuses are runs that fail, not a reason to stop.
     return np.linspace(low, high, count)

@@ -13,7 +13,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -124,7 +124,7 @@ class Fmu:
         #: The variables by name, in the order of the model description. Arrays and clocks of FMI 3.0 are left out.
         self.variables = {fields[0]: Variable(*fields) for fields in self._loaded.variables()}
 
-    def __enter__(self) -> Fmu:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
