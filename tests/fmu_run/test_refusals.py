@@ -166,7 +166,9 @@ def test_other_types(unruly):
 
 
 LONG = """
-import sys, numpy as np, fmu_run
+import signal, sys, numpy as np, fmu_run
+# Shells start commands in the background with Ctrl-C ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 with fmu_run.Fmu(sys.argv[1]) as fmu:
     time = np.linspace(0, 100, 100001)
     print("begun", flush=True)
@@ -178,11 +180,14 @@ with fmu_run.Fmu(sys.argv[1]) as fmu:
 
 
 def test_ctrl_c_stops_between_runs(testbed):
-    process = subprocess.Popen([sys.executable, "-c", LONG, testbed], stdout=subprocess.PIPE, text=True)
-    assert process.stdout.readline() == "begun\n"
-    clock.sleep(1.0)
-    process.send_signal(signal.SIGINT)
-    assert process.communicate(timeout=30)[0] == "interrupted\n"
+    with subprocess.Popen([sys.executable, "-c", LONG, testbed], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "begun\n"
+            clock.sleep(1.0)
+            process.send_signal(signal.SIGINT)
+            assert process.communicate(timeout=60)[0] == "interrupted\n"
+        finally:
+            process.kill()
     assert process.returncode == 0
 
 
