@@ -54,6 +54,8 @@ def test_goes_on_after_a_kill(prw, tmp_path, fmu):
     process.wait()
     kept = sum(pq.read_table(part).num_rows for part in parts.glob("[0-9]*.parquet"))
     assert 0 < kept < 400
+    # As if it had been killed while it wrote.
+    (parts / ".000000390-000000399-abcdefgh.parquet").touch()
     result = prw(*arguments)
     assert result.returncode == 0, result.stderr
     assert "were there already" in result.stdout

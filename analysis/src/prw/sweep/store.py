@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Set
 
@@ -46,7 +47,7 @@ class Store:
         if self.table.exists():
             return set(range(len(self._study.table)))
         found: Set[int] = set()
-        for part in sorted(self._parts.glob("*.parquet")):
+        for part in self._whole():
             found.update(self._read(part).column("run").to_pylist())
         return found
 
@@ -59,13 +60,10 @@ class Store:
     def finish(self) -> Dict[str, int]:
         """Put all parts into one table, sorted by run. Returns the number of runs by status."""
         if not self.table.exists():
-            parts = sorted(self._parts.glob("*.parquet"))
-            whole = pa.concat_tables([self._read(part) for part in parts]).sort_by("run")
+            whole = pa.concat_tables([self._read(part) for part in self._whole()]).sort_by("run")
             with replacing(self.table) as temporary:
                 pq.write_table(whole, temporary)
-            for part in parts:
-                part.unlink()
-            self._parts.rmdir()
+            shutil.rmtree(self._parts)
         counts = pq.read_table(self.table, columns=["status"]).column("status").value_counts().to_pylist()
         return {entry["values"]: entry["counts"] for entry in counts}
 
@@ -73,6 +71,10 @@ class Store:
         """The message of the first run that failed."""
         table = pq.read_table(self.table, columns=["run", "status", "message"]).to_pylist()
         return next((f"run {row['run']}: {row['message']}" for row in table if row["status"] == "failed"), "")
+
+    def _whole(self) -> List[Path]:
+        """The parts that were written to their end: a process that is killed leaves others, with a dot before the name."""
+        return sorted(self._parts.glob("[0-9]*.parquet"))
 
     def _read(self, part: Path) -> pa.Table:
         try:
