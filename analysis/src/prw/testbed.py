@@ -45,6 +45,12 @@ class Testbed:
         """Unload the library and remove the unpacked files. Harmless when called again."""
         self.loaded.close()
 
+    @property
+    def starts(self) -> Dict[str, float]:
+        """The start values of the Real parameters in SI, by name."""
+        parameters = (v for v in self.loaded.variables.values() if v.causality == "parameter" and v.type == "Real")
+        return {v.name: float(v.start) for v in parameters}
+
     def respond(
         self, motion: Motion, outputs: Sequence[str] = OUTPUTS, start: Mapping[str, float] = {}
     ) -> Dict[str, np.ndarray]:

@@ -60,8 +60,6 @@ class Model(Testbed):
         self._said: List[str] = []
         self._description = fmpy.read_model_description(str(fmu))
         self._references = {v.name: v.valueReference for v in self._description.modelVariables}
-        self._folder = fmpy.extract(str(fmu))
-        self._slave = instantiate_fmu(self._folder, self._description, fmi_type="CoSimulation", logger=self._hear)
         shown = {
             (unit.name, display.name): 1 / display.factor
             for unit in self._description.unitDefinitions
@@ -93,11 +91,6 @@ class Model(Testbed):
     def meaning(self, name: str) -> str:
         """The description of the variable `name`."""
         return next(v.description or "" for v in self._description.modelVariables if v.name == name)
-
-    @property
-    def starts(self) -> Dict[str, float]:
-        """The start values of the Real parameters in SI, by name."""
-        return {name: parameter.start for name, parameter in self.parameters.items()}
 
     def run(
         self, motion: Motion, values: Mapping[str, float], outputs: Sequence[str] = OUTPUTS, state=None
@@ -151,6 +144,9 @@ class Model(Testbed):
 
     def matrices(self, values: Mapping[str, float]) -> Matrices:
         """The FMU's linear model with the parameters `values` (SI, by name), from fmi2GetDirectionalDerivative."""
+        if self._slave is None:
+            self._folder = fmpy.extract(str(self.fmu))
+            self._slave = instantiate_fmu(self._folder, self._description, fmi_type="CoSimulation", logger=self._hear)
         reference, slave = self._references, self._slave
         rates = [reference[f"der({name})"] for name in STATES]
         calculated = [name for name in OUTPUTS if name not in STATES]

@@ -14,11 +14,11 @@ from prw import motion as motions
 from prw import recording
 from prw.errors import UserError
 from prw.identify import options
-from prw.identify.model import Model
 from prw.progress import Progress
 from prw.sweep.store import Store
 from prw.sweep.study import Study, chunks
 from prw.sweep.workers import on_cluster, on_this_machine
+from prw.testbed import Testbed
 
 #: A chunk is kept when it is done, and is the unit of what an interruption loses.
 LONGEST_CHUNK = 256
@@ -36,8 +36,8 @@ def sweep(arguments: argparse.Namespace) -> None:
     workers = arguments.workers if arguments.workers is not None else os.cpu_count() or 1
     if workers < 1:
         raise UserError(f"--workers {workers}: at least 1 is needed")
-    with Model(arguments.fmu) as model:
-        values = layout(arguments, model.starts)
+    with Testbed(arguments.fmu) as testbed:
+        values = layout(arguments, testbed.starts)
     study = Study(arguments.fmu.read_bytes(), motion, tuple(values), np.column_stack(list(values.values())))
     store = Store(arguments.out, study)
     total = len(study.table)
