@@ -148,6 +148,17 @@ def test_an_unruly_fmu(unruly):
     assert np.nanmax(runs["instances"]) <= 1 + 3
 
 
+def test_an_fmu_that_makes_no_instances(tmp_path, unruly):
+    path = tmp_path / "strange.fmu"
+    with zipfile.ZipFile(unruly) as whole, zipfile.ZipFile(path, "w") as archive:
+        for name in whole.namelist():
+            archive.writestr(name, whole.read(name).replace(b'guid="{unruly}"', b'guid="{strange}"'))
+    with fmu_run.Fmu(path) as fmu:
+        runs = fmu.run(TIME, start={"slope": [1.0, 2.0]}, outputs=["y"], every=1, measures=["peak"])
+    assert runs.errors == dict.fromkeys((0, 1), "Unruly makes no instance, and logs no message")
+    assert np.isnan(runs["y"]).all() and np.isnan(runs["y", "peak"]).all()
+
+
 def test_other_types(unruly):
     with fmu_run.Fmu(unruly) as fmu:
         assert fmu.variables["label"].type == "String" and fmu.variables["count"].start == "3"

@@ -26,7 +26,7 @@ pub mod realtime;
 pub mod serialized;
 pub mod testing;
 
-pub use batch::{Batch, Course, Measure, Runs, Size, Start, Watch};
+pub use batch::{Batch, Course, Measure, Planned, Runs, Size, Start, Watch};
 pub use description::{Description, Standard, Variable};
 pub use error::Error;
 pub use fmu::Fmu;

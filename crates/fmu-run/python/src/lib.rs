@@ -1,7 +1,7 @@
 //! The part of the Python package `fmu_run` that is written in Rust: `fmu_run._native`. What users see is in
 //! `fmu_run/__init__.py`.
 
-use fmu_run::{Batch, Course, Error, Fmu, Start, Watch};
+use fmu_run::{Batch, Course, Error, Fmu, Planned, Start, Watch};
 use numpy::{PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
@@ -113,7 +113,8 @@ impl Loaded {
             threads,
             read_before_set,
         };
-        let size = fmu.size(&batch).map_err(python)?;
+        let planned = fmu.plan(&batch).map_err(python)?;
+        let size = planned.size();
         if size.courses().is_none() || size.measures().is_none() {
             return Err(python(Error::too_much()));
         }
@@ -126,7 +127,7 @@ impl Loaded {
         let errors = {
             let (mut courses, mut measures) = (courses.readwrite(), measures.readwrite());
             let room = [courses.as_slice_mut()?, measures.as_slice_mut()?];
-            carry_out(py, &fmu, &batch, size.runs, room, progress.as_ref())?
+            carry_out(py, &planned, room, progress.as_ref())?
         };
         Ok((courses, measures, errors))
     }
@@ -170,9 +171,7 @@ fn starts<'a>(given: &'a [(String, StartValue)]) -> PyResult<Vec<(&'a str, Start
 /// The runs, in other threads; this one listens to Python.
 fn carry_out(
     py: Python,
-    fmu: &Fmu,
-    batch: &Batch,
-    total: usize,
+    planned: &Planned,
     [courses, measures]: [&mut [f64]; 2],
     progress: Option<&Py<PyAny>>,
 ) -> PyResult<Vec<(usize, String)>> {
@@ -181,7 +180,7 @@ fn carry_out(
     // Messages may be sent to one thread only.
     let receiver = Mutex::new(receiver);
     std::thread::scope(|scope| {
-        scope.spawn(|| sender.send(fmu.run_into(batch, &watch, courses, measures)));
+        scope.spawn(|| sender.send(planned.run(&watch, courses, measures)));
         let mut raised = None;
         loop {
             let waited =
@@ -194,8 +193,9 @@ fn carry_out(
                 Err(RecvTimeoutError::Timeout) => {}
             }
             if raised.is_none() {
-                let told =
-                    progress.map_or(Ok(()), |progress| progress.call1(py, (watch.done(), total)).map(drop));
+                let told = progress.map_or(Ok(()), |progress| {
+                    progress.call1(py, (watch.done(), planned.size().runs)).map(drop)
+                });
                 if let Err(error) = py.check_signals().and(told) {
                     watch.cancel();
                     raised = Some(error);

@@ -111,37 +111,49 @@ impl Fmu {
     /// [`Error::Cancelled`]. A run that the FMU refuses, or makes no instance for, is no error here, see
     /// [`Runs::errors`].
     pub fn run(&self, batch: &Batch, watch: &Watch) -> Result<Runs, Error> {
-        let size = self.size(batch)?;
+        let planned = self.plan(batch)?;
+        let size = planned.size();
         let [mut courses, mut measures] = [zeros(size.courses())?, zeros(size.measures())?];
-        let errors = self.run_into(batch, watch, &mut courses, &mut measures)?;
+        let errors = planned.run(watch, &mut courses, &mut measures)?;
         Ok(Runs { size, courses, measures, errors })
+    }
+
+    /// Checks a batch, for who has memory for its results.
+    ///
+    /// # Errors
+    /// [`Error::Request`], as [`run`](Self::run).
+    pub fn plan<'a>(&'a self, batch: &'a Batch) -> Result<Planned<'a>, Error> {
+        Ok(Planned { fmu: self, plan: plan::Plan::of(self, batch)? })
+    }
+}
+
+/// A [`Batch`] that fits its FMU.
+pub struct Planned<'a> {
+    fmu: &'a Fmu,
+    plan: plan::Plan<'a>,
+}
+
+impl Planned<'_> {
+    /// How much comes of it.
+    pub fn size(&self) -> Size {
+        let plan = &self.plan;
+        Size { runs: plan.runs, outputs: plan.outputs, kept: plan.kept(), measures: plan.measures.len() }
     }
 
     /// Carries out the runs, into memory of the caller, as [`Runs`] has it; returns [`Runs::errors`].
     ///
     /// # Errors
-    /// As [`run`](Self::run).
+    /// As [`Fmu::run`].
     ///
     /// # Panics
     /// When there is too little room.
-    pub fn run_into(
+    pub fn run(
         &self,
-        batch: &Batch,
         watch: &Watch,
         courses: &mut [f64],
         measures: &mut [f64],
     ) -> Result<Vec<(usize, String)>, Error> {
-        let plan = plan::Plan::of(self, batch)?;
-        run::run(self, &plan, watch, [courses, measures])
-    }
-
-    /// How much comes of a batch.
-    ///
-    /// # Errors
-    /// [`Error::Request`], as [`run`](Self::run).
-    pub fn size(&self, batch: &Batch) -> Result<Size, Error> {
-        let plan = plan::Plan::of(self, batch)?;
-        Ok(Size { runs: plan.runs, outputs: plan.outputs, kept: plan.kept(), measures: plan.measures.len() })
+        run::run(self.fmu, &self.plan, watch, [courses, measures])
     }
 }
 

@@ -78,8 +78,10 @@ fn on_threads<S: Slave + Send>(
         while !watch.is_cancelled()
             && let Some(row) = next()
         {
-            let run = row.run;
-            if let Err(error) = worker.run(row) {
+            let Row { run, courses, measures } = row;
+            if let Err(error) = worker.run(run, courses, measures) {
+                courses.fill(f64::NAN);
+                measures.fill(f64::NAN);
                 errors.push((run, error));
             }
             watch.done.fetch_add(1, Ordering::Relaxed);
@@ -155,9 +157,8 @@ impl<'a> Room<'a> {
 }
 
 impl<S: Slave> Worker<'_, S> {
-    fn run(&mut self, row: Row) -> Result<(), String> {
+    fn run(&mut self, run: usize, courses: &mut [f64], measures: &mut [f64]) -> Result<(), String> {
         let instance = self.instance()?;
-        let Row { run, courses, measures } = row;
         self.room.begin(self.plan, run);
         let done = follow(self.plan, &instance, &mut self.room, run, courses);
         let done = done.and_then(|()| instance.terminate().map_err(|refusal| (None, refusal)));
@@ -170,8 +171,6 @@ impl<S: Slave> Worker<'_, S> {
             self.instance = Some(instance);
             return Ok(());
         };
-        courses.fill(f64::NAN);
-        measures.fill(f64::NAN);
         match refusal.is_fatal() {
             // Not even its memory may be given back.
             true => std::mem::forget(instance),
