@@ -28,7 +28,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -48,7 +48,7 @@ help:
 	@echo 'make wheels                  the Python package fmu-run for the same systems, ready to install -> dist/wheels/'
 	@echo 'make test-platforms          run both on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make dist/ again elsewhere and compare every byte'
-	@echo 'make study                   set up prw identify, excite and sweep  (see analysis/tutorial.md)'
+	@echo 'make study                   set up prw identify, excite, sweep and linearize  (see analysis/tutorial.md)'
 	@echo 'make monte-carlo             200 identifications of simulated rigs -> out/monte_carlo.json'
 	@echo 'make fuzz                    look for calls that break the FMU, for 10 minutes (FUZZ_SECONDS=600)'
 	@echo 'make sanitize                the tests under address, leak, thread and real-time sanitizers and valgrind'
@@ -63,10 +63,10 @@ demo: need-rust need-python
 fmu: need-rust
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu
 
-test: test-rust test-fmu test-closed-loop
+test: test-rust test-python test-fmu test-closed-loop
 
 # C programs are compiled against the standard's headers, which FMPy brings.
-headers: $(VENV)/demo.stamp
+headers: $(VENV)/study.stamp
 
 test-rust: need-rust headers
 	$(CARGO) fmt --all --check
@@ -78,6 +78,12 @@ test-rust: need-rust headers
 	  set -ex; $(CARGO) test $(LOCKED) --workspace; \
 	fi
 
+# ruff and mypy; pyproject.toml says what they look at.
+test-python: $(VENV)/test.stamp
+	$(PY) -m ruff check
+	$(PY) -m ruff format --check
+	$(PY) -m mypy
+
 # Everyone else gets the newest FMPy, these environments the oldest that is supported.
 test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 	@$(PIP_INSTALL) --quiet --upgrade --no-deps --target target/newest-fmpy fmpy
@@ -85,25 +91,25 @@ test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check
-	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/analysis
+	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis
 
 # Ratios of one run; quiet the machine first.
-bench: $(VENV)/demo.stamp closed-loop-fmus
+bench: $(VENV)/study.stamp closed-loop-fmus
 	@benches/run $(FMU) $(PY)
 
 # Instructions of a step, counted by callgrind.
-profile: $(VENV)/demo.stamp fmu
+profile: $(VENV)/study.stamp fmu
 	@benches/profile $(FMU) $(PY)
 
 # The figures and their copies for documentation and README.
-figures: need-rust $(VENV)/demo.stamp fmu
-	@$(VENV)/bin/prw figures --fmu $(FMU) --commit
+figures: need-rust $(VENV)/test.stamp fmu
+	@$(PY) -m tools figures --fmu $(FMU) --commit
 
 # The pages' tables come from the model descriptions.
 docs: need-rust $(VENV)/test.stamp
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe
 	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --describe
-	@$(VENV)/bin/prw docs
+	@$(PY) -m tools docs
 
 # A controller FMU, the system of both, and the example FMU to copy.
 closed-loop-fmus: fmu
@@ -112,7 +118,7 @@ closed-loop-fmus: fmu
 	@$(CARGO) run $(LOCKED) --release -p lag_fmu -- --out target/fmu
 
 closed-loop: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
-	@$(VENV)/bin/prw closed-loop $(ARGS)
+	@$(PY) -m tools closed-loop $(ARGS)
 
 test-closed-loop: $(VENV)/closed-loop.stamp closed-loop-fmus
 	$(PYTEST) tests/closed_loop
@@ -133,7 +139,7 @@ test-reproducible: dist
 	@$(DIST_VENV)/bin/python platforms/rebuild.py
 
 study: $(VENV)/study.stamp fmu
-	@echo 'ready: $(VENV)/bin/prw identify --help, excite --help, sweep --help; analysis/tutorial.md shows how'
+	@echo 'ready: $(VENV)/bin/prw identify, excite, sweep and linearize (with --help); analysis/tutorial.md shows how'
 
 # Takes minutes; `make test` has the short version.
 monte-carlo: $(VENV)/study.stamp fmu

@@ -32,7 +32,7 @@ def smoothly(motion: Motion) -> Motion:
         path = CubicSpline(motion.time, motion.theta)
     else:
         path = CubicHermiteSpline(motion.time, motion.theta, motion.omega)
-    return Motion(motion.name, time, path(time), path(time, 1))
+    return Motion(time, path(time), path(time, 1), motion.name)
 
 
 def main() -> None:
@@ -50,8 +50,7 @@ def main() -> None:
         truth = {name: model.starts[name] * float(rig.uniform(0.75, 1.3)) for name in CHOSEN}
         response = {name: values[::STEPS] for name, values in model.run(smoothly(motion), truth).items()}
         shown = {
-            name: f"{truth[name] / model.parameters[name].factor:.5g} {model.parameters[name].shown}"
-            for name in CHOSEN
+            name: f"{truth[name] / model.parameters[name].factor:.5g} {model.parameters[name].shown}" for name in CHOSEN
         }
 
     def encoder(angle: np.ndarray) -> np.ndarray:
@@ -69,9 +68,7 @@ def main() -> None:
         else:
             noise = sensors.normal(0, 0.06, len(motion.time)) + sensors.uniform(-1, 1)
             columns[f"{name} [deg]"] = np.degrees(response[name]) + noise
-    np.savetxt(
-        options.run, np.column_stack(list(columns.values())), "%.6f", ",", header=",".join(columns), comments=""
-    )
+    np.savetxt(options.run, np.column_stack(list(columns.values())), "%.6f", ",", header=",".join(columns), comments="")
     print(f"wrote {options.run}; the rig behind it: " + ", ".join(f"{name} {text}" for name, text in shown.items()))
 
 

@@ -18,7 +18,7 @@ def shaky(n: int, h: float, seed: int = 0) -> Motion:
     random = np.random.default_rng(seed)
     t = np.arange(n) * h
     theta = np.column_stack([0.3 * np.sin(20 * t), 0.2 * np.cos(31 * t)]) + random.normal(0, 0.01, (n, 2))
-    return Motion("shaky", t, theta, random.normal(0, 3, (n, 2)))
+    return Motion(t, theta, random.normal(0, 3, (n, 2)), "shaky")
 
 
 @pytest.mark.parametrize("every", [1, 4])

@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from prw.motion import fig4
-from prw.sweep.study import Study, chunks
-from prw.sweep.workers import on_this_machine
+from prw.sweeps.study import Study, chunks
+from prw.sweeps.workers import on_this_machine
 from prw.testbed import OUTPUTS
 
 

@@ -1,1 +1,66 @@
-"""Simulation and analysis of the pitch-roll wrist testbed, on top of its FMU. The command is `prw`."""
+"""The pitch-roll wrist testbed in Python: simulate it, read recordings of it, linearize it, run it with thousands of
+parameter sets.
+
+    import prw
+
+    run = prw.simulate("motors.csv", {"k1": 100.0})  # or a prw.Motion; by default the paper's experiment
+    run["roll"]  # (n,) rad, at run.time
+
+Everything is in SI (s, rad, rad/s, N.m, kg.m2). Nothing prints, and nothing writes a file unless it is told where. What
+the caller can put right is a `prw.UserError`, whose text says what is wrong and what to do.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from prw.errors import UserError
+    from prw.linearization import Linearizer, linearize
+    from prw.motion import Motion
+    from prw.recording import Recording, read
+    from prw.simulation import Run, simulate
+    from prw.state_space import StateSpace
+    from prw.sweeps import sweep
+
+__all__ = [
+    "Linearizer",
+    "Motion",
+    "Recording",
+    "Run",
+    "StateSpace",
+    "UserError",
+    "linearize",
+    "read",
+    "simulate",
+    "sweep",
+]
+
+#: The module of each name, loaded when the name is first used: `import prw` takes no time. A name here must not be that
+#: of a module or package in this folder, which would take its place once something imports it.
+_HOMES = {
+    "Linearizer": "linearization",
+    "Motion": "motion",
+    "Recording": "recording",
+    "Run": "simulation",
+    "StateSpace": "state_space",
+    "UserError": "errors",
+    "linearize": "linearization",
+    "read": "recording",
+    "simulate": "simulation",
+    "sweep": "sweeps",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "motion":  # for prw.motion.fig4()
+        return importlib.import_module("prw.motion")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'prw' has no attribute {name!r}")
+    value = globals()[name] = getattr(importlib.import_module(f"prw.{_HOMES[name]}"), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

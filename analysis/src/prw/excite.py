@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.identify.options import FORMATTER, add_task_options, names, need, number, numbers
-from prw.simulate import DEFAULT_FMU, DEFAULT_OUT
 
 DESCRIPTION = """\
 Proposes motor motions within the motors' limits and ranks them by what they tell about the parameters: the standard
@@ -49,9 +49,7 @@ def add_parser(subparsers) -> None:
         metavar="DEG/S2",
         help="motor limit, deg/s2 (default: %(default)g)",
     )
-    parser.add_argument(
-        "--duration", type=float, default=10.0, metavar="S", help="of a motion (default: %(default)g)"
-    )
+    parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="of a motion (default: %(default)g)")
     parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="of sampling (default: %(default)g)")
     add_task_options(parser)
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
@@ -71,9 +69,9 @@ def run(arguments: argparse.Namespace) -> None:
     import numpy as np
     from threadpoolctl import threadpool_limits
 
+    from prw.channels import MEASURED
     from prw.errors import UserError
     from prw.identify import design
-    from prw.channels import MEASURED
     from prw.identify.command import task_of
     from prw.identify.exports import write_json
     from prw.identify.model import Model
@@ -90,9 +88,7 @@ def run(arguments: argparse.Namespace) -> None:
         )
     if rate < 50:
         raise UserError(f"--rate {rate:g}: the testbed moves at up to 30 Hz; sample with 50 Hz or more")
-    channels = (
-        tuple(MEASURED) if arguments.measure == "all" else names(arguments.measure, list(MEASURED), "--measure")
-    )
+    channels = tuple(MEASURED) if arguments.measure == "all" else names(arguments.measure, list(MEASURED), "--measure")
     noise = {**design.default_noise(), **numbers(arguments.noise, list(MEASURED), "--noise")}
     noise = {name: noise[name] for name in channels}
     limits = design.Limits(*np.deg2rad([angle, speed, acceleration]))

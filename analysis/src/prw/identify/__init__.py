@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from prw.identify.options import FORMATTER, add_task_options
-from prw.simulate import DEFAULT_FMU, DEFAULT_OUT
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 
 DESCRIPTION = """\
 Estimates parameters of the testbed from measurements: those with which the FMU, driven by the measured motor angles,

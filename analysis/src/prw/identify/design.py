@@ -162,7 +162,7 @@ def _within(name: str, time: np.ndarray, motors, limits: Limits) -> Motion:
     peaks = np.max([np.abs(wave).max(axis=1) for wave in motors], axis=0)
     scale = min(limit / peak for limit, peak in zip((limits.angle, limits.rate, limits.acceleration), peaks))
     theta, omega = (np.column_stack([scale * wave[i] for wave in motors]) for i in (0, 1))
-    return Motion(name, time, theta, omega)
+    return Motion(time, theta, omega, name)
 
 
 def _optimal(model: Model, task: Task, time, frequency: np.ndarray, limits: Limits, noise) -> Motion:

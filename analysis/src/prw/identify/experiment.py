@@ -60,7 +60,7 @@ class Experiment:
 
     def motion(self) -> Motion:
         """What the FMU is driven by."""
-        return Motion(self.name, self.start + self.step * np.arange(len(self.theta)), self.theta, self.omega)
+        return Motion(self.start + self.step * np.arange(len(self.theta)), self.theta, self.omega, self.name)
 
     def rest(self) -> np.ndarray:
         """The state (6,) of rest at the motors' first angles."""

@@ -131,7 +131,7 @@ class Model(Testbed):
         rest at 0, and between two times the FMU is exact."""
         still = np.zeros((len(time), 2))
         table = self._courses(
-            Motion("rest", time, still, still), channels, 1, {**values, **dict(zip(STATES, np.eye(len(STATES))))}
+            Motion(time, still, still), channels, 1, {**values, **dict(zip(STATES, np.eye(len(STATES))))}
         )
         return np.moveaxis(table, 0, -1)
 
