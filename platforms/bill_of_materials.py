@@ -16,7 +16,7 @@ import subprocess
 import sys
 import uuid
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 from targets import MODEL, ROOT, TARGETS
@@ -70,7 +70,7 @@ distribution. libgcc is linked under the GCC Runtime Library Exception, which as
 """
 
 
-@lru_cache(maxsize=None)
+@cache
 def packages(product: Product) -> list[dict]:
     """The packages that are compiled into a library for any target, as cargo describes them."""
     names = set()
@@ -100,7 +100,12 @@ def copyright_of(package: dict) -> str:
         if re.match(r"(licen[cs]e|copyright)", path.name, re.IGNORECASE) and path.is_file():
             for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
                 match = HOLDER.match(line)
-                if match and "owner" not in match[1] and match[1] not in lines and not re.fullmatch(r"[\d\s-]+", match[1]):
+                if (
+                    match
+                    and "owner" not in match[1]
+                    and match[1] not in lines
+                    and not re.fullmatch(r"[\d\s-]+", match[1])
+                ):
                     lines.append(match[1])
     authors = [re.sub(r"\s*<.*>", "", author) for author in package["authors"]]
     return "; ".join(lines or authors) or "its authors"
