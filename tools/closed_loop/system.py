@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Union
 from xml.etree import ElementTree
 
 from prw.errors import UserError
 
-Value = Union[float, int, bool]
+Value = float | int | bool
 OSP = "{http://opensimulationplatform.com/MSMI/OSPSystemStructure}"
 
 

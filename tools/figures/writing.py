@@ -175,7 +175,7 @@ def _join_ticks(root) -> None:
     """Neighbours of one style and nothing else are one path."""
     for path in reversed(list(root.iter(f"{SVG}path"))):
         before = path.getprevious()
-        if before is not None and before.tag == path.tag and set(path.attrib) == {"d", "style"} == set(before.attrib):
-            if path.get("style") == before.get("style"):
-                before.attrib["d"] += path.get("d")
-                path.getparent().remove(path)
+        alike = before is not None and before.tag == path.tag and before.get("style") == path.get("style")
+        if alike and set(path.attrib) == {"d", "style"} == set(before.attrib):
+            before.attrib["d"] += path.get("d")
+            path.getparent().remove(path)

@@ -71,7 +71,7 @@ class Linearizer:
         try:
             self._description = fmpy.read_model_description(str(self.fmu))
         except Exception as error:  # FMPy raises bare Exceptions
-            raise UserError(f"{self.fmu}: cannot be read ({error})") from None
+            raise UserError(f"{self.fmu}: cannot be read ({' '.join(str(error).split())})") from None
         self._fmi_type = self._interface(fmi_type)
         self._variables = {v.name: v for v in self._description.modelVariables}
         derivatives = {d.variable.derivative.name: d.variable.name for d in self._description.derivatives}
