@@ -21,9 +21,8 @@ from test_model_exchange import END, OUTPUTS, angle, rate
 
 from prw.errors import UserError
 from prw.motion import Motion
-from tools.documentation.formulas import plain, typeset
+from tools.documentation.formulas import typeset
 from tools.documentation.pages import CONTROLLER, PAGES, TESTBED, render
-from tools.documentation.readme import renew
 from tools.documentation.sources import read_description, read_table
 from tools.figures import COMMITTED, ICON, ICON_SVG, bode, gallery
 from tools.figures.gallery import figures
@@ -58,11 +57,6 @@ def found(fmu):
 @pytest.mark.parametrize("which", PAGES, ids=lambda page: page.text)
 def test_the_pages_are_up_to_date(which):
     assert text_of(which) == render(ROOT, which), f"{which.path} is out of date; write it anew with `make docs`"
-
-
-def test_readme_is_up_to_date():
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert readme == renew(ROOT), "README.md is out of date; write it anew with `make docs`"
 
 
 def test_the_page_travels_in_the_fmu(fmu, page):
@@ -119,12 +113,6 @@ def test_typeset():
     assert '<mtable class="matrix">' in block and "<mo>&lt;</mo>" in block
 
 
-def test_formulas_as_plain_text():
-    assert plain(r"\(\dot{\mathbf{q}}_I\) and \(\dot\theta_1 = \sin(10\pi t)\)") == "qI' and theta1' = sin(10 pi t)"
-    with pytest.raises(UserError, match="no plain text is known"):
-        plain(r"\(\frac{1}{2}\)")
-
-
 def test_a_table_that_is_missing_or_has_gaps_is_named(tmp_path):
     path = tmp_path / "tables.md"
     path.write_text(
@@ -134,14 +122,6 @@ def test_a_table_that_is_missing_or_has_gaps_is_named(tmp_path):
     for heading, message in [("Run", "no table below a heading “Run”"), ("Gap", "the row of “1” has 1 cells, not 2")]:
         with pytest.raises(UserError, match=message):
             read_table(path, heading)
-
-
-def test_readme_without_its_marks_is_refused(tmp_path):
-    (tmp_path / "README.md").write_text("nothing")
-    for name in ("analysis", "modelDescription"):
-        (tmp_path / name).symlink_to(ROOT / name)
-    with pytest.raises(UserError, match="there must be one line <!-- variables, written by make docs -->"):
-        renew(tmp_path)
 
 
 def program(page: str, name: str) -> str:

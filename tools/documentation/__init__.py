@@ -1,4 +1,4 @@
-"""`tools docs`: the pages that travel in the FMUs, and the parts of README that say the same."""
+"""`tools docs`: the pages that travel in the FMUs."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ def add_parser(subparsers: Any) -> None:
         "docs",
         help="write the FMUs' documentation anew",
         description="Writes the documentation of both FMUs from the text in analysis/documentation, the tables of the model "
-        "descriptions, docs/compatibility.md and the figures that `make figures` has made; and what README.md "
-        "has of it.",
+        "descriptions, docs/compatibility.md and the figures that `make figures` has made.",
     )
     parser.add_argument(
         "--project", type=Path, default=PROJECT, metavar="DIR", help="the project's folder (default: %(default)s)"
@@ -30,11 +29,9 @@ def run(arguments: argparse.Namespace) -> None:
     """Carry out `tools docs`. Raises UserError with one line on what is wrong, and then writes nothing."""
     # Loaded when they are needed: FMPy takes a while.
     from tools.documentation.pages import PAGES, render
-    from tools.documentation.readme import README, renew
 
     project = arguments.project
     texts = {page.path: render(project, page) for page in PAGES}
-    texts[README] = renew(project)
     for name, text in texts.items():
         path = project / name
         if path.is_file() and path.read_bytes() == text.encode():

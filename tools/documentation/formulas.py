@@ -1,4 +1,4 @@
-r"""LaTeX between \( \) and \[ \]: as MathML for the pages, as plain text for README."""
+r"""LaTeX between \( \) and \[ \]: as MathML for the pages."""
 
 from __future__ import annotations
 
@@ -6,16 +6,6 @@ import html
 import re
 
 from prw.errors import UserError
-
-#: What is left of LaTeX in plain text: `\dot\theta_1` is theta1', as the FMU's variables and the tables write it.
-PLAIN = (
-    (r"\\dot\{?(\\[a-zA-Z]+(?:\{\w\})?)\}?(_\w|_\{\w+\})?", r"\1\2'"),
-    (r"\\mathbf\{(\w+)\}", r"\1"),
-    (r"\\(theta|pi|sin)(?![a-zA-Z])", r"\1"),
-    (r"_\{(\w+)\}|_(\w)", r"\1\2"),
-    (r"(?<=\S)-(?=\S)", " - "),
-    (r"(?<=\d)(?=pi)", " "),
-)
 
 
 def typeset(text: str) -> str:
@@ -44,19 +34,3 @@ def _tidy(mathml: str) -> str:
     special = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
     mathml = re.sub(r"&#x([0-9A-Fa-f]+);", lambda m: special.get(chr(int(m[1], 16)), chr(int(m[1], 16))), mathml)
     return re.sub(r"<mo>\[</mo><mtable>(.*?)</mtable><mo>\]</mo>", r'<mtable class="matrix">\1</mtable>', mathml)
-
-
-def plain(text: str) -> str:
-    """Formulas as plain text. Raises UserError for LaTeX that has no such form here."""
-
-    def formula(match) -> str:
-        words = match[1]
-        for pattern, instead in PLAIN:
-            words = re.sub(pattern, instead, words)
-        if re.search(r"[\\{}]", words):
-            raise UserError(
-                f"no plain text is known for the formula {match[0]}; add it in tools.documentation.formulas"
-            )
-        return words
-
-    return re.sub(r"\\\((.+?)\\\)", formula, text)

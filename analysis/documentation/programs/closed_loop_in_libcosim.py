@@ -12,7 +12,7 @@ execution = CosimExecution.from_osp_config_file("prw_closed_loop")
 testbed = execution.slave_index_from_instance_name("testbed")
 observer = CosimObserver.create_last_value()
 execution.add_observer(observer)
-for _ in range(1000):
+for k in range(1000):
     execution.step()
 pitch, roll = observer.last_real_values(testbed, [reference["pitch"], reference["roll"]])
 print(degrees(pitch), degrees(roll))
