@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from prw import recording
+import prw
 from prw.identify.model import Model
 from prw.motion import Motion
 
@@ -45,7 +45,7 @@ def main() -> None:
     parser.add_argument("--fmu", type=Path, default=Path("target/fmu/prw_testbed.fmu"))
     options = parser.parse_args()
     rig, sensors = np.random.default_rng(options.seed), np.random.default_rng()
-    motion = recording.read(options.motion)
+    motion = prw.read(options.motion).motion
     with Model(options.fmu) as model:
         truth = {name: model.starts[name] * float(rig.uniform(0.75, 1.3)) for name in CHOSEN}
         response = {name: values[::STEPS] for name, values in model.run(smoothly(motion), truth).items()}

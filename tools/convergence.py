@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from prw.motion import Motion
+from prw.motion import Array, Motion
 from prw.state_space import StateSpace
 from prw.testbed import OUTPUTS, Testbed
 
@@ -94,5 +95,5 @@ def _broken_line_error(fmu: Path, n: int) -> dict[str, float]:
     return _largest(coarse, {name: values[::CUTS] for name, values in fine.items()}, time[::CUTS] >= FROM)
 
 
-def _largest(found, true, late: np.ndarray) -> dict[str, float]:
+def _largest(found: Mapping[str, Array], true: Mapping[str, Array], late: np.ndarray) -> dict[str, float]:
     return {name: float(np.abs(found[name] - true[name])[late].max() / np.abs(true[name]).max()) for name in OUTPUTS}

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from prw.motion import Motion
+from prw.motion import Array, Motion
 from prw.testbed import Testbed
 
 #: The shafts' angles q of H(s), eq. (15), and the sensors' torques.
@@ -36,16 +37,16 @@ class Sweep(NamedTuple):
     outputs: Sequence[str]
 
 
-def sweep(fmu: Path, frequency, slowest: float, outputs: Sequence[str] = (*SHAFTS, *TORQUES)) -> Sweep:
+def sweep(fmu: Path, frequency: ArrayLike, slowest: float, outputs: Sequence[str] = (*SHAFTS, *TORQUES)) -> Sweep:
     """Turn one motor of the Co-Simulation FMU at a time to and fro, theta = sin(2 pi f t), and compare the outputs.
 
     frequency: (k,) Hz. slowest: the rate at which transients decay, 1/s. After they have settled, the component of each
     output at f over whole periods (one bin of its discrete Fourier transform) is divided by that of the motor's angle.
     Units: those of the output per rad.
     """
-    frequency = np.atleast_1d(np.asarray(frequency, dtype=float))
-    response = np.empty((len(frequency), len(outputs), 2), dtype=complex)
-    for k, f in enumerate(frequency):
+    frequencies = np.atleast_1d(np.asarray(frequency, dtype=float))
+    response = np.empty((len(frequencies), len(outputs), 2), dtype=complex)
+    for k, f in enumerate(frequencies):
         periods = int(np.ceil(-np.log(SETTLED) / slowest * f))
         steps = max(STEPS, int(np.ceil(1 / (LONGEST_STEP * f))))
         n = (periods + PERIODS) * steps
@@ -60,20 +61,20 @@ def sweep(fmu: Path, frequency, slowest: float, outputs: Sequence[str] = (*SHAFT
                 found = testbed.respond(Motion(time, theta, omega), outputs)
             drive = bin_of @ theta[window, motor]
             response[k, :, motor] = [bin_of @ found[name][window] / drive for name in outputs]
-    return Sweep(frequency, response, tuple(outputs))
+    return Sweep(frequencies, response, tuple(outputs))
 
 
-def decibels(response) -> np.ndarray:
+def decibels(response: ArrayLike) -> Array:
     """20 log10 |response|."""
-    return 20 * np.log10(np.abs(response))
+    return np.asarray(20 * np.log10(np.abs(response)))
 
 
-def degrees(response, axis: int = 0) -> np.ndarray:
+def degrees(response: ArrayLike, axis: int = 0) -> Array:
     """The phase in degrees, unwrapped along the frequencies, which are on `axis`."""
-    return np.rad2deg(np.unwrap(np.angle(response), axis=axis))
+    return np.asarray(np.rad2deg(np.unwrap(np.angle(np.asarray(response)), axis=axis)))
 
 
-def slope(frequency, response) -> np.ndarray:
+def slope(frequency: ArrayLike, response: ArrayLike) -> Array:
     """The slope of |response| (k, ...) between neighbouring frequencies (k,), dB per decade, (k - 1, ...)."""
     decades = np.diff(np.log10(frequency))
-    return np.diff(decibels(response), axis=0) / decades.reshape(-1, *[1] * (np.ndim(response) - 1))
+    return np.asarray(np.diff(decibels(response), axis=0) / decades.reshape(-1, *[1] * (np.ndim(response) - 1)))

@@ -149,7 +149,7 @@ def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
         ({"motion": tmp_path / "absent.csv"}, "absent.csv: cannot be read"),
     ]:
         with pytest.raises(prw.UserError, match=complaint) as caught:
-            prw.simulate(**{"fmu": testbed, **arguments})  # type: ignore[arg-type]
+            prw.simulate(**{"fmu": testbed, **dict(arguments)})  # type: ignore[call-overload]
         assert "\n" not in str(caught.value)
 
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from prw.errors import UserError
+
+if TYPE_CHECKING:
+    from tools.closed_loop.system import System
 
 DEFAULT_FMUS = Path("target/fmu")
 DEFAULT_OUT = Path("out")
@@ -81,7 +84,7 @@ def run(arguments: argparse.Namespace) -> None:
     print("\n".join(lines))
 
 
-def _experiment(system) -> str:
+def _experiment(system: System) -> str:
     goals = ", ".join(f"{name} {np.rad2deg(value):g} deg" for name, (_, value) in system.inputs.items())
     return f"{goals}, {system.stop_time:g} s"
 
@@ -94,7 +97,7 @@ def settling_time(time: np.ndarray, values: np.ndarray, goal: float) -> float:
     return float(time[outside[-1] + 1]) if outside[-1] + 1 < len(time) else float("inf")
 
 
-def _response(system, values: dict[str, np.ndarray]) -> list[str]:
+def _response(system: System, values: dict[str, np.ndarray]) -> list[str]:
     lines = []
     for axis in ("pitch", "roll"):
         goal, angle = system.inputs[f"{axis}_ref"][1], values[f"testbed.{axis}"]

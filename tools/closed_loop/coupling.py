@@ -15,7 +15,7 @@ import fmpy
 import numpy as np
 from fmpy.simulation import instantiate_fmu
 
-from tools.closed_loop.system import System
+from tools.closed_loop.system import System, Value
 
 #: Communication steps (s) and the one that stands for the exact solution; all are whole multiples of it.
 STEPS = (125e-6, 250e-6, 500e-6, 1e-3, 2e-3, 4e-3, 8e-3, 16e-3)
@@ -96,7 +96,7 @@ def couple(
     return rows
 
 
-def _ends(wire) -> list[str]:
+def _ends(wire: tuple[str, str]) -> list[str]:
     return [end.split(".")[0] for end in wire]
 
 
@@ -123,12 +123,12 @@ class _Slave:
         self.fmu.exitInitializationMode()
 
     def reference(self, name: str) -> int:
-        return self.variables[name].valueReference
+        return int(self.variables[name].valueReference)
 
     def get_one(self, name: str) -> float:
-        return self.fmu.getReal([self.reference(name)])[0]
+        return float(self.fmu.getReal([self.reference(name)])[0])
 
-    def set_one(self, name: str, value) -> None:
+    def set_one(self, name: str, value: Value) -> None:
         variable = self.variables[name]
         setter = {"Real": self.fmu.setReal, "Integer": self.fmu.setInteger, "Boolean": self.fmu.setBoolean}
         setter[variable.type]([variable.valueReference], [value])
@@ -141,7 +141,7 @@ class _Slave:
 class _Wire:
     """All connections from one FMU to another, with arrays that are made once: a study has a hundred thousand steps."""
 
-    def __init__(self, slaves, wires):
+    def __init__(self, slaves: dict[str, _Slave], wires: list[tuple[str, str]]):
         (self._from, self._to), n = (slaves[end] for end in _ends(wires[0])), len(wires)
         self._sources = (c_uint32 * n)(*(self._from.reference(start.split(".")[1]) for start, _ in wires))
         self._targets = (c_uint32 * n)(*(self._to.reference(end.split(".")[1]) for _, end in wires))

@@ -19,7 +19,7 @@ def plot_response(path: Path, system: System, values: dict[str, np.ndarray]) -> 
     """Draw reference and response, motor angles and rates, and torques over time into the PNG `path`."""
     degrees = {name: np.rad2deg(column) for name, column in values.items()}
 
-    def pair(source: dict[str, np.ndarray], name: str, label: str):
+    def pair(source: dict[str, np.ndarray], name: str, label: str) -> list[tuple[str, np.ndarray]]:
         return [(f"{label} {i}", source[f"{name}{i}"]) for i in (1, 2)]
 
     panels = [

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 from prw.errors import UserError
@@ -46,7 +47,7 @@ def read(ssp: Path, osp: Path) -> System:
     try:
         system = ssd.read_ssd(str(ssp)).system
         root = ElementTree.parse(osp / "OspSystemStructure.xml").getroot()
-        stop_time, step = (float(root.findtext(OSP + name)) for name in ("EndTime", "BaseStepSize"))
+        stop_time, step = (float(root.findtext(OSP + name) or "") for name in ("EndTime", "BaseStepSize"))
     except Exception as error:  # FMPy raises bare Exceptions
         raise UserError(f"{ssp}: cannot be read ({str(error).splitlines()[0]})") from None
     values = dict(_values(system))
@@ -63,7 +64,7 @@ def read(ssp: Path, osp: Path) -> System:
     return System(ssp, osp, fmus, connections, start, inputs, stop_time, step)
 
 
-def _values(element):
+def _values(element: Any) -> Iterator[tuple[str, Value]]:
     """The start values bound to a system or component, by name."""
     for binding in element.parameterBindings:
         for parameter_set in binding.parameterValues:

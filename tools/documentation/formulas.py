@@ -15,10 +15,10 @@ def typeset(text: str) -> str:
     except ImportError:
         raise UserError("the package latex2mathml is missing; `make docs` installs it") from None
 
-    def inline(match) -> str:
+    def inline(match: re.Match[str]) -> str:
         return _tidy(convert(html.unescape(match[1]), display="inline"))
 
-    def block(match) -> str:
+    def block(match: re.Match[str]) -> str:
         tag = re.search(r"\\tag\{(.*?)\}", match[1])
         formula = _tidy(convert(re.sub(r"\\tag\{.*?\}", "", match[1]).strip(), display="block"))
         number = f'<span class="number">({tag[1]})</span>' if tag else ""

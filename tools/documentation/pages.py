@@ -5,8 +5,10 @@ from __future__ import annotations
 import html
 import json
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from prw.errors import UserError
 from tools.documentation import tables
@@ -89,7 +91,7 @@ def _in_order(folder: Path) -> list[Path]:
     return paths
 
 
-def _section(environment, path: Path, values) -> tuple[str, str, str]:
+def _section(environment: Any, path: Path, values: dict[str, Any]) -> tuple[str, str, str]:
     """A file's anchor, its title, which is a comment in its first line, and its text."""
     title = re.match(r"\{# title: (.*) #\}\n", read(path))
     if not title:
@@ -111,7 +113,7 @@ def _program(name: str, text: str) -> str:
     return f'<pre data-run="{name}"><code>{html.escape(text.strip(), quote=False)}</code></pre>'
 
 
-def _roots(roots) -> str:
+def _roots(roots: Iterable[Sequence[float]]) -> str:
     """Real and conjugate complex numbers in words: -174.873 and -9.68 ± 34.68 i."""
     words = []
     for real, imaginary in roots:
@@ -119,6 +121,6 @@ def _roots(roots) -> str:
     return _minus(" and ".join(words))
 
 
-def _minus(number) -> str:
+def _minus(number: object) -> str:
     """A number, or words with numbers in them, with the sign that mathematics has."""
     return str(number).replace("-", "\N{MINUS SIGN}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from prw.errors import UserError
 
@@ -33,7 +33,7 @@ def read(path: Path) -> str:
         raise UserError(f"{path}: cannot be read ({error.strerror}); run this in the project's folder") from None
 
 
-def read_description(path: Path):
+def read_description(path: Path) -> Any:
     """FMPy's model description. Raises UserError."""
     from fmpy import read_model_description
 
@@ -59,12 +59,12 @@ def read_table(path: Path, heading: str) -> Table:
     return Table(heads, rows)
 
 
-def unit_of(variable) -> str:
+def unit_of(variable: Any) -> str:
     """A variable's unit as the model description writes it; empty for 1 and for none."""
     unit = variable.unit or getattr(variable.declaredType, "unit", None) or ""
     return "" if unit == "1" else unit
 
 
-def start_of(variable) -> str:
+def start_of(variable: Any) -> str:
     """A variable's start value with eight digits."""
     return f"{float(variable.start):.8g}" if variable.type == "Real" else variable.start

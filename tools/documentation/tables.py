@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 from tools.documentation.sources import Table, start_of, unit_of
 
@@ -18,7 +19,7 @@ OUTPUT_NAMES = {
 }
 
 
-def variable_table(description, causality: str, title: str) -> str:
+def variable_table(description: Any, causality: str, title: str) -> str:
     """Name, unit and meaning of the variables of a causality, in the order of the model description."""
     rows = []
     for variable in description.modelVariables:
@@ -30,7 +31,7 @@ def variable_table(description, causality: str, title: str) -> str:
     return _table(title, ("name", "unit", "meaning"), rows, kind="rows")
 
 
-def parameter_table(description, printed: dict[str, dict]) -> str:
+def parameter_table(description: Any, printed: dict[str, Any]) -> str:
     """The parameters with their start values, and as a paper prints them if it does."""
     rows = []
     for variable in description.modelVariables:
@@ -52,7 +53,7 @@ def parameter_table(description, printed: dict[str, dict]) -> str:
     return _table("", heads, rows, numbers=(1, 3) if printed else (1,), kind="rows")
 
 
-def order_table(numbers: dict) -> str:
+def order_table(numbers: dict[str, Any]) -> str:
     """Orders of convergence, and the error at a step of 1 ms."""
     rows = []
     for name, words in OUTPUT_NAMES.items():
@@ -77,7 +78,7 @@ def _inline(text: str) -> str:
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False))
 
 
-def _table(title: str, heads: Iterable[str], rows, numbers=(), kind: str = "") -> str:
+def _table(title: str, heads: Sequence[str], rows: Iterable[str], numbers: Sequence[int] = (), kind: str = "") -> str:
     """`numbers` are the columns that are set flush right."""
     classes = (' class="number"' if column in numbers else "" for column in range(len(heads)))
     head = "".join(f"<th{of_number}>{text}</th>" for of_number, text in zip(classes, heads))

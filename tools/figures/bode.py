@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.ticker import LogLocator, MaxNLocator, MultipleLocator
@@ -53,7 +53,7 @@ def transfers(found: Results) -> tuple[list[Transfer], list[Transfer]]:
     return shafts, [panel._replace(title=panel.title.replace(f"({panel.key})   ", "")) for panel in torques]
 
 
-def draw_bode(figure, panel: Transfer) -> None:
+def draw_bode(figure: Any, panel: Transfer) -> None:
     """Draw magnitude and phase, one above the other, into a figure or subfigure."""
     magnitude, phase = figure.subplots(2, sharex=True, height_ratios=[1.25, 1])
     magnitude.set_title(panel.title)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -39,7 +39,7 @@ def figures(found: Results) -> dict[str, Drawn]:
         of_shafts, of_torques = transfers(found)
         for plate, panels in (("fig5", of_shafts), ("torques", of_torques)):
             whole = Figure(figsize=(2 * COLUMN, 2.75 * len(panels) / 2), layout="constrained")
-            places = whole.subfigures(len(panels) // 2, 2).T.flat
+            places = np.asarray(whole.subfigures(len(panels) // 2, 2)).T.flat
             for panel, place in zip(panels, places):
                 draw_bode(place, panel)
                 single = Figure(figsize=(COLUMN, 2.9), layout="constrained")
@@ -58,10 +58,11 @@ def _velocities(run: Run) -> Figure:
     return figure
 
 
-def _draw_velocities(figure, run: Run) -> None:
+def _draw_velocities(figure: Any, run: Run) -> None:
     motion, response = run
     first = motion.time <= SHOWN
-    motion = replace(motion, time=motion.time[first], theta=motion.theta[first], omega=motion.omega[first])
+    omega = None if motion.omega is None else motion.omega[first]
+    motion = replace(motion, time=motion.time[first], theta=motion.theta[first], omega=omega)
     response = {name: values[first] for name, values in response.items()}
     panels = [motion_panel(motion, angles=False), *response_panels(response, angles=False)]
     axes = figure.subplots(len(panels), sharex=True)
@@ -75,7 +76,7 @@ def _draw_velocities(figure, run: Run) -> None:
 def _fig4_plate(found: Results) -> Figure:
     """Fig. 4 beside its counterpart."""
     figure = Figure(figsize=(2 * COLUMN, 4.8), layout="constrained")
-    left, right = figure.subfigures(1, 2, wspace=0.04)
+    left, right = np.asarray(figure.subfigures(1, 2, wspace=0.04))
     for place, title, run in (
         (left, "Opposite motors: the wrist rolls (Fig. 4)", found.fig4),
         (right, "Equal motors: the wrist pitches", found.fig4_equal),
@@ -90,7 +91,7 @@ def _poles(found: Results) -> Figure:
     axis = figure.subplots()
     for mode, name, colour, marker in zip(found.modes, ("pitch", "roll"), (BLUE, VERMILION), "x+"):
         poles, zeros = mode.poles(), mode.zeros()
-        cross = {"color": colour, "markersize": 9, "markeredgewidth": 1.6}
+        cross: dict[str, Any] = {"color": colour, "markersize": 9, "markeredgewidth": 1.6}
         axis.plot(poles.real, poles.imag, marker, linestyle="none", label=f"poles of {name}", **cross)
     axis.plot(zeros.real, zeros.imag, "o", color="black", fillstyle="none", markersize=7, label="zeros of both")
     axis.axvline(0, color="black", linewidth=0.8)

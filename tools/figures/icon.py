@@ -5,18 +5,23 @@ Figures of two inches square, on white so that they show on any canvas; clear at
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon
 
+from prw.motion import Array
+
 INK, BLUE, GREEN, GREY, ORANGE = "#1c2126", "#2f8fd0", "#27a17c", "#c9ced3", "#d55e00"
-EDGE = {"edgecolor": INK, "linewidth": 2.2, "joinstyle": "round"}
+EDGE: dict[str, Any] = {"edgecolor": INK, "linewidth": 2.2, "joinstyle": "round"}
 
 
 def draw_testbed() -> Figure:
     """The icon of the testbed."""
     figure, axis = _card()
-    line = {"color": INK, "linewidth": 5, "solid_capstyle": "butt"}
+    line: dict[str, Any] = {"color": INK, "linewidth": 5, "solid_capstyle": "butt"}
     axis.plot([-0.95, -0.5], [-0.28, -0.28], **line)
     axis.plot([0.5, 0.95], [-0.28, -0.28], **line)
     axis.plot([0, 0], [0.1, 0.5], **line)
@@ -47,18 +52,18 @@ def draw_controller() -> Figure:
     return figure
 
 
-def _card():
+def _card() -> tuple[Figure, Axes]:
     """A figure and its axes, -1 to 1 both ways, with a white card."""
     figure = Figure(figsize=(2, 2), facecolor="none")
     axis = figure.add_axes((0, 0, 1, 1))
     axis.set(xlim=(-1, 1), ylim=(-1, 1), aspect="equal")
     axis.axis("off")
-    card = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": INK, "linewidth": 2}
+    card: dict[str, Any] = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": INK, "linewidth": 2}
     axis.add_patch(FancyBboxPatch((-0.86, -0.86), 1.72, 1.72, **card))
     return figure, axis
 
 
-def _cam(x: float, y: float, size: float):
+def _cam(x: float, y: float, size: float) -> Array:
     """A wheel with four lobes, seen along its shaft."""
     angle = np.linspace(0, 2 * np.pi, 161)
     radius = size + 0.055 * np.cos(4 * angle)

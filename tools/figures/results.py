@@ -57,8 +57,10 @@ def results(fmu: Path) -> Results:
         linearize(fmu, outputs=(*SHAFTS, *TORQUES)),
         pitch_and_roll(model),
         sweep(fmu, POINTS, slowest),
-        *(_run(fmu, fig4(opposite=opposite)) for opposite in (True, False)),
-        *(_step(fmu, sides) for sides in ([1, 1], [1, -1])),
+        _run(fmu, fig4()),
+        _run(fmu, fig4(opposite=False)),
+        _step(fmu, (1, 1)),
+        _step(fmu, (1, -1)),
         convergence(fmu, model),
     )
 
@@ -68,7 +70,7 @@ def _run(fmu: Path, motion: Motion) -> Run:
         return motion, testbed.respond(motion, ("theta5", "theta6", *OUTPUTS))
 
 
-def _step(fmu: Path, sides) -> Step:
+def _step(fmu: Path, sides: tuple[int, int]) -> Step:
     before, end, coarse = -0.02, 0.6, 0.025
     # Nothing has moved yet at 0; what the impulse through the dampers does is there right after.
     times = np.array([before, 0, 1e-9, *np.arange(1, 601) * 1e-3]), np.array([before, *np.arange(0, end, coarse), end])
@@ -77,7 +79,7 @@ def _step(fmu: Path, sides) -> Step:
         theta = np.where(time[:, None] < 0, 0.0, np.deg2rad(1.0) * np.array(sides))
         # A rate of zero holds the angles between the samples.
         runs.append(_run(fmu, Motion(time, theta, np.zeros_like(theta))))
-    return Step(*runs)
+    return Step(runs[0], runs[1])
 
 
 def numbers(found: Results) -> dict[str, object]:
@@ -91,10 +93,10 @@ def numbers(found: Results) -> dict[str, object]:
     step, angles, rates, _ = found.convergence
     pitch, roll = found.modes
 
-    def rounded(value: complex) -> list:
+    def rounded(value: complex) -> list[float]:
         return [float(f"{value.real:.6g}"), float(f"{abs(value.imag):.6g}")]
 
-    def orders(errors) -> dict[str, float]:
+    def orders(errors: dict[str, np.ndarray]) -> dict[str, float]:
         return {name: round(value, 2) for name, value in order(step, errors).items()}
 
     return {

@@ -6,6 +6,7 @@ import io
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 from lxml import etree
@@ -51,7 +52,7 @@ def write_small_png(path: Path, figure: Figure) -> None:
         few.save(temporary, format="PNG", optimize=True)
 
 
-def write_json(path: Path, content) -> None:
+def write_json(path: Path, content: object) -> None:
     """Write JSON, indented and in order."""
     with replacing(path) as temporary:
         temporary.write_bytes((json.dumps(content, indent=2) + "\n").encode())
@@ -109,10 +110,10 @@ def for_page(svg: bytes, name: str) -> bytes:
             parent[place : place + 1] = list(element)
     _join_ticks(root)
     etree.cleanup_namespaces(root)
-    return etree.tostring(root, encoding="utf-8", pretty_print=True)
+    return bytes(etree.tostring(root, encoding="utf-8", pretty_print=True))
 
 
-def _name_apart(element, name: str, used: set) -> None:
+def _name_apart(element: Any, name: str, used: set[str]) -> None:
     """Prefix the ids that are referred to, and drop the others."""
     identifier = element.attrib.pop("id", None)
     if identifier in used:
@@ -130,7 +131,7 @@ def _shorter(numbers: str) -> str:
     return re.sub(r" ?([A-Za-z]) (?=-?\d)", r"\1", text).strip()
 
 
-def _restyle(element) -> None:
+def _restyle(element: Any) -> None:
     """The page's colours and fonts in place of matplotlib's."""
     style = element.attrib.pop("style", "")
     if not style and element.tag != f"{SVG}text":
@@ -140,7 +141,7 @@ def _restyle(element) -> None:
         rules.pop(key, None)
     if "font" in rules:  # matplotlib 3.9 and 3.10: one rule for all
         font = rules.pop("font")
-        rules["font-size"] = re.search(r"[\d.]+px", font)[0]
+        rules["font-size"] = re.findall(r"[\d.]+px", font)[0]
         if re.match(r"(bold|[67]00)\b", font):
             rules["font-weight"] = "bold"
     if element.tag == f"{SVG}text":
@@ -152,7 +153,7 @@ def _restyle(element) -> None:
         element.attrib["style"] = ";".join(f"{key}:{value}" for key, value in rules.items())
 
 
-def _draw_ticks(root) -> None:
+def _draw_ticks(root: Any) -> None:
     """Markers keep their style once, with their definition; those that are straight lines, ticks, become paths."""
     defined = {f"#{path.get('id')}": path for path in root.iter(f"{SVG}path") if path.get("id")}
     for use in list(root.iter(f"{SVG}use")):
@@ -171,7 +172,7 @@ def _draw_ticks(root) -> None:
             path.getparent().remove(path)
 
 
-def _join_ticks(root) -> None:
+def _join_ticks(root: Any) -> None:
     """Neighbours of one style and nothing else are one path."""
     for path in reversed(list(root.iter(f"{SVG}path"))):
         before = path.getprevious()

@@ -1,5 +1,4 @@
 import math
-
 from fmpy import read_model_description
 from libcosimpy.CosimExecution import CosimExecution
 from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
