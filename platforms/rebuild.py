@@ -9,8 +9,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from dist import DIST
 from targets import ROOT
+
+from dist import DIST
 
 SUMS = "SHA256SUMS"
 

@@ -1,5 +1,5 @@
-"""The pitch-roll wrist testbed in Python: simulate it, read recordings of it, linearize it, run it with thousands of
-parameter sets.
+"""The pitch-roll wrist testbed in Python: simulate it, read recordings of it, find its parameters in them, linearize it,
+run it with thousands of parameter sets.
 
     import prw
 
@@ -17,6 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from prw.errors import UserError
+    from prw.identification import identify
+    from prw.identification.excitation import Excitation, excite
+    from prw.identification.results import Identification
     from prw.linearization import Linearizer, linearize
     from prw.motion import Motion
     from prw.recording import Recording, read
@@ -25,12 +28,16 @@ if TYPE_CHECKING:
     from prw.sweeps import sweep
 
 __all__ = [
+    "Excitation",
+    "Identification",
     "Linearizer",
     "Motion",
     "Recording",
     "Run",
     "StateSpace",
     "UserError",
+    "excite",
+    "identify",
     "linearize",
     "read",
     "simulate",
@@ -40,12 +47,16 @@ __all__ = [
 #: The module of each name, loaded when the name is first used: `import prw` takes no time. A name here must not be that
 #: of a module or package in this folder, which would take its place once something imports it.
 _HOMES = {
+    "Excitation": "identification.excitation",
+    "Identification": "identification.results",
     "Linearizer": "linearization",
     "Motion": "motion",
     "Recording": "recording",
     "Run": "simulation",
     "StateSpace": "state_space",
     "UserError": "errors",
+    "excite": "identification.excitation",
+    "identify": "identification",
     "linearize": "linearization",
     "read": "recording",
     "simulate": "simulation",

@@ -8,8 +8,8 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from prw import excite, identify, progress
-from prw.commands import linearize, simulate, sweep
+from prw import progress
+from prw.commands import excite, identify, linearize, simulate, sweep
 from prw.errors import UserError
 
 #: Each subcommand is a module with add_parser(subparsers); the parser's default `run` takes the parsed arguments.

@@ -7,10 +7,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+from prw.commands.assignments import pairs
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import UserError
 from prw.files import replacing
-from prw.identify.options import pairs
 from prw.linearization import linearize
 from prw.state_space import StateSpace
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from prw.commands.assignments import FORMATTER, pairs, said_of_options, spreads
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import UserError
-from prw.identify.options import FORMATTER, names, need, pairs, spreads
+from prw.extras import need
 from prw.motion import Array, fig4
 from prw.recording import read_motion
 from prw.sweeps import Swept, carry_out, layout
@@ -74,7 +74,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw sweep`. Raises UserError with one line on what is wrong."""
-    need("pyarrow", *(["distributed"] if arguments.scheduler else []))
+    need("sweep", "pyarrow", *(["distributed"] if arguments.scheduler else []))
     motion = fig4() if arguments.input is None else read_motion(arguments.input, degrees=arguments.degrees)
     workers = arguments.workers if arguments.workers is not None else os.cpu_count() or 1
     for option, number in (("--workers", workers), ("--runs", arguments.runs)):
@@ -82,14 +82,15 @@ def run(arguments: argparse.Namespace) -> None:
             raise UserError(f"{option} {number}: at least 1 is needed")
     with Testbed(arguments.fmu) as testbed:
         starts = testbed.starts
-    grid = {name: _steps(name, text, starts) for name, text in pairs(arguments.grid, "--grid").items()}
-    random = spreads(arguments.random, starts, "--random")
+    grid = {name: _steps(name, text) for name, text in pairs(arguments.grid, "--grid").items()}
+    random = spreads(arguments.random, "--random")
     for name in random:
         if name in grid:
             raise UserError(f"{name} is in --grid and in --random; choose one")
     if not grid and not random:
         raise UserError("nothing varies; add --grid NAME=LOW:HIGH:N or --random NAME=PERCENT% (see --help)")
-    values = layout(grid, random, arguments.runs, arguments.seed, starts)
+    with said_of_options(grid="grid", random="random"):
+        values = layout(grid, random, arguments.runs, arguments.seed, starts)
     study = Study(arguments.fmu.read_bytes(), motion, tuple(values), np.column_stack(list(values.values())))
     swept = carry_out(study, arguments.out, workers, arguments.scheduler)
     print("\n".join(_summary(arguments, swept, workers)))
@@ -111,8 +112,7 @@ def _summary(arguments: argparse.Namespace, swept: Swept, workers: int) -> list[
     return [*lines, f"wrote       {arguments.out / 'runs.parquet'}"]
 
 
-def _steps(name: str, text: str, starts: Mapping[str, float]) -> Array:
-    names(name, list(starts), "--grid")
+def _steps(name: str, text: str) -> Array:
     parts = text.split(":")
     try:
         low, high, count = float(parts[0]), float(parts[1]), int(parts[2])

@@ -114,7 +114,8 @@ def layout(
     starts: the FMU's start values. Raises UserError for what does not fit."""
     for name in (*grid, *random):
         if name not in starts:
-            raise UserError(f"{name} is not known; there are {', '.join(starts)}")
+            argument = "grid" if name in grid else "random"
+            raise UserError(f"{argument}: {name} is not known; there are {', '.join(starts)}")
         if name in grid and name in random:
             raise UserError(f"{name} is in the grid and random; choose one")
     if not grid and not random:

@@ -7,27 +7,28 @@ phases (IEEE Trans. Inf. Theory 16 (1970) 85), which keep their peaks low. All m
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Dict, Mapping, Sequence
 
 import numpy as np
 
 from prw.channels import MEASURED
-from prw.identify.experiment import Experiment, planned
-from prw.identify.fit import Fitter, Task
-from prw.identify.model import Matrices, Model, stack
-from prw.identify.statistics import condition, genuine
-from prw.motion import Motion
+from prw.identification.excitation import FADE
+from prw.identification.experiment import Experiment
+from prw.identification.fit import Fitter, Task
+from prw.identification.model import Model
+from prw.identification.statistics import condition, genuine, information_of
+from prw.motion import Array, Motion
 from prw.testbed import OUTPUTS
 
-#: Seconds in which a motion fades in and out.
-FADE = 0.5
 #: At most so many frequencies in a multisine.
 MOST_LINES = 60
 #: Frequencies in Hz: of the slow multisine, up to; and of the widest motions, up to.
 SLOW, WIDEST = 4.0, 40.0
 #: From this condition on, what an information matrix says of its weakest combination is rounding.
 SINGULAR = 1e12
+#: Motors move with their rates.
+RATES = {"omega1": "theta1", "omega2": "theta2"}
 #: Rounds of the multiplicative algorithm for the D-optimal spectrum.
 ROUNDS = 300
 
@@ -41,7 +42,9 @@ class Limits:
     acceleration: float = 400.0
 
 
-def motions(model: Model, task: Task, limits: Limits, duration: float, rate: float, noise: Mapping[str, float]):
+def motions(
+    model: Model, task: Task, limits: Limits, duration: float, rate: float, noise: Mapping[str, float]
+) -> list[Motion]:
     """All candidates within `limits`: each kind with equal, opposite, single and independent motors.
 
     duration: s. rate: samples per second. noise: by channel in SI; the optimal multisine is made for these channels.
@@ -70,33 +73,23 @@ PATTERNS = {
 
 
 def information(
-    model: Model, experiments: Sequence[Experiment], task: Task, logarithms: np.ndarray, noise: Mapping[str, float]
-) -> np.ndarray:
+    model: Model, experiments: Sequence[Experiment], task: Task, logarithms: Array, noise: Mapping[str, float]
+) -> Array:
     """What experiments, made or yet to be made, would tell about the logarithms of task.names: (p, p), without
     priors."""
-    values = [task.values(logarithms)]
-    ready = [replace(experiment, values=experiment.simulate(model, values)[0]) for experiment in experiments]
-    fitter = Fitter(model, ready, task)
-    fitter.noise = {name: noise[name] for name in fitter.channels}
-    logarithms = np.asarray(logarithms, dtype=float)
-    total = np.zeros((len(task.names), len(task.names)))
-    for jacobian in fitter.jacobians(logarithms):
-        flat = jacobian.reshape(-1, len(task.names))
-        total += flat.T @ flat
-    return genuine(total, fitter.spurious(logarithms))
+    unmeasured = [replace(experiment, values=None) for experiment in experiments]
+    channels = {name for experiment in experiments for name in experiment.channels}
+    fitter = Fitter(model, unmeasured, task, {name: noise[name] for name in channels})
+    jacobians, feigned = fitter.jacobians(np.asarray(logarithms, dtype=float))
+    return genuine(information_of(jacobians), feigned)
 
 
-def plan(motion: Motion, channels: Sequence[str]) -> Experiment:
-    """The experiment of `motion` with these channels measured."""
-    return planned(motion, channels)
-
-
-def default_noise() -> Dict[str, float]:
+def default_noise() -> dict[str, float]:
     """The noise that is assumed where nothing is known, by channel in SI."""
     return {name: channel.noise for name, channel in MEASURED.items()}
 
 
-def _lines(duration: float, top: float) -> np.ndarray:
+def _lines(duration: float, top: float) -> Array:
     """Harmonics of 1/duration up to `top` Hz, thinned out evenly in the logarithm."""
     harmonics = np.arange(1, int(top * duration) + 1)
     if len(harmonics) > MOST_LINES:
@@ -104,14 +97,14 @@ def _lines(duration: float, top: float) -> np.ndarray:
     return harmonics / duration
 
 
-def _natural(frequency: np.ndarray, limits: Limits) -> np.ndarray:
+def _natural(frequency: Array, limits: Limits) -> Array:
     """Amplitudes that use the limits alike: of angle at low, of rate at middle, of acceleration at high
     frequencies."""
     w = 2 * np.pi * frequency
     return np.minimum(np.minimum(limits.angle, limits.rate / w), limits.acceleration / w**2)
 
 
-def _multisine(time: np.ndarray, frequency: np.ndarray, size: np.ndarray, shift: int = 0) -> np.ndarray:
+def _multisine(time: Array, frequency: Array, size: Array, shift: int = 0) -> Array:
     """Angle, rate and acceleration, (3, n), of a sum of sines. shift: another one gives other phases."""
     k = np.arange(len(frequency))
     power = size**2 / max(np.sum(size**2), np.finfo(float).tiny)
@@ -124,7 +117,7 @@ def _multisine(time: np.ndarray, frequency: np.ndarray, size: np.ndarray, shift:
     return total
 
 
-def _chirp(time: np.ndarray, span, limits: Limits) -> np.ndarray:
+def _chirp(time: Array, span: tuple[float, float], limits: Limits) -> Array:
     """Angle, rate and acceleration, (3, n), of a sine whose frequency goes from one end of the span to the other
     exponentially, with the amplitude that the limits allow."""
     duration = time[-1] - time[0]
@@ -137,7 +130,7 @@ def _chirp(time: np.ndarray, span, limits: Limits) -> np.ndarray:
     return np.stack([angle, rate, np.gradient(rate, time, edge_order=2)])
 
 
-def _faded(time: np.ndarray, wave: np.ndarray) -> np.ndarray:
+def _faded(time: Array, wave: Array) -> Array:
     """The wave (3, n) between a fade-in and a fade-out, at rest at angle 0 before and after."""
     since, left = time - time[0], time[-1] - time
     x = np.clip(np.minimum(since, left) / FADE, 0, 1)
@@ -151,28 +144,31 @@ def _faded(time: np.ndarray, wave: np.ndarray) -> np.ndarray:
     return np.stack([gain * angle, gain * rate + slope * angle, gain * acceleration + 2 * slope * rate + bend * angle])
 
 
-def _assemble(name: str, time: np.ndarray, waves, pattern: str, limits: Limits) -> Motion:
+def _assemble(name: str, time: Array, waves: Sequence[Array], pattern: str, limits: Limits) -> Motion:
     """The waves (3, n) mixed for the two motors and scaled up to the limits."""
-    motors = [sum(share * wave for share, wave in zip(shares, waves)) for shares in PATTERNS[pattern]]
+    motors = [shares[0] * waves[0] + shares[1] * waves[1] for shares in PATTERNS[pattern]]
     return _within(name, time, motors, limits)
 
 
-def _within(name: str, time: np.ndarray, motors, limits: Limits) -> Motion:
-    motors = [_faded(time, np.asarray(wave)) if np.ndim(wave) else np.zeros((3, len(time))) for wave in motors]
+def _within(name: str, time: Array, motors: Sequence[Array], limits: Limits) -> Motion:
+    """The motors' waves (3, n), faded and scaled up to the limits."""
+    motors = [_faded(time, wave) for wave in motors]
     peaks = np.max([np.abs(wave).max(axis=1) for wave in motors], axis=0)
     scale = min(limit / peak for limit, peak in zip((limits.angle, limits.rate, limits.acceleration), peaks))
     theta, omega = (np.column_stack([scale * wave[i] for wave in motors]) for i in (0, 1))
     return Motion(time, theta, omega, name)
 
 
-def _optimal(model: Model, task: Task, time, frequency: np.ndarray, limits: Limits, noise) -> Motion:
+def _optimal(
+    model: Model, task: Task, time: Array, frequency: Array, limits: Limits, noise: Mapping[str, float]
+) -> Motion:
     """The multisine whose power is spread over frequencies, equal and opposite motors such that the determinant of the
     information is largest for what it costs of the limits (D-optimal; multiplicative algorithm, Silvey, Titterington
     and Torsney, Comm. Stat. A 7 (1978) 1379)."""
     share = 1e-4
-    logarithms = np.log([task.start[name] for name in task.names])
+    logarithms = task.first()
     steps = share * np.vstack([np.eye(len(logarithms)), -np.eye(len(logarithms))])
-    response = _response(stack([model.matrices(task.values(logarithms + s)) for s in steps]), frequency)
+    response = np.array([model.at(task.values(logarithms + s)).frequency_response(frequency, RATES) for s in steps])
     slopes = (response[: len(logarithms)] - response[len(logarithms) :]) / (2 * share)
     rows = [OUTPUTS.index(name) for name in noise]
     weighted = slopes[:, :, rows] / np.array(list(noise.values()))[:, None]
@@ -195,15 +191,7 @@ def _optimal(model: Model, task: Task, time, frequency: np.ndarray, limits: Limi
     return _within("multisine_optimal", time, [mean + half, mean - half], limits)
 
 
-def _response(models: Matrices, frequency: np.ndarray) -> np.ndarray:
-    """From motor angles, moving together with their rates, to outputs: complex (m, f, 8, 2)."""
-    s = 2j * np.pi * frequency[:, None, None]
-    b = models.B[:, None, :, :2] + s * models.B[:, None, :, 2:]
-    d = models.D[:, None, :, :2] + s * models.D[:, None, :, 2:]
-    return models.C[:, None] @ np.linalg.solve(s * np.eye(6) - models.A[:, None], b) + d
-
-
-def typical_error(information: np.ndarray) -> float:
+def typical_error(information: Array) -> float:
     """The standard error, as a fraction, that is the same for all parameters in an equally good experiment:
     det(F)^(-1/2p)."""
     if condition(information) > SINGULAR:
@@ -211,6 +199,6 @@ def typical_error(information: np.ndarray) -> float:
     return float(np.exp(-np.linalg.slogdet(information)[1] / (2 * len(information))))
 
 
-def with_priors(information: np.ndarray, task: Task) -> np.ndarray:
+def with_priors(information: Array, task: Task) -> Array:
     """Information (p, p) with what the priors add."""
     return information + task.prior_information()

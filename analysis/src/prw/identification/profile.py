@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from prw.identify.fit import Solution
+from prw.identification.fit import Solution
+from prw.motion import Array
 
 #: Below this standard error (of the logarithm) the model is as good as linear; above the other, there is no interval.
 LINEAR, HOPELESS = 0.01, 1.0
@@ -20,7 +21,7 @@ TRIALS, CLOSE, FURTHER = 8, 0.02, 2.0
 FOLLOWED = {"ftol": 1e-5, "xtol": 1e-5}
 
 
-def ends(solution: Solution, white: np.ndarray, errors: np.ndarray, quantile: float) -> tuple:
+def ends(solution: Solution, white: Array, errors: Array, quantile: float) -> tuple[Array, Array]:
     """Lower and upper ends (p,) of the logarithms' intervals. white: (p, p), the covariance for white noise. errors:
     (p,) standard errors. quantile: of the normal distribution, 1.96 for 95 %."""
     low, high = solution.logarithms - quantile * errors, solution.logarithms + quantile * errors
@@ -33,7 +34,7 @@ def ends(solution: Solution, white: np.ndarray, errors: np.ndarray, quantile: fl
     return low, high
 
 
-def _end(solution: Solution, i: int, step: np.ndarray, wanted: float) -> float:
+def _end(solution: Solution, i: int, step: Array, wanted: float) -> float:
     """Logarithm of parameter i at which the least misfit has risen by `wanted`. step: (p,), where to look first."""
     centre, (low, high) = solution.logarithms, solution.task.span()
     for _ in range(TRIALS):
@@ -45,4 +46,3 @@ def _end(solution: Solution, i: int, step: np.ndarray, wanted: float) -> float:
             break
         step = (point - centre) * max(further, 1 / FURTHER)
     return float(point[i])
-

@@ -8,15 +8,19 @@ is follows from the recording by maximum likelihood; an encoder's noise is at le
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Callable, NamedTuple, Optional
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.optimize import minimize
-from scipy.sparse import diags
+from scipy.sparse import csr_matrix, diags
 
+from prw.motion import Array
+
+#: Sparse rows from coefficients to what was measured, and the values that were.
+Block = tuple[csr_matrix, Array]
 DEGREE = 5
 #: The penalty is on third differences of the coefficients: jerk.
 ORDER = 3
@@ -24,7 +28,7 @@ ORDER = 3
 STIFFNESS = (-6.0, 10.0)
 #: Range of log10 of the weight of logged rates, s^2, and where the search for it begins, for one block and for two.
 RATIO = (-14.0, 4.0)
-GUESSES = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
+GUESSES: dict[int, list[list[float]]] = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
 #: The most probable penalty is divided by this. Angles smoothed too little add a little noise; smoothed too much they
 #: bias the parameters. It raises the frequency up to which the path follows by its sixth root, 1.6.
 UNDERSMOOTHING = 16.0
@@ -36,53 +40,42 @@ OVERSMOOTHING, RESCALED = 64.0, 0.05
 ON_GRID = 0.05
 #: So many quanta at most lie between neighbouring values of a typical column.
 MOST_STEPS = 50
+#: Samples have noise besides their steps if there is this much more variance than the steps make.
+NOISIER = 1.2
 #: Values that are looked at to find the quantum.
 QUANTUM_VALUES = 20000
 
 
 class Path(NamedTuple):
-    """The motion of one motor. angle: spline of the angle over time (rad, s); its derivative is the rate. noise:
-    standard deviation of the samples, rad. quantum: of the samples, rad, 0 if none. rate_noise: of the logged rates,
-    rad/s, or None. follows: frequency up to which the path follows the samples, Hz. wander: draws what noise like
-    theirs, smoothed the same way, adds to the path."""
+    """The course of one angle. angle: spline over time (rad, s); its derivative is the rate. noise: standard deviation
+    of the samples, rad. quantum: of the samples, rad, 0 if none. rate_noise: of the logged rates, rad/s, or None.
+    quiet: (n,) rad, a course at the samples' times that does not follow their errors."""
 
     angle: BSpline
     noise: float
     quantum: float
-    rate_noise: Optional[float]
-    follows: float
-    wander: Callable[[np.random.Generator], BSpline]
+    rate_noise: float | None
+    quiet: Array
+
+    def errors(self, random: np.random.Generator) -> Array:
+        """Errors (n,) in rad like those of the samples."""
+        if self.noise >= self.quantum:
+            return random.normal(0, self.noise, len(self.quiet))
+        return rounding(self.quiet, self.quantum, random)
 
 
-def smooth(time: np.ndarray, theta: np.ndarray, omega: Optional[np.ndarray] = None, quantum: float = 0.0) -> Path:
-    """The most probable path of a motor through the angles theta (n,) rad and, where logged, rates omega (n,) rad/s at
-    the times (n,) s, which may be uneven. quantum: of the angles in rad, where it is known to be coarser than it
-    looks."""
+def smooth(time: Array, theta: Array, omega: Array | None = None, quantum: float = 0.0) -> Path:
+    """The most probable course through the angles theta (n,) rad and, where logged, rates omega (n,) rad/s at the times
+    (n,) s, which may be uneven. quantum: of the angles in rad, where it is known to be coarser than it looks."""
     quantum = max(quantum, quantum_of(theta))
     spline = _Spline(time)
-    angles = spline.rows(time, 0)
-    blocks = [(angles, theta)] + ([(spline.rows(time, 1), omega)] if omega is not None else [])
-    coefficients, quiet, noise, penalty, weights, solve = _fit(spline, blocks, quantum)
-    strengths = noise / np.sqrt(weights)
-
-    path, quiet = spline.curve(coefficients), spline.curve(quiet)(time)
-
-    def error(random: np.random.Generator) -> np.ndarray:
-        if noise >= quantum:
-            return random.normal(0, noise, len(time))
-        return rounding(quiet, quantum, random)
-
-    def wander(random: np.random.Generator) -> BSpline:
-        errors = [error(random)] + [random.normal(0, strength, len(time)) for strength in strengths[1:]]
-        drawn = (w * (rows.T @ values) for w, values, (rows, _) in zip(weights, errors, blocks))
-        return spline.curve(solve(sum(drawn)))
-
-    rate_noise = float(strengths[1]) if omega is not None else None
-    follows = penalty ** (-1 / (2 * ORDER)) / (2 * np.pi * spline.spacing)
-    return Path(path, noise, quantum, rate_noise, min(follows, 0.5 / spline.spacing), wander)
+    blocks = [(spline.rows(time, 0), theta)] + ([(spline.rows(time, 1), omega)] if omega is not None else [])
+    found = _fit(spline, blocks, quantum**2 / 12)
+    rate_noise = None if omega is None else found.noise / float(np.sqrt(found.weights[1]))
+    return Path(spline.curve(found.coefficients), found.noise, quantum, rate_noise, spline.curve(found.quiet)(time))
 
 
-def quantum_of(values: np.ndarray) -> float:
+def quantum_of(values: Array) -> float:
     """The step that all `values` (n,) are multiples of, give or take a constant, or 0 if there is none."""
     levels = np.unique(values[:QUANTUM_VALUES])
     if len(levels) < 3:
@@ -98,7 +91,13 @@ def quantum_of(values: np.ndarray) -> float:
     return float(quantum) if off.max() < ON_GRID and np.median(np.rint(gaps / quantum)) < MOST_STEPS else 0.0
 
 
-def rounding(values: np.ndarray, quantum: float, random: np.random.Generator) -> np.ndarray:
+def rough_noise(values: Array) -> float:
+    """About the standard deviation of white noise on a smooth course (n,), if anything too much: third differences
+    leave next to nothing of the course, and of the noise its variance times 20."""
+    return float(np.std(np.diff(values, 3)) / np.sqrt(20)) if len(values) > 3 else np.inf
+
+
+def rounding(values: Array, quantum: float, random: np.random.Generator) -> Array:
     """Errors like those an encoder makes at the values (n,). It errs the same way at the same angle, and so alike in
     every period of a motion."""
     # What is left of the samples' own errors in `values` must not meet the grid it came from: another zero, another
@@ -110,7 +109,7 @@ def rounding(values: np.ndarray, quantum: float, random: np.random.Generator) ->
 class _Spline:
     """A spline with knots at the spacing of the samples, and its penalty in banded storage."""
 
-    def __init__(self, time: np.ndarray):
+    def __init__(self, time: Array):
         self.spacing = float(np.median(np.diff(time)))
         pieces = max(1, int(np.ceil((time[-1] - time[0]) / self.spacing - 1e-6)))
         self.spacing = (time[-1] - time[0]) / pieces
@@ -127,10 +126,10 @@ class _Spline:
             for j in range(i + 1):
                 self.penalty[DEGREE - (i - j), i : i + self.penalties] += difference[i] * difference[j]
 
-    def curve(self, coefficients: np.ndarray) -> BSpline:
+    def curve(self, coefficients: Array) -> BSpline:
         return BSpline(self._knots, coefficients, DEGREE)
 
-    def rows(self, time: np.ndarray, derivative: int):
+    def rows(self, time: Array, derivative: int) -> csr_matrix:
         """Sparse matrix (n, size) from coefficients to the spline's value (or derivative) at the times."""
         time = np.clip(time, *self._ends)
         if derivative == 0:
@@ -141,10 +140,18 @@ class _Spline:
         return lower @ diags([-1.0 / self.spacing, 1.0 / self.spacing], [0, 1], shape=shape, format="csr")
 
 
-def _fit(spline: _Spline, blocks, quantum: float) -> tuple:
-    """The coefficients, those of a quieter path, and what goes with them: noise of the first block (rad), penalty,
-    weight of the second block relative to the first (the ratio of their variances), and what solves for coefficients
-    again. blocks: (rows, values) of what was measured."""
+class _Fit(NamedTuple):
+    """Coefficients of the path and of a quieter one; noise of the first block, rad; weights of the blocks relative to
+    the first (ratios of their variances)."""
+
+    coefficients: Array
+    quiet: Array
+    noise: float
+    weights: list[float]
+
+
+def _fit(spline: _Spline, blocks: list[Block], least: float) -> _Fit:
+    """The most probable path. blocks: what was measured. least: variance of the first block at least, rad2."""
     count = sum(len(values) for _, values in blocks) - ORDER
     normals, rights = [], []
     for rows, values in blocks:
@@ -155,48 +162,47 @@ def _fit(spline: _Spline, blocks, quantum: float) -> tuple:
         normals.append(normal)
         rights.append(rows.T @ values)
 
-    def factorize(penalty: float, weights) -> np.ndarray:
+    def solve(penalty: float, weights: list[float]) -> tuple[Array, float, float]:
+        """Coefficients, misfit with penalty, and logarithm of the determinant."""
         normal = penalty * spline.penalty + sum(w * n for w, n in zip(weights, normals))
-        return cholesky_banded(normal, overwrite_ab=True, check_finite=False)
-
-    def solve(penalty: float, weights) -> tuple:
-        factor = factorize(penalty, weights)
+        factor = cholesky_banded(normal, overwrite_ab=True, check_finite=False)
         right = sum(w * r for w, r in zip(weights, rights))
         coefficients = cho_solve_banded((factor, False), right, check_finite=False)
         misfit = sum(w * np.sum((values - rows @ coefficients) ** 2) for w, (rows, values) in zip(weights, blocks))
         bend = np.diff(coefficients, ORDER)
         spread = 2 * np.log(factor[-1]).sum() - spline.penalties * np.log(penalty)
-        return coefficients, misfit + penalty * (bend @ bend), spread
+        return coefficients, float(misfit + penalty * (bend @ bend)), float(spread)
 
-    def most_probable(variance: Optional[float]) -> tuple:
+    def most_probable(variance: float | None) -> tuple[float, list[float]]:
         """Minus twice the logarithm of the likelihood at its minimum over penalty and weights, as (penalty,
         weights)."""
 
-        def unlikeliness(x) -> float:
+        def unlikeliness(x: Sequence[float]) -> float:
             weights = _weights(x)
             _, misfit, spread = solve(10.0 ** np.clip(x[0], *STIFFNESS), weights)
-            spread -= sum(len(values) * np.log(w) for w, (_, values) in zip(weights, blocks))
+            spread -= float(sum(len(values) * np.log(w) for w, (_, values) in zip(weights, blocks)))
             if variance is None:
-                return count * np.log(max(misfit, np.finfo(float).tiny)) + spread
+                return count * float(np.log(max(misfit, np.finfo(float).tiny))) + spread
             return misfit / variance + spread
 
-        grid = [[x, *guess] for x in np.linspace(*STIFFNESS, 10) for guess in GUESSES[len(blocks)]]
+        guesses = GUESSES[len(blocks)]
+        grid = [[float(x), *guess] for x in np.linspace(*STIFFNESS, 10) for guess in guesses]
         best = min(grid, key=unlikeliness)
         found = minimize(unlikeliness, best, method="Nelder-Mead", options={"xatol": 0.05, "fatol": 0.5}).x
-        return 10.0 ** np.clip(found[0], *STIFFNESS), _weights(found)
+        return float(10.0 ** np.clip(found[0], *STIFFNESS)), _weights(found)
 
-    least = quantum**2 / 12
-    penalty, weights = most_probable(None)
-    variance = solve(penalty, weights)[1] / count
-    if variance < least:
+    variance = least
+    if least == 0 or rough_noise(blocks[0][1]) ** 2 > NOISIER * least:
+        penalty, weights = most_probable(None)
+        variance = solve(penalty, weights)[1] / count
+    if variance <= least and least > 0:
         variance = least
         penalty, weights = most_probable(variance)
     quiet = solve(min(penalty * OVERSMOOTHING, 10.0 ** STIFFNESS[1]), weights)[0]
     penalty = max(penalty / UNDERSMOOTHING, 10.0 ** STIFFNESS[0])
-    again = partial(cho_solve_banded, (factorize(penalty, weights), False), check_finite=False)
-    return solve(penalty, weights)[0], quiet, float(np.sqrt(variance)), penalty, weights, again
+    return _Fit(solve(penalty, weights)[0], quiet, float(np.sqrt(variance)), weights)
 
 
-def _weights(x) -> list:
+def _weights(x: Sequence[float]) -> list[float]:
     """Weights of the blocks from the logarithms that are optimised."""
-    return [1.0, *(10.0 ** np.clip(y, *RATIO) for y in x[1:])]
+    return [1.0, *(float(10.0 ** np.clip(y, *RATIO)) for y in x[1:])]

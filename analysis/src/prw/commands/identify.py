@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
+from typing import Any
 
-from prw.identify.options import FORMATTER, add_task_options
+from prw.channels import factor
+from prw.commands.assignments import (
+    FORMATTER,
+    add_task_options,
+    bounds,
+    listed,
+    number,
+    numbers,
+    pairs,
+    said_of_options,
+    spreads,
+)
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+from prw.errors import UserError
+from prw.extras import need
+from prw.identification import identify
 
 DESCRIPTION = """\
 Estimates parameters of the testbed from measurements: those with which the FMU, driven by the measured motor angles,
@@ -30,7 +46,7 @@ then:
 """
 
 
-def add_parser(subparsers) -> None:
+def add_parser(subparsers: Any) -> None:
     """Add `identify` to prw's subcommands."""
     parser = subparsers.add_parser(
         "identify",
@@ -65,20 +81,9 @@ def add_parser(subparsers) -> None:
     )
     parser.add_argument("--no-offsets", action="store_true", help="the sensors have no offsets")
     parser.add_argument(
-        "--rest", action="store_true", help="every experiment starts at rest (default: unknown state)"
-    )
-    parser.add_argument(
         "--starts", type=int, default=6, metavar="N", help="places to start the search from (default: %(default)s)"
     )
-    parser.add_argument(
-        "--seed", type=int, default=0, help="of the random places to start from (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--step",
-        type=float,
-        metavar="MS",
-        help="longest communication step of the FMU in ms (default: 0.125)",
-    )
+    parser.add_argument("--seed", type=int, default=0, help="of the random places to start from (default: %(default)s)")
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
     parser.add_argument(
         "--out",
@@ -92,10 +97,53 @@ def add_parser(subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw identify`. Raises UserError with one line on what is wrong."""
-    # numpy's friends take a while to load, and only this command and `prw excite` need scipy.
-    from prw.identify.options import need
+    need("identify", "scipy", "jinja2", "threadpoolctl")
+    with said_of_options(
+        estimate="estimate", fixed="set", priors="prior", noise="noise", units="units", starts="starts"
+    ):
+        found = identify(
+            arguments.files,
+            estimate=listed(arguments.estimate),
+            priors=spreads(arguments.prior, "--prior"),
+            fixed=numbers(arguments.set, "--set"),
+            bounds=bounds(arguments.bounds),
+            noise=numbers(arguments.noise, "--noise"),
+            units=pairs([arguments.units], "--units"),
+            degrees=arguments.degrees,
+            quantum=_quantum(arguments.quantum),
+            offsets=not arguments.no_offsets,
+            starts=arguments.starts,
+            seed=arguments.seed,
+            fmu=arguments.fmu,
+        )
+    report, numbers_, parameters, ssv = (
+        arguments.out / name for name in ("report.html", "report.json", "identified.json", "identified.ssv")
+    )
+    found.report(report)
+    found.to_json(numbers_)
+    print(found.summary())
+    # The parameters only if the data determine them, and never beside another fit's report.
+    if found.undetermined:
+        parameters.unlink(missing_ok=True)
+        ssv.unlink(missing_ok=True)
+        print(f"wrote       {report}, {numbers_}")
+        raise UserError(
+            f"{'; '.join(found.undetermined)}. What would settle it: {'; or '.join(found.advice)}. {report} has the rest; "
+            "identified.json was not written"
+        )
+    found.to_parameters(parameters)
+    found.to_ssv(ssv)
+    print(f"wrote       {report}, {numbers_}, {parameters}, {ssv}")
+    print(
+        "next        look at the report; then: cargo run --release --bin build_fmu -- "
+        f"--parameters {parameters} --out mine"
+    )
 
-    need("scipy", "jinja2", "threadpoolctl")
-    from prw.identify.command import identify
 
-    identify(arguments)
+def _quantum(text: str | None) -> float:
+    if text is None:
+        return 0.0
+    match = re.fullmatch(r"\s*([-+.\deE]+)\s*([^\d\s].*)?", text)
+    if not match:
+        raise UserError(f"--quantum {text}: write an angle like 0.036deg")
+    return number(match.group(1), "--quantum") * factor("theta1", match.group(2) or "rad")

@@ -1,19 +1,15 @@
-"""Options of `prw identify` and `prw excite`: texts like k1=120 to numbers, with a clear word on what is wrong."""
+"""Options like --set k1=120: from texts to numbers, with a clear word on what is wrong."""
 
 from __future__ import annotations
 
 import argparse
-import importlib.util
+import contextlib
 import math
 import re
-from typing import Dict, Iterable, Mapping, Sequence, Tuple
+from collections.abc import Iterable, Iterator
 
 from prw.errors import UserError
-
-#: What is estimated if nothing is said.
-DEFAULT_ESTIMATE = "k1,k2,c1,c2,c3"
-#: Default bounds: this factor about the start value.
-REACH = 100.0
+from prw.identification import DEFAULT_ESTIMATE
 
 
 class FORMATTER(argparse.RawDescriptionHelpFormatter):
@@ -27,7 +23,7 @@ def add_task_options(parser: argparse.ArgumentParser) -> None:
     """Options on parameters and noise that identification and experiment design share."""
     parser.add_argument(
         "--estimate",
-        default=DEFAULT_ESTIMATE,
+        default=",".join(DEFAULT_ESTIMATE),
         metavar="NAMES",
         help="parameters to estimate, with commas; all others stay fixed (default: %(default)s)",
     )
@@ -47,19 +43,9 @@ def add_task_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def need(*packages: str) -> None:
-    """Raise UserError unless the packages are installed."""
-    missing = [name for name in packages if importlib.util.find_spec(name) is None]
-    if missing:
-        raise UserError(
-            f"{', '.join(missing)} missing; `make study` installs what identification and sweeps need "
-            "(or: pip install 'prw[study]')"
-        )
-
-
-def pairs(texts: Iterable[str], option: str) -> Dict[str, str]:
+def pairs(texts: Iterable[str], option: str) -> dict[str, str]:
     """NAME=TEXT, each perhaps several with commas, as a dict. Raises UserError naming the option."""
-    found: Dict[str, str] = {}
+    found: dict[str, str] = {}
     for text in texts:
         for part in filter(None, (p.strip() for p in text.split(","))):
             name, equals, value = part.partition("=")
@@ -82,42 +68,32 @@ def number(text: str, what: str) -> float:
     return value
 
 
-def names(text: str, known: Sequence[str], option: str, others: str = "") -> Tuple[str, ...]:
-    """Names with commas, each once and known. `others` is said of those that are not."""
-    found = tuple(dict.fromkeys(filter(None, (part.strip() for part in text.split(",")))))
-    for name in found:
-        if name not in known:
-            raise UserError(f"{option}: {name} is not known; there are {', '.join(known)}{others}")
-    if not found:
-        raise UserError(f"{option}: nothing is named; there are {', '.join(known)}")
-    return found
+def listed(text: str) -> tuple[str, ...]:
+    """Names with commas, each once."""
+    return tuple(dict.fromkeys(filter(None, (part.strip() for part in text.split(",")))))
 
 
-def numbers(texts: Iterable[str], known: Sequence[str], option: str) -> Dict[str, float]:
-    """NAME=VALUE with known names and positive values."""
-    found = pairs(texts, option)
-    names(",".join(found) or known[0], known, option)
-    return {name: number(text, f"{option} {name}") for name, text in found.items()}
+def numbers(texts: Iterable[str], option: str) -> dict[str, float]:
+    """NAME=VALUE with positive values."""
+    return {name: number(text, f"{option} {name}") for name, text in pairs(texts, option).items()}
 
 
-def spreads(texts: Iterable[str], starts: Mapping[str, float], option: str) -> Dict[str, Tuple[float, float]]:
-    """NAME=[VALUE:]PERCENT% as (value, fraction) by name; the value is the start value if none is given."""
-    found = {}
+def spreads(texts: Iterable[str], option: str) -> dict[str, float | tuple[float, float]]:
+    """NAME=[VALUE:]PERCENT% as a fraction, or (value, fraction), by name."""
+    found: dict[str, float | tuple[float, float]] = {}
     for name, text in pairs(texts, option).items():
-        names(name, list(starts), option)
         match = re.fullmatch(r"(?:([^:]+):)?\s*([^:%]+)%", text)
         if not match:
             raise UserError(f"{option} {name}={text}: write {name}=10%, or {name}=VALUE:10%")
-        value = number(match.group(1), f"{option} {name}") if match.group(1) else starts[name]
-        found[name] = (value, number(match.group(2), f"{option} {name}") / 100)
+        fraction = number(match.group(2), f"{option} {name}") / 100
+        found[name] = (number(match.group(1), f"{option} {name}"), fraction) if match.group(1) else fraction
     return found
 
 
-def bounds(texts: Iterable[str], starts: Mapping[str, float]) -> Dict[str, Tuple[float, float]]:
-    """NAME=LOW:HIGH over the default bounds, by name."""
-    found = {name: (value / REACH, value * REACH) for name, value in starts.items()}
+def bounds(texts: Iterable[str]) -> dict[str, tuple[float, float]]:
+    """NAME=LOW:HIGH by name."""
+    found = {}
     for name, text in pairs(texts, "--bounds").items():
-        names(name, list(starts), "--bounds")
         low, colon, high = text.partition(":")
         if not colon:
             raise UserError(f"--bounds {name}={text}: write {name}=LOW:HIGH")
@@ -125,3 +101,17 @@ def bounds(texts: Iterable[str], starts: Mapping[str, float]) -> Dict[str, Tuple
         if found[name][0] >= found[name][1]:
             raise UserError(f"--bounds {name}={text}: the first must be below the second")
     return found
+
+
+@contextlib.contextmanager
+def said_of_options(**options: str) -> Iterator[None]:
+    """Turn an error on an argument in Python, `fixed: k9 is not known`, into one on the option that it came from,
+    `--set: k9 ...`. options: by argument."""
+    try:
+        yield
+    except UserError as error:
+        text = str(error)
+        argument = re.split(r"\W", text, maxsplit=1)[0]
+        if argument in options:
+            raise UserError(f"--{options[argument]}{text.removeprefix(argument)}") from None
+        raise

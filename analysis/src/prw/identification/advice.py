@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import List, Sequence
 
 import numpy as np
 
-from prw.identify import design
-from prw.identify.experiment import Experiment
-from prw.identify.fit import Solution
-from prw.identify.model import Model
-from prw.identify.statistics import UNDETERMINED, covariance_of
+from prw.identification import design
+from prw.identification.experiment import Experiment, planned
+from prw.identification.fit import Solution
+from prw.identification.model import Model
+from prw.identification.statistics import UNDETERMINED, covariance_of
+from prw.motion import Array
 
 #: Sensors that come in pairs.
 SENSORS = {
@@ -31,7 +32,7 @@ SAID = {
 }
 
 
-def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) -> List[str]:
+def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) -> list[str]:
     """What would determine all parameters, each with the largest standard error to be expected; the best
     motion with the same sensors, and the best pair of sensors with the same motions. Only what helps is named."""
     task = solution.task
@@ -45,9 +46,9 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
     trials = []
     candidates = design.motions(model, task, limits, DURATION, RATE, {name: noise[name] for name in channels})
     for motion in candidates:
-        more = design.information(model, [design.plan(motion, channels)], task, point, noise)
+        more = design.information(model, [planned(motion, channels)], task, point, noise)
         trials.append((_worst(have + more), motion.name))
-    sentences: List[str] = []
+    sentences: list[str] = []
     for error, name in sorted(trials)[:1]:
         if error < UNDETERMINED:
             pattern = name.rsplit("_", 1)[1]
@@ -60,10 +61,7 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
     for name, pair in SENSORS.items():
         if set(pair) <= set(channels):
             continue
-        wider = [
-            replace(e, channels=(*e.channels, *(c for c in pair if c not in e.channels)), values=None)
-            for e in experiments
-        ]
+        wider = [_measured_wholly(e, (*e.channels, *(c for c in pair if c not in e.channels))) for e in experiments]
         found = design.with_priors(design.information(model, wider, task, point, noise), task)
         trials.append((_worst(found), name))
     for error, name in sorted(trials)[:1]:
@@ -74,7 +72,13 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
     return sentences
 
 
-def _worst(information: np.ndarray) -> float:
+def _measured_wholly(experiment: Experiment, channels: tuple[str, ...]) -> Experiment:
+    """The same experiment with these channels, every one at all times and without steps."""
+    exact = np.zeros((1, experiment.bins, len(channels)), dtype=np.complex128)
+    return replace(experiment, channels=channels, values=None, samplers=None, channel_errors=exact)
+
+
+def _worst(information: Array) -> float:
     return float(np.sqrt(np.diag(covariance_of(information)).max()))
 
 
