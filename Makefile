@@ -46,7 +46,7 @@ help:
 	@echo 'make docs                    write the documentation in the FMUs anew'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make dist                    the FMUs for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
-	@echo 'make wheels                  the Python package fmu-run for the same systems, ready to install -> dist/wheels/'
+	@echo 'make wheels                  the Python packages fmu-run and prw (with the FMU), ready to install -> dist/wheels/'
 	@echo 'make test-platforms          run both on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make dist/ again elsewhere and compare every byte'
 	@echo 'make study                   set up prw identify, excite, sweep and linearize  (see analysis/tutorial.md)'
@@ -129,9 +129,10 @@ test-closed-loop: $(VENV)/closed-loop.stamp closed-loop-fmus
 dist: need-rust $(DIST_VENV)/dist.stamp
 	@$(DIST_VENV)/bin/python platforms/dist.py
 
-# One for each system, for Python 3.11 and later.
-wheels: need-rust $(DIST_VENV)/dist.stamp
+# For Python 3.11 and later: fmu-run for each system, prw for all with the FMU inside.
+wheels: dist
 	@$(DIST_VENV)/bin/python platforms/wheels.py
+	@$(DIST_VENV)/bin/python platforms/prw_wheel.py
 
 test-platforms: dist wheels $(DIST_VENV)/test.stamp
 	$(DIST_VENV)/bin/python -m pytest -q -p no:cacheprovider tests/platforms

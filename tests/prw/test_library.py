@@ -143,7 +143,9 @@ def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
     for arguments, complaint in [
         ({"parameters": {"k9": 1.0}}, "parameters: k9 is not known; there are J2, J3, H3"),
         ({"parameters": {"k1": -1.0}}, "the FMU stopped: .*k1 must not be below 0"),
-        ({"parameters": {"N": 7.5}}, "N"),
+        ({"parameters": {"N": 7.5}}, "N.* 7.5"),
+        ({"parameters": {"k1": np.array([1.0, 2.0])}}, r"k1 is array\(\[1., 2.\]\), not a number; prw.sweep takes"),
+        ({"parameters": {"k1": "stiff"}}, "k1 is 'stiff', not a number"),
         ({"outputs": ["yaw"]}, "outputs: yaw is not known; there are theta1"),
         ({"fmu": tmp_path / "absent.fmu"}, "absent.fmu: no such FMU; `make fmu` builds it"),
         ({"motion": tmp_path / "absent.csv"}, "absent.csv: cannot be read"),

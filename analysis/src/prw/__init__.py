@@ -44,8 +44,8 @@ __all__ = [
     "sweep",
 ]
 
-#: The module of each name, loaded when the name is first used: `import prw` takes no time. A name here must not be that
-#: of a module or package in this folder, which would take its place once something imports it.
+#: The module of each name, loaded when the name is first used, so that `import prw` takes no time. No module or package
+#: in this folder may be called like a name here (as `identify` is): once imported, it would be in the name's place.
 _HOMES = {
     "Excitation": "identification.excitation",
     "Identification": "identification.results",

@@ -11,6 +11,4 @@ def need(extra: str, *packages: str) -> None:
     """Raise UserError unless the packages, which `pip install prw[extra]` brings, are installed."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if missing:
-        raise UserError(
-            f"{', '.join(missing)} missing; in a checkout `make study` installs it, elsewhere pip install 'prw[{extra}]'"
-        )
+        raise UserError(f"{', '.join(missing)} missing; install with: pip install 'prw[{extra}]'")

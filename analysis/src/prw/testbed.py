@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from typing import Any, Self
 
 import fmu_run
+import numpy as np
 
 from prw.errors import UserError
 from prw.motion import Array, Motion
@@ -16,7 +18,7 @@ OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3",
 ANGLES, RATES = ("theta1", "theta2"), ("omega1", "omega2")
 
 Value = float | int | bool
-#: What a Real is called in FMI 2.0 and in 3.0.
+#: What a continuous variable is called in FMI 2.0 and in 3.0.
 REAL = ("Real", "Float64")
 #: Where `make fmu` leaves the FMU, within a checkout.
 BUILT = Path("target/fmu/prw_testbed.fmu")
@@ -79,15 +81,17 @@ class Testbed:
 
     def with_starts(self, parameters: Mapping[str, Value]) -> dict[str, Value]:
         """The value of every numeric parameter, in the FMU's units: `parameters`, and the start values of the others.
-        Raises UserError for a name that is no parameter."""
+        Raises UserError for a name that is no parameter, or a value that is no number."""
         known = {
             v.name: _value(v.type, v.start or "0")
             for v in self.loaded.variables.values()
             if v.causality == "parameter" and v.type != "String" and v.name != "use_omega"
         }
-        for name in parameters:
+        for name, value in parameters.items():
             if name not in known:
                 raise UserError(f"parameters: {name} is not known; there are {', '.join(known)}")
+            if not isinstance(value, (Real, np.bool_)):
+                raise UserError(f"parameters: {name} is {value!r}, not a number; prw.sweep takes many values")
         return {**known, **parameters}
 
     def respond(

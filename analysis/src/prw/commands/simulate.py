@@ -10,6 +10,7 @@ import numpy as np
 
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import UserError
+from prw.extras import need
 from prw.files import replacing
 from prw.motion import fig4
 from prw.recording import read_motion
@@ -43,6 +44,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw simulate`. Raises UserError with one line on what is wrong."""
+    need("plot", "matplotlib")
     recorded = arguments.input is not None
     if recorded:
         motion = read_motion(arguments.input, degrees=arguments.degrees)

@@ -67,7 +67,9 @@ def sweep(
     at the end, such as `roll_peak`, in SI. A run that the FMU refuses is a row with its message. Raises UserError for
     what cannot be.
     """
-    need("sweep", "pyarrow", *(["distributed"] if scheduler else []))
+    need("sweep", "pyarrow")
+    if scheduler:
+        need("cluster", "distributed")
     path = existing_fmu(fmu)
     with Testbed(path) as testbed:
         values = layout(grid or {}, random or {}, runs, seed, testbed.starts)
