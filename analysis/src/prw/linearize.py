@@ -11,6 +11,7 @@ import fmpy
 import numpy as np
 from fmpy.simulation import apply_start_values, instantiate_fmu, settable_in_instantiated
 
+from prw.columns import ANGLES, RATES
 from prw.errors import UserError
 
 
@@ -18,8 +19,8 @@ class LinearModel(NamedTuple):
     """x' = A x + B u, y = C x + D u, eq. (11), with the names and units of x, u and y.
 
     A: (n, n), B: (n, m), C: (p, n), D: (p, m), in the FMU's units. states, inputs, outputs: the names of x (n), u (m)
-    and y (p). units: unit by name, "" where there is none. rates: for each input that is the derivative of another one,
-    that other one by name (omega1 is the rate of theta1). Unpacks as `A, B, C, D, *names = linearize(fmu)`.
+    and y (p). units: unit by name, "" where there is none. rates: which input is the rate of which (omega1 of theta1).
+    Unpacks as `A, B, C, D, *names = linearize(fmu)`.
     """
 
     A: np.ndarray
@@ -81,7 +82,7 @@ def linearize(
 ) -> LinearModel:
     """The linear model of the FMI 2.0 file `fmu` at its initial state, by fmi2GetDirectionalDerivative.
 
-    outputs: names of y, outputs or states (default: the FMU's Real outputs). start_values: parameters, states and
+    outputs: names of y, outputs or states (default: the FMU's Real outputs). start_values: parameters and
     inputs by name (default: the FMU's own); the testbed is linear, so of these only parameters matter. fmi_type:
     "CoSimulation" or "ModelExchange" (default: what the FMU offers, in this order).
 
@@ -129,7 +130,7 @@ def linearize(
             C[calculated], D[calculated] = partials(unknowns, states), partials(unknowns, inputs)
 
     units = {name: _unit(variables[name]) for name in (*states, *inputs, *outputs)}
-    rate_of = {n: variables[n].derivative.name for n in inputs if variables[n].derivative is not None}
+    rate_of = {rate: angle for rate, angle in zip(RATES, ANGLES) if {rate, angle} <= set(inputs)}
     return LinearModel(A, B, C, D, states, inputs, outputs, units, rate_of)
 
 

@@ -78,6 +78,4 @@ def driven_by(motion: Motion, start: Mapping[str, float] = {}) -> dict:
     inputs = dict(zip(ANGLES, motion.theta.T))
     if rates:
         inputs.update(zip(RATES, motion.omega.T))
-    theta1, theta2 = motion.theta[0]
-    rest = {"theta3": theta1, "theta5": theta1, "theta4": theta2, "theta6": theta2}
-    return {"inputs": inputs, "start": {"use_omega": rates, **rest, **start}}
+    return {"inputs": inputs, "start": {"use_omega": rates, **start}}
