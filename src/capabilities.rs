@@ -114,6 +114,7 @@ impl OutputDerivatives for TestbedFmu {
     }
 }
 
+/// Those of eq. (11), by states and inputs, whatever a state starts from; by parameters, of all that is calculated.
 impl Partials for TestbedFmu {
     fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
         let is_given = !self.start.is_over && !self.start.at_rest;

@@ -54,8 +54,8 @@ class Testbed:
     def respond(
         self, motion: Motion, outputs: Sequence[str] = OUTPUTS, start: Mapping[str, float] = {}
     ) -> Dict[str, np.ndarray]:
-        """Response to `motion` from rest at its first angles, or from the start values `start` (parameters and states by
-        name, in the FMU's units); each sample is one communication point.
+        """Response to `motion` from rest at its first angles, or from the start values `start` (parameters by name, in
+        the FMU's units); each sample is one communication point.
 
         Returns `outputs` (any Real variables) by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is read
         at time[k] with the motors' angles (and rates, where the motion has them) of sample k set, so a row belongs
