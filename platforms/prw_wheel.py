@@ -13,8 +13,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from dist import DIST
 from targets import MODEL, ROOT
+
+from dist import DIST
 
 PACKAGE = ROOT / "analysis"
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
