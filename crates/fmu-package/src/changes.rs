@@ -14,11 +14,18 @@ pub struct Changes {
     pub start: Vec<(String, String)>,
     /// Parameters are `tunable` instead of `fixed`.
     pub tunable_parameters: bool,
+    /// The files of the folder `sources` that an importer compiles (FMI 2.0).
+    pub source_files: Vec<String>,
 }
 
 impl From<&Variant> for Changes {
     fn from(variant: &Variant) -> Self {
-        Self { guid: Some(variant.guid()), start: variant.start.clone(), tunable_parameters: variant.tunable }
+        Self {
+            guid: Some(variant.guid()),
+            start: variant.start.clone(),
+            tunable_parameters: variant.tunable,
+            source_files: Vec::new(),
+        }
     }
 }
 

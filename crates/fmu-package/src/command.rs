@@ -1,5 +1,6 @@
 //! The command `build_fmu`, the same for every model.
 
+use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources};
 use crate::cargo::LibraryBuild;
 use crate::changes::Changes;
 use crate::connectors::{Terminal, terminals};
@@ -41,6 +42,9 @@ pub struct BuildOptions {
     /// Put in this compiled library, for example win64=model.dll or x86_64-windows=model.dll; repeat it for several
     #[arg(long, value_name = "PLATFORM=PATH", value_parser = binary)]
     pub binary: Vec<(String, PathBuf)>,
+    /// Make the FMU of C sources instead, for targets with no Rust (FMI 2.0, in the folder source; needs wasm2c)
+    #[arg(long, conflicts_with_all = ["target", "binary", "describe"])]
+    pub c_sources: bool,
     /// Accept a library for another processor than its platform names (with FMI 2.0, importers on ARM look in linux64)
     #[arg(long, requires = "binary")]
     pub any_processor: bool,
@@ -116,15 +120,25 @@ impl Builder {
             _ => M::INFO.identifier.to_owned(),
         };
         let guid = variant.guid();
+        let sources = match options.c_sources {
+            true => self.c_sources(options.tunable, M::INFO.identifier)?,
+            false => CSources::new(),
+        };
         let describe = |fmi: Fmi, guid: &str| {
-            let changes = Changes { guid: Some(guid.to_owned()), ..Changes::from(&variant) };
+            let source_files = sources.iter().take(COMPILED).map(|(name, _)| name.clone()).collect();
+            let changes = Changes { guid: Some(guid.to_owned()), source_files, ..Changes::from(&variant) };
             let text = match fmi {
                 Fmi::V2 => fmi2::describe::<M>(&changes),
                 Fmi::V3 => fmi3::describe::<M>(&changes),
             };
             text.with_context(|| described.clone())
         };
-        let versions = options.fmi.map_or_else(|| self.fmi.clone(), |fmi| vec![fmi]);
+        let versions = match options.fmi {
+            None if options.c_sources => vec![Fmi::V2],
+            None => self.fmi.clone(),
+            Some(fmi) => vec![fmi],
+        };
+        ensure!(!options.c_sources || versions == [Fmi::V2], "C sources are made for FMI 2.0 only");
         ensure!(
             !options.any_processor || versions == [Fmi::V2],
             "FMI 3.0 has a folder for every processor; --any-processor goes with --fmi 2 only"
@@ -153,7 +167,7 @@ impl Builder {
             return write_description(&path, description);
         }
 
-        let libraries = self.libraries(options)?;
+        let libraries = if options.c_sources { Vec::new() } else { self.libraries(options)? };
         for library in &libraries {
             check_library(library, &guid, options.any_processor)?;
         }
@@ -164,17 +178,21 @@ impl Builder {
         let identifier = M::INFO.identifier;
         for (fmi, description, terminals) in &descriptions {
             let folder = match fmi {
+                Fmi::V2 if options.c_sources => folder.join("source"),
                 Fmi::V2 => folder.clone(),
                 Fmi::V3 => folder.join("fmi3"),
             };
             let fmu = folder.join(format!("{identifier}.fmu"));
-            let (libraries, content) = (&libraries, &content);
+            let (libraries, sources, content) = (&libraries, &sources, &content);
             let terminals = terminals.as_deref();
-            let size =
-                pack(&fmu, &Parts { fmi: *fmi, identifier, description, terminals, libraries, content })?;
+            let parts = Parts { fmi: *fmi, identifier, description, terminals, libraries, sources, content };
+            let size = pack(&fmu, &parts)?;
             let mut platforms: Vec<_> =
                 libraries.iter().map(|library| library.platform.folder(*fmi)).collect();
             platforms.sort_unstable();
+            if options.c_sources {
+                platforms.push("C sources");
+            }
             println!("{}: {} kB, {}", short(&fmu), size.div_ceil(1000), platforms.join(", "));
         }
         let start = match &self.start_from {
@@ -184,6 +202,7 @@ impl Builder {
         let tunable = if options.tunable { ", tunable" } else { "" };
         println!("guid {guid}{start}{tunable}");
         if is_default
+            && !options.c_sources
             && let Some((fmi, description, _)) = descriptions.first()
             && self.fmi.first() == Some(fmi)
             && let Ok(text) = fs::read_to_string(&committed)
@@ -217,16 +236,25 @@ impl Builder {
         let platforms: Vec<_> =
             options.target.iter().map(|target| Platform::of_target(target)).collect::<Result<_>>()?;
         for (platform, target) in platforms.into_iter().zip(&options.target) {
-            libraries.push(Library { platform, path: self.compile(options.tunable, Some(target))? });
+            libraries.push(Library { platform, path: self.compile(options.tunable, Some(target), &[])? });
         }
         if libraries.is_empty() {
-            libraries
-                .push(Library { platform: Platform::host()?, path: self.compile(options.tunable, None)? });
+            libraries.push(Library {
+                platform: Platform::host()?,
+                path: self.compile(options.tunable, None, &[])?,
+            });
         }
         Ok(libraries)
     }
 
-    fn compile(&self, tunable: bool, target: Option<&str>) -> Result<PathBuf> {
+    /// The sources in C, for every platform.
+    fn c_sources(&self, tunable: bool, identifier: &str) -> Result<CSources> {
+        let module = self.compile(tunable, Some(WEBASSEMBLY), &LINKING)?;
+        let wasm2c = std::env::var_os("WASM2C").unwrap_or_else(|| "wasm2c".into());
+        c_sources(&wasm2c, &module, identifier)
+    }
+
+    fn compile(&self, tunable: bool, target: Option<&str>, arguments: &[&str]) -> Result<PathBuf> {
         let mut environment = self.environment.clone();
         environment.push(("FMU_TUNABLE", tunable.then(|| OsString::from("1"))));
         let build = LibraryBuild {
@@ -234,6 +262,7 @@ impl Builder {
             package: self.package,
             profile: self.profile,
             target,
+            arguments,
             environment,
         };
         build.run()

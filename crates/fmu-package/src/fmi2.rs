@@ -34,8 +34,8 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
     let indicators = M::MODEL_EXCHANGE.map(|offer| offer.indicators);
     let root = root::<M>("2.0", "guid", changes).with_some("numberOfEventIndicators", indicators);
     let children = [
-        M::MODEL_EXCHANGE.map(|_| interface::<M>(Interface::ModelExchange)),
-        M::CO_SIMULATION.map(|_| interface::<M>(Interface::CoSimulation)),
+        M::MODEL_EXCHANGE.map(|_| interface::<M>(Interface::ModelExchange, changes)),
+        M::CO_SIMULATION.map(|_| interface::<M>(Interface::CoSimulation, changes)),
         unit_definitions(&types)?,
         type_definitions(&types, &names, simple_type)?,
         log_categories(),
@@ -47,7 +47,7 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
 }
 
 /// The element of an interface type, with what the FMU can do through it (sections 3.3.1 and 4.3.1).
-fn interface<M: Exported>(interface: Interface) -> Element {
+fn interface<M: Exported>(interface: Interface, changes: &Changes) -> Element {
     let element = match interface {
         Interface::ModelExchange => {
             let told = M::MODEL_EXCHANGE.is_some_and(|offer| offer.step_completed);
@@ -69,6 +69,11 @@ fn interface<M: Exported>(interface: Interface) -> Element {
         .with("canGetAndSetFMUstate", true)
         .with("canSerializeFMUstate", true)
         .with("providesDirectionalDerivative", M::PARTIALS)
+        .containing(list("SourceFiles", changes.source_files.iter().map(source_file)))
+}
+
+fn source_file(name: &String) -> Element {
+    Element::new("File").with("name", name)
 }
 
 fn simple_type(of: &Type) -> Element {

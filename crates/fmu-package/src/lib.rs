@@ -16,7 +16,7 @@
 //! | files | `xml`, `files` |
 //! | the description | `changes`, `check`, `sample`, `structure`, `definitions`, `describe`, `fmi2`, `fmi3` |
 //! | the FMU | `connectors`, `version`, `platform`, `cargo`, `pack` |
-//! | the command | `library`, `terminal`, `command` |
+//! | the command | `library`, `c_sources`, `terminal`, `command` |
 
 #![cfg_attr(not(feature = "command"), allow(rustdoc::broken_intra_doc_links))]
 
@@ -59,6 +59,8 @@ pub mod structure;
 #[cfg(feature = "package")]
 mod version;
 
+#[cfg(feature = "command")]
+mod c_sources;
 #[cfg(feature = "command")]
 mod command;
 #[cfg(feature = "command")]

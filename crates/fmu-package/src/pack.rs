@@ -31,6 +31,8 @@ pub struct Parts<'a> {
     pub terminals: Option<&'a str>,
     /// The libraries, one for each platform.
     pub libraries: &'a [Library],
+    /// The folder `sources`: names and content.
+    pub sources: &'a [(String, Vec<u8>)],
     /// What goes in as it is, under the names of FMI 2.0.
     pub content: &'a [ContentFile],
 }
@@ -39,11 +41,11 @@ pub struct Parts<'a> {
 /// there before stays as it was.
 ///
 /// # Errors
-/// When there is no library, there are two for one platform, a file cannot be read, or the destination
+/// When there is neither library nor sources, there are two for one platform, a file cannot be read, or the destination
 /// cannot be written.
 pub fn pack(destination: &Path, parts: &Parts) -> Result<u64> {
-    let Parts { fmi, identifier, description, terminals, libraries, content } = *parts;
-    ensure!(!libraries.is_empty(), "an FMU needs at least one library");
+    let Parts { fmi, identifier, description, terminals, libraries, sources, content } = *parts;
+    ensure!(!libraries.is_empty() || !sources.is_empty(), "an FMU needs at least one library, or sources");
     let mut entries = vec![("modelDescription.xml".to_owned(), description.as_bytes().to_vec())];
     entries.extend(terminals.map(|text| (TERMINALS.to_owned(), text.as_bytes().to_vec())));
     for Library { platform, path } in libraries {
@@ -51,6 +53,7 @@ pub fn pack(destination: &Path, parts: &Parts) -> Result<u64> {
         let name = format!("binaries/{folder}/{}", platform.library_name(identifier));
         entries.push((name, read(path).with_context(|| format!("the library for {folder} is missing"))?));
     }
+    entries.extend(sources.iter().map(|(name, bytes)| (format!("sources/{name}"), bytes.clone())));
     let has_icon = content.iter().any(|file| file.name == ICON);
     for ContentFile { name, path } in content {
         let name = match (fmi, name.as_str()) {

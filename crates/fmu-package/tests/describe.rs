@@ -270,6 +270,7 @@ fn lists_that_would_be_empty_are_left_out() {
 #[test]
 fn changes_are_made_and_nothing_else() {
     let changes = Changes {
+        source_files: Vec::new(),
         guid: Some("{other}".into()),
         start: vec![
             ("p".into(), "0.30000000000000004".into()),

@@ -41,7 +41,15 @@ impl Sources {
     }
 
     fn parts<'a>(&self, fmi: Fmi, libraries: &'a [Library], content: &'a [ContentFile]) -> Parts<'a> {
-        Parts { fmi, identifier: "toy", description: "<xml/>", terminals: None, libraries, content }
+        Parts {
+            fmi,
+            identifier: "toy",
+            description: "<xml/>",
+            terminals: None,
+            libraries,
+            sources: &[],
+            content,
+        }
     }
 
     fn pack_both(&self, destination: &Path) -> u64 {

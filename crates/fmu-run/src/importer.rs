@@ -1,5 +1,6 @@
 //! An instance as an importer holds it: the C functions as methods.
 
+use crate::library::functions_of;
 use fmu_export::fmi2::Functions;
 use fmu_export::fmi2::types::*;
 use fmu_export::{Exported, Interface};
@@ -182,12 +183,12 @@ impl Importer {
         if component.is_null() { Err(log.take()) } else { Ok(Self { functions, component, log }) }
     }
 
-    /// A fresh instance of a model in this program.
+    /// A fresh instance of a model in this program (see [`functions_of`]).
     ///
     /// # Panics
     /// When there is none.
     pub fn of<M: Exported>(interface: Interface) -> Self {
-        Self::instantiate(Functions::of::<M>(), &Arguments::of::<M>(interface))
+        Self::instantiate(functions_of::<M>(), &Arguments::of::<M>(interface))
             .unwrap_or_else(|log| panic!("there is no instance: {log:?}"))
     }
 

@@ -32,4 +32,4 @@ pub use error::Error;
 pub use fmu::Fmu;
 pub use fmu_export::fmi2::Functions;
 pub use importer::{Arguments, Borrowed, FUNCTIONS, Importer, Message};
-pub use library::{Library, load};
+pub use library::{Library, functions_of, load};

@@ -1,8 +1,11 @@
 //! The shared library of an FMU.
 
+use fmu_export::Exported;
 use fmu_export::fmi2::Functions;
 use fmu_export::fmi2::types::*;
+use std::ffi::OsString;
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// A loaded library. It must outlive its instances.
 #[derive(Debug)]
@@ -43,6 +46,25 @@ macro_rules! find_all {
 }
 
 fmu_export::fmi2_functions!(find_all);
+
+/// The functions of a model: those in this program or, for tests of what else was made of the model, those of the library
+/// that the environment variable `FMU_LIBRARY` names, which must be one that [`load`] may load.
+///
+/// # Panics
+/// When that library cannot be loaded.
+pub fn functions_of<M: Exported>() -> Functions {
+    other_library().map_or_else(Functions::of::<M>, |library| library.functions)
+}
+
+/// The library that `FMU_LIBRARY` names.
+pub(crate) fn other_library() -> Option<&'static Library> {
+    static LIBRARY: OnceLock<Option<Library>> = OnceLock::new();
+    let named = || std::env::var_os("FMU_LIBRARY").filter(|path| !path.is_empty());
+    // SAFETY: who sets the variable knows what it names.
+    let load =
+        |path: OsString| unsafe { load(Path::new(&path)) }.expect("FMU_LIBRARY names an FMU's library");
+    LIBRARY.get_or_init(|| named().map(load)).as_ref()
+}
 
 /// Loads the shared library of an FMU.
 ///

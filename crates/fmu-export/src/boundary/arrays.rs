@@ -1,7 +1,7 @@
 //! The importer's arrays, places and strings.
 
+use crate::c_types::c_char;
 use crate::instance::{Outcome, refuse};
-use libc::c_char;
 use std::ffi::CStr;
 use std::mem::MaybeUninit;
 
@@ -72,12 +72,9 @@ fn check<T>(pointer: *const T, length: usize, argument: &str) -> Outcome {
 #[cold]
 #[inline(never)]
 fn refuse_array<T>(pointer: *const T, length: usize, argument: &str) -> Outcome {
-    let fault = if pointer.is_null() {
-        "is NULL"
-    } else if !pointer.is_aligned() {
-        "is not aligned"
-    } else {
-        "is larger than memory"
-    };
+    if length >> (isize::BITS - 1 - size_of::<T>().ilog2()) != 0 {
+        return refuse(format!("the array {argument} is larger than memory"));
+    }
+    let fault = if pointer.is_null() { "is NULL" } else { "is not aligned" };
     refuse(format!("the array {argument} {fault}, its length is {length}"))
 }

@@ -1,5 +1,6 @@
 //! What every call on an instance has in common.
 
+use crate::c_types::c_void;
 use crate::export::Exported;
 use crate::fmi2::types::fmi2CallbackLogger;
 use crate::fmi3::types::fmi3LogMessageCallback;
@@ -8,13 +9,13 @@ use crate::log::Message;
 use crate::mode::{Mode, Situations};
 use crate::rule::Rule;
 use crate::status::Status;
-use libc::c_void;
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
 use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-#[cfg(panic = "abort")]
+// WebAssembly traps instead, which ends the call and not the process.
+#[cfg(all(panic = "abort", not(target_family = "wasm")))]
 compile_error!("an FMU must not end the importer's process: build with panic = \"unwind\"");
 
 /// What a component points to.
@@ -31,6 +32,7 @@ pub(crate) struct Component<M> {
 
 /// The importer's log callback, as its standard has it.
 #[derive(Clone, Copy)]
+#[cfg_attr(target_family = "wasm", allow(dead_code, reason = "the C around the module knows the importer"))]
 pub(crate) enum Callback {
     Fmi2(fmi2CallbackLogger),
     Fmi3(fmi3LogMessageCallback),
@@ -38,6 +40,7 @@ pub(crate) enum Callback {
 
 /// The importer's log callback, if it has one, and what it wants back with every call. Copied, because the callbacks
 /// structure of FMI 2.0 may go after `fmi2Instantiate`.
+#[cfg_attr(target_family = "wasm", allow(dead_code, reason = "the C around the module knows the importer"))]
 pub(crate) struct ImporterLog {
     pub callback: Option<Callback>,
     pub environment: *mut c_void,
@@ -45,6 +48,12 @@ pub(crate) struct ImporterLog {
 }
 
 impl ImporterLog {
+    #[cfg(target_family = "wasm")]
+    pub fn deliver(&self, message: &Message) {
+        super::webassembly::log(message);
+    }
+
+    #[cfg(not(target_family = "wasm"))]
     pub fn deliver(&self, message: &Message) {
         let Some(callback) = self.callback else { return };
         let (category, text) = (message.category().as_ptr(), message.printable());
@@ -118,7 +127,7 @@ type Ended = Result<Outcome, Box<dyn Any + Send>>;
 /// The end of a call that is not simply OK: says what there is to say.
 #[cold]
 #[inline(never)]
-fn finish<M: Exported>(component: &Component<M>, name: &str, ended: Ended) -> Status {
+pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: Ended) -> Status {
     let status = match &ended {
         Ok(Ok(())) => Status::Ok,
         Ok(Err(refusal)) => refusal.status,

@@ -1,13 +1,13 @@
 //! Making and freeing instances.
 
 use super::{Component, ImporterLog, forget_panic, panic_message};
+use crate::c_types::c_void;
 use crate::export::Exported;
 use crate::instance::{Importer, Instance, Outcome, refuse};
 use crate::log::{Logger, Message};
 use crate::mode::{Interface, Standard};
 use crate::model::Setup;
 use crate::status::Status;
-use libc::c_void;
 use std::cell::{Cell, UnsafeCell};
 use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -30,6 +30,8 @@ pub(crate) fn instantiate<M: Exported>(
     log: impl FnOnce() -> ImporterLog,
     arguments: Arguments,
 ) -> *mut c_void {
+    #[cfg(target_family = "wasm")]
+    super::webassembly::keep_panics();
     let make = || {
         let (importer, standard) = (log(), arguments.importer.standard);
         let refusal = match catch_unwind(AssertUnwindSafe(|| make_instance::<M>(arguments))) {

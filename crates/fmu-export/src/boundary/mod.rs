@@ -8,6 +8,8 @@ mod instances;
 mod settings;
 mod states;
 mod texts;
+#[cfg(target_family = "wasm")]
+pub(crate) mod webassembly;
 
 pub(crate) use arrays::{array, output, place, string};
 pub(crate) use call::{Callback, Component, ImporterLog, call, forget_panic, panic_message};

@@ -1,9 +1,9 @@
 //! What is logged.
 
 use super::{array, string};
+use crate::c_types::c_char;
 use crate::instance::{Instance, Outcome, refuse};
 use crate::log::{Category, Logger};
-use libc::c_char;
 use std::ffi::CStr;
 
 /// # Safety

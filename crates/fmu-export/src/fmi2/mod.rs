@@ -35,6 +35,9 @@ pub use functions::{ALLOWED, Function};
 pub use instances::{fmi2FreeInstance, fmi2GetTypesPlatform, fmi2GetVersion, fmi2Instantiate};
 pub use pointers::Functions;
 
+#[cfg(target_family = "wasm")]
+pub use crate::boundary::webassembly::{broken, room};
+
 use crate::boundary::call;
 use crate::export::Exported;
 use types::*;
@@ -122,6 +125,21 @@ macro_rules! fmi2_symbols {
             }
 
             $crate::fmi2_functions!($crate::fmi2_symbols, @each __fmi2_model;);
+
+            /// See `fmu_export::fmi2::room`.
+            #[cfg(target_family = "wasm")]
+            #[unsafe(no_mangle)]
+            pub extern "C" fn fmu_room(size: usize) -> fmi2Component {
+                $crate::fmi2::room(size)
+            }
+
+            /// See `fmu_export::fmi2::broken`.
+            #[cfg(target_family = "wasm")]
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn fmu_broken(c: fmi2Component, function: fmi2String, reason: fmi2String) -> Status {
+                // SAFETY: the C around the module keeps the contract of this function.
+                unsafe { $crate::fmi2::broken::<__fmi2_model>(c, function, reason) }
+            }
         }
     };
     (

@@ -4,8 +4,8 @@
 //! because a C caller can pass any value; the enumeration that goes out ([`Status`]) is a Rust enum.
 #![allow(non_camel_case_types)]
 
+use crate::c_types::{c_char, c_int, c_uint, c_void};
 pub use crate::status::Status;
-use libc::{c_char, c_int, c_uint, c_void};
 
 /// An instance, as the importer holds it.
 pub type fmi2Component = *mut c_void;

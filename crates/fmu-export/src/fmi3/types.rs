@@ -1,8 +1,8 @@
 //! The C types of FMI 3.0, as in `fmi3PlatformTypes.h` and `fmi3FunctionTypes.h`, written by hand.
 #![allow(non_camel_case_types)]
 
+use crate::c_types::{c_char, c_int, c_void};
 pub use crate::status::Status;
-use libc::{c_char, c_int, c_void};
 
 /// An instance, as the importer holds it.
 pub type fmi3Instance = *mut c_void;

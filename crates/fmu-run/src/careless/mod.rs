@@ -11,7 +11,8 @@ mod arguments;
 mod call;
 pub mod fmi3;
 
-use crate::serialized::{sealed, time};
+use crate::library::{functions_of, other_library};
+use crate::serialized::{fnv1a, sealed, time};
 use crate::{Arguments, Functions, Importer};
 use arbitrary::{Result, Unstructured};
 use arguments::CallArguments;
@@ -32,9 +33,34 @@ pub type Tally = BTreeMap<&'static str, [u64; 3]>;
 /// # Panics
 /// At the first broken promise.
 pub fn run<M: Exported>(bytes: &[u8], tally: &mut Tally) {
+    let at_home = other_library().is_some();
+    session::<M>(functions_of::<M>(), at_home, bytes, tally, None);
+}
+
+/// Makes the calls on these functions of a model, saved states staying with their instances, and tells what was
+/// answered and logged, call by call.
+///
+/// # Panics
+/// At the first broken promise.
+pub fn record<M: Exported>(functions: Functions, bytes: &[u8]) -> Vec<String> {
+    let mut record = Vec::new();
+    session::<M>(functions, true, bytes, &mut Tally::new(), Some(&mut record));
+    record
+}
+
+fn session<M: Exported>(
+    functions: Functions,
+    at_home: bool,
+    bytes: &[u8],
+    tally: &mut Tally,
+    record: Option<&mut Vec<String>>,
+) {
     let mut session = Session::<M> {
+        functions,
+        at_home,
+        record,
         instances: [const { None }; 3],
-        states: [null_mut(); 3],
+        states: [[null_mut(); 3]; 3],
         saved: Vec::new(),
         variables: arguments::Variables::of::<M>(),
         tally,
@@ -94,9 +120,13 @@ pub fn random_bytes(seed: u64, count: usize) -> Vec<u8> {
 }
 
 struct Session<'a, M> {
+    functions: Functions,
+    /// Whether saved states stay with their instances: compiled C sources keep them there.
+    at_home: bool,
+    record: Option<&'a mut Vec<String>>,
     instances: [Option<Slot>; 3],
-    /// Saved states of any instance.
-    states: [fmi2FMUstate; 3],
+    /// Saved states: of any instance, all in the first place, or of each.
+    states: [[fmi2FMUstate; 3]; 3],
     /// A serialized state, intact or not.
     saved: Vec<u8>,
     variables: arguments::Variables,
@@ -156,6 +186,20 @@ impl<M: Exported> Session<'_, M> {
         self.tally.entry(function).or_default()[column] += 1;
     }
 
+    fn record(&mut self, what: impl FnOnce() -> String) {
+        if let Some(record) = &mut self.record {
+            record.push(what());
+        }
+    }
+
+    /// Frees an instance.
+    fn free(&mut self, index: usize) {
+        self.instances[index] = None;
+        if self.at_home {
+            self.states[index] = [null_mut(); 3];
+        }
+    }
+
     fn act(&mut self, u: &mut Unstructured) -> Result<()> {
         let index = u.int_in_range(0..=self.instances.len() - 1)?;
         let kind = u.int_in_range(0..=63_u8)?;
@@ -163,7 +207,7 @@ impl<M: Exported> Session<'_, M> {
             return self.instantiate(index, u);
         }
         match kind {
-            1 => self.instances[index] = None,
+            1 => self.free(index),
             2 => self.without_instance(u)?,
             3..=5 => self.initialize(index),
             6..=8 => self.replay(index, u.arbitrary()?),
@@ -186,7 +230,7 @@ impl<M: Exported> Session<'_, M> {
 
     /// `fmi2Instantiate` in place of an instance, which is freed before.
     fn instantiate(&mut self, index: usize, u: &mut Unstructured) -> Result<()> {
-        self.instances[index] = None;
+        self.free(index);
         self.tally.entry("fmi2FreeInstance").or_default()[0] += 1;
         let both = M::CO_SIMULATION.is_some() && M::MODEL_EXCHANGE.is_some();
         let any = *u.choose(&[Interface::CoSimulation, Interface::ModelExchange])?;
@@ -206,7 +250,10 @@ impl<M: Exported> Session<'_, M> {
         }
         (made_of.logging_on, made_of.visible) = (u.arbitrary()?, u.arbitrary()?);
         made_of.environment = u.ratio(7, 8)?;
-        let made = Importer::instantiate(Functions::of::<M>(), &made_of);
+        let made = Importer::instantiate(self.functions, &made_of);
+        self.record(|| {
+            format!("fmi2Instantiate {:?}", made.as_ref().map_or_else(Clone::clone, Importer::take_log))
+        });
         self.count("fmi2Instantiate", if made.is_ok() { Status::Ok } else { Status::Error });
         if let Ok(fmu) = made {
             let saved = fmu.bytes();
@@ -220,7 +267,7 @@ impl<M: Exported> Session<'_, M> {
 
     /// What needs no instance, and what must survive that there is none.
     fn without_instance(&mut self, u: &mut Unstructured) -> Result<()> {
-        let nothing = Importer::null(Functions::of::<M>());
+        let nothing = Importer::null(self.functions);
         assert_eq!(nothing.version_and_platform(), [c"2.0", c"default"]);
         self.count("fmi2GetVersion", Status::Ok);
         self.count("fmi2GetTypesPlatform", Status::Ok);
@@ -256,7 +303,11 @@ impl<M: Exported> Session<'_, M> {
         let call = Call { function, arguments };
         slot.fmu.take_log();
         let answer = call.run(&slot.fmu);
-        check_messages(slot.fmu.take_log());
+        let messages = slot.fmu.take_log();
+        if let Some(record) = &mut self.record {
+            record.push(format!("{:x?} {function} {answer:?} {messages:?}", fnv1a(&before)));
+        }
+        check_messages(messages);
         let unasked = function == "fmi2CompletedIntegratorStep"
             && M::MODEL_EXCHANGE.is_none_or(|offer| !offer.step_completed);
         assert!(!unasked || answer.values.iter().all(|flag| *flag == 0), "{answer:?}");
@@ -277,7 +328,7 @@ impl<M: Exported> Session<'_, M> {
         let Some(slot) = &mut self.instances[index] else { return };
         let end = slot.fmu.bytes();
         let other = elsewhere
-            .then(|| Importer::instantiate(Functions::of::<M>(), &slot.made_of).expect("it was made before"));
+            .then(|| Importer::instantiate(self.functions, &slot.made_of).expect("it was made before"));
         let fmu = other.as_ref().unwrap_or(&slot.fmu);
         fmu.restore(&slot.saved);
         for (call, answer) in &slot.since {
@@ -292,14 +343,14 @@ impl<M: Exported> Session<'_, M> {
         }
     }
 
-    /// The six functions of saved states. States go from any instance to any other.
+    /// The six functions of saved states. States go from any instance to any other, if they do not stay at home.
     fn handle(&mut self, index: usize, u: &mut Unstructured) -> Result<()> {
         let which = u.int_in_range(0..=self.states.len() - 1)?;
         let Some(slot) = &mut self.instances[index] else { return Ok(()) };
         let fmu = &slot.fmu;
         let before = fmu.bytes();
         fmu.take_log();
-        let state = &mut self.states[which];
+        let state = &mut self.states[if self.at_home { index } else { 0 }][which];
         let (function, status) = match u.int_in_range(0..=7_u8)? {
             0 | 1 => ("fmi2GetFMUstate", fmu.fmi2GetFMUstate(place(state, u)?)),
             2 | 3 => ("fmi2SetFMUstate", fmu.fmi2SetFMUstate(*state)),
@@ -331,7 +382,11 @@ impl<M: Exported> Session<'_, M> {
                 ("fmi2DeSerializeFMUstate", status)
             }
         };
-        check_messages(fmu.take_log());
+        let messages = fmu.take_log();
+        if let Some(record) = &mut self.record {
+            record.push(format!("{:x?} {function} {status:?} {messages:?}", fnv1a(&self.saved)));
+        }
+        check_messages(messages);
         assert!([Status::Ok, Status::Error].contains(&status), "{function} answers {status:?}");
         if function == "fmi2SetFMUstate" && status == Status::Ok {
             slot.start_over();
@@ -346,10 +401,11 @@ impl<M: Exported> Session<'_, M> {
     fn end(mut self) {
         for index in 0..self.instances.len() {
             self.replay(index, index % 2 == 0);
-            self.instances[index] = None;
+            self.free(index);
         }
-        let stranger = Importer::of::<M>(offered::<M>());
-        for state in self.states {
+        let stranger = Importer::instantiate(self.functions, &Arguments::of::<M>(offered::<M>()));
+        let stranger = stranger.expect("an instance like the others");
+        for state in self.states.into_iter().flatten() {
             stranger.forget(state);
         }
     }

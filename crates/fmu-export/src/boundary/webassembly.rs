@@ -1,0 +1,70 @@
+//! What C around a WebAssembly module needs of it, where an FMU is made into C sources: nothing unwinds there, and the
+//! importer's memory and callbacks are out of reach. Each instance has a module, with its memory, for itself.
+
+use super::call::{Component, finish, panic_message};
+use super::string;
+use crate::c_types::{c_char, c_void};
+use crate::export::Exported;
+use crate::log::Message;
+use crate::status::Status;
+use std::any::Any;
+use std::cell::{Cell, RefCell};
+use std::panic::PanicHookInfo;
+
+#[link(wasm_import_module = "fmu")]
+unsafe extern "C" {
+    safe fn fmu_log(status: Status, category: *const c_char, message: *const c_char);
+}
+
+thread_local! {
+    static ROOM: RefCell<Vec<u64>> = const { RefCell::new(Vec::new()) };
+    static PANIC: Cell<Option<String>> = const { Cell::new(None) };
+}
+
+/// Hands a message to the importer's log callback, if it has one.
+pub(super) fn log(message: &Message) {
+    fmu_log(message.status, message.category().as_ptr(), message.printable().as_ptr());
+}
+
+/// Keeps what panics say, for [`broken`] to tell.
+pub(super) fn keep_panics() {
+    let keep = |panic: &PanicHookInfo| {
+        PANIC.set(Some(panic_message(panic.payload()).to_owned()));
+    };
+    std::panic::set_hook(Box::new(keep));
+}
+
+/// Makes room for the arguments of a call: `size` bytes in place of those it made before, or NULL if there is not so
+/// much memory.
+pub fn room(size: usize) -> *mut c_void {
+    ROOM.with_borrow_mut(|room| {
+        *room = Vec::new();
+        match room.try_reserve_exact(size.div_ceil(size_of::<u64>())) {
+            Ok(()) => room.as_mut_ptr().cast(),
+            Err(_) => std::ptr::null_mut(),
+        }
+    })
+}
+
+/// The end of a call that trapped: by a panic, or for `reason`. Without an instance it was `fmi2Instantiate`.
+///
+/// # Safety
+/// `c` is NULL or a living component of this model, the texts are strings.
+pub unsafe fn broken<M: Exported>(c: *mut c_void, function: *const c_char, reason: *const c_char) -> Status {
+    // SAFETY: the caller's promise.
+    let [function, reason] =
+        [function, reason].map(|text| unsafe { string(text) }.unwrap_or_default().to_string_lossy());
+    let panic = PANIC.take().unwrap_or_else(|| reason.into_owned());
+    // SAFETY: the caller's promise.
+    match unsafe { c.cast::<Component<M>>().as_ref() } {
+        Some(component) => {
+            component.delivering.set(false);
+            finish(component, &function, Err(Box::new(panic) as Box<dyn Any + Send>))
+        }
+        None => {
+            let text = format!("{function}: internal failure ({panic})");
+            log(&Message { status: Status::Error, text });
+            Status::Error
+        }
+    }
+}

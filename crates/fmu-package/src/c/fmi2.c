@@ -1,0 +1,606 @@
+/* The functions of FMI 2.0 around a model that was compiled to WebAssembly and made into C.
+
+   An instance is one block of memory, with a module of its own in it, which has the functions under their names and
+   decides everything: what is allowed, what is refused, what the log says. Here the importer's arrays and texts are
+   copied into the module's memory and out of it, and a module that traps is told of it. */
+
+/* What the module is called, and how much memory it needs. */
+#include "module.h"
+
+#if !defined(FMI2_FUNCTION_PREFIX) && !defined(FMI2_OVERRIDE_FUNCTION_PREFIX)
+#define FMI2_FUNCTION_PREFIX FMU_PREFIX
+#endif
+#include "fmi2Functions.h"
+#include <stdlib.h>
+
+/* The most memory that an instance's module can have, for what states and texts the importer makes it keep. */
+#ifndef FMU_MEMORY_PAGES
+#define FMU_MEMORY_PAGES (FMU_INITIAL_PAGES + 2)
+#endif
+#if FMU_MEMORY_PAGES < FMU_INITIAL_PAGES + 1
+#error "FMU_MEMORY_PAGES, the memory of an instance in units of 64 KiB, is less than the module needs"
+#endif
+
+typedef struct {
+    FMU_MODULE module;
+    fmi2CallbackLogger logger;
+    fmi2ComponentEnvironment environment;
+    char *name;
+    u32 component; /* the instance, as the module knows it */
+    u32 room;      /* for arguments, in the module's memory */
+    u32 room_size;
+    bool dead; /* after a failure that the module cannot even tell of */
+    wasm_rt_funcref_t table[FMU_TABLE];
+    union {
+        double aligned;
+        uint8_t bytes[FMU_MEMORY_PAGES * FMU_PAGE];
+    } memory;
+} Instance;
+
+/* A call that is running. */
+typedef struct {
+    Instance *instance;
+    const char *function;
+    jmp_buf trap;
+    u32 stack; /* as it was before the call */
+    u32 next;  /* where the next argument goes */
+    bool endless;
+} Call;
+
+static void log_error(const Instance *instance, fmi2Status status, fmi2String message) {
+    if (instance->logger != NULL) {
+        instance->logger(instance->environment, instance->name, status,
+                         status == fmi2Fatal ? "logStatusFatal" : "logStatusError", message);
+    }
+}
+
+/* The module has a message for the importer. */
+void FMU_log(struct w2c_fmu *importer, u32 status, u32 category, u32 message) {
+    const Instance *instance = (const Instance *)(void *)importer;
+    const char *texts = (const char *)instance->module.w2c_memory.data;
+    if (instance->logger != NULL) {
+        instance->logger(instance->environment, instance->name, (fmi2Status)status, texts + category,
+                         texts + message);
+    }
+}
+
+static void begin(Call *call, Instance *instance, const char *function) {
+    call->instance = instance;
+    call->function = function;
+    call->stack = instance->module.FMU_STACK;
+    call->next = instance->room;
+    call->endless = false;
+    instance->module.w2c_memory.trap = &call->trap;
+    instance->module.w2c_memory.refused = false;
+}
+
+static fmi2Status end(Call *call, fmi2Status status) {
+    call->instance->module.w2c_memory.trap = NULL;
+    return status;
+}
+
+/* The array's length, as the module is told it. */
+static u32 count(const Call *call, size_t n) {
+    return call->endless ? UINT32_MAX : (u32)n;
+}
+
+/* Makes room for `n` times `each` bytes of arguments, with `more` for the gaps between them and what else there is.
+   A length that no array can have is left to the module to refuse. */
+static bool room(Call *call, size_t n, size_t each, size_t more) {
+    Instance *instance = call->instance;
+    size_t size;
+    if (n > PTRDIFF_MAX / 8) {
+        call->endless = true;
+        n = 0;
+    }
+    if (n > (UINT32_MAX / 2 - more) / each) {
+        return false;
+    }
+    size = n * each + more;
+    if (size > instance->room_size) {
+        instance->room_size = 0;
+        instance->room = FMU_room(&instance->module, (u32)size);
+        if (instance->room == 0) {
+            return false;
+        }
+        instance->room_size = (u32)size;
+        call->next = instance->room;
+    }
+    return true;
+}
+
+static fmi2Status refuse(Call *call, fmi2String message) {
+    log_error(call->instance, fmi2Error, message);
+    return end(call, fmi2Error);
+}
+
+/* The address in the module for an array of the importer's: none for NULL, one that is not aligned if that is so. */
+static u32 output(Call *call, const void *array, size_t n, size_t size, size_t alignment) {
+    u32 address = call->next;
+    if (array == NULL) {
+        return 0;
+    }
+    if ((uintptr_t)array % alignment != 0) {
+        return address + 1;
+    }
+    if (!call->endless) {
+        call->next += (u32)((n * size + 7) / 8 * 8);
+    }
+    return address;
+}
+
+static void *at(const Call *call, u32 address) {
+    return call->instance->module.w2c_memory.data + address;
+}
+
+static u32 input(Call *call, const void *array, size_t n, size_t size, size_t alignment) {
+    u32 address = output(call, array, n, size, alignment);
+    if (address % alignment == 0 && address != 0 && !call->endless) {
+        memcpy(at(call, address), array, n * size);
+    }
+    return address;
+}
+
+#define ALIGNMENT(type) offsetof(struct { char byte; type value; }, value)
+#define IN(array, n, type) input(&call, array, n, sizeof(type), ALIGNMENT(type))
+#define OUT(array, n, type) output(&call, array, n, sizeof(type), ALIGNMENT(type))
+#define COPY_OUT(array, address, n)                                        \
+    if (status == fmi2OK && (n) != 0) {                                    \
+        memcpy(array, at(&call, address), (n) * sizeof *(array));          \
+    }
+
+static size_t length(fmi2String text) {
+    return text == NULL ? 0 : strlen(text) + 1;
+}
+
+static u32 string(Call *call, fmi2String text) {
+    return input(call, text, length(text), 1, 1);
+}
+
+/* The importer's texts, behind an array of the module's. */
+static u32 strings(Call *call, const fmi2String texts[], size_t n) {
+    u32 array = output(call, texts, n, sizeof(u32), ALIGNMENT(fmi2String));
+    size_t i;
+    if (array % sizeof(u32) == 0 && array != 0 && !call->endless) {
+        for (i = 0; i < n; i++) {
+            u32 text = string(call, texts[i]);
+            memcpy(at(call, array + (u32)(i * sizeof text)), &text, sizeof text);
+        }
+    }
+    return array;
+}
+
+static size_t length_of_all(const fmi2String texts[], size_t n) {
+    size_t i, sum = 0;
+    if (texts == NULL || (uintptr_t)texts % ALIGNMENT(fmi2String) != 0 || n > PTRDIFF_MAX / 8) {
+        return 0;
+    }
+    for (i = 0; i < n; i++) {
+        sum += length(texts[i]) + 8;
+    }
+    return sum;
+}
+
+static const char *reason(const wasm_rt_memory_t *memory) {
+    if (memory->refused) {
+        return "the memory of the instance is used up; compile the FMU with a larger FMU_MEMORY_PAGES";
+    }
+    return memory->reason == WASM_RT_TRAP_OOB ? "stack overflow" : "no message";
+}
+
+/* The end of a call that has trapped. */
+static fmi2Status broken(Call *call) {
+    Instance *instance = call->instance;
+    instance->module.FMU_STACK = call->stack;
+    if (setjmp(call->trap) == 0) {
+        const char *why = reason(&instance->module.w2c_memory);
+        if (room(call, length(call->function) + length(why), 1, 16)) {
+            u32 function, text;
+            call->next = instance->room;
+            call->endless = false;
+            function = string(call, call->function);
+            text = string(call, why);
+            return end(call, (fmi2Status)FMU_broken(&instance->module, instance->component, function, text));
+        }
+    }
+    instance->dead = true;
+    log_error(instance, fmi2Fatal, "internal failure; free this instance, others are not affected");
+    return end(call, fmi2Fatal);
+}
+
+/* What every function of an instance begins with. None can be called while another is running: by the log callback. */
+#define BEGIN(name)                                                     \
+    Instance *instance = (Instance *)c;                                 \
+    fmi2Status status;                                                  \
+    Call call;                                                          \
+    if (instance == NULL || instance->module.w2c_memory.trap != NULL) { \
+        return fmi2Error;                                               \
+    }                                                                   \
+    if (instance->dead) {                                               \
+        return fmi2Fatal;                                               \
+    }                                                                   \
+    begin(&call, instance, name);                                       \
+    if (setjmp(call.trap) != 0) {                                       \
+        return broken(&call);                                           \
+    }
+
+#define ROOM(name, n, each, more)                                                               \
+    if (!room(&call, n, each, more)) {                                                          \
+        return refuse(&call, name ": the instance has no memory for so many values; compile the " \
+                                  "FMU with a larger FMU_MEMORY_PAGES");                        \
+    }
+
+/* A function of the module; what it takes first is the instance. */
+#define CALL(function, ...) status = (fmi2Status)function(&instance->module, instance->component, __VA_ARGS__)
+#define END return end(&call, status);
+
+fmi2String fmi2GetTypesPlatform(void) {
+    return fmi2TypesPlatform;
+}
+
+fmi2String fmi2GetVersion(void) {
+    return fmi2Version;
+}
+
+/* fmi2CallbackFunctions, as the module has it: all it asks is whether there is a logger. */
+typedef struct {
+    u32 logger, allocate_memory, free_memory, step_finished, environment;
+} Callbacks;
+
+/* A block of memory for all that an instance ever needs. */
+static Instance *allocate(fmi2String name, const fmi2CallbackFunctions *functions) {
+    Instance *instance = (Instance *)calloc(1, sizeof(Instance) + length(name) + 1);
+    if (instance == NULL) {
+        if (functions->logger != NULL) {
+            functions->logger(functions->componentEnvironment, name, fmi2Error, "logStatusError",
+                              "fmi2Instantiate: there is no memory for an instance");
+        }
+        return NULL;
+    }
+    instance->logger = functions->logger;
+    instance->environment = functions->componentEnvironment;
+    instance->name = (char *)(instance + 1);
+    if (name != NULL) {
+        memcpy(instance->name, name, length(name));
+    }
+    instance->module.w2c_memory.data = instance->memory.bytes;
+    instance->module.w2c_memory.most = FMU_MEMORY_PAGES;
+    instance->module.FMU_FUNCTIONS.data = instance->table;
+    return instance;
+}
+
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging_on) {
+    Instance *const instance = functions == NULL ? NULL : allocate(name, functions);
+    Call call;
+    if (instance == NULL) {
+        return NULL;
+    }
+    begin(&call, instance, "fmi2Instantiate");
+    if (setjmp(call.trap) != 0) {
+        broken(&call);
+        instance->component = 0;
+    } else {
+        FMU_instantiate(&instance->module, (struct w2c_fmu *)(void *)instance);
+        call.stack = instance->module.FMU_STACK;
+        if (room(&call, length(name) + length(guid) + length(resources), 1, 4096)) {
+            Callbacks callbacks = {0, 0, 0, 0, 0};
+            u32 in_name = string(&call, name), in_guid = string(&call, guid), in_resources = string(&call, resources);
+            callbacks.logger = functions->logger != NULL;
+            instance->component = FMU_fmi2Instantiate(
+                &instance->module, in_name, (u32)type, in_guid, in_resources,
+                input(&call, &callbacks, 1, sizeof callbacks, 1), (u32)visible, (u32)logging_on);
+        } else {
+            log_error(instance, fmi2Error, "fmi2Instantiate: the arguments need more memory than an instance has");
+        }
+        end(&call, fmi2OK);
+    }
+    if (instance->component == 0) {
+        free(instance);
+        return NULL;
+    }
+    return instance;
+}
+
+void fmi2FreeInstance(fmi2Component c) {
+    Instance *instance = (Instance *)c;
+    Call call;
+    if (instance == NULL || instance->module.w2c_memory.trap != NULL) {
+        return;
+    }
+    begin(&call, instance, "fmi2FreeInstance");
+    if (setjmp(call.trap) == 0 && !instance->dead) {
+        FMU_fmi2FreeInstance(&instance->module, instance->component);
+    }
+    free(instance);
+}
+
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean logging_on, size_t n, const fmi2String categories[]) {
+    BEGIN("fmi2SetDebugLogging")
+    ROOM("fmi2SetDebugLogging", n, sizeof(u32), 64 + length_of_all(categories, n))
+    CALL(FMU_fmi2SetDebugLogging, (u32)logging_on, count(&call, n), strings(&call, categories, n));
+    END
+}
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
+                               fmi2Real start_time, fmi2Boolean stop_time_defined, fmi2Real stop_time) {
+    BEGIN("fmi2SetupExperiment")
+    CALL(FMU_fmi2SetupExperiment, (u32)tolerance_defined, tolerance, start_time, (u32)stop_time_defined, stop_time);
+    END
+}
+
+fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
+    BEGIN("fmi2SetTime")
+    CALL(FMU_fmi2SetTime, time);
+    END
+}
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real point, fmi2Real size, fmi2Boolean no_set_state_prior) {
+    BEGIN("fmi2DoStep")
+    CALL(FMU_fmi2DoStep, point, size, (u32)no_set_state_prior);
+    END
+}
+
+/* Alike but for a name. FMI's headers make the names macros: `#` and `##` take them before they expand. */
+
+#define WITHOUT_ARGUMENTS(name)                                                        \
+    fmi2Status name(fmi2Component c) {                                                 \
+        BEGIN(#name)                                                                   \
+        status = (fmi2Status)FMU_##name(&instance->module, instance->component);       \
+        END                                                                            \
+    }
+
+WITHOUT_ARGUMENTS(fmi2EnterInitializationMode)
+WITHOUT_ARGUMENTS(fmi2ExitInitializationMode)
+WITHOUT_ARGUMENTS(fmi2Terminate)
+WITHOUT_ARGUMENTS(fmi2Reset)
+WITHOUT_ARGUMENTS(fmi2CancelStep)
+WITHOUT_ARGUMENTS(fmi2EnterEventMode)
+WITHOUT_ARGUMENTS(fmi2EnterContinuousTimeMode)
+
+#define GET_AND_SET(get, set, type)                                                                       \
+    fmi2Status get(fmi2Component c, const fmi2ValueReference vr[], size_t n, type value[]) {              \
+        u32 values;                                                                                       \
+        BEGIN(#get)                                                                                       \
+        ROOM(#get, n, sizeof *vr + sizeof *value, 64)                                                     \
+        values = OUT(value, n, type);                                                                     \
+        CALL(FMU_##get, IN(vr, n, fmi2ValueReference), count(&call, n), values);                          \
+        COPY_OUT(value, values, n)                                                                        \
+        END                                                                                               \
+    }                                                                                                     \
+    fmi2Status set(fmi2Component c, const fmi2ValueReference vr[], size_t n, const type value[]) {        \
+        BEGIN(#set)                                                                                       \
+        ROOM(#set, n, sizeof *vr + sizeof *value, 64)                                                     \
+        CALL(FMU_##set, IN(vr, n, fmi2ValueReference), count(&call, n), IN(value, n, type));              \
+        END                                                                                               \
+    }
+
+GET_AND_SET(fmi2GetReal, fmi2SetReal, fmi2Real)
+GET_AND_SET(fmi2GetInteger, fmi2SetInteger, fmi2Integer)
+GET_AND_SET(fmi2GetBoolean, fmi2SetBoolean, fmi2Boolean)
+
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String value[]) {
+    u32 values;
+    size_t i;
+    BEGIN("fmi2GetString")
+    ROOM("fmi2GetString", n, sizeof *vr + sizeof(u32), 64)
+    values = output(&call, value, n, sizeof(u32), ALIGNMENT(fmi2String));
+    CALL(FMU_fmi2GetString, IN(vr, n, fmi2ValueReference), count(&call, n), values);
+    for (i = 0; status == fmi2OK && i < n; i++) {
+        u32 text;
+        memcpy(&text, at(&call, values + (u32)(i * sizeof text)), sizeof text);
+        value[i] = (fmi2String)at(&call, text);
+    }
+    END
+}
+
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String value[]) {
+    BEGIN("fmi2SetString")
+    ROOM("fmi2SetString", n, sizeof *vr + sizeof(u32), 64 + length_of_all(value, n))
+    CALL(FMU_fmi2SetString, IN(vr, n, fmi2ValueReference), count(&call, n), strings(&call, value, n));
+    END
+}
+
+/* A state that the importer keeps lies in the module's memory. */
+
+static u32 to_module(const Instance *instance, fmi2FMUstate state) {
+    const uint8_t *bytes = (const uint8_t *)state, *first = instance->memory.bytes;
+    if (state == NULL) {
+        return 0;
+    }
+    return bytes > first && bytes < first + sizeof instance->memory.bytes ? (u32)(bytes - first) : UINT32_MAX;
+}
+
+#define STATE(name, state)                                                                     \
+    u32 in_module = to_module(instance, state);                                                \
+    if (in_module == UINT32_MAX) {                                                             \
+        return refuse(&call, name ": the state is another instance's; serialize it there, and " \
+                                  "deserialize it here");                                      \
+    }
+
+/* A place for a state; what it holds is looked at only if there is a place. */
+#define STATE_PLACE(name, place, n)                                         \
+    u32 in_place;                                                           \
+    ROOM(name, n, 1, 64)                                                    \
+    in_place = output(&call, place, 1, sizeof(u32), ALIGNMENT(fmi2FMUstate)); \
+    if (in_place != 0 && in_place % sizeof(u32) == 0) {                     \
+        STATE(name, *place)                                                 \
+        memcpy(at(&call, in_place), &in_module, sizeof in_module);          \
+    }
+
+#define STATE_OUT(place)                                           \
+    if (status == fmi2OK && (place) != NULL) {                     \
+        u32 in_it;                                                 \
+        memcpy(&in_it, at(&call, in_place), sizeof in_it);         \
+        *(place) = in_it == 0 ? NULL : (fmi2FMUstate)at(&call, in_it); \
+    }
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    BEGIN("fmi2GetFMUstate")
+    STATE_PLACE("fmi2GetFMUstate", state, 0)
+    CALL(FMU_fmi2GetFMUstate, in_place);
+    STATE_OUT(state)
+    END
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
+    BEGIN("fmi2SetFMUstate")
+    STATE("fmi2SetFMUstate", state)
+    CALL(FMU_fmi2SetFMUstate, in_module);
+    END
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    BEGIN("fmi2FreeFMUstate")
+    STATE_PLACE("fmi2FreeFMUstate", state, 0)
+    CALL(FMU_fmi2FreeFMUstate, in_place);
+    STATE_OUT(state)
+    END
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
+    u32 sizes, written;
+    BEGIN("fmi2SerializedFMUstateSize")
+    STATE("fmi2SerializedFMUstateSize", state)
+    ROOM("fmi2SerializedFMUstateSize", 0, 1, 64)
+    sizes = output(&call, size, 1, sizeof(u32), ALIGNMENT(size_t));
+    CALL(FMU_fmi2SerializedFMUstateSize, in_module, sizes);
+    if (status == fmi2OK) {
+        memcpy(&written, at(&call, sizes), sizeof written);
+        *size = written;
+    }
+    END
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte byte[], size_t n) {
+    u32 bytes;
+    BEGIN("fmi2SerializeFMUstate")
+    STATE("fmi2SerializeFMUstate", state)
+    ROOM("fmi2SerializeFMUstate", n, 1, 64)
+    bytes = OUT(byte, n, fmi2Byte);
+    CALL(FMU_fmi2SerializeFMUstate, in_module, bytes, count(&call, n));
+    COPY_OUT(byte, bytes, n)
+    END
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte byte[], size_t n, fmi2FMUstate *state) {
+    BEGIN("fmi2DeSerializeFMUstate")
+    STATE_PLACE("fmi2DeSerializeFMUstate", state, n)
+    CALL(FMU_fmi2DeSerializeFMUstate, IN(byte, n, fmi2Byte), count(&call, n), in_place);
+    STATE_OUT(state)
+    END
+}
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
+                                        const fmi2ValueReference known[], size_t n_known, const fmi2Real dv_known[],
+                                        fmi2Real dv_unknown[]) {
+    u32 result;
+    BEGIN("fmi2GetDirectionalDerivative")
+    ROOM("fmi2GetDirectionalDerivative", n_known, 12, 64)
+    ROOM("fmi2GetDirectionalDerivative", n_unknown, 12, 64 + (call.endless ? 0 : n_known * 12))
+    result = OUT(dv_unknown, n_unknown, fmi2Real);
+    CALL(FMU_fmi2GetDirectionalDerivative, IN(unknown, n_unknown, fmi2ValueReference), count(&call, n_unknown),
+         IN(known, n_known, fmi2ValueReference), count(&call, n_known), IN(dv_known, n_known, fmi2Real), result);
+    COPY_OUT(dv_unknown, result, n_unknown)
+    END
+}
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                       const fmi2Integer order[], const fmi2Real value[]) {
+    BEGIN("fmi2SetRealInputDerivatives")
+    ROOM("fmi2SetRealInputDerivatives", n, 16, 64)
+    CALL(FMU_fmi2SetRealInputDerivatives, IN(vr, n, fmi2ValueReference), count(&call, n), IN(order, n, fmi2Integer),
+         IN(value, n, fmi2Real));
+    END
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                        const fmi2Integer order[], fmi2Real value[]) {
+    u32 values;
+    BEGIN("fmi2GetRealOutputDerivatives")
+    ROOM("fmi2GetRealOutputDerivatives", n, 16, 64)
+    values = OUT(value, n, fmi2Real);
+    CALL(FMU_fmi2GetRealOutputDerivatives, IN(vr, n, fmi2ValueReference), count(&call, n), IN(order, n, fmi2Integer),
+         values);
+    COPY_OUT(value, values, n)
+    END
+}
+
+#define STATUS(name, type)                                                               \
+    fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) {           \
+        u32 place;                                                                       \
+        BEGIN(#name)                                                                     \
+        ROOM(#name, 0, 1, 64)                                                            \
+        place = OUT(value, 1, type);                                                     \
+        CALL(FMU_##name, (u32)kind, place);                                              \
+        COPY_OUT(value, place, 1)                                                        \
+        END                                                                              \
+    }
+
+/* The module answers those of a status and a string with no value. */
+STATUS(fmi2GetStatus, fmi2Status)
+STATUS(fmi2GetRealStatus, fmi2Real)
+STATUS(fmi2GetIntegerStatus, fmi2Integer)
+STATUS(fmi2GetBooleanStatus, fmi2Boolean)
+STATUS(fmi2GetStringStatus, fmi2String)
+
+/* fmi2EventInfo, as the module has it. */
+typedef struct {
+    u32 flags[6];
+    double next_event_time;
+} EventInfo;
+
+fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
+    EventInfo event;
+    u32 place;
+    BEGIN("fmi2NewDiscreteStates")
+    ROOM("fmi2NewDiscreteStates", 0, 1, 64)
+    place = output(&call, info, 1, sizeof event, ALIGNMENT(fmi2EventInfo));
+    CALL(FMU_fmi2NewDiscreteStates, place);
+    if (status == fmi2OK) {
+        memcpy(&event, at(&call, place), sizeof event);
+        info->newDiscreteStatesNeeded = (fmi2Boolean)event.flags[0];
+        info->terminateSimulation = (fmi2Boolean)event.flags[1];
+        info->nominalsOfContinuousStatesChanged = (fmi2Boolean)event.flags[2];
+        info->valuesOfContinuousStatesChanged = (fmi2Boolean)event.flags[3];
+        info->nextEventTimeDefined = (fmi2Boolean)event.flags[4];
+        info->nextEventTime = event.next_event_time;
+    }
+    END
+}
+
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_state_prior, fmi2Boolean *enter_event_mode,
+                                       fmi2Boolean *terminate) {
+    u32 enter_place, terminate_place;
+    BEGIN("fmi2CompletedIntegratorStep")
+    ROOM("fmi2CompletedIntegratorStep", 0, 1, 64)
+    enter_place = OUT(enter_event_mode, 1, fmi2Boolean);
+    terminate_place = OUT(terminate, 1, fmi2Boolean);
+    CALL(FMU_fmi2CompletedIntegratorStep, (u32)no_set_state_prior, enter_place, terminate_place);
+    COPY_OUT(enter_event_mode, enter_place, 1)
+    COPY_OUT(terminate, terminate_place, 1)
+    END
+}
+
+fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) {
+    BEGIN("fmi2SetContinuousStates")
+    ROOM("fmi2SetContinuousStates", n, sizeof *x, 64)
+    CALL(FMU_fmi2SetContinuousStates, IN(x, n, fmi2Real), count(&call, n));
+    END
+}
+
+#define GET_VECTOR(name)                                          \
+    fmi2Status name(fmi2Component c, fmi2Real x[], size_t n) {    \
+        u32 values;                                               \
+        BEGIN(#name)                                              \
+        ROOM(#name, n, sizeof *x, 64)                             \
+        values = OUT(x, n, fmi2Real);                             \
+        CALL(FMU_##name, values, count(&call, n));                \
+        COPY_OUT(x, values, n)                                    \
+        END                                                       \
+    }
+
+GET_VECTOR(fmi2GetDerivatives)
+GET_VECTOR(fmi2GetEventIndicators)
+GET_VECTOR(fmi2GetContinuousStates)
+GET_VECTOR(fmi2GetNominalsOfContinuousStates)

