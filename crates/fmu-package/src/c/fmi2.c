@@ -86,14 +86,14 @@ static u32 count(const Call *call, size_t n) {
 
 /* Makes room for `n` times `each` bytes of arguments, with `more` for the gaps between them and what else there is.
    A length that no array can have is left to the module to refuse. */
-static bool room(Call *call, size_t n, size_t each, size_t more) {
+static inline bool room(Call *call, size_t n, size_t each, size_t more) {
     Instance *instance = call->instance;
     size_t size;
     if (n > PTRDIFF_MAX / 8) {
         call->endless = true;
         n = 0;
     }
-    if (n > (UINT32_MAX / 2 - more) / each) {
+    if (n >= UINT32_MAX / 64 || more >= UINT32_MAX / 4) {
         return false;
     }
     size = n * each + more;
@@ -114,13 +114,31 @@ static fmi2Status refuse(Call *call, fmi2String message) {
     return end(call, fmi2Error);
 }
 
+/* How types are aligned here. */
+#define ALIGNED(type)   \
+    typedef struct {    \
+        char byte;      \
+        type value;     \
+    } Aligned_##type;
+ALIGNED(fmi2Real)
+ALIGNED(fmi2Integer)
+ALIGNED(fmi2Boolean)
+ALIGNED(fmi2String)
+ALIGNED(fmi2Byte)
+ALIGNED(fmi2ValueReference)
+ALIGNED(fmi2Status)
+ALIGNED(fmi2FMUstate)
+ALIGNED(fmi2EventInfo)
+ALIGNED(size_t)
+#define ALIGNMENT(type) offsetof(Aligned_##type, value)
+
 /* The address in the module for an array of the importer's: none for NULL, one that is not aligned if that is so. */
-static u32 output(Call *call, const void *array, size_t n, size_t size, size_t alignment) {
+static inline u32 output(Call *call, const void *array, size_t n, size_t size, size_t alignment) {
     u32 address = call->next;
     if (array == NULL) {
         return 0;
     }
-    if ((uintptr_t)array % alignment != 0) {
+    if (((uintptr_t)array & (alignment - 1)) != 0) {
         return address + 1;
     }
     if (!call->endless) {
@@ -133,15 +151,14 @@ static void *at(const Call *call, u32 address) {
     return call->instance->module.w2c_memory.data + address;
 }
 
-static u32 input(Call *call, const void *array, size_t n, size_t size, size_t alignment) {
+static inline u32 input(Call *call, const void *array, size_t n, size_t size, size_t alignment) {
     u32 address = output(call, array, n, size, alignment);
-    if (address % alignment == 0 && address != 0 && !call->endless) {
+    if ((address & (alignment - 1)) == 0 && address != 0 && !call->endless) {
         memcpy(at(call, address), array, n * size);
     }
     return address;
 }
 
-#define ALIGNMENT(type) offsetof(struct { char byte; type value; }, value)
 #define IN(array, n, type) input(&call, array, n, sizeof(type), ALIGNMENT(type))
 #define OUT(array, n, type) output(&call, array, n, sizeof(type), ALIGNMENT(type))
 #define COPY_OUT(array, address, n)                                        \
