@@ -96,7 +96,7 @@ profile: $(VENV)/demo.stamp fmu
 	@benches/profile $(FMU) $(PY)
 
 # The figures and their copies for documentation and README.
-figures: need-rust $(VENV)/demo.stamp fmu
+figures: need-rust $(VENV)/demo.stamp closed-loop-fmus
 	@$(VENV)/bin/prw figures --fmu $(FMU) --commit
 
 # The pages' tables come from the model descriptions.

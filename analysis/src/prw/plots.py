@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Dict, Sequence, Tuple
+from typing import Any, Dict, Sequence, Tuple
 
 import matplotlib
 import numpy as np
@@ -15,7 +15,9 @@ from prw.files import replacing
 from prw.motion import Motion
 
 BLUE, VERMILION = "#0072B2", "#D55E00"
-STYLE = {
+#: Of pitch and roll where the sides have the other two.
+GREEN, PURPLE = "#009E73", "#CC79A7"
+STYLE: Any = {
     "font.family": "DejaVu Sans",  # matplotlib brings it along
     "font.size": 10,
     "axes.titlesize": 10,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Dict, List
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from prw import motion as motions
 from prw import recording
+from prw.columns import ANGLES
 from prw.errors import UserError
 from prw.motion import Motion
 
@@ -36,6 +38,12 @@ def add_parser(subparsers) -> None:
     parser.add_argument(
         "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
     )
+    parser.add_argument(
+        "--animate",
+        type=Path,
+        metavar="FILE",
+        help="also show the wrist moving: a .gif, an .mp4 (needs imageio-ffmpeg) or an .html",
+    )
     parser.set_defaults(run=run)
 
 
@@ -57,13 +65,36 @@ def run(arguments: argparse.Namespace) -> None:
     # FMPy and matplotlib take a while to load; a slip in the recording is reported without waiting for them.
     from prw.output import write_table
     from prw.plots import plot_response
-    from prw.testbed import Testbed
+    from prw.testbed import OUTPUTS, Testbed
 
     with Testbed(arguments.fmu) as testbed:
-        response = testbed.respond(motion)
+        response = testbed.respond(motion, OUTPUTS if arguments.animate is None else (*OUTPUTS, "theta5", "theta6"))
     write_table(table, motion, response)
     plot_response(figure, title, motion, response, angles=arguments.input is not None)
+    if arguments.animate is not None:
+        from prw.animate import animate
+
+        animate(Moved(motion, response), arguments.animate)
     print("\n".join(_summary(arguments, motion, response, table, figure)))
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A motion and the response to it as one run, for `animate`."""
+
+    motion: Motion
+    response: Dict[str, np.ndarray]
+
+    @property
+    def time(self) -> np.ndarray:
+        """Instants (n,), s."""
+        return self.motion.time
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A course (n,) by name, in SI."""
+        if name in ANGLES:
+            return self.motion.theta[:, ANGLES.index(name)]
+        return self.response[name]
 
 
 def _summary(arguments, motion: Motion, response: Dict[str, np.ndarray], table: Path, figure: Path) -> List[str]:
@@ -91,7 +122,8 @@ def _summary(arguments, motion: Motion, response: Dict[str, np.ndarray], table: 
     else:
         lines.append(f"at the end  pitch {_degrees(response['pitch'][-1])}, roll {_degrees(response['roll'][-1])}")
     lines += [f"note        {note}" for note in motion.notes]
-    lines.append(f"wrote       {table}, {figure}")
+    written = [table, figure, *filter(None, [arguments.animate])]
+    lines.append(f"wrote       {', '.join(map(str, written))}")
     if arguments.input is None:
         lines.append(
             "next        look at the figure; then your own motors: make demo INPUT=examples/point_to_point.csv"

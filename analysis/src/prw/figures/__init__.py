@@ -9,6 +9,8 @@ from prw.simulate import DEFAULT_FMU, DEFAULT_OUT
 
 #: The copies that are kept with the sources, for the documentation and the README.
 COMMITTED = Path("analysis/documentation/figures")
+#: README's first picture.
+FILM = Path("docs/wrist.gif")
 #: Within the folder of what goes into an FMU: its icon for importers, and to scale it.
 ICON = Path("model.png")
 ICON_SVG = Path("documentation/model.svg")
@@ -30,7 +32,7 @@ def add_parser(subparsers) -> None:
     parser.add_argument(
         "--commit",
         action="store_true",
-        help=f"also renew the copies kept with the sources, in {COMMITTED}, and the icons of both FMUs",
+        help=f"also renew the copies kept with the sources, in {COMMITTED}, the icons of both FMUs, and {FILM}",
     )
     parser.set_defaults(run=run)
 
@@ -61,4 +63,9 @@ def run(arguments: argparse.Namespace) -> None:
         for page, draw in ((TESTBED, draw_testbed), (CONTROLLER, draw_controller)):
             write_png(page.content / ICON, draw(), dpi=128)
             write_svg(page.content / ICON_SVG, draw())
-        print(f"renewed {COMMITTED} and the icons")
+        from prw.animate import animate
+        from prw.figures.film import SPEED, story
+
+        film = story(arguments.fmu, arguments.fmu.with_name("prw_controller.fmu"))
+        animate(film, FILM, speed=SPEED, captions=film.captions)
+        print(f"renewed {COMMITTED}, the icons and {FILM}")
