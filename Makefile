@@ -28,7 +28,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop examples test-examples dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -43,6 +43,7 @@ help:
 	@echo 'make profile                 count the instructions of a step, with callgrind'
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
 	@echo 'make docs                    write the documentation in the FMUs anew, and what README has of it'
+	@echo 'make examples                set up the examples                    (see docs/examples.md)'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make dist                    the FMUs for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
 	@echo 'make wheels                  the Python package fmu-run for the same systems, ready to install -> dist/wheels/'
@@ -63,7 +64,7 @@ demo: need-rust need-python
 fmu: need-rust
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu
 
-test: test-rust test-fmu test-closed-loop
+test: test-rust test-fmu test-closed-loop test-examples
 
 # C programs are compiled against the standard's headers, which FMPy brings.
 headers: $(VENV)/demo.stamp
@@ -100,10 +101,11 @@ figures: need-rust $(VENV)/demo.stamp closed-loop-fmus
 	@$(VENV)/bin/prw figures --fmu $(FMU) --commit
 
 # The pages' tables come from the model descriptions.
-docs: need-rust $(VENV)/test.stamp
+docs: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe
 	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --describe
 	@$(VENV)/bin/prw docs
+	@$(PY) tools/examples_page.py
 
 # A controller FMU, the system of both, and the example FMU to copy.
 closed-loop-fmus: fmu
@@ -113,6 +115,12 @@ closed-loop-fmus: fmu
 
 closed-loop: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
 	@$(VENV)/bin/prw closed-loop $(ARGS)
+
+examples: need-rust $(VENV)/examples.stamp closed-loop-fmus
+	@echo 'ready: $(PY) examples/lqr.py and the others; docs/examples.md shows them'
+
+test-examples: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
+	$(PYTEST) tests/examples
 
 test-closed-loop: $(VENV)/closed-loop.stamp closed-loop-fmus
 	$(PYTEST) tests/closed_loop
@@ -183,6 +191,11 @@ $(VENV)/study.stamp: $(VENV)/demo.stamp analysis/requirements-study.txt
 $(VENV)/test.stamp: $(VENV)/study.stamp tests/requirements.txt
 	@echo 'installing the Python packages of the tests (once)'
 	@$(PIP_INSTALL) -r tests/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@touch $@
+
+$(VENV)/examples.stamp: $(VENV)/study.stamp analysis/requirements-examples.txt
+	@echo 'installing the Python packages of the examples (once)'
+	@$(PIP_INSTALL) -r analysis/requirements-examples.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
 $(VENV)/closed-loop.stamp: $(VENV)/test.stamp tests/closed_loop/requirements.txt

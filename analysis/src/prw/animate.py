@@ -98,7 +98,8 @@ def animate(
 ) -> FuncAnimation:
     """Animate `run`, and write it to `path`: a GIF, an MP4 (with the package imageio-ffmpeg) or an HTML page.
 
-    run: has theta1 ... theta6, pitch, roll, tau1 and tau2. speed: seconds of the run that pass in a second of the
+    run: has theta1 ... theta6, pitch, roll, tau1 and tau2; theta1 and theta2 may be in its `motion`, theta5 and theta6
+    follow from its `parameters` M and N. speed: seconds of the run that pass in a second of the
     animation (default: 1, but so that the whole is neither shorter than SHORTEST nor longer than LONGEST). captions:
     lines to show from a time (s) of the run on, in order.
 
@@ -150,14 +151,27 @@ def _courses(run: Run) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     time, courses = np.asarray(run.time, dtype=float), {}
     for name in COURSES:
         try:
-            courses[name] = np.asarray(run[name], dtype=float)
-        except (KeyError, ValueError):
+            courses[name] = np.asarray(_course(run, name), dtype=float)
+        except (AttributeError, KeyError, ValueError):
             raise UserError(f"the run has no {name}, which an animation shows") from None
         if courses[name].shape != time.shape or not np.isfinite(courses[name]).all():
             raise UserError(f"{name} of the run must be {len(time)} finite numbers, one for each time")
     if len(time) < 2:
         raise UserError("a run of a single instant does not move; an animation needs two at least")
     return time, courses
+
+
+def _course(run: Any, name: str) -> np.ndarray:
+    """A course of the run, or what follows from its others: the motors of its motion, and eq. (1) for the carriers."""
+    try:
+        return np.asarray(run[name])
+    except KeyError:
+        if name in ("theta1", "theta2"):
+            return np.asarray(run.motion.theta)[:, int(name[-1]) - 1]
+        if name in ("theta5", "theta6"):
+            side = 1 if name == "theta5" else -1
+            return np.asarray(run["pitch"] + side * run.parameters["M"] / run.parameters["N"] * run["roll"])
+        raise
 
 
 class _Picture:

@@ -12,7 +12,7 @@ from typing import Dict, List, NamedTuple, Optional, Sequence
 import fmpy
 import numpy as np
 
-from prw.closed_loop.slave import Slave
+from prw.slave import Slave
 from prw.closed_loop.system import System
 
 #: Communication steps (s) and the one that stands for the exact solution; all are whole multiples of it.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from prw.closed_loop.slave import Slave
+from prw.slave import Slave
 
 #: Communication step, s.
 STEP = 1e-3
