@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from PIL import Image
-
-from prw.animate import COURSES, RATES, animate
+from prw.animate import COURSES, RATES, animate, still
 from prw.errors import UserError
 from prw.plots import GREEN, PURPLE
 from prw.wrist import Wrist, about_x, about_y
@@ -77,6 +76,12 @@ def test_gif_has_its_pictures_and_ends_as_it_began(tmp_path):
     scene = [picture[int(0.08 * height) : int(0.66 * height)] for picture in pictures]
     assert np.array_equal(scene[0], scene[-1])
     assert np.abs(scene[0] - scene[2]).max() > 100
+
+
+def test_still_stands_on_no_ground():
+    pixels = np.asarray(still(swing(), 0.25))
+    assert (pixels[0, :, 3] == 0).all()
+    assert 0.15 < np.mean(pixels[:, :, 3] == 255) < 0.6
 
 
 def test_page_needs_nothing_else(tmp_path):

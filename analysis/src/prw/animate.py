@@ -26,6 +26,8 @@ ANGLES = ("theta1", "theta2", "theta3", "theta4", "theta5", "theta6", "pitch", "
 COURSES = (*ANGLES, "tau1", "tau2")
 #: Pixels, and inches at DPI, of the picture.
 SIZE, DPI = (720, 405), 92
+#: The same for a still, and the upper share of the picture that shows the testbed.
+STILL_DPI, SCENE = 138, 0.66
 #: Pictures a second, by the file's suffix; "" is for a notebook.
 RATES = {".gif": 10, ".html": 10, ".mp4": 25, "": 10}
 #: What a run is slowed down to or hurried up to, s, when the speed is not given.
@@ -139,12 +141,16 @@ def animate(
     return animation
 
 
-def still(run: Run, instant: float) -> Figure:
-    """The picture of the animation at an instant (s), as a figure."""
-    time, courses = _courses(run)
-    picture = _Picture(time, courses, 1.0, ())
+def still(run: Run, instant: float) -> Image.Image:
+    """The testbed at an instant (s) as a picture of its own, sharp and on no ground, for light and dark pages."""
+    picture = _Picture(*_courses(run), 1.0, ())
+    picture.figure.set_dpi(STILL_DPI)
+    for ground in (picture.figure, picture.scene):
+        ground.set_facecolor("none")
+    picture.note.set_visible(False)
     picture.draw(instant)
-    return picture.figure
+    pixels = picture.pixels()
+    return pixels.crop((0, 0, pixels.width, round(SCENE * pixels.height)))
 
 
 def _courses(run: Run) -> tuple[np.ndarray, dict[str, np.ndarray]]:
@@ -212,7 +218,7 @@ class _Picture:
         note = f"couplings' twist × {factor:g}"
         if abs(speed - 1) > 1e-3:
             note = f"{speed:.2g} × real time, {note}"
-        self.figure.text(0.98, 0.955, note, fontsize=8, color="0.35", ha="right", va="center")
+        self.note = self.figure.text(0.98, 0.955, note, fontsize=8, color="0.35", ha="right", va="center")
         for x, y, words, colour in LABELS:
             self.figure.text(x, y, words, color=colour, ha="center", va="center")
 
@@ -258,10 +264,10 @@ class _Picture:
             shown.set_text(panel.number.format(round(value, panel.digits) + 0.0).replace("-", "\N{MINUS SIGN}"))
 
     def pixels(self) -> Image.Image:
-        """The picture as it is."""
+        """The picture as it is, with its transparency."""
         canvas: Any = self.figure.canvas
         canvas.draw()
-        return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+        return Image.fromarray(np.asarray(canvas.buffer_rgba()))
 
 
 def _writer(suffix: str, rate: int) -> AbstractMovieWriter:
@@ -286,7 +292,7 @@ def _write_gif(path: Path, picture: _Picture, instants: np.ndarray, rate: int) -
     pictures = []
     for instant in instants:
         picture.draw(float(instant))
-        pictures.append(picture.pixels().quantize(palette=table, dither=Image.Dither.NONE))
+        pictures.append(picture.pixels().convert("RGB").quantize(palette=table, dither=Image.Dither.NONE))
     first, *others = pictures
     first.save(
         path, format="GIF", save_all=True, append_images=others, duration=round(1000 / rate), loop=0, optimize=True

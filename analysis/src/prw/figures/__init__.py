@@ -9,8 +9,9 @@ from prw.simulate import DEFAULT_FMU, DEFAULT_OUT
 
 #: The copies that are kept with the sources, for the documentation and the README.
 COMMITTED = Path("analysis/documentation/figures")
-#: README's first picture.
+#: README's first picture, and a still for the page in the FMU, which the film would double in size.
 FILM = Path("docs/wrist.gif")
+STILL = Path("wrist.png")
 #: Within the folder of what goes into an FMU: its icon for importers, and to scale it.
 ICON = Path("model.png")
 ICON_SVG = Path("documentation/model.svg")
@@ -44,7 +45,7 @@ def run(arguments: argparse.Namespace) -> None:
     from prw.figures.gallery import figures
     from prw.figures.icon import draw_controller, draw_testbed
     from prw.figures.results import numbers, results
-    from prw.figures.writing import write_for_page, write_json, write_png, write_small_png, write_svg
+    from prw.figures.writing import write_for_page, write_json, write_picture, write_png, write_small_png, write_svg
 
     found = results(arguments.fmu)
     drawn = figures(found)
@@ -63,9 +64,10 @@ def run(arguments: argparse.Namespace) -> None:
         for page, draw in ((TESTBED, draw_testbed), (CONTROLLER, draw_controller)):
             write_png(page.content / ICON, draw(), dpi=128)
             write_svg(page.content / ICON_SVG, draw())
-        from prw.animate import animate
-        from prw.figures.film import SPEED, story
+        from prw.animate import animate, still
+        from prw.figures.film import POSE, SPEED, story
 
         film = story(arguments.fmu, arguments.fmu.with_name("prw_controller.fmu"))
+        write_picture(COMMITTED / STILL, still(film, POSE))
         animate(film, FILM, speed=SPEED, captions=film.captions)
         print(f"renewed {COMMITTED}, the icons and {FILM}")

@@ -18,6 +18,8 @@ SPEED = 0.8
 SWING, LEGS = np.deg2rad(35), (0.45, 0.7, 0.45)
 #: Where the controller goes, pitch and roll in rad, one after the other, and the time that each takes, s.
 GOALS, STAY = (np.deg2rad((30, 60)), np.zeros(2)), 0.8
+#: When the controller has reached the first of them, s.
+POSE = 2 * sum(LEGS) + 0.95 * STAY
 RECORDED = ("theta1", "theta2", "theta3", "theta4", "theta5", "theta6", "pitch", "roll", "tau1", "tau2")
 CONTROLLED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
 
@@ -35,7 +37,7 @@ class Story:
 
 
 def story(testbed_fmu: Path, controller_fmu: Path) -> Story:
-    """Run the testbed, first with motors that are led, then with the controller. All begins and ends at rest at zero."""
+    """Run the testbed, first with motors that are led, then with the controller. It begins and ends at rest at zero."""
     led = _there_and_back()
     with Slave(testbed_fmu, {"use_omega": True}) as testbed, Slave(controller_fmu) as controller:
         rows, captions = [], []
