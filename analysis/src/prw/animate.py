@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 
 import matplotlib
 import numpy as np
-from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, FuncAnimation, HTMLWriter
+from matplotlib.animation import FuncAnimation
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -19,6 +19,7 @@ from PIL import Image
 
 from prw.errors import UserError
 from prw.files import replacing
+from prw.moving import movie_writer, write_gif, write_page
 from prw.plots import BLUE, GREEN, PURPLE, STYLE, VERMILION
 from prw.wrist import DARK, PALE, STEEL, Wrist
 
@@ -36,6 +37,8 @@ SHORTEST, LONGEST = 6.0, 40.0
 MOST = 1500
 #: The twist of a coupling that the largest one in a run is shown with, rad.
 SHOWN_TWIST = 0.9
+#: But by no more than this.
+MOST_TWISTED = 100.0
 #: Where the viewer is, deg: from the left of motor 2, and above.
 AZIMUTH, ELEVATION = -64, 20
 #: Directions to the viewer and to the lamp in matplotlib's axes.
@@ -68,7 +71,7 @@ class Panel(NamedTuple):
 PANELS = (
     Panel("Motors", 180 / np.pi, 0, "{:.0f}°", {"theta1": ("θ₁", BLUE), "theta2": ("θ₂", VERMILION)}),
     Panel("Wrist", 180 / np.pi, 0, "{:.0f}°", {"pitch": ("pitch", GREEN), "roll": ("roll", PURPLE)}),
-    Panel("Torques (N m)", 1.0, 1, "{:.1f}", {"tau1": ("τ₁", BLUE), "tau2": ("τ₂", VERMILION)}),
+    Panel("Torque (N m)", 1.0, 1, "{:.1f}", {"tau1": ("τ₁", BLUE), "tau2": ("τ₂", VERMILION)}),
 )
 
 
@@ -134,10 +137,13 @@ def animate(
     animation = FuncAnimation(picture.figure, draw, frames=len(instants), interval=1000 / rate, init_func=list)
     if path is not None:
         with matplotlib.rc_context(STYLE), replacing(path) as temporary:
+            pictures = (picture.at(float(instant)) for instant in instants)
             if suffix == ".gif":
-                _write_gif(temporary, picture, instants, rate)
+                write_gif(temporary, pictures, rate, _colours())
+            elif suffix == ".html":
+                write_page(temporary, pictures, rate)
             else:
-                animation.save(str(temporary), writer=_writer(suffix, rate), dpi=DPI)
+                animation.save(str(temporary), writer=movie_writer(rate), dpi=DPI)
     return animation
 
 
@@ -148,8 +154,7 @@ def still(run: Run, instant: float) -> Image.Image:
     for ground in (picture.figure, picture.scene):
         ground.set_facecolor("none")
     picture.note.set_visible(False)
-    picture.draw(instant)
-    pixels = picture.pixels()
+    pixels = picture.at(instant)
     return pixels.crop((0, 0, pixels.width, round(SCENE * pixels.height)))
 
 
@@ -193,7 +198,7 @@ class _Picture:
         self.time, self.courses, self.captions = time, courses, captions
         pairs = (("theta1", "theta3"), ("theta3", "theta5"), ("theta2", "theta4"), ("theta4", "theta6"))
         twist = max(float(np.abs(courses[a] - courses[b]).max()) for a, b in pairs)
-        factor = _round_below(SHOWN_TWIST / max(twist, 1e-6))
+        factor = _round_below(min(SHOWN_TWIST / max(twist, 1e-6), MOST_TWISTED))
         self.wrist = Wrist(factor)
         with matplotlib.rc_context({**STYLE, "font.size": 9, "axes.titlesize": 9}):
             self.figure = Figure(figsize=(SIZE[0] / DPI, SIZE[1] / DPI), dpi=DPI, facecolor="white", edgecolor="0.7")
@@ -235,7 +240,7 @@ class _Picture:
             axis.text(place - 0.19, 1.07, label, color=colour, ha="right", transform=axis.transAxes)
             number_shown = axis.text(place, 1.07, "", color=colour, ha="right", transform=axis.transAxes)
             moving.append(Moving(name, panel, line, dot, number_shown))
-        peak = max(1e-6, *(float(np.abs(course).max()) for course in values.values()))
+        peak = max(10.0**-panel.digits, *(float(np.abs(course).max()) for course in values.values()))
         axis.set(xlim=(self.time[0], self.time[-1]), ylim=(-1.15 * peak, 1.15 * peak))
         axis.locator_params(axis="y", nbins=4)
         axis.tick_params(labelsize=8, length=2)
@@ -263,40 +268,12 @@ class _Picture:
             # Adding 0 to what is rounded leaves no minus before a zero.
             shown.set_text(panel.number.format(round(value, panel.digits) + 0.0).replace("-", "\N{MINUS SIGN}"))
 
-    def pixels(self) -> Image.Image:
-        """The picture as it is, with its transparency."""
+    def at(self, instant: float) -> Image.Image:
+        """The picture at the instant (s), with its transparency."""
+        self.draw(instant)
         canvas: Any = self.figure.canvas
         canvas.draw()
         return Image.fromarray(np.asarray(canvas.buffer_rgba()))
-
-
-def _writer(suffix: str, rate: int) -> AbstractMovieWriter:
-    """What writes an HTML page or an MP4. Raises UserError where a package is missing."""
-    if suffix == ".html":
-        return HTMLWriter(fps=rate, embed_frames=True)
-    try:
-        import imageio_ffmpeg
-    except ImportError:
-        raise UserError("MP4 needs the package imageio-ffmpeg; add it with `pip install imageio-ffmpeg`") from None
-    matplotlib.rcParams["animation.ffmpeg_path"] = imageio_ffmpeg.get_ffmpeg_exe()
-    # Players want even sides and this order of colours.
-    return FFMpegWriter(
-        fps=rate, extra_args=["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-crf", "20"]
-    )
-
-
-def _write_gif(path: Path, picture: _Picture, instants: np.ndarray, rate: int) -> None:
-    """One table of colours for all pictures, without dithering: neither flickers, and what stays takes no room."""
-    table = Image.new("P", (1, 1))
-    table.putpalette([round(255 * part) for colour in _colours() for part in colour])
-    pictures = []
-    for instant in instants:
-        picture.draw(float(instant))
-        pictures.append(picture.pixels().convert("RGB").quantize(palette=table, dither=Image.Dither.NONE))
-    first, *others = pictures
-    first.save(
-        path, format="GIF", save_all=True, append_images=others, duration=round(1000 / rate), loop=0, optimize=True
-    )
 
 
 def _colours() -> Iterator[tuple[float, ...]]:
