@@ -28,7 +28,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop examples test-examples dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop examples test-examples dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -38,18 +38,19 @@ help:
 	@echo 'make fmu                     build the FMU                          -> $(FMU)'
 	@echo '                             and that for FMI 3.0                   -> target/fmu/fmi3/prw_testbed.fmu'
 	@echo 'make test                    check and test everything'
+	@echo 'make test-python             check the Python, with ruff and mypy'
 	@echo 'make test-newest-fmpy        the tests with FMPy again, with its newest version'
 	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
 	@echo 'make profile                 count the instructions of a step, with callgrind'
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
-	@echo 'make docs                    write the documentation in the FMUs anew, and what README has of it'
+	@echo 'make docs                    write the documentation in the FMUs and docs/examples.md anew'
 	@echo 'make examples                set up the examples                    (see docs/examples.md)'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make dist                    the FMUs for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
-	@echo 'make wheels                  the Python package fmu-run for the same systems, ready to install -> dist/wheels/'
+	@echo 'make wheels                  the Python packages fmu-run and prw (with the FMU), ready to install -> dist/wheels/'
 	@echo 'make test-platforms          run both on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make dist/ again elsewhere and compare every byte'
-	@echo 'make study                   set up prw identify, excite and sweep  (see analysis/tutorial.md)'
+	@echo 'make study                   set up prw identify, excite, sweep and linearize  (see analysis/tutorial.md)'
 	@echo 'make monte-carlo             200 identifications of simulated rigs -> out/monte_carlo.json'
 	@echo 'make fuzz                    look for calls that break the FMU, for 10 minutes (FUZZ_SECONDS=600)'
 	@echo 'make sanitize                the tests under address, leak, thread and real-time sanitizers and valgrind'
@@ -64,10 +65,10 @@ demo: need-rust need-python
 fmu: need-rust
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu
 
-test: test-rust test-fmu test-closed-loop test-examples
+test: test-rust test-python test-fmu test-closed-loop test-examples
 
 # C programs are compiled against the standard's headers, which FMPy brings.
-headers: $(VENV)/demo.stamp
+headers: $(VENV)/study.stamp
 
 test-rust: need-rust headers
 	$(CARGO) fmt --all --check
@@ -79,6 +80,12 @@ test-rust: need-rust headers
 	  set -ex; $(CARGO) test $(LOCKED) --workspace; \
 	fi
 
+# ruff and mypy; pyproject.toml says what they look at.
+test-python: $(VENV)/test.stamp
+	$(PY) -m ruff check
+	$(PY) -m ruff format --check
+	$(PY) -m mypy
+
 # Everyone else gets the newest FMPy, these environments the oldest that is supported.
 test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 	@$(PIP_INSTALL) --quiet --upgrade --no-deps --target target/newest-fmpy fmpy
@@ -86,26 +93,26 @@ test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check
-	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/analysis
+	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis
 
 # Ratios of one run; quiet the machine first.
-bench: $(VENV)/demo.stamp closed-loop-fmus
+bench: $(VENV)/study.stamp closed-loop-fmus
 	@benches/run $(FMU) $(PY)
 
 # Instructions of a step, counted by callgrind.
-profile: $(VENV)/demo.stamp fmu
+profile: $(VENV)/study.stamp fmu
 	@benches/profile $(FMU) $(PY)
 
 # The figures and their copies for documentation and README.
-figures: need-rust $(VENV)/demo.stamp closed-loop-fmus
-	@$(VENV)/bin/prw figures --fmu $(FMU) --commit
+figures: need-rust $(VENV)/test.stamp closed-loop-fmus
+	@$(PY) -m tools figures --fmu $(FMU) --commit
 
 # The pages' tables come from the model descriptions.
 docs: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe
 	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --describe
-	@$(VENV)/bin/prw docs
-	@$(PY) tools/examples_page.py
+	@$(PY) -m tools docs
+	@$(PY) -m tools examples
 
 # A controller FMU, the system of both, and the example FMU to copy.
 closed-loop-fmus: fmu
@@ -114,7 +121,7 @@ closed-loop-fmus: fmu
 	@$(CARGO) run $(LOCKED) --release -p lag_fmu -- --out target/fmu
 
 closed-loop: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
-	@$(VENV)/bin/prw closed-loop $(ARGS)
+	@$(PY) -m tools closed-loop $(ARGS)
 
 examples: need-rust $(VENV)/examples.stamp closed-loop-fmus
 	@echo 'ready: $(PY) examples/lqr.py and the others; docs/examples.md shows them'
@@ -130,9 +137,10 @@ test-closed-loop: $(VENV)/closed-loop.stamp closed-loop-fmus
 dist: need-rust $(DIST_VENV)/dist.stamp
 	@$(DIST_VENV)/bin/python platforms/dist.py
 
-# One for each system, for Python 3.11 and later.
-wheels: need-rust $(DIST_VENV)/dist.stamp
+# For Python 3.11 and later: fmu-run for each system, prw for all with the FMU inside.
+wheels: dist
 	@$(DIST_VENV)/bin/python platforms/wheels.py
+	@$(DIST_VENV)/bin/python platforms/prw_wheel.py
 
 test-platforms: dist wheels $(DIST_VENV)/test.stamp
 	$(DIST_VENV)/bin/python -m pytest -q -p no:cacheprovider tests/platforms
@@ -141,7 +149,7 @@ test-reproducible: dist
 	@$(DIST_VENV)/bin/python platforms/rebuild.py
 
 study: $(VENV)/study.stamp fmu
-	@echo 'ready: $(VENV)/bin/prw identify --help, excite --help, sweep --help; analysis/tutorial.md shows how'
+	@echo 'ready: $(VENV)/bin/prw identify, excite, sweep and linearize (with --help); analysis/tutorial.md shows how'
 
 # Takes minutes; `make test` has the short version.
 monte-carlo: $(VENV)/study.stamp fmu

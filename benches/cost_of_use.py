@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 from fmpy import extract, read_model_description, simulate_fmu
@@ -20,7 +21,7 @@ ROOT = Path(__file__).parent.parent
 ROUNDS = 5
 
 
-def shortest(work) -> float:
+def shortest(work: Callable[[], object]) -> float:
     """The least of several wall times of `work`, s."""
 
     def once() -> float:

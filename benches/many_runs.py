@@ -13,6 +13,7 @@ import tempfile
 import time
 from ctypes import c_double, c_uint32
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import fmu_run
@@ -61,7 +62,7 @@ class Case:
         )
         return float(done.stderr), np.frombuffer(done.stdout).reshape(SAMPLES, -1)
 
-    def by_fmu_run(self, threads: int, **kept) -> tuple[float, fmu_run.Runs]:
+    def by_fmu_run(self, threads: int, **kept: Any) -> tuple[float, fmu_run.Runs]:
         begin = time.perf_counter()
         runs = self.loaded.run(
             TIME, inputs=self.inputs, start=self.start, outputs=self.outputs, threads=threads, **kept
@@ -80,8 +81,8 @@ class Case:
         slave.enterInitializationMode()
         slave.exitInitializationMode()
         for k, t in enumerate(instants):
-            slave.fmi2SetReal(component, into, n_in, in_row.from_buffer(inputs, k * inputs.strides[0]))
-            slave.fmi2GetReal(component, out_of, n_out, out_row.from_buffer(table, k * table.strides[0]))
+            slave.fmi2SetReal(component, into, n_in, in_row.from_buffer(inputs, k * inputs.strides[0]))  # type: ignore[arg-type]
+            slave.fmi2GetReal(component, out_of, n_out, out_row.from_buffer(table, k * table.strides[0]))  # type: ignore[arg-type]
             if k + 1 < SAMPLES:
                 slave.fmi2DoStep(component, t, STEP, True)
         slave.terminate()

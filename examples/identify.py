@@ -9,7 +9,6 @@ and to look at the report. Here the rig is a pretended one, so that the truth is
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import prw
 
@@ -23,10 +22,10 @@ def record(run: Path) -> str:
     return subprocess.run([sys.executable, *paths, "--seed", "7"], stdout=subprocess.PIPE, text=True, check=True).stdout
 
 
-def main(out: Path = Path("out/identify")) -> Any:
+def main(out: Path = Path("out/identify")) -> prw.Identification:
     """Record, estimate, print and write the report; returns what was found."""
     print(record(out / "run.csv").partition("; ")[2].strip())
-    found = prw.identify([out / "run.csv"])
+    found = prw.identify(out / "run.csv")
     for name, estimate in found.parameters.items():
         low, high = estimate.interval
         print(f"{name}: {estimate.value:.4g} +- {estimate.standard_error:.2g}, 95 % between {low:.4g} and {high:.4g}")

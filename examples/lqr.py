@@ -6,13 +6,13 @@ python-control, and to close the loop around the FMU itself, sample by sample, w
     make examples; .venv/bin/python examples/lqr.py
 """
 
-from pathlib import Path
 from typing import Any
 
 import control
 import numpy as np
-import prw
 from matplotlib.figure import Figure
+
+import prw
 from prw.slave import Slave
 
 STEP, STEPS = 1e-3, 3000  # s
@@ -24,15 +24,14 @@ TO_SIDES = np.array([[1, 4 / 7], [1, -4 / 7]])  # from pitch and roll to the two
 
 def design() -> tuple[np.ndarray, ...]:
     """The sampled model z+ = A z + B a, y = C z (z: states, motors' angles and rates), and the gains of both."""
-    model = prw.linearize()
-    wrist_angles = model.C[[model.outputs.index(name) for name in ("pitch", "roll")]]
+    model = prw.linearize(outputs=("pitch", "roll"))
     (angles, rates), zero, one = np.hsplit(model.B, 2), np.zeros, np.eye(2)
     # Motors turn at a steady rate for a sample, so the angles are states and the rates are held.
     wrist = control.ss(np.block([[model.A, angles], [zero((2, 8))]]), np.vstack([rates, one]), np.eye(8), zero((8, 2)))
     held = control.c2d(wrist, STEP)
     A = np.block([[held.A, held.B], [zero((2, 8)), one]])
     B = STEP * A[:, 8:]  # an acceleration changes the rate at once, for the sample that begins
-    C = np.block([[wrist_angles, zero((2, 4))], [zero((2, 6)), one, zero((2, 2))]])
+    C = np.block([[model.C, zero((2, 4))], [zero((2, 6)), one, zero((2, 2))]])
     # A degree of pitch or roll weighs as much as 30 rad/s2.
     weight = C[:2].T @ C[:2] / np.deg2rad(1) ** 2 + 1e-6 * np.eye(10)
     feedback, *_ = control.dlqr(A, B, weight, np.eye(2) / ACCELERATION**2)
@@ -44,10 +43,10 @@ def follow(controller: Any, noise: np.ndarray) -> np.ndarray:
     """Pitch and roll (n, 2) in rad of the FMU with a controller that turns what is measured into the motors' motion."""
     rows = []
     next(controller)  # up to where it waits for what is measured
-    with Slave(Path("target/fmu/prw_testbed.fmu"), {"use_omega": True}) as testbed:
+    with Slave(start={"use_omega": True}) as testbed:
         for k in range(STEPS):
             rows.append(testbed.get("pitch", "roll"))
-            testbed.set(dict(zip(MOTORS, map(float, controller.send((k, rows[-1] + noise[k]))))))
+            testbed.set(dict(zip(MOTORS, controller.send((k, rows[-1] + noise[k])))))
             testbed.step(STEP)
     return np.array(rows)
 
@@ -72,7 +71,7 @@ def pi(controller: Slave, angle: np.ndarray) -> Any:
     while True:
         k, measured = yield motion
         motion = controller.get(*MOTORS)
-        controller.set(dict(zip(("pitch", "roll", "pitch_ref", "roll_ref"), map(float, (*measured, *angle[k])))))
+        controller.set(dict(zip(("pitch", "roll", "pitch_ref", "roll_ref"), (*measured, *angle[k]))))
         controller.step(STEP)
 
 
@@ -81,7 +80,7 @@ def main() -> tuple[Figure, dict[str, np.ndarray]]:
     time = STEP * np.arange(STEPS)
     angle = np.deg2rad([30, 50]) * np.sin(np.pi * np.outer(time, [0.9, 0.6])) ** 2
     noise = np.random.default_rng(1).normal(0, NOISE, (STEPS, 2))
-    with Slave(Path("target/fmu/prw_controller.fmu")) as fmu:
+    with Slave("target/fmu/prw_controller.fmu") as fmu:
         errors = {"PI": follow(pi(fmu, angle), noise) - angle, "LQR": follow(lqr(angle), noise) - angle}
     picture = Figure(figsize=(8, 3.2), layout="constrained")
     axes = picture.subplots(1, 2, sharex=True)

@@ -12,11 +12,12 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-from prw import recording
-from prw.identify.model import Model
-from prw.motion import Motion
+import prw
+from prw.recording import read_motion
+from prw.testbed import Testbed
 
 ENCODER = 360 / 10_000
 #: Motors move smoothly between the rows of a file: the FMU is stepped this many times from one row to the next.
@@ -24,7 +25,7 @@ STEPS = 20
 CHOSEN = ("k1", "k2", "c1", "c2", "c3")
 
 
-def smoothly(motion: Motion) -> Motion:
+def smoothly(motion: prw.Motion) -> prw.Motion:
     """The motion with STEPS communication points for each of its own."""
     rows = np.arange(len(motion.time))
     time = np.interp(np.arange(STEPS * (len(rows) - 1) + 1) / STEPS, rows, motion.time)
@@ -32,7 +33,7 @@ def smoothly(motion: Motion) -> Motion:
         path = CubicSpline(motion.time, motion.theta)
     else:
         path = CubicHermiteSpline(motion.time, motion.theta, motion.omega)
-    return Motion(motion.name, time, path(time), path(time, 1))
+    return prw.Motion(time, path(time), path(time, 1), motion.name)
 
 
 def main() -> None:
@@ -45,17 +46,19 @@ def main() -> None:
     parser.add_argument("--fmu", type=Path, default=Path("target/fmu/prw_testbed.fmu"))
     options = parser.parse_args()
     rig, sensors = np.random.default_rng(options.seed), np.random.default_rng()
-    motion = recording.read(options.motion)
-    with Model(options.fmu) as model:
-        truth = {name: model.starts[name] * float(rig.uniform(0.75, 1.3)) for name in CHOSEN}
-        response = {name: values[::STEPS] for name, values in model.run(smoothly(motion), truth).items()}
-        shown = {
-            name: f"{truth[name] / model.parameters[name].factor:.5g} {model.parameters[name].shown}"
-            for name in CHOSEN
-        }
+    motion = read_motion(options.motion)
+    with Testbed(options.fmu) as testbed:
+        truth = {name: testbed.starts[name] * float(rig.uniform(0.75, 1.3)) for name in CHOSEN}
+        response = {name: values[::STEPS] for name, values in testbed.respond(smoothly(motion), start=truth).items()}
+    # All of them are per radian, and shown per degree.
+    shown = {
+        name: f"{np.radians(value):.5g} {'N.m/deg' if name.startswith('k') else 'N.m.s/deg'}"
+        for name, value in truth.items()
+    }
 
-    def encoder(angle: np.ndarray) -> np.ndarray:
-        return np.round(np.degrees(angle) / ENCODER + sensors.uniform(-0.5, 0.5)) * ENCODER
+    def encoder(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+        counts: NDArray[np.float64] = np.round(np.degrees(angle) / ENCODER + sensors.uniform(-0.5, 0.5))
+        return counts * ENCODER
 
     columns = {"time [s]": motion.time}
     for i in (0, 1):
@@ -69,9 +72,7 @@ def main() -> None:
         else:
             noise = sensors.normal(0, 0.06, len(motion.time)) + sensors.uniform(-1, 1)
             columns[f"{name} [deg]"] = np.degrees(response[name]) + noise
-    np.savetxt(
-        options.run, np.column_stack(list(columns.values())), "%.6f", ",", header=",".join(columns), comments=""
-    )
+    np.savetxt(options.run, np.column_stack(list(columns.values())), "%.6f", ",", header=",".join(columns), comments="")
     print(f"wrote {options.run}; the rig behind it: " + ", ".join(f"{name} {text}" for name, text in shown.items()))
 
 

@@ -9,13 +9,13 @@ and to replay what was found on the FMU: the couplings are wound up and unwound 
 import tempfile
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import casadi
 import numpy as np
-import prw
 from matplotlib.figure import Figure
 from scipy.linalg import expm
+
+import prw
 
 FMU = Path("target/fmu/prw_testbed.fmu")
 MOVE, AFTER, STEP = 0.25, 0.35, 2.5e-3  # s
@@ -58,14 +58,14 @@ def minimum_jerk() -> np.ndarray:
     return np.asarray(np.diff(SIDES * s**3 * (10 - 15 * s + 6 * s**2), axis=0) / STEP)
 
 
-def replay(rates: np.ndarray, parameters: dict[str, float] | None = None) -> Any:
+def replay(rates: np.ndarray, parameters: dict[str, float] | None = None) -> prw.Run:
     """The FMU's answer to motors with these rates, and then still."""
     omega = np.vstack([rates, np.zeros((round(AFTER / STEP) + 1, 2))])
     theta = np.vstack([np.zeros(2), np.cumsum(STEP * omega[:-1], axis=0)])
-    return prw.simulate(prw.Motion(np.linspace(0, MOVE + AFTER, len(theta)), theta, omega), parameters, fmu=FMU)
+    return prw.simulate(prw.Motion(np.linspace(0, MOVE + AFTER, len(theta)), theta, omega), parameters)
 
 
-def left(run: Any) -> float:
+def left(run: prw.Run) -> float:
     """The largest deviation of pitch or roll from the goal after the move, deg."""
     after = run.time >= MOVE - STEP / 2
     return float(np.rad2deg(max(np.abs(run[name] - goal)[after].max() for name, goal in zip(("pitch", "roll"), GOAL))))
@@ -75,7 +75,7 @@ def main() -> tuple[Figure, dict[str, float]]:
     """Find, replay, print and draw; returns the figure, and how far pitch or roll is off after each motion, deg."""
     rates = {"quintic": minimum_jerk(), "quietest": quietest()}
     runs = {name: replay(course) for name, course in rates.items()}
-    runs["quietest, k2 10 % less"] = replay(rates["quietest"], {"k2": 0.9 * 43.5448})
+    runs["quietest, k2 10 % less"] = replay(rates["quietest"], {"k2": 0.9 * runs["quietest"].parameters["k2"]})
     picture = Figure(figsize=(8, 4.2), layout="constrained")
     axes = picture.subplots(2, 2, sharex=True)
     for (name, run), style in zip(runs.items(), ("C1-", "C0-", "k:")):
@@ -83,8 +83,8 @@ def main() -> tuple[Figure, dict[str, float]]:
         for axis, angle in zip(axes[:, 0], ("pitch", "roll")):
             axis.plot(run.time, np.rad2deg(run[angle]), style, label=name)
             axis.set_ylabel(f"{angle} (deg)")
-        for axis, course, motor in zip(axes[:, 1], run.motion.omega.T, (1, 2)):
-            axis.step(run.time, course, style, where="post")
+        for axis, course, motor in zip(axes[:, 1], np.diff(run.motion.theta.T) / STEP, (1, 2)):
+            axis.step(run.time[:-1], course, style, where="post")
             axis.set_ylabel(f"motor {motor} (rad/s)")
     for axis in axes.flat:
         axis.axvline(MOVE, color="0.6", linewidth=0.8)

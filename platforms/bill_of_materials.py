@@ -15,9 +15,11 @@ import re
 import subprocess
 import sys
 import uuid
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 from targets import MODEL, ROOT, TARGETS
 
@@ -70,10 +72,10 @@ distribution. libgcc is linked under the GCC Runtime Library Exception, which as
 """
 
 
-@lru_cache(maxsize=None)
-def packages(product: Product) -> list[dict]:
+@cache
+def packages(product: Product) -> list[dict[str, Any]]:
     """The packages that are compiled into a library for any target, as cargo describes them."""
-    names = set()
+    names: set[tuple[str, ...]] = set()
     for target in TARGETS:
         # Without build scripts and procedural macros: they run, but nothing of them gets in.
         command = ["cargo", "tree", "--locked", "--no-default-features", "--package", product.package]
@@ -92,7 +94,7 @@ def _cargo(command: list[str]) -> str:
     return process.stdout
 
 
-def copyright_of(package: dict) -> str:
+def copyright_of(package: dict[str, Any]) -> str:
     """The holders named in the package's licence files, else its authors."""
     folder = Path(package["manifest_path"]).parent
     lines = []
@@ -100,15 +102,20 @@ def copyright_of(package: dict) -> str:
         if re.match(r"(licen[cs]e|copyright)", path.name, re.IGNORECASE) and path.is_file():
             for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
                 match = HOLDER.match(line)
-                if match and "owner" not in match[1] and match[1] not in lines and not re.fullmatch(r"[\d\s-]+", match[1]):
+                if (
+                    match
+                    and "owner" not in match[1]
+                    and match[1] not in lines
+                    and not re.fullmatch(r"[\d\s-]+", match[1])
+                ):
                     lines.append(match[1])
     authors = [re.sub(r"\s*<.*>", "", author) for author in package["authors"]]
     return "; ".join(lines or authors) or "its authors"
 
 
-def licence_of(package: dict) -> str:
+def licence_of(package: dict[str, Any]) -> str:
     """The licence as an SPDX expression."""
-    return package["license"].replace("/", " OR ")
+    return str(package["license"]).replace("/", " OR ")
 
 
 def other_licences(product: Product) -> str:
@@ -181,7 +188,7 @@ def notice(product: Product) -> str:
     return HEADER.format(name=product.name) + lists + FOOTER.format(name=product.name) + other_licences(product)
 
 
-def _row(rows: list[tuple[str, ...]], row: tuple[str, ...]) -> str:
+def _row(rows: Sequence[tuple[str, ...]], row: tuple[str, ...]) -> str:
     widths = [max(len(line[column]) for line in rows) for column in range(len(row))]
     return "  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() + "\n"
 

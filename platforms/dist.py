@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import tempfile
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 import bill_of_materials
@@ -79,7 +80,7 @@ def compiled_elsewhere(folder: Path) -> tuple[dict[Target, Path], list[str]]:
 
 
 def pack(
-    out: Path, fmi: int, folders: dict[str, tuple[Target, ...]], libraries: dict[Target, Path], *options: str
+    out: Path, fmi: int, folders: Mapping[str, tuple[Target, ...]], libraries: dict[Target, Path], *options: str
 ) -> None:
     """Packs an FMU for this version of FMI with a library in each of these folders of `binaries/`."""
     command = ["cargo", "run", "--locked", "--release", "--quiet", "--bin", "build_fmu", "--"]

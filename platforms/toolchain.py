@@ -9,7 +9,7 @@ import subprocess
 import sys
 import sysconfig
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 from targets import ROOT, Target
@@ -68,7 +68,7 @@ def _rustup_adds(target: Target) -> bool:
     return subprocess.run(["rustup", "target", "add", target.triple], stdin=subprocess.DEVNULL).returncode == 0
 
 
-@lru_cache(maxsize=None)
+@cache
 def _with_sources() -> Toolchain:
     sources = Path("lib/rustlib/src/rust/library/Cargo.lock")
     if not (DEBIAN_RUSTC.exists() and (DEBIAN_RUSTC.parents[1] / sources).exists()):
@@ -153,7 +153,7 @@ def macos_sdk() -> Path:
     return folder.parents[1]
 
 
-@lru_cache(maxsize=None)
+@cache
 def _output(program: str, *arguments: str) -> str:
     try:
         return subprocess.run([program, *arguments], check=True, capture_output=True, text=True).stdout.strip()

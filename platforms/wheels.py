@@ -1,6 +1,6 @@
 """Makes the wheels of the Python package fmu-run: one for each platform, for every Python from 3.11 on.
 
-    python platforms/wheels.py [--out FOLDER] [TRIPLE...]
+python platforms/wheels.py [--out FOLDER] [TRIPLE...]
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ def fmu() -> Path:
 @pytest.fixture(scope="session")
 def model(fmu):
     """One instance of the FMU for all tests that compute in this process."""
-    from prw.identify.model import Model
+    from prw.identification.model import Model
 
     with Model(fmu) as instance:
         yield instance

@@ -1,7 +1,7 @@
 """Is `prw identify` unbiased, and are its intervals honest? Repetitions on simulated rigs; `make monte-carlo` runs it.
 
     python tests/analysis/monte_carlo.py target/fmu/prw_testbed.fmu [--repetitions 200] [--sensors all|torque]
-        [--motion independent|equal|opposite|fig4] [--seed 0] [--counts 10000] [--workers N] [--out out/monte_carlo.json]
+        [--motion independent|equal|opposite|fig4|slow] [--seed 0] [--counts 10000] [--workers N] [--out out/monte_carlo.json]
 
 Every repetition has its own rig (parameters up to 30 % off Table 1, where the search starts), its own motion of 10 s
 at 1 kHz, its own noise, encoder positions and sensor offsets; see rig.py. Exit status 1 if an estimate is biased by
@@ -25,14 +25,16 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracle"))
 import rig  # noqa: E402
 from threadpoolctl import threadpool_limits  # noqa: E402
 
-from prw.identify.experiment import prepare  # noqa: E402
-from prw.identify.fit import Task, fit  # noqa: E402
-from prw.identify.measurements import Measurements  # noqa: E402
-from prw.identify.model import Model  # noqa: E402
-from prw.identify.statistics import certainty  # noqa: E402
+from prw.identification import task_of  # noqa: E402
+from prw.identification.experiment import prepare  # noqa: E402
+from prw.identification.fit import fit  # noqa: E402
+from prw.identification.model import Model  # noqa: E402
+from prw.identification.statistics import certainty  # noqa: E402
+from prw.motion import Motion  # noqa: E402
+from prw.recording import Recording  # noqa: E402
 
 SENSORS = {"all": rig.ALL, "torque": ("tau1", "tau2")}
-MOTIONS = ("independent", "equal", "opposite", "fig4")
+MOTIONS = ("independent", "equal", "opposite", "fig4", "slow")
 
 
 def repetition(fmu: str, seed: int, channels, counts: int, motion: str) -> tuple:
@@ -41,12 +43,10 @@ def repetition(fmu: str, seed: int, channels, counts: int, motion: str) -> tuple
     truth = rig.experiment(seed, pattern=motion)
     columns = rig.measure(truth, seed + 1_000_000, channels, counts)
     theta = np.column_stack([columns["theta1"], columns["theta2"]])
-    values = np.column_stack([columns[name] for name in channels])
-    measured = Measurements("rig", Path("rig.csv"), truth.time, theta, None, tuple(channels), values, {})
-    with Model(Path(fmu)) as model, threadpool_limits(1):
+    measured = Recording(Path("rig.csv"), Motion(truth.time, theta), {name: columns[name] for name in channels}, {})
+    with Model(fmu) as model, threadpool_limits(1):
         begin = time.perf_counter()
-        bounds = {name: (value / 100, value * 100) for name, value in model.starts.items()}
-        solution = fit(model, [prepare(measured)], Task(rig.NAMES, model.starts, bounds, {}, {}), starts=1)
+        solution = fit(model, [prepare(measured)], task_of(model.known, rig.NAMES), starts=1)
         sure = certainty(solution)
         seconds = time.perf_counter() - begin
     true = np.array([truth.parameters[name] for name in rig.NAMES])

@@ -6,10 +6,10 @@ the response to each is exact (transfer function), and so is the transient from 
 
 from __future__ import annotations
 
-from typing import Dict, NamedTuple, Optional, Sequence
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-
 from lagrange import linear_model, pitch_roll, table_1
 
 SHAFT_SENSORS = ("theta3", "theta4")
@@ -23,18 +23,19 @@ COUNTS = 10_000
 class Truth(NamedTuple):
     """parameters: SI. time (n,) s. theta, omega: (n, 2) rad, rad/s. outputs: (n,) each, SI."""
 
-    parameters: Dict[str, float]
+    parameters: dict[str, float]
     time: np.ndarray
     theta: np.ndarray
     omega: np.ndarray
-    outputs: Dict[str, np.ndarray]
+    outputs: dict[str, np.ndarray]
 
 
 def experiment(
     seed: int, duration: float = 10.0, rate: float = 1000.0, pattern: str = "independent", spread: float = 0.3
 ) -> Truth:
     """A random rig in a random motion: NAMES up to `spread` off Table 1, 40 sines from 0.1 to 20 Hz a motor, 30 deg.
-    Both motors in the same motion or in opposite ones, or each in its own; "fig4": the paper's, over and over."""
+    Both motors in the same motion or in opposite ones, or each in its own; "fig4": the paper's, over and over; "slow":
+    slow smooth moves with small vibrations of 2 to 22 Hz on top."""
     random = np.random.default_rng(seed)
     parameters = dict(table_1())
     for name in NAMES:
@@ -42,6 +43,11 @@ def experiment(
     time = np.arange(int(round(duration * rate)) + 1) / rate
     if pattern == "fig4":
         return respond(parameters, time, np.array([5.0]), np.array([[-1.0], [1.0]]), 1 / (10 * np.pi))
+    if pattern == "slow":
+        frequency = np.concatenate([np.sort(random.uniform(0.1, 0.6, 5)), np.sort(random.uniform(2, 22, 12))])
+        size = np.concatenate([np.full(5, 0.2), random.uniform(0.0003, 0.003, 12)])
+        waves = size * np.exp(1j * random.uniform(0, 2 * np.pi, (2, 17)))
+        return respond(parameters, time, frequency, waves)
     frequency = np.sort(random.uniform(0.1, 20, 40))
     size = np.minimum(1, (2 / frequency) ** 1.5)
     phases = random.uniform(0, 2 * np.pi, (2, 40))
@@ -112,7 +118,7 @@ def measure(truth: Truth, seed: int, channels: Sequence[str] = ALL, counts: int 
     return found
 
 
-def write(path, columns: Dict[str, np.ndarray], units: Optional[Dict[str, tuple]] = None, rows=slice(None)) -> None:
+def write(path, columns: dict[str, np.ndarray], units: dict[str, tuple] | None = None, rows=slice(None)) -> None:
     """Write the columns as CSV with nine digits. units: (unit, factor) by column, written into the header."""
     units = units or {}
     header = [f"{name} [{units[name][0]}]" if name in units else name for name in columns]

@@ -8,20 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prw.identify import design
-from prw.identify.fit import Task, fit
+from prw.identification import design, task_of
+from prw.identification.experiment import planned
+from prw.identification.fit import fit
 from prw.recording import read
-
-
-def task(model, *names) -> Task:
-    bounds = {name: (value / 100, value * 100) for name, value in model.starts.items()}
-    return Task(names, model.starts, bounds, {}, {})
+from prw.testbed import Testbed
 
 
 def test_motions_keep_the_limits_and_start_and_end_at_rest(model):
     limits = design.Limits(0.3, 5.0, 150.0)
     noise = {"tau1": 0.02, "tau2": 0.02}
-    for motion in design.motions(model, task(model, "k1", "c3"), limits, 6.0, 1000.0, noise):
+    for motion in design.motions(model, task_of(model.known, ["k1", "c3"]), limits, 6.0, 1000.0, noise):
         assert np.abs(motion.theta).max() <= limits.angle * 1.001, motion.name
         assert np.abs(motion.omega).max() <= limits.rate * 1.001, motion.name
         acceleration = np.diff(motion.omega, axis=0) * 1000
@@ -34,22 +31,24 @@ def test_motions_keep_the_limits_and_start_and_end_at_rest(model):
         assert np.abs(slope - motion.omega[2:-2]).max() < 0.02 * limits.rate, f"{motion.name}: omega is not theta'"
 
 
-def test_the_expected_errors_are_those_of_many_fits(model):
+def test_the_expected_errors_are_those_of_many_fits(model, fmu):
     """White noise, exact angles, 16 fits: the scatter of the estimates is what the design promised."""
     channels = ("tau1", "tau2", "pitch")
     noise = {"tau1": 0.05, "tau2": 0.05, "pitch": 2e-3}
-    what = task(model, "k2", "c2", "c3")
+    what = task_of(model.known, ["k2", "c2", "c3"])
     motions = design.motions(model, what, design.Limits(0.3, 5.0, 150.0), 2.0, 250.0, noise)
     motion = next(m for m in motions if m.name == "chirp_independent")
-    planned = design.plan(motion, channels)
-    point = np.log([model.starts[name] for name in what.names])
-    expected = np.sqrt(np.diag(np.linalg.inv(design.information(model, [planned], what, point, noise))))
-    response = planned.simulate(model, [model.starts])[0]
+    experiment = planned(motion, channels)
+    point = what.first()
+    expected = np.sqrt(np.diag(np.linalg.inv(design.information(model, [experiment], what, point, noise))))
+    with Testbed(fmu) as testbed:
+        courses = testbed.respond(motion, channels)
+    response = np.column_stack([courses[name] for name in channels])
     random = np.random.default_rng(0)
     found = []
     for _ in range(16):
         values = response + random.normal(0, list(noise.values()), response.shape) + random.uniform(-1, 1, 3)
-        found.append(fit(model, [replace(planned, values=values)], what, starts=1).logarithms - point)
+        found.append(fit(model, [replace(experiment, values=values)], what, starts=1).logarithms - point)
     ratio = np.std(found, axis=0) / expected
     assert (ratio > 0.6).all() and (ratio < 1.5).all(), ratio
 

@@ -15,7 +15,7 @@ import rig
 from lxml import etree
 
 ROOT = Path(__file__).resolve().parents[2]
-DEGREES = {name: ("deg", np.pi / 180) for name in ("theta1", "theta2", "theta3", "theta4", "pitch", "roll")}
+DEGREES = dict.fromkeys(("theta1", "theta2", "theta3", "theta4", "pitch", "roll"), ("deg", np.pi / 180))
 
 
 def report(folder) -> dict:
@@ -87,7 +87,7 @@ def test_several_experiments_in_motion_with_gaps_and_uneven_rows(prw, tmp_path, 
     assert result.returncode == 0, result.stderr
     found = report(tmp_path / "out" / "identified")
     check_estimates(found, experiment.parameters)
-    assert {c["count"] for c in found["channels"] if c["channel"] == "pitch"} == {400}
+    assert {c["values"] for c in found["channels"] if c["channel"] == "pitch"} == {400}
 
 
 def test_build_fmu_takes_what_was_identified(prw, tmp_path, experiment, fmu):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from prw.errors import UserError
-from prw.identify.measurements import read
+from prw.identification.experiment import prepare
+from prw.recording import read
 
 
 def lines(header: str, rows: int = 30, row: str = "{t},0.1,0.2,{x}") -> str:
@@ -28,16 +29,16 @@ def test_units_of_the_header_and_of_the_option(file):
     measured = read(path, units={"pitch": "mrad"})
     assert measured.time[-1] == pytest.approx(0.29e-3)
     np.testing.assert_allclose(measured.theta[0], [np.deg2rad(0.1), 0.4 * np.pi])
-    assert measured.values[6, 0] == pytest.approx(0.6e-3)
-    assert measured.channels == ("pitch",)
-    assert read(path).values[6, 0] == pytest.approx(0.6)
-    assert read(path, degrees=True).values[6, 0] == pytest.approx(np.deg2rad(0.6))
+    assert measured["pitch"][6] == pytest.approx(0.6e-3)
+    assert list(measured.measured) == ["pitch"]
+    assert read(path)["pitch"][6] == pytest.approx(0.6)
+    assert read(path, degrees=True)["pitch"][6] == pytest.approx(np.deg2rad(0.6))
 
 
 @pytest.mark.parametrize("unit, factor", [("N.m", 1), ("Nm", 1), ("N·m", 1), ("mN.m", 1e-3), ("N cm", 1e-2)])
 def test_torque_units(file, unit, factor):
     measured = read(file(lines(f"time,theta1,theta2,tau1 [{unit}]")))
-    assert measured.values[6, 0] == pytest.approx(0.6 * factor)
+    assert measured["tau1"][6] == pytest.approx(0.6 * factor)
 
 
 @pytest.mark.parametrize(
@@ -50,7 +51,7 @@ def test_headers_as_others_write_them(file, header):
     measured = read(path)
     assert measured.time[-1] == pytest.approx(0.29e-3)
     np.testing.assert_allclose(measured.theta[0], np.deg2rad([0.1, 0.2]))
-    assert measured.channels == ("tau1",) and measured.values[6, 0] == pytest.approx(0.6)
+    assert list(measured.measured) == ["tau1"] and measured["tau1"][6] == pytest.approx(0.6)
     assert measured.notes[0] == f"columns ignored: {header.rsplit(',', 1)[1]}"
     path.write_text(path.read_text().replace("0.29,", "oops,"))
     with pytest.raises(UserError, match="row 33, column time: 'oops' is not a number"):
@@ -62,14 +63,13 @@ def test_a_slow_sensor_leaves_cells_empty(file):
     for k in range(1, 61, 2):
         text[k] = text[k].replace(",,", f",{k / 100},")
     measured = read(file("\n".join(text)))
-    assert measured.channels == ("tau1", "pitch")
-    assert np.isfinite(measured.values).sum(axis=0).tolist() == [60, 30]
+    assert {name: np.isfinite(column).sum() for name, column in measured.measured.items()} == {"tau1": 60, "pitch": 30}
 
 
 @pytest.mark.parametrize(
     "text, message",
     [
-        (lines("time,theta1,theta2,x"), "run.csv, row 1: nothing measured; at least one column of tau1, tau2"),
+        (lines("time,theta1,theta2,x"), "run.csv: nothing measured; at least one column of tau1, tau2"),
         (lines("time,theta1,pitch,x"), "row 1: column theta2 is missing; the header has time, theta1, pitch, x"),
         (lines("time,theta1,theta2,tau1 [deg]"), "row 1, column tau1: tau1 cannot be in 'deg'; use N.m, mN.m"),
         (lines("time [h],theta1,theta2,tau1"), "row 1, column time: time cannot be in 'h'; use s, ms"),
@@ -89,7 +89,7 @@ def test_a_slow_sensor_leaves_cells_empty(file):
 )
 def test_what_is_wrong_is_said(file, text, message):
     with pytest.raises(UserError) as error:
-        read(file(text))
+        prepare(read(file(text)))
     assert message in str(error.value) and "\n" not in str(error.value)
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from prw.identify.experiment import prepare
-from prw.identify.measurements import Measurements
-from prw.identify.path import quantum_of, smooth
+from prw.identification.experiment import prepare
+from prw.identification.path import quantum_of, smooth
+from prw.motion import Motion
+from prw.recording import Recording
 
 
 def wave(t):
@@ -64,7 +65,7 @@ def test_errors_drawn_at_two_angles_differ():
     angle = 0.4 / (1 + np.exp(-(t - 2) / 0.02))
     path = smooth(t, np.round(angle / quantum) * quantum)
     random = np.random.default_rng(0)
-    differences = [np.ptp(path.wander(random)([1.0, 3.0])) for _ in range(200)]
+    differences = [np.ptp(path.errors(random)[[1000, 3000]]) for _ in range(200)]
     # of two uniform errors: sqrt(2 / 12)
     assert np.sqrt(np.mean(np.square(differences))) == pytest.approx(quantum / np.sqrt(6), rel=0.2)
 
@@ -102,6 +103,5 @@ def test_an_encoder_s_errors_in_every_period_are_no_motion(counts):
     angle = (1 - np.cos(10 * np.pi * t)) / (10 * np.pi)
     theta = np.round(np.outer(angle, [1, -1]) / quantum + [0.3, 0.1]) * quantum
     assert quantum_of(theta[:, 0]) == pytest.approx(quantum)
-    values = np.zeros((len(t), 1))
-    found = prepare(Measurements("run", Path("run.csv"), t, theta, None, ("tau1",), values, {}))
+    found = prepare(Recording(Path("run.csv"), Motion(t, theta), {"tau1": np.zeros(len(t))}, {}))
     assert 5 < found.band < 8

@@ -14,16 +14,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from prw.motion import fig4
-from prw.sweep.study import Study, chunks
-from prw.sweep.workers import on_this_machine
-from prw.testbed import OUTPUTS
+from prw.sweeps.study import Study, chunks
+from prw.sweeps.workers import on_this_machine
+from prw.testbed import OUTPUTS, Testbed
 
 
 def rows(folder):
     return pq.read_table(folder / "runs.parquet").to_pylist()
 
 
-def test_grid_random_and_failures(prw, tmp_path, model):
+def test_grid_random_and_failures(prw, tmp_path, fmu):
     result = prw("sweep", "--grid", "k1=-50:150:3", "--random", "c3=0.4:20%", "--runs", 4, "--workers", 2)
     assert result.returncode == 0, result.stderr
     assert "ran         12 runs on 2 processes" in result.stdout
@@ -33,7 +33,8 @@ def test_grid_random_and_failures(prw, tmp_path, model):
     assert [row["status"] for row in table] == ["failed"] * 4 + ["done"] * 8
     assert np.std(np.log([row["c3"] for row in table])) == pytest.approx(0.2, rel=0.6)
     for row in (table[5], table[11]):
-        response = model.run(fig4(), {"k1": row["k1"], "c3": row["c3"]})
+        with Testbed(fmu) as testbed:
+            response = testbed.respond(fig4(), start={"k1": row["k1"], "c3": row["c3"]})
         for name in OUTPUTS:
             assert row[f"{name}_peak"] == np.abs(response[name]).max()
             assert row[f"{name}_rms"] == pytest.approx(np.sqrt(np.mean(response[name] ** 2)), rel=1e-12)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from prw.closed_loop import masters, system
+from tools.closed_loop import masters, system
 
 ROOT = Path(__file__).resolve().parents[2]
 FMUS = ROOT / "target" / "fmu"

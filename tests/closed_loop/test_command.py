@@ -1,4 +1,4 @@
-"""`prw closed-loop` and the example FMU to copy."""
+"""`tools closed-loop` and the example FMU to copy."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ import sys
 import fmpy
 import numpy as np
 import pytest
+from conftest import FMUS, ROOT, built
 from fmpy.validation import validate_fmu
 
-from conftest import FMUS, ROOT, built
-from prw.closed_loop import masters
+from tools.closed_loop import masters
 
 
-def prw(*arguments):
-    return subprocess.run([sys.executable, "-m", "prw", "closed-loop", *arguments], capture_output=True, text=True)
+def tools(*arguments):
+    command = [sys.executable, "-m", "tools", "closed-loop", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 
 def test_it_writes_figures_and_tables_and_says_what_it_saw(closed_loop, tmp_path):
-    run = prw("--fmus", str(FMUS), "--out", str(tmp_path))
+    run = tools("--fmus", str(FMUS), "--out", str(tmp_path))
     assert run.returncode == 0, run.stderr
     for text in ("pitch_ref 30 deg, roll_ref 60 deg", "within 0.1 deg after", "FMPy", "with input derivatives"):
         assert text in run.stdout, run.stdout
@@ -30,7 +31,7 @@ def test_it_writes_figures_and_tables_and_says_what_it_saw(closed_loop, tmp_path
 
 
 def test_what_is_missing_is_named(tmp_path):
-    run = prw("--fmus", str(tmp_path))
+    run = tools("--fmus", str(tmp_path))
     assert run.returncode == 1 and run.stderr.count("\n") == 1
     assert "prw_closed_loop.ssp: no such file; `make closed-loop` builds it" in run.stderr
 
@@ -50,4 +51,6 @@ def test_the_example_to_copy_works(interface):
     result = fmpy.simulate_fmu(
         fmu, fmi_type=interface, stop_time=2, output_interval=0.1, start_values={"u": 1.0}, relative_tolerance=1e-8
     )
-    np.testing.assert_allclose(result["x"], 1 - np.exp(-result["time"]), atol=1e-14 if interface == "CoSimulation" else 1e-6)
+    np.testing.assert_allclose(
+        result["x"], 1 - np.exp(-result["time"]), atol=1e-14 if interface == "CoSimulation" else 1e-6
+    )

@@ -8,10 +8,9 @@ import sys
 import fmpy
 import numpy as np
 import pytest
+from conftest import ROOT
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
-
-from conftest import ROOT
 
 sys.path[:0] = [str(ROOT / "tests" / "oracle"), str(ROOT / "tests" / "fmpy")]
 

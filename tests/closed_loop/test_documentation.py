@@ -10,10 +10,10 @@ import sys
 import zipfile
 
 import pytest
+from conftest import ROOT
 
-from conftest import FMUS, ROOT
-from prw.documentation.pages import CONTROLLER, TESTBED
-from prw.figures import ICON, ICON_SVG
+from tools.documentation.pages import CONTROLLER, TESTBED
+from tools.figures import ICON, ICON_SVG
 
 
 @pytest.mark.parametrize("master, package", [("fmpy", "fmpy"), ("libcosim", "libcosimpy")])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from prw.closed_loop import coupling, masters, settling_time
+from tools.closed_loop import coupling, masters, settling_time
 
 
 @pytest.fixture(scope="module")

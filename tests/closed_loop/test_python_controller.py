@@ -7,9 +7,9 @@ import sys
 
 import numpy as np
 import pytest
-
 from conftest import ROOT
-from prw.closed_loop import masters, settling_time, system
+
+from tools.closed_loop import masters, settling_time, system
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +17,9 @@ def python_loop(tmp_path_factory, testbed_fmu):
     pytest.importorskip("pythonfmu")
     folder = tmp_path_factory.mktemp("python")
     source = ROOT / "examples" / "python_controller.py"
-    subprocess.run([sys.executable, "-m", "pythonfmu", "build", "-f", source, "-d", folder], check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, "-m", "pythonfmu", "build", "-f", source, "-d", folder], check=True, capture_output=True
+    )
     build = ["cargo", "run", "--quiet", "--release", "-p", "prw_controller", "--bin", "build_closed_loop", "--"]
     options = ["--testbed", testbed_fmu, "--controller", folder / "PythonController.fmu", "--out", folder]
     subprocess.run([*build, *options], check=True, cwd=ROOT, capture_output=True)

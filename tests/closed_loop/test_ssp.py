@@ -8,9 +8,8 @@ from pathlib import Path
 
 import fmpy.ssp
 import pytest
-from lxml import etree
-
 from conftest import ROOT
+from lxml import etree
 
 SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"
 BUILD = ["cargo", "run", "--quiet", "--release", "-p", "prw_controller", "--bin", "build_closed_loop", "--"]
@@ -42,11 +41,20 @@ def test_the_fmus_in_it_are_those_that_were_built(archive, closed_loop, testbed_
 
 def test_connections_have_the_units_of_the_fmus(archive, closed_loop):
     root = etree.fromstring(archive.read("SystemStructure.ssd"))
-    ns = {"ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription", "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon"}
+    ns = {
+        "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
+        "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+    }
     defined = {unit.get("name") for unit in root.findall("ssd:Units/ssc:Unit", ns)}
     for component in root.findall(".//ssd:Component", ns):
-        variables = fmpy.read_model_description(str(closed_loop.osp / Path(component.get("source")).name)).modelVariables
-        units = {variable.name: variable.unit or variable.declaredType.unit for variable in variables if variable.type == "Real"}
+        variables = fmpy.read_model_description(
+            str(closed_loop.osp / Path(component.get("source")).name)
+        ).modelVariables
+        units = {
+            variable.name: variable.unit or variable.declaredType.unit
+            for variable in variables
+            if variable.type == "Real"
+        }
         for connector in component.findall("ssd:Connectors/ssd:Connector", ns):
             unit = connector.find("ssc:Real", ns).get("unit")
             assert unit == units[connector.get("name")] and unit in defined

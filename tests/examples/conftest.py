@@ -8,11 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "examples"), str(ROOT / "tests" / "oracle"), str(ROOT / "tests" / "examples")]
-
-import interim  # noqa: E402
-
-interim.install()
+sys.path[:0] = [str(ROOT / "examples"), str(ROOT / "tests" / "oracle")]
 
 
 @pytest.fixture(autouse=True)

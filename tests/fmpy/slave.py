@@ -11,7 +11,6 @@ from fmpy.fmi2 import (
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
 )
-
 from lagrange import OUTPUTS
 
 

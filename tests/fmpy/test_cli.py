@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from lagrange import OUTPUTS
-from prw.recording import read
 from reference import backward_slope, follow
 from slave import assert_close
+
+from prw.recording import read_motion as read
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 GOOD = "time,theta1,theta2\n0,0.1,0.2\n0.001,0.1,0.2\n0.002,0.1,0.2\n"
@@ -138,7 +138,9 @@ def test_bad_recordings(prw, tmp_path, case):
 
 def test_units_in_the_header(tmp_path):
     file = tmp_path / "run.csv"
-    file.write_text("time [ms],theta1 [deg],theta2 [deg],omega1_rpm,omega2_rpm,tau1 [N.m]\n0,180,90,30,0,1\n5,180,90,30,0,1\n")
+    file.write_text(
+        "time [ms],theta1 [deg],theta2 [deg],omega1_rpm,omega2_rpm,tau1 [N.m]\n0,180,90,30,0,1\n5,180,90,30,0,1\n"
+    )
     motion = read(file)
     np.testing.assert_allclose(motion.time, [0, 5e-3], rtol=1e-15)
     np.testing.assert_allclose(motion.theta, [[np.pi, np.pi / 2]] * 2, rtol=1e-15)
@@ -149,7 +151,10 @@ def test_units_in_the_header(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "note"),
     [
-        ("0,3.1,0\n0.01,3.14,0\n0.02,-3.13,0\n0.03,-3.1,0\n", "theta1 jumps by 6.27 rad after 0.01 s; angles must run on"),
+        (
+            "0,3.1,0\n0.01,3.14,0\n0.02,-3.13,0\n0.03,-3.1,0\n",
+            "theta1 jumps by 6.27 rad after 0.01 s; angles must run on",
+        ),
         ("0,0,0\n10,0.1,0\n20,0.2,0\n", "a sample every 10 s; if time is in ms, call its column time [ms]"),
     ],
 )

@@ -8,9 +8,8 @@ from math import pi
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
-from lxml import etree
-
 from lagrange import PER_DEGREE, REAL, TABLE_1, table_1
+from lxml import etree
 
 STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 INPUTS = ("theta1", "theta2", "omega1", "omega2")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import html
 import json
+import os
 import re
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
-from typing import Dict
 
 import matplotlib
 import numpy as np
@@ -19,17 +19,16 @@ from lxml import etree
 from reference import integrate
 from test_model_exchange import END, OUTPUTS, angle, rate
 
-from prw.documentation.formulas import plain, typeset
-from prw.documentation.pages import CONTROLLER, PAGES, TESTBED, render
-from prw.documentation.readme import renew
-from prw.documentation.sources import read_description, read_table
 from prw.errors import UserError
-from prw.figures import COMMITTED, ICON, ICON_SVG, bode, gallery
-from prw.figures.gallery import figures
-from prw.figures.icon import draw_controller, draw_testbed
-from prw.figures.results import numbers, results
-from prw.figures.writing import write_for_page, write_json, write_png, write_small_png, write_svg
 from prw.motion import Motion
+from tools.documentation.formulas import typeset
+from tools.documentation.pages import CONTROLLER, PAGES, TESTBED, render
+from tools.documentation.sources import read_description, read_table
+from tools.figures import COMMITTED, ICON, ICON_SVG, bode, gallery
+from tools.figures.gallery import figures
+from tools.figures.icon import draw_controller, draw_testbed
+from tools.figures.results import numbers, results
+from tools.figures.writing import write_for_page, write_json, write_png, write_small_png, write_svg
 
 ROOT = Path(__file__).resolve().parents[2]
 EPSILON = np.finfo(float).eps
@@ -58,11 +57,6 @@ def found(fmu):
 @pytest.mark.parametrize("which", PAGES, ids=lambda page: page.text)
 def test_the_pages_are_up_to_date(which):
     assert text_of(which) == render(ROOT, which), f"{which.path} is out of date; write it anew with `make docs`"
-
-
-def test_readme_is_up_to_date():
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert readme == renew(ROOT), "README.md is out of date; write it anew with `make docs`"
 
 
 def test_the_page_travels_in_the_fmu(fmu, page):
@@ -104,7 +98,9 @@ def test_every_variable_is_in_its_page(which):
     assert description.guid not in page and description.guid.strip("{}") not in page
 
 
-@pytest.mark.parametrize("which, formulas", [(TESTBED, 30), (CONTROLLER, 7)], ids=lambda value: getattr(value, "text", ""))
+@pytest.mark.parametrize(
+    "which, formulas", [(TESTBED, 30), (CONTROLLER, 7)], ids=lambda value: getattr(value, "text", "")
+)
 def test_no_equation_is_left_untyped(which, formulas):
     page = text_of(which)
     text = re.sub(r"<pre.*?</pre>", "", page, flags=re.S)
@@ -118,27 +114,15 @@ def test_typeset():
     assert '<mtable class="matrix">' in block and "<mo>&lt;</mo>" in block
 
 
-def test_formulas_as_plain_text():
-    assert plain(r"\(\dot{\mathbf{q}}_I\) and \(\dot\theta_1 = \sin(10\pi t)\)") == "qI' and theta1' = sin(10 pi t)"
-    with pytest.raises(UserError, match="no plain text is known"):
-        plain(r"\(\frac{1}{2}\)")
-
-
 def test_a_table_that_is_missing_or_has_gaps_is_named(tmp_path):
     path = tmp_path / "tables.md"
-    path.write_text("# Run\n\ntext\n\n## Deeper\n\n| a | b |\n|---|---|\n| 1 | 2 |\n\n## Gap\n\n| a | b |\n|---|---|\n| 1 |\n")
+    path.write_text(
+        "# Run\n\ntext\n\n## Deeper\n\n| a | b |\n|---|---|\n| 1 | 2 |\n\n## Gap\n\n| a | b |\n|---|---|\n| 1 |\n"
+    )
     assert read_table(path, "Deeper") == (["a", "b"], [["1", "2"]])
     for heading, message in [("Run", "no table below a heading “Run”"), ("Gap", "the row of “1” has 1 cells, not 2")]:
         with pytest.raises(UserError, match=message):
             read_table(path, heading)
-
-
-def test_readme_without_its_marks_is_refused(tmp_path):
-    (tmp_path / "README.md").write_text("nothing")
-    for name in ("analysis", "modelDescription"):
-        (tmp_path / name).symlink_to(ROOT / name)
-    with pytest.raises(UserError, match="there must be one line <!-- variables, written by make docs -->"):
-        renew(tmp_path)
 
 
 def program(page: str, name: str) -> str:
@@ -178,13 +162,17 @@ def test_the_script_for_omsimulator_wires_what_there_is(page):
         f"wrist.root.{which.text}.": {v.name: v for v in read_description(ROOT / which.description).modelVariables}
         for which in (TESTBED, CONTROLLER)
     }
-    loops = re.findall(r"ipairs\(\{(.*?)\}\) do\s+oms_addConnection\((\S+) \.\. name, (\S+) \.\. name\)", html.unescape(script))
+    loops = re.findall(
+        r"ipairs\(\{(.*?)\}\) do\s+oms_addConnection\((\S+) \.\. name, (\S+) \.\. name\)", html.unescape(script)
+    )
     assert len(loops) == 2
     for names, start, end in loops:
         for name in re.findall(r'"(\w+)"', names):
             assert variables[start.strip('"')][name].causality == "output"
             assert variables[end.strip('"')][name].causality == "input"
-    for kind, component, name in re.findall(r'oms_set(Real|Boolean)\("(wrist\.root\.\w+\.)(\w+)"', html.unescape(script)):
+    for kind, component, name in re.findall(
+        r'oms_set(Real|Boolean)\("(wrist\.root\.\w+\.)(\w+)"', html.unescape(script)
+    ):
         assert variables[component][name].type == kind
 
 
@@ -278,7 +266,7 @@ def in_the_last_digit(value, random):
 def test_another_processor_writes_the_same_files(found, tmp_path, monkeypatch):
     """`make figures` on another machine changes no file that is kept with the sources."""
 
-    def write(folder: Path, found) -> Dict[str, bytes]:
+    def write(folder: Path, found) -> dict[str, bytes]:
         folder.mkdir()
         write_json(folder / "numbers.json", numbers(found))
         for name, drawn in figures(found).items():
@@ -301,10 +289,11 @@ def test_another_processor_writes_the_same_files(found, tmp_path, monkeypatch):
 
 
 def test_the_command(fmu, tmp_path):
-    run_figures = [sys.executable, "-m", "prw", "figures", "--fmu", "absent.fmu"]
-    result = subprocess.run(run_figures, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    elsewhere = {"cwd": tmp_path, "env": {**os.environ, "PYTHONPATH": str(ROOT)}}
+    run_figures = [sys.executable, "-m", "tools", "figures", "--fmu", "absent.fmu"]
+    result = subprocess.run(run_figures, **elsewhere, capture_output=True, text=True, timeout=120)
     assert result.returncode == 1 and result.stderr.count("\n") == 1 and "absent.fmu: no such FMU" in result.stderr
     result = subprocess.run(
-        [sys.executable, "-m", "prw", "docs"], cwd=tmp_path, capture_output=True, text=True, timeout=120
+        [sys.executable, "-m", "tools", "docs"], **elsewhere, capture_output=True, text=True, timeout=120
     )
     assert result.returncode == 1 and result.stderr.count("\n") == 1 and "cannot be read" in result.stderr

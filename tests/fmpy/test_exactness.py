@@ -5,7 +5,6 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
-
 from lagrange import OUTPUTS, REAL, linear_model, table_1
 from reference import backward_slope, follow
 from slave import assert_close

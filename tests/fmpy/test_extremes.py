@@ -11,7 +11,6 @@ import os
 import mpmath
 import numpy as np
 import pytest
-
 from lagrange import OUTPUTS, REAL, linear_model, table_1
 from reference import augmented, exponential
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import fmpy
 import numpy as np
-
 from lagrange import OUTPUTS
-from prw.motion import FIG4_FREQUENCY, fig4
 from reference import follow, integrate
 from slave import assert_close
+
+from prw.motion import FIG4_FREQUENCY, fig4
 
 
 def run(slave, motion):

@@ -10,9 +10,8 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
-from packaging.version import Version
-
 from lagrange import OUTPUTS
+from packaging.version import Version
 
 #: Let go with the couplings wound up, while both motors turn.
 START = {"theta3": 0.5, "theta4": -0.3, "theta5": 0.1, "theta6": 0.4, "omega5": 3.0, "omega6": -2.0, "k1": 130.0}

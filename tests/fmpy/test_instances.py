@@ -6,7 +6,6 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-
 from lagrange import OUTPUTS, linear_model, table_1
 from reference import follow
 from slave import assert_close
@@ -142,7 +141,7 @@ def test_set_input_derivatives_of_simulate_fmu(fmu, model):
     grid = np.arange(0, 21) * 0.05
     theta = np.cumsum(rng.normal(0, 0.1, (21, 2)), axis=0)
     table = np.asarray(np.rec.fromarrays([grid, *theta.T], names="time,theta1,theta2"))
-    rest = dict(theta3=theta[0, 0], theta5=theta[0, 0], theta4=theta[0, 1], theta6=theta[0, 1])
+    rest = {"theta3": theta[0, 0], "theta5": theta[0, 0], "theta4": theta[0, 1], "theta6": theta[0, 1]}
     try:
         result = fmpy.simulate_fmu(
             str(fmu),

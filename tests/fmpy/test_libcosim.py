@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from lagrange import OUTPUTS
-from prw.motion import fig4
 from reference import follow
 from slave import assert_close
+
+from prw.motion import fig4
 
 pytest.importorskip("libcosimpy")
 

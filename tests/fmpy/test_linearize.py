@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
-
 from lagrange import linear_model, table_1
-from prw.errors import UserError
-from prw.linearize import linearize
-from prw.modes import pitch_and_roll
 
-ROOT = Path(__file__).resolve().parents[2]
+from prw.errors import UserError
+from prw.linearization import linearize
+from tools.modes import pitch_and_roll
+
 STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 INPUTS = ("theta1", "theta2", "omega1", "omega2")
+RATES = {"omega1": "theta1", "omega2": "theta2"}
 #: q of H(s), and the torques.
 MEASURED = ("theta3", "theta4", "theta5", "theta6", "tau1", "tau2")
 
@@ -34,16 +31,17 @@ def expected(model, n_over_2m=7 / 8):
 @pytest.mark.parametrize("fmi_type", ["CoSimulation", "ModelExchange"])
 @pytest.mark.parametrize("change", [{}, {"J3": 0.05, "k2": 100.0, "c1": 0.1, "N": 9, "M": 2}])
 def test_matrices(fmu, fmi_type, change):
-    found = linearize(fmu, (*MEASURED, "pitch", "roll", "pitch_rate", "roll_rate"), change, fmi_type)
+    outputs = (*MEASURED, "pitch", "roll", "pitch_rate", "roll_rate")
+    found = linearize(fmu, change, outputs=outputs, fmi_type=fmi_type)
     p = {**table_1(), **change}
     assert (found.states, found.inputs) == (STATES, INPUTS)
-    for matrix, truth in zip(found, expected(linear_model(p), p["N"] / (2 * p["M"]))):
-        np.testing.assert_allclose(matrix, truth, rtol=1e-12, atol=1e-12 * np.abs(truth).max())
+    for name, truth in zip("ABCD", expected(linear_model(p), p["N"] / (2 * p["M"]))):
+        np.testing.assert_allclose(getattr(found, name), truth, rtol=1e-12, atol=1e-12 * np.abs(truth).max())
 
 
 def test_names_and_units(fmu):
-    A, B, C, D, *_ = model = linearize(fmu)
-    assert (A.shape, B.shape, C.shape, D.shape) == ((6, 6), (6, 4), (8, 6), (8, 4))
+    model = linearize(fmu)
+    assert (model.A.shape, model.B.shape, model.C.shape, model.D.shape) == ((6, 6), (6, 4), (8, 6), (8, 4))
     assert set(model.outputs) == {"tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4"}
     assert {n: model.units[n] for n in ("theta1", "omega1", "theta5", "omega6", "tau2", "roll_rate")} == {
         "theta1": "rad",
@@ -53,25 +51,27 @@ def test_names_and_units(fmu):
         "tau2": "N.m",
         "roll_rate": "rad/s",
     }
-    assert model.rates == {"omega1": "theta1", "omega2": "theta2"} and model.motions == ("theta1", "theta2")
+    assert model.moved({"omega1": "theta1", "omega2": "theta2"}) == ("theta1", "theta2")
 
 
 def test_the_point_of_operation_does_not_matter(fmu):
     start = {"theta3": 1.0, "theta5": 2.0, "omega6": -30.0, "theta1": 0.5, "use_omega": True}
-    for here, there in zip(linearize(fmu)[:4], linearize(fmu, start_values=start)[:4]):
-        np.testing.assert_array_equal(here, there)
+    here, there = linearize(fmu), linearize(fmu, start)
+    for name in "ABCD":
+        np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
 
 
 def test_transfer_matrices(fmu, model):
     """G(s) of eq. (13) entry by entry from the oracle, and the motors' rates folded in."""
-    found = linearize(fmu, MEASURED)
+    found = linearize(fmu, outputs=MEASURED)
     s = 2j * np.pi * np.array([0.1, 3.0, 5.6, 80.0])
     a, b, c, d = expected(model)
     truth = np.array([c[:6] @ np.linalg.inv(si * np.eye(6) - a) @ b + d[:6] for si in s])
     np.testing.assert_allclose(found.transfer(s), truth, rtol=1e-10)
     np.testing.assert_allclose(
-        found.motion_transfer(s), truth[:, :, :2] + s[:, None, None] * truth[:, :, 2:], rtol=1e-9, atol=1e-12
+        found.transfer(s, RATES), truth[:, :, :2] + s[:, None, None] * truth[:, :, 2:], rtol=1e-9, atol=1e-12
     )
+    np.testing.assert_array_equal(found.frequency_response(s.imag / (2 * np.pi), RATES), found.transfer(s, RATES))
 
 
 def test_pitch_and_roll_are_apart(fmu):
@@ -103,10 +103,10 @@ def test_to_control(fmu):
 @pytest.mark.parametrize(
     "arguments, complaint",
     [
-        ({"outputs": ["yaw"]}, "yaw is neither a Real output nor a state; there are "),
-        ({"start_values": {"k9": 1.0}}, "no start value k9"),
-        ({"start_values": {"J2": -1.0}}, "J2"),
-        ({"fmi_type": "ScheduledExecution"}, "offers no directional derivatives of FMI 2.0 for ScheduledExecution"),
+        ({"outputs": ["yaw"]}, "yaw is neither a continuous output nor a state; there are "),
+        ({"parameters": {"k9": 1.0}}, "no start value k9"),
+        ({"parameters": {"J2": -1.0}}, "J2"),
+        ({"fmi_type": "ScheduledExecution"}, "offers no directional derivatives for ScheduledExecution"),
     ],
 )
 def test_complaints(fmu, arguments, complaint):
@@ -120,12 +120,3 @@ def test_no_fmu(tmp_path):
     for name, complaint in (("absent.fmu", "no such FMU"), ("no.fmu", "cannot be read")):
         with pytest.raises(UserError, match=complaint):
             linearize(tmp_path / name)
-
-
-def test_the_program_in_the_readme(fmu, monkeypatch, capsys):
-    """It runs as it stands, from the project's folder."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    (program,) = re.findall(r"```python\n(from prw\.linearize .*?)```", readme, flags=re.S)
-    monkeypatch.chdir(ROOT)
-    exec(program, {})
-    assert "theta3" in capsys.readouterr().out

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
-
 from lagrange import OUTPUTS
 from reference import integrate
 

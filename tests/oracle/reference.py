@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import mpmath
 import numpy as np
+from lagrange import OUTPUTS, LinearModel
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
-
-from lagrange import OUTPUTS, LinearModel
 
 
 def at_rest(theta) -> np.ndarray:

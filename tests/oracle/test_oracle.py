@@ -5,7 +5,6 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
-
 from lagrange import OUTPUTS, dissipation, hessian, kinetic_energy, linear_model, potential_energy, table_1
 from reference import at_rest, augmented, backward_slope, exponential, follow, integrate
 

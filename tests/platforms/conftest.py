@@ -139,7 +139,9 @@ def include(description, tmp_path_factory) -> Path:
     derivatives = [unknown.variable for unknown in description.derivatives]
     inputs = [variable for variable in by_name.values() if variable.causality == "input"]
     lines = [f'#define GUID "{description.guid}"']
-    lines += [f"#define VR_{name} {variable.valueReference}" for name, variable in by_name.items() if name.isidentifier()]
+    lines += [
+        f"#define VR_{name} {variable.valueReference}" for name, variable in by_name.items() if name.isidentifier()
+    ]
     for name, variables in (
         ("outputs", outputs),
         ("unknowns", outputs + derivatives),

@@ -11,7 +11,14 @@ from conftest import ROOT
 from targets import GLIBC, Target
 
 #: glibc and nothing else; part of every Linux that is not musl's.
-LINUX_LIBRARIES = {"libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
+LINUX_LIBRARIES = {
+    "libc.so.6",
+    "libm.so.6",
+    "libpthread.so.0",
+    "libdl.so.2",
+    "ld-linux-x86-64.so.2",
+    "ld-linux-aarch64.so.1",
+}
 
 #: Part of every Windows from 10 on.
 WINDOWS_LIBRARIES = {"kernel32.dll", "ntdll.dll", "msvcrt.dll", "api-ms-win-core-synch-l1-2-0.dll"}
@@ -49,7 +56,11 @@ def linux(path: Path, target: Target, exported: set[str]) -> None:
     number = lambda version: [int(part) for part in version.split("_")[-1].split(".")]  # noqa: E731
     assert max(map(number, versions)) <= number(GLIBC), versions
     tags = {entry.tag for entry in elf.dynamic_entries}
-    assert not tags & {lief.ELF.DynamicEntry.TAG.RPATH, lief.ELF.DynamicEntry.TAG.RUNPATH, lief.ELF.DynamicEntry.TAG.TEXTREL}
+    assert not tags & {
+        lief.ELF.DynamicEntry.TAG.RPATH,
+        lief.ELF.DynamicEntry.TAG.RUNPATH,
+        lief.ELF.DynamicEntry.TAG.TEXTREL,
+    }
     # Without this the loader makes the importer's stack executable, or refuses.
     (stack,) = [segment for segment in elf.segments if segment.type == lief.ELF.Segment.TYPE.GNU_STACK]
     assert not stack.has(lief.ELF.Segment.FLAGS.X)
@@ -79,7 +90,7 @@ def macos(path: Path, targets: tuple[Target, ...], exported: set[str], name: str
     assert {part.header.cpu_type for part in parts} == set(wanted)
     for part in parts:
         assert part.header.file_type == lief.MachO.Header.FILE_TYPE.DYLIB
-        commands = [command for command in part.commands]
+        commands = list(part.commands)
         (own,) = [command for command in commands if command.command == lief.MachO.LoadCommand.TYPE.ID_DYLIB]
         assert own.name == name
         assert {command.name for command in part.libraries} == {own.name, "/usr/lib/libSystem.B.dylib"}
@@ -107,4 +118,6 @@ def macos_signature(path: Path) -> None:
     assert (size, kind) == (32, 2) and end == part.code_signature.data_offset and pages == -(-end // page)
     for index in range(pages):
         expected = signature[directory + hashes + size * index :][:size]
-        assert hashlib.sha256(content[index * page : min((index + 1) * page, end)]).digest() == expected, f"page {index}"
+        assert hashlib.sha256(content[index * page : min((index + 1) * page, end)]).digest() == expected, (
+            f"page {index}"
+        )

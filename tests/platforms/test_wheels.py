@@ -1,4 +1,4 @@
-"""The wheels of fmu-run: what is in them, what their libraries promise, and that they run the FMUs where that can be
+"""The wheels of fmu-run and prw: what is in them, what their libraries promise, and that they run the FMUs where that can be
 tried: installed on Linux without Rust, and in CPython for Windows under Wine."""
 
 from __future__ import annotations
@@ -39,6 +39,12 @@ def wheel(target) -> Path:
     return path
 
 
+def prw_wheel() -> Path:
+    """The wheel of prw."""
+    (path,) = (DIST / "wheels").glob("prw-*-py3-none-any.whl")
+    return path
+
+
 @pytest.fixture(params=TARGETS, ids=lambda target: target.triple)
 def target(request):
     """Each target in turn."""
@@ -52,7 +58,7 @@ def native(target, tmp_path) -> Path:
 
 
 def test_one_for_each_platform_and_every_python():
-    names = [path.name for path in (DIST / "wheels").iterdir()]
+    names = [path.name for path in (DIST / "wheels").iterdir() if path != prw_wheel()]
     assert sorted(names) == sorted(wheel(target).name for target in TARGETS)
     for name in names:
         assert {(tag.interpreter, tag.abi) for tag in parse_wheel_filename(name)[3]} == {("cp311", "abi3")}
@@ -115,6 +121,21 @@ def here(tmp_path_factory) -> str:
     command = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary=:all:"]
     subprocess.run([*command, "-c", HERE / "requirements.txt", wheel(LINUX)], env=environment, check=True)
     return ran([python, HERE / "wheel_run.py", *FMUS], environment)
+
+
+def test_prw_brings_the_fmu(tmp_path):
+    """Installed where there is no checkout, it simulates, with what fmu-run needs and no more."""
+    venv.create(tmp_path, with_pip=True)
+    python = tmp_path / "bin" / "python"
+    command = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary=:all:"]
+    subprocess.run([*command, "-c", HERE / "requirements.txt", wheel(LINUX), prw_wheel()], check=True)
+    program = "import prw; run = prw.simulate(); print(float(abs(run['roll_rate']).max()))"
+    environment = {**os.environ, "PYTHONPATH": "", "PYTHONSAFEPATH": "1"}
+    result = subprocess.run([python, "-c", program], cwd=tmp_path, env=environment, capture_output=True, text=True)
+    # Sec. 4 of the paper: a roll rate of about 2 rad/s.
+    assert result.returncode == 0 and float(result.stdout) == pytest.approx(2.03, abs=0.01), result.stderr
+    with zipfile.ZipFile(prw_wheel()) as archive:
+        assert archive.read(f"prw/fmu/{MODEL}.fmu") == (DIST / f"{MODEL}.fmu").read_bytes()
 
 
 def ran(command, environment) -> str:

@@ -58,7 +58,9 @@ def test_fmpys_server_for_windows(kind, simulate, served, fmu, capsys):
     (there, said), (here, _) = simulate(served, kind), simulate(fmu, kind)
     assert "prw_testbed.dll" in said
     assert there.dtype == here.dtype and len(there) == len(here) == 101
-    largest = max(np.abs(there[name] - here[name]).max() / max(np.abs(here[name]).max(), 1e-9) for name in here.dtype.names)
+    largest = max(
+        np.abs(there[name] - here[name]).max() / max(np.abs(here[name]).max(), 1e-9) for name in here.dtype.names
+    )
     with capsys.disabled():
         print(f"\n{kind} by FMPy's server for Windows: largest relative difference {largest:.2g} ", end="")
     assert largest <= 1e-12

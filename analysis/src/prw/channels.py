@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from math import pi
-from typing import Dict, NamedTuple
+from typing import NamedTuple
 
 from prw.errors import UserError
 
 #: Factor to SI of every unit a column may have, by quantity. The first is SI.
-UNITS: Dict[str, Dict[str, float]] = {
+UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "angle": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "arcmin": pi / 10800, "rev": 2 * pi},
     "rate": {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": pi / 180, "rev/s": 2 * pi, "rpm": pi / 30},
@@ -16,8 +16,17 @@ UNITS: Dict[str, Dict[str, float]] = {
 }
 #: Other ways to write them.
 ALIASES = {
-    **{"sec": "s", "µs": "us", "°": "deg", "degree": "deg", "degrees": "deg", "turn": "rev", "turns": "rev"},
-    **{"°/s": "deg/s", "deg_s": "deg/s", "dps": "deg/s", "rad_s": "rad/s"},
+    "sec": "s",
+    "µs": "us",
+    "°": "deg",
+    "degree": "deg",
+    "degrees": "deg",
+    "turn": "rev",
+    "turns": "rev",
+    "°/s": "deg/s",
+    "deg_s": "deg/s",
+    "dps": "deg/s",
+    "rad_s": "rad/s",
 }
 
 
@@ -29,7 +38,7 @@ class Channel(NamedTuple):
     noise: float
 
 
-MEASURED: Dict[str, Channel] = {
+MEASURED: dict[str, Channel] = {
     "tau1": Channel("torque", 0.02),
     "tau2": Channel("torque", 0.02),
     "theta3": Channel("angle", 1e-3),

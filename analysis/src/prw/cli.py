@@ -5,31 +5,39 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from typing import Optional, Sequence
+from collections.abc import Sequence
+from types import ModuleType
 
-from prw import closed_loop, documentation, excite, figures, identify, simulate, sweep
+from prw import progress
+from prw.commands import excite, identify, linearize, simulate, sweep
 from prw.errors import UserError
 
 #: Each subcommand is a module with add_parser(subparsers); the parser's default `run` takes the parsed arguments.
-COMMANDS = (simulate, figures, documentation, closed_loop, identify, excite, sweep)
+COMMANDS = (simulate, linearize, identify, excite, sweep)
 
 
-def main(argv: Optional[Sequence[str]] = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run `prw` with the arguments argv (default: the process's). Returns the exit status: 0, 1 after a UserError, 130
     when interrupted."""
-    parser = argparse.ArgumentParser(prog="prw", description="Simulate the pitch-roll wrist testbed through its FMU.")
+    return run("prw", "Simulate the pitch-roll wrist testbed through its FMU.", COMMANDS, argv)
+
+
+def run(program: str, description: str, commands: Sequence[ModuleType], argv: Sequence[str] | None) -> int:
+    """Run one of the commands as `program COMMAND ...`."""
+    parser = argparse.ArgumentParser(prog=program, description=description)
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for command in COMMANDS:
+    for command in commands:
         command.add_parser(subparsers)
     arguments = parser.parse_args(argv)
+    progress.show()
     try:
         arguments.run(arguments)
         sys.stdout.flush()
     except UserError as error:
-        print(f"prw {arguments.command}: {error}", file=sys.stderr)
+        print(f"{program} {arguments.command}: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print(f"\nprw {arguments.command}: interrupted", file=sys.stderr)
+        print(f"\n{program} {arguments.command}: interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:
         # The reader of our output has gone (`prw ... | head`); keep the interpreter from tripping over it at exit.

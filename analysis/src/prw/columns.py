@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import NamedTuple
 
 from prw.channels import MOTORS, QUANTITIES, factor, si_unit
 from prw.errors import UserError
@@ -21,11 +22,11 @@ SHOWN = 12
 class Columns(NamedTuple):
     """taken: (name, index) of the columns to read, time first. units: of each by name. notes: lines for the user."""
 
-    taken: List[Tuple[str, int]]
-    units: Dict[str, str]
-    notes: List[str]
+    taken: list[tuple[str, int]]
+    units: dict[str, str]
+    notes: list[str]
 
-    def factors(self) -> Dict[str, float]:
+    def factors(self) -> dict[str, float]:
         """What the values of each column are multiplied with to be in SI."""
         return {name: factor(name, unit) for name, unit in self.units.items()}
 
@@ -35,7 +36,7 @@ def columns(
     header: Sequence[str],
     line: int,
     outputs: Sequence[str] = (),
-    units: Optional[Mapping[str, str]] = None,
+    units: Mapping[str, str] | None = None,
     degrees: bool = False,
 ) -> Columns:
     """Time, both angles, both rates if they are there, and what there is of `outputs` (names of measured outputs).
@@ -44,8 +45,8 @@ def columns(
     degrees per second if `degrees`. Raises UserError naming file, row (`line`) and column.
     """
     wanted = ("time", *MOTORS, *outputs)
-    found: Dict[str, int] = {}
-    chosen: Dict[str, str] = {}
+    found: dict[str, int] = {}
+    chosen: dict[str, str] = {}
     ignored = []
     for index, text in enumerate(header):
         name, unit = _column(text)
@@ -75,7 +76,7 @@ def shown(header: Sequence[str]) -> str:
     return ", ".join(text or "(blank)" for text in header[:SHOWN]) + (", ..." if len(header) > SHOWN else "")
 
 
-def _column(text: str) -> Tuple[str, str]:
+def _column(text: str) -> tuple[str, str]:
     """The name in QUANTITIES that the header `text` stands for, and the unit in it; or "" twice."""
     match = COLUMN.match(text)
     if not match:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Iterator
 
 from prw.errors import UserError
 
@@ -38,3 +38,9 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write `text` as UTF-8 with line feeds, all or nothing. Raises UserError when the place cannot be written."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(text.encode("utf-8"))

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Optional
 
 import numpy as np
+from numpy.typing import NDArray
 
-#: Frequency and length of the excitation behind Fig. 4 (Sec. 4).
+from prw.errors import UserError
+
+Array = NDArray[np.float64]
+
+#: Frequency (rad/s) and length (s) of the excitation behind Fig. 4 (Sec. 4).
 FIG4_FREQUENCY = 10 * np.pi
 FIG4_DURATION = 2.0
 
@@ -16,16 +20,34 @@ FIG4_DURATION = 2.0
 class Motion:
     """Motor motion at the communication points.
 
-    name: what files and titles are called after. time: (n,) s, strictly increasing. theta: (n, 2) rad, motor angles
-    theta1, theta2. omega: (n, 2) rad/s, their rates at the same instants, or None where only angles are known.
+    time: (n,) s, strictly increasing. theta: (n, 2) rad, motor angles theta1, theta2. omega: (n, 2) rad/s, their
+    rates at the same instants, or None where only angles are known. name: what files and titles are called after.
     notes: lines the user should read.
+
+    Raises UserError where the shapes do not fit or time does not increase.
     """
 
-    name: str
-    time: np.ndarray
-    theta: np.ndarray
-    omega: Optional[np.ndarray] = None
-    notes: list = field(default_factory=list)
+    time: Array
+    theta: Array
+    omega: Array | None = None
+    name: str = "motion"
+    notes: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        for name in ("time", "theta", "omega"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, _numbers(name, value))
+        count = len(self.time) if self.time.ndim == 1 else 0
+        if count < 2:
+            raise UserError(f"motion: time has the shape {self.time.shape}; it must be (n,), with at least two times")
+        for name, value in (("theta", self.theta), ("omega", self.omega)):
+            if value is not None and value.shape != (count, 2):
+                raise UserError(
+                    f"motion: {name} has the shape {value.shape}; it must be ({count}, 2), a column each motor"
+                )
+        if not (np.diff(self.time) > 0).all():
+            raise UserError("motion: time must increase from sample to sample")
 
 
 def fig4(step: float = 1e-3, opposite: bool = True) -> Motion:
@@ -35,9 +57,16 @@ def fig4(step: float = 1e-3, opposite: bool = True) -> Motion:
     The angles are the integrals from zero, (1 - cos(10 pi t)) / (10 pi). Angle and rate are both the true values at the
     communication point: the torque there is then the true one, and the path in between is second-order accurate.
     """
-    time = np.arange(round(FIG4_DURATION / step) + 1) * step
+    time: Array = np.arange(round(FIG4_DURATION / step) + 1, dtype=np.float64) * step
     # 1 - cos as 2 sin^2, which does not cancel near t = 0
     theta1 = 2 * np.sin(FIG4_FREQUENCY * time / 2) ** 2 / FIG4_FREQUENCY
     omega1 = np.sin(FIG4_FREQUENCY * time)
     sides = np.array([1, -1 if opposite else 1])
-    return Motion("fig4" if opposite else "fig4_equal", time, np.outer(theta1, sides), np.outer(omega1, sides))
+    return Motion(time, np.outer(theta1, sides), np.outer(omega1, sides), "fig4" if opposite else "fig4_equal")
+
+
+def _numbers(name: str, value: object) -> Array:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise UserError(f"motion: {name} is not made of numbers ({error})") from None

@@ -12,7 +12,7 @@ import matplotlib
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter
 from PIL import Image
 
-from prw.errors import UserError
+from prw.extras import need
 
 PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -69,10 +69,9 @@ def write_page(path: Path, pictures: Iterable[Image.Image], rate: int) -> None:
 
 def movie_writer(rate: int) -> AbstractMovieWriter:
     """What writes an MP4 of `rate` pictures a second. Raises UserError where a package is missing."""
-    try:
-        import imageio_ffmpeg
-    except ImportError:
-        raise UserError("MP4 needs the package imageio-ffmpeg; add it with `pip install imageio-ffmpeg`") from None
+    need("movie", "imageio_ffmpeg")
+    import imageio_ffmpeg
+
     matplotlib.rcParams["animation.ffmpeg_path"] = imageio_ffmpeg.get_ffmpeg_exe()
     # Players want even sides and this order of colours.
     extra = ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-crf", "20"]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Dict
 
 import numpy as np
 
 from prw.files import replacing
-from prw.motion import Motion
+from prw.motion import Array, Motion
 from prw.progress import Progress
 from prw.testbed import OUTPUTS
 
@@ -20,20 +20,29 @@ def write_motion(path: Path, motion: Motion) -> None:
     write_table(path, motion, {}, ())
 
 
-def write_table(path: Path, motion: Motion, response: Dict[str, np.ndarray], outputs=OUTPUTS) -> None:
+def inputs_of(motion: Motion) -> dict[str, Array]:
+    """Time (s), motor angles (rad) and rates (rad/s), where known, (n,) by the names of the columns."""
+    inputs = {"time": motion.time, "theta1": motion.theta[:, 0], "theta2": motion.theta[:, 1]}
+    if motion.omega is not None:
+        inputs.update(omega1=motion.omega[:, 0], omega2=motion.omega[:, 1])
+    return inputs
+
+
+def write_table(path: Path, motion: Motion, response: Mapping[str, Array], outputs: Sequence[str] = OUTPUTS) -> None:
     """Write time (s), the inputs given (rad, rad/s) and the outputs (N.m, rad, rad/s) to `path`, one row per sample.
 
     Time and inputs keep all their digits, so that they can be read back unchanged; outputs have twelve.
     """
-    inputs = {"time": motion.time, "theta1": motion.theta[:, 0], "theta2": motion.theta[:, 1]}
-    if motion.omega is not None:
-        inputs.update(omega1=motion.omega[:, 0], omega2=motion.omega[:, 1])
+    inputs = inputs_of(motion)
     # + 0.0 turns -0.0, which reads oddly, into 0.0
     table = np.column_stack([*inputs.values(), *(response[name] for name in outputs)]) + 0.0
     row_format = ",".join(["%r"] * len(inputs) + ["%.12g"] * len(outputs)) + "\n"
-    with replacing(path) as temporary, Progress(f"writing {path}", len(table)) as progress:
-        with open(temporary, "w", encoding="ascii", newline="") as file:
-            file.write(",".join([*inputs, *outputs]) + "\n")
-            for start in range(0, len(table), BLOCK):
-                file.writelines(row_format % tuple(row) for row in table[start : start + BLOCK].tolist())
-                progress(start)
+    with (
+        replacing(path) as temporary,
+        Progress(f"writing {path}", len(table)) as progress,
+        open(temporary, "w", encoding="ascii", newline="") as file,
+    ):
+        file.write(",".join([*inputs, *outputs]) + "\n")
+        for start in range(0, len(table), BLOCK):
+            file.writelines(row_format % tuple(row) for row in table[start : start + BLOCK].tolist())
+            progress(start)

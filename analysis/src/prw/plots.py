@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import io
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Dict, Sequence, Tuple
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from prw.files import replacing
-from prw.motion import Motion
+from prw.motion import Array, Motion
 
 BLUE, VERMILION = "#0072B2", "#D55E00"
 #: Of pitch and roll where the sides have the other two.
@@ -34,7 +34,14 @@ STYLE: Any = {
     "svg.hashsalt": "prw",
 }
 #: The same for figures a column wide.
-PAGE_STYLE = {**STYLE, "font.size": 9, "axes.titlesize": 9, "axes.labelsize": 9, "xtick.labelsize": 8, "ytick.labelsize": 8}
+PAGE_STYLE: Any = {
+    **STYLE,
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 9,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+}
 #: Time intervals a long curve is reduced to, each drawn by its extremes; more than the figure has pixels.
 INTERVALS = 4000
 #: A panel whose curves all stay below this shows zero, not rounding errors blown up to its full height.
@@ -47,59 +54,73 @@ class Panel:
 
     title: str
     label: str
-    curves: Sequence[Tuple[str, np.ndarray]]
+    curves: Sequence[tuple[str, Array]]
+
+
+class ShownFigure(Figure):
+    """A figure that notebooks show, with or without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        file = io.BytesIO()
+        self.savefig(file, format="png", dpi=100)
+        return file.getvalue()
 
 
 def motion_panel(motion: Motion, angles: bool) -> Panel:
-    """What the motors do: their angles in degrees, or their velocities as in Fig. 4."""
-    if angles:
+    """What the motors do: their angles in degrees, or their velocities as in Fig. 4 where the motion has them."""
+    if angles or motion.omega is None:
         label, (y1, y2) = "θ₁, θ₂  (deg)", np.rad2deg(motion.theta.T)
         return Panel("Motor angles", label, [("motor 1", y1), ("motor 2", y2)])
     label, (y1, y2) = "θ₁′, θ₂′  (rad/s)", motion.omega.T
     return Panel("Motor velocities", label, [("motor 1", y1), ("motor 2", y2)])
 
 
-def response_panels(response: Dict[str, np.ndarray], angles: bool) -> list:
-    """What the wrist does: pitch and roll (with `angles` in degrees as well as their rates), and the sensor torques."""
-    panels = []
+def response_panels(response: Mapping[str, Array], angles: bool) -> list[Panel]:
+    """What the wrist does: pitch and roll (with `angles` in degrees as well as their rates), and the sensor torques,
+    as far as `response` has them."""
+    known = [
+        Panel(
+            "Pitch and roll rates", "θ₇′, θ₈′  (rad/s)", _both(response, "pitch_rate", "roll_rate", ("pitch", "roll"))
+        ),
+        Panel("Sensor torques", "τ₁, τ₂  (N m)", _both(response, "tau1", "tau2", ("sensor 1", "sensor 2"))),
+    ]
     if angles:
-        pitch, roll = np.rad2deg(response["pitch"]), np.rad2deg(response["roll"])
-        label = "θ₇, θ₈  (deg)"
-        panels.append(Panel("Pitch and roll angles", label, [("pitch", pitch), ("roll", roll)]))
-    label = "θ₇′, θ₈′  (rad/s)"
-    rates = [("pitch", response["pitch_rate"]), ("roll", response["roll_rate"])]
-    panels.append(Panel("Pitch and roll rates", label, rates))
-    torques = [("sensor 1", response["tau1"]), ("sensor 2", response["tau2"])]
-    panels.append(Panel("Sensor torques", "τ₁, τ₂  (N m)", torques))
-    return panels
+        curves = [(entry, np.rad2deg(y)) for entry, y in _both(response, "pitch", "roll", ("pitch", "roll"))]
+        known.insert(0, Panel("Pitch and roll angles", "θ₇, θ₈  (deg)", curves))
+    return [panel for panel in known if panel.curves]
 
 
-def plot_response(path: Path, title: str, motion: Motion, response: Dict[str, np.ndarray], angles: bool) -> None:
-    """Draw motor motion, pitch and roll, and torques over time into the PNG `path`.
+def _both(response: Mapping[str, Array], one: str, other: str, entries: tuple[str, str]) -> list[tuple[str, Array]]:
+    if one not in response or other not in response:
+        return []
+    return [(entries[0], response[one]), (entries[1], response[other])]
+
+
+def draw_response(title: str, motion: Motion, response: Mapping[str, Array], angles: bool) -> Figure:
+    """Motor motion, pitch and roll, and torques over time.
 
     `angles`: show motor and output angles, as for a recording; otherwise motor velocities, as in Fig. 4.
     """
     panels = [motion_panel(motion, angles), *response_panels(response, angles)]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(8, 0.8 + 2.1 * len(panels)), layout="constrained")
+        figure = ShownFigure(figsize=(8, 0.8 + 2.1 * len(panels)), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
-        axes = figure.subplots(len(panels), sharex=True)
+        axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
         for axis, panel in zip(axes, panels):
             draw_panel(axis, motion.time, panel)
         figure.align_ylabels(axes)
         axes[-1].set_xlabel("time (s)")
         axes[-1].set_xlim(motion.time[0], motion.time[-1])
-        with replacing(path) as temporary:
-            figure.savefig(temporary, dpi=150)
+    return figure
 
 
-def draw_panel(axis: Axes, time: np.ndarray, panel: Panel) -> None:
+def draw_panel(axis: Axes, time: Array, panel: Panel) -> None:
     """Draw the panel's two curves over time (n,) in s, with a legend at the right end of the title's line."""
     axis.set_title(panel.title)
     axis.set_ylabel(panel.label)
     # The second curve is dashed, so that two equal curves still show as two; a dense one is translucent instead.
     dense = len(time) > 2 * INTERVALS
-    second = {"alpha": 0.6} if dense else {"dashes": (4, 2)}
+    second: dict[str, Any] = {"alpha": 0.6} if dense else {"dashes": (4, 2)}
     for (name, y), colour, style in zip(panel.curves, (BLUE, VERMILION), ({}, second)):
         axis.plot(*envelope(time, y), color=colour, label=name, **style)
     axis.legend(loc="lower right", bbox_to_anchor=(1, 0.97), ncols=2, borderaxespad=0)
@@ -108,12 +129,12 @@ def draw_panel(axis: Axes, time: np.ndarray, panel: Panel) -> None:
         axis.set_ylim(-1, 1)
 
 
-def envelope(time: np.ndarray, y: np.ndarray, intervals: int = INTERVALS) -> Tuple[np.ndarray, np.ndarray]:
+def envelope(time: Array, y: Array, intervals: int = INTERVALS) -> tuple[Array, Array]:
     """The curve y (n,) over time (n,) in at most 2 * intervals points that draw the same: each interval's extremes."""
     if len(time) <= 2 * intervals:
         return time, y
     starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], intervals, endpoint=False)))
-    keep = set()
+    keep: set[int] = set()
     for start, stop in zip(starts, [*starts[1:], len(time)]):
         keep.update((start + int(y[start:stop].argmin()), start + int(y[start:stop].argmax())))
     kept = sorted(keep)

@@ -1,4 +1,4 @@
-"""Progress of long work, on stderr."""
+"""Progress of long work, on stderr, for those who run a command."""
 
 from __future__ import annotations
 
@@ -10,8 +10,17 @@ TERMINAL_PERIOD = 0.2
 LOG_PERIOD = 10.0
 
 
+_wanted = False
+
+
+def show() -> None:
+    """From now on, progress is shown in this process. Commands call this; a library is quiet."""
+    global _wanted
+    _wanted = True
+
+
 class Progress:
-    """Says how far a piece of work has come, once it has taken longer than two seconds.
+    """Says how far a piece of work has come, once it has taken longer than two seconds, if that is wanted.
 
     On a terminal one line is rewritten, and wiped on leaving the context; in a log a line is added every ten seconds.
     """
@@ -29,7 +38,7 @@ class Progress:
     def __call__(self, done: int) -> None:
         """Report that `done` units are done; cheap enough for every thousand rows."""
         now = time.monotonic()
-        if now < self._next:
+        if not _wanted or now < self._next:
             return
         self._next = now + (TERMINAL_PERIOD if self._terminal else LOG_PERIOD)
         self._shown = True

@@ -1,4 +1,4 @@
-"""Reading a recorded motor motion from a CSV file. Every complaint names the file, the line and the column."""
+"""Reading a recorded experiment from a CSV file. Every complaint names the file, the line and the column."""
 
 from __future__ import annotations
 
@@ -7,14 +7,18 @@ import math
 import os
 import re
 from array import array
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Callable, Container, Mapping
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
+from prw.channels import MEASURED, QUANTITIES
 from prw.columns import ANGLES, RATES, Columns, columns
 from prw.errors import UserError
-from prw.motion import Motion
+from prw.motion import Array, Motion
+from prw.output import inputs_of
 from prw.progress import Progress
 
 DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab"}
@@ -35,27 +39,100 @@ JUMP = 0.9 * np.pi
 REPORT_ROWS = 4096
 
 
-def read(path: Path, degrees: bool = False) -> Motion:
-    """Read columns time (s), theta1, theta2 (rad) and, where present, omega1, omega2 (rad/s) as a Motion.
+class Table(NamedTuple):
+    """columns: which were taken. time: (n,) s. values: (n, len(columns.taken) - 1), in SI."""
 
-    The file is UTF-8 text with a header line, perhaps below comments after `#`; columns in any order, others ignored;
-    separated by commas, semicolons or tabs (with semicolons, a decimal comma is understood). A unit in the header
-    (`theta1 [deg]`) counts; without, `degrees` means deg and deg/s. Time may be uneven but must increase. Raises
-    UserError naming file, line and column.
+    columns: Columns
+    time: Array
+    values: Array
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recorded experiment, in SI. recording["tau1"]: (n,), and so for time, motors and whatever was measured.
+
+    motion: what the motors did, (n,) times. measured: (n,) by name, of `prw.channels.MEASURED`; NaN where a cell is
+    empty. units: the unit in the file, by column. source: the file.
     """
 
-    def choose(path, header, line) -> Columns:
-        return columns(path, header, line, degrees=degrees)
+    source: Path
+    motion: Motion
+    measured: Mapping[str, Array]
+    units: Mapping[str, str]
 
-    found, time, values = read_columns(path, choose)
-    theta, omega = values[:, :2], values[:, 2:] if RATES[0] in found.units else None
+    @property
+    def name(self) -> str:
+        """The file's name, without what follows the dot."""
+        return self.motion.name
+
+    @property
+    def time(self) -> Array:
+        """(n,) s."""
+        return self.motion.time
+
+    @property
+    def theta(self) -> Array:
+        """(n, 2) rad: theta1, theta2."""
+        return self.motion.theta
+
+    @property
+    def omega(self) -> Array | None:
+        """(n, 2) rad/s: omega1, omega2; None if they were not recorded."""
+        return self.motion.omega
+
+    @property
+    def notes(self) -> list[str]:
+        """Lines the user should read, on what looks like a slip."""
+        return self.motion.notes
+
+    def __getitem__(self, column: str) -> Array:
+        columns = {**inputs_of(self.motion), **self.measured}
+        if column not in columns:
+            raise KeyError(f"{column}: was not recorded; there are {', '.join(columns)}")
+        return columns[column]
+
+    def __repr__(self) -> str:
+        span = f"{self.time[0]:g} to {self.time[-1]:g} s"
+        return f"<Recording {self.name}: {', '.join(self.units)}; {len(self.time)} times, {span}>"
+
+
+def read(path: str | os.PathLike[str], units: Mapping[str, str] | None = None, degrees: bool = False) -> Recording:
+    """Read a recorded experiment: time (s), theta1, theta2 (rad) and, where present, omega1, omega2 (rad/s) and any
+    of tau1, tau2 (N.m), theta3, theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s).
+
+    The file is UTF-8 text with a header line, perhaps below comments after `#`; columns in any order, others ignored;
+    separated by commas, semicolons or tabs (with semicolons, a decimal comma is understood). A column's unit is in
+    its header (`pitch [deg]`) or in `units` by name; without either it is SI, or degrees and degrees per second if
+    `degrees`. Time may be uneven but must increase. A measured column may have empty cells. Raises UserError naming
+    file, row and column.
+    """
+    return _read(Path(path), units, degrees, tuple(MEASURED))
+
+
+def read_motion(path: str | os.PathLike[str], units: Mapping[str, str] | None = None, degrees: bool = False) -> Motion:
+    """The motors' motion alone, as `read` reads it: what was measured is ignored, and may be anything."""
+    return _read(Path(path), units, degrees, ()).motion
+
+
+def _read(path: Path, units: Mapping[str, str] | None, degrees: bool, measured: tuple[str, ...]) -> Recording:
+    for name in units or {}:
+        if name not in QUANTITIES:
+            raise UserError(f"units: {name} is not known; there are {', '.join(QUANTITIES)}")
+
+    def choose(path: Path, header: Sequence[str], line: int) -> Columns:
+        return columns(path, header, line, measured, units, degrees)
+
+    found, time, values = read_columns(path, choose, may_be_empty=measured)
+    table = dict(zip((name for name, _ in found.taken[1:]), values.T))
+    theta = np.column_stack([table.pop(name) for name in ANGLES])
+    omega = np.column_stack([table.pop(name) for name in RATES]) if RATES[0] in table else None
     with np.errstate(all="ignore"):  # angles near the largest number are the FMU's to refuse
         notes = found.notes + doubts(time, theta, omega, found.units)
-    return Motion(Path(path).stem, time, np.ascontiguousarray(theta), omega, notes)
+    return Recording(path, Motion(time, theta, omega, path.stem, notes), table, found.units)
 
 
-def read_columns(path: Path, choose: Callable, may_be_empty: Container[str] = ()) -> tuple:
-    """Read numbers from a CSV file like `read` does: (Columns, time (n,) in s, values (n, len(taken) - 1) in SI).
+def read_columns(path: Path, choose: Callable[..., Columns], may_be_empty: Container[str] = ()) -> Table:
+    """Read numbers from a CSV file like `read` does.
 
     choose(path, header, line) returns the Columns to take. An empty cell in a column of `may_be_empty` becomes NaN.
     Raises UserError naming file, line and column.
@@ -71,7 +148,7 @@ def read_columns(path: Path, choose: Callable, may_be_empty: Container[str] = ()
         raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
 
 
-def _parse(path: Path, file: IO[str], choose: Callable, may_be_empty: Container[str]) -> tuple:
+def _parse(path: Path, file: IO[str], choose: Callable[..., Columns], may_be_empty: Container[str]) -> Table:
     begin, first = _top(file)
     if not first:
         raise UserError(
@@ -93,10 +170,10 @@ def _parse(path: Path, file: IO[str], choose: Callable, may_be_empty: Container[
         raise UserError(f"{_where(path, table.line_num)}: {rows}; at least two are needed")
     factors = found.factors()
     scale = np.array([factors[name] for name, _ in found.taken])
-    return found, time * scale[0], values * scale[1:]
+    return Table(found, time * scale[0], values * scale[1:])
 
 
-def _top(file: IO[str]) -> tuple:
+def _top(file: IO[str]) -> tuple[int, str]:
     """How many lines stand above the header, blank or comments after `#`, and the header, "" if there is none. numpy
     writes a `#` before the header as well: it is the last comment then, with numbers right below."""
     count, comment, line = 0, "", file.readline()
@@ -108,8 +185,14 @@ def _top(file: IO[str]) -> tuple:
 
 
 def _rows(
-    path: Path, table, width: int, columns, decimal_comma: bool, size: int, may_be_empty: Container[str]
-) -> tuple:
+    path: Path,
+    table: Any,
+    width: int,
+    columns: Sequence[tuple[str, int]],
+    decimal_comma: bool,
+    size: int,
+    may_be_empty: Container[str],
+) -> tuple[Array, Array]:
     """All rows below the header as time (n,) and values (n, len(columns) - 1), checked cell by cell."""
     cells, previous, bytes_read = array("d"), -math.inf, 0
     with Progress(f"reading {path}", size) as progress:
@@ -148,7 +231,7 @@ def _rows(
     return values[:, 0].copy(), values[:, 1:].copy()
 
 
-def doubts(time: np.ndarray, theta: np.ndarray, omega, units: Mapping[str, str]) -> list:
+def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, str]) -> list[str]:
     """Notes on values that are legal and yet look like a slip. units: of the columns in the file."""
     notes = []
     if len(time) > 1 and (step := (time[-1] - time[0]) / (len(time) - 1)) > SLOW_SAMPLING:
@@ -180,7 +263,7 @@ def doubts(time: np.ndarray, theta: np.ndarray, omega, units: Mapping[str, str])
     return notes
 
 
-def _mismatch(time: np.ndarray, theta: np.ndarray, omega: np.ndarray, side: int) -> str:
+def _mismatch(time: Array, theta: Array, omega: Array, side: int) -> str:
     """A note when the integral of the rate omega (n,) is not the angle theta (n,), else nothing."""
     turned = theta - theta.mean()
     if np.ptp(theta) < SMALL_MOVE:

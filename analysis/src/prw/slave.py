@@ -2,39 +2,40 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any, Union
+from typing import Any
 
-import fmpy
 import numpy as np
-from fmpy.simulation import instantiate_fmu
 
 from prw.errors import UserError
-
-Value = Union[float, int, bool]
+from prw.extras import need
+from prw.motion import Array
+from prw.testbed import Value, existing_fmu
 
 
 class Slave:
     """An instance of a Co-Simulation FMU of FMI 2.0, initialized at time 0. A context manager: leaving it frees it.
 
-        with Slave(Path("target/fmu/prw_testbed.fmu"), {"use_omega": True}) as testbed:
+        with Slave(start={"use_omega": True}) as testbed:
             testbed.set({"theta1": 0.1})
             testbed.step(1e-3)
             pitch, roll = testbed.get("pitch", "roll")
 
-    Raises UserError where the FMU is missing or has no such variable; FMPy raises where the FMU refuses a call.
+    Raises UserError where the FMU or FMPy is missing or there is no such variable; FMPy raises where the FMU refuses a call.
     """
 
-    def __init__(self, path: Path, start: Mapping[str, Value] = {}):
-        """Unpack and load the FMU file, with start values by name in the FMU's units."""
-        if not path.is_file():
-            raise UserError(f"{path}: no such FMU; `make closed-loop-fmus` builds it")
-        description: Any = fmpy.read_model_description(str(path))
-        self.path, self.time = path, 0.0
+    def __init__(self, fmu: str | os.PathLike[str] | None = None, start: Mapping[str, Value] = {}):
+        """Unpack and load the FMU file (default: the testbed's), with start values by name in the FMU's units."""
+        need("linearize", "fmpy")
+        import fmpy
+        from fmpy.simulation import instantiate_fmu
+
+        self.path, self.time = existing_fmu(fmu), 0.0
+        description: Any = fmpy.read_model_description(str(self.path))
         self.variables = {variable.name: variable for variable in description.modelVariables}
-        self._folder = fmpy.extract(str(path))
+        self._folder = fmpy.extract(str(self.path))
         self.fmu: Any = instantiate_fmu(self._folder, description, fmi_type="CoSimulation")
         try:
             self.fmu.setupExperiment(startTime=0.0)
@@ -64,7 +65,7 @@ class Slave:
             reference = self.reference(name)
             setters[self.variables[name].type]([reference], [value])
 
-    def get(self, *names: str) -> np.ndarray:
+    def get(self, *names: str) -> Array:
         """The values of Real variables, in the order of the names."""
         return np.array(self.fmu.getReal([self.reference(name) for name in names]))
 

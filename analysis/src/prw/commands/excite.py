@@ -1,0 +1,127 @@
+"""`prw excite`: motor motions to identify parameters with, ranked by what they tell."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prw.commands.assignments import FORMATTER, add_task_options, listed, number, numbers, said_of_options
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+from prw.extras import need
+from prw.files import write_text
+from prw.identification.excitation import excite
+from prw.output import write_motion
+
+DESCRIPTION = """\
+Proposes motor motions within the motors' limits and ranks them by what they tell about the parameters: the standard
+errors to be expected from measuring the given channels once, with unknown sensor offsets. Kinds: multisines (slow,
+wide, and one whose spectrum is optimal for the parameters), chirps; with equal, opposite, single and independent
+motors. Each motion becomes a CSV file for `prw simulate --input` or for your motor controller (s, rad, rad/s).
+"""
+
+EXAMPLES = """\
+examples:
+  prw excite                                        all channels, a 10 s experiment at 1 kHz
+  prw excite --measure tau1,tau2                    what torque sensors alone can tell
+  prw excite --angle 20 --speed 120 --acceleration 3000 --duration 30      your motors, in deg, deg/s, deg/s2
+  prw excite --estimate J2,J3,H3                    motions for the inertias
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add `excite` to prw's subcommands."""
+    parser = subparsers.add_parser(
+        "excite",
+        help="propose motor motions to identify parameters with",
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+        formatter_class=FORMATTER,
+    )
+    parser.add_argument(
+        "--measure", default="all", metavar="NAMES", help="channels that will be measured (default: all)"
+    )
+    parser.add_argument(
+        "--angle", type=float, default=40.0, metavar="DEG", help="motor limit, deg (default: %(default)g)"
+    )
+    parser.add_argument(
+        "--speed", type=float, default=450.0, metavar="DEG/S", help="motor limit, deg/s (default: %(default)g)"
+    )
+    parser.add_argument(
+        "--acceleration",
+        type=float,
+        default=20000.0,
+        metavar="DEG/S2",
+        help="motor limit, deg/s2 (default: %(default)g)",
+    )
+    parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="of a motion (default: %(default)g)")
+    parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="of sampling (default: %(default)g)")
+    add_task_options(parser)
+    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=DEFAULT_OUT / "excite",
+        metavar="DIR",
+        help="where the motions and ranking.json go (default: %(default)s)",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Carry out `prw excite`. Raises UserError with one line on what is wrong."""
+    need("identify", "scipy", "threadpoolctl")
+    angle, speed, acceleration, duration, rate = (
+        number(str(getattr(arguments, name)), f"--{name}")
+        for name in ("angle", "speed", "acceleration", "duration", "rate")
+    )
+    with said_of_options(
+        measure="measure", duration="duration", rate="rate", noise="noise", estimate="estimate", fixed="set"
+    ):
+        ranking = excite(
+            None if arguments.measure == "all" else listed(arguments.measure),
+            angle=np.deg2rad(angle),
+            speed=np.deg2rad(speed),
+            acceleration=np.deg2rad(acceleration),
+            duration=duration,
+            rate=rate,
+            estimate=listed(arguments.estimate),
+            fixed=numbers(arguments.set, "--set"),
+            noise=numbers(arguments.noise, "--noise"),
+            fmu=arguments.fmu,
+        )
+    for entry in ranking:
+        write_motion(arguments.out / f"{entry.name}.csv", entry.motion)
+    best = ranking[0]
+    content = {
+        "measured": dict(best.noise),
+        "duration": duration,
+        "rate": rate,
+        "motions": [
+            {
+                "file": f"{entry.name}.csv",
+                "typical_error": entry.typical_error if np.isfinite(entry.typical_error) else None,
+                "expected_errors": {name: min(error, 1e6) for name, error in entry.expected_errors.items()},
+                "undetermined": entry.undetermined,
+            }
+            for entry in ranking
+        ],
+    }
+    write_text(arguments.out / "ranking.json", json.dumps(content, indent=2, allow_nan=False) + "\n")
+    measured = ", ".join(best.noise)
+    print(f"expected standard errors of one experiment of {duration:g} s at {rate:g} Hz, measuring {measured}")
+    print(f"  {'motion':<28}{'typical':>9}" + "".join(f"{name:>9}" for name in best.expected_errors))
+    for entry in ranking:
+        errors = (entry.typical_error, *entry.expected_errors.values())
+        print(f"  {entry.name:<28}" + "".join(f"{_percent(error):>9}" for error in errors))
+    for combination in best.undetermined:
+        print(f"note        even the best: {combination}")
+    print(f"wrote       {len(ranking)} motions and ranking.json into {arguments.out}")
+    print(f"next        look at the best: prw simulate --input {arguments.out / best.name}.csv")
+
+
+def _percent(value: float) -> str:
+    return f"{value:.3%}" if value < 0.1 else f"{value:.1%}" if value < 10 else "none"

@@ -1,0 +1,149 @@
+"""`prw identify`: the parameters of the testbed from measurements, by least squares on the FMU."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+from typing import Any
+
+from prw.channels import factor
+from prw.commands.assignments import (
+    FORMATTER,
+    add_task_options,
+    bounds,
+    listed,
+    number,
+    numbers,
+    pairs,
+    said_of_options,
+    spreads,
+)
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+from prw.errors import UserError
+from prw.extras import need
+from prw.identification import identify
+
+DESCRIPTION = """\
+Estimates parameters of the testbed from measurements: those with which the FMU, driven by the measured motor angles,
+comes closest to what was measured. Sensor offsets and the state at the first row are unknown and estimated along.
+
+Each FILE is one experiment, a CSV table with the columns
+  time, theta1, theta2        and, if logged, the motors' rates omega1, omega2
+  tau1 tau2 theta3 theta4 pitch roll pitch_rate roll_rate      any of these; cells may be empty
+Units stand in the header, as in `pitch [deg]` or `tau1_mNm`, or in --units; otherwise SI: s, rad, rad/s, N.m. Rows may
+be uneven; lines above the header that start with # are comments.
+"""
+
+EXAMPLES = """\
+examples:
+  prw identify run1.csv run2.csv                     k1, k2, c1, c2, c3 from two experiments together
+  prw identify run.csv --units pitch=deg,roll=deg    where the header has no units
+  prw identify run.csv --prior J3=10% --prior H3=10% inertias too, known to 10 % (one sigma)
+  prw identify run.csv --estimate k1,k2 --set c3=0.3 two of them, c3 held at another value
+then:
+  cargo run --release --bin build_fmu -- --parameters out/identified/identified.json --out mine
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add `identify` to prw's subcommands."""
+    parser = subparsers.add_parser(
+        "identify",
+        help="estimate parameters from measurements",
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+        formatter_class=FORMATTER,
+    )
+    parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="CSV table of one experiment")
+    add_task_options(parser)
+    parser.add_argument(
+        "--prior",
+        action="append",
+        default=[],
+        metavar="NAME=[VALUE:]PERCENT%",
+        help="what is known of a parameter beforehand, one sigma; VALUE in SI (default: its start value). It is then "
+        "estimated along. May be repeated",
+    )
+    parser.add_argument(
+        "--bounds",
+        action="append",
+        default=[],
+        metavar="NAME=LOW:HIGH",
+        help="range of a parameter in SI (default: a factor of 100 about its start value). May be repeated",
+    )
+    parser.add_argument("--units", default="", metavar="NAME=UNIT,...", help="units of columns whose header has none")
+    parser.add_argument("--degrees", action="store_true", help="columns without a unit are in deg and deg/s, not SI")
+    parser.add_argument(
+        "--quantum",
+        metavar="ANGLE",
+        help="resolution of the motors' encoders, as in 0.036deg or 0.000628rad (default: found in the data)",
+    )
+    parser.add_argument("--no-offsets", action="store_true", help="the sensors have no offsets")
+    parser.add_argument(
+        "--starts", type=int, default=6, metavar="N", help="places to start the search from (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the random places to start from (default: %(default)s)")
+    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=DEFAULT_OUT / "identified",
+        metavar="DIR",
+        help="where report.html, report.json, identified.json and identified.ssv go (default: %(default)s)",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Carry out `prw identify`. Raises UserError with one line on what is wrong."""
+    need("identify", "scipy", "jinja2", "threadpoolctl")
+    with said_of_options(
+        estimate="estimate", fixed="set", priors="prior", noise="noise", units="units", starts="starts"
+    ):
+        found = identify(
+            arguments.files,
+            estimate=listed(arguments.estimate),
+            priors=spreads(arguments.prior, "--prior"),
+            fixed=numbers(arguments.set, "--set"),
+            bounds=bounds(arguments.bounds),
+            noise=numbers(arguments.noise, "--noise"),
+            units=pairs([arguments.units], "--units"),
+            degrees=arguments.degrees,
+            quantum=_quantum(arguments.quantum),
+            offsets=not arguments.no_offsets,
+            starts=arguments.starts,
+            seed=arguments.seed,
+            fmu=arguments.fmu,
+        )
+    report, numbers_, parameters, ssv = (
+        arguments.out / name for name in ("report.html", "report.json", "identified.json", "identified.ssv")
+    )
+    found.report(report)
+    found.to_json(numbers_)
+    print(found.summary())
+    # The parameters only if the data determine them, and never beside another fit's report.
+    if found.undetermined:
+        parameters.unlink(missing_ok=True)
+        ssv.unlink(missing_ok=True)
+        print(f"wrote       {report}, {numbers_}")
+        raise UserError(
+            f"{'; '.join(found.undetermined)}. What would settle it: {'; or '.join(found.advice)}. {report} has the rest; "
+            "identified.json was not written"
+        )
+    found.to_parameters(parameters)
+    found.to_ssv(ssv)
+    print(f"wrote       {report}, {numbers_}, {parameters}, {ssv}")
+    print(
+        "next        look at the report; then: cargo run --release --bin build_fmu -- "
+        f"--parameters {parameters} --out mine"
+    )
+
+
+def _quantum(text: str | None) -> float:
+    if text is None:
+        return 0.0
+    match = re.fullmatch(r"\s*([-+.\deE]+)\s*([^\d\s].*)?", text)
+    if not match:
+        raise UserError(f"--quantum {text}: write an angle like 0.036deg")
+    return number(match.group(1), "--quantum") * factor("theta1", match.group(2) or "rad")

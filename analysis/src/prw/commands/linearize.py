@@ -1,0 +1,68 @@
+"""`prw linearize`: A, B, C, D of an FMU."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from prw.commands.assignments import pairs
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+from prw.errors import UserError
+from prw.files import replacing
+from prw.linearization import linearize
+from prw.state_space import StateSpace
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add `linearize` to prw's subcommands."""
+    parser = subparsers.add_parser(
+        "linearize",
+        help="the linear model of an FMU",
+        description="Writes A, B, C, D of the testbed's FMU, or of any other with directional derivatives (FMI 2.0 or 3.0), "
+        "with the names and units of states, inputs and outputs, and prints the poles.",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="start value in the FMU's unit (default: the FMU's). May be repeated",
+    )
+    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the FMU (default: %(default)s)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=DEFAULT_OUT / "linear.json",
+        metavar="FILE",
+        help="where to write (default: %(default)s)",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Carry out `prw linearize`. Raises UserError with one line on what is wrong."""
+    model = linearize(
+        arguments.fmu, {name: _number(name, text) for name, text in pairs(arguments.set, "--set").items()}
+    )
+    with replacing(arguments.out) as temporary:
+        temporary.write_text(json.dumps(content(model), indent=2) + "\n", encoding="utf-8")
+    for kind in ("states", "inputs", "outputs"):
+        print(f"{kind:<11} {', '.join(getattr(model, kind)) or 'none'}")
+    print(f"poles       {', '.join(f'{pole:.6g}' for pole in model.poles()) or 'none'} (1/s)")
+    print(f"wrote       {arguments.out}")
+
+
+def content(model: StateSpace) -> dict[str, Any]:
+    """What is written, by name."""
+    matrices = {name: getattr(model, name).tolist() for name in "ABCD"}
+    names = {kind: list(getattr(model, kind)) for kind in ("states", "inputs", "outputs")}
+    return {**matrices, **names, "units": dict(model.units)}
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise UserError(f"--set {name}={text}: {text!r} is not a number") from None

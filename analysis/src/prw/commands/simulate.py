@@ -1,0 +1,130 @@
+"""`prw simulate`: the paper's experiment, or the response to a recorded motor motion."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+from prw.errors import UserError
+from prw.extras import need
+from prw.files import replacing
+from prw.motion import fig4
+from prw.recording import read_motion
+from prw.simulation import Run, simulate
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add `simulate` to prw's subcommands."""
+    parser = subparsers.add_parser(
+        "simulate",
+        help="simulate the paper's experiment or a recording",
+        description="Simulate the paper's experiment (Fig. 4) or, with --input, the response to recorded motor angles. "
+        "Writes a CSV table (time, inputs, all outputs; rad, rad/s, N.m) and a PNG figure.",
+    )
+    parser.add_argument(
+        "--input",
+        type=Path,
+        metavar="FILE",
+        help="CSV recording with columns time (s), theta1, theta2 (rad) and, if known, omega1, omega2 (rad/s)",
+    )
+    parser.add_argument("--degrees", action="store_true", help="the recording is in degrees and degrees per second")
+    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
+    parser.add_argument(
+        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--animate",
+        type=Path,
+        metavar="FILE",
+        help="also show the wrist moving: a .gif, an .mp4 (needs the extra prw[movie]) or an .html",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Carry out `prw simulate`. Raises UserError with one line on what is wrong."""
+    need("plot", "matplotlib")
+    recorded = arguments.input is not None
+    if recorded:
+        motion = read_motion(arguments.input, degrees=arguments.degrees)
+        title = f"Response to {arguments.input.name}"
+    else:
+        if arguments.degrees:
+            raise UserError("--degrees belongs to --input; the paper's experiment is in radians")
+        motion, title = fig4(), "Fig. 4: equal and opposite motor velocities"
+    table, picture = (arguments.out / f"{motion.name}{suffix}" for suffix in (".csv", ".png"))
+    if recorded and table.exists() and table.samefile(arguments.input):
+        raise UserError(
+            f"{table}: is the recording itself and would be overwritten; choose another directory with --out"
+        )
+    response = simulate(motion, fmu=arguments.fmu)
+    response.to_csv(table)
+    write_png(picture, response.plot(title, angles=recorded))
+    written = [table, picture]
+    if arguments.animate is not None:
+        from prw.animation import animate  # matplotlib takes a while to load
+
+        animate(response, arguments.animate)
+        written.append(arguments.animate)
+    print("\n".join(_summary(arguments, response, written)))
+
+
+def write_png(path: Path, figure: Figure) -> None:
+    """Write the figure to `path`, whole or not at all."""
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=150)
+
+
+def _summary(arguments: argparse.Namespace, response: Run, written: Sequence[Path]) -> list[str]:
+    """What was done, the key figures, and what to do next; one line each."""
+    motion = response.motion
+    time, steps = motion.time, np.diff(motion.time)
+    even = np.ptp(steps) < 1e-6 * steps.mean() + 4 * np.spacing(np.abs(time).max())
+    spacing = (
+        f"steps of {steps.mean() * 1e3:.4g} ms"
+        if even
+        else (f"steps from {steps.min() * 1e3:.4g} to {steps.max() * 1e3:.4g} ms")
+    )
+    source = "the paper's experiment (Sec. 4, Fig. 4)" if arguments.input is None else str(arguments.input)
+    rates = "rates from omega1, omega2" if motion.omega is not None else "rates from the angles"
+    lines = [f"simulated   {source}: {time[-1] - time[0]:.4g} s in {spacing}, {rates}"]
+
+    def peak(*names: str) -> float:
+        return max(float(np.abs(response[name]).max()) for name in names)
+
+    lines.append(
+        f"peaks       pitch rate {_tidy(peak('pitch_rate'))} rad/s, roll rate {_tidy(peak('roll_rate'))} rad/s, "
+        f"torque {_tidy(peak('tau1', 'tau2'))} N.m"
+    )
+    if arguments.input is None:
+        lines.append("            opposite motors turn the wrist about its roll axis only, as the paper says")
+    else:
+        lines.append(f"at the end  pitch {_degrees(response['pitch'][-1])}, roll {_degrees(response['roll'][-1])}")
+    lines += [f"note        {note}" for note in motion.notes]
+    lines.append(f"wrote       {', '.join(map(str, written))}")
+    if arguments.input is None:
+        lines.append(
+            "next        look at the figure; then your own motors: make demo INPUT=examples/point_to_point.csv"
+        )
+    else:
+        lines.append(
+            "next        look at the figure; the FMU also loads in Simulink, OpenModelica and others, see README.md"
+        )
+    return lines
+
+
+def _tidy(value: float) -> str:
+    # Below 1e-12 it is zero but for rounding.
+    return "0" if value < 1e-12 else f"{value:.3g}"
+
+
+def _degrees(angle: float) -> str:
+    return f"{np.rad2deg(angle):.2f} deg"

@@ -1,0 +1,302 @@
+"""An experiment as the fit sees it: spectra of the motors' paths and of what was measured, and of the errors in both.
+
+What is compared are discrete Fourier transforms of the whole recording, up to the frequency at which the motors' motion
+drowns in the noise of their samples. Transforms are unitary: white noise of variance v has the power v at every
+frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.ndimage import convolve1d
+from scipy.sparse import csr_matrix
+
+from prw.channels import MEASURED
+from prw.errors import UserError
+from prw.identification.path import Path, quantum_of, rough_noise, smooth
+from prw.motion import Array, Motion
+from prw.recording import Recording
+from prw.state_space import Complex
+
+#: The fit looks up to the highest frequency at which a motor's motion is this many times stronger than the noise of its
+#: samples (power, averaged over neighbouring frequencies), and this much further.
+CLEARLY_MOVING, MARGIN = 10.0, 1.15
+NEIGHBOURS = 9
+#: Less power than this share of the strongest is none.
+ROUNDING = 1e-10
+#: Draws of encoders' errors, and how many frequencies further a line of theirs still counts.
+DRAWS, FURTHEST = 64, 100
+#: Times are even if none is off by more than this fraction of a step.
+EVEN = 1e-3
+#: The fewest frequencies that are compared, and the fewest values that say something of a channel's noise.
+FEWEST, FEWEST_VALUES = 8, 20
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """name: of the experiment. time: (n,) s, even. theta, omega: (n, 2) rad, rad/s, of the motors at `time`. channels:
+    what was measured. sampled: (s,) s, when. values: (s, c) in SI with NaN for nothing, or None where the experiment is
+    only planned. samplers: for each channel a matrix (s, n) from `time` to `sampled`, or None where both are the same
+    and no value is missing. bins: number of frequencies that are compared, from 0. motor_errors: (d, bins, 2) rad, spectra of
+    d draws of the errors of the motors' samples. channel_errors: (d, bins, c), of what encoders' steps add to the
+    channels. paths: of the two motors, or None where they are known exactly. notes: lines for the user."""
+
+    name: str
+    time: Array
+    theta: Array
+    omega: Array
+    channels: tuple[str, ...]
+    sampled: Array
+    values: Array | None
+    samplers: tuple[csr_matrix, ...] | None
+    bins: int
+    motor_errors: Complex
+    channel_errors: Complex
+    paths: tuple[Path, Path] | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def step(self) -> float:
+        """Time between two points of `time`, s."""
+        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+
+    @property
+    def all_bins(self) -> int:
+        """Number of frequencies in all."""
+        return len(self.time) // 2 + 1
+
+    @property
+    def needed_bins(self) -> int:
+        """Number of frequencies at which the model is needed: where values are missing, all of them mix."""
+        return self.bins if self.samplers is None else self.all_bins
+
+    @property
+    def band(self) -> float:
+        """The highest frequency that is compared, Hz."""
+        return (self.bins - 1) / (len(self.time) * self.step)
+
+    @cached_property
+    def motors(self) -> Complex:
+        """Spectra of the motors' angles and rates (all_bins, 4)."""
+        return spectra(np.hstack([self.theta, self.omega]))
+
+    @cached_property
+    def measured(self) -> Complex:
+        """Spectra of what was measured (bins, c)."""
+        assert self.values is not None
+        if self.samplers is None:
+            return spectra(self.values)[: self.bins]
+        known = np.nan_to_num(self.values)
+        courses = np.column_stack([s.T @ column for s, column in zip(self.samplers, known.T)])
+        return spectra(courses)[: self.bins]
+
+    @cached_property
+    def shares(self) -> Array:
+        """Squares of the samplers' numbers per point of `time`, (c,): the share of points that have a value."""
+        if self.samplers is None:
+            return np.ones(len(self.channels))
+        return np.array([s.power(2).sum() / len(self.time) for s in self.samplers])
+
+    @cached_property
+    def motor_power(self) -> Array:
+        """Power (bins, 2) rad2 of the errors of the motors' samples."""
+        return _power(self.motor_errors)
+
+    @cached_property
+    def channel_power(self) -> Array:
+        """Power (bins, c) of what encoders' steps add to the channels."""
+        return _power(self.channel_errors)
+
+    def seen(self, modelled: Complex) -> Complex:
+        """Spectra (bins, c, ...) like `measured` of spectra (needed_bins, c, ...) that a model has."""
+        if self.samplers is None:
+            return modelled
+        courses = np.fft.irfft(modelled, len(self.time), axis=0, norm="ortho")
+        flat = courses.reshape(len(self.time), len(self.channels), -1)
+        for i, sampler in enumerate(self.samplers):
+            flat[:, i] = sampler.T @ (sampler @ flat[:, i])
+        return spectra(flat.reshape(courses.shape))[: self.bins]
+
+    def courses(self, modelled: Complex) -> Array:
+        """The channels (s, c) at `sampled` of spectra (all_bins, c)."""
+        found = np.fft.irfft(modelled, len(self.time), axis=0, norm="ortho")
+        if self.samplers is None:
+            return found
+        everywhere = _interpolation(self.time, self.sampled) if len(self.sampled) != len(self.time) else None
+        return found if everywhere is None else everywhere @ found
+
+
+def spectra(courses: Array) -> Complex:
+    """The unitary Fourier transform over the first axis, frequencies from 0."""
+    return np.fft.rfft(courses, axis=0, norm="ortho")
+
+
+def prepare(recording: Recording, quantum: float = 0.0) -> Experiment:
+    """Find the motors' paths in `recording`, and how far their samples and the other encoders err.
+
+    quantum: of the motor angles in rad, where it is known to be coarser than it looks. Raises UserError where nothing
+    was measured, or too little of something."""
+    sampled, omega, channels = recording.time, recording.omega, tuple(recording.measured)
+    values, notes = _measured(recording)
+    paths = [smooth(sampled, recording.theta[:, i], None if omega is None else omega[:, i], quantum) for i in (0, 1)]
+    spacing = (sampled[-1] - sampled[0]) / (len(sampled) - 1)
+    even = np.abs(sampled - (sampled[0] + spacing * np.arange(len(sampled)))).max() < EVEN * spacing
+    if even:
+        time = sampled[0] + spacing * np.arange(len(sampled))
+    else:
+        spacing = float(np.median(np.diff(sampled)))
+        time = sampled[0] + spacing * np.arange(max(int((sampled[-1] - sampled[0]) / spacing + 1e-9) + 1, 5))
+    inside = np.clip(time, sampled[0], sampled[-1])
+    theta = np.column_stack([path.angle(inside) for path in paths])
+    errors = [_drawn(path, inside, sampled) for path in paths]
+    bins = max(_clear(t, e, path.rate_noise, spacing) for t, e, path in zip(theta.T, errors, paths))
+    bins = min(max(bins, FEWEST), len(time) // 2 + 1)
+    channel_errors = np.zeros((DRAWS, bins, len(channels)), dtype=np.complex128)
+    for i, column in enumerate(values.T):
+        there = np.isfinite(column)
+        if _stepped(column[there]):
+            channel = smooth(sampled[there], column[there])
+            channel_errors[:, :, i] = spectra(_drawn(channel, inside, sampled[there]).T)[:bins].T
+    return Experiment(
+        recording.name,
+        time,
+        theta,
+        np.column_stack([path.angle.derivative()(inside) for path in paths]),
+        channels,
+        sampled,
+        values,
+        None if even and np.isfinite(values).all() else _samplers(time, sampled, values, even),
+        bins,
+        np.stack([_with_rates(e, path.rate_noise, spacing)[:, :bins] for e, path in zip(errors, paths)], axis=2),
+        channel_errors,
+        (paths[0], paths[1]),
+        notes,
+    )
+
+
+def _measured(recording: Recording) -> tuple[Array, tuple[str, ...]]:
+    """What was measured (s, c), and what should be said of it."""
+    if not recording.measured:
+        raise UserError(
+            f"{recording.source}: nothing measured; at least one column of {', '.join(MEASURED)} is needed, "
+            f"the file has {', '.join(recording.units)}"
+        )
+    # Rates are found by smoothing here, so the advice that a simulation gives on them is no news.
+    notes = [note for note in recording.notes if "at rest" not in note and not note.startswith("no omega")]
+    for name, column in recording.measured.items():
+        count = int(np.isfinite(column).sum())
+        if count < FEWEST_VALUES:
+            raise UserError(
+                f"{recording.source}, column {name}: {count} values; at least {FEWEST_VALUES} are needed to fit anything"
+            )
+        if np.nanmax(column) == np.nanmin(column):
+            notes.append(f"{name} never changes; is its sensor connected?")
+    return np.column_stack(list(recording.measured.values())), tuple(notes)
+
+
+def planned(motion: Motion, channels: Sequence[str]) -> Experiment:
+    """An experiment that is yet to be made: the motors' motion is known, evenly sampled, and the channels have no
+    values."""
+    assert motion.omega is not None
+    step = float(motion.time[-1] - motion.time[0]) / (len(motion.time) - 1)
+    exact = np.full((1, len(motion.time)), 0.0)
+    bins = max(FEWEST, *(_clear(theta, exact, None, step) for theta in motion.theta.T))
+    bins = min(bins, len(motion.time) // 2 + 1)
+    return Experiment(
+        motion.name,
+        motion.time,
+        motion.theta,
+        motion.omega,
+        tuple(channels),
+        motion.time,
+        None,
+        None,
+        bins,
+        np.zeros((1, bins, 2), dtype=np.complex128),
+        np.zeros((1, bins, len(channels)), dtype=np.complex128),
+    )
+
+
+def _drawn(path: Path, time: Array, sampled: Array) -> Array:
+    """Errors like those of the samples, (DRAWS, n), at the times (n,)."""
+    random = np.random.default_rng(0)
+    return np.array([np.interp(time, sampled, path.errors(random)) for _ in range(DRAWS)])
+
+
+def _power(errors: Complex) -> Array:
+    """Mean power (bins, ...) of the spectra (d, bins, ...) of draws."""
+    mean: Array = np.mean(np.abs(errors) ** 2, axis=0)
+    # In a periodic motion errors are lines. What a line leaks to its neighbours is the same error once more, however
+    # little it is: they count as having what a line between two frequencies leaks.
+    leaked = 1 / (np.pi * np.arange(1, FURTHEST + 1)) ** 2
+    power: Array = np.maximum(mean, convolve1d(mean, [*leaked[::-1], 0.0, *leaked], axis=0, mode="constant"))
+    return power
+
+
+def _with_rates(errors: Array, rate_noise: float | None, step: float) -> Complex:
+    """Spectra (d, f) of draws (d, n) of an angle's errors, if its rate was logged, too, with this noise."""
+    found = spectra(errors.T).T
+    if rate_noise is None:
+        return found
+    w = 2 * np.pi * np.arange(found.shape[1]) / (errors.shape[1] * step)
+    power = np.mean(np.abs(found) ** 2, axis=0)
+    together: Complex = found / np.sqrt(1 + power * (w / max(rate_noise, 1e-150)) ** 2)
+    return together
+
+
+def _clear(theta: Array, errors: Array, rate_noise: float | None, step: float) -> int:
+    """Number of frequencies, from 0, up to the highest at which the angle (n,) moves clearly more than its errors, drawn
+    (draws, n)."""
+    n = len(theta)
+    window = np.hanning(n - 1)
+
+    def power(course: Array) -> Array:
+        increments = np.diff(course) / step
+        found = np.abs(np.fft.rfft((increments - increments.mean()) * window)) ** 2 / (window @ window)
+        return np.convolve(found, np.ones(NEIGHBOURS) / NEIGHBOURS, mode="same")
+
+    # In a periodic motion an encoder's errors are lines at multiples of its frequency, which differ much from draw to
+    # draw. The strongest counts; by half, which for white noise is less than its mean.
+    drawn = [power(course) for course in errors]
+    noise = np.maximum(np.mean(drawn, axis=0), np.max(drawn, axis=0) / 2)
+    if rate_noise is not None:
+        noise = 1 / (1 / np.maximum(noise, 1e-300) + 1 / max(rate_noise, 1e-150) ** 2)
+    moving = power(theta)
+    noise = np.maximum(noise, ROUNDING * moving.max())
+    clear = np.flatnonzero(moving[1:] > CLEARLY_MOVING * noise[1:])
+    return int(np.ceil(MARGIN * (clear[-1] + 1))) + 1 if len(clear) and moving.max() > 0 else 0
+
+
+def _stepped(values: Array) -> bool:
+    """Whether values (n,) have steps that no other noise blurs."""
+    quantum = quantum_of(values)
+    return quantum > 0 and rough_noise(values) < quantum
+
+
+def _samplers(time: Array, sampled: Array, values: Array, even: bool) -> tuple[csr_matrix, ...]:
+    """For each channel what takes a course at `time` (n,) to `sampled` (s,), with empty rows where it has no value."""
+    everything = csr_matrix(np.eye(1)) if even else _interpolation(time, sampled)
+    found = []
+    for column in values.T:
+        there = np.isfinite(column).astype(float)
+        keep = csr_matrix((there, (np.arange(len(there)), np.arange(len(there)))))
+        found.append(keep if even else (keep @ everything).tocsr())
+    return tuple(found)
+
+
+def _interpolation(points: Array, time: Array) -> csr_matrix:
+    """Cubic interpolation from even points (n,) to times (s,): a matrix (s, n) with four numbers a row."""
+    step = points[1] - points[0]
+    first = np.clip(np.floor((time - points[0]) / step).astype(int) - 1, 0, len(points) - 4)
+    x = (time - points[0]) / step - first
+    weights = np.empty((len(time), 4))
+    for i in range(4):
+        others = [j for j in range(4) if j != i]
+        weights[:, i] = np.prod([(x - j) / (i - j) for j in others], axis=0)
+    columns = first[:, None] + np.arange(4)
+    rows = np.repeat(np.arange(len(time)), 4)
+    return csr_matrix((weights.ravel(), (rows, columns.ravel())), shape=(len(time), len(points)))

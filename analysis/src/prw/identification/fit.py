@@ -1,0 +1,426 @@
+"""Least squares: the parameters with which the FMU comes closest to what was measured.
+
+Parameters are sought as logarithms, which keeps them positive and makes their errors relative. Sensor offsets and the
+initial state of each experiment enter linearly; they are eliminated in every evaluation by projection (variable
+projection in the form of Kaufman, BIT 15 (1975) 49), so that the search is over the parameters alone.
+
+Encoders err, and what they say of the motors goes through the model: at every frequency the difference of measured and
+modelled spectra has the covariance of the channels' noise plus G P G^H, with the model's transfer G and the power P of
+the encoders' errors. It is weighted with the inverse of that, which depends on the parameters, too; leaving P out would
+bias the dampers (errors in variables; Soderstrom, Automatica 43 (2007) 939, Sec. 8; Pintelon and Schoukens, 2nd ed.,
+Sec. 9.11). The noise of each channel is what its residuals have beyond that, or given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+
+from prw.errors import UserError
+from prw.identification.experiment import Experiment
+from prw.identification.model import Matrices, Model, stacked
+from prw.identification.response import Discrete, Response, discrete
+from prw.motion import Array
+from prw.progress import Progress
+from prw.state_space import Complex
+
+#: Step of the logarithms for the central differences: errors of 1e-8 in the sensitivities.
+DIFFERENCE = 1e-4
+#: Directions of the initial state that the data see this much less than others are left alone.
+UNSEEN = 1e-9
+#: Rounds of fitting and judging the noise, and the change at which they end; and of the latter alone.
+ROUNDS, SETTLED = 12, 0.003
+NOISE_ROUNDS = 30
+#: A channel cannot be more exact than this fraction of its range: doubles and CSV digits end somewhere.
+FINEST = 1e-9
+#: A search starts at least this far inside its bounds.
+INSIDE = 1e-6
+#: When a search ends.
+FINE, COARSE = {"ftol": 1e-12, "xtol": 1e-9, "max_nfev": 100}, {"ftol": 1e-5, "xtol": 1e-4, "max_nfev": 25}
+#: Two minima are the same if no parameter differs by more than this fraction.
+SAME = 0.01
+#: Another minimum is reported if it is no more than this worse, in terms of -2 log likelihood.
+RIVAL = 9.0
+
+
+class Prior(NamedTuple):
+    """What is known beforehand: the parameter is `value` (SI) give or take the fraction `relative` (one sigma)."""
+
+    value: float
+    relative: float
+
+
+@dataclass(frozen=True)
+class Task:
+    """What to estimate. names: of the parameters. start: all parameters in SI by name. bounds: (least, greatest) by
+    name, SI. priors: by name. noise: given standard deviations by channel, SI. offsets: whether each channel has an
+    unknown one."""
+
+    names: tuple[str, ...]
+    start: Mapping[str, float]
+    bounds: Mapping[str, tuple[float, float]]
+    priors: Mapping[str, Prior]
+    noise: Mapping[str, float]
+    offsets: bool = True
+
+    def values(self, logarithms: Array) -> dict[str, float]:
+        """All parameters in SI, with the estimated ones at these logarithms."""
+        return {**self.start, **dict(zip(self.names, np.exp(logarithms).tolist()))}
+
+    def first(self) -> Array:
+        """Logarithms (p,) of the start values of `names`."""
+        return np.log([self.start[name] for name in self.names])
+
+    def span(self) -> tuple[Array, Array]:
+        """The bounds of the logarithms of `names`: least (p,) and greatest (p,)."""
+        low, high = np.log([self.bounds[name] for name in self.names]).T
+        return low, high
+
+    def prior_information(self) -> Array:
+        """What the priors know about the logarithms of `names`: (p, p)."""
+        return np.diag([1 / self.priors[n].relative ** 2 if n in self.priors else 0.0 for n in self.names])
+
+
+class Comparison:
+    """An experiment beside the model at one set of parameters, at given noise.
+
+    residual: (2, bins, c), real and imaginary parts of the difference of measured and modelled spectra, uncorrelated
+    and of variance 1, offsets and initial state taken out. offsets: (c,) SI. initial: (6,), x[0] - x[n]."""
+
+    def __init__(self, experiment: Experiment, response: Response, noise: Array, offsets: bool):
+        """noise: (c,) standard deviations, SI. offsets: whether the channels have any."""
+        self.experiment, self.response = experiment, response
+        bins, channels = experiment.bins, len(experiment.channels)
+        share = experiment.shares
+        self._scaled = self.response.transfer[:bins] * share[:, None]
+        self._noise = noise**2 * share
+        stepped = experiment.channel_power * share**2 + self._noise
+        covariance = self._through(self._scaled)
+        covariance[:, np.arange(channels), np.arange(channels)] += stepped
+        self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+        columns = [experiment.seen(self.response.transients)]
+        if offsets:
+            steady = np.zeros((experiment.needed_bins, channels, channels), dtype=complex)
+            steady[0] = np.sqrt(len(experiment.time)) * np.eye(channels)
+            columns.insert(0, experiment.seen(steady))
+        nuisance = np.concatenate(columns, axis=2)
+        difference = np.zeros((bins, channels), dtype=complex)
+        if experiment.values is not None:
+            difference = experiment.measured - experiment.seen(response.outputs)
+        white = self._parts(self._whiten @ np.concatenate([nuisance, difference[:, :, None]], axis=2))
+        flat = white.reshape(-1, white.shape[-1])
+        left, sizes, right = np.linalg.svd(flat[:, :-1], full_matrices=False)
+        seen = sizes > UNSEEN * sizes[0]
+        self._basis = left[:, seen]
+        found = (right[seen].T / sizes[seen]) @ (self._basis.T @ flat[:, -1])
+        self.residual = self.project(white[..., -1])
+        self.offsets, self.initial = found[:-6] if offsets else np.zeros(channels), found[-6:]
+        self._rest = difference - nuisance @ found
+
+    def project(self, table: Array) -> Array:
+        """Parts (2, bins, c, ...) with what offsets and initial state could explain taken out."""
+        flat = table.reshape(len(self._basis), -1)
+        return (flat - self._basis @ (self._basis.T @ flat)).reshape(table.shape)
+
+    def slopes(self, change: Discrete) -> tuple[Array, Array]:
+        """Derivatives (2, bins, c, p) of `residual`, and the part (p, p) of their squares that is noise.
+
+        change: the model's derivatives by the parameters. What encoders' errors add to the squares is no information:
+        with equal motors, say, the difference of two encoders' steps seems to roll the wrist a little, and J3 would
+        look determined."""
+        outputs, transfer = self.response.slopes(change, self.initial)
+        bins, whiten = self.experiment.bins, self._whiten
+        outputs = np.moveaxis(self.experiment.seen(np.moveaxis(outputs, 0, -1)), -1, 0)
+        moved = whiten @ self._through(transfer[:, :bins] * self.experiment.shares[:, None], self._scaled)
+        moved = moved @ whiten.conj().swapaxes(-1, -2)
+        # Of the inverse of a Cholesky factor: the lower half of the covariance's change, seen through it.
+        lower = np.tril(moved + moved.conj().swapaxes(-1, -2))
+        diagonal = np.arange(lower.shape[-1])
+        lower[..., diagonal, diagonal] /= 2
+        white = -whiten @ outputs[..., None] - lower @ (whiten @ self._rest[:, :, None])
+        table = self.project(self._parts(np.moveaxis(white[..., 0], 0, -1)))
+        # E |d residual|^2, where d residual = -(whitened dG) n_u - lower r, with errors n_u of the encoders.
+        errors = np.sqrt(self.experiment.motor_power)[:, None, :]
+        direct = whiten @ (transfer[:, :bins] * self.experiment.shares[:, None] * errors)
+        rows = [t.reshape(len(t), -1) for t in (direct, lower, moved)]
+        a, s, b = (np.hstack([t.real, t.imag]) for t in rows)
+        return table, 2 * (a @ a.T + s @ s.T - b @ s.T - s @ b.T)
+
+    def _through(self, first: Complex, second: Complex | None = None) -> Complex:
+        """What encoders' errors do to the channels: first P second^H, (..., bins, c, c)."""
+        second = first if second is None else second
+        product: Complex = (first * self.experiment.motor_power[:, None, :]) @ second.conj().swapaxes(-1, -2)
+        return product
+
+    def _parts(self, table: Complex) -> Array:
+        """Real and imaginary parts (2, bins, ...), each of variance 1, of spectra (bins, ...) of variance 1."""
+        found: Array = np.sqrt(2) * np.stack([table.real, table.imag])
+        found[:, 0] /= np.sqrt(2)
+        if self.experiment.bins == self.experiment.all_bins and len(self.experiment.time) % 2 == 0:
+            found[:, -1] /= np.sqrt(2)
+        return found
+
+    def score_variance(self, jacobian: Array) -> Array:
+        """Variance (p, p) of the score J'r, with the encoders' errors as they were drawn: in a periodic motion they have
+        its phase and repeat with it. jacobian: (2, bins, c, p)."""
+        e = self.experiment
+        drawn = e.channel_errors * e.shares - (self._scaled @ e.motor_errors[..., None])[..., 0]
+        white = self._parts(np.moveaxis((self._whiten @ drawn[..., None])[..., 0], 0, -1))
+        scores = np.einsum("rfcp,rfcd->dp", jacobian, white, optimize=True)
+        seen = self._whiten * np.sqrt(self._noise)
+        of_noise = np.einsum("fcj,rfcp->rfjp", seen.conj(), jacobian, optimize=True).reshape(-1, jacobian.shape[-1])
+        variance: Array = scores.T @ scores / len(drawn) + (of_noise.conj().T @ of_noise).real
+        return variance
+
+    def noise_ratios(self) -> Array:
+        """Sums (2, c) over frequencies, of which the ratio is 1 where each channel's noise explains its residuals, and
+        above where there should be more of it: the score of the likelihood by its variance."""
+        inverse = self._whiten.conj().swapaxes(-1, -2) @ self._whiten
+        weighted = (inverse @ self._rest[:, :, None])[..., 0]
+        expected = np.einsum("fcc->c", inverse).real
+        sums: Array = self.experiment.shares * np.array([np.sum(np.abs(weighted) ** 2, axis=0), expected])
+        return sums
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What was found. logarithms: (p,) of the parameters. noise: by channel, SI. comparisons: one for each experiment.
+    jacobians: for each experiment (2, bins, c, p), derivatives of the residuals. noise_information: (p, p), see
+    Comparison.slopes. modelled: for each experiment (s, c), the channels as the FMU has them, offsets included, SI.
+    misfit: sum of squares of residuals and priors. rivals: other minima that fit as well, as (logarithms, misfit).
+    tried: places that were searched from. evaluations: sets of parameters that were compared. fitter: what found it,
+    ready to compare at other parameters."""
+
+    task: Task
+    logarithms: Array
+    noise: dict[str, float]
+    comparisons: list[Comparison]
+    jacobians: list[Array]
+    noise_information: Array
+    modelled: list[Array]
+    misfit: float
+    rivals: list[tuple[Array, float]]
+    tried: int
+    evaluations: int
+    fitter: Fitter
+
+    @property
+    def values(self) -> dict[str, float]:
+        """All parameters in SI."""
+        return self.task.values(self.logarithms)
+
+
+class Fitter:
+    """The experiments and the FMU, ready to be compared at any parameters and noise."""
+
+    def __init__(self, model: Model, experiments: Sequence[Experiment], task: Task, noise: Mapping[str, float] = {}):
+        """noise: of all channels, by name, SI; default: a twentieth of their motion."""
+        self.model, self.experiments, self.task = model, experiments, task
+        self.channels = tuple(dict.fromkeys(name for e in experiments for name in e.channels))
+        columns = {name: self._columns(name) for name in self.channels}
+        self._spread = {n: max([1e-12, *(float(np.nanstd(v)) for v, _ in c)]) for n, c in columns.items()}
+        self._stepped = {n: max([0.0, *(float(e.mean()) for _, e in c)]) for n, c in columns.items()}
+        self.noise = dict(noise) or {n: task.noise.get(n) or 0.05 * self._spread[n] for n in self.channels}
+        self.evaluations = 0
+        self._responses: tuple[bytes, list[Response]] = b"", []
+        self._comparisons: tuple[tuple[object, ...], list[Comparison]] = (), []
+
+    def _model(self, logarithms: Array, experiment: Experiment) -> Discrete:
+        """The FMU's linear model over the experiment's steps."""
+        one = discrete(self._matrices(logarithms[None]), experiment.step, experiment.channels)
+        return Discrete(*(block[0] for block in one))
+
+    def compare(self, logarithms: Array) -> list[Comparison]:
+        """Every experiment beside the FMU at one set of parameters."""
+        at = logarithms.tobytes()
+        if self._responses[0] != at:
+            self.evaluations += 1
+            self._responses = at, [Response(self._model(logarithms, e), e, e.needed_bins) for e in self.experiments]
+        key = (at, *self.noise.items())
+        if self._comparisons[0] != key:
+            self._comparisons = (
+                key,
+                [
+                    Comparison(e, response, np.array([self.noise[n] for n in e.channels]), self.task.offsets)
+                    for e, response in zip(self.experiments, self._responses[1])
+                ],
+            )
+        return self._comparisons[1]
+
+    def jacobians(self, logarithms: Array) -> tuple[list[Array], Array]:
+        """For each experiment the derivatives (2, bins, c, p) of the residuals by the logarithms; and the part (p, p)
+        of all their squares that is noise."""
+        steps = DIFFERENCE * np.eye(len(logarithms))
+        around = self._matrices(np.vstack([logarithms + steps, logarithms - steps]))
+        self.evaluations += 2 * len(logarithms)
+        tables, noise = [], np.zeros_like(steps)
+        for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
+            table, feigned = comparison.slopes(
+                discrete(around, experiment.step, experiment.channels).slopes(DIFFERENCE)
+            )
+            tables.append(table)
+            noise += feigned
+        return tables, noise
+
+    def modelled(self, logarithms: Array) -> list[Array]:
+        """For each experiment the channels (s, c) as the FMU has them, offsets included, SI."""
+        found = []
+        for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
+            whole = Response(self._model(logarithms, experiment), experiment, experiment.all_bins)
+            found.append(experiment.courses(whole.outputs + whole.transients @ comparison.initial) + comparison.offsets)
+        return found
+
+    def residuals(self, logarithms: Array) -> Array:
+        """All residuals in one row (r,), and how far the parameters are off their priors."""
+        centre, strength = self._priors()
+        weighted = (comparison.residual.ravel() for comparison in self.compare(logarithms))
+        return np.concatenate([*weighted, strength * (centre - logarithms)])
+
+    def slopes(self, logarithms: Array) -> Array:
+        """Derivatives (r, p) of residuals() by the logarithms."""
+        rows = [table.reshape(-1, len(logarithms)) for table in self.jacobians(logarithms)[0]]
+        return np.vstack([*rows, -np.diag(self._priors()[1])])
+
+    def search(self, start: Array, tolerances: Mapping[str, float] = FINE, held: int | None = None) -> OptimizeResult:
+        """scipy's trust-region least squares from `start` (p,) at the present noise. held: a parameter that stays
+        where `start` has it. tolerances: scipy's, for when to end."""
+        free = np.arange(len(start)) != (-1 if held is None else held)
+        low, high = (bound[free] for bound in self.task.span())
+
+        def at(moved: Array) -> Array:
+            point = start.copy()
+            point[free] = moved
+            return point
+
+        found = least_squares(
+            lambda moved: self.residuals(at(moved)),
+            np.clip(start[free], low + INSIDE, high - INSIDE),
+            lambda moved: self.slopes(at(moved))[:, free],
+            bounds=(low, high),
+            method="trf",
+            gtol=1e-12,
+            **tolerances,
+        )
+        found.x = at(found.x)
+        return found
+
+    def settle(self, point: Array) -> Array:
+        """Fit and judge the noise by turns, until the noise settles."""
+        for _ in range(ROUNDS):
+            point, before = self.search(point).x, self.noise
+            for _ in range(NOISE_ROUNDS):
+                last, self.noise = self.noise, self._judged_noise(point)
+                if self._alike(self.noise, last):
+                    break
+            if self._alike(self.noise, before):
+                break
+        return point
+
+    def _judged_noise(self, point: Array) -> dict[str, float]:
+        """Each channel's noise over all experiments, by its residuals at the present noise, where none is given."""
+        sums, freedom = dict.fromkeys(self.channels, np.zeros(2)), dict.fromkeys(self.channels, 0.0)
+        for experiment, comparison in zip(self.experiments, self.compare(point)):
+            taken = 1 + int(self.task.offsets) + 6 / len(experiment.channels)
+            for name, ratio in zip(experiment.channels, comparison.noise_ratios().T):
+                sums[name] = sums[name] + ratio
+                freedom[name] += 2 * experiment.bins - taken
+        each, judged = len(self.task.names) / len(self.channels), {}
+        for name, (found, expected) in sums.items():
+            left = max(freedom[name] - each, 1.0) / max(freedom[name], 1.0)
+            noise = self.noise[name] * float(np.sqrt(found / (expected * left)))
+            judged[name] = self.task.noise.get(name) or max(noise, FINEST * self._spread[name])
+        return judged
+
+    def _alike(self, noise: Mapping[str, float], other: Mapping[str, float]) -> bool:
+        """Whether two judgements of the noise differ by next to nothing, encoders' steps included."""
+        return all(
+            abs(np.sqrt((noise[n] ** 2 + e) / (other[n] ** 2 + e)) - 1) < SETTLED for n, e in self._stepped.items()
+        )
+
+    def _matrices(self, points: Array) -> Matrices:
+        return stacked([self.model.at(self.task.values(point)) for point in points])
+
+    def _priors(self) -> tuple[Array, Array]:
+        """Logarithms (p,) of the priors' values, and 1/sigma (p,), 0 where there is none."""
+        priors = [self.task.priors.get(name) for name in self.task.names]
+        return (
+            np.array([np.log(prior.value) if prior else 0.0 for prior in priors]),
+            np.array([1 / prior.relative if prior else 0.0 for prior in priors]),
+        )
+
+    def _columns(self, name: str) -> list[tuple[Array, Array]]:
+        """Values (s,) and errors' power (bins,) of the channel in every experiment that has it."""
+        with_it = [(e, e.channels.index(name)) for e in self.experiments if name in e.channels and e.values is not None]
+        return [(e.values[:, i], e.channel_power[:, i]) for e, i in with_it if e.values is not None]
+
+
+def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int = 6, seed: int = 0) -> Solution:
+    """Estimate, from `task.start` and `starts` - 1 other places, of which the best counts.
+
+    Where several minima fit alike, the one nearest to task.start counts and the others are reported. Raises UserError
+    where a parameter is out of its bounds or the FMU refuses something.
+    """
+    for name in task.names:
+        low, high = task.bounds[name]
+        if not low < task.start[name] < high:
+            raise UserError(f"{name} starts at {task.start[name]:.6g}, outside of its bounds {low:.6g} to {high:.6g}")
+    fitter, first = Fitter(model, experiments, task), task.first()
+    point = fitter.settle(fitter.search(first, COARSE).x)
+
+    # Other minima, at the noise that the first one has.
+    minima = [(point, 2 * fitter.search(point).cost)]
+    others = _other_starts(task, point, starts - 1, seed)
+    with Progress("looking for other minima", len(others)) as progress:
+        for done, start in enumerate(others):
+            progress(done)
+            found = fitter.search(start, COARSE)
+            better = 2 * found.cost < min(misfit for _, misfit in minima) + max(RIVAL, 0.05 * len(found.fun))
+            if not better or any(np.abs(found.x - x).max() < SAME for x, _ in minima):
+                continue
+            found = fitter.search(found.x)
+            if not any(np.abs(found.x - x).max() < SAME for x, _ in minima):
+                minima.append((found.x, 2 * found.cost))
+    best = min(misfit for _, misfit in minima)
+    alike = [minimum for minimum in minima if minimum[1] < best + RIVAL]
+    alike.sort(key=lambda minimum: float(np.sum((minimum[0] - first) ** 2)))
+    if alike[0][0] is not point:
+        point = fitter.settle(alike[0][0])
+    misfit = 2 * fitter.search(point).cost
+    rivals = [(x, chi) for x, chi in alike[1:] if np.abs(x - point).max() > SAME]
+    return Solution(
+        task,
+        point,
+        fitter.noise,
+        fitter.compare(point),
+        *fitter.jacobians(point),
+        fitter.modelled(point),
+        misfit,
+        rivals,
+        len(others) + 1,
+        fitter.evaluations,
+        fitter,
+    )
+
+
+def _other_starts(task: Task, point: Array, count: int, seed: int) -> list[Array]:
+    """Starting points to look for other minima: within a factor of 3 of task.start, and the exchanged couplings.
+
+    Torque, pitch and roll see the two couplings of a side in series, which is the same when they change places; only
+    theta3 and theta4, between them, can tell. So the mirror image is tried first.
+    """
+    starts = []
+    place = {name: i for i, name in enumerate(task.names)}
+    if {"k1", "k2", "c1", "c2"} <= set(place) and count > 0:
+        mirrored = point.copy()
+        for a, b in (("k1", "k2"), ("c1", "c2")):
+            mirrored[[place[a], place[b]]] = point[[place[b], place[a]]]
+        starts.append(mirrored)
+    random = np.random.default_rng(seed)
+    (low, high), first = task.span(), task.first()
+    while len(starts) < count:
+        starts.append(np.clip(first + random.uniform(-np.log(3), np.log(3), len(first)), low, high))
+    return starts

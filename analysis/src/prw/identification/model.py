@@ -1,0 +1,134 @@
+"""The testbed FMU as identification sees it: its parameters, and its linear model with any of them."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import fmpy
+import numpy as np
+from lxml import etree
+
+from prw.linearization import Linearizer
+from prw.motion import Array
+from prw.state_space import StateSpace
+from prw.testbed import OUTPUTS
+
+SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
+BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+
+class Parameter(NamedTuple):
+    """A Real parameter as the FMU declares it. start: its start value in SI. shown, factor: the unit it is shown in,
+    and what a value in that unit is multiplied with to be in SI. meaning: its description."""
+
+    start: float
+    unit: str
+    shown: str
+    factor: float
+    meaning: str
+
+
+class Matrices(NamedTuple):
+    """x' = A x + B u, y = C x + D u of m models at a time: A (m, 6, 6), B (m, 6, 4), C (m, 8, 6), D (m, 8, 4), with the
+    FMU's states and inputs in its order, theta before omega, and the outputs in the order of OUTPUTS."""
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+
+
+class Parameters:
+    """The parameters that the model description of the testbed declares. real: by name. counts: those that are whole
+    numbers, with their start values. guid: of the FMU, a hash of its sources and start values."""
+
+    def __init__(self, description: Any):
+        self.guid: str = description.guid
+        self.real: dict[str, Parameter] = {}
+        self.counts: dict[str, int] = {}
+        self._units, self._meanings = description.unitDefinitions, {}
+        factors = {
+            (unit.name, display.name): 1 / display.factor
+            for unit in description.unitDefinitions
+            for display in unit.displayUnits
+        }
+        for v in description.modelVariables:
+            if v.causality == "parameter" and v.type == "Real" and not v.name.endswith("_start"):
+                shown = v.displayUnit or v.unit
+                factor = factors.get((v.unit, shown), 1.0)
+                self.real[v.name] = Parameter(float(v.start), v.unit, shown, factor, v.description or "")
+            elif v.causality == "parameter" and v.type == "Integer":
+                self.counts[v.name], self._meanings[v.name] = int(v.start), v.description or ""
+
+    @property
+    def starts(self) -> dict[str, float]:
+        """Start values of the Real parameters in SI, by name."""
+        return {name: parameter.start for name, parameter in self.real.items()}
+
+    def for_building(self, values: Mapping[str, float]) -> str:
+        """All parameters in the format of modelDescription/parameters.json, for `build_fmu --parameters`; `values` are
+        in SI, and what is shown in another unit is written in that."""
+        entries: dict[str, dict[str, object]] = {}
+        for name, parameter in self.real.items():
+            value = values[name] / parameter.factor
+            entries[name] = {"value": value, "unit": parameter.shown, "meaning": parameter.meaning}
+        for name, count in self.counts.items():
+            entries[name] = {"value": count, "unit": "1", "meaning": self._meanings[name]}
+        lines = [f"  {json.dumps(name)}: {json.dumps(entry, ensure_ascii=False)}" for name, entry in entries.items()]
+        return "{\n" + ",\n".join(lines) + "\n}\n"
+
+    def ssv(self, values: Mapping[str, float], title: str) -> str:
+        """All parameters as a parameter set of SSP 1.0 in SI, with the units' definitions."""
+        root = etree.Element(f"{{{SSV}}}ParameterSet", nsmap={"ssv": SSV, "ssc": SSC}, version="1.0", name=title)
+        parameters = etree.SubElement(root, f"{{{SSV}}}Parameters")
+        for name, parameter in self.real.items():
+            element = etree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
+            etree.SubElement(element, f"{{{SSV}}}Real", value=repr(float(values[name])), unit=parameter.unit)
+        for name, count in self.counts.items():
+            element = etree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
+            etree.SubElement(element, f"{{{SSV}}}Integer", value=str(count))
+        units, used = etree.SubElement(root, f"{{{SSV}}}Units"), {p.unit for p in self.real.values()}
+        for unit in self._units:
+            if unit.name in used:
+                exponents = {base: str(power) for base in BASE_UNITS if (power := getattr(unit.baseUnit, base))}
+                element = etree.SubElement(units, f"{{{SSC}}}Unit", name=unit.name)
+                etree.SubElement(element, f"{{{SSC}}}BaseUnit", **exponents)
+        found: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
+        return found.decode("utf-8")
+
+
+class Model:
+    """The FMU's linear model, eq. (11), as a function of its parameters. A context manager; leaving it unloads the FMU.
+
+    known: the FMU's parameters. Raises UserError where the FMU is missing, is not the testbed, or refuses something
+    (with what it logged).
+    """
+
+    def __init__(self, fmu: str | os.PathLike[str] | None = None):
+        """Unpack, load and instantiate the FMU file `fmu` (default: see prw.testbed.default_fmu)."""
+        self._linearizer = Linearizer(fmu, outputs=OUTPUTS)
+        self.fmu = self._linearizer.fmu
+        self.known = Parameters(fmpy.read_model_description(str(self.fmu)))
+
+    def __enter__(self) -> Model:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Unload the FMU. Harmless when called again."""
+        self._linearizer.close()
+
+    def at(self, values: Mapping[str, float]) -> StateSpace:
+        """The model with the parameters `values` (SI, by name); its outputs are OUTPUTS."""
+        return self._linearizer.at(values)
+
+
+def stacked(models: Sequence[StateSpace]) -> Matrices:
+    """Several models as one with a leading axis."""
+    return Matrices(*(np.stack([getattr(model, block) for model in models]) for block in Matrices._fields))

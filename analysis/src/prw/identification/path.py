@@ -1,0 +1,208 @@
+"""Where the motors really were: a smooth path through quantised or noisy samples of their angles (and rates).
+
+The FMU derives rates from angles as a simulation must, from the past; the steps of an encoder then become noise in the
+torque that is far above that of the sensor. Here the whole recording is known. The path is a quintic spline, its
+coefficients the most probable ones if the jerk is a white process and the samples carry white noise. How strong either
+is follows from the recording by maximum likelihood; an encoder's noise is at least quantum^2 / 12.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.optimize import minimize
+from scipy.sparse import csr_matrix, diags
+
+from prw.motion import Array
+
+#: Sparse rows from coefficients to what was measured, and the values that were.
+Block = tuple[csr_matrix, Array]
+DEGREE = 5
+#: The penalty is on third differences of the coefficients: jerk.
+ORDER = 3
+#: Range of log10 of the penalty: below, the path interpolates; above, the normal equations lose their digits.
+STIFFNESS = (-6.0, 10.0)
+#: Range of log10 of the weight of logged rates, s^2, and where the search for it begins, for one block and for two.
+RATIO = (-14.0, 4.0)
+GUESSES: dict[int, list[list[float]]] = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
+#: The most probable penalty is divided by this. Angles smoothed too little add a little noise; smoothed too much they
+#: bias the parameters. It raises the frequency up to which the path follows by its sixth root, 1.6.
+UNDERSMOOTHING = 16.0
+#: Encoders' errors are drawn along a path whose penalty is this many times the most probable one, and that is longer or
+#: shorter by up to a fraction. One that follows the encoder's steps would be rounded to the same steps again wherever
+#: the motor is slow, and the errors drawn would be up to three times too large.
+OVERSMOOTHING, RESCALED = 64.0, 0.05
+#: A column is a multiple of a quantum if all its values are, to this fraction of the quantum.
+ON_GRID = 0.05
+#: So many quanta at most lie between neighbouring values of a typical column.
+MOST_STEPS = 50
+#: Samples have noise besides their steps if there is this much more variance than the steps make.
+NOISIER = 1.2
+#: Values that are looked at to find the quantum.
+QUANTUM_VALUES = 20000
+
+
+class Path(NamedTuple):
+    """The course of one angle. angle: spline over time (rad, s); its derivative is the rate. noise: standard deviation
+    of the samples, rad. quantum: of the samples, rad, 0 if none. rate_noise: of the logged rates, rad/s, or None.
+    quiet: (n,) rad, a course at the samples' times that does not follow their errors."""
+
+    angle: BSpline
+    noise: float
+    quantum: float
+    rate_noise: float | None
+    quiet: Array
+
+    def errors(self, random: np.random.Generator) -> Array:
+        """Errors (n,) in rad like those of the samples."""
+        if self.noise >= self.quantum:
+            return random.normal(0, self.noise, len(self.quiet))
+        return rounding(self.quiet, self.quantum, random)
+
+
+def smooth(time: Array, theta: Array, omega: Array | None = None, quantum: float = 0.0) -> Path:
+    """The most probable course through the angles theta (n,) rad and, where logged, rates omega (n,) rad/s at the times
+    (n,) s, which may be uneven. quantum: of the angles in rad, where it is known to be coarser than it looks."""
+    quantum = max(quantum, quantum_of(theta))
+    spline = _Spline(time)
+    blocks = [(spline.rows(time, 0), theta)] + ([(spline.rows(time, 1), omega)] if omega is not None else [])
+    found = _fit(spline, blocks, quantum**2 / 12)
+    rate_noise = None if omega is None else found.noise / float(np.sqrt(found.weights[1]))
+    return Path(spline.curve(found.coefficients), found.noise, quantum, rate_noise, spline.curve(found.quiet)(time))
+
+
+def quantum_of(values: Array) -> float:
+    """The step that all `values` (n,) are multiples of, give or take a constant, or 0 if there is none."""
+    levels = np.unique(values[:QUANTUM_VALUES])
+    if len(levels) < 3:
+        return 0.0
+    gaps = np.diff(levels)
+    # Digits cut off in the file make two values of one level; what is left of the gaps is one quantum or several.
+    gaps = gaps[gaps > np.median(gaps) / MOST_STEPS]
+    quantum = gaps.min()
+    for _ in range(3):
+        multiples = np.rint(gaps / quantum)
+        quantum = gaps.sum() / multiples.sum()
+    off = np.abs(gaps / quantum - np.rint(gaps / quantum))
+    return float(quantum) if off.max() < ON_GRID and np.median(np.rint(gaps / quantum)) < MOST_STEPS else 0.0
+
+
+def rough_noise(values: Array) -> float:
+    """About the standard deviation of white noise on a smooth course (n,), if anything too much: third differences
+    leave next to nothing of the course, and of the noise its variance times 20."""
+    return float(np.std(np.diff(values, 3)) / np.sqrt(20)) if len(values) > 3 else np.inf
+
+
+def rounding(values: Array, quantum: float, random: np.random.Generator) -> Array:
+    """Errors like those an encoder makes at the values (n,). It errs the same way at the same angle, and so alike in
+    every period of a motion."""
+    # What is left of the samples' own errors in `values` must not meet the grid it came from: another zero, another
+    # scale.
+    level = values * (1 + random.uniform(-RESCALED, RESCALED)) / quantum + random.uniform()
+    return (np.rint(level) - level) * quantum
+
+
+class _Spline:
+    """A spline with knots at the spacing of the samples, and its penalty in banded storage."""
+
+    def __init__(self, time: Array):
+        self.spacing = float(np.median(np.diff(time)))
+        pieces = max(1, int(np.ceil((time[-1] - time[0]) / self.spacing - 1e-6)))
+        self.spacing = (time[-1] - time[0]) / pieces
+        self._knots = time[0] + self.spacing * np.arange(-DEGREE, pieces + DEGREE + 1)
+        # Not the first and last time themselves, which may lie outside by rounding.
+        self._ends = self._knots[DEGREE], self._knots[-DEGREE - 1]
+        self.size = pieces + DEGREE
+        difference = np.array([1.0])
+        for _ in range(ORDER):
+            difference = np.convolve(difference, [1.0, -1.0])
+        self.penalties = max(self.size - ORDER, 0)
+        self.penalty = np.zeros((DEGREE + 1, self.size))
+        for i in range(ORDER + 1):
+            for j in range(i + 1):
+                self.penalty[DEGREE - (i - j), i : i + self.penalties] += difference[i] * difference[j]
+
+    def curve(self, coefficients: Array) -> BSpline:
+        return BSpline(self._knots, coefficients, DEGREE)
+
+    def rows(self, time: Array, derivative: int) -> csr_matrix:
+        """Sparse matrix (n, size) from coefficients to the spline's value (or derivative) at the times."""
+        time = np.clip(time, *self._ends)
+        if derivative == 0:
+            return BSpline.design_matrix(time, self._knots, DEGREE)
+        # The derivative on even knots: differences of the coefficients, in the basis of one degree less.
+        lower = BSpline.design_matrix(time, self._knots[1:-1], DEGREE - 1)
+        shape = (lower.shape[1], self.size)
+        return lower @ diags([-1.0 / self.spacing, 1.0 / self.spacing], [0, 1], shape=shape, format="csr")
+
+
+class _Fit(NamedTuple):
+    """Coefficients of the path and of a quieter one; noise of the first block, rad; weights of the blocks relative to
+    the first (ratios of their variances)."""
+
+    coefficients: Array
+    quiet: Array
+    noise: float
+    weights: list[float]
+
+
+def _fit(spline: _Spline, blocks: list[Block], least: float) -> _Fit:
+    """The most probable path. blocks: what was measured. least: variance of the first block at least, rad2."""
+    count = sum(len(values) for _, values in blocks) - ORDER
+    normals, rights = [], []
+    for rows, values in blocks:
+        product = rows.T @ rows
+        normal = np.zeros((DEGREE + 1, spline.size))
+        for i in range(DEGREE + 1):
+            normal[DEGREE - i, i:] = product.diagonal(i)
+        normals.append(normal)
+        rights.append(rows.T @ values)
+
+    def solve(penalty: float, weights: list[float]) -> tuple[Array, float, float]:
+        """Coefficients, misfit with penalty, and logarithm of the determinant."""
+        normal = penalty * spline.penalty + sum(w * n for w, n in zip(weights, normals))
+        factor = cholesky_banded(normal, overwrite_ab=True, check_finite=False)
+        right = sum(w * r for w, r in zip(weights, rights))
+        coefficients = cho_solve_banded((factor, False), right, check_finite=False)
+        misfit = sum(w * np.sum((values - rows @ coefficients) ** 2) for w, (rows, values) in zip(weights, blocks))
+        bend = np.diff(coefficients, ORDER)
+        spread = 2 * np.log(factor[-1]).sum() - spline.penalties * np.log(penalty)
+        return coefficients, float(misfit + penalty * (bend @ bend)), float(spread)
+
+    def most_probable(variance: float | None) -> tuple[float, list[float]]:
+        """Minus twice the logarithm of the likelihood at its minimum over penalty and weights, as (penalty,
+        weights)."""
+
+        def unlikeliness(x: Sequence[float]) -> float:
+            weights = _weights(x)
+            _, misfit, spread = solve(10.0 ** np.clip(x[0], *STIFFNESS), weights)
+            spread -= float(sum(len(values) * np.log(w) for w, (_, values) in zip(weights, blocks)))
+            if variance is None:
+                return count * float(np.log(max(misfit, np.finfo(float).tiny))) + spread
+            return misfit / variance + spread
+
+        guesses = GUESSES[len(blocks)]
+        grid = [[float(x), *guess] for x in np.linspace(*STIFFNESS, 10) for guess in guesses]
+        best = min(grid, key=unlikeliness)
+        found = minimize(unlikeliness, best, method="Nelder-Mead", options={"xatol": 0.05, "fatol": 0.5}).x
+        return float(10.0 ** np.clip(found[0], *STIFFNESS)), _weights(found)
+
+    variance = least
+    if least == 0 or rough_noise(blocks[0][1]) ** 2 > NOISIER * least:
+        penalty, weights = most_probable(None)
+        variance = solve(penalty, weights)[1] / count
+    if variance <= least and least > 0:
+        variance = least
+        penalty, weights = most_probable(variance)
+    quiet = solve(min(penalty * OVERSMOOTHING, 10.0 ** STIFFNESS[1]), weights)[0]
+    penalty = max(penalty / UNDERSMOOTHING, 10.0 ** STIFFNESS[0])
+    return _Fit(solve(penalty, weights)[0], quiet, float(np.sqrt(variance)), weights)
+
+
+def _weights(x: Sequence[float]) -> list[float]:
+    """Weights of the blocks from the logarithms that are optimised."""
+    return [1.0, *(float(10.0 ** np.clip(y, *RATIO)) for y in x[1:])]

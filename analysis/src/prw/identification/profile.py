@@ -1,0 +1,48 @@
+"""Ends of intervals where the model bends over the uncertainty: torques alone leave k1 open by several percent, and at
+the lower end of that range the same data would tell more about it than at the upper one.
+
+An interval ends where the least misfit, over all other parameters, has risen by the square of the quantile (profile
+likelihood; Meeker and Escobar, The American Statistician 49 (1995) 48); by more, where noise is not white.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from prw.identification.fit import Solution
+from prw.motion import Array
+
+#: Below this standard error (of the logarithm) the model is as good as linear; above the other, there is no interval.
+LINEAR, HOPELESS = 0.01, 1.0
+#: Trials for an end, how close the rise of the misfit's root must come to what is wanted, and how far a trial may reach
+#: beyond the one before.
+TRIALS, CLOSE, FURTHER = 8, 0.02, 2.0
+#: When the other parameters have followed.
+FOLLOWED = {"ftol": 1e-5, "xtol": 1e-5}
+
+
+def ends(solution: Solution, white: Array, errors: Array, quantile: float) -> tuple[Array, Array]:
+    """Lower and upper ends (p,) of the logarithms' intervals. white: (p, p), the covariance for white noise. errors:
+    (p,) standard errors. quantile: of the normal distribution, 1.96 for 95 %."""
+    low, high = solution.logarithms - quantile * errors, solution.logarithms + quantile * errors
+    for i, error in enumerate(errors):
+        if LINEAR < error < HOPELESS:
+            # Where the others follow parameter i at the least cost.
+            step = quantile * error * white[:, i] / white[i, i]
+            rise = (quantile * error) ** 2 / white[i, i]
+            low[i], high[i] = _end(solution, i, -step, rise), _end(solution, i, step, rise)
+    return low, high
+
+
+def _end(solution: Solution, i: int, step: Array, wanted: float) -> float:
+    """Logarithm of parameter i at which the least misfit has risen by `wanted`. step: (p,), where to look first."""
+    centre, (low, high) = solution.logarithms, solution.task.span()
+    for _ in range(TRIALS):
+        point = np.clip(centre + step, low, high)
+        found = solution.fitter.search(point, FOLLOWED, held=i)
+        point, rise = found.x, 2 * found.cost - solution.misfit
+        further = np.sqrt(wanted / rise) if rise > wanted / FURTHER**2 else FURTHER
+        if abs(further - 1) < CLOSE or (point[i] in (low[i], high[i]) and further > 1):
+            break
+        step = (point - centre) * max(further, 1 / FURTHER)
+    return float(point[i])

@@ -1,0 +1,132 @@
+"""The fit report as one HTML page that needs nothing beside it."""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import Any
+
+import matplotlib
+import numpy as np
+from jinja2 import Environment, PackageLoader
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from prw.channels import si_unit
+from prw.identification.results import ChannelFit, Identification
+from prw.motion import Array
+from prw.plots import BLUE, PAGE_STYLE, VERMILION, envelope
+
+#: Stands in figures for the page's text colour, which depends on light or dark, as those of the curves do.
+INK = "#010203"
+COLOURS = {INK: "currentColor", BLUE.lower(): "var(--blue)", VERMILION.lower(): "var(--red)"}
+#: Time intervals in which a curve is drawn by its extremes; about one for each point on the screen.
+INTERVALS = 500
+#: Shown in these units: more telling than radians.
+SHOWN = {"rad": ("deg", np.degrees(1.0)), "rad/s": ("deg/s", np.degrees(1.0))}
+#: Seconds of the close-up.
+CLOSE = 1.0
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def page(found: Identification) -> str:
+    """The page as text."""
+    environment = Environment(
+        loader=PackageLoader("prw.identification", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters.update(digits=_digits, percent=_percent, shade=_shade)
+    solution, estimates, rows = found.solution, found.parameters, []
+    for name, parameter in found.known.real.items():
+        rows.append(
+            {
+                "name": name,
+                "meaning": parameter.meaning.split(";")[0],
+                "factor": parameter.factor,
+                "unit": parameter.shown,
+                "start": solution.task.start[name],
+                "found": estimates.get(name),
+            }
+        )
+    return environment.get_template("report.html.j2").render(
+        found=found,
+        solution=solution,
+        sure=found.sure,
+        rows=rows,
+        channels=[_shown(channel) for channel in found.channels],
+        figures=figures(found),
+    )
+
+
+def figures(found: Identification) -> list[dict[str, str]]:
+    """A figure for every channel of every experiment: a close-up of measured and modelled, and the residual."""
+    drawn = []
+    for i, experiment in enumerate(found.experiments):
+        residual, modelled = found.residual(i), found.solution.modelled[i]
+        for j, name in enumerate(experiment.channels):
+            unit, factor = SHOWN.get(si_unit(name), (si_unit(name), 1.0))
+            keep = np.isfinite(residual[:, j])
+            curves = factor * modelled[keep, j], factor * residual[keep, j]
+            title = f"{experiment.name}: {name}" if len(found.experiments) > 1 else name
+            svg = _figure(experiment.sampled[keep], *curves, unit.replace("N.m", "N m"))
+            drawn.append({"title": title, "svg": Markup(svg)})
+    return drawn
+
+
+def _figure(time: Array, modelled: Array, residual: Array, unit: str) -> str:
+    measured = modelled + residual
+    style = {
+        **PAGE_STYLE,
+        **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK),
+        "axes.grid": False,
+        "lines.linewidth": 1.0,
+        "font.size": 8.5,
+        "svg.fonttype": "none",
+    }
+    with matplotlib.rc_context(style):
+        # Margins by hand: to find them, matplotlib draws everything twice.
+        figure = Figure(figsize=(6.4, 3.6))
+        figure.subplots_adjust(left=0.12, right=0.985, top=0.93, bottom=0.115, hspace=0.5)
+        close, all_of_it = figure.subplots(2)
+        # The liveliest second, where measured and modelled can be told apart.
+        centre = time[np.argmax(np.abs(measured - measured.mean()))]
+        part = (time >= centre - CLOSE / 2) & (time <= centre + CLOSE / 2)
+        close.plot(*envelope(time[part], measured[part], INTERVALS), color=BLUE, label="measured")
+        close.plot(*envelope(time[part], modelled[part], INTERVALS), color=VERMILION, dashes=(4, 2), label="FMU")
+        close.legend(loc="lower right", bbox_to_anchor=(1, 0.98), ncols=2, borderaxespad=0)
+        close.set(title="measured and modelled, the liveliest second", ylabel=unit, xlim=time[part][[0, -1]])
+        all_of_it.plot(*envelope(time, residual, INTERVALS), color=BLUE, linewidth=0.7)
+        all_of_it.set(title="residual, all of it", ylabel=unit, xlabel="time (s)", xlim=time[[0, -1]])
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    svg = text.getvalue()
+    svg = svg[svg.index("<svg") :]
+    for drawn, shown in COLOURS.items():
+        svg = svg.replace(drawn, shown)
+    return re.sub(r'width="[\d.]+pt" height="[\d.]+pt"', 'role="img"', svg, count=1)
+
+
+def _shown(channel: ChannelFit) -> dict[str, Any]:
+    unit, factor = SHOWN.get(channel.unit, (channel.unit, 1.0))
+    scaled = {name: getattr(channel, name) * factor for name in ("noise", "residual", "offset")}
+    return {**channel._asdict(), **scaled, "unit": unit}
+
+
+def _digits(value: float, count: int = 4) -> str:
+    """A number with `count` significant digits."""
+    text = f"{value:.{count}g}"
+    if "e" in text:
+        mantissa, exponent = text.split("e")
+        return f"{mantissa}·10{str(int(exponent)).translate(RAISED)}"
+    return text.replace("-", "−")
+
+
+def _percent(value: float) -> str:
+    if not np.isfinite(value) or abs(value) > 10:
+        return "> 1000 %"
+    return f"{100 * value:.{1 if abs(value) >= 0.1 else 2 if abs(value) >= 0.001 else 3}f} %".replace("-", "−")
+
+
+def _shade(value: float) -> str:
+    """Background of a correlation: blue for positive, vermilion for negative, as strong as it is."""
+    colour = "0 114 178" if value > 0 else "213 94 0"
+    return f"rgb({colour} / {0.75 * abs(value):.2f})"

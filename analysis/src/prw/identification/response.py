@@ -1,0 +1,90 @@
+"""The FMU's linear model between samples, and what it answers to the spectra of a recording.
+
+Between two samples the motors follow the cubic that has their angles and rates at both; over such a step eq. (11) is
+solved exactly by one matrix exponential. Summed over a recording of n samples, x[k+1] = Ad x[k] + G0 u[k] + G1 u[k+1]
+becomes z X = Ad X + (G0 + z G1) U + z d with z = exp(2 pi i f h) and d = x[0] - x[n]: an experiment that starts
+and ends anywhere differs from a periodic one by six numbers (Pintelon and Schoukens, System Identification: A Frequency
+Domain Approach, 2nd ed., Sec. 6.3.2).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+from prw.identification.experiment import Experiment
+from prw.identification.model import Matrices
+from prw.motion import Array
+from prw.state_space import Complex
+from prw.testbed import OUTPUTS
+
+
+class Discrete(NamedTuple):
+    """x[k+1] = A x[k] + before u[k] + after u[k+1], y[k] = C x[k] + D u[k]: A (..., 6, 6), before and after
+    (..., 6, 4), C (..., c, 6), D (..., c, 4)."""
+
+    A: Array
+    before: Array
+    after: Array
+    C: Array
+    D: Array
+
+    def slopes(self, step: float) -> Discrete:
+        """Derivatives by p parameters, from models at p steps forwards and the same backwards."""
+        half = len(self.A) // 2
+        return Discrete(*((block[:half] - block[half:]) / (2 * step) for block in self))
+
+
+def discrete(models: Matrices, step: float, channels: tuple[str, ...]) -> Discrete:
+    """`models`, one or m of them, over steps of `step` s, with the rows of `channels`."""
+    rows = [OUTPUTS.index(name) for name in channels]
+    angle, rate = models.B[..., :2], models.B[..., 2:]
+    # The state, and the motors' angles with three derivatives, in units of the step.
+    whole = np.zeros((*models.A.shape[:-2], 14, 14))
+    whole[..., :6, :6], whole[..., :6, 6:8], whole[..., :6, 8:10] = models.A * step, angle * step, rate
+    whole[..., 6:12, 8:14] = np.eye(6)
+    solved = expm(whole)[..., :6, :]
+    e0, e1, e2, e3 = (solved[..., 6 + 2 * i : 8 + 2 * i] for i in range(4))
+    before = np.concatenate([e0 - 6 * e2 + 12 * e3, step * (e1 - 4 * e2 + 6 * e3)], axis=-1)
+    after = np.concatenate([6 * e2 - 12 * e3, step * (6 * e3 - 2 * e2)], axis=-1)
+    return Discrete(solved[..., :6], before, after, models.C[..., rows, :], models.D[..., rows, :])
+
+
+class Response:
+    """What a model answers to the motors of an experiment, at its first `bins` frequencies (f)."""
+
+    def __init__(self, model: Discrete, experiment: Experiment, bins: int):
+        self.model = model
+        turn = 2j * np.pi * np.arange(bins) / len(experiment.time)
+        self._z, self._s = np.exp(turn)[:, None, None], (turn / experiment.step)[:, None, None]
+        self._motors = experiment.motors[:bins, :, None]
+        self._resolvent = np.linalg.inv(self._z * np.eye(6) - model.A)
+        self._driven = self._resolvent @ (model.before + self._z * model.after)
+        self._states = self._driven @ self._motors
+        #: Spectra of the channels (f, c), periodic.
+        self.outputs: Complex = (model.C @ self._states + model.D @ self._motors)[..., 0]
+        #: What each of the six numbers d adds, (f, c, 6).
+        self.transients: Complex = self._z * (model.C @ self._resolvent)
+        # An error of a motor's angle comes with one of its rate.
+        self._moved = self._together(self._driven)
+        #: From the motors' angles, moving with their rates, to the channels: (f, c, 2).
+        self.transfer: Complex = model.C @ self._moved + self._together(model.D)
+
+    def _together(self, table: Array | Complex) -> Complex:
+        table = np.asarray(table, dtype=np.complex128)
+        moved: Complex = table[..., :2] + self._s * table[..., 2:]
+        return moved
+
+    def slopes(self, change: Discrete, d: Array) -> tuple[Complex, Complex]:
+        """Derivatives by p parameters, of outputs with transients `d` (6,): (p, f, c), and of transfer: (p, f, c, 2).
+
+        change: the model's derivatives by them."""
+        states = self._states + self._z * (self._resolvent @ d[:, None])
+        per = Discrete(*(block[:, None] for block in change))
+        driven = per.before + self._z * per.after
+        moved = self._resolvent @ (per.A @ states + driven @ self._motors)
+        outputs = per.C @ states + per.D @ self._motors + self.model.C @ moved
+        moved = self._resolvent @ (per.A @ self._moved + self._together(driven))
+        return outputs[..., 0], per.C @ self._moved + self._together(per.D) + self.model.C @ moved

@@ -1,0 +1,101 @@
+"""`prw.identify` and `prw.excite` as a notebook uses them."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+import rig
+from lxml import etree
+
+import prw
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory, experiment):
+    path = tmp_path_factory.mktemp("recorded") / "run.csv"
+    rig.write(path, rig.measure(experiment, 5, ("tau1", "theta3", "theta4")))
+    return path
+
+
+@pytest.fixture(scope="module")
+def found(recording, fmu):
+    return prw.identify(recording, fmu=fmu)
+
+
+def test_it_prints_and_writes_nothing(recording, fmu, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    prw.identify([prw.read(recording)], starts=1, fmu=fmu)
+    prw.excite(["tau1"], duration=2, rate=100, fmu=fmu)
+    assert capfd.readouterr() == ("", "") and not list(tmp_path.iterdir())
+
+
+def test_the_result(found, experiment, tmp_path):
+    assert list(found.parameters) == list(rig.NAMES)
+    for name, estimate in found.parameters.items():
+        low, high = estimate.interval
+        assert low < estimate.value < high and estimate.value == found.values[name]
+        assert estimate.standard_error == pytest.approx(estimate.relative * estimate.value)
+        assert abs(estimate.value - experiment.parameters[name]) < 4.5 * estimate.standard_error
+    assert found.parameters["k1"].unit == "N.m/rad" and found.parameters["k1"].shown == "N.m/deg"
+    assert found.values["J2"] == pytest.approx(experiment.parameters["J2"])
+    assert found.correlation.shape == (5, 5) and found.undetermined == []
+    assert "k1" in found.summary() and repr(found) == found.summary()
+    page = etree.HTML(found._repr_html_())
+    assert [row[0].text for row in page.iterfind(".//tr")] == ["parameter", *rig.NAMES]
+    assert json.loads(found.to_json())["parameters"]["k1"]["value"] == found.parameters["k1"].value
+    assert found.to_ssv(tmp_path / "k.ssv") == (tmp_path / "k.ssv").read_text(encoding="utf-8")
+    found.report(tmp_path / "report.html")
+    assert (tmp_path / "report.html").read_text(encoding="utf-8").count("<svg") == 3
+
+
+def test_priors_fixed_values_and_bounds(recording, fmu, experiment):
+    truth = {name: experiment.parameters[name] for name in ("k2", "c1", "c2", "c3")}
+    found = prw.identify(
+        recording,
+        estimate=["k1"],
+        fixed=truth,
+        priors={"J2": (0.004, 0.02)},
+        bounds={"k1": (50, 200)},
+        starts=1,
+        fmu=fmu,
+    )
+    assert list(found.parameters) == ["J2", "k1"] and found.values["c3"] == truth["c3"]
+    assert found.parameters["J2"].relative <= 0.0201 and found.parameters["J2"].prior == (0.004, 0.02)
+
+
+def test_what_stays_open_is_no_error(tmp_path, fmu):
+    rig.write(tmp_path / "run.csv", rig.measure(rig.experiment(3, 5, pattern="equal"), 1, ("tau1", "tau2")))
+    found = prw.identify(tmp_path / "run.csv", estimate=["k2", "J3"], starts=1, fmu=fmu)
+    assert re.search("J3 has hardly any effect", found.undetermined[0]) and found.advice
+    assert found.parameters["J3"].hopeless and "not determined" in found.summary()
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"estimate": ["k9"]}, "estimate: k9 is not known; there are J2, J3, H3, k1"),
+        ({"estimate": []}, "estimate: nothing is named"),
+        ({"priors": {"k1": -0.1}}, "priors k1: "),
+        ({"fixed": {"k1": float("nan")}}, "fixed: k1 nan is not a positive number"),
+        ({"bounds": {"k1": (5, 2)}}, "bounds: k1 from 5 to 2"),
+        ({"noise": {"pitch": 0.1}}, "noise: pitch is not known; there are tau1"),
+        ({"starts": 0}, "starts 0: at least 1"),
+        ({"fmu": "none.fmu"}, "none.fmu: no such FMU"),
+    ],
+)
+def test_what_cannot_be(recording, fmu, options, message):
+    with pytest.raises(prw.UserError) as error:
+        prw.identify(recording, **{"fmu": fmu, **options})
+    assert message in str(error.value)
+
+
+def test_excite(fmu):
+    ranking = prw.excite(["tau1", "tau2"], estimate=["k1", "c3"], duration=4, rate=500, fmu=fmu)
+    assert [e.typical_error for e in ranking] == sorted(e.typical_error for e in ranking)
+    assert set(ranking[0].expected_errors) == {"k1", "c3"} and isinstance(ranking[0].motion, prw.Motion)
+    assert np.abs(ranking[0].motion.theta).max() <= np.deg2rad(40.001)
+    with pytest.raises(prw.UserError, match="measure: tau3 is not known"):
+        prw.excite(["tau3"], fmu=fmu)

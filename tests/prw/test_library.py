@@ -1,0 +1,234 @@
+"""`import prw`: what a notebook does with it, and what it is told where it errs."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from lagrange import linear_model, table_1
+from reference import follow
+
+import prw
+
+HERE = Path(__file__).resolve().parent
+MOTION = HERE.parents[1] / "examples" / "point_to_point.csv"
+
+
+def python(program: str, folder: Path) -> str:
+    """What a Python of its own prints."""
+    result = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0, result.stderr
+    assert result.stderr == ""
+    return result.stdout
+
+
+def test_import_loads_nothing(tmp_path: Path) -> None:
+    heavy = ("numpy", "matplotlib", "scipy", "fmpy", "pyarrow", "fmu_run")
+    assert python(f"import sys, prw; print([name for name in {heavy} if name in sys.modules])", tmp_path) == "[]\n"
+    used = (
+        "prw.simulate(); import sys; print([n for n in ('matplotlib', 'scipy', 'fmpy', 'pyarrow') if n in sys.modules])"
+    )
+    assert python(f"import prw; {used}", tmp_path) == "[]\n"
+
+
+def test_all_names_are_there(tmp_path: Path) -> None:
+    """Whatever was imported before: no module of the package takes the place of a function."""
+    program = (
+        "import prw, pkgutil, importlib\n"
+        "for module in pkgutil.walk_packages(prw.__path__, 'prw.'):\n"
+        "    if not module.name.endswith('__main__'): importlib.import_module(module.name)\n"
+        "print([name for name in prw.__all__ if not callable(getattr(prw, name))], set(prw.__all__) <= set(dir(prw)))"
+    )
+    assert python(program, tmp_path) == "[] True\n"
+    with pytest.raises(AttributeError, match="module 'prw' has no attribute 'simulation_of'"):
+        prw.simulation_of  # noqa: B018
+
+
+def test_the_default_is_fig4(testbed: Path) -> None:
+    run = prw.simulate(fmu=testbed)
+    motion = prw.motion.fig4()
+    expected, _ = follow(linear_model(table_1()), motion.time, motion.theta, motion.omega)
+    assert list(run) == ["tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4"]
+    assert run.time.shape == run["roll"].shape == (2001,) and run.motion.name == "fig4"
+    for name in ("roll", "tau1"):
+        np.testing.assert_allclose(run[name], expected[name], atol=1e-11 * np.abs(expected[name]).max())
+    assert {name: run.parameters[name] for name in table_1()} == pytest.approx(table_1(), rel=1e-15)
+
+
+def test_a_file_a_recording_a_motion(testbed: Path) -> None:
+    recording = prw.read(MOTION)
+    own = prw.Motion(recording.time, recording.theta, recording.omega)
+    runs = [prw.simulate(source, {"k1": 80.0}, fmu=testbed) for source in (MOTION, str(MOTION), recording, own)]
+    assert [run.motion.name for run in runs] == [*["point_to_point"] * 3, "motion"]
+    assert all(run.parameters["k1"] == 80.0 for run in runs)
+    expected, _ = follow(linear_model({**table_1(), "k1": 80.0}), own.time, own.theta, own.omega)
+    for run in runs:
+        np.testing.assert_allclose(run["tau2"], expected["tau2"], atol=1e-10 * np.abs(expected["tau2"]).max())
+
+
+def test_other_outputs(testbed: Path) -> None:
+    run = prw.simulate(outputs=["theta5", "omega6"], fmu=testbed)
+    assert list(run) == ["theta5", "omega6"] and len(run) == 2
+    with pytest.raises(KeyError, match="roll: was not asked for; there are theta5, omega6"):
+        run["roll"]
+    assert len(run.plot().axes) == 1
+
+
+def test_nothing_is_printed_or_written(tmp_path: Path) -> None:
+    program = "import prw; run = prw.simulate(); run.plot(); prw.linearize(); prw.sweep({'k1': [100.0]})"
+    assert python(program, tmp_path) == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_where_a_run_goes(testbed: Path, tmp_path: Path) -> None:
+    run = prw.simulate(MOTION, fmu=testbed)
+    run.to_csv(tmp_path / "run.csv")
+    back = prw.read(tmp_path / "run.csv")
+    np.testing.assert_array_equal(back.theta, run.motion.theta)
+    np.testing.assert_allclose(back["tau1"], run["tau1"], rtol=1e-11, atol=1e-15)
+    frame = run.to_pandas()
+    assert frame.index.name == "time" and list(frame) == ["theta1", "theta2", "omega1", "omega2", *run]
+    np.testing.assert_array_equal(frame["roll"], run["roll"])
+    figure = run.plot("Moves")
+    assert figure.get_suptitle() == "Moves" and len(figure.axes) == 4
+    assert figure._repr_png_().startswith(b"\x89PNG")  # type: ignore[attr-defined]
+    assert "<td>tau1</td><td>N.m</td>" in run._repr_html_() and "tau1" in repr(run)
+
+
+def test_a_recording_with_measurements(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text("time [ms],theta1,theta2,tau1 [mN.m],pitch,site\n0,1,2,3,90,a\n5,1,2,,90,b\n10,1,2,5,90,c\n")
+    recording = prw.read(path, units={"pitch": "deg"})
+    assert set(recording.measured) == {"tau1", "pitch"} and recording.omega is None and recording.name == "rig"
+    np.testing.assert_allclose(recording["time"], [0, 5e-3, 1e-2], rtol=1e-15)
+    np.testing.assert_allclose(recording["tau1"], [3e-3, np.nan, 5e-3])
+    np.testing.assert_allclose(recording["pitch"], np.pi / 2, rtol=1e-15)
+    np.testing.assert_array_equal(recording["theta2"], 2)
+    assert recording.units == {"time": "ms", "theta1": "rad", "theta2": "rad", "tau1": "mN.m", "pitch": "deg"}
+    assert any("columns ignored: site" in note for note in recording.notes) and "rig" in repr(recording)
+    np.testing.assert_allclose(prw.read(path, degrees=True).theta, np.deg2rad([[1, 2]] * 3), rtol=1e-15)
+    with pytest.raises(KeyError, match="roll: was not recorded; there are time, theta1, theta2, "):
+        recording["roll"]
+    with pytest.raises(prw.UserError, match="units: yaw is not known; there are time, theta1"):
+        prw.read(path, units={"yaw": "deg"})
+    # What was measured does not stop a simulation of the motors.
+    path.write_text(path.read_text().replace(",3,", ",broken,"))
+    assert prw.simulate(path)["roll"].shape == (3,)
+    with pytest.raises(prw.UserError, match="rig.csv, row 2, column tau1: 'broken' is not a number"):
+        prw.read(path)
+
+
+def test_wrong_motions() -> None:
+    time, theta = [0.0, 1.0], [[0.0, 0.0], [1.0, 1.0]]
+    for arguments, complaint in [
+        (([0.0], [[0.0, 0.0]]), r"time has the shape \(1,\); it must be \(n,\), with at least two times"),
+        ((time, [0.0, 1.0]), r"theta has the shape \(2,\); it must be \(2, 2\), a column each motor"),
+        ((time, theta, [[0.0, 0.0]]), r"omega has the shape \(1, 2\)"),
+        (([1.0, 1.0], theta), "time must increase"),
+        (([0.0, float("nan")], theta), "time must increase"),
+        ((["now", "then"], theta), "time is not made of numbers"),
+    ]:
+        with pytest.raises(prw.UserError, match=complaint):
+            prw.Motion(*arguments)  # type: ignore[arg-type]
+
+
+def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
+    for arguments, complaint in [
+        ({"parameters": {"k9": 1.0}}, "parameters: k9 is not known; there are J2, J3, H3"),
+        ({"parameters": {"k1": -1.0}}, "the FMU stopped: .*k1 must not be below 0"),
+        ({"parameters": {"N": 7.5}}, "N.* 7.5"),
+        ({"parameters": {"k1": np.array([1.0, 2.0])}}, r"k1 is array\(\[1., 2.\]\), not a number; prw.sweep takes"),
+        ({"parameters": {"k1": "stiff"}}, "k1 is 'stiff', not a number"),
+        ({"outputs": ["yaw"]}, "outputs: yaw is not known; there are theta1"),
+        ({"fmu": tmp_path / "absent.fmu"}, "absent.fmu: no such FMU; `make fmu` builds it"),
+        ({"motion": tmp_path / "absent.csv"}, "absent.csv: cannot be read"),
+    ]:
+        with pytest.raises(prw.UserError, match=complaint) as caught:
+            prw.simulate(**{"fmu": testbed, **dict(arguments)})  # type: ignore[call-overload]
+        assert "\n" not in str(caught.value)
+
+
+def test_sweep_is_many_simulations(testbed: Path, tmp_path: Path) -> None:
+    table = prw.sweep({"k1": [-1.0, 90.0], "c3": np.linspace(0.1, 0.4, 3)}, fmu=testbed, out=tmp_path)
+    assert table.column("status").to_pylist() == ["failed"] * 3 + ["done"] * 3
+    assert "k1 must not be below 0" in table.column("message")[0].as_py()
+    for row in table.to_pylist()[3:]:
+        run = prw.simulate(parameters={name: row[name] for name in ("k1", "c3")}, fmu=testbed)
+        assert row["roll_peak"] == np.abs(run["roll"]).max() and row["tau1_end"] == run["tau1"][-1]
+    assert pq.read_table(tmp_path / "runs.parquet").to_pylist() == table.to_pylist()
+    assert len(table.to_pandas()) == 6
+
+
+def test_sweep_draws(testbed: Path) -> None:
+    """The draws are those of the seed, whoever runs them."""
+    table = prw.sweep(random={"k1": 0.1, "c3": (0.5, 0.2)}, runs=300, seed=4, motion=MOTION, fmu=testbed)
+    assert table == prw.sweep(
+        random={"k1": 0.1, "c3": (0.5, 0.2)}, runs=300, seed=4, motion=MOTION, fmu=testbed, workers=1
+    )
+    for name, middle, relative in (("k1", table_1()["k1"], 0.1), ("c3", 0.5, 0.2)):
+        logarithms = np.log(np.array(table.column(name)) / middle)
+        assert abs(logarithms.mean()) < relative / 5 and logarithms.std() == pytest.approx(relative, rel=0.2)
+
+
+def test_wrong_sweeps(testbed: Path) -> None:
+    for arguments, complaint in [
+        ({}, "nothing varies; give values by parameter"),
+        ({"grid": {"k9": [1.0]}}, "k9 is not known; there are J2"),
+        ({"grid": {"k1": []}}, "k1: .* are not the values of a parameter"),
+        ({"grid": {"k1": [1.0]}, "random": {"k1": 0.1}}, "k1 is in the grid and random; choose one"),
+        ({"random": {"k1": -0.1}}, "k1: -0.1; the value and its relative standard deviation must be positive"),
+        ({"random": {"k1": 0.1}, "runs": 0}, "runs 0: at least 1"),
+        ({"random": {"k1": 0.1}, "workers": 0}, "workers 0: at least 1"),
+        ({"grid": {"k1": np.ones(4000), "k2": np.ones(4000)}}, "16000000 runs are more than"),
+    ]:
+        with pytest.raises(prw.UserError, match=complaint):
+            prw.sweep(fmu=testbed, **arguments)  # type: ignore[arg-type]
+
+
+def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, testbed: Path) -> None:
+    run = prw.simulate(fmu=testbed)
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    for call, package, extra in [
+        (run.plot, "matplotlib", "plot"),
+        (run.to_pandas, "pandas", "pandas"),
+        (prw.linearize, "fmpy", "linearize"),
+        (prw.sweep, "pyarrow", "sweep"),
+    ]:
+        with pytest.raises(prw.UserError, match=rf"{package} missing; .*pip install 'prw\[{extra}\]'"):
+            call()
+
+
+def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
+    def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, "-m", "prw", "linearize", "--fmu", str(testbed), *arguments]
+        return subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+
+    result = command("--set", "k1=90")
+    assert result.returncode == 0 and "states      theta3, theta4" in result.stdout, result.stderr
+    written = json.loads((tmp_path / "out" / "linear.json").read_text())
+    np.testing.assert_array_equal(written["A"], prw.linearize(testbed, {"k1": 90.0}).A)
+    assert written["outputs"][0] == "tau1" and written["units"]["tau1"] == "N.m"
+    for wrong, complaint in (
+        ("k1", "--set k1: write NAME=VALUE"),
+        ("k1=stiff", "--set k1=stiff: 'stiff' is not a number"),
+    ):
+        result = command("--set", wrong)
+        assert result.returncode == 1 and complaint in result.stderr and result.stderr.count("\n") == 1
+
+
+def test_the_program_in_the_readme(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It runs as it stands, from the project's folder."""
+    readme = (HERE.parents[1] / "README.md").read_text(encoding="utf-8")
+    (program,) = re.findall(r"^```python\n(.*?)^```", readme, flags=re.S | re.M)
+    monkeypatch.chdir(HERE.parents[1])
+    names: dict[str, Any] = {}
+    exec(compile(program, "README.md", "exec"), names)
+    assert names["run"].parameters["k1"] == 100.0 and names["model"].A.shape == (6, 6)
+    assert names["table"].num_rows == 100

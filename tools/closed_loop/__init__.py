@@ -1,0 +1,126 @@
+"""`tools closed-loop`: the testbed driven by a controller FMU, under every co-simulation master that is installed."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from prw.errors import UserError
+
+if TYPE_CHECKING:
+    from tools.closed_loop.system import System
+
+DEFAULT_FMUS = Path("target/fmu")
+DEFAULT_OUT = Path("out")
+
+#: A pitch or roll within this of its reference has settled, deg.
+SETTLED = 0.1
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add `closed-loop` to the subcommands."""
+    parser = subparsers.add_parser(
+        "closed-loop",
+        help="run testbed and controller under several masters",
+        description="Run the closed loop prw_closed_loop.ssp (and its twin OspSystemStructure.xml) under FMPy, libcosim and "
+        "Ecos, as far as they are installed; compare them, and study the error of the coupling over the communication "
+        "step. Writes closed_loop.csv, closed_loop.png, coupling.csv and coupling.png.",
+    )
+    parser.add_argument(
+        "--fmus",
+        type=Path,
+        default=DEFAULT_FMUS,
+        metavar="DIR",
+        help="folder with prw_closed_loop.ssp and prw_closed_loop/ (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Carry out `tools closed-loop`. Raises UserError with one line on what is wrong."""
+    from tools.closed_loop import coupling, masters, plots
+    from tools.closed_loop.system import read
+    from tools.closed_loop.tables import write_columns
+
+    system = read(arguments.fmus / "prw_closed_loop.ssp", arguments.fmus / "prw_closed_loop")
+    runs, absent = {}, []
+    for master in masters.MASTERS:
+        if master.version() is None:
+            absent.append(master)
+        else:
+            runs[f"{master.name} {master.version()}"] = masters.run_apart(master, system)
+    if not runs:
+        raise UserError("no co-simulation master is installed; `make closed-loop` installs them")
+    name, first = next(iter(runs.items()))
+    study = coupling.study(system)
+
+    out = arguments.out
+    write_columns(out / "closed_loop.csv", first)
+    plots.plot_response(out / "closed_loop.png", system, first)
+    written = ["closed_loop.csv", "closed_loop.png"]
+    if study is not None:
+        write_columns(out / "coupling.csv", study.columns())
+        plots.plot_coupling(out / "coupling.png", study)
+        written += ["coupling.csv", "coupling.png"]
+    lines = [f"experiment  {_experiment(system)}, communication step {system.step * 1e3:g} ms"]
+    lines += _response(system, first)
+    lines += [f"master      {other}: {_difference(first, values, name)}" for other, values in runs.items()]
+    lines += [f"absent      {master.name}: pip package {master.package} is not installed" for master in absent]
+    if study is None:
+        lines.append("coupling    not studied, because not every FMU takes and gives derivatives")
+    else:
+        lines += [
+            f"coupling    {step * 1e3:g} ms: error {held:.2g} deg; with input derivatives {derivatives:.2g} deg"
+            for step, held, derivatives in zip(*study)
+            if step >= system.step
+        ]
+    lines.append(f"wrote       {', '.join(str(out / name) for name in written)}")
+    print("\n".join(lines))
+
+
+def _experiment(system: System) -> str:
+    goals = ", ".join(f"{name} {np.rad2deg(value):g} deg" for name, (_, value) in system.inputs.items())
+    return f"{goals}, {system.stop_time:g} s"
+
+
+def settling_time(time: np.ndarray, values: np.ndarray, goal: float) -> float:
+    """When values (n,) rad over time (n,) s come within SETTLED of goal (rad) for good; infinite if they do not."""
+    outside = np.nonzero(np.abs(np.rad2deg(values - goal)) > SETTLED)[0]
+    if not len(outside):
+        return float(time[0])
+    return float(time[outside[-1] + 1]) if outside[-1] + 1 < len(time) else float("inf")
+
+
+def _response(system: System, values: dict[str, np.ndarray]) -> list[str]:
+    lines = []
+    for axis in ("pitch", "roll"):
+        goal, angle = system.inputs[f"{axis}_ref"][1], values[f"testbed.{axis}"]
+        settled = settling_time(values["time"], angle, goal)
+        when = f"within {SETTLED} deg after {settled:.3f} s" if np.isfinite(settled) else f"not within {SETTLED} deg"
+        beyond = np.rad2deg(np.max((angle - goal) * np.sign(goal)))
+        lines.append(
+            f"{axis:<11} {when}, {max(beyond, 0):.2f} deg beyond; off by {np.rad2deg(abs(angle[-1] - goal)):.1g} deg at the end"
+        )
+    torque = max(np.abs(values[f"testbed.tau{i}"]).max() for i in (1, 2))
+    rate = max(np.abs(values[f"controller.omega{i}"]).max() for i in (1, 2))
+    lines.append(f"motors      rate up to {rate:.3g} rad/s, torque up to {torque:.3g} N.m")
+    return lines
+
+
+def _difference(first: dict[str, np.ndarray], other: dict[str, np.ndarray], name: str) -> str:
+    if other is first:
+        return "the others are compared with it"
+    torques = [key for key in first if ".tau" in key]
+    motion, torque = (
+        max(np.abs(first[key] - other[key]).max() for key in first if (key in torques) == wanted)
+        for wanted in (False, True)
+    )
+    # Torques depend on the motors at the same instant, so it matters whether a master reads before it sets.
+    when = ", read after the next inputs are set" if torque > 1e-6 > motion else ""
+    return f"angles and rates within {motion:.1g} (rad, rad/s) of {name}, torques within {torque:.1g} N.m{when}"

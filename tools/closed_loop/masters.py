@@ -1,0 +1,153 @@
+"""Co-simulation masters of others that run the closed loop: FMPy's SSP support, libcosim, Ecos.
+
+All three couple by Jacobi's method: every FMU does its step with the outputs the others had at its beginning. So with
+the same step they must agree to rounding. Each runs in a process of its own, because libraries in C++ bring their own
+loggers, thread pools and crashes.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+
+from prw.errors import UserError
+from tools.closed_loop.system import System, read
+
+#: What is recorded, as `component.variable`.
+RECORDED = (
+    *(f"controller.{name}" for name in ("theta1", "theta2", "omega1", "omega2")),
+    *(f"testbed.{name}" for name in ("pitch", "roll", "tau1", "tau2")),
+)
+TIMEOUT = 300.0
+#: Of the project.
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True)
+class Master:
+    """A master: its name, the pip package it comes in, and what runs the system under it."""
+
+    name: str
+    package: str
+    simulate: Callable[[System], np.ndarray]
+
+    def version(self) -> str | None:
+        """The installed version, or None."""
+        try:
+            return metadata.version(self.package)
+        except metadata.PackageNotFoundError:
+            return None
+
+
+def fmpy_ssp(system: System) -> np.ndarray:
+    """FMPy's simulate_ssp. It leaves the start values in the SSP to its caller, and feeds the system's inputs to the
+    FMUs after the first step only, so that the whole experiment is one step late; that row is left out."""
+    from fmpy.ssp.simulation import simulate_ssp
+    from fmpy.ssp.ssd import Parameter, ParameterSet
+
+    start = ParameterSet(parameters=[Parameter(name=name, value=value) for name, value in system.start.items()])
+    inputs = {name: (lambda _time, value=value: value) for name, (_, value) in system.inputs.items()}
+    stop_time = (system.steps + 0.5) * system.step
+    rows = simulate_ssp(str(system.ssp), stop_time=stop_time, step_size=system.step, parameter_set=start, input=inputs)
+    return np.column_stack([rows[name] for name in RECORDED])[1:]
+
+
+def libcosim(system: System) -> np.ndarray:
+    """libcosim, from OspSystemStructure.xml with all it says."""
+    from fmpy import read_model_description
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimObserver import CosimObserver
+
+    log_output_level(CosimLogLevel.WARNING)
+    execution = CosimExecution.from_osp_config_file(str(system.osp))
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    wanted = []
+    for component, fmu in system.fmus.items():
+        variables = read_model_description(str(system.osp / fmu)).modelVariables
+        references = {variable.name: variable.valueReference for variable in variables}
+        names = [name.partition(".")[2] for name in RECORDED if name.partition(".")[0] == component]
+        index = execution.slave_index_from_instance_name(component)
+        wanted.append((index, [references[name] for name in names]))
+    rows = np.empty((system.steps, len(RECORDED)))
+    for row in rows:
+        if not execution.step():
+            raise RuntimeError("libcosim stopped")
+        row[:] = np.concatenate([observer.last_real_values(*of_slave) for of_slave in wanted])
+    return rows
+
+
+def ecos(system: System) -> np.ndarray:
+    """Ecos, wired call by call: its SSP import knows no connectors of the system itself ("No element named").
+
+    It shows outputs after the inputs of the next step have been set. Torques follow from those directly, so they differ
+    from the other masters' by the jump of an input at a communication point; nothing in the loop does.
+    """
+    # Ecos does not say where its dependency is: the wheel `tbb` puts it into the environment's lib.
+    ctypes.CDLL(str(Path(sys.prefix, "lib", "libtbb.so.12")), mode=ctypes.RTLD_GLOBAL)
+    from ecospy import EcosSimulation, EcosSimulationStructure
+
+    def there(name: str) -> str:
+        return name.replace(".", "::")
+
+    values = {**system.start, **dict(system.inputs.values())}
+    with EcosSimulationStructure() as structure:
+        for component, fmu in system.fmus.items():
+            structure.add_model(component, str(system.osp / fmu))
+        for start, end in system.connections:
+            structure.make_real_connection(there(start), there(end))
+        structure.add_parameter_set("default", {there(name): value for name, value in values.items()})
+        with EcosSimulation(structure=structure, step_size=system.step) as simulation:
+            simulation.init(parameter_set="default")
+            rows = np.empty((system.steps, len(RECORDED)))
+            for row in rows:
+                simulation.step()
+                row[:] = [simulation.get_real(there(name)) for name in RECORDED]
+    return rows
+
+
+MASTERS = (
+    Master("FMPy", "fmpy", fmpy_ssp),
+    Master("libcosim", "libcosimpy", libcosim),
+    Master("Ecos", "ecospy", ecos),
+)
+
+
+def run_apart(master: Master, system: System) -> dict[str, np.ndarray]:
+    """Run the system under the master in a process of its own.
+
+    Returns `time` and RECORDED by name, each (steps,): the values at the end of every step. Raises UserError with what
+    the process said if it fails, or if it logs a warning or an error.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        result = Path(folder, "result.npy")
+        command = [sys.executable, "-m", __name__, master.name, *map(os.path.abspath, (system.ssp, system.osp, result))]
+        try:
+            process = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, cwd=ROOT)
+        except subprocess.TimeoutExpired:
+            raise UserError(f"{master.name} did not finish within {TIMEOUT:g} s") from None
+        said = [line for line in (process.stdout + process.stderr).splitlines() if line.strip()]
+        if process.returncode:
+            raise UserError(f"{master.name} failed: {said[-1] if said else f'status {process.returncode}'}")
+        complaints = [line for line in said if any(word in line.lower() for word in ("error", "warn", "fatal"))]
+        if complaints:
+            raise UserError(f"{master.name} complains: {complaints[0]}")
+        rows = np.load(result)
+    time = system.step * np.arange(1, system.steps + 1)
+    return {"time": time, **dict(zip(RECORDED, np.ascontiguousarray(rows.T)))}
+
+
+if __name__ == "__main__":
+    _name, _ssp, _osp, _result = sys.argv[1:]
+    _simulate = next(master.simulate for master in MASTERS if master.name == _name)
+    np.save(_result, _simulate(read(Path(_ssp), Path(_osp))))

@@ -1,0 +1,77 @@
+"""The closed loop as `build_closed_loop` describes it: which FMUs, what is wired to what, what it starts with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from prw.errors import UserError
+
+Value = float | int | bool
+OSP = "{http://opensimulationplatform.com/MSMI/OSPSystemStructure}"
+
+
+@dataclass(frozen=True)
+class System:
+    """ssp: the SSP file; osp: the folder with OspSystemStructure.xml. Variables are written `component.variable`.
+
+    fmus: file name by component. connections: output to input. start: values of FMU variables. inputs: the system's
+    inputs with what they feed and their value. stop_time and step in s.
+    """
+
+    ssp: Path
+    osp: Path
+    fmus: Mapping[str, str]
+    connections: Sequence[tuple[str, str]]
+    start: Mapping[str, Value]
+    inputs: Mapping[str, tuple[str, float]]
+    stop_time: float
+    step: float
+
+    @property
+    def steps(self) -> int:
+        """Communication steps of the experiment."""
+        return round(self.stop_time / self.step)
+
+
+def read(ssp: Path, osp: Path) -> System:
+    """Read the SSP, valid against the schema of SSP 1.0, and step and end from its OSP twin. Raises UserError."""
+    from fmpy.ssp import ssd
+
+    for path in (ssp, osp / "OspSystemStructure.xml"):
+        if not path.is_file():
+            raise UserError(f"{path}: no such file; `make closed-loop` builds it")
+    try:
+        system = ssd.read_ssd(str(ssp)).system
+        root = ElementTree.parse(osp / "OspSystemStructure.xml").getroot()
+        stop_time, step = (float(root.findtext(OSP + name) or "") for name in ("EndTime", "BaseStepSize"))
+    except Exception as error:  # FMPy raises bare Exceptions
+        raise UserError(f"{ssp}: cannot be read ({str(error).splitlines()[0]})") from None
+    values = dict(_values(system))
+    connections, inputs = [], {}
+    for wire in system.connections:
+        if wire.startElement is None:
+            inputs[wire.startConnector] = (f"{wire.endElement}.{wire.endConnector}", float(values[wire.startConnector]))
+        elif wire.endElement is not None:
+            connections.append((f"{wire.startElement}.{wire.startConnector}", f"{wire.endElement}.{wire.endConnector}"))
+    start: dict[str, Value] = {}
+    for component in system.elements:
+        start.update({f"{component.name}.{name}": value for name, value in _values(component)})
+    fmus = {component.name: Path(component.source).name for component in system.elements}
+    return System(ssp, osp, fmus, connections, start, inputs, stop_time, step)
+
+
+def _values(element: Any) -> Iterator[tuple[str, Value]]:
+    """The start values bound to a system or component, by name."""
+    for binding in element.parameterBindings:
+        for parameter_set in binding.parameterValues:
+            for parameter in parameter_set.parameters:
+                if parameter.type == "Real":
+                    yield parameter.name, float(parameter.value)
+                elif parameter.type == "Boolean":
+                    yield parameter.name, parameter.value in ("true", "1")
+                else:
+                    yield parameter.name, int(parameter.value)

@@ -1,0 +1,99 @@
+"""How the Co-Simulation FMU's error shrinks with the step, for each way of telling it how the motors move."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from prw.motion import Array, Motion
+from prw.state_space import StateSpace
+from prw.testbed import OUTPUTS, Testbed
+
+#: The motion: theta_i = AMPLITUDE_i sin(RATE_i t + PHASE_i), rad; wrist moves of some hertz.
+AMPLITUDE, RATE, PHASE = np.array([0.3, 0.2]), np.array([14.0, 23.0]), np.array([0.4, 1.9])
+#: Seconds, and from when on errors count: with angles alone the first two steps do not know how the motors move.
+DURATION, FROM = 1.0, 0.3
+STEPS_PER_SECOND = (125, 250, 500, 1000, 2000)
+#: Each step of the broken line is cut in so many for the run it is compared with.
+CUTS = 16
+
+
+class Convergence(NamedTuple):
+    """step: (k,) s. Errors by output name, (k,) each, as a fraction of the largest value that the output takes: with
+    `angles` alone, with `rates` as well (use_omega), and for motors on a `broken_line` whose slope is given."""
+
+    step: np.ndarray
+    angles: dict[str, np.ndarray]
+    rates: dict[str, np.ndarray]
+    broken_line: dict[str, np.ndarray]
+
+
+def convergence(fmu: Path, model: StateSpace) -> Convergence:
+    """Run the FMU with ever smaller steps against the exact response of its linear model (outputs: OUTPUTS)."""
+    errors = [
+        (_error(fmu, model, n, False), _error(fmu, model, n, True), _broken_line_error(fmu, n))
+        for n in STEPS_PER_SECOND
+    ]
+    angles, rates, broken = ({name: np.array([e[way][name] for e in errors]) for name in OUTPUTS} for way in range(3))
+    return Convergence(1 / np.array(STEPS_PER_SECOND, dtype=float), angles, rates, broken)
+
+
+def order(step: np.ndarray, errors: dict[str, np.ndarray]) -> dict[str, float]:
+    """The order of convergence by output name, between the two smallest steps."""
+    return {name: float(np.log(e[-2] / e[-1]) / np.log(step[-2] / step[-1])) for name, e in errors.items()}
+
+
+def exact_response(model: StateSpace, time: np.ndarray) -> dict[str, np.ndarray]:
+    """The response to the motion from rest at its first angles: forced sines, and transients by A's eigenvectors."""
+    motors = [(model.inputs.index(f"theta{i}"), model.inputs.index(f"omega{i}")) for i in (1, 2)]
+    x, y = np.zeros((len(time), len(model.states))), np.zeros((len(time), len(model.outputs)))
+    start = np.zeros(len(model.states))
+    for i, (theta, omega) in enumerate(motors):
+        w, phasor = RATE[i], AMPLITUDE[i] * np.exp(1j * PHASE[i])
+        forced = np.linalg.solve(1j * w * np.eye(len(x[0])) - model.A, model.B[:, theta] + 1j * w * model.B[:, omega])
+        wave = phasor * np.exp(1j * w * time)[:, None]
+        x += (wave * forced).imag
+        y += (wave * (model.D[:, theta] + 1j * w * model.D[:, omega])).imag
+        side = [model.states.index(name) for name in (("theta3", "theta5"), ("theta4", "theta6"))[i]]
+        start[side] = phasor.imag
+    values, vectors = np.linalg.eig(model.A)
+    x += ((np.exp(np.outer(time, values)) * np.linalg.solve(vectors, start - x[0])) @ vectors.T).real
+    return dict(zip(model.outputs, (y + x @ model.C.T).T))
+
+
+def _sines(n: int) -> Motion:
+    time = np.arange(round(DURATION * n) + 1) / n
+    angle = np.outer(time, RATE) + PHASE
+    return Motion(time, AMPLITUDE * np.sin(angle), AMPLITUDE * RATE * np.cos(angle))
+
+
+def _run(fmu: Path, motion: Motion) -> dict[str, np.ndarray]:
+    with Testbed(fmu) as testbed:
+        return testbed.respond(motion)
+
+
+def _error(fmu: Path, model: StateSpace, n: int, rates: bool) -> dict[str, float]:
+    motion = _sines(n)
+    found = _run(fmu, motion if rates else replace(motion, omega=None))
+    return _largest(found, exact_response(model, motion.time), motion.time >= FROM)
+
+
+def _broken_line_error(fmu: Path, n: int) -> dict[str, float]:
+    corners = _sines(n)
+    slope = np.diff(corners.theta, axis=0) * n
+    # Along each line: at the corner, and at CUTS - 1 points on the way; rates are those of the line that follows.
+    way = np.arange(CUTS)[None, :, None] / CUTS
+    theta = np.vstack([(corners.theta[:-1, None] + way * slope[:, None] / n).reshape(-1, 2), corners.theta[-1:]])
+    rate = np.vstack([np.repeat(slope, CUTS, axis=0), slope[-1:]])
+    time = np.arange(len(theta)) / (n * CUTS)
+    fine = _run(fmu, Motion(time, theta, rate))
+    coarse = _run(fmu, Motion(time[::CUTS], theta[::CUTS], rate[::CUTS]))
+    return _largest(coarse, {name: values[::CUTS] for name, values in fine.items()}, time[::CUTS] >= FROM)
+
+
+def _largest(found: Mapping[str, Array], true: Mapping[str, Array], late: np.ndarray) -> dict[str, float]:
+    return {name: float(np.abs(found[name] - true[name])[late].max() / np.abs(true[name]).max()) for name in OUTPUTS}

@@ -1,0 +1,136 @@
+"""The pages: text from analysis/documentation/text, tables from the model descriptions, figures from runs of the FMU."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from prw.errors import UserError
+from tools.documentation import tables
+from tools.documentation.formulas import typeset
+from tools.documentation.sources import PROGRAMS, SOURCES, read, read_description, read_table
+
+#: Table 1 as the paper prints it.
+PRINTED = Path("modelDescription/parameters.json")
+
+
+@dataclass(frozen=True)
+class Page:
+    """The page of an FMU: the folder of its text within SOURCES/text, and what goes into the FMU."""
+
+    text: str
+    content: Path
+
+    @property
+    def path(self) -> Path:
+        """The page within the project."""
+        return self.content / "documentation" / "index.html"
+
+    @property
+    def description(self) -> Path:
+        """The model description of its FMU within the project."""
+        return self.content / "modelDescription.xml"
+
+
+TESTBED = Page("testbed", Path("modelDescription"))
+CONTROLLER = Page("controller", Path("crates/prw-controller/modelDescription"))
+PAGES = (TESTBED, CONTROLLER)
+
+
+def render(project: Path, page: Page) -> str:
+    """The page as HTML. Depends on the project's files only, so that the same files give the same page."""
+    import jinja2
+
+    sources = project / SOURCES
+    description = read_description(project / page.description)
+    printed = json.loads(read(project / PRINTED))
+    numbers = json.loads(read(sources / "figures/numbers.json"))
+    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(sources), undefined=jinja2.StrictUndefined)
+    values = {
+        "n": numbers,
+        "drawing": read(sources / "testbed.svg"),
+        "figure": lambda name, meaning: _figure(sources / "figures" / f"{name}.svg", meaning),
+        "picture": lambda name, meaning: _picture(sources / "figures" / f"{name}.png", meaning),
+        "program": lambda name: _program(name, read(project / PROGRAMS / f"{name}.py")),
+        "table_of": lambda path, heading, about="": tables.text_table(read_table(project / path, heading).about(about)),
+        "variable_table": lambda causality, title: tables.variable_table(description, causality, title),
+        "parameter_table": lambda: tables.parameter_table(description, {}),
+        "parameter_table_as_printed": lambda: tables.parameter_table(description, printed),
+        "order_table": lambda: tables.order_table(numbers),
+        "minus": _minus,
+        "poles": {mode: _roots(numbers["poles"][mode]) for mode in ("pitch", "roll")},
+        "zeros": _roots(list(reversed(numbers["zeros"]))),
+        "identifier": html.escape(description.coSimulation.modelIdentifier),
+        "description": html.escape(description.description),
+    }
+    try:
+        (_, title, lead), *sections = [
+            _section(environment, path, values) for path in _in_order(sources / "text" / page.text)
+        ]
+        return environment.get_template("page.html").render(
+            style=read(sources / "style.css"),
+            title=title,
+            lead=lead,
+            version=html.escape(description.version),
+            license=html.escape(description.license),
+            sections=sections,
+        )
+    except jinja2.TemplateError as error:
+        raise UserError(f"{getattr(error, 'filename', None) or sources}: {error.message}") from None
+
+
+def _in_order(folder: Path) -> list[Path]:
+    """The files 0_header.html, 1_....html to the last."""
+    paths = sorted(folder.glob("*_*.html"), key=lambda path: int(path.stem.split("_")[0]))
+    if not paths:
+        raise UserError(f"{folder}: there is no text; run this in the project's folder")
+    return paths
+
+
+def _section(environment: Any, path: Path, values: dict[str, Any]) -> tuple[str, str, str]:
+    """A file's anchor, its title, which is a comment in its first line, and its text."""
+    title = re.match(r"\{# title: (.*) #\}\n", read(path))
+    if not title:
+        raise UserError(f"{path}: the first line must be {{# title: ... #}}")
+    text = environment.get_template(f"text/{path.parent.name}/{path.name}").render(values)
+    return path.stem.split("_", 1)[1], html.escape(title[1]), typeset(text).strip()
+
+
+def _figure(path: Path, meaning: str) -> str:
+    """A figure's SVG, to be put into the page, with what it shows in words."""
+    if not path.is_file():
+        raise UserError(f"{path}: missing; `make figures` makes it")
+    start = f'<svg class="plot" role="img" aria-label="{html.escape(meaning)}"'
+    return read(path).strip().replace('<svg xmlns="http://www.w3.org/2000/svg"', start, 1)
+
+
+def _picture(path: Path, meaning: str) -> str:
+    """A PNG within the page, with what it shows in words."""
+    if not path.is_file():
+        raise UserError(f"{path}: missing; `make figures` makes it")
+    content = base64.b64encode(path.read_bytes()).decode()
+    return f'<img alt="{html.escape(meaning)}" src="data:image/png;base64,{content}"/>'
+
+
+def _program(name: str, text: str) -> str:
+    """A program, which the tests run as it stands here."""
+    return f'<pre data-run="{name}"><code>{html.escape(text.strip(), quote=False)}</code></pre>'
+
+
+def _roots(roots: Iterable[Sequence[float]]) -> str:
+    """Real and conjugate complex numbers in words: -174.873 and -9.68 ± 34.68 i."""
+    words = []
+    for real, imaginary in roots:
+        words.append(f"{real:.2f}" + (f" ± {imaginary:.2f} i" if imaginary else ""))
+    return _minus(" and ".join(words))
+
+
+def _minus(number: object) -> str:
+    """A number, or words with numbers in them, with the sign that mathematics has."""
+    return str(number).replace("-", "\N{MINUS SIGN}")

@@ -1,0 +1,70 @@
+"""What the documentation is made from: files of the project, and tables in Markdown."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from prw.errors import UserError
+
+#: Within the project.
+SOURCES = Path("analysis/documentation")
+ERRATA = SOURCES / "errata.md"
+PROGRAMS = SOURCES / "programs"
+
+
+class Table(NamedTuple):
+    """The cells of a table as they are written."""
+
+    heads: list[str]
+    rows: list[list[str]]
+
+    def about(self, word: str) -> Table:
+        """The rows with that word in them."""
+        return self._replace(rows=[row for row in self.rows if any(word in cell for cell in row)])
+
+
+def read(path: Path) -> str:
+    """The text of a file. Raises UserError."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror}); run this in the project's folder") from None
+
+
+def read_description(path: Path) -> Any:
+    """FMPy's model description. Raises UserError."""
+    from fmpy import read_model_description
+
+    read(path)
+    try:
+        return read_model_description(str(path))
+    except Exception as error:  # FMPy raises bare Exceptions
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
+        raise UserError(f"{path}: no model description ({reason}); `make docs` writes it anew") from None
+
+
+def read_table(path: Path, heading: str) -> Table:
+    """The first table below a heading of a Markdown file. Raises UserError where there is none, or one with a gap."""
+    text = read(path)
+    section = re.search(rf"^(#+) {re.escape(heading)}\n(.*?)(?=^#+ |\Z)", text, flags=re.M | re.S)
+    table = section and re.search(r"^\|.*\|\n\|[-:| ]+\|\n(?:\|.*\|\n)+", section[2], flags=re.M)
+    if not table:
+        raise UserError(f"{path}: there is no table below a heading “{heading}”")
+    heads, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table[0].splitlines()]
+    for row in rows:
+        if len(row) != len(heads):
+            raise UserError(f"{path}: below “{heading}” the row of “{row[0]}” has {len(row)} cells, not {len(heads)}")
+    return Table(heads, rows)
+
+
+def unit_of(variable: Any) -> str:
+    """A variable's unit as the model description writes it; empty for 1 and for none."""
+    unit = variable.unit or getattr(variable.declaredType, "unit", None) or ""
+    return "" if unit == "1" else unit
+
+
+def start_of(variable: Any) -> str:
+    """A variable's start value with eight digits."""
+    return f"{float(variable.start):.8g}" if variable.type == "Real" else variable.start

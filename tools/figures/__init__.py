@@ -1,0 +1,74 @@
+"""`tools figures`: every figure of the paper and of the documentation, from runs of the FMU."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+
+#: The copies that are kept with the sources, for the documentation and the README.
+COMMITTED = Path("analysis/documentation/figures")
+#: README's first picture, and a still for the page in the FMU, which the film would double in size.
+FILM = Path("docs/wrist.gif")
+STILL = Path("wrist.png")
+#: Within the folder of what goes into an FMU: its icon for importers, and to scale it.
+ICON = Path("model.png")
+ICON_SVG = Path("documentation/model.svg")
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add `figures` to the subcommands."""
+    parser = subparsers.add_parser(
+        "figures",
+        help="reproduce the paper's figures from runs of the FMU",
+        description="Reproduces the paper's Figs. 4 and 5 and draws Bode plots of the torques, poles and zeros, step "
+        "responses and the order of convergence, all from the FMU. Writes each figure as SVG and PNG, and the figures "
+        "behind the text as numbers.json.",
+    )
+    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
+    parser.add_argument(
+        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--commit",
+        action="store_true",
+        help=f"also renew the copies kept with the sources, in {COMMITTED}, the icons of both FMUs, and {FILM}",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Carry out `tools figures`. Raises UserError with one line on what is wrong."""
+    # FMPy and matplotlib take a while to load.
+    from tools.documentation.pages import CONTROLLER, TESTBED
+    from tools.figures.gallery import figures
+    from tools.figures.icon import draw_controller, draw_testbed
+    from tools.figures.results import numbers, results
+    from tools.figures.writing import write_for_page, write_json, write_picture, write_png, write_small_png, write_svg
+
+    found = results(arguments.fmu)
+    drawn = figures(found)
+    for name, figure in drawn.items():
+        write_svg(arguments.out / f"{name}.svg", figure.figure)
+        write_png(arguments.out / f"{name}.png", figure.figure)
+    write_json(arguments.out / "numbers.json", numbers(found))
+    print(f"wrote {len(drawn)} figures as SVG and PNG, and numbers.json, into {arguments.out}")
+    if arguments.commit:
+        for name, figure in drawn.items():
+            if figure.for_page:
+                write_for_page(COMMITTED / f"{name}.svg", figure.figure)
+            if figure.for_readme:
+                write_small_png(COMMITTED / f"{name}.png", figure.figure)
+        write_json(COMMITTED / "numbers.json", numbers(found))
+        for page, draw in ((TESTBED, draw_testbed), (CONTROLLER, draw_controller)):
+            write_png(page.content / ICON, draw(), dpi=128)
+            write_svg(page.content / ICON_SVG, draw())
+        from prw.animation import animate, still
+        from tools.figures.film import POSE, SPEED, story
+
+        run, captions = story(arguments.fmu, arguments.fmu.with_name("prw_controller.fmu"))
+        write_picture(COMMITTED / STILL, still(run, POSE))
+        animate(run, FILM, speed=SPEED, captions=captions)
+        print(f"renewed {COMMITTED}, the icons and {FILM}")

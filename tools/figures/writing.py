@@ -1,0 +1,189 @@
+"""Figures into files that are the same each time: SVG, PNG, and the page's SVG that follows its light or dark."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from lxml import etree
+from matplotlib.figure import Figure
+from PIL import Image
+
+from prw.files import replacing
+from prw.plots import BLUE, PAGE_STYLE, VERMILION
+
+#: matplotlib's colours, and the page's names for them with what they are without a page.
+COLOURS = {
+    "#000000": "currentColor",
+    BLUE.lower(): f"var(--curve-1, {BLUE})",
+    VERMILION.lower(): f"var(--curve-2, {VERMILION})",
+    "#e6e6e6": "var(--grid, #e5e5e5)",
+    "#e5e5e5": "var(--grid, #e5e5e5)",
+}
+#: What matplotlib's ids begin with, and what they are called here.
+ID_WORDS = {"p": "clip", "m": "mark", "h": "hatch"}
+SVG = "{http://www.w3.org/2000/svg}"
+XLINK = "{http://www.w3.org/1999/xlink}"
+
+
+def write_svg(path: Path, figure: Figure) -> None:
+    """Write the figure as SVG with text as text."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(_svg(figure))
+
+
+def write_png(path: Path, figure: Figure, dpi: int = 150) -> None:
+    """Write the figure as PNG."""
+    with replacing(path) as temporary, matplotlib.rc_context(PAGE_STYLE):
+        figure.savefig(temporary, dpi=dpi)
+
+
+def write_small_png(path: Path, figure: Figure) -> None:
+    """Write the figure as PNG of 32 colours, some ten kilobytes."""
+    pixels = io.BytesIO()
+    with matplotlib.rc_context(PAGE_STYLE):
+        figure.savefig(pixels, dpi=110, format="png")
+    with replacing(path) as temporary:
+        few = Image.open(pixels).convert("RGB").quantize(32, dither=Image.Dither.NONE)
+        few.save(temporary, format="PNG", optimize=True)
+
+
+def write_picture(path: Path, picture: Image.Image) -> None:
+    """Write a picture, with its transparency, as PNG of 255 colours."""
+    with replacing(path) as temporary:
+        few = picture.quantize(255, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        few.save(temporary, format="PNG", optimize=True)
+
+
+def write_json(path: Path, content: object) -> None:
+    """Write JSON, indented and in order."""
+    with replacing(path) as temporary:
+        temporary.write_bytes((json.dumps(content, indent=2) + "\n").encode())
+
+
+def write_for_page(path: Path, figure: Figure) -> None:
+    """Write the figure as an SVG element to put into the page: no fonts, sizes or colours of its own, unique ids."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(for_page(_svg(figure, transparent=True), path.stem))
+
+
+def _svg(figure: Figure, transparent: bool = False) -> bytes:
+    file = io.BytesIO()
+    with matplotlib.rc_context(PAGE_STYLE):
+        figure.savefig(file, format="svg", metadata={"Date": None}, transparent=transparent)
+    return _with_counted_ids(file.getvalue().decode()).encode()
+
+
+def _with_counted_ids(svg: str) -> str:
+    """clip1, clip2, mark1 in order of appearance: matplotlib's ids are hashes of coordinates to the last digit, which
+    is not the same on every processor."""
+    for kind, word in ID_WORDS.items():
+        ids = dict.fromkeys(re.findall(rf'["#]({kind}[0-9a-f]{{10}})[")]', svg))
+        for number, identifier in enumerate(ids, 1):
+            svg = svg.replace(identifier, f"{word}{number}")
+    return svg
+
+
+def for_page(svg: bytes, name: str) -> bytes:
+    """matplotlib's SVG, tidied for a page that holds several; `name` tells its ids from theirs."""
+    root = etree.fromstring(svg, etree.XMLParser(remove_comments=True, remove_blank_text=True))
+    for element in [*root.findall(f".//{SVG}metadata"), *root.findall(f".//{SVG}style")]:
+        element.getparent().remove(element)
+    for attribute in ("width", "height", "version"):
+        root.attrib.pop(attribute, None)
+    used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', etree.tostring(root, encoding="unicode")))
+    for element in root.iter():
+        _name_apart(element, name, used)
+        for attribute in ("d", "points", "x", "y", "width", "height", "transform"):
+            if attribute in element.attrib:
+                element.attrib[attribute] = _shorter(element.attrib[attribute])
+        if element.get("transform", "").startswith(("rotate(0 ", "rotate(-0 ")):
+            del element.attrib["transform"]
+        _restyle(element)
+    _draw_ticks(root)
+    for element in reversed(list(root.iter(f"{SVG}g", f"{SVG}defs", f"{SVG}path"))):
+        parent, style = element.getparent(), element.get("style", "")
+        if element.tag == f"{SVG}path":
+            if style == "fill:none":  # paints nothing
+                parent.remove(element)
+        elif len(element) == 0:
+            parent.remove(element)
+        elif element.tag == f"{SVG}g" and not element.attrib:  # carried an id only
+            place = parent.index(element)
+            parent[place : place + 1] = list(element)
+    _join_ticks(root)
+    etree.cleanup_namespaces(root)
+    return bytes(etree.tostring(root, encoding="utf-8", pretty_print=True))
+
+
+def _name_apart(element: Any, name: str, used: set[str]) -> None:
+    """Prefix the ids that are referred to, and drop the others."""
+    identifier = element.attrib.pop("id", None)
+    if identifier in used:
+        element.attrib["id"] = f"{name}-{identifier}"
+    if XLINK + "href" in element.attrib:
+        element.attrib["href"] = f"#{name}-{element.attrib.pop(XLINK + 'href')[1:]}"
+    if "clip-path" in element.attrib:
+        element.attrib["clip-path"] = element.attrib["clip-path"].replace("url(#", f"url(#{name}-")
+
+
+def _shorter(numbers: str) -> str:
+    """Two decimals are a hundredth of a point."""
+    text = re.sub(r"-?\d+\.\d+", lambda match: f"{float(match[0]):.2f}".rstrip("0").rstrip("."), numbers)
+    text = re.sub(r"-0(?![.\d])", "0", re.sub(r"\s+", " ", text))
+    return re.sub(r" ?([A-Za-z]) (?=-?\d)", r"\1", text).strip()
+
+
+def _restyle(element: Any) -> None:
+    """The page's colours and fonts in place of matplotlib's."""
+    style = element.attrib.pop("style", "")
+    if not style and element.tag != f"{SVG}text":
+        return
+    rules = dict(re.split(r":\s*", rule.strip(), maxsplit=1) for rule in style.split(";") if rule.strip())
+    for key in ("stroke-linecap", "stroke-linejoin", "font-family"):
+        rules.pop(key, None)
+    if "font" in rules:  # matplotlib 3.9 and 3.10: one rule for all
+        font = rules.pop("font")
+        rules["font-size"] = re.findall(r"[\d.]+px", font)[0]
+        if re.match(r"(bold|[67]00)\b", font):
+            rules["font-weight"] = "bold"
+    if element.tag == f"{SVG}text":
+        rules["fill"] = "currentColor"
+    for key in ("fill", "stroke"):
+        if key in rules:
+            rules[key] = COLOURS.get(rules[key].lower(), rules[key])
+    if rules:
+        element.attrib["style"] = ";".join(f"{key}:{value}" for key, value in rules.items())
+
+
+def _draw_ticks(root: Any) -> None:
+    """Markers keep their style once, with their definition; those that are straight lines, ticks, become paths."""
+    defined = {f"#{path.get('id')}": path for path in root.iter(f"{SVG}path") if path.get("id")}
+    for use in list(root.iter(f"{SVG}use")):
+        path, style = defined[use.get("href")], use.attrib.pop("style", None)
+        if style is not None:
+            path.attrib["style"] = style
+        line = re.fullmatch(r"M0 0 ?L(\S+ \S+)", path.get("d"))
+        if line is not None:
+            tick = {"d": f"M{use.get('x')} {use.get('y')}l{line[1]}", "style": path.get("style")}
+            use.tag = f"{SVG}path"
+            use.attrib.clear()
+            use.attrib.update(tick)
+    still_used = {use.get("href") for use in root.iter(f"{SVG}use")}
+    for href, path in defined.items():
+        if href not in still_used:
+            path.getparent().remove(path)
+
+
+def _join_ticks(root: Any) -> None:
+    """Neighbours of one style and nothing else are one path."""
+    for path in reversed(list(root.iter(f"{SVG}path"))):
+        before = path.getprevious()
+        alike = before is not None and before.tag == path.tag and before.get("style") == path.get("style")
+        if alike and set(path.attrib) == {"d", "style"} == set(before.attrib):
+            before.attrib["d"] += path.get("d")
+            path.getparent().remove(path)

@@ -1,0 +1,80 @@
+"""Frequency responses: measured on the FMU by stepped sines, to lay over those of its linear model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from prw.motion import Array, Motion
+from prw.testbed import Testbed
+
+#: The shafts' angles q of H(s), eq. (15), and the sensors' torques.
+SHAFTS = ("theta3", "theta4", "theta5", "theta6")
+TORQUES = ("tau1", "tau2")
+#: The rates of H(s) and of the torques move along with their angles.
+RATES = {"omega1": "theta1", "omega2": "theta2"}
+
+#: Steps in a period, at least. A motor follows its tangent over a step, which raises the amplitude of its motion by the
+#: fraction (2 pi / STEPS)^2 / 6: 0.0014 dB.
+STEPS = 200
+#: The longest step, s. At low frequencies tau and the other side's shaft are small differences of large angles.
+LONGEST_STEP = 2e-3
+#: Whole periods that are evaluated.
+PERIODS = 2
+#: Transients are waited for until they have shrunk to this fraction.
+SETTLED = 1e-7
+
+
+class Sweep(NamedTuple):
+    """Measured responses. frequency: (k,) Hz; response: complex (k, outputs, 2 motors), outputs as asked for."""
+
+    frequency: np.ndarray
+    response: np.ndarray
+    outputs: Sequence[str]
+
+
+def sweep(fmu: Path, frequency: ArrayLike, slowest: float, outputs: Sequence[str] = (*SHAFTS, *TORQUES)) -> Sweep:
+    """Turn one motor of the Co-Simulation FMU at a time to and fro, theta = sin(2 pi f t), and compare the outputs.
+
+    frequency: (k,) Hz. slowest: the rate at which transients decay, 1/s. After they have settled, the component of each
+    output at f over whole periods (one bin of its discrete Fourier transform) is divided by that of the motor's angle.
+    Units: those of the output per rad.
+    """
+    frequencies = np.atleast_1d(np.asarray(frequency, dtype=float))
+    response = np.empty((len(frequencies), len(outputs), 2), dtype=complex)
+    for k, f in enumerate(frequencies):
+        periods = int(np.ceil(-np.log(SETTLED) / slowest * f))
+        steps = max(STEPS, int(np.ceil(1 / (LONGEST_STEP * f))))
+        n = (periods + PERIODS) * steps
+        time = np.arange(n) / (steps * f)
+        phase = 2 * np.pi * (np.arange(n) % steps) / steps
+        window = slice(periods * steps, n)
+        bin_of = np.exp(-1j * phase[window])
+        for motor in range(2):
+            theta, omega = np.zeros((n, 2)), np.zeros((n, 2))
+            theta[:, motor], omega[:, motor] = np.sin(phase), 2 * np.pi * f * np.cos(phase)
+            with Testbed(fmu) as testbed:
+                found = testbed.respond(Motion(time, theta, omega), outputs)
+            drive = bin_of @ theta[window, motor]
+            response[k, :, motor] = [bin_of @ found[name][window] / drive for name in outputs]
+    return Sweep(frequencies, response, tuple(outputs))
+
+
+def decibels(response: ArrayLike) -> Array:
+    """20 log10 |response|."""
+    return np.asarray(20 * np.log10(np.abs(response)))
+
+
+def degrees(response: ArrayLike, axis: int = 0) -> Array:
+    """The phase in degrees, unwrapped along the frequencies, which are on `axis`."""
+    return np.asarray(np.rad2deg(np.unwrap(np.angle(np.asarray(response)), axis=axis)))
+
+
+def slope(frequency: ArrayLike, response: ArrayLike) -> Array:
+    """The slope of |response| (k, ...) between neighbouring frequencies (k,), dB per decade, (k - 1, ...)."""
+    decades = np.diff(np.log10(frequency))
+    return np.asarray(np.diff(decibels(response), axis=0) / decades.reshape(-1, *[1] * (np.ndim(response) - 1)))
