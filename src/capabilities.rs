@@ -5,6 +5,7 @@ use crate::instant::Instant;
 use crate::motor::Motions;
 use crate::pair::Pair;
 use crate::parameters::{InvalidParameter, Parameters};
+use crate::start::Start;
 use crate::testbed::Testbed;
 use crate::variables::Name;
 use fmu_export::{
@@ -44,7 +45,7 @@ impl Model for TestbedFmu {
 
     fn new(setup: &Setup) -> Result<Self, Error> {
         let testbed = Testbed::new(Parameters::BUILT_IN)?;
-        Ok(Self { testbed, interface: setup.interface, torques: Pair::default() })
+        Ok(Self { testbed, interface: setup.interface, start: Start::default(), torques: Pair::default() })
     }
 
     fn update(&mut self) -> Result<(), Error> {
@@ -72,7 +73,11 @@ impl Model for TestbedFmu {
 impl CoSimulation for TestbedFmu {
     #[inline]
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
-        if self.testbed.step(step.size) { Ok(Stepped::Done) } else { out_of_range() }
+        if !self.testbed.step(step.size) {
+            return out_of_range();
+        }
+        self.start.is_over = true;
+        Ok(Stepped::Done)
     }
 }
 
@@ -82,7 +87,11 @@ fn out_of_range() -> Result<Stepped, Error> {
     Err(Error::new("the state would leave the range of numbers; look for extreme inputs or states"))
 }
 
-impl ModelExchange for TestbedFmu {}
+impl ModelExchange for TestbedFmu {
+    fn continuous_time_entered(&mut self) {
+        self.start.is_over = true;
+    }
+}
 
 impl InputDerivatives for TestbedFmu {
     /// Order 1 of theta is its slope over the next step. Higher orders, and derivatives of omega, are
@@ -105,11 +114,14 @@ impl OutputDerivatives for TestbedFmu {
     }
 }
 
+/// Those of eq. (11), by states and inputs, whatever a state starts from; by parameters, of all that is calculated.
 impl Partials for TestbedFmu {
     fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
-        Some(match unit_instant(known) {
-            Some(unit) => self.at(unknown, &unit),
-            None => self.change(unknown, &self.unit_change(known)),
+        let is_given = !self.start.is_over && !self.start.at_rest;
+        Some(match (unit_instant(known), started_by(known)) {
+            (Some(unit), _) => self.at(unknown, &unit),
+            (_, Some(state)) if is_given => self.partial(unknown, state)?,
+            _ => self.change(unknown, &self.unit_change(known)),
         })
     }
 }
@@ -131,6 +143,19 @@ fn unit_instant(known: Name) -> Option<Instant> {
         _ => return None,
     } = 1.0;
     Some(unit)
+}
+
+/// The state that starts at the value of a parameter.
+fn started_by(parameter: Name) -> Option<Name> {
+    Some(match parameter {
+        Name::theta3_start => Name::theta3,
+        Name::theta4_start => Name::theta4,
+        Name::theta5_start => Name::theta5,
+        Name::theta6_start => Name::theta6,
+        Name::omega5_start => Name::omega5,
+        Name::omega6_start => Name::omega6,
+        _ => return None,
+    })
 }
 
 impl TestbedFmu {

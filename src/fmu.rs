@@ -3,6 +3,7 @@
 use crate::decoupled::{Decoupled, Sides};
 use crate::instant::{Instant, torques};
 use crate::motor::{Motion, Motions};
+use crate::start::Start;
 use crate::testbed::Testbed;
 use fmu_export::Interface;
 
@@ -11,6 +12,7 @@ use fmu_export::Interface;
 pub struct TestbedFmu {
     pub(crate) testbed: Testbed,
     pub(crate) interface: Interface,
+    pub(crate) start: Start,
     /// Sensor torques, of the last time they were calculated.
     pub(crate) torques: Sides,
 }
@@ -22,9 +24,9 @@ impl Clone for TestbedFmu {
 
     /// Passes on to the testbed, which copies little if the parameters are the same.
     fn clone_from(&mut self, source: &Self) {
-        let Self { testbed, interface, torques } = source;
+        let Self { testbed, interface, start, torques } = source;
         self.testbed.clone_from(testbed);
-        (self.interface, self.torques) = (*interface, *torques);
+        (self.interface, self.start, self.torques) = (*interface, *start, *torques);
     }
 }
 
@@ -61,6 +63,14 @@ impl TestbedFmu {
     #[inline(never)]
     fn torques_otherwise(&self) -> Sides {
         torques(&self.testbed.state, &self.motions(), self.system())
+    }
+
+    /// Until the testbed has started, its state follows the motors, or what is given. Called after either was set.
+    #[inline]
+    pub(crate) fn follow(&mut self) {
+        if !self.start.is_over {
+            self.testbed.state = self.start.from(self.testbed.motors.theta());
+        }
     }
 
     /// State and motors now.

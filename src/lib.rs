@@ -20,7 +20,8 @@
 //! 6. [`propagator`]: their solution over a step on which the motors move on straight lines.
 //! 7. [`testbed`]: motors and state, advanced from point to point.
 //! 8. [`instant`]: torques, rates and accelerations at one instant, and how they react to the parameters.
-//! 9. [`TestbedFmu`] and [`variables`]: the names and units that an importer sees, and what the FMU offers.
+//! 9. [`start`]: where the motion begins.
+//! 10. [`TestbedFmu`] and [`variables`]: the names and units that an importer sees, and what the FMU offers.
 //!
 //! Where the printed equations are wrong, the item that mends them says so.
 //!
@@ -56,6 +57,7 @@ pub mod pair;
 pub mod parameter_file;
 pub mod parameters;
 pub mod propagator;
+pub mod start;
 pub mod state_space;
 pub mod testbed;
 pub mod variables;

@@ -17,16 +17,23 @@ const COUNT: Type = Type::integer("Integer_from_1").from(1);
 variables! {
     for TestbedFmu, memory in
         testbed.motors.times.count, testbed.motors.times.last_step, testbed.motors.times.step_before,
-        testbed.motors.is_sampled, testbed.motors.set_rate, testbed.motors.earlier, testbed.motors.path_end;
+        testbed.motors.is_sampled, testbed.motors.set_rate, testbed.motors.earlier, testbed.motors.path_end,
+        start.is_over;
 
     /// Angle of motor 1
-    theta1 = input(&ANGLE) in testbed.motors.inputs[0].theta then |fmu| { fmu.testbed.motors.theta_set(0) };
+    theta1 = input(&ANGLE) in testbed.motors.inputs[0].theta then |fmu| {
+        fmu.testbed.motors.theta_set(0);
+        fmu.follow();
+    };
     /// Angle of motor 2
-    theta2 = input(&ANGLE) in testbed.motors.inputs[1].theta then |fmu| { fmu.testbed.motors.theta_set(1) };
+    theta2 = input(&ANGLE) in testbed.motors.inputs[1].theta then |fmu| {
+        fmu.testbed.motors.theta_set(1);
+        fmu.follow();
+    };
     /// Angular velocity of motor 1; used in Co-Simulation only if use_omega is true
-    omega1 = input(&ANGULAR_VELOCITY).derivative_of(theta1) in testbed.motors.inputs[0].omega then |fmu| { fmu.testbed.motors.omega_set(0) };
+    omega1 = input(&ANGULAR_VELOCITY) in testbed.motors.inputs[0].omega then |fmu| { fmu.testbed.motors.omega_set(0) };
     /// Angular velocity of motor 2; used in Co-Simulation only if use_omega is true
-    omega2 = input(&ANGULAR_VELOCITY).derivative_of(theta2) in testbed.motors.inputs[1].omega then |fmu| { fmu.testbed.motors.omega_set(1) };
+    omega2 = input(&ANGULAR_VELOCITY) in testbed.motors.inputs[1].omega then |fmu| { fmu.testbed.motors.omega_set(1) };
 
     /// Torque measured by sensor 1 between motor 1 and the SECT, eq. (9a)
     tau1 = output(&TORQUE) by |fmu| fmu.torques[0];
@@ -41,18 +48,24 @@ variables! {
     /// Roll rate, the derivative of theta8
     roll_rate = output(&ANGULAR_VELOCITY) by |fmu| fmu.now().roll_rate(fmu.system());
     /// Angle of the shaft between couplings 1 and 2 (motor 1 side); state
-    theta3 = output(&ANGLE).state() in testbed.state[0];
+    theta3 = output(&ANGLE).state().calculated().depends_on(&[start_at_rest, theta3_start, theta1])
+        in testbed.state[0] then |fmu| { fmu.start.is_over = true };
     /// Angle of the shaft between couplings 3 and 4 (motor 2 side); state
-    theta4 = output(&ANGLE).state() in testbed.state[1];
+    theta4 = output(&ANGLE).state().calculated().depends_on(&[start_at_rest, theta4_start, theta2])
+        in testbed.state[1] then |fmu| { fmu.start.is_over = true };
 
     /// Angle of SECT input shaft 1; state
-    theta5 = local(&ANGLE).state() in testbed.state[2];
+    theta5 = local(&ANGLE).state().calculated().depends_on(&[start_at_rest, theta5_start, theta1])
+        in testbed.state[2] then |fmu| { fmu.start.is_over = true };
     /// Angle of SECT input shaft 2; state
-    theta6 = local(&ANGLE).state() in testbed.state[3];
+    theta6 = local(&ANGLE).state().calculated().depends_on(&[start_at_rest, theta6_start, theta2])
+        in testbed.state[3] then |fmu| { fmu.start.is_over = true };
     /// Angular velocity of SECT input shaft 1; state
-    omega5 = local(&ANGULAR_VELOCITY).state() in testbed.state[4];
+    omega5 = local(&ANGULAR_VELOCITY).state().calculated().depends_on(&[start_at_rest, omega5_start])
+        in testbed.state[4] then |fmu| { fmu.start.is_over = true };
     /// Angular velocity of SECT input shaft 2; state
-    omega6 = local(&ANGULAR_VELOCITY).state() in testbed.state[5];
+    omega6 = local(&ANGULAR_VELOCITY).state().calculated().depends_on(&[start_at_rest, omega6_start])
+        in testbed.state[5] then |fmu| { fmu.start.is_over = true };
 
     /// Derivative of theta3, eq. (11a)
     der_theta3 as "der(theta3)" = local(&ANGULAR_VELOCITY).derivative_of(theta3)
@@ -93,4 +106,18 @@ variables! {
     N = parameter(&COUNT) in testbed.parameters.N;
     /// Co-Simulation: take the motor rates from omega1 and omega2 instead of differentiating theta1 and theta2
     use_omega = parameter(&BOOLEAN) in testbed.motors.use_omega then |fmu| { fmu.testbed.motors.use_omega_set() };
+    /// Start at rest wherever the motors are (theta3 = theta5 = theta1, theta4 = theta6 = theta2, rates 0); if false, start at theta3_start ... omega6_start
+    start_at_rest = parameter(&BOOLEAN) in start.at_rest then |fmu| { fmu.follow() };
+    /// theta3 at the start; used only if start_at_rest is false
+    theta3_start = parameter(&ANGLE) in start.state[0] then |fmu| { fmu.follow() };
+    /// theta4 at the start; used only if start_at_rest is false
+    theta4_start = parameter(&ANGLE) in start.state[1] then |fmu| { fmu.follow() };
+    /// theta5 at the start; used only if start_at_rest is false
+    theta5_start = parameter(&ANGLE) in start.state[2] then |fmu| { fmu.follow() };
+    /// theta6 at the start; used only if start_at_rest is false
+    theta6_start = parameter(&ANGLE) in start.state[3] then |fmu| { fmu.follow() };
+    /// omega5 at the start; used only if start_at_rest is false
+    omega5_start = parameter(&ANGULAR_VELOCITY) in start.state[4] then |fmu| { fmu.follow() };
+    /// omega6 at the start; used only if start_at_rest is false
+    omega6_start = parameter(&ANGULAR_VELOCITY) in start.state[5] then |fmu| { fmu.follow() };
 }

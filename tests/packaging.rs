@@ -111,22 +111,51 @@ fn dependencies_are_the_sparsity_of_the_matrices() {
         assert_eq!(listed(&structure.outputs.unknowns, output), owned(expected.into()));
     }
     for (unknown, expected) in [
+        // What a state starts from, then what starts from states.
+        ("theta3", &["theta1", "theta3_start"][..]),
+        ("theta4", &["theta2", "theta4_start"]),
+        ("theta5", &["theta1", "theta5_start"]),
+        ("theta6", &["theta2", "theta6_start"]),
+        ("omega5", &["omega5_start"]),
+        ("omega6", &["omega6_start"]),
         (
             "tau1",
-            &["theta1", "omega1", "theta3", "theta5", "omega5", "k1", "k2", "c1", "c2", "use_omega"][..],
+            &[
+                "theta1",
+                "omega1",
+                "theta3_start",
+                "theta5_start",
+                "omega5_start",
+                "k1",
+                "k2",
+                "c1",
+                "c2",
+                "use_omega",
+            ],
         ),
         (
             "der(theta4)",
-            &["theta2", "omega2", "theta4", "theta6", "omega6", "k1", "k2", "c1", "c2", "use_omega"],
+            &[
+                "theta2",
+                "omega2",
+                "theta4_start",
+                "theta6_start",
+                "omega6_start",
+                "k1",
+                "k2",
+                "c1",
+                "c2",
+                "use_omega",
+            ],
         ),
-        ("roll_rate", &["omega5", "omega6", "M", "N"]),
-        ("pitch", &["theta5", "theta6"]),
-        ("der(theta5)", &["omega5"]),
+        ("roll_rate", &["omega5_start", "omega6_start", "M", "N"]),
+        ("pitch", &["theta1", "theta2", "theta5_start", "theta6_start"]),
+        ("der(theta5)", &["omega5_start"]),
     ] {
-        let expected: BTreeSet<&str> = expected.iter().copied().collect();
+        let expected: BTreeSet<&str> = expected.iter().copied().chain(["start_at_rest"]).collect();
         assert_eq!(listed(&structure.initial_unknowns.unknowns, unknown), owned(expected));
     }
-    assert_eq!(structure.initial_unknowns.unknowns.len(), 12);
+    assert_eq!(structure.initial_unknowns.unknowns.len(), 18);
 }
 
 #[test]

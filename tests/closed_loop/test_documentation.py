@@ -36,3 +36,15 @@ def test_the_page_and_the_icons_travel_in_the_controller(controller_fmu):
         assert archive.read("documentation/index.html") == (ROOT / CONTROLLER.path).read_bytes()
         for icon in (ICON, ICON_SVG):
             assert archive.read(icon.as_posix()) == (ROOT / CONTROLLER.content / icon).read_bytes()
+
+
+def test_the_model_for_openmodelica_has_the_wires_of_the_ssp(closed_loop):
+    """Nothing here can read Modelica; the names and values at least are those of what is run elsewhere."""
+    model = (ROOT / "examples/openmodelica/ClosedLoop.mo").read_text(encoding="utf-8")
+    wires = re.findall(r"^  connect\(([\w.]+), ([\w.]+)\);$", model, flags=re.M)
+    assert sorted(wires) == sorted(tuple(wire) for wire in closed_loop.connections)
+    for name, (end, value) in closed_loop.inputs.items():
+        assert f"  parameter Real {name} = {value} " in model and f"  {end} = {name};" in model
+    script = (ROOT / "examples/openmodelica/closed_loop.mos").read_text(encoding="utf-8")
+    for fmu in closed_loop.fmus.values():
+        assert f"target/fmu/{fmu}" in script and f"  {fmu.removesuffix('.fmu')}_me_FMU " in model

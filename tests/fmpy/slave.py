@@ -59,7 +59,6 @@ class Slave:
         """
         self.fmi.setupExperiment(startTime=time)
         self.set(use_omega=rate is not None, **parameters)
-        self.set(theta3=theta[0], theta4=theta[1], theta5=theta[0], theta6=theta[1])
         self.fmi.enterInitializationMode()
         self.set(theta1=theta[0], theta2=theta[1])
         if rate is not None:

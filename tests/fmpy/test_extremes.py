@@ -71,7 +71,7 @@ def check(slave, parameters, h, seed, steps=3):
     rng = np.random.default_rng(seed)
     slave.fmi.setupExperiment(startTime=0.0)
     slave.set(**{name: int(value) if name in "MN" else float(value) for name, value in parameters.items()})
-    slave.set(**dict(zip(STATES, rng.uniform(-1, 1, 6))))
+    slave.set(start_at_rest=False, **dict(zip((f"{name}_start" for name in STATES), rng.uniform(-1, 1, 6))))
     slave.fmi.enterInitializationMode()
     slave.fmi.exitInitializationMode()
     angles = [slave.variables[name].valueReference for name in ("theta1", "theta2")]

@@ -14,7 +14,10 @@ from lagrange import OUTPUTS
 from packaging.version import Version
 
 #: Let go with the couplings wound up, while both motors turn.
-START = {"theta3": 0.5, "theta4": -0.3, "theta5": 0.1, "theta6": 0.4, "omega5": 3.0, "omega6": -2.0, "k1": 130.0}
+START = {
+    "start_at_rest": False, "theta3_start": 0.5, "theta4_start": -0.3, "theta5_start": 0.1, "theta6_start": 0.4,
+    "omega5_start": 3.0, "omega6_start": -2.0, "k1": 130.0,
+}  # fmt: skip
 MOTORS = np.array(
     [(t, 0.2 * np.sin(9 * t), 0.1 * t, 1.8 * np.cos(9 * t), 0.1) for t in np.linspace(0, 0.3, 301)],
     dtype=[(name, float) for name in ("time", "theta1", "theta2", "omega1", "omega2")],
@@ -138,6 +141,7 @@ def test_a_state_can_be_saved_and_restored(testbed3):
 def test_partial_derivatives_by_parameters(testbed3, parameter):
     """After a step, against differences: torques and state derivatives at the same state and inputs."""
     instance, references = testbed3
+    instance.setBoolean([references["start_at_rest"]], [False])
     instance.setFloat64([references[name] for name in ("theta1", "theta2", "omega1")], [0.2, -0.1, 1.0])
     instance.exitInitializationMode()
     instance.doStep(0.0, 0.01)

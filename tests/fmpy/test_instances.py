@@ -120,7 +120,7 @@ def test_each_parameter_counts(slave, model, change):
         ("N", -7),
         ("k1", float("nan")),
         ("theta1", float("inf")),
-        ("theta3", float("nan")),
+        ("theta3_start", float("nan")),
     ],
 )
 def test_bad_values_are_refused_by_name(slave, name, value):
@@ -141,14 +141,12 @@ def test_set_input_derivatives_of_simulate_fmu(fmu, model):
     grid = np.arange(0, 21) * 0.05
     theta = np.cumsum(rng.normal(0, 0.1, (21, 2)), axis=0)
     table = np.asarray(np.rec.fromarrays([grid, *theta.T], names="time,theta1,theta2"))
-    rest = {"theta3": theta[0, 0], "theta5": theta[0, 0], "theta4": theta[0, 1], "theta6": theta[0, 1]}
     try:
         result = fmpy.simulate_fmu(
             str(fmu),
             stop_time=1.0,
             output_interval=0.01,
             input=table,
-            start_values=rest,
             output=list(OUTPUTS),
             set_input_derivatives=True,
             fmi_type="CoSimulation",

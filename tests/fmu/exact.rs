@@ -21,6 +21,15 @@ pub const STATES: [u32; 6] = [
     vr(Name::omega5),
     vr(Name::omega6),
 ];
+/// The parameters that say where the states start, in the same order.
+pub const STARTS: [u32; 6] = [
+    vr(Name::theta3_start),
+    vr(Name::theta4_start),
+    vr(Name::theta5_start),
+    vr(Name::theta6_start),
+    vr(Name::omega5_start),
+    vr(Name::omega6_start),
+];
 /// The derivatives, then the outputs.
 pub const UNKNOWNS: [u32; 14] = [
     vr(Name::der_theta3),
@@ -84,6 +93,13 @@ pub fn jumped(p: &Parameters, x: [f64; 6], d: [f64; 2]) -> [f64; 6] {
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// Lets the testbed start in this state instead of at rest.
+#[track_caller]
+pub fn start_at(fmu: &Fmu, x: [f64; 6]) {
+    fmu.ok(fmu.fmi2SetBoolean(&vr(Name::start_at_rest), 1, &0));
+    fmu.set(&STARTS, &x);
 }
 
 /// Sets all parameters that eq. (11) has: all at once, because they are checked together.

@@ -13,6 +13,7 @@ mod parameters;
 mod robustness;
 mod saved_states;
 mod serialized;
+mod start;
 mod steps;
 
 use fmu_export::{Interface, Variable, Variables};

@@ -1,6 +1,8 @@
 //! Model Exchange (section 3.2): eq. (11) for an importer's integrator.
 
-use crate::exact::{INPUTS, Random, STATES, UNKNOWNS, distance, jacobian, parameters, set_parameters};
+use crate::exact::{
+    INPUTS, Random, STATES, UNKNOWNS, distance, jacobian, parameters, set_parameters, start_at,
+};
 use crate::modes::{enter_continuous_time, in_mode};
 use crate::{new, vr};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
@@ -58,7 +60,7 @@ fn equations() {
 fn start_values_are_the_first_states() {
     let start = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
     let fmu = in_mode(ModelExchange, Instantiated);
-    fmu.set(&STATES, &start);
+    start_at(&fmu, start);
     fmu.initialize(0.0);
     assert_eq!(states(&fmu), start);
     enter_continuous_time(&fmu);

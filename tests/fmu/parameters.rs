@@ -5,7 +5,8 @@ use crate::vr;
 use fmu_export::Interface::CoSimulation;
 use fmu_export::Mode::*;
 use fmu_export::Status;
-use fmu_run::Importer as Fmu;
+use fmu_run::{Importer as Fmu, fmi3};
+use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 
 const NAN: f64 = f64::NAN;
@@ -71,5 +72,32 @@ fn one_damping_may_be_zero() {
         let message = fmu.refused("the other damping too", |fmu| fmu.try_set(&[other], &[0.0]));
         assert!(message.contains("c1 and c2"), "{message}");
         fmu.set(&[zero], &[0.1]);
+    }
+}
+
+/// Importers that ignore the status (fmi-sim, OMSimulator) must not run with Table 1 instead: the initialization is refused in
+/// the words of the first refusal, until the parameter is set to something possible.
+#[test]
+fn refused_parameters_stop_the_initialization() {
+    let words = |message: String| message.split_once(": ").unwrap().1.to_owned();
+    for interface in INTERFACES {
+        for (vr, wrong, right) in [(vr(Name::k1), -1.0, 60.0), (vr(Name::omega5_start), NAN, 0.0)] {
+            let fmu = in_mode(interface, Instantiated);
+            let first = words(fmu.refused("a start value", |fmu| fmu.try_set(&[vr], &[wrong])));
+            assert_eq!(words(fmu.refused("to begin", |fmu| fmu.fmi2EnterInitializationMode())), first);
+            fmu.set(&[vr], &[right]);
+            fmu.enter_initialization(0.0, None);
+            let first = words(fmu.refused("a start value", |fmu| fmu.try_set(&[vr], &[wrong])));
+            assert_eq!(words(fmu.refused("to end", |fmu| fmu.fmi2ExitInitializationMode())), first);
+            fmu.set(&[vr], &[right]);
+            fmu.ok(fmu.fmi2ExitInitializationMode());
+
+            let fmu = fmi3::Importer::of::<TestbedFmu>(interface);
+            let first = words(fmu.refused("a start value", |fmu| fmu.fmi3SetFloat64(&vr, 1, &wrong, 1)));
+            let enter = |fmu: &fmi3::Importer| fmu.fmi3EnterInitializationMode(0, 0.0, 0.0, 0, 0.0);
+            assert_eq!(words(fmu.refused("to begin", enter)), first);
+            fmu.set(&[vr], &[right]);
+            fmu.initialize(0.0);
+        }
     }
 }

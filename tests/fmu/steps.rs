@@ -1,5 +1,6 @@
 //! Steps at the edge of the range of numbers.
 
+use crate::exact::start_at;
 use crate::modes::in_mode;
 use crate::vr;
 use fmu_export::Interface::CoSimulation;
@@ -11,6 +12,7 @@ use prw_testbed::variables::Name;
 #[test]
 fn steps_out_of_the_range_of_numbers() {
     let fmu = in_mode(CoSimulation, StepComplete);
+    start_at(&fmu, [0.0; 6]);
     fmu.set(&[vr(Name::theta1)], &[f64::MAX]);
     fmu.set_rates([vr(Name::theta1)], [f64::MAX]);
     let message = fmu.refused("a step to infinity", |fmu| fmu.try_step(0.0, 10.0));

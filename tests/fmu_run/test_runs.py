@@ -72,7 +72,7 @@ def same(runs, expected, run=0):
 @pytest.mark.parametrize("read_before_set", [False, True])
 def test_the_testbed(testbed, read_before_set):
     time, inputs = motion()
-    start = {"use_omega": True, "k1": 77.0, "theta3": 0.1, "N": 5}
+    start = {"use_omega": True, "k1": 77.0, "start_at_rest": False, "theta3_start": 0.1, "N": 5}
     expected = by_fmpy(testbed, time, inputs, start, OUTPUTS, read_before_set=read_before_set)
     with fmu_run.Fmu(testbed) as fmu:
         runs = fmu.run(time, inputs=inputs, start=start, outputs=OUTPUTS, read_before_set=read_before_set)

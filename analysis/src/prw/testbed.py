@@ -97,8 +97,8 @@ class Testbed:
     def respond(
         self, motion: Motion, outputs: Sequence[str] = OUTPUTS, start: Mapping[str, float] = {}
     ) -> dict[str, Array]:
-        """Response to `motion` from rest at its first angles, or from the start values `start` (parameters and states
-        by name, in the FMU's units); each sample is one communication point.
+        """Response to `motion` from rest at its first angles, or from the start values `start` (parameters by name, in
+        the FMU's units); each sample is one communication point.
 
         Returns `outputs` (any Real variables) by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is
         read at time[k] with the motors' angles (and rates, where the motion has them) of sample k set, so a row
@@ -123,9 +123,7 @@ def driven_by(motion: Motion, start: Mapping[str, Any] = {}) -> dict[str, Any]:
     inputs = dict(zip(ANGLES, motion.theta.T))
     if motion.omega is not None:
         inputs.update(zip(RATES, motion.omega.T))
-    theta1, theta2 = motion.theta[0]
-    rest = {"theta3": theta1, "theta5": theta1, "theta4": theta2, "theta6": theta2}
-    return {"inputs": inputs, "start": {"use_omega": motion.omega is not None, **rest, **start}}
+    return {"inputs": inputs, "start": {"use_omega": motion.omega is not None, **start}}
 
 
 def _value(kind: str, text: str) -> Value:

@@ -95,6 +95,9 @@ pub trait ModelExchange: Model {
         Ok(Event::default())
     }
 
+    /// The importer goes on to integrate: after the events at the begin of the simulation, and after every other event.
+    fn continuous_time_entered(&mut self) {}
+
     /// The integrator has completed a step. Called if [`STEP_COMPLETED`](Self::STEP_COMPLETED).
     fn step_completed(&mut self, _time: f64) -> StepCompleted {
         StepCompleted::default()

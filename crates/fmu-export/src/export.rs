@@ -28,6 +28,8 @@ pub trait Exported: Model {
         Ok(Event::default())
     }
     #[doc(hidden)]
+    fn exported_continuous_time_entered(&mut self) {}
+    #[doc(hidden)]
     fn exported_step_completed(&mut self, _time: f64) -> StepCompleted {
         StepCompleted::default()
     }
@@ -154,6 +156,9 @@ macro_rules! offer {
         }
         fn exported_event(&mut self, time: f64) -> ::core::result::Result<$crate::Event, $crate::Error> {
             $crate::ModelExchange::event(self, time)
+        }
+        fn exported_continuous_time_entered(&mut self) {
+            $crate::ModelExchange::continuous_time_entered(self);
         }
         fn exported_step_completed(&mut self, time: f64) -> $crate::StepCompleted {
             $crate::ModelExchange::step_completed(self, time)

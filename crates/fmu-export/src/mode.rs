@@ -146,6 +146,12 @@ impl Situations {
         Self(self.0 | other.0)
     }
 
+    /// These but for the others.
+    #[must_use]
+    pub const fn without(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
+    }
+
     /// These for the interface types that the other set has any mode of.
     #[must_use]
     pub const fn where_any(self, other: Self) -> Self {
@@ -181,6 +187,10 @@ impl Situation {
         self.0 & set.0 != 0
     }
 }
+
+/// Where start values are set.
+pub(crate) const STARTING: Situations =
+    Situations::new(Standard::Fmi2, "IN", "IN").and(Situations::new(Standard::Fmi3, "IN", "IN"));
 
 /// The modes that instances can be in, short of fatal.
 pub(crate) const POSSIBLE: Situations = Situations::new(Standard::Fmi2, "INCFTE", "INMKTE")

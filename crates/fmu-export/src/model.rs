@@ -27,9 +27,10 @@ use std::path::PathBuf;
 /// | instantiate, reset | [`new`](Self::new) |
 /// | set inputs, states, start values of outputs | the value in its place, and the `then` of the table |
 /// | set parameters | the same on a copy, then [`update`](Self::update) once; the copy takes the model's place if that succeeds |
-/// | enter initialization | [`initialize`](Self::initialize) on a copy likewise |
+/// | enter initialization | [`initialize`](Self::initialize) on a copy likewise; refused while a start value that was refused has not been set to another |
 /// | read | [`calculate`](Self::calculate), if anything was set or stepped since the last time; then the `by` of the table |
 /// | step, event | [`CoSimulation::step`](crate::CoSimulation::step), [`ModelExchange::event`](crate::ModelExchange::event) |
+/// | enter Continuous-Time Mode | [`ModelExchange::continuous_time_entered`](crate::ModelExchange::continuous_time_entered) |
 /// | save, restore | `clone_from` |
 /// | de-serialize | on a copy, the values of the places and memory of the table; then [`update`](Self::update) |
 pub trait Model: Variables + Clone + Send + Sync {

@@ -67,8 +67,7 @@ pub const fn find_states<M, const N: usize>(table: &[Variable<M>]) -> [StateOfTa
 const fn derivative<M>(table: &[Variable<M>], state: u32) -> Option<u32> {
     let mut place = 0;
     while place < table.len() {
-        let of = table[place].differentiates();
-        if table[place].is_state_derivative() && matches!(of, Some(of) if of == state) {
+        if matches!(table[place].differentiates(), Some(of) if of == state) {
             return Some(place as u32);
         }
         place += 1;
@@ -223,7 +222,7 @@ macro_rules! variables {
                         );
                     )?
                     $(
-                        let variable = variable.calculated($crate::Read {
+                        let variable = variable.read_by($crate::Read {
                             base: $crate::base_of_calculation(|model: &$model| $crate::read(model, $calculate)),
                             real: |model| $crate::Scalar::real(&$crate::read(model, $calculate)),
                             value: |model| $crate::Scalar::value(&$crate::read(model, $calculate)),

@@ -213,7 +213,8 @@ impl<M> Variable<M> {
         self
     }
 
-    /// The variable, an output or local, as continuous-time state with an exact start value.
+    /// The variable, an output or local, as continuous-time state with an exact start value, or with one that is
+    /// [`calculated`](Self::calculated).
     ///
     /// It lives in the model (`in`): its value is what was set, or what the last step made of it.
     #[must_use]
@@ -237,6 +238,15 @@ impl<M> Variable<M> {
         self
     }
 
+    /// The variable, a state, with a start that the model calculates: until the model steps, or the importer sets states
+    /// or enters Continuous-Time Mode, the model brings it up to date whenever something that it follows from is set
+    /// (`then` in the table). Importers that want to set it are told by [`depends_on`](Self::depends_on) what to set instead.
+    #[must_use]
+    pub const fn calculated(mut self) -> Self {
+        self.initial = Some(Initial::Calculated);
+        self
+    }
+
     /// The variable, an output or local, with a start value that its calculation begins with.
     #[must_use]
     pub const fn approx(mut self) -> Self {
@@ -244,7 +254,8 @@ impl<M> Variable<M> {
         self
     }
 
-    /// The variable as time derivative of another, given by its name.
+    /// The variable, an output or local, as time derivative of another, given by its name. (No input: importers take
+    /// what is said to be a derivative for that of a state.)
     #[must_use]
     pub const fn derivative_of(mut self, of: Index) -> Self {
         self.derivative_of = Some(of);
@@ -273,7 +284,7 @@ impl<M> Variable<M> {
 
     /// Called by the macro: the value is calculated from the model.
     #[doc(hidden)]
-    pub const fn calculated(mut self, read: Read<M>) -> Self {
+    pub const fn read_by(mut self, read: Read<M>) -> Self {
         self.read = Some(read);
         self
     }
@@ -288,7 +299,8 @@ impl<M> Variable<M> {
         }
         self.settable = settable(self.causality, self.variability, self.initial, self.state, self.reinit);
         if !matches!(self.causality, Causality::Parameter) && matches!(self.of.base(), BaseType::Real) {
-            self.takes_reals = self.settable;
+            // A start value that is refused is remembered, which takes further ado.
+            self.takes_reals = self.settable.without(crate::mode::STARTING);
         }
         self
     }
@@ -334,8 +346,11 @@ impl<M> Variable<M> {
         if self.reinit && !self.state {
             return Some("only a state can be changed by events (reinit)");
         }
-        if self.derivative_of.is_some() && !(matches!(self.variability, Continuous) && is_real) {
-            return Some("only a continuous Real can be a derivative");
+        let is_calculated = matches!(self.causality, Output | Local);
+        if self.derivative_of.is_some()
+            && !(is_calculated && matches!(self.variability, Continuous) && is_real)
+        {
+            return Some("only a continuous Real output or local can be a derivative");
         }
         if self.depends_on.is_some() && !matches!(self.causality, Output | Local | CalculatedParameter) {
             return Some("only what is calculated depends on others");
@@ -355,7 +370,8 @@ impl<M> Variable<M> {
             }
             _ => {}
         }
-        let is_set = matches!(self.causality, Parameter | Input)
+        let is_set = self.state
+            || matches!(self.causality, Parameter | Input)
             || matches!(self.initial, Some(Initial::Exact | Initial::Approx))
                 && !matches!(self.variability, Constant);
         if is_set && self.store.is_none() {
@@ -421,11 +437,6 @@ impl<M> Variable<M> {
     /// Whether this is a state that events may change.
     pub const fn is_reinit(&self) -> bool {
         self.reinit
-    }
-
-    /// Whether this is the derivative of a state (and not, say, an input that is another's rate).
-    pub const fn is_state_derivative(&self) -> bool {
-        self.derivative_of.is_some() && matches!(self.causality, Causality::Output | Causality::Local)
     }
 
     /// Whether it begins with a value that is given: inputs, and what is exact or approx (section 2.2.7).

@@ -226,7 +226,7 @@ fn check_references<M: Exported>(variable: &Variable<M>) -> Result<()> {
 /// A state without derivative is refused when the model is compiled.
 fn check_derivatives<M: Exported>() -> Result<()> {
     for state in M::STATES.iter().map(|state| state.state) {
-        let is_derivative = |v: &&Variable<M>| v.is_state_derivative() && v.differentiates() == Some(state);
+        let is_derivative = |v: &&Variable<M>| v.differentiates() == Some(state);
         let count = M::TABLE.iter().filter(is_derivative).count();
         let name = M::TABLE[state as usize].name();
         ensure!(count == 1, "the state {name} has {count} derivatives among the variables");

@@ -82,7 +82,9 @@ impl<M: Exported> Sampler<M> {
         let mut refused = None;
         for _ in 0..100 {
             for (place, variable) in M::TABLE.iter().enumerate().filter(|(_, variable)| which(variable)) {
-                if let Some(start) = &self.starts[place]
+                // States of a running model have been set, however they start.
+                let zero = (self.running && variable.is_state()).then_some(&Value::Real(0.0));
+                if let Some(start) = self.starts[place].as_ref().or(zero)
                     && variable.variability() != Variability::Constant
                 {
                     let value = &mut point.values[place];
@@ -110,7 +112,7 @@ impl<M: Exported> Sampler<M> {
 /// A model at a point. An importer may set values before it enters Initialization Mode and in it, and sets states later.
 fn model_at<M: Exported>(point: &Point, running: bool) -> Result<M, Error> {
     let mut model = M::new(&Setup::new(point.interface))?;
-    set(&mut model, point, |_| true)?;
+    set(&mut model, point, Variable::has_start)?;
     model.initialize(&Experiment { start_time: point.time, ..Experiment::default() })?;
     // What is approx has been calculated now.
     let is_set = |variable: &Variable<M>| {

@@ -75,6 +75,7 @@ impl CheckedSystem<'_> {
             .containing([
                 Element::new("ssd:Elements").containing(elements),
                 Element::new("ssd:Connections").containing(from_inputs.chain(inside).chain(to_outputs)),
+                self.omsimulator(),
             ]);
         let root = Element::new("ssd:SystemStructureDescription")
             .with("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription")
@@ -90,6 +91,25 @@ impl CheckedSystem<'_> {
             .containing([system])
             .containing(enumerations(&used)?)
             .containing([self.units_of(&used), experiment]))
+    }
+
+    /// The kind of master, without which OMSimulator does not take the file; others skip it. The tolerances are
+    /// OMSimulator's own: it wants them with every master, also with one of fixed steps.
+    fn omsimulator(&self) -> Element {
+        let master = Element::new("oms:FixedStepMaster")
+            .with("description", "oms-ma")
+            .with("stepSize", self.system.step_size)
+            .with("absoluteTolerance", 1e-4)
+            .with("relativeTolerance", 1e-4);
+        let annotations = Element::new("oms:Annotations")
+            .with(
+                "xmlns:oms",
+                "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
+            )
+            .containing([Element::new("oms:SimulationInformation").containing([master])]);
+        let annotation =
+            Element::new("ssc:Annotation").with("type", "org.openmodelica").containing([annotations]);
+        Element::new("ssd:Annotations").containing([annotation])
     }
 
     /// The variables that have connectors.

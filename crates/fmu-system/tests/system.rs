@@ -149,6 +149,10 @@ fn the_ssp_has_everything_and_is_the_same_every_time() {
     ] {
         assert_eq!(ssd.matches(part).count(), 1, "{part}\n{ssd}");
     }
+    // What OMSimulator wants to know, the last in the system.
+    let annotations: String = ssd.lines().map(str::trim).collect();
+    let last = r#"<oms:SimulationInformation><oms:FixedStepMaster description="oms-ma" stepSize="0.001" absoluteTolerance="0.0001" relativeTolerance="0.0001"/></oms:SimulationInformation></oms:Annotations></ssc:Annotation></ssd:Annotations></ssd:System>"#;
+    assert!(annotations.contains(last), "{ssd}");
     // Units that are used, and no others.
     assert!(ssd.contains(r#"<ssc:Unit name="rad">"#) && !ssd.contains(r#"<ssc:Unit name="s">"#), "{ssd}");
     assert!(read("resources/plant.ssv").contains(r#"<ssv:Boolean value="true"/>"#));

@@ -60,7 +60,6 @@ def identify(
     # They take a while to load.
     from threadpoolctl import threadpool_limits
 
-    from prw.identification.advice import advice
     from prw.identification.experiment import prepare
     from prw.identification.fit import fit
     from prw.identification.model import Model
@@ -79,7 +78,11 @@ def identify(
         experiments = [prepare(each, quantum) for each in measured]
         solution = fit(model, experiments, task, starts, seed)
         sure = certainty(solution)
-        hints = advice(model, experiments, solution) if sure.undetermined else []
+        hints = []
+        if sure.undetermined:
+            from prw.identification.advice import advice
+
+            hints = advice(model, experiments, solution)
         sources = tuple(str(each.source) for each in measured)
         return Identification(model.fmu, model.known, sources, tuple(experiments), solution, sure, tuple(hints))
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import convolve1d
 from scipy.sparse import csr_matrix
 
 from prw.channels import MEASURED
@@ -233,7 +232,8 @@ def _power(errors: Complex) -> Array:
     # In a periodic motion errors are lines. What a line leaks to its neighbours is the same error once more, however
     # little it is: they count as having what a line between two frequencies leaks.
     leaked = 1 / (np.pi * np.arange(1, FURTHEST + 1)) ** 2
-    power: Array = np.maximum(mean, convolve1d(mean, [*leaked[::-1], 0.0, *leaked], axis=0, mode="constant"))
+    spread = [np.convolve(column, [*leaked[::-1], 0.0, *leaked])[FURTHEST:-FURTHEST] for column in mean.T]
+    power: Array = np.maximum(mean, np.column_stack(spread))
     return power
 
 

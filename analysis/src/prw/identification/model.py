@@ -57,6 +57,7 @@ class Parameters:
             for display in unit.displayUnits
         }
         for v in description.modelVariables:
+            # Where a run starts is no property of the testbed.
             if v.causality == "parameter" and v.type == "Real" and not v.name.endswith("_start"):
                 shown = v.displayUnit or v.unit
                 factor = factors.get((v.unit, shown), 1.0)

@@ -96,6 +96,8 @@ def _figure(time: Array, modelled: Array, residual: Array, unit: str) -> str:
         close.set(title="measured and modelled, the liveliest second", ylabel=unit, xlim=time[part][[0, -1]])
         all_of_it.plot(*envelope(time, residual, INTERVALS), color=BLUE, linewidth=0.7)
         all_of_it.set(title="residual, all of it", ylabel=unit, xlabel="time (s)", xlim=time[[0, -1]])
+        for axes in (close, all_of_it):
+            axes.locator_params(axis="y", nbins=4)
         text = io.StringIO()
         figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
     svg = text.getvalue()

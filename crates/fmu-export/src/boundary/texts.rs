@@ -2,7 +2,7 @@
 
 use super::string;
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, refuse};
+use crate::instance::{Instance, Outcome};
 use crate::types::BaseType;
 use crate::value::Value;
 use libc::c_char;
@@ -37,18 +37,18 @@ pub(crate) unsafe fn set_texts<M: Exported>(
     values: &[*const c_char],
 ) -> Outcome {
     let mut texts = Vec::with_capacity(vr.len());
-    for (vr, value) in vr.iter().zip(values) {
+    for (place, value) in values.iter().enumerate() {
         // SAFETY: by contract NULL or a string.
-        match unsafe { string(*value) }.map(CStr::to_str) {
-            Some(Ok(text)) => texts.push(Value::String(text.to_owned())),
-            Some(Err(_)) => {
-                return refuse(format!(
-                    "the text for {} is not UTF-8",
-                    instance.name(*vr, BaseType::String)?
-                ));
+        let fault = match unsafe { string(*value) }.map(CStr::to_str) {
+            Some(Ok(text)) => {
+                texts.push(Value::String(text.to_owned()));
+                continue;
             }
-            None => return refuse(format!("the text for {} is NULL", instance.name(*vr, BaseType::String)?)),
-        }
+            Some(Err(_)) => "not UTF-8",
+            None => "NULL",
+        };
+        let why = |name: &str| format!("the text for {name} is {fault}");
+        return instance.refuse_value(vr, &[BaseType::String], place, why);
     }
     instance.set(vr, &[BaseType::String], texts.iter().cloned())
 }

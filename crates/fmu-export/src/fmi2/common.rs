@@ -9,7 +9,7 @@ use crate::boundary::{
     set_debug_logging, set_state, set_texts,
 };
 use crate::export::Exported;
-use crate::instance::{Direction, Instance, Outcome, refuse};
+use crate::instance::{Direction, Instance, Outcome};
 use crate::model::Experiment;
 use crate::types::BaseType;
 use crate::value::Value;
@@ -131,8 +131,9 @@ pub unsafe fn fmi2SetBoolean<M: Exported>(
     // SAFETY: by contract arrays of this length.
     let (vr, values) = unsafe { (array(vr, count, "vr")?, array(values, count, "value")?) };
     if let Some(place) = values.iter().position(|value| !(0..=1).contains(value)) {
-        let name = instance.name(vr[place], BaseType::Boolean)?;
-        return refuse(format!("{name} must be 0 (false) or 1 (true), it is {}", values[place]));
+        return instance.refuse_value(vr, &[BaseType::Boolean], place, |name| {
+            format!("{name} must be 0 (false) or 1 (true), it is {}", values[place])
+        });
     }
     instance.set(vr, &[BaseType::Boolean], values.iter().map(|value| Value::Boolean(*value == 1)))
 }

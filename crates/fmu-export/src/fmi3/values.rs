@@ -7,7 +7,7 @@ use super::common::same;
 use super::types::*;
 use crate::boundary::{array, get_texts, output, set_texts};
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, refuse};
+use crate::instance::{Instance, Outcome};
 use crate::types::BaseType;
 use crate::value::Value;
 use std::mem::MaybeUninit;
@@ -148,8 +148,9 @@ pub unsafe fn fmi3SetBoolean<M: Exported>(
     // SAFETY: by contract arrays of these lengths.
     let (vr, values) = unsafe { to_read(vr, count, values, value_count) }?;
     if let Some(place) = values.iter().position(|value| *value > 1) {
-        let name = instance.name(vr[place], BaseType::Boolean)?;
-        return refuse(format!("{name} must be 0 (false) or 1 (true), it is {}", values[place]));
+        return instance.refuse_value(vr, &[BaseType::Boolean], place, |name| {
+            format!("{name} must be 0 (false) or 1 (true), it is {}", values[place])
+        });
     }
     instance.set(vr, &[BaseType::Boolean], values.iter().map(|value| Value::Boolean(*value == fmi3True)))
 }

@@ -22,6 +22,9 @@ impl<M: Exported> Instance<M> {
         if !is_unknown {
             return Ok(Vec::new());
         }
+        if !initial && variable.is_state() {
+            return Ok(vec![vr]);
+        }
         let is_known = |known: &Variable<M>| match known.causality() {
             Causality::Input | Causality::Independent => true,
             _ if initial => {

@@ -43,7 +43,7 @@ impl<M: Exported> Instance<M> {
         }
         for vr in unknowns {
             let variable = self.variable(*vr, BaseType::Real)?;
-            if variable.causality() != Causality::Output && !variable.is_state_derivative() {
+            if variable.causality() != Causality::Output && variable.differentiates().is_none() {
                 return refuse(format!(
                     "{} is no unknown: neither output nor state derivative",
                     variable.name()

@@ -25,6 +25,7 @@ use crate::status::Status;
 use crate::types::{BaseType, NUMBER, TIME};
 use crate::value::Value;
 use crate::variable::{Causality, Read, Variable};
+use std::collections::BTreeMap;
 
 /// An instance of model `M`.
 pub(crate) struct Instance<M> {
@@ -35,6 +36,8 @@ pub(crate) struct Instance<M> {
     importer: Importer,
     setup: Setup,
     state: State<M>,
+    /// Why start values were refused, of the variables that have been set to no other since.
+    refused: BTreeMap<u32, String>,
     /// Texts that the importer reads until the next call.
     pub texts: Vec<std::ffi::CString>,
     /// Bytes that the importer reads until the next call.
@@ -118,6 +121,7 @@ impl<M: Exported> Instance<M> {
             importer,
             setup,
             state,
+            refused: BTreeMap::new(),
             texts: Vec::new(),
             bytes: Vec::new(),
         };
@@ -150,6 +154,7 @@ impl<M: Exported> Instance<M> {
     /// Replaces everything that a saved state holds.
     fn replace(&mut self, state: State<M>) {
         self.state = state;
+        self.refused.clear();
         self.enter(self.state.mode);
     }
 
@@ -193,6 +198,7 @@ impl<M: Exported> Instance<M> {
     }
 
     pub fn enter_initialization_mode(&mut self) -> Outcome {
+        self.check_start_values()?;
         let experiment = self.state.experiment;
         self.try_on_copy(|model| model.initialize(&experiment))?;
         self.enter(Mode::Initialization);
@@ -209,6 +215,7 @@ impl<M: Exported> Instance<M> {
     }
 
     pub fn exit_initialization_mode(&mut self) -> Outcome {
+        self.check_start_values()?;
         let mode = match self.setup.interface {
             Interface::CoSimulation if self.importer.event_mode => Mode::Event,
             Interface::CoSimulation => {
@@ -284,7 +291,7 @@ impl<M: 'static> Implicit<M> {
 
     /// Any of them: who reads it has its value from the model.
     const INDICATOR: &'static Variable<M> = &Variable::local(&NUMBER)
-        .calculated(Read { base: BaseType::Real, real: |_| f64::NAN, value: |_| Value::Real(f64::NAN) })
+        .read_by(Read { base: BaseType::Real, real: |_| f64::NAN, value: |_| Value::Real(f64::NAN) })
         .finished("eventIndicator", "An event happens where it changes its sign");
 }
 

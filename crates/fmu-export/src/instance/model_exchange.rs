@@ -34,6 +34,8 @@ impl<M: Exported> Instance<M> {
     }
 
     pub fn enter_continuous_time_mode(&mut self) {
+        self.state.model.exported_continuous_time_entered();
+        self.state.stale = true;
         self.enter(Mode::ContinuousTime);
     }
 

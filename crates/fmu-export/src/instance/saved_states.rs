@@ -69,6 +69,7 @@ impl<M: Exported> Instance<M> {
         saved.origin.check(self.origin()).or_else(refuse)?;
         self.check_event_mode(&saved.state)?;
         self.state.clone_from(&saved.state);
+        self.refused.clear();
         self.enter(self.state.mode);
         Ok(())
     }

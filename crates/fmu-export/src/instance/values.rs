@@ -2,9 +2,10 @@
 
 use super::{Instance, Outcome, finite, implicit_value, refuse, refuse_with};
 use crate::export::Exported;
+use crate::mode::STARTING;
 use crate::types::{Attributes, BaseType};
 use crate::value::Value;
-use crate::variable::{Causality, Variable};
+use crate::variable::{Causality, Initial, Variable};
 use std::mem::MaybeUninit;
 
 impl<M: Exported> Instance<M> {
@@ -97,10 +98,51 @@ impl<M: Exported> Instance<M> {
         bases: &[BaseType],
         values: impl Iterator<Item = Value> + Clone,
     ) -> Outcome {
+        self.check_all_settable(vr, bases)?;
+        let set = self.set_settable(vr, values);
+        self.remember(vr, set)
+    }
+
+    /// Refuses to set variables because the value at one place is none of its type. `why` is given the variable's name.
+    #[cold]
+    pub fn refuse_value(
+        &mut self,
+        vr: &[u32],
+        bases: &[BaseType],
+        place: usize,
+        why: impl FnOnce(&str) -> String,
+    ) -> Outcome {
+        self.check_all_settable(vr, bases)?;
+        let refusal = refuse(why(M::TABLE[vr[place] as usize].name()));
+        self.remember(vr, refusal)
+    }
+
+    fn check_all_settable(&self, vr: &[u32], bases: &[BaseType]) -> Outcome {
+        vr.iter().try_for_each(|vr| self.check_settable(self.variable_of(*vr, bases)?))
+    }
+
+    /// Some importers go on after a start value was refused, and the simulation would have another one than the user
+    /// wants: until it is set to one that is possible, the initialization is refused with the same words.
+    fn remember(&mut self, vr: &[u32], set: Outcome) -> Outcome {
+        if self.situation().is_in(STARTING) {
+            for vr in vr {
+                match &set {
+                    Ok(()) => _ = self.refused.remove(vr),
+                    Err(refusal) => _ = self.refused.insert(*vr, refusal.message.clone()),
+                }
+            }
+        }
+        set
+    }
+
+    pub(super) fn check_start_values(&self) -> Outcome {
+        self.refused.first_key_value().map_or(Ok(()), |(_, message)| refuse(message.clone()))
+    }
+
+    fn set_settable(&mut self, vr: &[u32], values: impl Iterator<Item = Value> + Clone) -> Outcome {
         let mut parameters = false;
         for (vr, value) in vr.iter().zip(values.clone()) {
-            let variable = self.variable_of(*vr, bases)?;
-            self.check_settable(variable)?;
+            let variable = &M::TABLE[*vr as usize];
             check_value(variable, &value)?;
             parameters |= variable.causality() == Causality::Parameter;
         }
@@ -130,9 +172,16 @@ impl<M: Exported> Instance<M> {
             return Ok(());
         }
         let (standard, interface, mode) = (self.standard(), self.interface(), self.mode());
+        let calculated = variable.initial() == Some(Initial::Calculated);
+        let sources = variable.dependencies().filter(|_| calculated).into_iter().flatten();
+        let sources: Vec<_> = sources.map(|known| M::TABLE[known as usize].name()).collect();
         refuse_with(|| {
+            let instead = match &sources[..] {
+                [] => String::new(),
+                sources => format!("; its start follows from {}: set these", sources.join(", ")),
+            };
             format!(
-                "{} cannot be set in state '{mode}' of {interface}; it can be set in: {}",
+                "{} cannot be set in state '{mode}' of {interface}; it can be set in: {}{instead}",
                 variable.name(),
                 variable.settable.names(standard, interface)
             )

@@ -15,6 +15,7 @@ macro_rules! for_every_toy {
         $function::<crate::toys::Sum>($($argument),*);
         $function::<crate::toys::Fuse>($($argument),*);
         $function::<crate::toys::Lazy>($($argument),*);
+        $function::<crate::toys::Balance>($($argument),*);
     }};
 }
 
@@ -33,5 +34,6 @@ mod random;
 mod refusals;
 mod saved_states;
 mod settable;
+mod start_values;
 mod tolerances;
 mod variables;

@@ -10,5 +10,6 @@ mod events;
 mod headers;
 mod hostile;
 mod same;
+mod start_values;
 mod states;
 mod values;

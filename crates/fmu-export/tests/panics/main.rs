@@ -186,6 +186,13 @@ fn contained<F: Standard>() {
     assert!(message.starts_with(&named("EnterInitializationMode")), "{message}");
     check_that_all_is_over(&fmu);
 
+    let fmu = F::new(ModelExchange);
+    fmu.start();
+    assert_eq!(fmu.set_fault(Fault::ContinuousTimeEntered), Status::Ok);
+    let message = fatal(&fmu, "continuous time", F::enter_continuous_time_mode);
+    assert!(message.starts_with(&named("EnterContinuousTimeMode")), "{message}");
+    check_that_all_is_over(&fmu);
+
     // A panic while an instance is freed ends with it.
     let fmu = F::new(CoSimulation);
     assert_eq!(fmu.set_fault(Fault::Drop), Status::Ok);

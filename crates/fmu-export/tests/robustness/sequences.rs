@@ -5,7 +5,7 @@ use fmu_run::FUNCTIONS;
 use fmu_run::careless::{RunBytes, Tally, run, run_seeds};
 
 /// All toys but the faulty one.
-const TOYS: [(&str, RunBytes); 7] = [
+const TOYS: [(&str, RunBytes); 8] = [
     ("oscillator", run::<Oscillator>),
     ("ball", run::<Ball>),
     ("counter", run::<Counter>),
@@ -13,6 +13,7 @@ const TOYS: [(&str, RunBytes); 7] = [
     ("sum", run::<Sum>),
     ("fuse", run::<Fuse>),
     ("lazy", run::<Lazy>),
+    ("balance", run::<Balance>),
 ];
 
 #[test]

@@ -18,6 +18,7 @@ pub enum Fault {
     Step,
     Indicators,
     Event,
+    ContinuousTimeEntered,
     StepCompleted,
     Nominals,
     Partial,
@@ -189,6 +190,10 @@ impl ModelExchange for Faulty {
     fn event(&mut self, _: f64) -> Result<Event, Error> {
         self.panic_if(Fault::Event);
         Ok(Event::default())
+    }
+
+    fn continuous_time_entered(&mut self) {
+        self.panic_if(Fault::ContinuousTimeEntered);
     }
 
     fn step_completed(&mut self, _: f64) -> StepCompleted {

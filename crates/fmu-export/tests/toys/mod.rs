@@ -2,6 +2,7 @@
 //! has more. Each is short, and complete.
 #![allow(dead_code, missing_docs, unused_imports, reason = "not every test uses every toy")]
 
+pub mod balance;
 pub mod ball;
 pub mod counter;
 pub mod faulty;
@@ -13,6 +14,7 @@ pub mod sum;
 pub mod talker;
 pub mod ticker;
 
+pub use balance::Balance;
 pub use ball::Ball;
 pub use counter::Counter;
 pub use faulty::Faulty;

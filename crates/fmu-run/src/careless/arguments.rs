@@ -38,7 +38,7 @@ impl Variables {
             real_starts: those(&|variable| real(variable) && variable.has_start()),
             unknowns: those(&|variable| {
                 real(variable)
-                    && (variable.causality() == Causality::Output || variable.is_state_derivative())
+                    && (variable.causality() == Causality::Output || variable.differentiates().is_some())
             }),
             whole: those(&|variable| [BaseType::Integer, BaseType::Enumeration].contains(&variable.base())),
             booleans: those(&|variable| variable.base() == BaseType::Boolean),

@@ -523,6 +523,7 @@ impl Slot {
     /// Remembers calls from here on.
     fn start_over(&mut self) {
         self.saved = self.fmu.bytes();
+        self.fmu.restore(&self.saved);
         self.since.clear();
     }
 }

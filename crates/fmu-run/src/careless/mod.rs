@@ -357,8 +357,11 @@ impl<M: Exported> Session<'_, M> {
 
 impl Slot {
     /// Remembers calls from here on.
+    ///
+    /// From a state that is restored: start values that were refused are no part of it.
     fn start_over(&mut self) {
         self.saved = self.fmu.bytes();
+        self.fmu.restore(&self.saved);
         self.since.clear();
     }
 }

@@ -1,0 +1,174 @@
+//! Start values: those that are refused are not forgotten, because some importers (fmi-sim, OMSimulator) go on after a
+//! refusal; those of states may be the model's to calculate.
+
+use crate::modes::{INTERFACES, enter_continuous_time, in_mode};
+use crate::toys::{Balance, Oscillator, Talker, balance, oscillator::Name, talker};
+use fmu_export::Interface::{self, CoSimulation, ModelExchange};
+use fmu_export::Mode::*;
+use fmu_export::fmi2::types::Status;
+use fmu_run::Importer;
+use std::ptr::null;
+
+const MASS: u32 = Name::mass as u32;
+const STIFFNESS: u32 = Name::stiffness as u32;
+
+/// The end of the mode that an instance is in.
+fn go_on(fmu: &Importer, instantiated: bool) -> Status {
+    if instantiated { fmu.fmi2EnterInitializationMode() } else { fmu.fmi2ExitInitializationMode() }
+}
+
+/// Refuses a start value by `wrong`, then the end of the mode with the same words until `right` is done.
+#[track_caller]
+fn is_remembered(fmu: &Importer, wrong: impl Fn(&Importer) -> Status, right: impl Fn(&Importer)) {
+    let instantiated = fmu.fmi2GetReal(&MASS, 1, &mut 0.0) != Status::Ok;
+    fmu.take_log();
+    let first = fmu.refused("a start value", &wrong);
+    for _ in 0..2 {
+        let again = fmu.refused("the end of the mode", |fmu| go_on(fmu, instantiated));
+        assert_eq!(again.split_once(": ").unwrap().1, first.split_once(": ").unwrap().1);
+    }
+    right(fmu);
+    fmu.ok(go_on(fmu, instantiated));
+}
+
+/// An instance in one of the modes in which start values are set.
+fn starting(interface: Interface) -> impl Iterator<Item = Importer> {
+    [Instantiated, Initialization].into_iter().map(move |mode| in_mode::<Oscillator>(interface, mode))
+}
+
+#[test]
+fn a_refused_start_value_is_remembered() {
+    for interface in INTERFACES {
+        for fmu in starting(interface) {
+            is_remembered(&fmu, |fmu| fmu.try_set(&[MASS], &[-1.0]), |fmu| fmu.set(&[MASS], &[3.0]));
+        }
+        for fmu in starting(interface) {
+            is_remembered(
+                &fmu,
+                |fmu| fmu.try_set(&[Name::force as u32], &[f64::NAN]),
+                |fmu| {
+                    fmu.set(&[Name::force as u32], &[0.0]);
+                },
+            );
+        }
+        for fmu in starting(interface) {
+            let springs =
+                |number: i32| move |fmu: &Importer| fmu.fmi2SetInteger(&(Name::springs as u32), 1, &number);
+            is_remembered(&fmu, springs(10), |fmu| fmu.ok(springs(9)(fmu)));
+        }
+        for fmu in starting(interface) {
+            let damped =
+                |value: i32| move |fmu: &Importer| fmu.fmi2SetBoolean(&(Name::damped as u32), 1, &value);
+            is_remembered(&fmu, damped(2), |fmu| fmu.ok(damped(1)(fmu)));
+        }
+        // What the model itself refuses.
+        for fmu in starting(interface) {
+            let damping = Name::damping as u32;
+            is_remembered(&fmu, |fmu| fmu.try_set(&[damping], &[1e6]), |fmu| fmu.set(&[damping], &[0.0]));
+        }
+    }
+    for mode in [Instantiated, Initialization] {
+        let fmu = in_mode::<Talker>(CoSimulation, mode);
+        let greet =
+            |text: *const std::ffi::c_char| fmu.fmi2SetString(&(talker::Name::greeting as u32), 1, &text);
+        for text in [null(), c"\xff".as_ptr()] {
+            assert_eq!(greet(text), Status::Error);
+        }
+        fmu.take_log();
+        let message = fmu.refused("the end of the mode", |fmu| go_on(fmu, mode == Instantiated));
+        assert!(message.contains("the text for greeting"), "{message}");
+        fmu.ok(greet(c"Good morning".as_ptr()));
+        fmu.ok(go_on(&fmu, mode == Instantiated));
+    }
+}
+
+/// Nothing of a call that is refused has been set, so each of its variables is to be set again.
+#[test]
+fn every_variable_of_a_refused_call() {
+    let fmu = in_mode::<Oscillator>(CoSimulation, Instantiated);
+    assert_eq!(fmu.try_set(&[STIFFNESS, MASS], &[60.0, -1.0]), Status::Error);
+    fmu.set(&[MASS], &[1.0]);
+    fmu.take_log();
+    assert_eq!(fmu.fmi2EnterInitializationMode(), Status::Error);
+    fmu.set(&[STIFFNESS], &[60.0]);
+    fmu.take_log();
+    fmu.initialize(0.0);
+}
+
+#[test]
+fn reset_and_restored_states_begin_anew() {
+    let fmu = in_mode::<Oscillator>(CoSimulation, Initialization);
+    let (state, bytes) = (fmu.save(), fmu.bytes());
+    let ways: [&dyn Fn(); 3] = [&|| fmu.ok(fmu.fmi2SetFMUstate(state)), &|| fmu.restore(&bytes), &|| {
+        fmu.ok(fmu.fmi2Reset());
+        fmu.enter_initialization(0.0, None);
+    }];
+    for way in ways {
+        assert_eq!(fmu.try_set(&[MASS], &[-1.0]), Status::Error);
+        fmu.take_log();
+        way();
+        fmu.ok(fmu.fmi2ExitInitializationMode());
+        fmu.restore(&bytes);
+    }
+    fmu.forget(state);
+}
+
+/// Importers probe: what is no start value has no consequences. Neither has a value that is refused while it runs.
+#[test]
+fn probing_has_no_consequences() {
+    for interface in INTERFACES {
+        let fmu = in_mode::<Oscillator>(interface, Instantiated);
+        for status in [
+            fmu.fmi2GetReal(&MASS, 1, &mut 0.0),
+            fmu.try_set(&[Name::energy as u32], &[1.0]),
+            fmu.try_set(&[999], &[1.0]),
+            fmu.try_set(&[Name::springs as u32], &[1.0]),
+            fmu.fmi2SetReal(&MASS, 1, null()),
+            fmu.fmi2ExitInitializationMode(),
+            fmu.try_step(0.0, 0.1),
+        ] {
+            assert_eq!(status, Status::Error);
+        }
+        fmu.take_log();
+        fmu.initialize(0.0);
+        assert_eq!(fmu.try_set(&[MASS], &[-1.0]), Status::Error);
+        fmu.take_log();
+        fmu.ok(fmu.fmi2Terminate());
+    }
+}
+
+const LOAD: u32 = balance::Name::load as u32;
+const STRETCH: u32 = balance::Name::stretch as u32;
+
+/// A state with a calculated start follows from the rest until the first step, or until it is the importer's.
+#[test]
+fn calculated_start() {
+    for interface in INTERFACES {
+        let fmu = Importer::of::<Balance>(interface);
+        fmu.set(&[LOAD], &[6.0]);
+        for mode in [Instantiated, Initialization] {
+            let message = if mode == Instantiated {
+                fmu.refused("a calculated start", |fmu| fmu.try_set(&[STRETCH], &[1.0]))
+            } else {
+                fmu.enter_initialization(0.0, None);
+                assert_eq!(fmu.get([STRETCH]), [3.0]);
+                fmu.refused("a calculated start", |fmu| fmu.try_set(&[STRETCH], &[1.0]))
+            };
+            assert!(message.ends_with("its start follows from load, stiffness: set these"), "{message}");
+        }
+        fmu.ok(fmu.fmi2ExitInitializationMode());
+        fmu.set(&[LOAD], &[8.0]);
+        assert_eq!(fmu.get([STRETCH]), [4.0]);
+        match interface {
+            CoSimulation => fmu.step(0.0, 0.1),
+            ModelExchange => _ = enter_continuous_time(&fmu),
+        }
+        fmu.set(&[LOAD], &[0.0]);
+        assert_eq!(fmu.get([STRETCH]), [4.0], "{interface}");
+    }
+    // OpenModelica sets states while still in event mode.
+    let fmu = in_mode::<Balance>(ModelExchange, Event);
+    fmu.ok(fmu.fmi2SetContinuousStates(&7.0, 1));
+    fmu.set(&[LOAD], &[8.0]);
+    assert_eq!(fmu.get([STRETCH]), [7.0]);
+}

@@ -1,0 +1,268 @@
+//! How the testbed starts: at rest with the motors, in whatever order an importer says where they are, or in the state
+//! that is given.
+
+use crate::exact::{INPUTS, STARTS, STATES, distance, start_at};
+use crate::modes::{INTERFACES, enter_continuous_time, in_mode};
+use crate::{new, vr};
+use fmu_export::Interface::{self, CoSimulation, ModelExchange};
+use fmu_export::Mode::*;
+use fmu_export::Status;
+use fmu_run::{Importer as Fmu, fmi3};
+use prw_testbed::TestbedFmu;
+use prw_testbed::variables::Name;
+
+const THETA: [u32; 2] = [vr(Name::theta1), vr(Name::theta2)];
+const ANGLES: [f64; 2] = [0.7, -0.4];
+const REST: [f64; 6] = [0.7, -0.4, 0.7, -0.4, 0.0, 0.0];
+const GIVEN: [f64; 6] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
+
+/// A stage of an importer's way to the first step.
+type Stage = usize;
+const BEFORE_SETUP: Stage = 0;
+const INSTANTIATED: Stage = 1;
+const INITIALIZING: Stage = 2;
+const INITIALIZED: Stage = 3;
+
+/// The importer's calls up to the first step, with `act` at each stage.
+fn initialize(fmu: &Fmu, act: impl Fn(Stage)) {
+    act(BEFORE_SETUP);
+    fmu.ok(fmu.fmi2SetupExperiment(0, 0.0, 0.0, 0, 1.0));
+    act(INSTANTIATED);
+    fmu.ok(fmu.fmi2EnterInitializationMode());
+    act(INITIALIZING);
+    fmu.ok(fmu.fmi2ExitInitializationMode());
+    act(INITIALIZED);
+}
+
+fn initialize3(fmu: &fmi3::Importer, act: impl Fn(Stage)) {
+    act(BEFORE_SETUP);
+    fmu.ok(fmu.fmi3EnterInitializationMode(0, 0.0, 0.0, 0, 0.0));
+    act(INITIALIZING);
+    fmu.ok(fmu.fmi3ExitInitializationMode());
+    act(INITIALIZED);
+}
+
+#[track_caller]
+fn rests(fmu: &Fmu) {
+    assert_eq!(fmu.get(STATES), REST);
+    assert_eq!(fmu.get([vr(Name::tau1), vr(Name::tau2), vr(Name::der_theta3)]), [0.0; 3]);
+}
+
+/// In Co-Simulation it stays where it is; to the last bit, because nothing is twisted.
+#[test]
+fn rest_in_co_simulation() {
+    for stages in [vec![BEFORE_SETUP], vec![INSTANTIATED], vec![INITIALIZING], vec![INITIALIZED]] {
+        for use_omega in [0, 1] {
+            let fmu = new(CoSimulation);
+            fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &use_omega));
+            initialize(&fmu, |stage| {
+                if stages.contains(&stage) {
+                    fmu.set(&THETA, &ANGLES);
+                }
+            });
+            rests(&fmu);
+            for i in 0..50 {
+                fmu.set(&THETA, &ANGLES);
+                fmu.step(f64::from(i) * 0.01, 0.01);
+                rests(&fmu);
+            }
+        }
+    }
+}
+
+/// The angles that count are the last ones before the first step.
+#[test]
+fn the_last_angles_before_the_first_step_count() {
+    let fmu = new(CoSimulation);
+    initialize(&fmu, |stage| {
+        fmu.set(&THETA, &[stage as f64, 1.0]);
+        if stage >= INITIALIZING {
+            assert_eq!(fmu.get(STATES), [stage as f64, 1.0, stage as f64, 1.0, 0.0, 0.0]);
+        }
+    });
+    fmu.set(&THETA, &ANGLES);
+    fmu.step(0.0, 0.01);
+    rests(&fmu);
+    // From here on the motors have to move it.
+    fmu.set(&THETA, &[0.0; 2]);
+    assert_eq!(fmu.get(STATES), REST);
+}
+
+/// A first step that is refused is none.
+#[test]
+fn a_refused_step_starts_nothing() {
+    let fmu = in_mode(CoSimulation, StepComplete);
+    fmu.set(&THETA, &[f64::MAX, 0.0]);
+    fmu.set_rates(THETA, [f64::MAX; 2]);
+    assert_eq!(fmu.try_step(0.0, 10.0), Status::Error);
+    fmu.set(&THETA, &ANGLES);
+    fmu.set_rates(THETA, [0.0; 2]);
+    rests(&fmu);
+}
+
+#[test]
+fn rest_in_model_exchange() {
+    for stage in [BEFORE_SETUP, INSTANTIATED, INITIALIZING, INITIALIZED] {
+        let fmu = new(ModelExchange);
+        initialize(&fmu, |now| {
+            if now == stage {
+                fmu.set(&THETA, &ANGLES);
+            }
+        });
+        rests(&fmu);
+        enter_continuous_time(&fmu);
+        rests(&fmu);
+        let mut rates = [f64::NAN; 6];
+        fmu.ok(fmu.fmi2GetDerivatives(rates.as_mut_ptr(), 6));
+        assert_eq!(rates, [0.0; 6]);
+        // The importer integrates from here on, whether it has set states or not.
+        fmu.set(&THETA, &[0.0; 2]);
+        assert_eq!(fmu.get(STATES), REST);
+        fmu.ok(fmu.fmi2EnterEventMode());
+        fmu.set(&THETA, &[1.0; 2]);
+        assert_eq!(fmu.get(STATES), REST, "in a later event mode");
+    }
+}
+
+/// OpenModelica sets parameters late, and states that it has just read while still in event mode.
+#[test]
+fn late_parameters_and_states_in_event_mode() {
+    for given in [false, true] {
+        let fmu = new(ModelExchange);
+        fmu.set(&INPUTS, &[ANGLES[0], ANGLES[1], 3.0, -2.0]);
+        initialize(&fmu, |_| {});
+        if given {
+            start_at(&fmu, GIVEN);
+        } else {
+            fmu.set(&[vr(Name::k1)], &[60.0]);
+        }
+        let expected = if given { GIVEN } else { REST };
+        let mut x = [f64::NAN; 6];
+        fmu.ok(fmu.fmi2GetContinuousStates(x.as_mut_ptr(), 6));
+        assert_eq!(x, expected);
+        x[4] += 0.25;
+        fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), 6));
+        fmu.set(&THETA, &[5.0; 2]);
+        assert_eq!(fmu.get(STATES), x, "states that are set are the importer's");
+        enter_continuous_time(&fmu);
+        assert_eq!(fmu.get(STATES), x);
+    }
+}
+
+/// In the state that is given, set at any stage, until the first step only.
+#[test]
+fn a_given_start() {
+    for interface in INTERFACES {
+        for stage in [BEFORE_SETUP, INSTANTIATED, INITIALIZING, INITIALIZED] {
+            let fmu = new(interface);
+            initialize(&fmu, |now| {
+                if now == stage {
+                    start_at(&fmu, GIVEN);
+                }
+            });
+            fmu.set(&THETA, &ANGLES);
+            assert_eq!(fmu.get(STATES), GIVEN, "{interface}, {stage}");
+        }
+    }
+    let fmu = new(CoSimulation);
+    initialize(&fmu, |_| {});
+    fmu.step(0.0, 0.01);
+    start_at(&fmu, GIVEN);
+    assert_eq!(fmu.get(STATES), [0.0; 6], "after the first step");
+}
+
+/// Before the first step a saved state still follows the motors; a reset brings that back.
+#[test]
+fn saved_and_reset() {
+    for interface in INTERFACES {
+        let fmu = new(interface);
+        initialize(&fmu, |_| fmu.set(&THETA, &[0.1, 0.2]));
+        let (state, bytes) = (fmu.save(), fmu.bytes());
+        let go = || match interface {
+            CoSimulation => fmu.step(0.0, 0.01),
+            ModelExchange => enter_continuous_time(&fmu),
+        };
+        go();
+        let gone = fmu.bytes();
+        let restores: [&dyn Fn(); 2] = [&|| fmu.ok(fmu.fmi2SetFMUstate(state)), &|| fmu.restore(&bytes)];
+        for restore in restores {
+            restore();
+            fmu.set(&THETA, &ANGLES);
+            rests(&fmu);
+            fmu.restore(&gone);
+            fmu.set(&THETA, &ANGLES);
+            assert!(distance(&fmu.get(STATES), &REST) > 0.1, "{interface}");
+        }
+        fmu.ok(fmu.fmi2Reset());
+        initialize(&fmu, |_| fmu.set(&THETA, &ANGLES));
+        rests(&fmu);
+        fmu.forget(state);
+    }
+}
+
+fn get3(fmu: &fmi3::Importer) -> [f64; 6] {
+    fmu.get(STATES)
+}
+
+#[test]
+fn fmi3() {
+    for (interface, stage) in INTERFACES
+        .into_iter()
+        .flat_map(|interface| [BEFORE_SETUP, INITIALIZING, INITIALIZED].map(|s| (interface, s)))
+    {
+        let fmu = fmi3::Importer::of::<TestbedFmu>(interface);
+        initialize3(&fmu, |now| {
+            if now == stage {
+                fmu.set(&THETA, &ANGLES);
+            }
+        });
+        assert_eq!(get3(&fmu), REST, "{interface}");
+        if interface == CoSimulation {
+            fmu.step(0.0, 0.01);
+            assert_eq!(get3(&fmu), REST);
+        } else {
+            fmu.ok(fmu.fmi3EnterContinuousTimeMode());
+        }
+        fmu.set(&THETA, &[0.0; 2]);
+        assert_eq!(get3(&fmu), REST, "{interface}, after the start");
+    }
+    // In event mode FMI 3.0 lets an importer set one state by itself: the others are where they are.
+    let fmu = fmi3::Importer::of::<TestbedFmu>(ModelExchange);
+    fmu.set(&THETA, &ANGLES);
+    initialize3(&fmu, |_| {});
+    fmu.set(&[vr(Name::theta5)], &[9.0]);
+    fmu.set(&THETA, &[0.0; 2]);
+    assert_eq!(get3(&fmu), [0.7, -0.4, 9.0, -0.4, 0.0, 0.0]);
+    // And what is given is given, late, too.
+    let fmu = fmi3::Importer::of::<TestbedFmu>(ModelExchange);
+    initialize3(&fmu, |_| {});
+    fmu.ok(fmu.fmi3SetBoolean(&vr(Name::start_at_rest), 1, &0, 1));
+    fmu.set(&STARTS, &GIVEN);
+    assert_eq!(get3(&fmu), GIVEN);
+}
+
+/// Who wants to set a state itself is told what to set instead.
+#[test]
+fn states_are_not_set() {
+    let told = |message: &str, name: &str| {
+        let sources = format!("its start follows from start_at_rest, {name}_start, theta1: set these");
+        assert!(
+            message.contains(&format!("{name} cannot be set")) && message.ends_with(&sources),
+            "{message}"
+        );
+    };
+    for (interface, mode) in [
+        (CoSimulation, Instantiated),
+        (CoSimulation, Initialization),
+        (CoSimulation, StepComplete),
+        (ModelExchange, Initialization),
+        (ModelExchange, Event),
+    ] {
+        let fmu = in_mode(interface, mode);
+        for (vr, name) in [(vr(Name::theta3), "theta3"), (vr(Name::theta5), "theta5")] {
+            told(&fmu.refused("a state", |fmu| fmu.fmi2SetReal(&vr, 1, &0.5)), name);
+        }
+    }
+    let fmu = fmi3::Importer::of::<TestbedFmu>(Interface::CoSimulation);
+    told(&fmu.refused("a state", |fmu| fmu.fmi3SetFloat64(&vr(Name::theta3), 1, &0.5, 1)), "theta3");
+}
