@@ -5,7 +5,8 @@
 
 Every repetition has its own rig (parameters up to 30 % off Table 1, where the search starts), its own motion of 10 s
 at 1 kHz, its own noise, encoder positions and sensor offsets; see rig.py. Exit status 1 if an estimate is biased by
-more than 1 %, or a 95 % interval holds the truth in less than 92 % or more than 98 % of the repetitions.
+more than a quarter of its standard error and twice what is chance, or a 95 % interval holds the truth in less than 92 %
+of the repetitions.
 """
 
 from __future__ import annotations
@@ -85,7 +86,7 @@ def main() -> int:
         bias, scatter, claimed = errors[:, i].mean(), errors[:, i].std(), np.sqrt(np.mean(sigmas[:, i] ** 2))
         cover = inside[:, i].mean()
         rows[name] = {"bias": bias, "scatter": scatter, "claimed": claimed, "coverage": cover}
-        good &= abs(bias) < 0.01 and 0.92 <= cover <= 0.98
+        good &= abs(bias) < claimed / 4 + 2 * scatter / np.sqrt(len(errors)) and cover >= 0.92
         print(
             f"  {name:4}{bias:>12.4%}{scatter / np.sqrt(len(errors)):>10.4%}{scatter:>10.4%}{claimed:>10.4%}"
             f"{cover:>22.1%}"
@@ -93,7 +94,7 @@ def main() -> int:
     if options.out:
         options.out.parent.mkdir(parents=True, exist_ok=True)
         options.out.write_text(json.dumps({"repetitions": options.repetitions, "parameters": rows}, indent=2) + "\n")
-    print("unbiased, intervals honest" if good else "NOT within 1 % bias and 92 to 98 % coverage")
+    print("unbiased, intervals honest" if good else "BIASED, or intervals too narrow")
     return 0 if good else 1
 
 

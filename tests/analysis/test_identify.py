@@ -87,7 +87,7 @@ def test_several_experiments_in_motion_with_gaps_and_uneven_rows(prw, tmp_path, 
     assert result.returncode == 0, result.stderr
     found = report(tmp_path / "out" / "identified")
     check_estimates(found, experiment.parameters)
-    assert {c["values"] for c in found["channels"] if c["channel"] == "pitch"} == {400}
+    assert {c["samples"] for c in found["channels"] if c["channel"] == "pitch"} == {400}
 
 
 def test_build_fmu_takes_what_was_identified(prw, tmp_path, experiment, fmu):

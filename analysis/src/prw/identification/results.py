@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from prw.channels import MOTORS, si_unit
+from prw.extras import need
 from prw.files import write_text
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Prior, Solution
@@ -50,13 +51,13 @@ class Estimate(NamedTuple):
 
 
 class ChannelFit(NamedTuple):
-    """How one channel of one experiment came out. values: their number. noise: strength in the band beyond what encoders
+    """How one channel of one experiment came out. samples: how many have a value. noise: strength in the band beyond what encoders
     explain, residual: rms over all frequencies, offset: of the sensor, all SI. explained: share of its motion."""
 
     experiment: str
     channel: str
     unit: str
-    values: int
+    samples: int
     noise: float
     residual: float
     offset: float
@@ -181,7 +182,9 @@ class Identification:
         return "\n".join([*lines, *(f"note        {note}" for note in self.notes)])
 
     def report(self, path: str | os.PathLike[str]) -> None:
-        """Write the report, one HTML page that needs nothing beside it: estimates, doubts, residuals. Needs jinja2."""
+        """Write the report, one HTML page that needs nothing beside it: estimates, doubts, residuals. Raises UserError
+        without jinja2 and matplotlib, or where it cannot be written."""
+        need("identify", "jinja2", "matplotlib")
         from prw.identification.report import page
 
         write_text(Path(path), page(self))
