@@ -19,7 +19,8 @@ def record(run: Path) -> str:
     """Write what the sensors of the pretended rig say of point-to-point moves; returns what the rig is."""
     run.parent.mkdir(parents=True, exist_ok=True)
     paths = map(str, (HERE / "pretend_rig.py", HERE / "point_to_point.csv", run))
-    return subprocess.run([sys.executable, *paths, "--seed", "7"], stdout=subprocess.PIPE, text=True, check=True).stdout
+    command = [sys.executable, *paths, "--seed", "7", "--noise", "1"]
+    return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
 
 
 def main(out: Path = Path("out/identify")) -> prw.Identification:
