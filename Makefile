@@ -28,7 +28,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop examples test-examples dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -43,7 +43,8 @@ help:
 	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
 	@echo 'make profile                 count the instructions of a step, with callgrind'
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
-	@echo 'make docs                    write the documentation in the FMUs anew'
+	@echo 'make docs                    write the documentation in the FMUs and docs/examples.md anew'
+	@echo 'make examples                set up the examples                    (see docs/examples.md)'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make dist                    the FMUs for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
 	@echo 'make wheels                  the Python packages fmu-run and prw (with the FMU), ready to install -> dist/wheels/'
@@ -64,7 +65,7 @@ demo: need-rust need-python
 fmu: need-rust
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu
 
-test: test-rust test-python test-fmu test-closed-loop
+test: test-rust test-python test-fmu test-closed-loop test-examples
 
 # C programs are compiled against the standard's headers, which FMPy brings.
 headers: $(VENV)/study.stamp
@@ -103,14 +104,15 @@ profile: $(VENV)/study.stamp fmu
 	@benches/profile $(FMU) $(PY)
 
 # The figures and their copies for documentation and README.
-figures: need-rust $(VENV)/test.stamp fmu
+figures: need-rust $(VENV)/test.stamp closed-loop-fmus
 	@$(PY) -m tools figures --fmu $(FMU) --commit
 
 # The pages' tables come from the model descriptions.
-docs: need-rust $(VENV)/test.stamp
+docs: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe
 	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --describe
 	@$(PY) -m tools docs
+	@$(PY) -m tools examples
 
 # A controller FMU, the system of both, and the example FMU to copy.
 closed-loop-fmus: fmu
@@ -120,6 +122,12 @@ closed-loop-fmus: fmu
 
 closed-loop: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
 	@$(PY) -m tools closed-loop $(ARGS)
+
+examples: need-rust $(VENV)/examples.stamp closed-loop-fmus
+	@echo 'ready: $(PY) examples/lqr.py and the others; docs/examples.md shows them'
+
+test-examples: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
+	$(PYTEST) tests/examples
 
 test-closed-loop: $(VENV)/closed-loop.stamp closed-loop-fmus
 	$(PYTEST) tests/closed_loop
@@ -191,6 +199,11 @@ $(VENV)/study.stamp: $(VENV)/demo.stamp analysis/requirements-study.txt
 $(VENV)/test.stamp: $(VENV)/study.stamp tests/requirements.txt
 	@echo 'installing the Python packages of the tests (once)'
 	@$(PIP_INSTALL) -r tests/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@touch $@
+
+$(VENV)/examples.stamp: $(VENV)/study.stamp analysis/requirements-examples.txt
+	@echo 'installing the Python packages of the examples (once)'
+	@$(PIP_INSTALL) -r analysis/requirements-examples.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
 $(VENV)/closed-loop.stamp: $(VENV)/test.stamp tests/closed_loop/requirements.txt

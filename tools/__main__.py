@@ -3,6 +3,6 @@
 import sys
 
 from prw.cli import run
-from tools import closed_loop, documentation, figures
+from tools import closed_loop, documentation, examples, figures
 
-sys.exit(run("tools", "What only this repository needs.", (documentation, figures, closed_loop), None))
+sys.exit(run("tools", "What only this repository needs.", (documentation, examples, figures, closed_loop), None))

@@ -1,5 +1,5 @@
 """The pitch-roll wrist testbed in Python: simulate it, read recordings of it, find its parameters in them, linearize it,
-run it with thousands of parameter sets.
+run it with thousands of parameter sets, show it moving.
 
     import prw
 
@@ -16,6 +16,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from prw.animation import animate
     from prw.errors import UserError
     from prw.identification import identify
     from prw.identification.excitation import Excitation, excite
@@ -36,6 +37,7 @@ __all__ = [
     "Run",
     "StateSpace",
     "UserError",
+    "animate",
     "excite",
     "identify",
     "linearize",
@@ -55,6 +57,7 @@ _HOMES = {
     "Run": "simulation",
     "StateSpace": "state_space",
     "UserError": "errors",
+    "animate": "animation",
     "excite": "identification.excitation",
     "identify": "identification",
     "linearize": "linearization",
