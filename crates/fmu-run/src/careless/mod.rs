@@ -348,9 +348,9 @@ impl<M: Exported> Session<'_, M> {
             self.replay(index, index % 2 == 0);
             self.instances[index] = None;
         }
-        let stranger = Importer::of::<M>(offered::<M>());
+        let other = Importer::of::<M>(offered::<M>());
         for state in self.states {
-            stranger.forget(state);
+            other.forget(state);
         }
     }
 }
