@@ -28,7 +28,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -44,6 +44,8 @@ help:
 	@echo 'make profile                 count the instructions of a step, with callgrind'
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
 	@echo 'make docs                    write the documentation in the FMUs anew'
+	@echo 'make experiments             write the reference experiments in the FMU anew'
+	@echo 'make validation              the FMUs against them, under every importer here -> out/validation.html, .json'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make dist                    the FMUs for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
 	@echo 'make wheels                  the Python packages fmu-run and prw (with the FMU), ready to install -> dist/wheels/'
@@ -111,6 +113,14 @@ docs: need-rust $(VENV)/test.stamp
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe
 	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --describe
 	@$(PY) -m tools docs
+
+# What the FMU is to do in them comes from the oracle of the tests, not from the FMU.
+experiments: $(VENV)/test.stamp
+	@$(PY) tests/oracle/write_experiments.py
+
+# After closed-loop.stamp the masters of the closed loop are among the importers.
+validation: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
+	@$(PY) -m tools validation $(ARGS)
 
 # A controller FMU, the system of both, and the example FMU to copy.
 closed-loop-fmus: fmu
