@@ -130,6 +130,7 @@ class Agreement:
                 found = differences[name]
                 off = f"{name}: off by {found.largest:.2g} at {found.at:g} s, allowed {found.allowed:.2g}"
                 draw_panel(axis, self.time, Panel(off, found.unit.replace(".", " "), curves))
+            figure.align_ylabels(axes)
             axes[-1].set_xlabel("time (s)")
             axes[-1].set_xlim(self.time[0], self.time[-1])
         return figure
@@ -179,7 +180,8 @@ def nearest(result: Result, known: Sequence[Experiment]) -> Experiment:
             for name in sorted({*columns} & {*result.values}):
                 true = np.interp(time, columns["time"], columns[name])
                 off = interpolated(result.time, result.values[name], time) - true
-                shares.append(np.abs(off).max() / (np.abs(true).max() + 1e-3))
+                # At most 1, so that a column in another unit does not outweigh all others.
+                shares.append(min(np.abs(off).max() / (np.abs(true).max() + 1e-3), 1.0))
         return float(np.mean(shares)) if shares else np.inf
 
     return min(known, key=distance)

@@ -106,10 +106,12 @@ def _csv(path: Path) -> dict[str, Array]:
     numbers = np.empty((len(rows), len(header)))
     for (number, _), row, into in zip(lines[1:], rows, numbers):
         cells = row[:-1] if len(row) == len(header) + 1 and not row[-1].strip() else row
+        if len(cells) != len(header):
+            raise UserError(f"{path}, row {number}: {len(cells)} cells, but the header has {len(header)}")
         try:
             into[:] = [_number(cell, delimiter) for cell in cells]
         except ValueError as error:
-            raise UserError(f"{path}, row {number}: {len(cells)} cells below {len(header)} titles ({error})") from None
+            raise UserError(f"{path}, row {number}: {error}") from None
     return dict(zip(header, numbers.T))
 
 
@@ -123,6 +125,7 @@ def _mat(path: Path) -> dict[str, Array]:
     """The columns of a .mat file by title."""
     need("check", "scipy")
     from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
 
     try:
         content = loadmat(path, squeeze_me=True, struct_as_record=False, chars_as_strings=True)
@@ -130,7 +133,7 @@ def _mat(path: Path) -> dict[str, Array]:
             return _modelica(path, loadmat(path, chars_as_strings=False))
     except NotImplementedError:
         raise UserError(f"{path}: is of MATLAB's format 7.3; save it with: save('{path.name}', ..., '-v7')") from None
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, ValueError, TypeError, MatReadError) as error:
         raise UserError(f"{path}: is no .mat file that can be read ({error})") from None
     columns: dict[str, Array] = {}
     for name, value in content.items():
