@@ -48,6 +48,7 @@ help:
 	@echo 'make validation              the FMUs against them, under every importer here -> out/validation.html, .json'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make dist                    the FMUs for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
+	@echo '                             and the reference experiments as other vendors take them'
 	@echo 'make wheels                  the Python packages fmu-run and prw (with the FMU), ready to install -> dist/wheels/'
 	@echo 'make test-platforms          run both on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make dist/ again elsewhere and compare every byte'
