@@ -176,7 +176,7 @@ def test_two_components_with_one_name(right, soft, fmu, tmp_path):
     "spoil, note",
     [
         (lambda c: {**c, "roll": -c["roll"], "pitch": c["pitch"]}, "roll has the other sign"),
-        (lambda c: {n: v[:501] for n, v in c.items()}, "covers only a part of the experiment, which ends at 1 s"),
+        (lambda c: {n: v[:501] for n, v in c.items()}, "the result has only 0 to 0.5 s of the experiment's 0 to 1 s"),
         (lambda c: {n: v for n, v in c.items() if n != "tau2"}, "not in the result: tau2"),
         (
             lambda c: {

@@ -215,7 +215,8 @@ def _notes(bare: Agreement, result: Result) -> list[str]:
     """What is missing, and what may be the reason where the two do not agree."""
     experiment, notes = bare.experiment, []
     if bare.time[0] > 0 or bare.time[-1] < experiment.stop_time - SAME_TIME:
-        notes.append(f"the result covers only a part of the experiment, which ends at {experiment.stop_time:g} s")
+        span = f"{bare.time[0]:g} to {bare.time[-1]:g} s"
+        notes.append(f"the result has only {span} of the experiment's 0 to {experiment.stop_time:g} s")
     if missing := [name for name in experiment.outputs if name not in bare.found]:
         notes.append(f"not in the result: {', '.join(missing)}")
     if bare.agrees:
