@@ -120,11 +120,17 @@ def simulink_structure(columns):
     return {"out": {"time": columns["time"][:, None], "signals": signals}}
 
 
+def simulink_outports(columns):
+    """The same for a model's outports whose signals have no names."""
+    logged = simulink_structure(columns)["out"]
+    return {"yout": {**logged, "signals": np.array([{**signal, "label": ""} for signal in logged["signals"]])}}
+
+
 def simulink_fields(columns):
     return {"run": {name: values[:, None] for name, values in columns.items()}}
 
 
-@pytest.mark.parametrize("layout", [simulink_vectors, simulink_structure, simulink_fields])
+@pytest.mark.parametrize("layout", [simulink_vectors, simulink_structure, simulink_outports, simulink_fields])
 def test_simulink(right, soft, fmu, tmp_path, layout):
     for name, columns in (("right", right), ("soft", soft)):
         savemat(tmp_path / f"{name}.mat", layout(columns))
