@@ -28,7 +28,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop examples test-examples dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop examples test-examples dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -45,8 +45,11 @@ help:
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
 	@echo 'make docs                    write the documentation in the FMUs and docs/examples.md anew'
 	@echo 'make examples                set up the examples                    (see docs/examples.md)'
+	@echo 'make experiments             write the reference experiments in the FMU anew'
+	@echo 'make validation              the FMUs against them, under every importer here -> out/validation.html, .json'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make dist                    the FMUs for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
+	@echo '                             and the reference experiments as other vendors take them'
 	@echo 'make wheels                  the Python packages fmu-run and prw (with the FMU), ready to install -> dist/wheels/'
 	@echo 'make test-platforms          run both on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make dist/ again elsewhere and compare every byte'
@@ -113,6 +116,14 @@ docs: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
 	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --describe
 	@$(PY) -m tools docs
 	@$(PY) -m tools examples
+
+# What the FMU is to do in them comes from the oracle of the tests, not from the FMU.
+experiments: $(VENV)/test.stamp
+	@$(PY) tests/oracle/write_experiments.py
+
+# After closed-loop.stamp the masters of the closed loop are among the importers.
+validation: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
+	@$(PY) -m tools validation $(ARGS)
 
 # A controller FMU, the system of both, and the example FMU to copy.
 closed-loop-fmus: fmu
