@@ -3,6 +3,13 @@
 import sys
 
 from prw.cli import run
-from tools import closed_loop, documentation, figures, validation
+from tools import closed_loop, compatibility, documentation, figures, validation
 
-sys.exit(run("tools", "What only this repository needs.", (documentation, figures, validation, closed_loop), None))
+sys.exit(
+    run(
+        "tools",
+        "What only this repository needs.",
+        (documentation, figures, validation, closed_loop, compatibility),
+        None,
+    )
+)
