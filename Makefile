@@ -28,7 +28,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop examples test-examples dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop test-importers examples test-examples dist wheels test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -68,7 +68,7 @@ demo: need-rust need-python
 fmu: need-rust
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu
 
-test: test-rust test-python test-fmu test-closed-loop test-examples
+test: test-rust test-python test-fmu test-closed-loop test-importers test-examples
 
 # C programs are compiled against the standard's headers, which FMPy brings.
 headers: $(VENV)/study.stamp
@@ -142,6 +142,14 @@ test-examples: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-f
 
 test-closed-loop: $(VENV)/closed-loop.stamp closed-loop-fmus
 	$(PYTEST) tests/closed_loop
+
+# Also with tunable parameters, which some importers treat otherwise.
+importer-fmus: closed-loop-fmus
+	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --tunable --out target/fmu/tunable
+
+# What its tests saw goes into docs/compatibility.md by `python -m tools compatibility`.
+test-importers: $(VENV)/importers.stamp importer-fmus
+	$(PYTEST) tests/importers
 
 # The tools for other platforms have an environment of their own. What is not a Python package is installed
 # where that is possible, else named. BUILD_STD=1 compiles std with Debian's Rust, as is done without rustup.
@@ -220,6 +228,11 @@ $(VENV)/examples.stamp: $(VENV)/study.stamp analysis/requirements-examples.txt
 $(VENV)/closed-loop.stamp: $(VENV)/test.stamp tests/closed_loop/requirements.txt
 	@echo 'installing the co-simulation masters of the closed loop (once)'
 	@$(PIP_INSTALL) -r tests/closed_loop/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@touch $@
+
+$(VENV)/importers.stamp: $(VENV)/test.stamp tests/importers/requirements.txt
+	@echo 'installing more importers (once)'
+	@$(PIP_INSTALL) -r tests/importers/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
 $(DIST_VENV)/dist.stamp: $(DIST_VENV)/made.stamp platforms/requirements.txt
