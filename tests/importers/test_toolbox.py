@@ -57,5 +57,5 @@ def test_the_closed_loop_as_one_fmu(closed_loop, tmp_path, saw):
     share = max(difference.largest / difference.allowed for difference in agreement.variables.values())
     assert share < 0.6 and len(agreement.variables) == 6
     seen = f"agrees with the reference experiment closed_loop, within {share:.0%} of its tolerance"
-    run = "`fmucontainer -container prw_closed_loop.ssp:0.001 -auto-local`, the container run by FMPy at 1 ms"
+    run = "`fmucontainer` with `-auto-local` at 1 ms, what it makes run by FMPy"
     saw("FMU containers (fmucontainer)", TOOLBOX, "SSP of controller and testbed, CS", run, seen)
