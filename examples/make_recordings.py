@@ -19,8 +19,11 @@ START = (20.0, -15.0)  # deg
 #: Motor angles to go to, one after the other, in deg: pitch, roll, one motor alone, and both back at their own lengths.
 TARGETS = ((55.0, 20.0), (85.0, -10.0), (85.0, 30.0), (40.0, 10.0), START)
 
+#: Start (s), angles from and to (rad), longest way (rad).
+Move = tuple[float, list[float], list[float], float]
 
-def trapezoid(length, s):
+
+def trapezoid(length: float, s: float) -> tuple[float, float]:
     """Distance (rad) and speed (rad/s) at s seconds into a rest-to-rest move over `length` (rad)."""
     ramp = min(VELOCITY / ACCELERATION, math.sqrt(length / ACCELERATION))
     top = ACCELERATION * ramp
@@ -34,8 +37,8 @@ def trapezoid(length, s):
     return top * (s - ramp / 2), top
 
 
-def moves():
-    """The plan, (start (s), angles from (rad), angles to (rad), longest way (rad)) of each move, and its end (s)."""
+def moves() -> tuple[list[Move], float]:
+    """The plan, and its end (s)."""
     plan, time, here = [], PAUSE, [math.radians(a) for a in START]
     for target in TARGETS:
         there = [math.radians(a) for a in target]
@@ -47,7 +50,7 @@ def moves():
     return plan, time
 
 
-def motors(plan, t):
+def motors(plan: list[Move], t: float) -> tuple[list[float], list[float]]:
     """Angles (rad) and rates (rad/s) of both motors at time t: each move goes along a straight line, both in step."""
     begin, here, there, length = [move for move in plan if move[0] <= t][-1] if t >= plan[0][0] else plan[0]
     distance, speed = trapezoid(length, t - begin)
@@ -55,12 +58,12 @@ def motors(plan, t):
     return angles, [(b - a) * speed / length for a, b in zip(here, there)]
 
 
-def encoder(angle):
+def encoder(angle: float) -> float:
     """The angle as the encoder sees it: whole counts, in rad."""
     return math.floor(angle * COUNTS_PER_TURN / (2 * math.pi)) * 2 * math.pi / COUNTS_PER_TURN
 
 
-def write(name, times, with_rates):
+def write(name: str, times: list[float], with_rates: bool) -> None:
     """Write one recording; `with_rates` adds the drives' velocity, logged to 1 mrad/s."""
     plan, _ = moves()
     with open(Path(__file__).with_name(name), "w", encoding="ascii", newline="") as file:
@@ -72,7 +75,7 @@ def write(name, times, with_rates):
             table.writerow(row + ([f"{r + 0:.3f}" for r in rates] if with_rates else []))
 
 
-def main():
+def main() -> None:
     _, end = moves()
     write("point_to_point.csv", [k / 1000 for k in range(int(end * 1000) + 1)], with_rates=True)
     # A slow bus: about every 5 ms, never quite on time, and no velocities.

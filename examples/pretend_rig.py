@@ -1,9 +1,10 @@
 """A testbed to practise on: writes what sensors would say of a motion, for `prw identify`.
 
-    python examples/pretend_rig.py MOTION.csv RUN.csv [--seed N] [--measure tau1,tau2,theta3,theta4,pitch,roll]
+    python examples/pretend_rig.py MOTION.csv RUN.csv [--seed N] [--noise N] [--measure tau1,tau2,theta3,theta4,pitch,roll]
 
 It runs the FMU with parameters of its own choice (a seed, a rig), and then spoils its answers: encoders of 10000
-counts, torques with 20 mN.m of noise, an inertial sensor with 0.06 deg, and an unknown offset on each of them.
+counts, torques with 20 mN.m of noise, an inertial sensor with 0.06 deg, and an unknown offset on each of them:
+others in each experiment, unless --noise says which.
 """
 
 from __future__ import annotations
@@ -42,10 +43,11 @@ def main() -> None:
     parser.add_argument("motion", type=Path)
     parser.add_argument("run", type=Path)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--noise", type=int)
     parser.add_argument("--measure", default="tau1,tau2,theta3,theta4,pitch,roll")
     parser.add_argument("--fmu", type=Path, default=Path("target/fmu/prw_testbed.fmu"))
     options = parser.parse_args()
-    rig, sensors = np.random.default_rng(options.seed), np.random.default_rng()
+    rig, sensors = np.random.default_rng(options.seed), np.random.default_rng(options.noise)
     motion = read_motion(options.motion)
     with Testbed(options.fmu) as testbed:
         truth = {name: testbed.starts[name] * float(rig.uniform(0.75, 1.3)) for name in CHOSEN}

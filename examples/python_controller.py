@@ -6,6 +6,8 @@
 wires it to the testbed, because it has the inputs and outputs of prw_controller.fmu. Whoever runs the FMU needs Python.
 """
 
+from typing import Any
+
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 INPUTS = ("pitch_ref", "roll_ref", "pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
@@ -17,7 +19,7 @@ class PythonController(Fmi2Slave):
 
     description = "Point-to-point controller for the pitch-roll wrist testbed, written in Python"
 
-    def __init__(self, **kwargs):
+    def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         for name in INPUTS + OUTPUTS:
             setattr(self, name, 0.0)
@@ -31,7 +33,7 @@ class PythonController(Fmi2Slave):
         self.goal, self.origin = [0.0, 0.0], [0.0, 0.0]  # pitch and roll, rad
         self.correction = [0.0, 0.0]
 
-    def do_step(self, current_time, step_size):
+    def do_step(self, current_time: float, step_size: float) -> bool:
         reference, measured = [self.pitch_ref, self.roll_ref], [self.pitch, self.roll]
         if reference != self.goal:
             self.origin, self.goal, self.began = self._plan(current_time)[0], reference, current_time
@@ -46,7 +48,7 @@ class PythonController(Fmi2Slave):
         self.omega2 = pitch_rate - self.motor_per_roll * roll_rate
         return True
 
-    def _plan(self, time):
+    def _plan(self, time: float) -> tuple[list[float], list[float]]:
         """Pitch and roll on the path, and their rates: the quintic that begins and ends at rest."""
         s = min(max((time - self.began) / self.duration, 0.0), 1.0)
         way, slope = s**3 * (10 - 15 * s + 6 * s**2), 30 * s**2 * (1 - s) ** 2 / self.duration

@@ -1,5 +1,5 @@
 """Makes dist/: the FMUs for all platforms, for FMI 2.0 and FMI 3.0, the FMU of FMI 2.0 for importers on ARM Linux,
-checksums, bill of materials.
+reference experiments for other tools, checksums, bill of materials.
 
     python platforms/dist.py [--libraries FOLDER]
 
@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import bill_of_materials
+import cross_check
 from libraries import compile_library, universal
 from targets import ARM_FOLDERS, FMI3_FOLDERS, FOLDERS, MODEL, NATIVE_WINDOWS, ROOT, TARGETS, WINDOWS, Target
 from toolchain import say
@@ -41,6 +42,7 @@ def main() -> None:
         (folder / "arm" / f"{MODEL}.fmu").rename(folder / f"{MODEL}-linux-arm64.fmu")
         pack(folder, 3, FMI3_FOLDERS, libraries)
         (folder / "fmi3" / f"{MODEL}.fmu").rename(folder / f"{MODEL}-fmi3.fmu")
+        cross_check.pack(folder / f"{MODEL}.fmu", folder / f"{MODEL}-cross-check.zip")
         bill = bill_of_materials.FMU.bill
         shutil.copyfile(bill, folder / bill.name)
         if compilers:

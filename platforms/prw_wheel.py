@@ -13,9 +13,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from targets import MODEL, ROOT
-
 from dist import DIST
+from targets import MODEL, ROOT
 
 PACKAGE = ROOT / "analysis"
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")

@@ -9,9 +9,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from targets import ROOT
-
 from dist import DIST
+from targets import ROOT
 
 SUMS = "SHA256SUMS"
 

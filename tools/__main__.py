@@ -1,8 +1,9 @@
-"""`python -m tools`: the commands behind `make docs`, `make figures` and `make closed-loop`."""
+"""`python -m tools`: the commands behind `make docs`, `make figures`, `make validation` and `make closed-loop`."""
 
 import sys
 
 from prw.cli import run
-from tools import closed_loop, documentation, figures
+from tools import closed_loop, compatibility, documentation, examples, figures, validation
 
-sys.exit(run("tools", "What only this repository needs.", (documentation, figures, closed_loop), None))
+COMMANDS = (documentation, examples, figures, validation, closed_loop, compatibility)
+sys.exit(run("tools", "What only this repository needs.", COMMANDS, None))

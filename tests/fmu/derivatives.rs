@@ -71,17 +71,20 @@ fn pair_by_pair() {
     }
 }
 
-/// While initializing, Real parameters are knowns too: their derivatives against differences of the values,
-/// with the error of a central difference of this width.
+/// Real parameters are knowns too, while initializing and, for CasADi, later: their derivatives against differences of
+/// the values, with the error of a central difference of this width.
 #[test]
 fn with_respect_to_parameters() {
     const WIDTH: f64 = 1e-4;
     for seed in 1..10 {
         let mut random = Random(seed);
-        let fmu = in_mode(if seed % 2 == 0 { CoSimulation } else { ModelExchange }, Initialization);
-        set_parameters(&fmu, &parameters(seed));
-        fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &1));
-        start_at(&fmu, std::array::from_fn(|_| random.between(-1.0, 1.0)));
+        let mode = if seed % 3 == 0 { ContinuousTime } else { Initialization };
+        let fmu = in_mode(if seed % 3 == 1 { CoSimulation } else { ModelExchange }, mode);
+        if mode == Initialization {
+            set_parameters(&fmu, &parameters(seed));
+            fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &1));
+            start_at(&fmu, std::array::from_fn(|_| random.between(-1.0, 1.0)));
+        }
         fmu.set(&INPUTS, &[(); 4].map(|()| random.between(-1.0, 1.0)));
         for known in real_parameters() {
             // What is 0 is tried elsewhere.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -103,3 +105,27 @@ def test_unknown_names(pendulum: Path) -> None:
 def _description(fmu: Path) -> str:
     with zipfile.ZipFile(fmu) as archive:
         return archive.read("modelDescription.xml").decode()
+
+
+def test_each_one_hears_its_own_fmu(testbed: Path, tmp_path: Path) -> None:
+    """FMPy would crash in the second half: messages would go to the one that is gone. In a process of its own."""
+    program = f"""
+import gc, prw
+first = prw.Linearizer({str(testbed)!r})
+first.at()
+for _ in range(3):
+    other = prw.Linearizer({str(testbed)!r})
+    other.at()
+    other.close()
+    del other
+    gc.collect()
+used_again = [bytearray(4096) for _ in range(10000)]
+for _ in range(20):
+    try:
+        first.at({{"k1": -1.0}})
+    except prw.UserError as error:
+        said = str(error)
+print(said)
+"""
+    result = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert result.returncode == 0 and "k1 must not be below 0" in result.stdout, result

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import fmpy
 import numpy as np
-from fmpy.simulation import instantiate_fmu
 
-from tools.closed_loop.system import System, Value
+from prw.slave import Slave
+from tools.closed_loop.system import System
 
 #: Communication steps (s) and the one that stands for the exact solution; all are whole multiples of it.
 STEPS = (125e-6, 250e-6, 500e-6, 1e-3, 2e-3, 4e-3, 8e-3, 16e-3)
@@ -71,20 +71,16 @@ def couple(
         folder = stack.enter_context(tempfile.TemporaryDirectory())
         with zipfile.ZipFile(system.ssp) as archive:
             archive.extractall(folder)
+        values = {**system.start, **dict(system.inputs.values())}
         slaves = {}
         for name, fmu in system.fmus.items():
-            slaves[name] = _Slave(str(Path(folder, "resources", fmu)), str(Path(folder, name)), name)
-            stack.callback(slaves[name].close)
-        for name, value in {**system.start, **dict(system.inputs.values())}.items():
-            component, variable = name.split(".")
-            slaves[component].set_one(variable, value)
-        for slave in slaves.values():
-            slave.initialize()
+            start = {key.split(".")[1]: value for key, value in values.items() if key.split(".")[0] == name}
+            slaves[name] = stack.enter_context(Slave(Path(folder, "resources", fmu), start))
         wires = [_Wire(slaves, [w for w in system.connections if _ends(w) == ends]) for ends in _pairs(system)]
         watched = [(slaves[name.split(".")[0]], name.split(".")[1]) for name in outputs]
         rows = np.empty((n + 1, len(outputs)))
         for k, row in enumerate(rows):
-            row[:] = [slave.get_one(variable) for slave, variable in watched]
+            row[:] = [slave.get(variable)[0] for slave, variable in watched]
             if k < n:
                 # All outputs before any input: setting one must not change what another reads.
                 for wire in wires:
@@ -92,7 +88,7 @@ def couple(
                 for wire in wires:
                     wire.write(derivatives)
                 for slave in slaves.values():
-                    slave.fmu.doStep(currentCommunicationPoint=k * step, communicationStepSize=step)
+                    slave.step(step)
     return rows
 
 
@@ -108,40 +104,10 @@ def _pairs(system: System) -> list[list[str]]:
     return pairs
 
 
-class _Slave:
-    """An instance of an FMU, with variables by name."""
-
-    def __init__(self, path: str, folder: str, name: str):
-        description = fmpy.read_model_description(path)
-        fmpy.extract(path, unzipdir=folder)
-        self.variables = {variable.name: variable for variable in description.modelVariables}
-        self.fmu = instantiate_fmu(folder, description, fmi_type="CoSimulation")
-        self.fmu.setupExperiment(startTime=0.0)
-
-    def initialize(self) -> None:
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
-
-    def reference(self, name: str) -> int:
-        return int(self.variables[name].valueReference)
-
-    def get_one(self, name: str) -> float:
-        return float(self.fmu.getReal([self.reference(name)])[0])
-
-    def set_one(self, name: str, value: Value) -> None:
-        variable = self.variables[name]
-        setter = {"Real": self.fmu.setReal, "Integer": self.fmu.setInteger, "Boolean": self.fmu.setBoolean}
-        setter[variable.type]([variable.valueReference], [value])
-
-    def close(self) -> None:
-        self.fmu.terminate()
-        self.fmu.freeInstance()
-
-
 class _Wire:
     """All connections from one FMU to another, with arrays that are made once: a study has a hundred thousand steps."""
 
-    def __init__(self, slaves: dict[str, _Slave], wires: list[tuple[str, str]]):
+    def __init__(self, slaves: dict[str, Slave], wires: list[tuple[str, str]]):
         (self._from, self._to), n = (slaves[end] for end in _ends(wires[0])), len(wires)
         self._sources = (c_uint32 * n)(*(self._from.reference(start.split(".")[1]) for start, _ in wires))
         self._targets = (c_uint32 * n)(*(self._to.reference(end.split(".")[1]) for _, end in wires))

@@ -10,6 +10,9 @@ from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 
 #: The copies that are kept with the sources, for the documentation and the README.
 COMMITTED = Path("analysis/documentation/figures")
+#: README's first picture, and a still for the page in the FMU, which the film would double in size.
+FILM = Path("docs/wrist.gif")
+STILL = Path("wrist.png")
 #: Within the folder of what goes into an FMU: its icon for importers, and to scale it.
 ICON = Path("model.png")
 ICON_SVG = Path("documentation/model.svg")
@@ -31,7 +34,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--commit",
         action="store_true",
-        help=f"also renew the copies kept with the sources, in {COMMITTED}, and the icons of both FMUs",
+        help=f"also renew the copies kept with the sources, in {COMMITTED}, the icons of both FMUs, and {FILM}",
     )
     parser.set_defaults(run=run)
 
@@ -43,7 +46,7 @@ def run(arguments: argparse.Namespace) -> None:
     from tools.figures.gallery import figures
     from tools.figures.icon import draw_controller, draw_testbed
     from tools.figures.results import numbers, results
-    from tools.figures.writing import write_for_page, write_json, write_png, write_small_png, write_svg
+    from tools.figures.writing import write_for_page, write_json, write_picture, write_png, write_small_png, write_svg
 
     found = results(arguments.fmu)
     drawn = figures(found)
@@ -62,4 +65,10 @@ def run(arguments: argparse.Namespace) -> None:
         for page, draw in ((TESTBED, draw_testbed), (CONTROLLER, draw_controller)):
             write_png(page.content / ICON, draw(), dpi=128)
             write_svg(page.content / ICON_SVG, draw())
-        print(f"renewed {COMMITTED} and the icons")
+        from prw.animation import animate, still
+        from tools.figures.film import POSE, SPEED, story
+
+        run, captions = story(arguments.fmu, arguments.fmu.with_name("prw_controller.fmu"))
+        write_picture(COMMITTED / STILL, still(run, POSE))
+        animate(run, FILM, speed=SPEED, captions=captions)
+        print(f"renewed {COMMITTED}, the icons and {FILM}")

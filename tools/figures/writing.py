@@ -52,6 +52,13 @@ def write_small_png(path: Path, figure: Figure) -> None:
         few.save(temporary, format="PNG", optimize=True)
 
 
+def write_picture(path: Path, picture: Image.Image) -> None:
+    """Write a picture, with its transparency, as PNG of 255 colours."""
+    with replacing(path) as temporary:
+        few = picture.quantize(255, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        few.save(temporary, format="PNG", optimize=True)
+
+
 def write_json(path: Path, content: object) -> None:
     """Write JSON, indented and in order."""
     with replacing(path) as temporary:

@@ -1,5 +1,5 @@
 """The pitch-roll wrist testbed in Python: simulate it, read recordings of it, find its parameters in them, linearize it,
-run it with thousands of parameter sets.
+run it with thousands of parameter sets, show it moving, compare what other tools make of it with a reference.
 
     import prw
 
@@ -16,6 +16,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from prw.animation import animate
+    from prw.checking import check
+    from prw.checking.agreement import Agreement
     from prw.errors import UserError
     from prw.identification import identify
     from prw.identification.excitation import Excitation, excite
@@ -28,6 +31,7 @@ if TYPE_CHECKING:
     from prw.sweeps import sweep
 
 __all__ = [
+    "Agreement",
     "Excitation",
     "Identification",
     "Linearizer",
@@ -36,6 +40,8 @@ __all__ = [
     "Run",
     "StateSpace",
     "UserError",
+    "animate",
+    "check",
     "excite",
     "identify",
     "linearize",
@@ -47,6 +53,7 @@ __all__ = [
 #: The module of each name, loaded when the name is first used, so that `import prw` takes no time. No module or package
 #: in this folder may be called like a name here (as `identify` is): once imported, it would be in the name's place.
 _HOMES = {
+    "Agreement": "checking.agreement",
     "Excitation": "identification.excitation",
     "Identification": "identification.results",
     "Linearizer": "linearization",
@@ -55,6 +62,8 @@ _HOMES = {
     "Run": "simulation",
     "StateSpace": "state_space",
     "UserError": "errors",
+    "animate": "animation",
+    "check": "checking",
     "excite": "identification.excitation",
     "identify": "identification",
     "linearize": "linearization",

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from prw import progress
-from prw.commands import excite, identify, linearize, simulate, sweep
+from prw.commands import check, excite, identify, linearize, simulate, sweep
 from prw.errors import UserError
 
 #: Each subcommand is a module with add_parser(subparsers); the parser's default `run` takes the parsed arguments.
-COMMANDS = (simulate, linearize, identify, excite, sweep)
+COMMANDS = (simulate, check, linearize, identify, excite, sweep)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

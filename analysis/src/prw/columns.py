@@ -49,7 +49,7 @@ def columns(
     chosen: dict[str, str] = {}
     ignored = []
     for index, text in enumerate(header):
-        name, unit = _column(text)
+        name, unit = column(text)
         if name not in wanted:
             ignored.append(text or "(blank)")
             continue
@@ -76,7 +76,7 @@ def shown(header: Sequence[str]) -> str:
     return ", ".join(text or "(blank)" for text in header[:SHOWN]) + (", ..." if len(header) > SHOWN else "")
 
 
-def _column(text: str) -> tuple[str, str]:
+def column(text: str) -> tuple[str, str]:
     """The name in QUANTITIES that the header `text` stands for, and the unit in it; or "" twice."""
     match = COLUMN.match(text)
     if not match:

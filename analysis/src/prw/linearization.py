@@ -170,11 +170,7 @@ class Linearizer:
     def _initialize(self, values: Sequence[tuple[Any, Any]]) -> None:
         """Bring the instance, or a new one, to where derivatives may be asked for."""
         if self._instance is None:
-            from fmpy.simulation import instantiate_fmu
-
-            self._instance = instantiate_fmu(
-                self._folder, self._description, fmi_type=self._fmi_type, logger=self._hear, require_functions=False
-            )
+            self._instance = self._instantiated()
         else:
             self._instance.reset()
         fmu, fmi2 = self._instance, self._description.fmiVersion.startswith("2.")
@@ -191,6 +187,36 @@ class Linearizer:
                 if not needed:
                     break
             fmu.enterContinuousTimeMode()
+
+    def _instantiated(self) -> Any:
+        """A new instance, whose messages this hears."""
+        from fmpy import calloc, fmi2, free
+        from fmpy.simulation import instantiate_fmu
+
+        if not self._description.fmiVersion.startswith("2."):
+            return instantiate_fmu(
+                self._folder, self._description, fmi_type=self._fmi_type, logger=self._hear, require_functions=False
+            )
+        # With a `logger`, FMPy sends the messages of all its instances of FMI 2.0 to that of the last one, also when it
+        # is gone, and crashes. Without its help the arguments of printf are lost, no more.
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._hear)
+        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
+        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
+        interface, kind = (
+            (self._description.coSimulation, fmi2.FMU2Slave)
+            if self._fmi_type == "CoSimulation"
+            else (self._description.modelExchange, fmi2.FMU2Model)
+        )
+        instance = kind(
+            guid=self._description.guid,
+            unzipDirectory=self._folder,
+            modelIdentifier=interface.modelIdentifier,
+            instanceName="linearized",
+            requireFunctions=False,
+        )
+        instance.instantiate(callbacks=callbacks)
+        return instance
 
     def _partials(self, known: CArray[c_uint32]) -> list[float]:
         """The derivatives of all unknowns by one known."""

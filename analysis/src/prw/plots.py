@@ -15,6 +15,8 @@ from matplotlib.figure import Figure
 from prw.motion import Array, Motion
 
 BLUE, VERMILION = "#0072B2", "#D55E00"
+#: Of pitch and roll where the sides have the other two.
+GREEN, PURPLE = "#009E73", "#CC79A7"
 STYLE: Any = {
     "font.family": "DejaVu Sans",  # matplotlib brings it along
     "font.size": 10,

@@ -10,11 +10,12 @@ pub(crate) const fn settable(
     initial: Option<Initial>,
     state: bool,
     reinit: bool,
+    real: bool,
 ) -> Situations {
     let of_both = in_both(Standard::Fmi2, causality, variability, initial, state)
         .and(in_both(Standard::Fmi3, causality, variability, initial, state))
-        .and(tolerated(Standard::Fmi2, causality))
-        .and(tolerated(Standard::Fmi3, causality));
+        .and(tolerated(Standard::Fmi2, causality, real))
+        .and(tolerated(Standard::Fmi3, causality, real));
     of_both.and(in_event_mode(causality, variability, state, reinit))
 }
 
@@ -66,11 +67,11 @@ const fn in_event_mode(
 }
 
 /// Inputs before the initialization (OpenModelica, libcosim; FMI 3.0 allows it, section 2.3.2), parameters after it
-/// (OpenModelica, and users who tune).
-const fn tolerated(standard: Standard, causality: Causality) -> Situations {
+/// (OpenModelica, and users who tune), Real ones also between two evaluations (CasADi).
+const fn tolerated(standard: Standard, causality: Causality, real: bool) -> Situations {
     match causality {
         Causality::Input => Situations::new(standard, "I", "I"),
-        Causality::Parameter => Situations::new(standard, "C", "M"),
+        Causality::Parameter => Situations::new(standard, "C", if real { "MK" } else { "M" }),
         _ => Situations::NONE,
     }
 }

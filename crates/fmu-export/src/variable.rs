@@ -297,8 +297,10 @@ impl<M> Variable<M> {
         if let Some(fault) = self.fault() {
             refuse(name, fault);
         }
-        self.settable = settable(self.causality, self.variability, self.initial, self.state, self.reinit);
-        if !matches!(self.causality, Causality::Parameter) && matches!(self.of.base(), BaseType::Real) {
+        let real = matches!(self.of.base(), BaseType::Real);
+        self.settable =
+            settable(self.causality, self.variability, self.initial, self.state, self.reinit, real);
+        if real && !matches!(self.causality, Causality::Parameter) {
             // A start value that is refused is remembered, which takes further ado.
             self.takes_reals = self.settable.without(crate::mode::STARTING);
         }

@@ -144,7 +144,7 @@ cases! {
         /// N
         n = parameter(&COUNT) in v.four;
     }
-    stranger "the start value of gear must be one of 0 (Neutral), it is 1" {
+    unknown_item "the start value of gear must be one of 0 (Neutral), it is 1" {
         /// Gear
         gear = parameter(&HALF) in v.drive;
     }

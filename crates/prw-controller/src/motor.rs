@@ -42,7 +42,7 @@ impl Motor {
     /// Within the limits it gets there in the least number of samples; a goal that lies behind, or nearer
     /// than the motor can stop, is passed and returned to. Tells whether the motor is on its goal: there, or
     /// there and at rest two samples from now.
-    pub fn head_for(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
+    pub fn turn_towards(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
         let Limits { rate: max_rate, acceleration: max } = *limits;
         // In units of what full acceleration makes of a rate and an angle within one period.
         let (rate_unit, angle_unit) = (max * period, max * period * period);
@@ -56,7 +56,7 @@ impl Motor {
 }
 
 /// The highest rate v, at most `limit`, such that the rest of this sample and braking from v take the
-/// distance q: v/2 + D(v) = q, in the units of [`Motor::head_for`].
+/// distance q: v/2 + D(v) = q, in the units of [`Motor::turn_towards`].
 ///
 /// Braking takes m = floor(v) whole samples and the rest v - m in one more: D(v) = (m + 1/2) v - m (m + 1)/2,
 /// and so q = (m + 1) v - m (m + 1)/2, which is m (m + 1)/2 at v = m.
@@ -83,7 +83,7 @@ mod tests {
             if motor.angle == goal && motor.rate == 0.0 {
                 return (samples, farthest, motor);
             }
-            motor.head_for(goal, limits, PERIOD);
+            motor.turn_towards(goal, limits, PERIOD);
             assert!(motor.acceleration.abs() <= limits.acceleration);
             motor = motor.after(PERIOD);
             assert!(motor.rate.abs() <= limits.rate * (1.0 + 1e-12), "{}", motor.rate);
@@ -123,7 +123,7 @@ mod tests {
         let limits = Limits { rate: 3.0, acceleration: 30.0 };
         let (_, _, mut motor) = go(Motor::default(), 0.7, &limits);
         for _ in 0..1000 {
-            motor.head_for(0.7, &limits, PERIOD);
+            motor.turn_towards(0.7, &limits, PERIOD);
             motor = motor.after(PERIOD);
             assert!((motor.angle - 0.7).abs() < 1e-12 && motor.rate.abs() < 1e-9, "{motor:?}");
         }
@@ -145,7 +145,7 @@ mod tests {
         for goal in [f64::INFINITY, f64::NEG_INFINITY, f64::MAX, -f64::MAX, 5e-324] {
             let mut motor = Motor::default();
             for _ in 0..1000 {
-                motor.head_for(goal, &limits, PERIOD);
+                motor.turn_towards(goal, &limits, PERIOD);
                 motor = motor.after(PERIOD);
             }
             assert!(motor.angle.is_finite() && motor.rate.abs() <= 3.0, "{motor:?}");

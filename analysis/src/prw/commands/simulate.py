@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +40,12 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
     )
+    parser.add_argument(
+        "--animate",
+        type=Path,
+        metavar="FILE",
+        help="also show the wrist moving: a .gif, an .mp4 (needs the extra prw[movie]) or an .html",
+    )
     parser.set_defaults(run=run)
 
 
@@ -61,7 +68,13 @@ def run(arguments: argparse.Namespace) -> None:
     response = simulate(motion, fmu=arguments.fmu)
     response.to_csv(table)
     write_png(picture, response.plot(title, angles=recorded))
-    print("\n".join(_summary(arguments, response, table, picture)))
+    written = [table, picture]
+    if arguments.animate is not None:
+        from prw.animation import animate  # matplotlib takes a while to load
+
+        animate(response, arguments.animate)
+        written.append(arguments.animate)
+    print("\n".join(_summary(arguments, response, written)))
 
 
 def write_png(path: Path, figure: Figure) -> None:
@@ -70,7 +83,7 @@ def write_png(path: Path, figure: Figure) -> None:
         figure.savefig(temporary, dpi=150)
 
 
-def _summary(arguments: argparse.Namespace, response: Run, table: Path, picture: Path) -> list[str]:
+def _summary(arguments: argparse.Namespace, response: Run, written: Sequence[Path]) -> list[str]:
     """What was done, the key figures, and what to do next; one line each."""
     motion = response.motion
     time, steps = motion.time, np.diff(motion.time)
@@ -96,7 +109,7 @@ def _summary(arguments: argparse.Namespace, response: Run, table: Path, picture:
     else:
         lines.append(f"at the end  pitch {_degrees(response['pitch'][-1])}, roll {_degrees(response['roll'][-1])}")
     lines += [f"note        {note}" for note in motion.notes]
-    lines.append(f"wrote       {table}, {picture}")
+    lines.append(f"wrote       {', '.join(map(str, written))}")
     if arguments.input is None:
         lines.append(
             "next        look at the figure; then your own motors: make demo INPUT=examples/point_to_point.csv"

@@ -80,8 +80,8 @@ def information(
     unmeasured = [replace(experiment, values=None) for experiment in experiments]
     channels = {name for experiment in experiments for name in experiment.channels}
     fitter = Fitter(model, unmeasured, task, {name: noise[name] for name in channels})
-    jacobians, feigned = fitter.jacobians(np.asarray(logarithms, dtype=float))
-    return genuine(information_of(jacobians), feigned)
+    jacobians, of_noise = fitter.jacobians(np.asarray(logarithms, dtype=float))
+    return genuine(information_of(jacobians), of_noise)
 
 
 def default_noise() -> dict[str, float]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags
 
 from prw.channels import MEASURED
 from prw.errors import UserError
@@ -39,10 +39,10 @@ FEWEST, FEWEST_VALUES = 8, 20
 class Experiment:
     """name: of the experiment. time: (n,) s, even. theta, omega: (n, 2) rad, rad/s, of the motors at `time`. channels:
     what was measured. sampled: (s,) s, when. values: (s, c) in SI with NaN for nothing, or None where the experiment is
-    only planned. samplers: for each channel a matrix (s, n) from `time` to `sampled`, or None where both are the same
-    and no value is missing. bins: number of frequencies that are compared, from 0. motor_errors: (d, bins, 2) rad, spectra of
-    d draws of the errors of the motors' samples. channel_errors: (d, bins, c), of what encoders' steps add to the
-    channels. paths: of the two motors, or None where they are known exactly. notes: lines for the user."""
+    only planned. between: (s, n), interpolation from `time` to `sampled`, or None where both are the same. samplers: the
+    same for each channel, with empty rows where it has no value, or None where nothing is missing either. bins: number
+    of frequencies that are compared, from 0. motor_errors: (d, bins, 2) rad, spectra of d draws of the errors of the
+    motors' samples. channel_errors: (d, bins, c), of what encoders' steps add to the channels. paths: of the two motors, or None where they are known exactly. notes: lines for the user."""
 
     name: str
     time: Array
@@ -51,6 +51,7 @@ class Experiment:
     channels: tuple[str, ...]
     sampled: Array
     values: Array | None
+    between: csr_matrix | None
     samplers: tuple[csr_matrix, ...] | None
     bins: int
     motor_errors: Complex
@@ -123,10 +124,7 @@ class Experiment:
     def courses(self, modelled: Complex) -> Array:
         """The channels (s, c) at `sampled` of spectra (all_bins, c)."""
         found = np.fft.irfft(modelled, len(self.time), axis=0, norm="ortho")
-        if self.samplers is None:
-            return found
-        everywhere = _interpolation(self.time, self.sampled) if len(self.sampled) != len(self.time) else None
-        return found if everywhere is None else everywhere @ found
+        return found if self.between is None else np.asarray(self.between @ found)
 
 
 def spectra(courses: Array) -> Complex:
@@ -160,6 +158,7 @@ def prepare(recording: Recording, quantum: float = 0.0) -> Experiment:
         if _stepped(column[there]):
             channel = smooth(sampled[there], column[there])
             channel_errors[:, :, i] = spectra(_drawn(channel, inside, sampled[there]).T)[:bins].T
+    between = None if even else _interpolation(time, sampled)
     return Experiment(
         recording.name,
         time,
@@ -168,7 +167,8 @@ def prepare(recording: Recording, quantum: float = 0.0) -> Experiment:
         channels,
         sampled,
         values,
-        None if even and np.isfinite(values).all() else _samplers(time, sampled, values, even),
+        between,
+        _samplers(between, values),
         bins,
         np.stack([_with_rates(e, path.rate_noise, spacing)[:, :bins] for e, path in zip(errors, paths)], axis=2),
         channel_errors,
@@ -212,6 +212,7 @@ def planned(motion: Motion, channels: Sequence[str]) -> Experiment:
         motion.omega,
         tuple(channels),
         motion.time,
+        None,
         None,
         None,
         bins,
@@ -277,15 +278,12 @@ def _stepped(values: Array) -> bool:
     return quantum > 0 and rough_noise(values) < quantum
 
 
-def _samplers(time: Array, sampled: Array, values: Array, even: bool) -> tuple[csr_matrix, ...]:
-    """For each channel what takes a course at `time` (n,) to `sampled` (s,), with empty rows where it has no value."""
-    everything = csr_matrix(np.eye(1)) if even else _interpolation(time, sampled)
-    found = []
-    for column in values.T:
-        there = np.isfinite(column).astype(float)
-        keep = csr_matrix((there, (np.arange(len(there)), np.arange(len(there)))))
-        found.append(keep if even else (keep @ everything).tocsr())
-    return tuple(found)
+def _samplers(between: csr_matrix | None, values: Array) -> tuple[csr_matrix, ...] | None:
+    """See Experiment."""
+    if between is None and np.isfinite(values).all():
+        return None
+    keep = [csr_matrix(diags(np.isfinite(column).astype(float))) for column in values.T]
+    return tuple(keep if between is None else [(k @ between).tocsr() for k in keep])
 
 
 def _interpolation(points: Array, time: Array) -> csr_matrix:

@@ -259,11 +259,11 @@ class Fitter:
         self.evaluations += 2 * len(logarithms)
         tables, noise = [], np.zeros_like(steps)
         for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
-            table, feigned = comparison.slopes(
+            table, of_noise = comparison.slopes(
                 discrete(around, experiment.step, experiment.channels).slopes(DIFFERENCE)
             )
             tables.append(table)
-            noise += feigned
+            noise += of_noise
         return tables, noise
 
     def modelled(self, logarithms: Array) -> list[Array]:

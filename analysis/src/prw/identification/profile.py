@@ -16,7 +16,7 @@ from prw.motion import Array
 LINEAR, HOPELESS = 0.01, 1.0
 #: Trials for an end, how close the rise of the misfit's root must come to what is wanted, and how far a trial may reach
 #: beyond the one before.
-TRIALS, CLOSE, FURTHER = 8, 0.02, 2.0
+TRIALS, CLOSE, LONGEST = 8, 0.02, 2.0
 #: When the other parameters have followed.
 FOLLOWED = {"ftol": 1e-5, "xtol": 1e-5}
 
@@ -41,8 +41,8 @@ def _end(solution: Solution, i: int, step: Array, wanted: float) -> float:
         point = np.clip(centre + step, low, high)
         found = solution.fitter.search(point, FOLLOWED, held=i)
         point, rise = found.x, 2 * found.cost - solution.misfit
-        further = np.sqrt(wanted / rise) if rise > wanted / FURTHER**2 else FURTHER
+        further = np.sqrt(wanted / rise) if rise > wanted / LONGEST**2 else LONGEST
         if abs(further - 1) < CLOSE or (point[i] in (low[i], high[i]) and further > 1):
             break
-        step = (point - centre) * max(further, 1 / FURTHER)
+        step = (point - centre) * max(further, 1 / LONGEST)
     return float(point[i])

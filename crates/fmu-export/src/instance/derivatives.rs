@@ -3,7 +3,7 @@
 
 use super::{Instance, Outcome, finite, refuse};
 use crate::export::Exported;
-use crate::mode::{Mode, Standard};
+use crate::mode::Standard;
 use crate::types::BaseType;
 use crate::variable::{Causality, Variability, Variable};
 use std::mem::MaybeUninit;
@@ -53,11 +53,13 @@ impl<M: Exported> Instance<M> {
         for vr in knowns {
             let variable = self.variable(*vr, BaseType::Real)?;
             // Parameters may be set at any time, whether the description calls them tunable or not. FMI 2.0 (section
-            // 2.1.9) has them among the knowns in initialization mode alone.
-            let parameter = variable.causality() == Causality::Parameter
-                && (self.standard() == Standard::Fmi3 || self.mode() == Mode::Initialization);
-            if variable.causality() != Causality::Input && !variable.is_state() && !parameter {
-                return refuse(format!("{} is no known: neither input nor state", variable.name()));
+            // 2.1.9) has them among the knowns in initialization mode alone; CasADi asks later.
+            let input = matches!(variable.causality(), Causality::Input | Causality::Parameter);
+            if !input && !variable.is_state() {
+                return refuse(format!(
+                    "{} is no known: neither input, parameter nor state",
+                    variable.name()
+                ));
             }
         }
         let (seeded, wanted) = match direction {

@@ -366,7 +366,6 @@ const DIRECTIONAL: &[Case] = &[
     ("with respect to an output", |fmu| directional(fmu, SPRING_FORCE, ENERGY, 1.0), &["energy", "known"]),
     ("with respect to a derivative", |fmu| directional(fmu, ENERGY, ACCELERATION, 1.0), &["der(velocity)"]),
     ("with respect to an Integer", |fmu| directional(fmu, ENERGY, SPRINGS, 1.0), &["springs", "Integer"]),
-    ("with respect to a parameter", |fmu| directional(fmu, ENERGY, MASS, 1.0), &["mass is no known"]),
     ("of nothing", |fmu| directional(fmu, UNKNOWN, FORCE, 1.0), &["12"]),
     ("with respect to nothing", |fmu| directional(fmu, ENERGY, UNKNOWN, 1.0), &["12"]),
     ("along NaN", |fmu| directional(fmu, ENERGY, FORCE, NAN), &["force", "seed"]),

@@ -30,10 +30,11 @@ fn standard<M>(variable: &Variable<M>, interface: Interface, mode: Mode) -> bool
 
 /// What real masters do beyond it: inputs before the initialization, parameters after it.
 fn tolerated<M>(variable: &Variable<M>, mode: Mode) -> bool {
-    matches!(
-        (variable.causality(), mode),
-        (Causality::Input, Instantiated) | (Causality::Parameter, StepComplete | Event)
-    )
+    match (variable.causality(), mode) {
+        (Causality::Input, Instantiated) | (Causality::Parameter, StepComplete | Event) => true,
+        (Causality::Parameter, ContinuousTime) => variable.base() == BaseType::Real,
+        _ => false,
+    }
 }
 
 pub fn accepted<M>(variable: &Variable<M>, interface: Interface, mode: Mode) -> bool {
@@ -64,13 +65,13 @@ fn one_of_each_kind() {
         ("velocity", "IN", "INK"),
         ("der(velocity)", "", ""),
         ("energy", "", ""),
-        ("mass", "INC", "INM"),
+        ("mass", "INC", "INMK"),
         ("springs", "INC", "INM"),
     ]);
     check_by_hand::<Counter>(&[("weight", "INC", "INM"), ("count", "IN", "IN"), ("odd", "", "")]);
     check_by_hand::<Talker>(&[
         ("heard", "INC", "INM"),
-        ("volume", "INC", "INM"),
+        ("volume", "INC", "INMK"),
         ("decibels", "", ""),
         ("root", "I", "I"),
         ("answer", "", ""),

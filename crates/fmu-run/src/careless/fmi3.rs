@@ -507,9 +507,9 @@ impl<M: Exported> Session<'_, M> {
             self.replay(index, index % 2 == 0);
             self.instances[index] = None;
         }
-        let stranger = Importer::of::<M>(offered::<M>());
+        let other = Importer::of::<M>(offered::<M>());
         for state in self.states {
-            stranger.forget(state);
+            other.forget(state);
         }
         // What must survive that there is no instance.
         for (function, status) in Importer::null(Functions::of::<M>()).call_all() {

@@ -403,10 +403,10 @@ impl<M: Exported> Session<'_, M> {
             self.replay(index, index % 2 == 0);
             self.free(index);
         }
-        let stranger = Importer::instantiate(self.functions, &Arguments::of::<M>(offered::<M>()));
-        let stranger = stranger.expect("an instance like the others");
+        let other = Importer::instantiate(self.functions, &Arguments::of::<M>(offered::<M>()));
+        let other = other.expect("an instance like the others");
         for state in self.states.into_iter().flatten() {
-            stranger.forget(state);
+            other.forget(state);
         }
     }
 }

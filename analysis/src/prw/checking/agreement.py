@@ -1,0 +1,260 @@
+"""What `prw.check` returns: how far a result is from a reference, where, and what may be the reason."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from prw.channels import MOTORS, si_unit
+from prw.checking.experiments import Experiment
+from prw.checking.result import Result
+from prw.errors import UserError
+from prw.extras import need
+from prw.files import write_text
+from prw.motion import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Times that differ by less, in s, are one and the same.
+SAME_TIME = 1e-9
+#: Motors that are off by more than this share of their largest angle or rate are other motors.
+OTHER_MOTORS = 1e-2
+#: How near a factor must be to that of a unit to be taken for it.
+NEAR = 0.02
+
+
+class Difference(NamedTuple):
+    """How far one output is off, in `unit` (SI). largest: at the time `at` (s), where it is `found` instead of
+    `expected`. allowed: the tolerance."""
+
+    largest: float
+    at: float
+    found: float
+    expected: float
+    allowed: float
+    unit: str
+
+    @property
+    def agrees(self) -> bool:
+        """Whether it is within the tolerance."""
+        return self.largest <= self.allowed
+
+
+@dataclass(frozen=True, repr=False)
+class Agreement:
+    """How far `source` agrees with an experiment. interface: by whose tolerances it is judged. time: (n,) s, the
+    reference's as far as the result goes. found, expected: (n,) by output. notes: what the user should read."""
+
+    source: Path
+    experiment: Experiment
+    interface: str
+    time: Array
+    found: Mapping[str, Array]
+    expected: Mapping[str, Array]
+    notes: tuple[str, ...]
+
+    @property
+    def variables(self) -> dict[str, Difference]:
+        """How far each output is off, by name."""
+        tolerance, differences = self.experiment.tolerance[self.interface], {}
+        for name, found in self.found.items():
+            expected = self.expected[name]
+            k = int(np.abs(found - expected).argmax())
+            values = float(abs(found[k] - expected[k])), float(self.time[k]), float(found[k]), float(expected[k])
+            differences[name] = Difference(*values, tolerance[name], si_unit(name))
+        return differences
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every output that the result has is within its tolerance."""
+        return all(difference.agrees for difference in self.variables.values())
+
+    def summary(self) -> str:
+        """What was compared, and how far off each output is, in a few lines of text."""
+        lines = [
+            f"compared    {self.source} with {self.experiment.name} ({self.experiment.description})",
+            f"            {len(self.time)} times, {self.time[0]:g} to {self.time[-1]:g} s, tolerances for {self.interface}",
+        ]
+        for name, found in self.variables.items():
+            verdict = "" if found.agrees else f"   TOO FAR: {found.found:.6g} instead of {found.expected:.6g}"
+            off = f"off by {found.largest:.2g} {found.unit} at {found.at:g} s, allowed {found.allowed:.2g}"
+            lines.append(f"  {name:<10} {off}{verdict}")
+        return "\n".join([*lines, *(f"note        {note}" for note in self.notes)])
+
+    def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
+        """Everything in numbers, as JSON; written to `path`, too, where that is given."""
+        content = {
+            "result": str(self.source),
+            "experiment": self.experiment.name,
+            "interface": self.interface,
+            "agrees": self.agrees,
+            "from": float(self.time[0]),
+            "to": float(self.time[-1]),
+            "times": len(self.time),
+            "variables": {
+                name: {**difference._asdict(), "agrees": difference.agrees}
+                for name, difference in self.variables.items()
+            },
+            "notes": list(self.notes),
+        }
+        text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+        if path is not None:
+            write_text(Path(path), text)
+        return text
+
+    def plot(self) -> Figure:
+        """Result and reference of the outputs that do not agree, or of all if they do; save it with `.savefig(path)`.
+        Raises UserError without matplotlib."""
+        need("plot", "matplotlib")
+        import matplotlib
+
+        from prw.plots import STYLE, Panel, ShownFigure, draw_panel
+
+        differences = self.variables
+        names = [name for name, found in differences.items() if not found.agrees] or list(differences)
+        with matplotlib.rc_context(STYLE):
+            figure = ShownFigure(figsize=(8, 0.8 + 1.9 * len(names)), layout="constrained")
+            title = f"{self.source.name} and {self.experiment.name}"
+            figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
+            axes = figure.subplots(len(names), sharex=True, squeeze=False)[:, 0]
+            for axis, name in zip(axes, names):
+                curves = [("reference", self.expected[name]), ("result", self.found[name])]
+                found = differences[name]
+                off = f"{name}: off by {found.largest:.2g} at {found.at:g} s, allowed {found.allowed:.2g}"
+                draw_panel(axis, self.time, Panel(off, found.unit.replace(".", " "), curves))
+            figure.align_ylabels(axes)
+            axes[-1].set_xlabel("time (s)")
+            axes[-1].set_xlim(self.time[0], self.time[-1])
+        return figure
+
+    def __repr__(self) -> str:
+        return self.summary()
+
+    def _repr_html_(self) -> str:
+        rows = []
+        for name, found in self.variables.items():
+            verdict = "agrees" if found.agrees else "<strong>too far</strong>"
+            cells = [name, f"{found.largest:.2g}", f"{found.allowed:.2g}", found.unit, f"{found.at:g}"]
+            rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + f"<td>{verdict}</td></tr>")
+        head = "".join(f"<th>{h}</th>" for h in ("output", "off by", "allowed", "unit", "at (s)", ""))
+        notes = "".join(f"<p>{escape(note)}</p>" for note in self.notes)
+        return f"<p>{escape(self.experiment.name)}</p><table><tr>{head}</tr>{''.join(rows)}</table>{notes}"
+
+
+def compare(result: Result, experiment: Experiment, interface: str) -> Agreement:
+    """How far the result agrees with the experiment. Raises UserError where they have no output or no time in
+    common."""
+    time = _common_times(result, experiment)
+    if not time.size:
+        raise UserError(
+            f"{result.source}: runs from {result.time[0]:g} to {result.time[-1]:g} s, {experiment.name} from 0 to "
+            f"{experiment.stop_time:g} s; start the run at 0, and look at the unit of time"
+        )
+    names = [name for name in experiment.outputs if name in result.values]
+    if not names:
+        raise UserError(f"{result.source}: has none of the outputs {', '.join(experiment.outputs)}")
+    at = np.isin(experiment.reference["time"], time)
+    expected = {name: experiment.reference[name][at] for name in names}
+    found = {name: interpolated(result.time, result.values[name], time) for name in names}
+    bare = Agreement(result.source, experiment, interface, time, found, expected, ())
+    return Agreement(result.source, experiment, interface, time, found, expected, tuple(_notes(bare, result)))
+
+
+def nearest(result: Result, known: Sequence[Experiment]) -> Experiment:
+    """The experiment whose motors and outputs are nearest to the result's. Raises UserError where none has any time in
+    common with it."""
+
+    def distance(experiment: Experiment) -> float:
+        time, shares = _common_times(result, experiment), []
+        if not time.size:
+            return np.inf
+        for columns in (experiment.inputs, experiment.reference):
+            for name in sorted({*columns} & {*result.values}):
+                true = np.interp(time, columns["time"], columns[name])
+                off = interpolated(result.time, result.values[name], time) - true
+                # At most 1, so that a column in another unit does not outweigh all others.
+                shares.append(min(np.abs(off).max() / (np.abs(true).max() + 1e-3), 1.0))
+        return float(np.mean(shares)) if shares else np.inf
+
+    return min(known, key=distance)
+
+
+def interpolated(time: Array, values: Array, at: Array) -> Array:
+    """Values (n,) at the times `at` (m,) within `time` (n,): where there is none, that of the cubic through the four
+    nearest."""
+    count = min(4, len(time))
+    first = np.clip(np.searchsorted(time, at) - count // 2, 0, len(time) - count)
+    nodes = first[:, None] + np.arange(count)
+    t = time[nodes]
+    found = np.zeros(len(at))
+    for i in range(count):
+        others = [j for j in range(count) if j != i]
+        weight = np.prod((at[:, None] - t[:, others]) / (t[:, [i]] - t[:, others]), axis=1)
+        found += weight * values[nodes[:, i]]
+    # Curves may bend at a row; the row itself is right.
+    near = np.clip(np.searchsorted(time, at - SAME_TIME), 0, len(time) - 1)
+    same = np.abs(time[near] - at) <= SAME_TIME
+    return np.where(same, values[near], found)
+
+
+def _common_times(result: Result, experiment: Experiment) -> Array:
+    time = experiment.reference["time"]
+    inside: Array = time[(time >= result.time[0] - SAME_TIME) & (time <= result.time[-1] + SAME_TIME)]
+    return inside
+
+
+def _notes(bare: Agreement, result: Result) -> list[str]:
+    """What is missing, and what may be the reason where the two do not agree."""
+    experiment, notes = bare.experiment, []
+    if bare.time[0] > 0 or bare.time[-1] < experiment.stop_time - SAME_TIME:
+        span = f"{bare.time[0]:g} to {bare.time[-1]:g} s"
+        notes.append(f"the result has only {span} of the experiment's 0 to {experiment.stop_time:g} s")
+    if missing := [name for name in experiment.outputs if name not in bare.found]:
+        notes.append(f"not in the result: {', '.join(missing)}")
+    if bare.agrees:
+        return notes
+    for name in MOTORS:
+        if name in result.values:
+            true = np.interp(bare.time, experiment.inputs["time"], experiment.inputs[name])
+            off = np.abs(interpolated(result.time, result.values[name], bare.time) - true)
+            largest = max(np.abs(experiment.inputs[other]).max() for other in MOTORS if other[0] == name[0])
+            if off.max() > OTHER_MOTORS * largest:
+                notes.append(
+                    f"{name} is not that of {experiment.name}: off by {off.max():.2g} {si_unit(name)} at "
+                    f"{bare.time[off.argmax()]:g} s; look at the inputs first"
+                )
+    for name, difference in bare.variables.items():
+        expected, found = bare.expected[name], bare.found[name]
+        if difference.agrees or not (power := expected @ expected):
+            continue
+        ratio = float(found @ expected / power)
+        if abs(ratio / np.rad2deg(1) - 1) < NEAR:
+            notes.append(f"{name} looks like degrees; say so with --units {name}=deg{'/s' * name.endswith('rate')}")
+        elif abs(ratio + 1) < NEAR:
+            notes.append(f"{name} has the other sign")
+    late = _late_by(bare, result)
+    if late:
+        notes.append(f"everything agrees if the result is taken {late:g} s later: is there a delay in the wiring?")
+    return notes
+
+
+def _late_by(bare: Agreement, result: Result) -> float:
+    """The delay of one communication step of either interface type, in s, with which everything agrees; else 0."""
+    for step in {*bare.experiment.step.values(), float(np.median(np.diff(result.time)))}:
+        inside = bare.time + step <= result.time[-1] + SAME_TIME
+        allowed = bare.experiment.tolerance[bare.interface]
+        if inside.any() and all(
+            np.abs(interpolated(result.time, result.values[name], bare.time[inside] + step) - expected[inside]).max()
+            <= allowed[name]
+            for name, expected in bare.expected.items()
+        ):
+            return step
+    return 0.0

@@ -1,0 +1,91 @@
+"""The reference experiments in an FMU, where the layered standard FMI-LS-REF has its place for them."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from prw.errors import UserError
+from prw.motion import Array
+
+FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+
+Value = float | int | bool
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One experiment, in SI. inputs, reference: (n,) by name, each with its own `time`; inputs are to be interpolated
+    linearly. parameters: of the FMU. step: communication step in s, tolerance: how far an output may be off, by
+    interface type and name."""
+
+    name: str
+    description: str
+    stop_time: float
+    inputs: Mapping[str, Array]
+    reference: Mapping[str, Array]
+    parameters: Mapping[str, Value]
+    step: Mapping[str, float]
+    tolerance: Mapping[str, Mapping[str, float]]
+
+    @property
+    def outputs(self) -> list[str]:
+        """Names of what the reference has besides time."""
+        return [name for name in self.reference if name != "time"]
+
+
+def read_experiments(fmu: Path) -> list[Experiment]:
+    """All experiments in the FMU file. Raises UserError where it has none."""
+    try:
+        with zipfile.ZipFile(fmu) as archive:
+            return [
+                Experiment(
+                    entry["name"],
+                    entry["description"],
+                    entry["stop_time"],
+                    _columns(_text(archive, entry["inputs"])),
+                    _columns(_text(archive, entry["reference"])),
+                    _parameters(_text(archive, entry["parameters"])),
+                    {kind: values["step_size"] for kind, values in entry["interfaces"].items()},
+                    {kind: values["tolerance"] for kind, values in entry["interfaces"].items()},
+                )
+                for entry in json.loads(_text(archive, "experiments.json"))
+            ]
+    except (OSError, zipfile.BadZipFile) as error:
+        raise UserError(f"{fmu}: cannot be read ({error})") from None
+    except KeyError:
+        raise UserError(f"{fmu}: has no reference experiments; take the testbed FMU that `make fmu` builds") from None
+
+
+def find(known: Sequence[Experiment], name: str) -> Experiment:
+    """The experiment of that name. Raises UserError where there is none."""
+    for experiment in known:
+        if experiment.name == name:
+            return experiment
+    raise UserError(f"experiment: {name} is not known; there are {', '.join(e.name for e in known)}")
+
+
+def _text(archive: zipfile.ZipFile, name: str) -> str:
+    return archive.read(f"{FOLDER}/{name}").decode("utf-8")
+
+
+def _columns(text: str) -> dict[str, Array]:
+    names = [name.strip('"') for name in text[: text.index("\n")].split(",")]
+    return dict(zip(names, np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1, ndmin=2).T))
+
+
+def _parameters(text: str) -> dict[str, Value]:
+    """The values of an SSV file."""
+    found: dict[str, Value] = {}
+    for parameter in ElementTree.fromstring(text.encode()).iterfind(".//{*}Parameter"):
+        kind, value = parameter[0].tag.rpartition("}")[2], parameter[0].attrib["value"]
+        number = int(value) if kind == "Integer" else float(value) if kind == "Real" else value == "true"
+        found[parameter.attrib["name"]] = number
+    return found

@@ -1,0 +1,98 @@
+"""LQR and Kalman filter for the wrist, against the PI controller
+
+You learn to go from the FMU to its linear model (`prw.linearize`), to design a state feedback and a Kalman filter with
+python-control, and to close the loop around the FMU itself, sample by sample, with encoders that are noisy.
+
+    make examples; .venv/bin/python examples/lqr.py
+"""
+
+from typing import Any
+
+import control
+import numpy as np
+from matplotlib.figure import Figure
+
+import prw
+from prw.slave import Slave
+
+STEP, STEPS = 1e-3, 3000  # s
+NOISE = np.deg2rad(0.02)  # standard deviation of the encoders of pitch and roll, rad
+ACCELERATION = 30.0  # limit of the motors, that of the PI controller, rad/s2
+MOTORS = ("theta1", "theta2", "omega1", "omega2")
+TO_SIDES = np.array([[1, 4 / 7], [1, -4 / 7]])  # from pitch and roll to the two sides: eq. (1) solved, M = 4, N = 7
+
+
+def design() -> tuple[np.ndarray, ...]:
+    """The sampled model z+ = A z + B a, y = C z (z: states, motors' angles and rates), and the gains of both."""
+    model = prw.linearize(outputs=("pitch", "roll"))
+    (angles, rates), zero, one = np.hsplit(model.B, 2), np.zeros, np.eye(2)
+    # Motors turn at a steady rate for a sample, so the angles are states and the rates are held.
+    wrist = control.ss(np.block([[model.A, angles], [zero((2, 8))]]), np.vstack([rates, one]), np.eye(8), zero((8, 2)))
+    held = control.c2d(wrist, STEP)
+    A = np.block([[held.A, held.B], [zero((2, 8)), one]])
+    B = STEP * A[:, 8:]  # an acceleration changes the rate at once, for the sample that begins
+    C = np.block([[model.C, zero((2, 4))], [zero((2, 6)), one, zero((2, 2))]])
+    # A degree of pitch or roll weighs as much as 30 rad/s2.
+    weight = C[:2].T @ C[:2] / np.deg2rad(1) ** 2 + 1e-6 * np.eye(10)
+    feedback, *_ = control.dlqr(A, B, weight, np.eye(2) / ACCELERATION**2)
+    gain, *_ = control.dlqe(A, B, C, 0.5 * np.eye(2), np.diag([NOISE, NOISE, 1e-5, 1e-5]) ** 2)
+    return A, B, C, np.asarray(feedback), np.asarray(gain)
+
+
+def follow(controller: Any, noise: np.ndarray) -> np.ndarray:
+    """Pitch and roll (n, 2) in rad of the FMU with a controller that turns what is measured into the motors' motion."""
+    rows = []
+    next(controller)  # up to where it waits for what is measured
+    with Slave(start={"use_omega": True}) as testbed:
+        for k in range(STEPS):
+            rows.append(testbed.get("pitch", "roll"))
+            testbed.set(dict(zip(MOTORS, controller.send((k, rows[-1] + noise[k])))))
+            testbed.step(STEP)
+    return np.array(rows)
+
+
+def lqr(angle: np.ndarray) -> Any:
+    """State feedback on what the Kalman filter estimates; unlike the PI controller it knows the reference's rate."""
+    A, B, C, feedback, gain = design()
+    side = angle @ TO_SIDES.T
+    wanted = np.hstack([side, side, rate := np.gradient(side, STEP, axis=0), side, rate])  # as if nothing twisted
+    estimate, motor, turning, motion = np.zeros(10), np.zeros(2), np.zeros(2), None
+    while True:
+        k, measured = yield motion
+        estimate = estimate + gain @ (np.hstack([measured, motor]) - C @ estimate)
+        asked = turning + STEP * np.clip(feedback @ (wanted[k] - estimate), -ACCELERATION, ACCELERATION)
+        estimate = A @ estimate + B @ (asked - turning) / STEP
+        motion, motor, turning = (*motor, *asked), motor + STEP * asked, asked
+
+
+def pi(controller: Slave, angle: np.ndarray) -> Any:
+    """The controller FMU, which goes to the reference as it is at each sample."""
+    motion = None
+    while True:
+        k, measured = yield motion
+        motion = controller.get(*MOTORS)
+        controller.set(dict(zip(("pitch", "roll", "pitch_ref", "roll_ref"), (*measured, *angle[k]))))
+        controller.step(STEP)
+
+
+def main() -> tuple[Figure, dict[str, np.ndarray]]:
+    """Follow waves of pitch and roll with both, print and draw; returns the figure, and the errors (n, 2) in rad."""
+    time = STEP * np.arange(STEPS)
+    angle = np.deg2rad([30, 50]) * np.sin(np.pi * np.outer(time, [0.9, 0.6])) ** 2
+    noise = np.random.default_rng(1).normal(0, NOISE, (STEPS, 2))
+    with Slave("target/fmu/prw_controller.fmu") as fmu:
+        errors = {"PI": follow(pi(fmu, angle), noise) - angle, "LQR": follow(lqr(angle), noise) - angle}
+    picture = Figure(figsize=(8, 3.2), layout="constrained")
+    axes = picture.subplots(1, 2, sharex=True)
+    for (name, error), colour in zip(errors.items(), ("#D55E00", "#0072B2")):
+        rms = np.rad2deg(np.sqrt(np.mean(error**2, axis=0)))
+        print(f"{name:<4} pitch {rms[0]:.2f} deg, roll {rms[1]:.2f} deg (root mean square of the error)")
+        for axis, course, title in zip(axes, np.rad2deg(error).T, ("pitch", "roll")):
+            axis.plot(time, course, color=colour, label=name)
+            axis.set(title=title, xlabel="time (s)", ylabel="error (deg)")
+    picture.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
+    return picture, errors
+
+
+if __name__ == "__main__":
+    main()[0].savefig("lqr.png", dpi=110)

@@ -1,0 +1,97 @@
+"""The quietest way from rest to rest, found with CasADi
+
+You learn to load the FMU into CasADi, to take the optimal control problem's matrices from the FMU's own derivatives,
+and to replay what was found on the FMU: the couplings are wound up and unwound so that nothing vibrates at the end.
+
+    make examples; .venv/bin/python examples/quiet_motion.py
+"""
+
+import tempfile
+import zipfile
+from pathlib import Path
+
+import casadi
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.linalg import expm
+
+import prw
+
+FMU = Path("target/fmu/prw_testbed.fmu")
+MOVE, AFTER, STEP = 0.25, 0.35, 2.5e-3  # s
+GOAL = np.deg2rad([20, 30])  # pitch and roll, rad
+SIDES = np.array([[1, 4 / 7], [1, -4 / 7]]) @ GOAL  # the motors' angles there: eq. (1) solved, M = 4, N = 7
+RATE = 6.0  # limit of the motors, rad/s
+
+
+def sampled() -> tuple[np.ndarray, np.ndarray]:
+    """z+ = A z + B w over a step: z are the six states and both motors' angles, w the motors' rates, which are held."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, zipfile.ZipFile(FMU) as archive:
+        archive.extractall(folder)
+        wrist = casadi.DaeBuilder("wrist", folder).create("wrist", ["x", "u"], ["ode"])
+        # The testbed is linear: its derivatives are the same everywhere, and CasADi has them from the FMU, exactly.
+        derivatives = wrist.jacobian()(np.zeros(6), np.zeros(4), np.zeros(6))
+    generator = np.zeros((10, 10))
+    generator[:6] = np.hstack([np.array(part) for part in derivatives])
+    generator[6:8, 8:] = np.eye(2)
+    whole = expm(STEP * generator)
+    return whole[:8, :8], whole[:8, 8:]
+
+
+def quietest() -> np.ndarray:
+    """The motors' rates (n, 2) in rad/s of the smoothest motion that is at rest at the goal after MOVE."""
+    A, B = sampled()
+    n, problem = round(MOVE / STEP), casadi.Opti()
+    z, w = problem.variable(8, n + 1), problem.variable(2, n)
+    problem.minimize(casadi.sumsqr(casadi.diff(casadi.horzcat(np.zeros(2), w, np.zeros(2)), 1, 1)))
+    problem.subject_to(z[:, 1:] == A @ z[:, :-1] + B @ w)
+    problem.subject_to(z[:, 0] == np.zeros(8))
+    problem.subject_to(z[:, n] == np.hstack([SIDES, SIDES, 0, 0, SIDES]))
+    problem.subject_to(problem.bounded(-RATE, casadi.vec(w), RATE))
+    problem.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes"})
+    return np.array(problem.solve().value(w)).T
+
+
+def minimum_jerk() -> np.ndarray:
+    """The same for motors on the usual quintic."""
+    s = np.arange(round(MOVE / STEP) + 1)[:, None] * STEP / MOVE
+    return np.asarray(np.diff(SIDES * s**3 * (10 - 15 * s + 6 * s**2), axis=0) / STEP)
+
+
+def replay(rates: np.ndarray, parameters: dict[str, float] | None = None) -> prw.Run:
+    """The FMU's answer to motors with these rates, and then still."""
+    omega = np.vstack([rates, np.zeros((round(AFTER / STEP) + 1, 2))])
+    theta = np.vstack([np.zeros(2), np.cumsum(STEP * omega[:-1], axis=0)])
+    return prw.simulate(prw.Motion(np.linspace(0, MOVE + AFTER, len(theta)), theta, omega), parameters)
+
+
+def left(run: prw.Run) -> float:
+    """The largest deviation of pitch or roll from the goal after the move, deg."""
+    after = run.time >= MOVE - STEP / 2
+    return float(np.rad2deg(max(np.abs(run[name] - goal)[after].max() for name, goal in zip(("pitch", "roll"), GOAL))))
+
+
+def main() -> tuple[Figure, dict[str, float]]:
+    """Find, replay, print and draw; returns the figure, and how far pitch or roll is off after each motion, deg."""
+    rates = {"quintic": minimum_jerk(), "quietest": quietest()}
+    runs = {name: replay(course) for name, course in rates.items()}
+    runs["quietest, k2 10 % less"] = replay(rates["quietest"], {"k2": 0.9 * runs["quietest"].parameters["k2"]})
+    picture = Figure(figsize=(8, 4.2), layout="constrained")
+    axes = picture.subplots(2, 2, sharex=True)
+    for (name, run), style in zip(runs.items(), ("C1-", "C0-", "k:")):
+        print(f"{name:<23} {left(run):.2f} deg off after the move")
+        for axis, angle in zip(axes[:, 0], ("pitch", "roll")):
+            axis.plot(run.time, np.rad2deg(run[angle]), style, label=name)
+            axis.set_ylabel(f"{angle} (deg)")
+        for axis, course, motor in zip(axes[:, 1], np.diff(run.motion.theta.T) / STEP, (1, 2)):
+            axis.step(run.time[:-1], course, style, where="post")
+            axis.set_ylabel(f"motor {motor} (rad/s)")
+    for axis in axes.flat:
+        axis.axvline(MOVE, color="0.6", linewidth=0.8)
+    axes[0, 0].legend(frameon=False, fontsize=8)
+    picture.supxlabel("time (s)", fontsize=10)
+    return picture, {name: left(run) for name, run in runs.items()}
+
+
+if __name__ == "__main__":
+    main()[0].savefig("quiet_motion.png", dpi=110)

@@ -1,0 +1,72 @@
+"""The reference experiments as tool vendors exchange them, by the rules of the FMI Cross-Check (4.1, section 9.1.4): for
+each a folder with the FMU, its inputs, its outputs and options."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+#: Within the FMU.
+FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+#: For comparisons that know one tolerance for all variables.
+RELATIVE_TOLERANCE = 1e-3
+#: What zip files say of every file, so that the same content gives the same bytes.
+TIME = (1980, 1, 1, 0, 0, 0)
+
+
+def pack(fmu: Path, destination: Path) -> None:
+    """Write the experiments in `fmu` to the zip file `destination`, a folder each."""
+    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(destination, "w", zipfile.ZIP_DEFLATED) as archive:
+
+        def write(name: str, content: bytes) -> None:
+            about = zipfile.ZipInfo(name, TIME)
+            about.compress_type, about.create_system, about.external_attr = zipfile.ZIP_DEFLATED, 3, 0o644 << 16
+            archive.writestr(about, content)
+
+        whole = fmu.read_bytes()
+        for experiment in json.loads(source.read(f"{FOLDER}/experiments.json")):
+            name = experiment["name"]
+            write(f"{name}/{name}.fmu", whole)
+            for kind in ("inputs", "reference", "parameters"):
+                write(f"{name}/{experiment[kind]}", source.read(f"{FOLDER}/{experiment[kind]}"))
+            write(f"{name}/{name}_ref.opt", options(experiment).encode())
+            write(f"{name}/README.md", readme(experiment).encode())
+
+
+def options(experiment: dict[str, Any]) -> str:
+    """NAME_ref.opt."""
+    values = {
+        "StartTime": experiment["start_time"],
+        "StopTime": experiment["stop_time"],
+        "StepSize": experiment["interfaces"]["CoSimulation"]["step_size"],
+        "RelTol": RELATIVE_TOLERANCE,
+        "SolverType": "FixedStep",
+    }
+    return "".join(f"{name}, {value}\n" for name, value in values.items())
+
+
+def readme(experiment: dict[str, Any]) -> str:
+    """README.md."""
+    interfaces = experiment["interfaces"]
+    name = experiment["name"]
+    heads = "".join(f" {interface} |" for interface in interfaces)
+    rows = "\n".join(
+        f"| {output} |" + "".join(f" {interface['tolerance'][output]:g} |" for interface in interfaces.values())
+        for output in interfaces["CoSimulation"]["tolerance"]
+    )
+    return f"""# {name}
+
+{experiment["description"]}.
+
+Set the parameters of `{name}.ssv` first, `use_omega` among them. `{name}_ref.csv` does not come from the FMU, but from a
+solution that shares nothing with it. How far a result may be off, in rad, rad/s and N.m, at communication steps of
+{interfaces["CoSimulation"]["step_size"]:g} s, in Model Exchange with inputs that are interpolated as the solver goes on:
+
+| output |{heads}
+|---|{"---|" * len(interfaces)}
+{rows}
+
+`documentation/fmi-ls-ref.txt` in the FMU says more.
+"""

@@ -1,0 +1,157 @@
+"""The animation: bodies turn as eq. (1) says, files are what they are called, the film loops and is small."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from PIL import Image, ImageSequence
+
+from prw import UserError, animate, simulate
+from prw.animation import MEASURED, RATES, angles_and_torques, still
+from prw.motion import Motion
+from prw.plots import GREEN, PURPLE
+from prw.simulation import Run
+from prw.wrist import Wrist, about_x, about_y
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def swing(**changed: np.ndarray | None) -> Run:
+    """A motion without dynamics, both sides turn stiffly; None leaves an output out."""
+    time = np.linspace(0, 0.5, 51)
+    angle = 0.3 * np.sin(2 * np.pi * time) ** 2
+    outputs = {name: angle if name not in ("tau1", "tau2", "roll") else 0 * angle for name in MEASURED} | changed
+    kept = {name: course for name, course in outputs.items() if course is not None}
+    return Run(Motion(time, np.column_stack([angle, angle])), kept, {"M": 4, "N": 7})
+
+
+def corners(at: dict[str, float], colour: str) -> np.ndarray:
+    """Where the corners of all faces of a colour are, (k, 3)."""
+    everything = dict.fromkeys((f"theta{k}" for k in range(1, 7)), 0.0) | {"pitch": 0.0, "roll": 0.0} | at
+    return np.vstack([face.corners for face in Wrist(1.0).faces(everything) if face.colour == to_rgb(colour)])
+
+
+def pictures_of(path: Path) -> list[np.ndarray]:
+    """The pictures of a GIF, (height, width, 3) each."""
+    with Image.open(path) as film:
+        return [np.asarray(picture.convert("RGB")).astype(int) for picture in ImageSequence.Iterator(film)]
+
+
+def test_pitch_swings_ring_and_gripper_from_up_to_the_viewer() -> None:
+    quarter = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    for colour in (GREEN, PURPLE):
+        turned = corners({}, colour) @ quarter.T
+        np.testing.assert_allclose(corners({"pitch": np.pi / 2}, colour), turned, atol=1e-12)
+
+
+def test_roll_turns_the_gripper_in_the_ring() -> None:
+    np.testing.assert_array_equal(corners({"roll": 1.0}, GREEN), corners({}, GREEN))
+    quarter = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    np.testing.assert_allclose(corners({"roll": np.pi / 2}, PURPLE), corners({}, PURPLE) @ quarter.T, atol=1e-12)
+
+
+@pytest.mark.parametrize("carrier, side, roll", [("theta5", -1, 1), ("theta6", 1, -1)])
+def test_cam_moves_with_the_rollers_that_touch_it(carrier: str, side: int, roll: int) -> None:
+    """Where they touch, above the input shaft of a side, both go to the viewer when eq. (1) says so."""
+    contact, small = np.array([side * 0.6, 0.6, 0.0]), 1e-3
+    assert (about_x(small) @ contact)[2] > 0, carrier
+    assert (about_y(roll * small) @ contact)[2] > 0, carrier
+
+
+def test_carriers_follow_from_pitch_and_roll(fmu: Path) -> None:
+    run = simulate(fmu=fmu, outputs=(*MEASURED, "theta5", "theta6"))
+    shown = angles_and_torques(run)
+    for name in ("theta5", "theta6"):
+        np.testing.assert_allclose(shown[name], run[name], rtol=0, atol=1e-14)
+
+
+def test_gif_has_its_pictures_and_ends_as_it_began(tmp_path: Path) -> None:
+    animate(swing(), tmp_path / "run.gif", speed=1.0)
+    with Image.open(tmp_path / "run.gif") as film:
+        assert film.info["duration"] == 1000 / RATES[".gif"]
+    pictures = pictures_of(tmp_path / "run.gif")
+    assert len(pictures) == round(0.5 * RATES[".gif"]) + 1
+    height = pictures[0].shape[0]
+    scene = [picture[int(0.08 * height) : int(0.66 * height)] for picture in pictures]
+    assert np.array_equal(scene[0], scene[-1])
+    assert np.abs(scene[0] - scene[2]).max() > 100
+
+
+def test_still_stands_on_no_ground() -> None:
+    pixels = np.asarray(still(swing(), 0.25))
+    assert (pixels[0, :, 3] == 0).all()
+    assert 0.15 < np.mean(pixels[:, :, 3] == 255) < 0.6
+
+
+def test_page_needs_nothing_else(tmp_path: Path) -> None:
+    animate(swing(), tmp_path / "run.html", speed=1.0)
+    page = (tmp_path / "run.html").read_text()
+    assert page.count("data:image/png;base64") == round(0.5 * RATES[".html"]) + 1
+    assert not re.search(r"https?:|<link|@import| src=", page)
+
+
+def test_movie(tmp_path: Path) -> None:
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    animate(swing(), tmp_path / "run.mp4", speed=1.0)
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "run.mp4"))
+    assert frames == round(0.5 * RATES[".mp4"]) + 1
+    assert seconds == pytest.approx(frames / RATES[".mp4"], abs=0.05)
+
+
+@pytest.mark.parametrize(
+    "change, path, speed, complaint",
+    [
+        ({}, "run.avi", 1.0, "a .gif, an .mp4 or an .html"),
+        ({}, "run.gif", 0.0, "must be positive"),
+        ({}, "run.gif", 1e-4, "too long; choose a speed of 0.0037"),
+        ({"theta3": None}, "run.gif", 1.0, "the run has no theta3"),
+        ({"pitch": np.full(51, np.nan)}, "run.gif", 1.0, "pitch of the run has values that are not finite"),
+    ],
+)
+def test_what_cannot_be_shown_is_said(
+    tmp_path: Path, change: dict[str, Any], path: str, speed: float, complaint: str
+) -> None:
+    run = swing(**change)
+    with pytest.raises(UserError, match=complaint):
+        animate(run, tmp_path / path, speed=speed)
+    assert not list(tmp_path.iterdir())
+
+
+def test_command(fmu: Path, tmp_path: Path) -> None:
+    recording = tmp_path / "motors.csv"
+    recording.write_text("time,theta1,theta2\n" + "".join(f"{k / 10},{k / 100},{k / 100}\n" for k in range(5)))
+    command: list[Any] = [
+        sys.executable,
+        "-m",
+        "prw",
+        "simulate",
+        "--fmu",
+        fmu,
+        "--input",
+        recording,
+        "--out",
+        tmp_path / "out",
+    ]
+    done = subprocess.run([*command, "--animate", tmp_path / "wrist.gif"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert f"{tmp_path / 'wrist.gif'}" in done.stdout
+    assert len(pictures_of(tmp_path / "wrist.gif")) > 1
+
+
+def test_film_of_the_readme() -> None:
+    """Small enough for a README; begins where it ends; panels stand still."""
+    path = ROOT / "docs" / "wrist.gif"
+    assert path.stat().st_size < 500_000
+    pictures = pictures_of(path)
+    height, width, _ = pictures[0].shape
+    scene = slice(int(0.08 * height), int(0.66 * height))
+    assert np.mean(np.abs(pictures[0][scene] - pictures[-1][scene]).max(axis=2) > 40) < 0.002
+    axis_below = (slice(int(0.94 * height), height), slice(0, width))
+    assert all(np.array_equal(picture[axis_below], pictures[0][axis_below]) for picture in pictures)

@@ -1,0 +1,249 @@
+"""`prw.check` and `prw check` on files as other tools write them; the numbers in them are the tests' own solution."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from lagrange import OUTPUTS, linear_model, table_1
+from reference import follow
+from scipy.io import savemat
+
+import prw
+
+STEP = 1e-3
+UNITS = {
+    **dict.fromkeys(("tau1", "tau2"), "N.m"),
+    **dict.fromkeys(("pitch_rate", "roll_rate", "omega1", "omega2"), "rad/s"),
+}
+DEGREES = ("pitch", "roll", "theta3", "theta4")
+
+
+def fig4(**change: float) -> dict[str, np.ndarray]:
+    """Time, motors and outputs of Fig. 4 with opposite motors, every millisecond for a second."""
+    t = np.arange(1001) * STEP
+    theta = np.outer(2 * np.sin(5 * np.pi * t) ** 2 / (10 * np.pi), [1, -1])
+    omega = np.outer(np.sin(10 * np.pi * t), [1, -1])
+    at, _ = follow(linear_model({**table_1(), **change}), t, theta, omega)
+    motors = {"theta1": theta[:, 0], "theta2": theta[:, 1], "omega1": omega[:, 0], "omega2": omega[:, 1]}
+    return {"time": t, **motors, **at}
+
+
+@pytest.fixture(scope="module")
+def right():
+    return fig4()
+
+
+@pytest.fixture(scope="module")
+def soft():
+    """k1 is 1 % too low."""
+    return fig4(k1=0.99 * table_1()["k1"])
+
+
+def write_csv(path, columns, titles=None, delimiter=","):
+    names = [(titles or {}).get(name, name) for name in columns]
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(path, rows, delimiter=delimiter, header=delimiter.join(names), comments="", fmt="%.17g")
+    return path
+
+
+def text_matrix(texts, across):
+    """Texts as a matrix of characters, one a row, or one a column."""
+    width = max(map(len, texts), default=1)
+    rows = [text.ljust(width) for text in texts]
+    return np.array(["".join(column) for column in zip(*rows)] if across else rows)
+
+
+def write_modelica(path, columns, units=False, across=True):
+    """As OpenModelica does: MATLAB 4; constants in data_1, trajectories in data_2, aliases by index and sign."""
+    time = columns["time"]
+    names, infos, texts = ["time", "testbed.k1"], [(0, 1, 0, -1), (1, 2, 0, 0)], ["Simulation time [s]", "Stiffness"]
+    table = [time]
+    for name, values in columns.items():
+        if name != "time":
+            table.append(-values if name == "tau2" else values)
+            names.append(f"testbed.{name}")
+            infos.append((2, -len(table) if name == "tau2" else len(table), 0, -1))
+            texts.append(f"of the testbed [{UNITS.get(name, 'rad')}]" if units else "of the testbed")
+    constants, table = np.array([[0.0, 1.0], [120.0, 120.0]]), np.array(table)
+    content = {
+        "Aclass": text_matrix(["Atrajectory", "1.1", "", "binTrans" if across else "binNormal"], False),
+        "name": text_matrix(names, across),
+        "description": text_matrix(texts, across),
+        "dataInfo": np.array(infos, dtype=np.int32).T if across else np.array(infos, dtype=np.int32),
+        "data_1": constants if across else constants.T,
+        "data_2": table if across else table.T,
+    }
+    savemat(path, content, format="4")
+    return path
+
+
+def test_what_agrees(right, fmu, tmp_path):
+    found = prw.check(write_csv(tmp_path / "run.csv", right), fmu=fmu)
+    assert found.agrees and found.experiment.name == "fig4_opposite" and not found.notes
+    assert list(found.variables) == list(OUTPUTS)
+    assert all(difference.largest < 0.3 * difference.allowed for difference in found.variables.values())
+    assert "roll " in found.summary() and "TOO FAR" not in repr(found) and "agrees" in found._repr_html_()
+
+
+@pytest.mark.parametrize("model_exchange", [False, True])
+def test_what_does_not(soft, fmu, tmp_path, model_exchange):
+    found = prw.check(write_csv(tmp_path / "run.csv", soft), fmu=fmu, model_exchange=model_exchange)
+    roll = found.variables["roll"]
+    assert not found.agrees and not roll.agrees and found.variables["pitch"].agrees
+    row = round(roll.at / STEP)
+    assert roll.found == soft["roll"][row] and roll.largest == abs(roll.found - roll.expected) > roll.allowed
+    assert found.variables["tau1"].agrees != model_exchange
+    assert json.loads(found.to_json(tmp_path / "check.json")) == json.loads((tmp_path / "check.json").read_text())
+    assert json.loads(found.to_json())["variables"]["roll"]["agrees"] is False
+    figure = found.plot()
+    assert any("roll: off by" in axis.get_title(loc="left") for axis in figure.axes)
+
+
+@pytest.mark.parametrize("across", [True, False])
+@pytest.mark.parametrize("units", [True, False])
+def test_openmodelica(right, soft, fmu, tmp_path, across, units):
+    assert prw.check(write_modelica(tmp_path / "wrist_res.mat", right, units, across), fmu=fmu).agrees
+    assert not prw.check(write_modelica(tmp_path / "soft_res.mat", soft, units, across), fmu=fmu).agrees
+
+
+def simulink_vectors(columns):
+    return {name if name != "time" else "tout": values[:, None] for name, values in columns.items()}
+
+
+def simulink_structure(columns):
+    """Structure with time, as the blocks Scope and To Workspace log it."""
+    signals = np.empty(len(columns) - 1, dtype=object)
+    for i, (name, values) in enumerate((n, v) for n, v in columns.items() if n != "time"):
+        signals[i] = {"values": values[:, None], "dimensions": 1.0, "label": name, "blockName": f"fig4/{name}"}
+    return {"out": {"time": columns["time"][:, None], "signals": signals}}
+
+
+def simulink_outports(columns):
+    """The same for a model's outports whose signals have no names."""
+    logged = simulink_structure(columns)["out"]
+    return {"yout": {**logged, "signals": np.array([{**signal, "label": ""} for signal in logged["signals"]])}}
+
+
+def simulink_fields(columns):
+    return {"run": {name: values[:, None] for name, values in columns.items()}}
+
+
+@pytest.mark.parametrize("layout", [simulink_vectors, simulink_structure, simulink_outports, simulink_fields])
+def test_simulink(right, soft, fmu, tmp_path, layout):
+    for name, columns in (("right", right), ("soft", soft)):
+        savemat(tmp_path / f"{name}.mat", layout(columns))
+        found = prw.check(tmp_path / f"{name}.mat", "fig4_opposite", fmu=fmu)
+        assert found.agrees == (name == "right") and len(found.variables) == len(OUTPUTS)
+
+
+def test_names_units_and_separators_of_others(right, fmu, tmp_path):
+    """Semicolons and decimal commas, degrees in the header, and components before the names."""
+    degrees = {n: np.rad2deg(v) if n in DEGREES else v for n, v in right.items()}
+    titles = {n: f"wrist/testbed/{n} [deg]" if n in DEGREES else f"wrist.root.testbed.{n}" for n in right}
+    path = write_csv(tmp_path / "run.csv", degrees, {**titles, "time": '"time"'}, ";")
+    path.write_text(path.read_text().replace(".0", ",0").replace(".", ",").replace("wrist,root,testbed,", "a.testbed."))
+    assert prw.check(path, fmu=fmu).agrees
+    plain = write_csv(tmp_path / "plain.csv", degrees)
+    assert prw.check(plain, units=dict.fromkeys(DEGREES, "deg"), fmu=fmu).agrees
+    assert "roll looks like degrees; say so with --units roll=deg" in prw.check(plain, fmu=fmu).notes
+
+
+def test_of_two_rows_at_one_time_the_last_counts(right, fmu, tmp_path):
+    """OMSimulator writes a row before the inputs of an instant are set, and one after."""
+    rows = {n: np.repeat(v, 2) for n, v in right.items()}
+    rows["tau1"][::2] += 1.0
+    assert prw.check(write_csv(tmp_path / "rows.csv", rows), fmu=fmu).agrees
+    rows["tau1"] = rows["tau1"][::-1]
+    assert not prw.check(write_csv(tmp_path / "rows.csv", rows), fmu=fmu).agrees
+
+
+def test_uneven_rows_are_interpolated(fmu, tmp_path):
+    """As a solver with variable steps leaves them: off the reference's times, up to 5 ms apart."""
+    full, rng = fig4(), np.random.default_rng(1)
+    rows = np.unique(np.append(np.cumsum(rng.integers(1, 6, 400)), [0, 1000]))
+    rows = rows[(rows <= 1000) & ((rows % 10 != 0) | (rows % 1000 == 0))]
+    path = write_csv(tmp_path / "uneven.csv", {n: v[rows] for n, v in full.items()})
+    assert prw.check(path, fmu=fmu).agrees
+
+
+def test_two_components_with_one_name(right, soft, fmu, tmp_path):
+    both = {"time": right["time"], "testbed.roll": right["roll"], "other.roll": soft["roll"]}
+    path = write_csv(tmp_path / "both.csv", both)
+    assert prw.check(path, fmu=fmu).agrees
+    assert not prw.check(path, component="other", fmu=fmu).agrees
+    path = write_csv(tmp_path / "either.csv", {"time": right["time"], "a.roll": right["roll"], "b.roll": soft["roll"]})
+    with pytest.raises(prw.UserError, match="several roll, of the components a, b; say which with --component"):
+        prw.check(path, fmu=fmu)
+
+
+@pytest.mark.parametrize(
+    "spoil, note",
+    [
+        (lambda c: {**c, "roll": -c["roll"], "pitch": c["pitch"]}, "roll has the other sign"),
+        (lambda c: {n: v[:501] for n, v in c.items()}, "the result has only 0 to 0.5 s of the experiment's 0 to 1 s"),
+        (lambda c: {n: v for n, v in c.items() if n != "tau2"}, "not in the result: tau2"),
+        (
+            lambda c: {
+                n: v if n in ("time", "theta1", "omega1") else np.append(0 * v[:1], v[:-1]) for n, v in c.items()
+            },
+            "everything agrees if the result is taken 0.001 s later",
+        ),
+        (
+            lambda c: {**c, "theta2": c["theta1"], "omega2": c["omega1"], "roll": 0 * c["roll"]},
+            "theta2 is not that of fig4_opposite",
+        ),
+    ],
+)
+def test_what_may_be_the_reason(right, fmu, tmp_path, spoil, note):
+    found = prw.check(write_csv(tmp_path / "run.csv", spoil(right)), "fig4_opposite", fmu=fmu)
+    assert any(note in line for line in found.notes), found.notes
+
+
+@pytest.mark.parametrize(
+    "text, complaint",
+    [
+        ("", "there are 0 lines"),
+        ("time,a\n0,1\n1,2\n", "there is none of time, theta1"),
+        ("roll,pitch\n0,1\n1,2\n", "there is no column time; it has roll, pitch"),
+        ("time,roll\n0,1\n1\n", "row 3: 1 cells, but the header has 2"),
+        ("time,roll\n0,1\n1,x\n", "row 3: could not convert string to float: 'x'"),
+        ("time,roll\n0,1\n1,nan\n", "row 2 of the numbers has one that is not finite"),
+        ("time,roll\n1,1\n0,2\n", "time runs backwards after 1 s"),
+        ("time,roll\n5,1\n6,2\n", "runs from 5 to 6 s"),
+        ("time,roll [N.m]\n0,1\n1,2\n", "column roll: roll cannot be in 'N.m'"),
+        ("time,theta1\n0,0\n1,0\n", "has none of the outputs tau1"),
+    ],
+)
+def test_what_cannot_be_read(fmu, tmp_path, text, complaint):
+    path = tmp_path / "run.csv"
+    path.write_text(text)
+    with pytest.raises(prw.UserError) as caught:
+        prw.check(path, fmu=fmu)
+    assert str(path) in str(caught.value) and complaint in str(caught.value)
+
+
+def test_mat_files_that_cannot_be_read(fmu, tmp_path):
+    path = tmp_path / "run.mat"
+    path.write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + b"\x89HDF\r\n\x1a\n" * 9)
+    with pytest.raises(prw.UserError, match=r"format 7.3; save it with: save\('run.mat', ..., '-v7'\)"):
+        prw.check(path, fmu=fmu)
+    path.write_bytes(b"something else")
+    with pytest.raises(prw.UserError, match="no .mat file"):
+        prw.check(path, fmu=fmu)
+    savemat(path, {"roll": np.zeros(3)})
+    with pytest.raises(prw.UserError, match="no vector time or tout; it has .*roll; save time and signals as vectors"):
+        prw.check(path, fmu=fmu)
+    with pytest.raises(prw.UserError, match="experiment: fig5 is not known; there are fig4_opposite, "):
+        prw.check(path, "fig5", fmu=fmu)
+    with pytest.raises(prw.UserError, match="absent.csv: no such file"):
+        prw.check(tmp_path / "absent.csv", fmu=fmu)
+
+
+def test_the_command(prw, right, soft, tmp_path):
+    result = prw("check", write_csv(tmp_path / "right.csv", right))
+    assert result.returncode == 0 and "agrees      with the reference" in result.stdout
+    result = prw("check", write_csv(tmp_path / "soft.csv", soft), "--out", tmp_path / "out")
+    assert result.returncode == 1 and "TOO FAR" in result.stdout and result.stderr.count("\n") == 1
+    assert "too far from fig4_opposite" in result.stderr and (tmp_path / "out" / "soft_check.png").stat().st_size > 1000

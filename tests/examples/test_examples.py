@@ -1,0 +1,132 @@
+"""The examples run, and what they find holds by means they do not use: the oracle's equations, the paper's poles."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lagrange import linear_model, table_1
+from reference import at_rest, follow
+
+ROOT = Path(__file__).resolve().parents[2]
+NAMES = ("lqr", "quiet_motion", "identify", "tolerances")
+#: The eigenvalues of eq. (11) with Table 1, 1/s, those with positive imaginary parts for their pairs.
+POLES = np.array([-174.87270665, -174.36733032, -18.94465405 + 32.14568305j, -9.68285129 + 34.67786598j])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_short_and_says_what_it_is_for(name: str) -> None:
+    lines = (ROOT / "examples" / f"{name}.py").read_text().splitlines()
+    assert len(lines) < 100
+    assert lines[2].startswith("You learn ")
+    assert any(line.startswith("    make examples") for line in lines[:12])
+
+
+def test_the_page_has_its_code_and_figures() -> None:
+    page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
+    for name in NAMES:
+        code = (ROOT / "examples" / f"{name}.py").read_text(encoding="utf-8").split('"""\n', 1)[1].strip()
+        assert code in page, f"{name}: `make docs` writes the page anew"
+        for figure in re.findall(r"\]\((examples/\w+\.png)\)", page):
+            assert (ROOT / "docs" / figure).is_file()
+
+
+@pytest.fixture(scope="module")
+def lqr() -> Any:
+    return importlib.import_module("lqr")
+
+
+def test_lqr_follows_closer_than_pi(lqr: Any) -> None:
+    figure, errors = lqr.main()
+    rms = {name: np.sqrt(np.mean(error**2, axis=0)) for name, error in errors.items()}
+    assert (rms["LQR"] < 0.5 * rms["PI"]).all()
+    assert (np.rad2deg(rms["LQR"]) < 1.5).all()
+    assert len(figure.axes) == 2
+
+
+def test_lqr_and_filter_are_stable_and_know_the_wrist(lqr: Any) -> None:
+    A, B, C, feedback, gain = lqr.design()
+    found = np.log(np.linalg.eigvals(A[:6, :6])) / lqr.STEP
+    upper = found[found.imag >= 0]
+    assert np.sort_complex(upper) == pytest.approx(np.sort_complex(POLES), rel=1e-7)
+    for closed in (A - B @ feedback, A - A @ gain @ C):
+        assert np.abs(np.linalg.eigvals(closed)).max() < 1
+
+
+@pytest.fixture(scope="module")
+def quiet() -> Any:
+    return importlib.import_module("quiet_motion")
+
+
+def vibration(quiet: Any, rates: np.ndarray, **changed: float) -> float:
+    """What is left of the motion by the oracle, deg: exact solution of the Lagrange equations."""
+    still = np.zeros((round(quiet.AFTER / quiet.STEP) + 1, 2))
+    slope = np.vstack([rates, still])
+    theta = np.vstack([np.zeros(2), np.cumsum(quiet.STEP * slope[:-1], axis=0)])
+    time = quiet.STEP * np.arange(len(theta))
+    at, _ = follow(linear_model({**table_1(), **changed}), time, theta, slope)
+    goal = {"pitch": np.deg2rad(20), "roll": np.deg2rad(30)}
+    return max(float(np.rad2deg(np.abs(at[name][len(rates) :] - goal[name]).max())) for name in goal)
+
+
+def test_quietest_motion_leaves_no_vibration(quiet: Any) -> None:
+    _, left = quiet.main()
+    quietest, quintic = quiet.quietest(), quiet.minimum_jerk()
+    assert vibration(quiet, quietest) < 1e-6
+    assert vibration(quiet, quintic) > 1
+    assert np.abs(quietest).max() <= quiet.RATE
+    assert left["quietest"] < 1e-6
+    assert left["quintic"] == pytest.approx(vibration(quiet, quintic), rel=1e-6)
+    softer = vibration(quiet, quietest, k2=0.9 * table_1()["k2"])
+    assert left["quietest, k2 10 % less"] == pytest.approx(softer, rel=1e-3)
+    assert softer < 0.2 * left["quintic"]
+
+
+@pytest.fixture(scope="module")
+def tolerances() -> Any:
+    return importlib.import_module("tolerances")
+
+
+def test_wrists_with_tolerances_answer_as_the_equations_say(tolerances: Any) -> None:
+    time, drawn, errors = tolerances.errors(runs=5)
+    _, wrist, rates = tolerances.motion()
+    motors = np.array([[1, 4 / 7], [1, -4 / 7]])
+    for run in range(5):
+        model = linear_model({**table_1(), **{name: values[run] for name, values in drawn.items()}})
+        at, _ = follow(model, time, wrist @ motors.T, rates @ motors.T, at_rest(np.zeros(2)))
+        for k, name in enumerate(("pitch", "roll")):
+            np.testing.assert_allclose(errors[name][run], at[name] - wrist[:, k], rtol=0, atol=1e-12)
+
+
+def test_blame_is_the_variance_that_a_parameter_makes_alone(tolerances: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, shares = tolerances.main(runs=2000)
+    everything = dict(tolerances.TOLERANCES)
+
+    def variances() -> dict[str, float]:
+        _, _, errors = tolerances.errors(runs=2000)
+        return {axis: np.abs(course).max(axis=1).var() for axis, course in errors.items()}
+
+    whole = variances()
+    for name in everything:
+        others = {other: everything[other] if other == name else 0.0 for other in everything}
+        monkeypatch.setattr(tolerances, "TOLERANCES", others)
+        for axis, alone in variances().items():
+            assert shares[axis][name] == pytest.approx(alone / whole[axis], abs=0.1), (axis, name)
+
+
+def test_identify_finds_the_pretended_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = importlib.import_module("identify").main(tmp_path)
+    truth = {
+        name: text.split()[0]
+        for name, text in (
+            part.split(" ", 1) for part in capsys.readouterr().out.splitlines()[0].split(": ")[1].split(", ")
+        )
+    }
+    assert (tmp_path / "report.html").stat().st_size > 10_000
+    for name in ("k1", "k2"):
+        estimate = found.parameters[name]
+        assert abs(estimate.value - np.rad2deg(float(truth[name]))) < 4 * estimate.standard_error

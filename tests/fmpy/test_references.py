@@ -1,0 +1,83 @@
+"""The packed FMUs against the reference experiments inside them, under several importers, with a margin; and the
+tolerances tell a testbed apart whose stiffness is off by 1 %."""
+
+from __future__ import annotations
+
+import csv
+import sys
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from conftest import ROOT
+
+from prw.checking.agreement import compare
+from prw.checking.experiments import FOLDER, read_experiments
+from tools.validation.importers import IMPORTERS
+
+sys.path.append(str(ROOT / "platforms"))
+
+import cross_check  # noqa: E402
+
+#: Of the tolerance: what the FMU takes at most, and what 1 % of k1 takes at least.
+PASSES, FAILS = 0.5, 1.4
+NAMES = ["fig4_opposite", "fig4_equal", "rate_step", "from_40_degrees", "other_parameters", "closed_loop"]
+
+
+@pytest.fixture(scope="module", params=["", "fmi3/"], ids=["fmi2", "fmi3"])
+def either_fmu(request, fmu) -> Path:
+    return fmu.parent / f"{request.param}{fmu.name}"
+
+
+@pytest.fixture(scope="module")
+def known(either_fmu):
+    return {experiment.name: experiment for experiment in read_experiments(either_fmu)}
+
+
+def test_the_fmu_brings_them_along(either_fmu, known):
+    assert list(known) == NAMES
+    with zipfile.ZipFile(either_fmu) as archive:
+        inside = {name.removeprefix(f"{FOLDER}/") for name in archive.namelist() if name.startswith(FOLDER)}
+        zipped = sum(i.compress_size for i in archive.infolist() if i.filename.startswith(FOLDER))
+    assert inside == {path.name for path in (ROOT / "modelDescription" / FOLDER).iterdir()}
+    assert zipped < 100_000
+
+
+@pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
+@pytest.mark.parametrize("name", NAMES)
+def test_the_tolerances_are_honest(either_fmu, known, importer, name):
+    experiment = known[name]
+
+    def share(parameters) -> float:
+        agreement = compare(importer.run(either_fmu, experiment, parameters), experiment, importer.interface)
+        assert len(agreement.time) == len(experiment.reference["time"])
+        return max(difference.largest / difference.allowed for difference in agreement.variables.values())
+
+    right = dict(experiment.parameters)
+    assert share(right) < PASSES
+    assert share({**right, "k1": 1.01 * right["k1"]}) > FAILS
+
+
+def test_the_folders_for_other_vendors(fmu, tmp_path):
+    """As the rules of the FMI Cross-Check want them, and the same bytes when made twice."""
+    for name in ("one.zip", "other.zip"):
+        cross_check.pack(fmu, tmp_path / name)
+    assert (tmp_path / "one.zip").read_bytes() == (tmp_path / "other.zip").read_bytes()
+    with zipfile.ZipFile(tmp_path / "one.zip") as archive:
+        archive.extractall(tmp_path)
+    description = fmpy.read_model_description(str(fmu))
+    for name in NAMES:
+        folder = tmp_path / name
+        ends = ".fmu", "_in.csv", "_ref.csv", "_ref.opt", ".ssv"
+        assert {path.name for path in folder.iterdir()} == {*(f"{name}{end}" for end in ends), "README.md"}
+        assert (folder / f"{name}.fmu").read_bytes() == fmu.read_bytes()
+        options = dict(line.split(", ") for line in (folder / f"{name}_ref.opt").read_text().splitlines())
+        for kind, causality in (("in", "input"), ("ref", "output")):
+            with open(folder / f"{name}_{kind}.csv", newline="") as file:
+                header, *rows = csv.reader(file)
+            variables = {v.name for v in description.modelVariables if v.causality == causality}
+            assert header[0] == "time" and set(header[1:]) == variables
+            assert [float(rows[0][0]), float(rows[-1][0])] == [
+                float(options[f"{end}Time"]) for end in ("Start", "Stop")
+            ]

@@ -1,0 +1,108 @@
+"""CasADi's DaeBuilder on the unpacked FMU, in Model Exchange: values, Jacobians and integration against the oracle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import needed
+from lagrange import OUTPUTS, REAL, linear_model, table_1
+from reference import follow
+
+needed("casadi", "casadi")
+
+import casadi  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def model():
+    return linear_model(table_1())
+
+
+def right(model, x, u):
+    """x' (6,) and outputs (8,) at states x (6,) and inputs u (4,): angles and rates of the motors."""
+    outputs = model.outputs(x, u[:2], u[2:])
+    return model.a @ x + model.b_angle @ u[:2] + model.b_rate @ u[2:], np.array([outputs[name] for name in OUTPUTS])
+
+
+def share(found, expected) -> float:
+    """Largest difference in terms of the largest value."""
+    off = np.abs(np.array(found).reshape(np.shape(expected)) - expected).max()
+    return float(off / (np.abs(expected).max() or 1.0))
+
+
+def test_values_and_jacobians(testbed, folder, unpacked, model, saw):
+    dae = casadi.DaeBuilder("testbed", unpacked(testbed))
+    assert dae.y() == list(OUTPUTS) and dae.u() == ["theta1", "theta2", "omega1", "omega2"]
+    f = dae.create("f", ["x", "u"], ["ode", "y"])
+    jacobians = f.factory("j", ["x", "u"], [f"jac:{of}:{by}" for of in ("ode", "y") for by in ("x", "u")])
+    rng, worst = np.random.default_rng(3), 0.0
+    # Linear in states and inputs: columns of the Jacobians are differences of values, exactly.
+    base = right(model, np.zeros(6), np.zeros(4))
+    unit = np.eye(10)
+    whole = [np.column_stack([right(model, e[:6], e[6:])[i] - base[i] for e in unit]) for i in (0, 1)]
+    for _ in range(20):
+        x, u = rng.normal(size=6), rng.normal(size=4)
+        worst = max(worst, *(share(a, b) for a, b in zip(f(x, u), right(model, x, u))))
+        found = [np.array(m) for m in jacobians(x, u)]
+        worst = max(worst, share(np.hstack(found[:2]), whole[0]), share(np.hstack(found[2:]), whole[1]))
+    assert worst < 1e-13
+    seen = f"agree with the equations to {worst:.0e} of the largest value"
+    of = f"testbed for FMI {'3.0' if folder else '2.0'}, ME"
+    saw("CasADi, `DaeBuilder`", "casadi", of, "right-hand side, outputs and their four Jacobians", seen)
+
+
+def test_cvodes(testbed, folder, unpacked, model, saw):
+    """The testbed let go with its couplings wound up, the motors held."""
+    dae = casadi.DaeBuilder("testbed", unpacked(testbed))
+    x, u = casadi.MX.sym("x", 6), casadi.MX.sym("u", 4)
+    equations = {"x": x, "u": u, "ode": dae.create("f", ["x", "u"], ["ode"])(x, u)}
+    t = np.arange(21) * 0.1
+    solver = casadi.integrator("s", "cvodes", equations, 0, t[1:], {"abstol": 1e-11, "reltol": 1e-10})
+    held, start = np.array([0.2, -0.1]), np.array([0.5, -0.3, 0.1, 0.4, 3.0, -2.0])
+    inputs = np.tile([*held, 0.0, 0.0], (20, 1)).T
+    found = np.array(solver(x0=start, u=inputs)["xf"])
+    at, _ = follow(model, t, np.tile(held, (21, 1)), np.zeros((21, 2)), x0=start)
+    worst = max(share(found[row], at[name][1:]) for row, name in ((0, "theta3"), (1, "theta4")))
+    assert worst < 1e-7
+    of = f"testbed for FMI {'3.0' if folder else '2.0'}, ME"
+    seen = f"2 s from a wound-up start agree with the matrix exponential to {worst:.0e} of the largest angle"
+    saw("CasADi, `cvodes`", "casadi", of, "integration with relative tolerance 1e-10", seen)
+
+
+def test_derivatives_by_parameters(tunable, folder, unpacked, saw):
+    """`fixed` parameters are constants to CasADi; those of the variant made with `--tunable` are its `p`."""
+    dae = casadi.DaeBuilder("testbed", unpacked(tunable))
+    physical = [name in REAL for name in dae.p()]
+    assert {name for name, real in zip(dae.p(), physical) if real} == set(REAL)
+    assert all(name.endswith("_start") for name, real in zip(dae.p(), physical) if not real)
+    f = dae.create("f", ["x", "u", "p"], ["ode", "y"])
+    jacobian = f.factory("j", ["x", "u", "p"], ["jac:ode:p", "jac:y:p"])
+    rng, worst = np.random.default_rng(4), 0.0
+    for _ in range(5):
+        x, u = rng.normal(size=6), rng.normal(size=4)
+        # Where it would have started says nothing of a state that is given.
+        p = np.array([table_1().get(name, 1.0) * rng.uniform(0.7, 1.3) for name in dae.p()])
+
+        def at(values, x=x, u=u):
+            return right(linear_model({**table_1(), **dict(zip(dae.p(), values))}), x, u)
+
+        assert max(share(a, b) for a, b in zip(f(x, u, p), at(p))) < 1e-13
+        for i, found in enumerate(jacobian(x, u, p)):
+            columns = []
+            for step in np.diag(1e-3 * p):
+                # Richardson's extrapolation of central differences, of fourth order in the step.
+                wide, narrow = ((at(p + k * step)[i] - at(p - k * step)[i]) / (2 * k * step.sum()) for k in (2, 1))
+                columns.append((4 * narrow - wide) / 3)
+            expected = np.column_stack(columns)
+            found = np.array(found)
+            worst = max(worst, *(share(found[:, k], expected[:, k]) for k in np.flatnonzero(physical)))
+            assert not found[:, np.logical_not(physical)].any()
+    assert worst < 1e-9
+    of = f"testbed for FMI {'3.0' if folder else '2.0'} made with `--tunable`, ME"
+    saw(
+        "CasADi, `DaeBuilder`",
+        "casadi",
+        of,
+        "derivatives by all eight Real parameters",
+        f"agree with differences to {worst:.0e}",
+    )

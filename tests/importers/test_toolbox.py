@@ -1,0 +1,61 @@
+"""fmu-manipulation-toolbox: its check of an FMU, and the closed loop as one FMU."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import fmpy
+import numpy as np
+from conftest import built, needed
+
+needed("fmu_manipulation_toolbox", "fmu-manipulation-toolbox")
+
+from prw.checking.agreement import compare  # noqa: E402
+from prw.checking.experiments import find, read_experiments  # noqa: E402
+from prw.checking.result import Result  # noqa: E402
+
+TOOLBOX = "fmu-manipulation-toolbox"
+
+
+def toolbox(command: str, *arguments: str, folder: Path) -> str:
+    """What a command of the toolbox says."""
+    code = f"import sys; from fmu_manipulation_toolbox.cli.{command} import {command}; sys.argv[0] = {command!r}; {command}()"
+    process = subprocess.run(
+        [sys.executable, "-c", code, *arguments], cwd=folder, capture_output=True, text=True, timeout=120
+    )
+    said = process.stdout + process.stderr
+    assert process.returncode == 0, said
+    return said
+
+
+def test_fmutool_has_nothing_to_say(testbed, folder, saw):
+    said = toolbox("fmutool", "-input", str(testbed), "-check", folder=testbed.parent)
+    verdict = f"No semantic error against the FMI-{'3' if folder else '2'} standard."
+    assert verdict in said and "ERROR" not in said.replace("semantic error", "")
+    of = f"testbed for FMI {'3.0' if folder else '2.0'}"
+    saw("fmutool", TOOLBOX, of, "`-check`", f"“{verdict}”")
+
+
+def test_the_closed_loop_as_one_fmu(closed_loop, tmp_path, saw):
+    """A container steps its FMUs one after the other's outputs, like any master; FMPy runs it."""
+    (tmp_path / closed_loop.name).write_bytes(closed_loop.read_bytes())
+    toolbox("fmucontainer", "-container", f"{closed_loop.name}:0.001", "-auto-local", folder=tmp_path)
+    container = tmp_path / "prw_closed_loop.fmu"
+    goals = {"pitch_ref": np.deg2rad(30.0), "roll_ref": np.deg2rad(60.0)}
+    inside = [
+        v.name for v in fmpy.read_model_description(str(container)).modelVariables if v.name.startswith("prw_testbed.")
+    ]
+    rows = fmpy.simulate_fmu(
+        str(container), stop_time=1.0, step_size=1e-3, output_interval=1e-3, start_values=goals, output=inside
+    )
+    experiment = find(read_experiments(built("prw_testbed.fmu")), "closed_loop")
+    values = {name.removeprefix("prw_testbed."): rows[name] for name in inside}
+    agreement = compare(Result(container, rows["time"], values), experiment, "CoSimulation")
+    assert agreement.agrees, agreement.summary()
+    share = max(difference.largest / difference.allowed for difference in agreement.variables.values())
+    assert share < 0.6 and len(agreement.variables) == 6
+    seen = f"agrees with the reference experiment closed_loop, within {share:.0%} of its tolerance"
+    run = "`fmucontainer` with `-auto-local` at 1 ms, what it makes run by FMPy"
+    saw("FMU containers (fmucontainer)", TOOLBOX, "SSP of controller and testbed, CS", run, seen)

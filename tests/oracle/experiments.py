@@ -1,0 +1,196 @@
+"""The reference experiments: what the motors do, with which parameters, and what the testbed then does.
+
+The truth is the oracle's. Motors that turn at constant rates are exact in both interface types and at any step size;
+of other motions the samples are exact, and what an importer makes of the time between them costs what the tolerances
+allow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from controlled import MOTORS, Law, control
+from lagrange import OUTPUTS, linear_model, table_1
+from reference import follow, integrate
+
+#: How far a result may be off, as a fraction of the largest value that any variable of its kind takes: of angles,
+#: rates and torques. In Co-Simulation the motors' rates are held over a step, and many importers read torques before
+#: they set the next rates: a step late.
+Fractions = Mapping[str, tuple[float, float, float]]
+INTERFACES = {"CoSimulation": 1e-3, "ModelExchange": 1e-3}
+QUICK: Fractions = {"CoSimulation": (5e-4, 1e-3, 2e-2), "ModelExchange": (5e-4, 1e-3, 2e-3)}
+SLOW: Fractions = {"CoSimulation": (1e-4, 3e-4, 2e-2), "ModelExchange": (1e-4, 3e-4, 2e-3)}
+EXACT: Fractions = {"CoSimulation": (1e-6,) * 3, "ModelExchange": (1e-5,) * 3}
+KINDS = (("pitch", "roll", "theta3", "theta4"), ("pitch_rate", "roll_rate"), ("tau1", "tau2"))
+#: Between rows of the reference, and of the motors where they do not turn at constant rates; s.
+INTERVAL, SAMPLE = 0.01, 1e-3
+#: Length of the experiments, and of the move from point to point; s.
+STOP, MOVE = 1.0, 0.4
+
+Function = Callable[[float], Any]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """inputs: `time` and MOTORS by name, to be interpolated linearly. reference: `time` and OUTPUTS by name. parameters:
+    of the FMU, in SI. tolerances: see Fractions."""
+
+    name: str
+    description: str
+    parameters: dict[str, Any]
+    inputs: dict[str, Any]
+    reference: dict[str, Any]
+    tolerances: Fractions = field(default_factory=lambda: QUICK)
+
+    def allowed(self, interface: str) -> dict[str, float]:
+        """How far each output may be off, rad, rad/s or N.m."""
+        found = {}
+        for names, fraction in zip(KINDS, self.tolerances[interface]):
+            largest = max(np.abs(self.reference[name]).max() for name in names)
+            found.update(dict.fromkeys(names, float(f"{fraction * largest:.3g}")))
+        return {name: found[name] for name in OUTPUTS}
+
+
+def experiments() -> list[Experiment]:
+    """All of them; takes some seconds."""
+    table = with_counts(table_1())
+    return [
+        fig4("fig4_opposite", "Fig. 4: motors with opposite rates, sin(10 pi t) rad/s; the wrist rolls", -1),
+        fig4("fig4_equal", "Fig. 4 with equal rates, sin(10 pi t) rad/s; the wrist pitches", 1),
+        rate_step(),
+        moved(
+            "from_40_degrees",
+            "From rest at a pitch of 40 degrees to a pitch of -10 and a roll of 30 degrees in 0.4 s, and then rest",
+            table,
+            *point_to_point(np.deg2rad([40.0, 40.0]), rigid_motors(np.deg2rad([-10.0, 30.0])), MOVE),
+            tolerances=SLOW,
+        ),
+        moved(
+            "other_parameters",
+            "Another testbed: every parameter differs from Table 1; sines of 3 and 5 Hz",
+            {
+                "J2": 5e-3,
+                "J3": 0.02,
+                "H3": 0.03,
+                "k1": 90.0,
+                "k2": 60.0,
+                "c1": 0.6,
+                "c2": 0.4,
+                "c3": 0.25,
+                "M": 3,
+                "N": 5,
+            },  # fmt: skip
+            *sines(np.array([0.2, -0.1]), 2 * np.pi * np.array([3.0, 5.0])),
+        ),
+        closed_loop(table),
+    ]
+
+
+def with_counts(parameters: dict[str, Any]) -> dict[str, Any]:
+    """M and N as whole numbers."""
+    return {**parameters, "M": int(parameters["M"]), "N": int(parameters["N"])}
+
+
+def rigid_motors(wrist: Any) -> Any:
+    """Motor angles (2,) rad at which the wrist rests at pitch and roll (2,) rad; eq. (1)."""
+    return np.linalg.solve(Law().to_wrist, wrist)
+
+
+def fig4(name: str, description: str, sign: int) -> Experiment:
+    """The paper's experiment (Sec. 4), its first second."""
+    frequency, sides = 10 * np.pi, np.array([1, sign])
+    return moved(
+        name,
+        description,
+        with_counts(table_1()),
+        lambda t: sides * 2 * np.sin(frequency * t / 2) ** 2 / frequency,
+        lambda t: sides * np.sin(frequency * t),
+    )
+
+
+def point_to_point(start: Any, end: Any, duration: float) -> tuple[Function, Function]:
+    """Angles and rates (2,) of a move of `duration` s with continuous acceleration: a polynomial of degree 5."""
+
+    def angle(t: float) -> Any:
+        s = min(t / duration, 1.0)
+        return start + (end - start) * s**3 * (10 - 15 * s + 6 * s**2)
+
+    def rate(t: float) -> Any:
+        s = min(t / duration, 1.0)
+        return (end - start) * 30 * s**2 * (1 - s) ** 2 / duration
+
+    return angle, rate
+
+
+def sines(amplitude: Any, frequency: Any) -> tuple[Function, Function]:
+    """Angles and rates (2,) that start at rest at 0; frequency (2,) in rad/s."""
+    return (
+        lambda t: amplitude * (1 - np.cos(frequency * t)),
+        lambda t: amplitude * frequency * np.sin(frequency * t),
+    )
+
+
+def moved(
+    name: str,
+    description: str,
+    parameters: dict[str, Any],
+    angle: Function,
+    rate: Function,
+    tolerances: Fractions = QUICK,
+) -> Experiment:
+    """Motors that follow the smooth functions of time angle(t) rad and rate(t) rad/s from rest."""
+    model = linear_model({key: float(value) for key, value in parameters.items()})
+    t, fine = times(STOP, INTERVAL), times(STOP, SAMPLE)
+    motion = np.array([(*angle(s), *rate(s)) for s in fine])
+    # Motions here are smooth but where a move ends; the solver restarts there.
+    truth = integrate(model, t, angle, rate, breaks=(MOVE,))
+    return Experiment(
+        name,
+        description,
+        {**parameters, "use_omega": True},
+        {"time": fine, **dict(zip(MOTORS, motion.T))},
+        {"time": t, **truth},
+        tolerances,
+    )
+
+
+def rate_step() -> Experiment:
+    """Motor 1 turns at 0.5 rad/s from the first instant on, with the wrist at rest; motor 2 stands."""
+    t, speed = times(0.5, INTERVAL), np.array([0.5, 0.0])
+    parameters = with_counts(table_1())
+    model = linear_model({key: float(value) for key, value in parameters.items()})
+    truth, _ = follow(model, t, np.outer(t, speed), np.tile(speed, (len(t), 1)))
+    ends = t[[0, -1]]
+    motors = np.column_stack([np.outer(ends, speed), np.tile(speed, (2, 1))])
+    return Experiment(
+        "rate_step",
+        "The rate of motor 1 steps from 0 to 0.5 rad/s at the first instant, motor 2 stands; exact at any step size",
+        {**parameters, "use_omega": True},
+        {"time": ends, **dict(zip(MOTORS, motors.T))},
+        {"time": t, **truth},
+        EXACT,
+    )
+
+
+def closed_loop(parameters: dict[str, Any]) -> Experiment:
+    """The testbed with its controller, which takes it to a pitch of 30 and a roll of 60 degrees."""
+    model = linear_model({key: float(value) for key, value in parameters.items()})
+    law = Law()
+    loop = control(model, law, np.deg2rad([30.0, 60.0]), round(STOP / law.sample_time))
+    fine, every = times(STOP, law.sample_time), round(INTERVAL / law.sample_time)
+    return Experiment(
+        "closed_loop",
+        "Closed loop with prw_controller to a pitch of 30 and a roll of 60 degrees; the inputs are its motors",
+        {**parameters, "use_omega": True},
+        {"time": fine, **{name: loop[name] for name in MOTORS}},
+        {"time": fine[::every], **{name: loop[name][::every] for name in OUTPUTS}},
+        SLOW,
+    )
+
+
+def times(stop: float, step: float) -> Any:
+    """0, step, ... stop."""
+    return np.arange(round(stop / step) + 1) * step

@@ -1,0 +1,106 @@
+"""The reference experiments as they are kept with the sources: up to date, and what the two oracles agree on."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from controlled import Law
+from experiments import INTERFACES, experiments
+from lagrange import OUTPUTS, linear_model
+from lxml import etree
+from reference import follow
+from write_experiments import DECIMALS, FILES, LAYER, ROOT, files
+
+COMMITTED = ROOT / "modelDescription"
+HINT = "out of date; write it anew with\n    make experiments"
+
+
+@pytest.fixture(scope="module")
+def found():
+    return experiments()
+
+
+@pytest.fixture(scope="module")
+def texts(found):
+    return files(found)
+
+
+def numbers(text: str) -> np.ndarray:
+    return np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1)
+
+
+def test_the_committed_files_are_up_to_date(texts):
+    kept = {path.relative_to(COMMITTED) for path in (COMMITTED / FILES).iterdir()}
+    assert kept == {place for place in texts if FILES in place.parents}, HINT
+    for place, text in texts.items():
+        committed = (COMMITTED / place).read_text(encoding="utf-8")
+        if place.suffix == ".csv":
+            # Another processor may round the last digit differently.
+            assert committed.splitlines()[0] == text.splitlines()[0], f"{place}: {HINT}"
+            last_digit = 1.01 * 10.0**-DECIMALS
+            np.testing.assert_allclose(numbers(committed), numbers(text), rtol=0, atol=last_digit, err_msg=HINT)
+        else:
+            assert committed == text, f"{place}: {HINT}"
+
+
+def test_both_oracles_agree(found):
+    """`integrate` and the closed loop against `follow`, whose straight lines are of second order in the step."""
+    for experiment in found:
+        if experiment.name == "rate_step":
+            continue
+        model = linear_model({n: float(v) for n, v in experiment.parameters.items() if n != "use_omega"})
+        motors = experiment.inputs
+        theta, omega = (np.column_stack([motors[f"{n}1"], motors[f"{n}2"]]) for n in ("theta", "omega"))
+        errors = []
+        for every in (2, 1):
+            at, _ = follow(model, motors["time"][::every], theta[::every], omega[::every])
+            common = np.isin(motors["time"][::every], experiment.reference["time"])
+            off = [np.abs(at[n][common] - experiment.reference[n]).max() for n in OUTPUTS]
+            errors.append(max(o / a for o, a in zip(off, experiment.allowed("ModelExchange").values())))
+        assert errors[1] < 0.6 and 3 < errors[0] / errors[1] < 5, (experiment.name, errors)
+
+
+def test_the_tables_follow_the_rules_of_the_cross_check(texts):
+    for place, text in texts.items():
+        if place.suffix == ".csv":
+            header, *_ = text.splitlines()
+            assert re.fullmatch(r'"time"(,"\w+")+', header) and len(text) < 1e6
+            assert (np.diff(numbers(text)[:, 0]) > 0).all()
+
+
+def test_the_parameter_sets_are_valid(texts):
+    schema = Path(fmpy.__file__).parent / "ssp" / "schema" / "SystemStructureParameterValues.xsd"
+    valid = etree.XMLSchema(etree.parse(schema))
+    for place, text in texts.items():
+        if place.suffix == ".ssv":
+            valid.assertValid(etree.fromstring(text.encode()))
+
+
+def test_the_manifest_names_every_file_and_no_other(texts):
+    root = etree.fromstring(texts[FILES / "fmi-ls-manifest.xml"].encode())
+    assert root.get("{http://fmi-standard.org/fmi-ls-manifest}fmi-ls-name") == LAYER == FILES.name
+    sources = {(COMMITTED / FILES / related.get("source")).resolve() for related in root.iter("Related")}
+    others = {(COMMITTED / place).resolve() for place in texts if place.name != "fmi-ls-manifest.xml"}
+    assert sources == others
+
+
+def test_every_experiment_has_a_step_and_a_tolerance_for_each_interface(texts, found):
+    listed = json.loads(texts[FILES / "experiments.json"])
+    assert [entry["name"] for entry in listed] == [experiment.name for experiment in found]
+    for entry in listed:
+        assert entry["interfaces"].keys() == INTERFACES.keys()
+        for interface in entry["interfaces"].values():
+            assert interface["step_size"] > 0 and interface["tolerance"].keys() == set(OUTPUTS)
+            assert all(value > 0 for value in interface["tolerance"].values())
+
+
+def test_a_motor_brakes_in_whole_samples():
+    """From 0.09 rad/s, three samples of braking at 30 rad/s2: 0.045, 0.015 and half a sample to get there."""
+    rates, reached = Law().braking_curve()
+    assert np.interp(0.09, rates, reached) == pytest.approx(0.09 / 2 * 1e-3 + 0.09**2 / 2 / 30)

@@ -1,0 +1,157 @@
+"""Writes the reference experiments as files that travel in the FMU, where the layered standard FMI-LS-REF (version
+1.0.0-alpha.1) has its place for them.
+
+    python tests/oracle/write_experiments.py [FOLDER]
+
+FOLDER is what goes into the FMU as it is, by default modelDescription.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from experiments import INTERFACES, KINDS, SAMPLE, Experiment, experiments
+from lxml import etree
+
+ROOT = Path(__file__).resolve().parents[2]
+LAYER = "org.fmi-standard.fmi-ls-ref"
+#: Within the folder; the second is what the standard recommends to readers.
+FILES, ABOUT = Path("extra", LAYER), Path("documentation", "fmi-ls-ref.txt")
+LS = "http://fmi-standard.org/fmi-ls-manifest"
+SSV, SSC = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("ParameterValues", "Common"))
+#: Decimals of all numbers: a hundredth of the smallest tolerance and less.
+DECIMALS = 8
+#: Relative tolerance of solvers for which the tolerances in Model Exchange are meant.
+SOLVER = 1e-7
+
+
+def files(found: list[Experiment]) -> dict[Path, str]:
+    """The text of every file by its place in the folder."""
+    texts = {}
+    for experiment in found:
+        for kind, columns in (("in", experiment.inputs), ("ref", experiment.reference)):
+            texts[FILES / f"{experiment.name}_{kind}.csv"] = table(columns)
+        texts[FILES / f"{experiment.name}.ssv"] = parameter_set(experiment)
+    texts[FILES / "experiments.json"] = json.dumps([entry(experiment) for experiment in found], indent=1) + "\n"
+    texts[FILES / "fmi-ls-manifest.xml"] = manifest(found)
+    texts[ABOUT] = about(found)
+    return texts
+
+
+def table(columns: dict[str, Any]) -> str:
+    """CSV as the FMI Cross-Check has it: names in quotes, commas, nothing else."""
+    rows = np.round(np.column_stack(list(columns.values())), DECIMALS) + 0.0  # no -0.0
+    lines = [",".join(f'"{name}"' for name in columns), *(",".join(f"{v:.10g}" for v in row) for row in rows)]
+    return "\n".join(lines) + "\n"
+
+
+def parameter_set(experiment: Experiment) -> str:
+    """All parameters as an SSV file of SSP 1.0, in the FMU's units."""
+    root = etree.Element(
+        f"{{{SSV}}}ParameterSet",
+        nsmap={"ssv": SSV, "ssc": SSC},
+        version="1.0",
+        name=experiment.name,
+        description=experiment.description,
+    )
+    parameters = etree.SubElement(root, f"{{{SSV}}}Parameters")
+    for name, value in experiment.parameters.items():
+        kind = {bool: "Boolean", int: "Integer", float: "Real"}[type(value)]
+        element = etree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
+        etree.SubElement(element, f"{{{SSV}}}{kind}", value=json.dumps(value))
+    return xml(root)
+
+
+def entry(experiment: Experiment) -> dict[str, Any]:
+    """What experiments.json says of one."""
+    t = experiment.reference["time"]
+    return {
+        "name": experiment.name,
+        "description": experiment.description,
+        "start_time": float(t[0]),
+        "stop_time": float(t[-1]),
+        "inputs": f"{experiment.name}_in.csv",
+        "reference": f"{experiment.name}_ref.csv",
+        "parameters": f"{experiment.name}.ssv",
+        "interfaces": {
+            interface: {"step_size": step, "tolerance": experiment.allowed(interface)}
+            for interface, step in INTERFACES.items()
+        },
+    }
+
+
+def manifest(found: list[Experiment]) -> str:
+    """fmi-ls-manifest.xml."""
+    root = etree.Element("fmiReferences", nsmap={"fmi-ls": LS})
+    root.set(f"{{{LS}}}fmi-ls-name", LAYER)
+    root.set(f"{{{LS}}}fmi-ls-version", "1.0.0-alpha.1")
+    said = "Layered Standard providing information on related files included in an FMU."
+    root.set(f"{{{LS}}}fmi-ls-description", said)
+
+    def related(source: str, kind: str, role: str, description: str, label: str = "") -> None:
+        element = etree.SubElement(root, "Related", type=kind, source=source, role=role, description=description)
+        if label:
+            etree.SubElement(element, "Label", name=f"experiment:{label}")
+
+    about = "All experiments: their files, times, step sizes and tolerances"
+    related("experiments.json", "application/json", "experiment/validation", about)
+    related(f"../../{ABOUT.as_posix()}", "text/plain", "document", "How to carry out and judge the experiments")
+    for experiment in found:
+        name = experiment.name
+        related(f"{name}.ssv", "application/x-ssp-parameter-set", "parameter", experiment.description, name)
+        related(f"{name}_in.csv", "text/csv", "testcase", "Inputs over time, to be interpolated linearly", name)
+        related(f"{name}_ref.csv", "text/csv", "result", "Outputs over time, not calculated by the FMU", name)
+    return xml(root)
+
+
+def about(found: list[Experiment]) -> str:
+    """documentation/fmi-ls-ref.txt."""
+    listed = "\n".join(f"  {e.name:<17} {e.description}" for e in found)
+    kinds = ", ".join(" ".join(names) for names in KINDS)
+    return f"""Reference experiments
+
+The folder extra/{LAYER} has experiments to try an importer with. What the testbed does in them was
+calculated from the energies of its parts by a program that shares nothing with the FMU.
+
+{listed}
+
+For each experiment NAME:
+
+  NAME.ssv          all parameters (SSP 1.0), in SI
+  NAME_in.csv       motor angles (rad) and rates (rad/s) over time (s), to be interpolated linearly between rows
+  NAME_ref.csv      outputs over time (s): torques (N.m), angles (rad), rates (rad/s)
+  experiments.json  start and stop time, step size and tolerances (in the outputs' units) for each interface type
+
+The tolerances are for communication steps of {INTERFACES["CoSimulation"] * 1e3:g} ms in Co-Simulation, with use_omega = true, and in Model Exchange
+for solvers with a relative tolerance of {SOLVER:g} or less that see interpolated inputs at every evaluation. Inputs that are
+held between communication points cost an error of first order and miss them. Variables of a kind share a tolerance:
+{kinds}. In Co-Simulation that of torques is wider, because many
+importers read outputs before they set the next inputs: torques are then those of the last rates.
+
+rate_step is exact in both interface types at any step size, because its motors turn at constant rates. The motors of
+the others are sampled every {SAMPLE * 1e3:g} ms.
+
+`prw check RESULT` compares a table of any tool with an experiment.
+"""
+
+
+def xml(root: Any) -> str:
+    found: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
+    return found.decode("utf-8")
+
+
+def main() -> None:
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "modelDescription"
+    texts = files(experiments())
+    for place, text in texts.items():
+        (folder / place).parent.mkdir(parents=True, exist_ok=True)
+        (folder / place).write_text(text, encoding="utf-8", newline="\n")
+    print(f"wrote {len(texts)} files, {sum(map(len, texts.values())) // 1000} kB, into {folder}")
+
+
+if __name__ == "__main__":
+    main()

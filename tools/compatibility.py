@@ -1,0 +1,43 @@
+"""`tools compatibility`: the table of docs/compatibility.md that is written from what tests/importers saw."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from prw.errors import UserError
+from prw.files import write_text
+
+#: Where tests/importers leave what they saw, a file each, and where it goes; within the project.
+SEEN, PAGE, HEADING = Path("target/importers"), Path("docs/compatibility.md"), "Seen by tests/importers"
+HEADS = ("tool", "version", "fmu", "run", "seen", "date")
+TITLES = ("tool", "version", "FMU", "what was run", "what was seen", "date")
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add `compatibility` to the subcommands."""
+    parser = subparsers.add_parser(
+        "compatibility",
+        help="write what tests/importers saw into docs/compatibility.md",
+        description=f"Writes the table “{HEADING}” of {PAGE} anew from {SEEN}, where `make test-importers` leaves it.",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(_: argparse.Namespace) -> None:
+    """Carry out `tools compatibility`. Raises UserError where there is nothing to write, or no place for it."""
+    rows = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(SEEN.glob("*.json"))]
+    if not rows:
+        raise UserError(f"{SEEN}: there is nothing; run `make test-importers` in the project's folder")
+    text = PAGE.read_text(encoding="utf-8")
+    lines = [f"| {' | '.join(TITLES)} |", "|" + "---|" * len(TITLES)]
+    lines += [f"| {' | '.join(row[head] for head in HEADS)} |" for row in rows]
+    place = rf"(^## {HEADING}\n\n(?:[^|\n][^\n]*\n)*\n?)(?:\|.*\n)*\n*"
+    found, count = re.subn(place, lambda match: match[1] + "\n".join(lines) + "\n\n", text, count=1, flags=re.M)
+    if not count:
+        raise UserError(f"{PAGE}: there is no heading “{HEADING}”")
+    write_text(PAGE, found)
+    print(f"wrote {len(rows)} rows into {PAGE}")

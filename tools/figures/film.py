@@ -1,0 +1,68 @@
+"""The animation that shows what the wrist does: equal motors, opposite motors, and both with a controller."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from prw.animation import MEASURED
+from prw.motion import Array, Motion
+from prw.simulation import Run
+from prw.slave import Slave
+
+#: Communication step, s.
+STEP = 1e-3
+#: Seconds of the run in a second of the animation.
+SPEED = 0.8
+#: The angle that motors turn by when they are led, rad, and the times they take there, across and back, s.
+SWING, LEGS = np.deg2rad(35), (0.45, 0.7, 0.45)
+#: Where the controller goes, pitch and roll in rad, one after the other, and the time that each takes, s.
+GOALS, STAY = (np.deg2rad((30, 60)), np.zeros(2)), 0.8
+#: When the controller has reached the first of them, s.
+POSE = 2 * sum(LEGS) + 0.95 * STAY
+MOTORS = ("theta1", "theta2", "omega1", "omega2")
+CONTROLLED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
+
+
+def story(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[float, str]]]:
+    """Run the testbed, first with motors that are led, then with the controller: it begins and ends at rest at zero.
+    Returns the run and its captions, each with the time (s) from which it is shown."""
+    led = _there_and_back()
+    with Slave(testbed_fmu, {"use_omega": True}) as testbed, Slave(controller_fmu) as controller:
+        rows, captions = [], []
+
+        def motors(theta: Sequence[float], omega: Sequence[float]) -> None:
+            testbed.set(dict(zip(MOTORS, (*theta, *omega))))
+            rows.append(testbed.get(*MOTORS, *MEASURED))
+
+        for words, second in (("Equal motors: the wrist pitches", 1), ("Opposite motors: the wrist rolls", -1)):
+            captions.append((testbed.time, words))
+            for theta, omega in led:
+                motors((theta, second * theta), (omega, second * omega))
+                testbed.step(STEP)
+        captions.append((testbed.time, "With a controller: both at once"))
+        for pitch, roll in GOALS:
+            controller.set({"pitch_ref": pitch, "roll_ref": roll})
+            for _ in range(round(STAY / STEP)):
+                theta1, theta2, omega1, omega2 = controller.get(*MOTORS)
+                motors((theta1, theta2), (omega1, omega2))
+                controller.set(dict(zip(CONTROLLED, testbed.get(*CONTROLLED))))
+                for slave in (testbed, controller):
+                    slave.step(STEP)
+        counts = {name: int(testbed.variables[name].start) for name in ("M", "N")}
+    found = np.array(rows)
+    time: Array = STEP * np.arange(len(rows), dtype=np.float64)
+    motion = Motion(time, found[:, :2], found[:, 2:4], "film")
+    return Run(motion, dict(zip(MEASURED, found[:, 4:].T)), counts), captions
+
+
+def _there_and_back() -> Array:
+    """Angle (rad) and rate (rad/s) of a motor that goes to SWING, to its opposite and back, with minimal jerk."""
+    places, parts = (0, SWING, -SWING, 0), []
+    for begin, end, duration in zip(places, places[1:], LEGS):
+        s = np.arange(round(duration / STEP)) * STEP / duration
+        way, slope = s**3 * (10 - 15 * s + 6 * s**2), 30 * s**2 * (1 - s) ** 2 / duration
+        parts.append(np.column_stack([begin + (end - begin) * way, (end - begin) * slope]))
+    return np.vstack(parts)

@@ -1,0 +1,67 @@
+"""`tools validation`: the FMUs against the reference experiments, under every importer that is installed."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from prw.commands.options import DEFAULT_OUT
+from prw.errors import UserError
+
+DEFAULT_FMUS = Path("target/fmu")
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add `validation` to the subcommands."""
+    parser = subparsers.add_parser(
+        "validation",
+        help="compare the FMUs with the reference experiments under every importer",
+        description="Runs the reference experiments with the testbed for FMI 2.0 and FMI 3.0 under every importer that is "
+        "installed, and the closed loop under every master; compares with the reference, and finds what the tolerances "
+        "tell apart. Writes validation.html and validation.json.",
+    )
+    parser.add_argument(
+        "--fmus",
+        type=Path,
+        default=DEFAULT_FMUS,
+        metavar="DIR",
+        help="folder with prw_testbed.fmu, fmi3/ and the closed loop (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--result",
+        action="append",
+        default=[],
+        metavar="TOOL=FILE",
+        help="also compare this file, which another tool wrote, as `prw check` does; TOOL is its name and version. May be "
+        "repeated",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Carry out `tools validation`. Raises UserError with one line on what is wrong, also where something does not
+    agree."""
+    # SciPy and FMPy take a while to load.
+    from prw.files import write_text
+    from tools.validation.page import page
+    from tools.validation.runs import validate
+
+    results = []
+    for text in arguments.result:
+        tool, equals, file = text.rpartition("=")
+        if not equals or not tool.strip() or not file:
+            raise UserError(f"--result {text}: write TOOL=FILE, for example --result 'OpenModelica 1.26=wrist_res.mat'")
+        results.append((tool.strip(), Path(file)))
+    found = validate(arguments.fmus, results)
+    write_text(arguments.out / "validation.json", found.to_json())
+    write_text(arguments.out / "validation.html", page(found))
+    for row in found.rows:
+        print(f"{'agrees' if row.agrees else 'TOO FAR':<8} {row.share:6.1%} of the tolerance  {row}")
+    print(f"wrote    {arguments.out / 'validation.html'}, {arguments.out / 'validation.json'}")
+    far = [str(row) for row in found.rows if not row.agrees]
+    if far:
+        raise UserError(f"too far from the reference: {'; '.join(far)}")

@@ -1,0 +1,140 @@
+"""What was run, and how far it agreed with the reference."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from prw.channels import MEASURED
+from prw.checking import check
+from prw.checking.agreement import Agreement, compare
+from prw.checking.experiments import Experiment, find, read_experiments
+from prw.checking.result import Result
+from prw.motion import Array
+from prw.testbed import existing_fmu
+from tools.closed_loop import masters, system
+from tools.validation.importers import IMPORTERS, by_fmu_run
+
+#: Where the FMUs are, by version of FMI.
+FMUS = {"2.0": Path("prw_testbed.fmu"), "3.0": Path("fmi3/prw_testbed.fmu")}
+#: Parameters that are changed to see what the tolerances tell apart, and by how much.
+CHANGED, CHANGE = ("J2", "J3", "H3", "k1", "k2", "c1", "c2", "c3"), 0.01
+
+
+@dataclass(frozen=True)
+class Row:
+    """One run. version, interface, fmi: empty where a file does not tell. share: the largest difference in terms of its tolerance.
+    largest: difference by quantity (angle, rate, torque), in rad, rad/s and N.m."""
+
+    importer: str
+    version: str
+    interface: str
+    fmi: str
+    experiment: str
+    share: float
+    largest: dict[str, float]
+    outputs: int
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every output is within its tolerance."""
+        return self.share <= 1
+
+    def __str__(self) -> str:
+        fmi = self.fmi and f"FMI {self.fmi}"
+        return f"{self.experiment}: {', '.join(filter(None, (self.tool, self.interface, fmi)))}"
+
+    @property
+    def tool(self) -> str:
+        """Importer and version."""
+        return f"{self.importer} {self.version}".strip()
+
+
+@dataclass(frozen=True)
+class Validation:
+    """All of it. experiments: description by name. sensitivity: the share of the tolerance that a change of a parameter
+    by CHANGE takes, by experiment and parameter. absent: importers that are not installed."""
+
+    guid: str
+    date: str
+    machine: str
+    experiments: dict[str, str]
+    rows: list[Row]
+    sensitivity: dict[str, dict[str, float]]
+    absent: list[str]
+
+    def to_json(self) -> str:
+        """Everything in numbers."""
+        rows = [{**asdict(row), "agrees": row.agrees} for row in self.rows]
+        content = {**asdict(self), "rows": rows, "parameters_changed_by": CHANGE}
+        return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+
+
+def validate(fmus: Path, results: Sequence[tuple[str, Path]] = ()) -> Validation:
+    """Run everything. results: (tool, file) that other tools wrote. Raises UserError where an FMU or a file is missing,
+    or refuses something."""
+    from fmpy import read_model_description
+
+    paths = {fmi: existing_fmu(fmus / name) for fmi, name in FMUS.items()}
+    known = read_experiments(paths["2.0"])
+    rows = []
+    for importer in IMPORTERS:
+        for fmi, path in paths.items():
+            for experiment in known:
+                found = importer.run(path, experiment, experiment.parameters)
+                agreement = compare(found, experiment, importer.interface)
+                rows.append(row(importer.name, importer.version, fmi, agreement))
+    loop, absent = system.read(fmus / "prw_closed_loop.ssp", fmus / "prw_closed_loop"), []
+    for master in masters.MASTERS:
+        version = master.version()
+        if version is None:
+            absent.append(f"{master.name} (pip {master.package})")
+            continue
+        agreement = compare(of_testbed(masters.run_apart(master, loop)), find(known, "closed_loop"), "CoSimulation")
+        rows.append(row(f"{master.name}, with the controller's FMU", version, "2.0", agreement))
+    for tool, file in results:
+        told = row(f"{tool}, from the file {file.name}", "", "", check(file, fmu=paths["2.0"]))
+        rows.append(replace(told, interface=""))
+    return Validation(
+        guid=str(read_model_description(str(paths["2.0"])).guid),
+        date=datetime.date.today().isoformat(),
+        machine=f"{platform.system()} on {platform.machine()}, Python {platform.python_version()}",
+        experiments={experiment.name: experiment.description for experiment in known},
+        rows=rows,
+        sensitivity={experiment.name: sensitivity(paths["2.0"], experiment) for experiment in known},
+        absent=absent,
+    )
+
+
+def row(importer: str, version: str, fmi: str, agreement: Agreement) -> Row:
+    """What is told of a comparison."""
+    largest = dict.fromkeys(("angle", "rate", "torque"), 0.0)
+    for name, difference in agreement.variables.items():
+        quantity = MEASURED[name].quantity
+        largest[quantity] = max(largest[quantity], difference.largest)
+    experiment, count = agreement.experiment.name, len(agreement.variables)
+    return Row(importer, version, agreement.interface, fmi, experiment, share(agreement), largest, count)
+
+
+def share(agreement: Agreement) -> float:
+    """The largest difference in terms of its tolerance."""
+    return max(difference.largest / difference.allowed for difference in agreement.variables.values())
+
+
+def of_testbed(values: Mapping[str, Array]) -> Result:
+    """The testbed's part of what a master recorded."""
+    outputs = {name.removeprefix("testbed."): v for name, v in values.items() if name.startswith("testbed.")}
+    return Result(Path("closed loop"), values["time"], outputs)
+
+
+def sensitivity(fmu: Path, experiment: Experiment) -> dict[str, float]:
+    """The share of the tolerance that a change of each parameter takes, in Co-Simulation."""
+    found = {}
+    for name in CHANGED:
+        changed = {**experiment.parameters, name: experiment.parameters[name] * (1 + CHANGE)}
+        found[name] = share(compare(by_fmu_run(fmu, experiment, changed), experiment, "CoSimulation"))
+    return found
