@@ -75,6 +75,10 @@ pub fn assert_nothing_to_lock(folder: &Path) -> usize {
             }
             files += 1;
             let text = std::fs::read_to_string(&path).expect("a readable file");
+            // Each instance has a WebAssembly module for itself: nothing in it is shared.
+            if text.contains("#![cfg(target_family = \"wasm\")]") {
+                continue;
+            }
             for word in text.split(|c: char| !c.is_alphanumeric() && c != '_') {
                 let found = shared.contains(&word) || word.starts_with("Atomic");
                 assert!(!found, "{} has {word}", path.display());

@@ -8,7 +8,6 @@ mod instances;
 mod settings;
 mod states;
 mod texts;
-#[cfg(target_family = "wasm")]
 pub(crate) mod webassembly;
 
 pub(crate) use arrays::{array, output, place, string};

@@ -1,6 +1,8 @@
 //! What C around a WebAssembly module needs of it, where an FMU is made into C sources: nothing unwinds there, and the
 //! importer's memory and callbacks are out of reach. Each instance has a module, with its memory, for itself.
 
+#![cfg(target_family = "wasm")]
+
 use super::call::{Component, finish, panic_message};
 use super::string;
 use crate::c_types::{c_char, c_void};
