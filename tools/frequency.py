@@ -15,8 +15,6 @@ from prw.testbed import Testbed
 #: The shafts' angles q of H(s), eq. (15), and the sensors' torques.
 SHAFTS = ("theta3", "theta4", "theta5", "theta6")
 TORQUES = ("tau1", "tau2")
-#: The rates of H(s) and of the torques move along with their angles.
-RATES = {"omega1": "theta1", "omega2": "theta2"}
 
 #: Steps in a period, at least. A motor follows its tangent over a step, which raises the amplitude of its motion by the
 #: fraction (2 pi / STEPS)^2 / 6: 0.0014 dB.

@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.ticker import LogLocator, MaxNLocator, MultipleLocator
 
 from prw.plots import BLUE, VERMILION
+from prw.testbed import ANGLE_OF
 from tools.figures.results import CURVE, Results
-from tools.frequency import RATES, SHAFTS, TORQUES, decibels, degrees
+from tools.frequency import SHAFTS, TORQUES, decibels, degrees
 
 #: Degrees between the ticks of a phase, the first that makes at most five.
 PHASE_STEPS = (10, 15, 30, 45, 90, 180, 360)
@@ -30,7 +31,7 @@ class Transfer(NamedTuple):
 
 def transfers(found: Results) -> tuple[list[Transfer], list[Transfer]]:
     """The eight plots of H(s), Fig. 5 (a) to (h), and the four of G(s) from motor angles to torques."""
-    response = found.model.frequency_response(CURVE, RATES)
+    response = found.model.frequency_response(CURVE, ANGLE_OF)
     frequency, points, _ = found.sweep
     assert found.sweep.outputs == found.model.outputs
 

@@ -11,9 +11,9 @@ import numpy as np
 from prw.linearization import linearize
 from prw.motion import Motion, fig4
 from prw.state_space import StateSpace
-from prw.testbed import OUTPUTS, Testbed
+from prw.testbed import ANGLE_OF, OUTPUTS, Testbed
 from tools.convergence import Convergence, convergence, order
-from tools.frequency import RATES, SHAFTS, TORQUES, Sweep, decibels, sweep
+from tools.frequency import SHAFTS, TORQUES, Sweep, decibels, sweep
 from tools.modes import Mode, pitch_and_roll
 
 #: Hz. The curves of the Bode plots run over CURVE, the measured points lie at POINTS.
@@ -85,8 +85,8 @@ def _step(fmu: Path, sides: tuple[int, int]) -> Step:
 def numbers(found: Results) -> dict[str, object]:
     """What the documentation quotes, by name, and which matplotlib drew the figures."""
     low = POINTS <= STATED
-    ratio = found.sweep.response / found.model.frequency_response(POINTS, RATES)
-    high = found.model.frequency_response(1e5, RATES)
+    ratio = found.sweep.response / found.model.frequency_response(POINTS, ANGLE_OF)
+    high = found.model.frequency_response(1e5, ANGLE_OF)
     _, opposite = found.fig4
     _, equal = found.fig4_equal
     late = found.fig4[0].time >= 1.0

@@ -14,8 +14,9 @@ import numpy as np
 
 from prw.checking.experiments import Experiment, Value
 from prw.checking.result import Result
+from prw.columns import ANGLES, RATES
 from prw.motion import Array, Motion
-from prw.testbed import ANGLES, OUTPUTS, RATES, Testbed
+from prw.testbed import OUTPUTS, Testbed
 
 #: Relative tolerance of the solver in Model Exchange.
 SOLVER_TOLERANCE = 1e-7

@@ -11,11 +11,13 @@ from typing import Any, Self
 import fmu_run
 import numpy as np
 
+from prw.columns import ANGLES, RATES
 from prw.errors import UserError
 from prw.motion import Array, Motion
 
 OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
-ANGLES, RATES = ("theta1", "theta2"), ("omega1", "omega2")
+#: The angle that each rate belongs to: they move together, see `StateSpace.transfer`.
+ANGLE_OF = dict(zip(RATES, ANGLES))
 
 Value = float | int | bool
 #: What a continuous variable is called in FMI 2.0 and in 3.0.

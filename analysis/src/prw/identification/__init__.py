@@ -107,12 +107,12 @@ def task_of(
     start = {**known.starts, **fixed}
     if not estimate and not priors:
         raise UserError(f"estimate: nothing is named; there are {', '.join(known.real)}")
-    pairs = {name: p if isinstance(p, tuple) else (start[name], p) for name, p in priors.items()}
-    chosen = tuple(name for name in known.real if name in estimate or name in pairs)
+    beliefs = {name: Prior(*p) if isinstance(p, tuple) else Prior(start[name], p) for name, p in priors.items()}
+    chosen = tuple(name for name in known.real if name in estimate or name in beliefs)
     for what, values in (
         ("fixed", fixed),
         ("noise", noise),
-        *((f"priors {n}", dict(zip("ab", p))) for n, p in pairs.items()),
+        *((f"priors {name}", prior._asdict()) for name, prior in beliefs.items()),
     ):
         for name, value in values.items():
             if not 0 < value < float("inf"):
@@ -126,7 +126,7 @@ def task_of(
             raise UserError(
                 f"bounds: {name} from {low:g} to {high:g}; both must be positive and the first below the second"
             )
-    return Task(chosen, start, spans, {name: Prior(*p) for name, p in pairs.items()}, dict(noise), offsets)
+    return Task(chosen, start, spans, beliefs, dict(noise), offsets)
 
 
 def _check(what: str, names: Iterable[str], known: Collection[str], others: str = "") -> None:

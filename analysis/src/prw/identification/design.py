@@ -19,7 +19,7 @@ from prw.identification.fit import Fitter, Task
 from prw.identification.model import Model
 from prw.identification.statistics import condition, genuine, information_of
 from prw.motion import Array, Motion
-from prw.testbed import OUTPUTS
+from prw.testbed import ANGLE_OF, OUTPUTS
 
 #: At most so many frequencies in a multisine.
 MOST_LINES = 60
@@ -27,8 +27,6 @@ MOST_LINES = 60
 SLOW, WIDEST = 4.0, 40.0
 #: From this condition on, what an information matrix says of its weakest combination is rounding.
 SINGULAR = 1e12
-#: Motors move with their rates.
-RATES = {"omega1": "theta1", "omega2": "theta2"}
 #: Rounds of the multiplicative algorithm for the D-optimal spectrum.
 ROUNDS = 300
 
@@ -168,7 +166,7 @@ def _optimal(
     share = 1e-4
     logarithms = task.first()
     steps = share * np.vstack([np.eye(len(logarithms)), -np.eye(len(logarithms))])
-    response = np.array([model.at(task.values(logarithms + s)).frequency_response(frequency, RATES) for s in steps])
+    response = np.array([model.at(task.values(logarithms + s)).frequency_response(frequency, ANGLE_OF) for s in steps])
     slopes = (response[: len(logarithms)] - response[len(logarithms) :]) / (2 * share)
     rows = [OUTPUTS.index(name) for name in noise]
     weighted = slopes[:, :, rows] / np.array(list(noise.values()))[:, None]

@@ -78,7 +78,8 @@ def excite(
     ranking = []
     with Model(fmu) as model, threadpool_limits(1):
         task = task_of(model.known, estimate, fixed=fixed, noise=noise)
-        assumed = {name: noise.get(name, MEASURED[name].noise) for name in channels}
+        known = {**design.default_noise(), **noise}
+        assumed = {name: known[name] for name in channels}
         limits = design.Limits(float(angle), float(speed), float(acceleration))
         for motion in design.motions(model, task, limits, duration, rate, assumed):
             told = design.information(model, [planned(motion, channels)], task, task.first(), assumed)

@@ -387,9 +387,10 @@ def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int
     best = min(misfit for _, misfit in minima)
     alike = [minimum for minimum in minima if minimum[1] < best + RIVAL]
     alike.sort(key=lambda minimum: float(np.sum((minimum[0] - first) ** 2)))
+    misfit = alike[0][1]
     if alike[0][0] is not point:
         point = fitter.settle(alike[0][0])
-    misfit = 2 * fitter.search(point).cost
+        misfit = 2 * fitter.search(point).cost
     rivals = [(x, chi) for x, chi in alike[1:] if np.abs(x - point).max() > SAME]
     return Solution(
         task,
