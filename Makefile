@@ -97,7 +97,7 @@ test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check
-	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis
+	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication
 
 # Ratios of one run; quiet the machine first.
 bench: $(VENV)/study.stamp closed-loop-fmus
