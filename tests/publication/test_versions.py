@@ -79,6 +79,16 @@ def test_descriptions_have_this_version() -> None:
         assert said == [VERSION, VERSION], f"{description.relative_to(ROOT)} is out of date; run `make docs`"
 
 
+def test_the_citation_is_of_this_version_and_its_day() -> None:
+    citation = dict(
+        re.findall(r"^(version|date-released): (.*)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.M)
+    )
+    (day,) = re.findall(
+        rf"^## {re.escape(VERSION)} \((.*)\)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M
+    )
+    assert citation == {"version": VERSION, "date-released": day}
+
+
 def test_the_changelog_begins_with_this_version() -> None:
     """What a release says of itself is cut out of the changelog by these headings."""
     headings = re.findall(r"^## (.*)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)

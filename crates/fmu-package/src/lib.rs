@@ -19,6 +19,7 @@
 //! | the command | `library`, `c_sources`, `terminal`, `command` |
 
 #![cfg_attr(not(feature = "command"), allow(rustdoc::broken_intra_doc_links))]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod content;
 mod fingerprint;

@@ -1,4 +1,6 @@
-//! Loads FMUs and runs them.
+#![doc = include_str!("../README.md")]
+//!
+//! ## Inside
 //!
 //! [`Fmu`] is an FMU for Co-Simulation, of FMI 2.0 or 3.0, and runs it as often as a [`Batch`] says, on all processors.
 //!
@@ -9,6 +11,8 @@
 //! the same program. [`testing`] has what tests of FMUs need, [`either`] what they do in both
 //! standards, [`serialized`] the bytes of saved states, [`c_programs`] what tests with C programs need. With the feature `careless` there is an importer that makes any calls in any order,
 //! with `realtime` a check that code may run in a control loop.
+
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod batch;
 pub mod c_programs;

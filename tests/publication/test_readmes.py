@@ -1,0 +1,81 @@
+"""READMEs and pages are read in many places: on the project's page, with a crate, in its documentation."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+LISTED = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+FILES = [name for name in LISTED.split("\0") if name]
+PAGES = [name for name in FILES if name.endswith(".md") or name in ("CITATION.cff",)]
+#: Whoever follows a link gets documentation or sources.
+REGISTRIES = ("crates.io", "pypi.org", "pypi.python.org", "npmjs.com", "anaconda.org")
+LINK = re.compile(r"\]\(<?([^)>\s]+)[^)]*\)|^\[[^\]]+\]:\s*(\S+)|(?:href|src)=\"([^\"]+)\"", re.MULTILINE)
+
+
+def links(text: str) -> list[str]:
+    """The targets of a page's links and pictures, without code."""
+    text = re.sub(r"^```.*?^```|`[^`\n]*`", "", text, flags=re.DOTALL | re.MULTILINE)
+    return ["".join(found) for found in LINK.findall(text)]
+
+
+def leads_out(page: Path, link: str, home: Path) -> bool:
+    """Whether a relative link leads out of the folder that is published."""
+    return not re.match(r"[a-z]+:|#", link) and not (page.parent / link).resolve().is_relative_to(home)
+
+
+def published() -> list[Path]:
+    """The folders of what is published with a README: crates, and the Python package beside one of them."""
+    manifests = [ROOT / name for name in FILES if name.endswith("Cargo.toml")]
+    packages = {path: tomllib.loads(path.read_text(encoding="utf-8")).get("package", {}) for path in manifests}
+    return [path.parent for path, package in packages.items() if package.get("publish", True)]
+
+
+def test_links_are_found() -> None:
+    text = '[a](b.md) `[c](d)` ![e](<f.png> "g") [h][i] <img src="k">\n\n[i]: ../j\n\n```\n[l](m)\n```\n'
+    assert links(text) == ["b.md", "f.png", "k", "../j"]
+
+
+def test_the_published_crates() -> None:
+    names = {folder.name for folder in published()}
+    assert names == {"fmu-export", "fmu-package", "fmu-run", "fmu-system"}, "a package without `publish = false`"
+
+
+@pytest.mark.parametrize("home", published(), ids=lambda folder: folder.name)
+def test_a_crate_has_all_that_its_page_needs(home: Path) -> None:
+    readme = home / "README.md"
+    package = tomllib.loads((home / "Cargo.toml").read_text(encoding="utf-8"))["package"]
+    assert package["documentation"] == f"https://docs.rs/{home.name}" and package["readme"] == readme.name
+    assert package["description"] and 0 < len(package["keywords"]) <= 5 and package["categories"]
+    for name in ("LICENSE-MIT", "LICENSE-APACHE"):
+        assert (home / name).read_bytes() == (ROOT / name).read_bytes()
+    found = links(readme.read_text(encoding="utf-8"))
+    outside = [link for link in found if leads_out(readme, link, home)]
+    assert not outside, f"{readme.relative_to(ROOT)} leads out of the crate, where it is read without the repository"
+    # The page of the documentation is the README.
+    assert (home / "src/lib.rs").read_text(encoding="utf-8").startswith('#![doc = include_str!("../README.md")]')
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_relative_links_lead_somewhere(name: str) -> None:
+    page = ROOT / name
+    found = [re.sub(r"#.*", "", link) for link in links(page.read_text(encoding="utf-8"))]
+    missing = [link for link in found if link and not re.match(r"[a-z]+:", link) and not (page.parent / link).exists()]
+    assert not missing
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_no_registry_is_linked(name: str) -> None:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    assert not [host for host in REGISTRIES if host in text], "link to documentation or sources instead"
+
+
+def test_the_release_notes_have_no_relative_links() -> None:
+    """They are cut out of the changelog and read elsewhere."""
+    found = links((ROOT / "CHANGELOG.md").read_text(encoding="utf-8"))
+    assert all(link.startswith("https://") for link in found), found
