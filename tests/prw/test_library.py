@@ -223,12 +223,14 @@ def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
         assert result.returncode == 1 and complaint in result.stderr and result.stderr.count("\n") == 1
 
 
-def test_the_program_in_the_readme(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It runs as it stands, from the project's folder."""
+def test_the_programs_in_the_readme(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They run as they stand, from the project's folder."""
     readme = (HERE.parents[1] / "README.md").read_text(encoding="utf-8")
-    (program,) = re.findall(r"^```python\n(.*?)^```", readme, flags=re.S | re.M)
+    short, program = re.findall(r"^```python\n(.*?)^```", readme, flags=re.S | re.M)
     monkeypatch.chdir(HERE.parents[1])
     names: dict[str, Any] = {}
+    exec(compile(short, "README.md", "exec"), names)
+    assert names["run"].motion.name == "fig4" and names["run"].parameters["k1"] == 100.0
     exec(compile(program, "README.md", "exec"), names)
     assert names["run"].parameters["k1"] == 100.0 and names["model"].A.shape == (6, 6)
     assert names["table"].num_rows == 100
