@@ -16,7 +16,7 @@ FMU = ROOT / "target" / "fmu" / "prw_testbed.fmu"
 SOURCE_FMU = ROOT / "target" / "fmu" / "source" / "prw_testbed.fmu"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 
-#: A clang for many processors, which comes with what `make dist` needs.
+#: A clang for many processors, which comes with what `make release` needs.
 ZIG = (str(ROOT / ".venv-dist" / "bin" / "python"), "-m", "ziglang", "cc")
 CLANG = ("clang",) if shutil.which("clang") else ZIG
 
