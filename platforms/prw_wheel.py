@@ -33,7 +33,7 @@ def build(fmu: Path, out: Path) -> Path:
         ignored = shutil.ignore_patterns("__pycache__", "*.egg-info", "fmu")
         shutil.copytree(PACKAGE / "src", copy / "src", ignore=ignored)
         inside.mkdir()
-        for path in (PACKAGE / "pyproject.toml", *(ROOT / name for name in LICENCES)):
+        for path in (PACKAGE / "pyproject.toml", PACKAGE / "README.md", *(ROOT / name for name in LICENCES)):
             shutil.copyfile(path, copy / path.name)
         shutil.copyfile(fmu, inside / f"{MODEL}.fmu")
         # A wheel has the modes of its files, and who checked them out may have a mask of their own.

