@@ -38,7 +38,7 @@ help:
 	@echo 'make fmu                     build the FMU                          -> $(FMU)'
 	@echo '                             and that for FMI 3.0                   -> target/fmu/fmi3/prw_testbed.fmu'
 	@echo 'make test                    check and test everything'
-	@echo 'make test-python             check the Python, with ruff and mypy, and the workflows'
+	@echo 'make test-python             check the Python, with ruff and mypy'
 	@echo 'make test-newest-fmpy        the tests with FMPy again, with its newest version'
 	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
 	@echo 'make profile                 count the instructions of a step, with callgrind'
@@ -88,7 +88,6 @@ test-python: $(VENV)/test.stamp
 	$(PY) -m ruff check
 	$(PY) -m ruff format --check
 	$(PY) -m mypy
-	$(PY) -m pytest -q -p no:cacheprovider tests/releasing
 
 # Everyone else gets the newest FMPy, these environments the oldest that is supported.
 test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
