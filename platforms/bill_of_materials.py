@@ -63,7 +63,7 @@ HOLDER = re.compile(r"\s*Copyright\s+(?:\(c\)\s+|©\s+)?(?=[\dA-Z])(.+?)(?: or)?
 
 HEADER = """\
 Compiled into the libraries of this {kind}. Where a package offers a choice of licences, the choice is shown.
-They are used under the Apache License, Version 2.0 (LICENSE-APACHE), if they are available under it; the licences
+Packages are used under the Apache License, Version 2.0 (LICENSE-APACHE), if they are available under it; the licences
 of the others are at the end.
 Each is a published Rust crate of that name and version. For tools: bill-of-materials.cdx.json.
 

@@ -32,6 +32,7 @@ from conftest import (
 from targets import LINUX, LINUX_ARM, MODEL, WINDOWS, Target
 
 PINS = ROOT / "analysis" / "requirements-study.txt"
+PINS_ELSEWHERE = HERE / "windows" / "requirements.txt"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
 
 
@@ -66,14 +67,8 @@ def installed(tmp_path_factory) -> Installed:
     return user
 
 
-@pytest.fixture(scope="session")
-def here(installed) -> str:
-    """What the wheel for this machine gives."""
-    return installed.run("python", str(HERE / "wheel_run.py"), *map(str, FMUS))
-
-
-def test_both_standards_give_the_same(here):
-    two, three = here.split("FMI 3.0\n")
+def test_both_standards_give_the_same(installed):
+    two, three = installed.run("python", str(HERE / "wheel_run.py"), *map(str, FMUS)).split("FMI 3.0\n")
     assert two == f"FMI 2.0\n{three}"
 
 
@@ -122,9 +117,6 @@ def test_the_tutorial(student):
     assert {"prw excite", "prw identify", "prw simulate", "prw sweep"} <= set(done)
     for made in ("identified/report.html", "identified/identified.ssv", "sweep/runs.parquet"):
         assert (student.folder / "out" / made).is_file()
-
-
-PINS_ELSEWHERE = HERE / "windows" / "requirements.txt"
 
 
 def unpacked_for(target: Target, numpy: Path, folder: Path) -> Path:
