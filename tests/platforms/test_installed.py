@@ -170,8 +170,9 @@ def arm_root(tmp_path) -> Path:
 def same_elsewhere(start: list, path: Callable[[Path], str], environment: dict[str, str], user: Installed) -> str:
     """Runs the wheels in another Python and compares with this machine's; says how many numbers and how far they differ."""
     worst = numbers = 0
-    # Of each FMU its version and four outputs at 21 times of two runs; of Fig. 4 more.
-    for program, arguments, least in (("wheel_run.py", FMUS, 2 * (1 + 4 * 42)), ("prw_run.py", (), 1000)):
+    recording = (ROOT / "examples" / "point_to_point.csv",)
+    # Of each FMU its version and four outputs at 21 times of two runs; of eight outputs every tenth row.
+    for program, arguments, least in (("wheel_run.py", FMUS, 2 * (1 + 4 * 42)), ("prw_run.py", recording, 3000)):
         files = (HERE / program, *arguments)
         theirs = ran([*start, *map(path, files)], environment)
         difference, count = disagreement(theirs, user.run("python", *map(str, files)))
