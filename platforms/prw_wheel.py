@@ -36,12 +36,12 @@ def build(fmu: Path, out: Path) -> Path:
         for path in (PACKAGE / "pyproject.toml", PACKAGE / "README.md", *(ROOT / name for name in LICENCES)):
             shutil.copyfile(path, copy / path.name)
         shutil.copyfile(fmu, inside / f"{MODEL}.fmu")
-        # A wheel has the modes of its files, and who checked them out may have a mask of their own.
-        for path in copy.rglob("*"):
-            path.chmod(0o755 if path.is_dir() else 0o644)
         command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(made), str(copy)]
         environment = {**os.environ, "SOURCE_DATE_EPOCH": EPOCH}
-        if subprocess.run(command, env=environment).returncode:
+        # A wheel has the modes of its files.
+        for path in copy.rglob("*"):
+            path.chmod(0o755 if path.is_dir() else 0o644)
+        if subprocess.run(command, env=environment, umask=0o022).returncode:
             raise SystemExit("error: the wheel of prw could not be made; the messages are above")
         (wheel,) = made.iterdir()
         return Path(shutil.copyfile(wheel, out / wheel.name))
