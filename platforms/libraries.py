@@ -1,8 +1,9 @@
-"""Compiles the library of the FMU for other platforms.
+"""Compiles the libraries of the FMUs for other platforms.
 
     python platforms/libraries.py FOLDER TRIPLE...
 
-puts FOLDER/TRIPLE/LIBRARY there. The same sources and tools give the same bytes, wherever they are.
+puts them in FOLDER/TRIPLE/, and beside them compiler.txt. The same sources and tools give the same bytes, wherever they
+are.
 """
 
 from __future__ import annotations
@@ -13,23 +14,28 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import macos_linker
 import mingw_linker
 import toolchain as tools
-from targets import GLIBC, MODEL, ROOT, Target, target
+from targets import GLIBC, MODEL, MODELS, ROOT, WEBASSEMBLY, Target, target
+
+#: Beside the libraries: what compiled them.
+COMPILER = "compiler.txt"
 
 
-def compile_library(target: Target) -> tuple[Path, str]:
-    """The library and a line that says what compiled it."""
-    toolchain, environment, glibc = prepare(target, f"@rpath/{MODEL}{target.suffix}")
+def compile_library(model: str, target: Target) -> tuple[Path, str]:
+    """The library of a model and what compiled it."""
+    toolchain, environment, glibc = prepare(target, f"@rpath/{model}{target.suffix}")
     command = [tools.zigbuild() if glibc else "cargo", "rustc", *toolchain.flags]
     command += ["--lib", "--crate-type", "cdylib", "--profile", "library", "--locked"]
-    command += ["--no-default-features", "--package", MODEL, "--target", target.triple + (f".{GLIBC}" if glibc else "")]
+    command += ["--no-default-features", "--package", model, "--target", target.triple + (f".{GLIBC}" if glibc else "")]
     if subprocess.run(command, cwd=ROOT, env=environment).returncode:
-        raise SystemExit(f"error: the library for {target.triple} could not be compiled; the messages are above")
-    return target_folder() / target.triple / "library" / target.library, toolchain.description
+        raise SystemExit(f"error: {model} could not be compiled for {target.triple}; the messages are above")
+    return target_folder() / target.triple / "library" / target.library(model), toolchain.description
 
 
 def prepare(target: Target, name: str = "") -> tuple[tools.Toolchain, dict[str, str], bool]:
@@ -55,6 +61,8 @@ def link(target: Target, name: str) -> tuple[dict[str, str], list[str], bool]:
         tools.need(mingw_linker.LINKER)
         environment = {f"{target.environment}LINKER": mingw_linker.__file__, "PRW_TARGET_FOLDER": str(target_folder())}
         return environment, ["-Clink-arg=-Wl,--no-insert-timestamp"], False
+    if target is WEBASSEMBLY:
+        return {}, [], False
     if target.triple.endswith("-windows-msvc"):
         return {}, ["-Ctarget-feature=+crt-static", "-Clink-arg=/Brepro"], False
 
@@ -97,16 +105,22 @@ def universal(destination: Path, libraries: list[Path]) -> Path:
     return destination
 
 
-def main(folder: str, *triples: str) -> None:
-    for triple in triples:
-        library, compiled_by = compile_library(target(triple))
-        destination = Path(folder) / triple / library.name
-        destination.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(library, destination)
-        print(f"{destination}: {destination.stat().st_size / 1000:.0f} kB, {compiled_by}")
+def compile_all(folder: Path, targets: Sequence[Target]) -> None:
+    """Puts the libraries of all models for these targets in FOLDER/TRIPLE."""
+    for number, each in enumerate(targets, start=1):
+        tools.say(f"[{number}/{len(targets)}] libraries for {each.triple}")
+        start = time.monotonic()
+        destination = folder / each.triple
+        destination.mkdir(parents=True, exist_ok=True)
+        for model in MODELS:
+            library, compiler = compile_library(model, each)
+            shutil.copyfile(library, destination / library.name)
+            tools.say(f"      {library.name}: {library.stat().st_size / 1000:.0f} kB")
+        (destination / COMPILER).write_text(f"{compiler}\n", encoding="utf-8")
+        tools.say(f"      {compiler}, {time.monotonic() - start:.0f} s")
 
 
 if __name__ == "__main__":
     if len(sys.argv) < 3:
         raise SystemExit(__doc__)
-    main(*sys.argv[1:])
+    compile_all(Path(sys.argv[1]), [target(triple) for triple in sys.argv[2:]])

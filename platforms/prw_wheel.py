@@ -1,19 +1,15 @@
-"""Makes the wheel of the Python package prw, with the FMU for all platforms inside: one wheel for all.
-
-python platforms/prw_wheel.py [--out FOLDER] [--fmu FILE]
-"""
+"""Makes the wheel of the Python package prw, with the FMU for all platforms inside: one wheel for all."""
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from pathlib import Path
 
-from dist import DIST
 from targets import MODEL, ROOT
 
 PACKAGE = ROOT / "analysis"
@@ -22,38 +18,30 @@ LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
 EPOCH = "315532800"
 
 
+def check_version(version: str) -> None:
+    """Stops if the package is not of this version, that of everything else."""
+    own = tomllib.loads((PACKAGE / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    if own != version:
+        raise SystemExit(f"error: the version in analysis/pyproject.toml is {own}, in Cargo.toml it is {version}")
+
+
 def build(fmu: Path, out: Path) -> Path:
     """The wheel, in `out`."""
     with tempfile.TemporaryDirectory() as folder:
         copy, made = Path(folder, "sources"), Path(folder, "made")
-        shutil.copytree(
-            PACKAGE / "src", copy / "src", ignore=shutil.ignore_patterns("__pycache__", "*.egg-info", "fmu")
-        )
-        for path in (PACKAGE / "pyproject.toml", *(ROOT / name for name in LICENCES)):
-            shutil.copy(path, copy)
-        (copy / "src" / "prw" / "fmu").mkdir()
-        shutil.copyfile(fmu, copy / "src" / "prw" / "fmu" / f"{MODEL}.fmu")
+        inside = copy / "src" / "prw" / "fmu"
+        ignored = shutil.ignore_patterns("__pycache__", "*.egg-info", "fmu")
+        shutil.copytree(PACKAGE / "src", copy / "src", ignore=ignored)
+        inside.mkdir()
+        for path in (PACKAGE / "pyproject.toml", PACKAGE / "README.md", *(ROOT / name for name in LICENCES)):
+            shutil.copyfile(path, copy / path.name)
+        shutil.copyfile(fmu, inside / f"{MODEL}.fmu")
         command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(made), str(copy)]
-        if subprocess.run(command, env={**os.environ, "SOURCE_DATE_EPOCH": EPOCH}).returncode:
+        environment = {**os.environ, "SOURCE_DATE_EPOCH": EPOCH}
+        # A wheel has the modes of its files.
+        for path in copy.rglob("*"):
+            path.chmod(0o755 if path.is_dir() else 0o644)
+        if subprocess.run(command, env=environment, umask=0o022).returncode:
             raise SystemExit("error: the wheel of prw could not be made; the messages are above")
         (wheel,) = made.iterdir()
-        # Of earlier versions.
-        for old in out.glob("prw-*.whl"):
-            old.unlink()
         return Path(shutil.copyfile(wheel, out / wheel.name))
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=DIST / "wheels", metavar="FOLDER")
-    parser.add_argument("--fmu", type=Path, default=DIST / f"{MODEL}.fmu", metavar="FILE")
-    options = parser.parse_args()
-    if not options.fmu.is_file():
-        raise SystemExit(f"error: {options.fmu} is missing; make it with `make dist`")
-    options.out.mkdir(parents=True, exist_ok=True)
-    wheel = build(options.fmu, options.out.resolve())
-    print(f"{wheel.name}: {wheel.stat().st_size / 1000:.0f} kB")
-
-
-if __name__ == "__main__":
-    main()

@@ -7,8 +7,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 
-#: The package whose library goes into the FMU, and the modelIdentifier.
+#: The packages whose libraries go into FMUs, and their modelIdentifiers.
 MODEL = "prw_testbed"
+CONTROLLER = "prw_controller"
+MODELS = (MODEL, CONTROLLER)
 
 #: Enterprise Linux 7 and everything since.
 GLIBC = "2.17"
@@ -23,10 +25,17 @@ class Target:
     #: The oldest macOS that the library runs on.
     macos: str = ""
 
+    def library(self, model: str) -> str:
+        """The file that cargo makes of a model."""
+        return f"{'' if 'windows' in self.triple else 'lib'}{model}{self.suffix}"
+
     @property
-    def library(self) -> str:
-        """The file that cargo makes."""
-        return f"{'' if 'windows' in self.triple else 'lib'}{MODEL}{self.suffix}"
+    def wheel(self) -> str:
+        """How pip calls the platform in the name of a wheel."""
+        processor = self.triple.split("-")[0]
+        if self.macos:
+            return f"macosx_{self.macos.replace('.', '_')}_{'arm64' if processor == 'aarch64' else processor}"
+        return "win_amd64" if "windows" in self.triple else f"manylinux_{GLIBC.replace('.', '_')}_{processor}"
 
     @property
     def environment(self) -> str:
@@ -40,11 +49,14 @@ WINDOWS = Target("x86_64-pc-windows-gnu", ".dll")
 MAC = Target("x86_64-apple-darwin", ".dylib", macos="10.12")
 MAC_ARM = Target("aarch64-apple-darwin", ".dylib", macos="11.0")
 
-#: What `make dist` compiles.
+#: What `make release` compiles.
 TARGETS = (LINUX, LINUX_ARM, WINDOWS, MAC, MAC_ARM)
 
 #: What a runner of its own kind compiles instead, see .github/workflows.
 NATIVE_WINDOWS = Target("x86_64-pc-windows-msvc", ".dll")
+
+#: What is made into C, for all others.
+WEBASSEMBLY = Target("wasm32-unknown-unknown", ".wasm")
 
 #: The folders of `binaries/` in FMI 2.0 and what each holds; two targets make a universal library. FMI 2.0.5 names
 #: the ARM folders as FMI 3.0 does; importers on ARM Macs look in darwin64.

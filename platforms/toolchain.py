@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from targets import ROOT, Target
+from targets import ROOT, WEBASSEMBLY, Target
 
 #: Compiles std from Debian's sources even where rustup has it compiled.
 BUILD_STD = bool(os.environ.get("BUILD_STD"))
@@ -50,8 +50,11 @@ class Toolchain:
 
 def toolchain(target: Target) -> Toolchain:
     """The toolchain for a target: rustup's, or else Debian's with std compiled from source."""
-    if not BUILD_STD and (_has_std(target) or _rustup_adds(target)):
+    compiled = not BUILD_STD or target is WEBASSEMBLY
+    if compiled and (_has_std(target) or _rustup_adds(target)):
         return Toolchain(_output("rustc", "--version"))
+    if target is WEBASSEMBLY:
+        raise SystemExit(f"error: Rust's std for {target.triple} is missing: rustup target add {target.triple}")
     return _with_sources()
 
 
@@ -119,7 +122,7 @@ def zigbuild() -> str:
     """cargo's subcommand that links against an old glibc; from this environment (platforms/requirements.txt)."""
     path = shutil.which("cargo-zigbuild", path=sysconfig.get_path("scripts"))
     if not path:
-        raise SystemExit("error: cargo-zigbuild is missing in this Python environment; start this with make dist")
+        raise SystemExit("error: cargo-zigbuild is missing in this Python environment; start this with make release")
     return path
 
 

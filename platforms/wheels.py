@@ -1,15 +1,15 @@
 """Makes the wheels of the Python package fmu-run: one for each platform, for every Python from 3.11 on.
 
-python platforms/wheels.py [--out FOLDER] [TRIPLE...]
+python platforms/wheels.py FOLDER TRIPLE...
 """
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from libraries import prepare
@@ -19,8 +19,8 @@ from toolchain import say
 PACKAGE = ROOT / "crates" / "fmu-run"
 
 
-def build(target: Target, out: Path) -> tuple[Path, str]:
-    """The wheel and a line that says what compiled it."""
+def build(target: Target, out: Path) -> Path:
+    """The wheel for a target, in `out`."""
     toolchain, environment, glibc = prepare(target)
     with tempfile.TemporaryDirectory(dir=out) as made:
         command = [sys.executable, "-m", "maturin", "build", *toolchain.flags, "--target", target.triple, "--out", made]
@@ -29,26 +29,33 @@ def build(target: Target, out: Path) -> tuple[Path, str]:
         if subprocess.run(command, cwd=PACKAGE, env=environment).returncode:
             raise SystemExit(f"error: the wheel for {target.triple} could not be made; the messages are above")
         (wheel,) = Path(made).iterdir()
-        # Of earlier versions.
-        for old in out.glob(f"fmu_run-*-{wheel.name.split('-', 2)[2]}"):
-            old.unlink()
-        return wheel.replace(out / wheel.name), toolchain.description
+        return wheel.replace(out / wheel.name)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=ROOT / "dist" / "wheels", metavar="FOLDER")
-    parser.add_argument("triples", nargs="*", metavar="TRIPLE")
-    options = parser.parse_args()
-    targets = [target(triple) for triple in options.triples] or TARGETS
-    options.out.mkdir(parents=True, exist_ok=True)
+def compile_all(out: Path, targets: Sequence[Target]) -> None:
+    """Puts the wheels for these targets in a folder."""
+    out.mkdir(parents=True, exist_ok=True)
     for number, each in enumerate(targets, start=1):
-        say(f"[{number}/{len(targets)}] {each.triple}")
+        say(f"[{number}/{len(targets)}] wheel for {each.triple}")
         start = time.monotonic()
-        wheel, compiled_by = build(each, options.out.resolve())
-        say(f"      {compiled_by}, {time.monotonic() - start:.0f} s")
-        print(f"{wheel.name}: {wheel.stat().st_size / 1000:.0f} kB", flush=True)
+        wheel = build(each, out.resolve())
+        say(f"      {wheel.name}: {wheel.stat().st_size / 1000:.0f} kB, {time.monotonic() - start:.0f} s")
+
+
+def found(folder: Path, version: str) -> list[Path]:
+    """The wheels of this version in a folder, one for each target."""
+    wheels = []
+    for each in TARGETS:
+        paths = sorted(folder.glob(f"fmu_run-{version}-*{each.wheel}*.whl"))
+        if len(paths) != 1:
+            raise SystemExit(
+                f"error: {folder} must have one wheel of fmu-run {version} for {each.wheel}, not {len(paths)}"
+            )
+        wheels += paths
+    return wheels
 
 
 if __name__ == "__main__":
-    main()
+    if len(sys.argv) < 3:
+        raise SystemExit(__doc__)
+    compile_all(Path(sys.argv[1]), [target(triple) for triple in sys.argv[2:]])

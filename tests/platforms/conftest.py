@@ -22,10 +22,11 @@ sys.path.insert(0, str(ROOT / "platforms"))
 pytest.register_assert_rewrite("headers")
 
 import toolchain  # noqa: E402
-from targets import FOLDERS, MODEL  # noqa: E402
+from targets import FOLDERS, MODEL, MODELS, Target  # noqa: E402
 
 #: The FMU for FMI 3.0.
 FMI3 = f"{MODEL}-fmi3.fmu"
+FMUS = (DIST / f"{MODEL}.fmu", DIST / FMI3)
 
 #: Debian's package wine64 alone has it only there.
 WINE = "/usr/lib/wine/wine64"
@@ -67,7 +68,7 @@ RUNNERS = (
 def pytest_configure():
     """Stops early where something is missing."""
     if not (DIST / f"{MODEL}.fmu").is_file():
-        pytest.exit(f"{DIST / MODEL}.fmu is missing; make it with `make dist`", returncode=1)
+        pytest.exit(f"{DIST / MODEL}.fmu is missing; make it with `make release`", returncode=1)
     toolchain.need("x86_64-w64-mingw32-gcc", "aarch64-linux-gnu-gcc", "qemu-aarch64", WINE)
 
 
@@ -85,9 +86,15 @@ def unpack(fmu: Path, folder: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def unpacked(fmu, tmp_path_factory) -> Path:
+def unpacked_models(tmp_path_factory) -> dict[str, Path]:
+    """The folders of the unpacked FMUs for FMI 2.0."""
+    return {model: unpack(DIST / f"{model}.fmu", tmp_path_factory.mktemp(model)) for model in MODELS}
+
+
+@pytest.fixture(scope="session")
+def unpacked(unpacked_models) -> Path:
     """The folder of the unpacked FMU."""
-    return unpack(fmu, tmp_path_factory.mktemp("fmu"))
+    return unpacked_models[MODEL]
 
 
 @pytest.fixture(scope="session")
@@ -122,6 +129,12 @@ def wine(tmp_path_factory) -> dict[str, str]:
 @pytest.fixture(params=RUNNERS[1:], ids=lambda runner: runner.folder)
 def foreign(request) -> Runner:
     """Each platform but this one."""
+    return request.param
+
+
+@pytest.fixture(params=MODELS)
+def model(request) -> str:
+    """Each FMU in turn."""
     return request.param
 
 
@@ -196,6 +209,26 @@ def downloaded(package: str, requirements: Path, platform: str, python: str = "3
             subprocess.run([*command, "--dest", folder, "-r", wanted.name], check=True)
     (path,) = folder.glob(file)
     return path
+
+
+def wheel(target: Target) -> Path:
+    """The wheel of fmu-run for a target."""
+    (path,) = DIST.glob(f"fmu_run-*{target.wheel}*.whl")
+    return path
+
+
+def prw_wheel() -> Path:
+    """The wheel of prw."""
+    (path,) = DIST.glob("prw-*-py3-none-any.whl")
+    return path
+
+
+def ran(command, environment, **options) -> str:
+    """What a program prints; its end is an error if it is none."""
+    # Python for Windows wants a standard input.
+    process = subprocess.run(command, env=environment, input="", capture_output=True, text=True, **options)
+    assert process.returncode == 0, f"{' '.join(map(str, command))}\n{process.stdout}{process.stderr}"
+    return process.stdout
 
 
 def windows_path(path) -> str:

@@ -54,6 +54,9 @@ static void booleans(unsigned use_omega) {
     CHECK(fmi2SetBoolean(c, &use_omega, 1, &yes) == fmi2OK);
     CHECK(fmi2SetBoolean(c, &use_omega, 1, &two) == fmi2Error && messages == 1);
     CHECK(fmi2SetupExperiment(c, 0, 0, 0, 0, 0) == fmi2OK);
+    /* A refused start value is not forgotten. */
+    CHECK(fmi2EnterInitializationMode(c) == fmi2Error && messages == 2);
+    CHECK(fmi2SetBoolean(c, &use_omega, 1, &yes) == fmi2OK);
     CHECK(fmi2EnterInitializationMode(c) == fmi2OK);
     CHECK(fmi2GetBoolean(c, &use_omega, 1, values) == fmi2OK);
     CHECK(values[0] == 1 && values[1] == -1);

@@ -7,7 +7,6 @@ import re
 from pathlib import Path
 
 import lief
-from conftest import ROOT
 from targets import GLIBC, Target
 
 #: glibc and nothing else; part of every Linux that is not musl's.
@@ -36,13 +35,6 @@ def slices(path: Path) -> list[lief.MachO.Binary]:
     """The libraries in a macOS library."""
     fat = lief.MachO.parse(str(path))
     return [fat.at(index) for index in range(fat.size)]
-
-
-def no_names_of_folders(path: Path) -> None:
-    """Nothing says where the library was compiled."""
-    content = path.read_bytes()
-    for name in (str(ROOT), str(Path.home()), "/.cargo/", "rustlib", "/usr/src"):
-        assert name.encode() not in content, f"{path.name} contains {name}"
 
 
 def linux(path: Path, target: Target, exported: set[str]) -> None:

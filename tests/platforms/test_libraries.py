@@ -9,7 +9,7 @@ import fmpy
 import headers
 import pytest
 from conftest import INCLUDED, library
-from targets import FOLDERS, MODEL, TARGETS
+from targets import FOLDERS, TARGETS
 
 #: kB
 LARGEST = 600
@@ -25,36 +25,35 @@ def test_the_functions_are_known():
     assert len(FMI2_FUNCTIONS) == 44 and len(FMI3_FUNCTIONS) == 75
 
 
-def test_small(unpacked, folder):
-    path = library(unpacked, folder)
-    parts = len(FOLDERS[folder])
-    assert path.stat().st_size <= parts * LARGEST * 1000, f"{folder}: {path.stat().st_size}"
+@pytest.fixture
+def path(unpacked_models, model, folder) -> Path:
+    """The library of each FMU in each folder."""
+    return library(unpacked_models[model], folder)
 
 
-def test_no_names_of_folders(unpacked, folder):
-    headers.no_names_of_folders(library(unpacked, folder))
+def test_small(path, folder):
+    assert path.stat().st_size <= len(FOLDERS[folder]) * LARGEST * 1000, path.stat().st_size
 
 
 @pytest.mark.parametrize("folder", ["linux64", "aarch64-linux"], indirect=True)
-def test_linux(unpacked, folder):
+def test_linux(path, folder):
     (target,) = FOLDERS[folder]
-    headers.linux(library(unpacked, folder), target, FUNCTIONS)
+    headers.linux(path, target, FUNCTIONS)
 
 
 @pytest.mark.parametrize("folder", ["win64"], indirect=True)
-def test_windows(unpacked, folder):
-    path = library(unpacked, folder)
+def test_windows(path):
     headers.windows(path, FUNCTIONS, path.name)
 
 
 @pytest.mark.parametrize("folder", ["darwin64", "aarch64-darwin"], indirect=True)
-def test_macos(unpacked, folder):
-    headers.macos(library(unpacked, folder), FOLDERS[folder], FUNCTIONS, f"@rpath/{MODEL}.dylib")
+def test_macos(path, folder, model):
+    headers.macos(path, FOLDERS[folder], FUNCTIONS, f"@rpath/{model}.dylib")
 
 
 @pytest.mark.parametrize("folder", ["darwin64", "aarch64-darwin"], indirect=True)
-def test_macos_runs_only_what_is_signed(unpacked, folder):
-    headers.macos_signature(library(unpacked, folder))
+def test_macos_runs_only_what_is_signed(path):
+    headers.macos_signature(path)
 
 
 def test_every_target_is_in_the_fmu():

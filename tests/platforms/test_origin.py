@@ -1,0 +1,60 @@
+"""Nothing in a release says where it was made."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from conftest import DIST, ROOT
+
+#: This machine's folders, and what those of others are called.
+FOLDERS = {str(ROOT), str(Path.home()), f"{tempfile.gettempdir()}/", "/.cargo/", "/.rustup/", "rustlib", "/usr/src"}
+FOLDERS |= {os.environ[name] for name in ("CARGO_HOME", "CARGO_TARGET_DIR") if os.environ.get(name)}
+OTHERS = re.compile(rb"/home/\w+/|/Users/\w+/|[A-Z]:\\(?:Users|a)\\", re.IGNORECASE)
+
+
+def contents(name: str, content: bytes) -> Iterator[tuple[str, bytes]]:
+    """A file and, if it is an archive, those in it, and those in these."""
+    yield name, content
+    if content.startswith(b"PK\3\4"):
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            for info in archive.infolist():
+                yield from contents(f"{name}: {info.filename}", archive.read(info))
+
+
+def origins(name: str, content: bytes) -> list[str]:
+    """The folders that are named in a file, and where."""
+    found = []
+    for path, text in contents(name, content):
+        for folder in FOLDERS:
+            # Windows has texts of two bytes a character.
+            if any(folder.encode(encoding) in text for encoding in ("utf-8", "utf-16-le")):
+                found.append(f"{folder} in {path}")
+        found += [f"{match.decode()} in {path}" for match in OTHERS.findall(text)]
+    return found
+
+
+@pytest.mark.parametrize("path", sorted(DIST.iterdir()), ids=lambda path: path.name)
+def test_no_names_of_folders(path):
+    assert origins(path.name, path.read_bytes()) == []
+
+
+@pytest.mark.parametrize(
+    "said",
+    [f"{ROOT}/src/fmu.rs".encode(), f"{Path.home()}".encode("utf-16-le"), rb"/home/runner/work", rb"D:\a\prw\src"],
+)
+def test_a_name_is_found_in_an_archive_in_an_archive(said):
+    content = b"\0\1" + said + b"\0"
+    for name in ("library.so", "model.fmu"):
+        archive = io.BytesIO()
+        with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+            file.writestr(name, content)
+        content = archive.getvalue()
+    (found, *_) = origins("package.whl", content)
+    assert found.endswith(" in package.whl: model.fmu: library.so")

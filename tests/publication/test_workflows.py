@@ -1,0 +1,68 @@
+"""What runs on GitHub's machines: nothing wrong in it, nothing from others that can change, no more rights than needed."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+#: A commit, and for people its version.
+PINNED = re.compile(r"uses: [\w./-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+$")
+
+
+def checked(program: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """What a checker of this environment says."""
+    command = [f"{sysconfig.get_path('scripts')}/{program}", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+def unpinned(workflow: str) -> list[str]:
+    """The lines that use an action in whatever version it will have."""
+    used = [line.strip() for line in workflow.splitlines() if re.search(r"\buses:", line)]
+    return [line for line in used if not PINNED.search(line)]
+
+
+def test_there_are_workflows() -> None:
+    assert [path.name for path in WORKFLOWS] == ["fmu.yml", "test.yml"]
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_actionlint(path: Path) -> None:
+    done = checked("actionlint", path)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_zizmor(path: Path) -> None:
+    done = checked("zizmor", "--offline", path)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_they_find_faults(tmp_path: Path) -> None:
+    faulty = WORKFLOWS[0].read_text(encoding="utf-8").replace("needs: release\n", "needs: relaese\n")
+    path = tmp_path / "fmu.yml"
+    path.write_text(faulty.replace("contents: read", "contents: write"), encoding="utf-8")
+    done = checked("actionlint", path)
+    assert done.returncode and "relaese" in done.stdout
+    done = checked("zizmor", "--offline", path)
+    assert done.returncode and "excessive-permissions" in done.stdout
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_actions_are_commits(path: Path) -> None:
+    assert unpinned(path.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize("version", ["v7", "main", "3d3c42e # v7.0.1", "3d3c42e5aac5ba805825da76410c181273ba90b1"])
+def test_what_is_not_pinned_is_found(version: str) -> None:
+    assert unpinned(f"      - uses: actions/checkout@{version}") == [f"- uses: actions/checkout@{version}"]
+
+
+def test_an_action_has_one_version() -> None:
+    used = re.findall(r"uses: (\S+)@(.*)", "".join(path.read_text(encoding="utf-8") for path in WORKFLOWS))
+    assert used and len(set(used)) == len({name for name, _ in used})
