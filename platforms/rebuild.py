@@ -15,17 +15,22 @@ from targets import ROOT
 SUMS = "SHA256SUMS"
 
 
+def copy_sources(copy: Path) -> Path:
+    """Copies all that is in git, as it is now."""
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    names = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
+    for name in filter(None, names):
+        if (ROOT / name).is_file():
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, copy / name)
+    return copy
+
+
 def main() -> None:
     if not (DIST / SUMS).is_file():
         raise SystemExit(f"error: {DIST / SUMS} is missing; make it with `make dist`")
-    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    names = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
     with tempfile.TemporaryDirectory(prefix="rebuilt-") as folder:
-        copy = Path(folder) / "sources"
-        for name in filter(None, names):
-            if (ROOT / name).is_file():
-                (copy / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy(ROOT / name, copy / name)
+        copy = copy_sources(Path(folder) / "sources")
         environment = {**os.environ, "CARGO_TARGET_DIR": str(Path(folder) / "target")}
         subprocess.run([sys.executable, copy / "platforms" / "dist.py"], cwd=copy, env=environment, check=True)
         ours, theirs = ((path / SUMS).read_text().splitlines() for path in (DIST, copy / "dist"))
