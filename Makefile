@@ -10,12 +10,14 @@ FUZZ_SECONDS ?= 600
 
 VENV := .venv
 DIST_VENV := .venv-dist
+WITH_WASM2C := WASM2C='$(CURDIR)/$(VENV)/bin/wasm2c'
 PY   := $(VENV)/bin/python
 # What is imported is compiled then; all of it takes longer than to install it.
 PIP_INSTALL := $(PY) -m pip install --progress-bar off --no-compile
 # A process for each core; `.venv/bin/python -m pytest -x FILE` runs a part.
 PYTEST := $(PY) -m pytest -q -p no:cacheprovider -n auto --dist worksteal
 FMU  := target/fmu/prw_testbed.fmu
+SOURCE_FMU := target/fmu/source/prw_testbed.fmu
 
 # rustup's default place, before a cargo of the system that may be too old
 export PATH := $(HOME)/.cargo/bin:$(PATH)
@@ -50,7 +52,7 @@ help:
 	@echo 'make closed-loop             drive the FMU with a controller FMU, under several masters -> out/closed_loop.png'
 	@echo 'make release                 all that a release has -> dist/: FMUs and Python wheels for Linux, Windows and macOS,'
 	@echo '                             Intel and ARM, reference experiments, checksums, release notes'
-	@echo 'make source-fmu              the FMU as C sources, for real-time targets -> target/fmu/source/prw_testbed.fmu'
+	@echo 'make source-fmu              the FMU as C sources, for real-time targets -> $(SOURCE_FMU)'
 	@echo 'make test-platforms          make it and run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make it twice and compare every byte'
 	@echo 'make study                   set up prw identify, excite, sweep and linearize  (see analysis/tutorial.md)'
@@ -99,8 +101,8 @@ test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication
 
 # Ratios of one run; quiet the machine first.
-bench: $(VENV)/study.stamp closed-loop-fmus
-	@benches/run $(FMU) $(PY)
+bench: $(VENV)/study.stamp closed-loop-fmus source-fmu
+	@benches/run $(FMU) $(SOURCE_FMU) $(PY)
 
 # Instructions of a step, counted by callgrind.
 profile: $(VENV)/study.stamp fmu
@@ -159,10 +161,11 @@ release: need-rust $(DIST_VENV)/dist.stamp
 # The library as WebAssembly, and that as C: for targets that have a C compiler and no Rust.
 source-fmu: need-rust $(VENV)/wasm2c.stamp
 	@test -d "$$(rustc --print target-libdir --target wasm32-unknown-unknown)" || rustup target add wasm32-unknown-unknown
-	@WASM2C='$(CURDIR)/$(VENV)/bin/wasm2c' $(CARGO) run $(LOCKED) --release --bin build_fmu -- --c-sources
+	@$(WITH_WASM2C) $(CARGO) run $(LOCKED) --release --bin build_fmu -- --c-sources
 
 test-source-fmu: source-fmu fmu $(VENV)/test.stamp
-	$(PY) -m pytest -q -p no:cacheprovider tests/source_fmu
+	@$(WITH_WASM2C) $(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --c-sources
+	$(PYTEST) tests/source_fmu
 
 test-platforms: release $(DIST_VENV)/test.stamp
 	$(DIST_VENV)/bin/python -m pytest -q -p no:cacheprovider tests/platforms
@@ -185,7 +188,7 @@ fuzz: need-rust need-nightly
 	$(CARGO) +nightly fuzz run --fuzz-dir crates/fmu-export/fuzz --target-dir target/fuzz calls target/fuzz/corpus crates/fmu-export/fuzz/corpus/calls \
 	  -- -max_len=4096 -max_total_time=$(FUZZ_SECONDS) -print_final_stats=1
 
-sanitize: need-rust need-nightly
+sanitize: need-rust need-nightly $(VENV)/test.stamp source-fmu fmu
 	@command -v valgrind >/dev/null || $(call stop,valgrind is missing; on Debian: apt install valgrind)
 	@tests/sanitize
 

@@ -22,6 +22,9 @@ PACKAGES = {
     "x86_64-w64-mingw32-gcc": ["gcc-mingw-w64-x86-64"],
     "aarch64-linux-gnu-gcc": ["gcc-aarch64-linux-gnu", "libc6-dev-arm64-cross"],
     "qemu-aarch64": ["qemu-user"],
+    "arm-linux-gnueabihf-gcc": ["gcc-arm-linux-gnueabihf", "libc6-dev-armhf-cross"],
+    "qemu-arm": ["qemu-user"],
+    "clang": ["clang"],
     "/usr/lib/wine/wine64": ["wine64"],
 }
 

@@ -1,9 +1,11 @@
-"""Fixtures: the FMU of C sources, unpacked, and compilers for it."""
+"""Fixtures: the FMUs of C sources, unpacked, and compilers for them."""
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
+import sys
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +16,14 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 FMU = ROOT / "target" / "fmu" / "prw_testbed.fmu"
 SOURCE_FMU = ROOT / "target" / "fmu" / "source" / "prw_testbed.fmu"
+CONTROLLER = SOURCE_FMU.with_name("prw_controller.fmu")
 HEADERS = Path(fmpy.__file__).parent / "c-code"
+sys.path.insert(0, str(ROOT / "platforms"))
 
-#: A clang for many processors, which comes with what `make release` needs.
-ZIG = (str(ROOT / ".venv-dist" / "bin" / "python"), "-m", "ziglang", "cc")
-CLANG = ("clang",) if shutil.which("clang") else ZIG
+import toolchain  # noqa: E402
+
+#: Debian's package wine64 alone has it only there.
+WINE = "/usr/lib/wine/wine64"
 
 
 @dataclass(frozen=True)
@@ -28,11 +33,15 @@ class Compiler:
     command: tuple[str, ...]
     start: tuple[str, ...] | None = ()
 
+    def programs(self) -> list[str]:
+        """What has to be installed."""
+        return [self.command[0], *(self.start or ())[:1]]
+
     def require(self) -> None:
         """Skips the test where it is missing."""
-        for program in (self.command[0], *(self.start or ())[:1]):
+        for program in self.programs():
             if not shutil.which(program):
-                pytest.skip(f"{program} is missing")
+                pytest.skip(f"{program} is missing; on Debian: apt install {' '.join(toolchain.PACKAGES[program])}")
 
     def compile(self, sources: Path, output: Path, *arguments: str, check: bool = True) -> str:
         """Compiles; the compiler's messages."""
@@ -44,19 +53,41 @@ class Compiler:
 
 COMPILERS = {
     "gcc": Compiler(("gcc",)),
-    "clang": Compiler(CLANG),
-    "mingw": Compiler(("x86_64-w64-mingw32-gcc", "-static"), None),
+    "clang": Compiler(("clang",)),
+    "mingw": Compiler(("x86_64-w64-mingw32-gcc", "-static"), (WINE,)),
     "aarch64": Compiler(("aarch64-linux-gnu-gcc", "-static"), ("qemu-aarch64",)),
-    "armhf": Compiler((*ZIG, "-target", "arm-linux-musleabihf", "-static"), ("qemu-arm",)),
+    "clang for aarch64": Compiler(("clang", "--target=aarch64-linux-gnu", "-static"), ("qemu-aarch64",)),
+    "armhf": Compiler(("arm-linux-gnueabihf-gcc", "-static"), ("qemu-arm",)),
 }
+
+
+def pytest_configure() -> None:
+    """Installs the compilers where that is possible, else names them: their tests are skipped then."""
+    programs = [program for name in COMPILERS if name != "gcc" for program in COMPILERS[name].programs()]
+    try:
+        toolchain.need(*programs)
+    except SystemExit as missing:
+        print(missing, file=sys.stderr)
+
+
+def unpack(fmu: Path, folder: Path) -> Path:
+    """Unpacks the FMU; the folder `sources`."""
+    if not fmu.is_file():
+        pytest.exit(f"{fmu} is missing; build it with `make test-source-fmu`", returncode=1)
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(folder)
+    return folder / "sources"
 
 
 @pytest.fixture(scope="session")
 def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder `sources` of the FMU."""
-    if not SOURCE_FMU.is_file():
-        pytest.exit(f"{SOURCE_FMU} is missing; build it with `make source-fmu`", returncode=1)
-    folder = tmp_path_factory.mktemp("fmu")
-    with zipfile.ZipFile(SOURCE_FMU) as fmu:
-        fmu.extractall(folder)
-    return folder / "sources"
+    return unpack(SOURCE_FMU, tmp_path_factory.mktemp("fmu"))
+
+
+@pytest.fixture(scope="session")
+def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """For the programs, of which some run under Wine: a Windows of their own, without windows."""
+    wine = {"WINEPREFIX": str(tmp_path_factory.mktemp("wine")), "WINEDEBUG": "-all", "WINEARCH": "win64"}
+    wine["WINEDLLOVERRIDES"] = "mscoree,mshtml="
+    return {name: value for name, value in os.environ.items() if name != "DISPLAY"} | wine

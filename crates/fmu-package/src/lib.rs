@@ -75,6 +75,8 @@ pub use sources::Sources;
 pub use variant::{NO_GUID, Variant, build_script};
 
 #[cfg(feature = "command")]
+pub use c_sources::{CSources, LINKING, WEBASSEMBLY, c_sources, check_tools};
+#[cfg(feature = "command")]
 pub use command::{BuildOptions, Builder};
 #[cfg(feature = "package")]
 pub use {

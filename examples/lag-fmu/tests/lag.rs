@@ -68,3 +68,16 @@ fn build_fmu_describes_the_model() {
         "{text}"
     );
 }
+
+#[test]
+fn without_its_tools_no_c_sources_are_begun() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut build_fmu = Command::new(env!("CARGO_BIN_EXE_build_fmu_lag"));
+    let build_fmu = build_fmu.arg("--c-sources").arg("--out").arg(folder.path());
+    let output = build_fmu.env("WASM2C", "/nowhere/wasm2c").output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success() && output.stdout.is_empty(), "{output:?}");
+    assert!(text.starts_with("error: wasm2c ") && text.contains(" is missing (/nowhere/wasm2c)"), "{text}");
+    assert_eq!(text.lines().count(), 1, "{text}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}

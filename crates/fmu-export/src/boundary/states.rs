@@ -15,7 +15,10 @@ pub(crate) unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *
     // SAFETY: by contract the handle is NULL or a state of this model that nobody else uses now.
     match unsafe { handle.cast::<SavedState<M>>().as_mut() } {
         Some(saved) => instance.save_into(saved),
-        None => *handle = Box::into_raw(Box::new(instance.save())).cast(),
+        None => {
+            check_memory(instance)?;
+            *handle = Box::into_raw(Box::new(instance.save())).cast();
+        }
     }
     Ok(())
 }
@@ -95,12 +98,26 @@ pub(crate) unsafe fn deserialize<M: Exported>(
     // SAFETY: by contract an array of this length; NULL or a pointer to a handle, which is NULL or a state.
     let (bytes, handle) =
         unsafe { (array(bytes, size, "serializedState")?, place(state, "FMUstate")?.assume_init_mut()) };
+    check_memory(instance)?;
     let restored = instance.deserialize(bytes)?;
     // SAFETY: by contract the handle is NULL or a state of this model that nobody else uses now.
     match unsafe { handle.cast::<SavedState<M>>().as_mut() } {
         Some(saved) => *saved = restored,
         None => *handle = Box::into_raw(Box::new(restored)).cast(),
     }
+    Ok(())
+}
+
+/// Refuses another state where an instance's memory is limited and has no place for it.
+fn check_memory<M: Exported>(instance: &mut Instance<M>) -> Outcome {
+    #[cfg(target_family = "wasm")]
+    if !super::webassembly::has_memory(2 * instance.size_of_state()) {
+        return refuse(
+            "the instance has no memory for another state; free one, or compile the FMU with a larger \
+             FMU_MEMORY_PAGES",
+        );
+    }
+    _ = instance;
     Ok(())
 }
 

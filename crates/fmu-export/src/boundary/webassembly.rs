@@ -36,15 +36,26 @@ pub(super) fn keep_panics() {
     std::panic::set_hook(Box::new(keep));
 }
 
+/// Whether there are so many bytes of memory in one piece, and some more for what a call says.
+pub(super) fn has_memory(size: usize) -> bool {
+    const SPARE: usize = 4096;
+    let mut piece = Vec::<u8>::new();
+    let is_there = piece.try_reserve_exact(size + SPARE).is_ok();
+    // What nobody uses need not be allocated.
+    std::hint::black_box(piece);
+    is_there
+}
+
 /// Makes room for the arguments of a call: `size` bytes in place of those it made before, or NULL if there is not so
 /// much memory.
 pub fn room(size: usize) -> *mut c_void {
     ROOM.with_borrow_mut(|room| {
         *room = Vec::new();
-        match room.try_reserve_exact(size.div_ceil(size_of::<u64>())) {
-            Ok(()) => room.as_mut_ptr().cast(),
-            Err(_) => std::ptr::null_mut(),
+        if !has_memory(size) {
+            return std::ptr::null_mut();
         }
+        room.reserve_exact(size.div_ceil(size_of::<u64>()));
+        room.as_mut_ptr().cast()
     })
 }
 

@@ -59,6 +59,12 @@ impl<M: Exported> Instance<M> {
         SavedState { origin: self.origin(), state: self.state.clone() }
     }
 
+    /// How many bytes a saved state takes now, with all that it points to.
+    #[cfg(target_family = "wasm")]
+    pub fn size_of_state(&mut self) -> usize {
+        size_of::<SavedState<M>>() + serialized::size_in_place(&mut self.state)
+    }
+
     /// Saves into a state that exists already, without allocation if the model clones without.
     pub fn save_into(&self, saved: &mut SavedState<M>) {
         saved.origin = self.origin();

@@ -36,8 +36,13 @@ const CHECKSUM_LENGTH: usize = 8;
 
 /// The number of bytes of a serialized state.
 pub(super) fn size<M: Exported>(state: &State<M>) -> usize {
+    size_in_place(&mut state.clone())
+}
+
+/// The same without a copy; the state stays as it is.
+pub(super) fn size_in_place<M: Exported>(state: &mut State<M>) -> usize {
     let mut counter = Counter(0);
-    state.clone().visit(&mut counter);
+    state.visit(&mut counter);
     HEADER_LENGTH + counter.0 + CHECKSUM_LENGTH
 }
 

@@ -13,14 +13,6 @@
 #include "fmi2Functions.h"
 #include <stdlib.h>
 
-/* The most memory that an instance's module can have, for what states and texts the importer makes it keep. */
-#ifndef FMU_MEMORY_PAGES
-#define FMU_MEMORY_PAGES (FMU_INITIAL_PAGES + 2)
-#endif
-#if FMU_MEMORY_PAGES < FMU_INITIAL_PAGES + 1
-#error "FMU_MEMORY_PAGES, the memory of an instance in units of 64 KiB, is less than the module needs"
-#endif
-
 typedef struct {
     FMU_MODULE module;
     fmi2CallbackLogger logger;
@@ -30,11 +22,6 @@ typedef struct {
     u32 room;      /* for arguments, in the module's memory */
     u32 room_size;
     bool dead; /* after a failure that the module cannot even tell of */
-    wasm_rt_funcref_t table[FMU_TABLE];
-    union {
-        double aligned;
-        uint8_t bytes[FMU_MEMORY_PAGES * FMU_PAGE];
-    } memory;
 } Instance;
 
 /* A call that is running. */
@@ -57,7 +44,7 @@ static void log_error(const Instance *instance, fmi2Status status, fmi2String me
 /* The module has a message for the importer. */
 void FMU_log(struct w2c_fmu *importer, u32 status, u32 category, u32 message) {
     const Instance *instance = (const Instance *)(void *)importer;
-    const char *texts = (const char *)instance->module.w2c_memory.data;
+    const char *texts = (const char *)instance->module.w2c_memory.data.bytes;
     if (instance->logger != NULL) {
         instance->logger(instance->environment, instance->name, (fmi2Status)status, texts + category,
                          texts + message);
@@ -148,7 +135,7 @@ static inline u32 output(Call *call, const void *array, size_t n, size_t size, s
 }
 
 static void *at(const Call *call, u32 address) {
-    return call->instance->module.w2c_memory.data + address;
+    return call->instance->module.w2c_memory.data.bytes + address;
 }
 
 static inline u32 input(Call *call, const void *array, size_t n, size_t size, size_t alignment) {
@@ -280,43 +267,55 @@ static Instance *allocate(fmi2String name, const fmi2CallbackFunctions *function
     if (name != NULL) {
         memcpy(instance->name, name, length(name));
     }
-    instance->module.w2c_memory.data = instance->memory.bytes;
-    instance->module.w2c_memory.most = FMU_MEMORY_PAGES;
-    instance->module.FMU_FUNCTIONS.data = instance->table;
     return instance;
+}
+
+/* Makes the instance in its module. */
+static bool make(Instance *instance, fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                 fmi2Boolean visible, fmi2Boolean logging_on) {
+    Call call;
+    begin(&call, instance, "fmi2Instantiate");
+    if (setjmp(call.trap) != 0) {
+        broken(&call);
+        return false;
+    }
+    FMU_instantiate(&instance->module, (struct w2c_fmu *)(void *)instance);
+    call.stack = instance->module.FMU_STACK;
+    if (room(&call, length(name) + length(guid) + length(resources), 1, 4096)) {
+        Callbacks callbacks = {0, 0, 0, 0, 0};
+        u32 in_name = string(&call, name), in_guid = string(&call, guid), in_resources = string(&call, resources);
+        callbacks.logger = instance->logger != NULL;
+        instance->component = FMU_fmi2Instantiate(&instance->module, in_name, (u32)type, in_guid, in_resources,
+                                                  input(&call, &callbacks, 1, sizeof callbacks, 1), (u32)visible,
+                                                  (u32)logging_on);
+    } else {
+        log_error(instance, fmi2Error, "fmi2Instantiate: the arguments need more memory than an instance has");
+    }
+    end(&call, fmi2OK);
+    return instance->component != 0;
+}
+
+/* A compiler that is told to fuses products and sums against what the runtime says. */
+static bool fuses(void) {
+    volatile double factor = 1 + DBL_EPSILON;
+    double product = factor * factor;
+    return product - (1 + 2 * DBL_EPSILON) != 0;
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging_on) {
-    Instance *const instance = functions == NULL ? NULL : allocate(name, functions);
-    Call call;
+    Instance *instance = functions == NULL ? NULL : allocate(name, functions);
     if (instance == NULL) {
         return NULL;
     }
-    begin(&call, instance, "fmi2Instantiate");
-    if (setjmp(call.trap) != 0) {
-        broken(&call);
-        instance->component = 0;
-    } else {
-        FMU_instantiate(&instance->module, (struct w2c_fmu *)(void *)instance);
-        call.stack = instance->module.FMU_STACK;
-        if (room(&call, length(name) + length(guid) + length(resources), 1, 4096)) {
-            Callbacks callbacks = {0, 0, 0, 0, 0};
-            u32 in_name = string(&call, name), in_guid = string(&call, guid), in_resources = string(&call, resources);
-            callbacks.logger = functions->logger != NULL;
-            instance->component = FMU_fmi2Instantiate(
-                &instance->module, in_name, (u32)type, in_guid, in_resources,
-                input(&call, &callbacks, 1, sizeof callbacks, 1), (u32)visible, (u32)logging_on);
-        } else {
-            log_error(instance, fmi2Error, "fmi2Instantiate: the arguments need more memory than an instance has");
-        }
-        end(&call, fmi2OK);
+    if (fuses()) {
+        log_error(instance, fmi2Error, "fmi2Instantiate: the FMU was compiled to fuse products and sums, which changes "
+                                       "its results; add -ffp-contract=off (/fp:precise)");
+    } else if (make(instance, name, type, guid, resources, visible, logging_on)) {
+        return instance;
     }
-    if (instance->component == 0) {
-        free(instance);
-        return NULL;
-    }
-    return instance;
+    free(instance);
+    return NULL;
 }
 
 void fmi2FreeInstance(fmi2Component c) {
@@ -421,11 +420,11 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 /* A state that the importer keeps lies in the module's memory. */
 
 static u32 to_module(const Instance *instance, fmi2FMUstate state) {
-    const uint8_t *bytes = (const uint8_t *)state, *first = instance->memory.bytes;
+    const uint8_t *bytes = (const uint8_t *)state, *first = instance->module.w2c_memory.data.bytes;
     if (state == NULL) {
         return 0;
     }
-    return bytes > first && bytes < first + sizeof instance->memory.bytes ? (u32)(bytes - first) : UINT32_MAX;
+    return bytes > first && bytes < first + FMU_MEMORY ? (u32)(bytes - first) : UINT32_MAX;
 }
 
 #define STATE(name, state)                                                                     \

@@ -52,16 +52,29 @@ enum {
     WASM_RT_TRAP_CALL_INDIRECT
 };
 
+/* An instance has the most memory that its module can ask for. Behind it are bytes that nobody uses: that a base is in
+   memory is enough to know where an offset is small. */
 #define FMU_PAGE 65536u
+#define FMU_MEMORY (FMU_MEMORY_PAGES * FMU_PAGE)
+#define FMU_SMALL 4096u
+
+#if FMU_MEMORY_PAGES <= FMU_INITIAL_PAGES || FMU_MEMORY_PAGES > 16384
+#error "FMU_MEMORY_PAGES, the memory of an instance in units of 64 KiB, is less than the module needs or over 1 GiB"
+#endif
+
+/* Files that were compiled with different memories do not link. */
+#define FMU_JOIN(name, number) name##_##number
+#define FMU_WITH_MEMORY(name, pages) FMU_JOIN(name, pages)
 
 typedef struct {
-    uint8_t *data;
-    uint64_t size; /* in bytes */
     uint64_t pages;
-    uint64_t most; /* pages that there is room for */
-    bool refused;  /* whether there was none for more */
+    bool refused;  /* whether there was no room for more */
     jmp_buf *trap; /* where the call that is running ends if it traps */
     int reason;    /* why it did */
+    union {
+        double aligned;
+        uint8_t bytes[FMU_MEMORY + FMU_SMALL];
+    } data;
 } wasm_rt_memory_t;
 
 typedef void (*wasm_rt_function_ptr_t)(void);
@@ -77,8 +90,7 @@ typedef struct {
 } wasm_rt_funcref_t;
 
 typedef struct {
-    wasm_rt_funcref_t *data;
-    uint32_t size;
+    wasm_rt_funcref_t data[FMU_TABLE];
 } wasm_rt_funcref_table_t;
 
 typedef enum { RefFunc } wasm_elem_segment_expr_type_t;
@@ -103,18 +115,17 @@ FMU_NO_RETURN static inline void wasm_rt_trap(wasm_rt_memory_t *memory, int reas
 #define TRAP(why) (wasm_rt_trap(&instance->w2c_memory, WASM_RT_TRAP_##why), 0)
 #define UNREACHABLE wasm_rt_trap(&instance->w2c_memory, WASM_RT_TRAP_UNREACHABLE)
 
-/* Memory and tables: `data` is set, and large enough, before a module is instantiated. */
+/* Memory and tables are part of an instance, which begins as zeros. */
 
 #define wasm_rt_is_initialized() true
 
 static inline uint64_t wasm_rt_grow_memory(wasm_rt_memory_t *memory, uint64_t pages) {
     uint64_t before = memory->pages;
-    if (pages > memory->most - before) {
+    if (pages > FMU_MEMORY_PAGES - before) {
         memory->refused = true;
         return 0xffffffffu;
     }
     memory->pages += pages;
-    memory->size = memory->pages * FMU_PAGE;
     return before;
 }
 
@@ -129,8 +140,7 @@ static inline void wasm_rt_free_memory(wasm_rt_memory_t *memory) {
 }
 
 static inline void wasm_rt_allocate_funcref_table(wasm_rt_funcref_table_t *table, uint32_t size, uint32_t most) {
-    (void)most;
-    table->size = size;
+    (void)table, (void)size, (void)most;
 }
 
 static inline void wasm_rt_free_funcref_table(wasm_rt_funcref_table_t *table) {
@@ -151,19 +161,19 @@ static inline void funcref_table_init(wasm_rt_funcref_table_t *table, const wasm
 
 /* Two functions have one type if they have the same name for it: there is one module. */
 #define CALL_INDIRECT(table, function, type, i, ...)                                        \
-    ((void)(UNLIKELY((i) >= (table).size || (table).data[i].func_type != (type)) ? TRAP(CALL_INDIRECT) : 0), \
+    ((void)(UNLIKELY((i) >= FMU_TABLE || (table).data[i].func_type != (type)) ? TRAP(CALL_INDIRECT) : 0), \
      ((function)(table).data[i].func)(__VA_ARGS__))
 
-#define LOAD_DATA(memory, at, from, count) memcpy(&(memory).data[at], from, count)
+#define LOAD_DATA(memory, at, from, count) memcpy(&(memory).data.bytes[at], from, count)
 
-#define FMU_CHECK(memory, at, length)                                          \
-    if (UNLIKELY((uint64_t)(at) + (length) > (memory)->size)) {                \
-        wasm_rt_trap(memory, WASM_RT_TRAP_OOB);                        \
+#define FMU_CHECK(memory, at, length)                           \
+    if (UNLIKELY((uint64_t)(at) + (length) > FMU_MEMORY)) {     \
+        wasm_rt_trap(memory, WASM_RT_TRAP_OOB);                 \
     }
 
 static inline void memory_fill(wasm_rt_memory_t *memory, uint32_t at, uint32_t value, uint32_t count) {
     FMU_CHECK(memory, at, count)
-    memset(&memory->data[at], (int)(value & 0xff), count);
+    memset(&memory->data.bytes[at], (int)(value & 0xff), count);
 }
 
 static inline void memory_copy(wasm_rt_memory_t *memory, const wasm_rt_memory_t *same, uint32_t to, uint32_t from,
@@ -171,28 +181,28 @@ static inline void memory_copy(wasm_rt_memory_t *memory, const wasm_rt_memory_t 
     (void)same;
     FMU_CHECK(memory, to, count)
     FMU_CHECK(memory, from, count)
-    memmove(&memory->data[to], &memory->data[from], count);
+    memmove(&memory->data.bytes[to], &memory->data.bytes[from], count);
 }
 
-#define FMU_LOAD(name, stored, extended, result)                                                       \
-    static inline result name##_default32(const uint8_t *data, uint64_t size, wasm_rt_memory_t *memory, \
-                                          uint64_t at) {                                               \
-        stored value;                                                                                  \
-        if (UNLIKELY(at + sizeof value > size)) {                                                      \
-            wasm_rt_trap(memory, WASM_RT_TRAP_OOB);                                              \
-        }                                                                                              \
-        memcpy(&value, &data[at], sizeof value);                                                       \
-        return (result)(extended)value;                                                                \
+/* The place of so many bytes. `offset` is a constant: what is asked of it is answered by the compiler. */
+static inline uint8_t *fmu_at(wasm_rt_memory_t *memory, uint32_t base, uint32_t offset, uint32_t length) {
+    if (UNLIKELY(offset <= FMU_SMALL - length ? base >= FMU_MEMORY : (uint64_t)base + offset + length > FMU_MEMORY)) {
+        wasm_rt_trap(memory, WASM_RT_TRAP_OOB);
+    }
+    return &memory->data.bytes[(size_t)base + offset];
+}
+
+#define FMU_LOAD(name, stored, extended, result)                                             \
+    static inline result name(wasm_rt_memory_t *memory, uint32_t base, uint32_t offset) {    \
+        stored value;                                                                        \
+        memcpy(&value, fmu_at(memory, base, offset, sizeof value), sizeof value);            \
+        return (result)(extended)value;                                                      \
     }
 
-#define FMU_STORE(name, stored, given)                                                                              \
-    static inline void name##_default32(uint8_t *data, uint64_t size, wasm_rt_memory_t *memory, uint64_t at,        \
-                                        given whole) {                                                              \
-        stored value = (stored)whole;                                                                               \
-        if (UNLIKELY(at + sizeof value > size)) {                                                                   \
-            wasm_rt_trap(memory, WASM_RT_TRAP_OOB);                                                           \
-        }                                                                                                           \
-        memcpy(&data[at], &value, sizeof value);                                                                    \
+#define FMU_STORE(name, stored, given)                                                                \
+    static inline void name(wasm_rt_memory_t *memory, uint32_t base, uint32_t offset, given whole) {  \
+        stored value = (stored)whole;                                                                 \
+        memcpy(fmu_at(memory, base, offset, sizeof value), &value, sizeof value);                     \
     }
 
 FMU_LOAD(i32_load, uint32_t, uint32_t, uint32_t)

@@ -1,0 +1,7 @@
+//! The model as a shared library, which is made into C sources for a test.
+
+#[path = "../toys/faulty.rs"]
+#[allow(dead_code, reason = "some of it is for tests in the same program")]
+mod faulty;
+
+fmu_export::fmi2_symbols!(faulty::Faulty);
