@@ -29,7 +29,7 @@ typedef struct {
     Instance *instance;
     const char *function;
     jmp_buf trap;
-    u32 stack; /* as it was before the call */
+    volatile u32 stack; /* as it was before the call; set after setjmp, read after longjmp (C99 7.13.2.1) */
     u32 next;  /* where the next argument goes */
     bool endless;
 } Call;
@@ -325,8 +325,10 @@ void fmi2FreeInstance(fmi2Component c) {
         return;
     }
     begin(&call, instance, "fmi2FreeInstance");
-    if (setjmp(call.trap) == 0 && !instance->dead) {
-        FMU_fmi2FreeInstance(&instance->module, instance->component);
+    if (setjmp(call.trap) == 0) {
+        if (!instance->dead) {
+            FMU_fmi2FreeInstance(&instance->module, instance->component);
+        }
     }
     free(instance);
 }
@@ -420,11 +422,11 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 /* A state that the importer keeps lies in the module's memory. */
 
 static u32 to_module(const Instance *instance, fmi2FMUstate state) {
-    const uint8_t *bytes = (const uint8_t *)state, *first = instance->module.w2c_memory.data.bytes;
+    uintptr_t place = (uintptr_t)state - (uintptr_t)instance->module.w2c_memory.data.bytes;
     if (state == NULL) {
         return 0;
     }
-    return bytes > first && bytes < first + FMU_MEMORY ? (u32)(bytes - first) : UINT32_MAX;
+    return place != 0 && place < FMU_MEMORY ? (u32)place : UINT32_MAX;
 }
 
 #define STATE(name, state)                                                                     \
