@@ -154,20 +154,21 @@ test-importers: $(VENV)/importers.stamp importer-fmus
 	$(PYTEST) tests/importers
 
 # The tools for other platforms have an environment of their own. What is not a Python package is installed
-# where that is possible, else named. BUILD_STD=1 compiles std with Debian's Rust, as is done without rustup.
+# where that is possible, else named. BUILD_STD=1 compiles std with Debian's Rust, as is done without rustup;
+# only WebAssembly's is always rustup's.
 release: need-rust $(DIST_VENV)/dist.stamp
 	@$(DIST_VENV)/bin/python platforms/release.py
 
 # The library as WebAssembly, and that as C: for targets that have a C compiler and no Rust.
 source-fmu: need-rust $(VENV)/wasm2c.stamp
-	@test -d "$$(rustc --print target-libdir --target wasm32-unknown-unknown)" || rustup target add wasm32-unknown-unknown
+	@ls "$$(rustc --print target-libdir --target wasm32-unknown-unknown)" 2>/dev/null | grep -q libstd || rustup target add wasm32-unknown-unknown
 	@$(WITH_WASM2C) $(CARGO) run $(LOCKED) --release --bin build_fmu -- --c-sources
 
 test-source-fmu: source-fmu fmu $(VENV)/test.stamp
 	@$(WITH_WASM2C) $(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --c-sources
 	$(PYTEST) tests/source_fmu
 
-test-platforms: release $(DIST_VENV)/test.stamp
+test-platforms: release source-fmu $(DIST_VENV)/test.stamp
 	$(DIST_VENV)/bin/python -m pytest -q -p no:cacheprovider tests/platforms
 
 test-reproducible: release

@@ -24,7 +24,7 @@ from targets import (
     WINDOWS,
     Target,
 )
-from toolchain import say
+from toolchain import say, toolchain
 
 #: The program that packs a model's FMUs.
 PACKERS = {MODEL: "build_fmu", CONTROLLER: "build_controller"}
@@ -53,6 +53,19 @@ def make(libraries: Path, out: Path, scratch: Path) -> None:
     cross_check.pack(out / f"{MODEL}.fmu", out / f"{MODEL}-cross-check.zip")
 
 
+def source_compiler() -> str:
+    """What makes the C sources; stops if some of it is missing."""
+    version = subprocess.run([_wasm2c(), "--version"], capture_output=True, text=True, check=True).stdout.strip()
+    return f"{toolchain(WEBASSEMBLY).description}, wasm2c {version}"
+
+
+def _wasm2c() -> str:
+    path = shutil.which("wasm2c", path=sysconfig.get_path("scripts"))
+    if not path:
+        raise SystemExit("error: wasm2c is missing in this Python environment; start this with make release")
+    return path
+
+
 def _library(folder: Path, model: str, target: Target) -> Path:
     candidates = [target, NATIVE_WINDOWS] if target is WINDOWS else [target]
     paths = [folder / candidate.triple / candidate.library(model) for candidate in candidates]
@@ -74,11 +87,8 @@ def _pack(model: str, fmi: int, folders: Folders, libraries: dict[Target, Path],
 
 def _sources(scratch: Path) -> Path:
     """The FMU of C sources."""
-    wasm2c = shutil.which("wasm2c", path=sysconfig.get_path("scripts"))
-    if not wasm2c:
-        raise SystemExit("error: wasm2c is missing in this Python environment; start this with make release")
     _, environment, _ = prepare(WEBASSEMBLY)
-    environment["WASM2C"] = wasm2c
+    environment["WASM2C"] = _wasm2c()
     command = (_program(PACKERS[MODEL]), "--c-sources", f"--out={scratch}")
     _run(*command, what=f"the C sources of {MODEL}", environment=environment)
     return scratch / "source" / f"{MODEL}.fmu"

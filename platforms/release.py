@@ -22,7 +22,7 @@ import libraries
 import prw_wheel
 import release_notes
 import wheels
-from targets import MODEL, ROOT, TARGETS
+from targets import MODEL, ROOT, TARGETS, WEBASSEMBLY
 
 DIST = ROOT / "dist"
 SUMS = "SHA256SUMS"
@@ -40,6 +40,7 @@ def main() -> None:
     notes = release_notes.notes(release_notes.CHANGELOG.read_text(encoding="utf-8"), version)
     prw_wheel.check_version(version)
     bill_of_materials.check()
+    source_compiler = fmus.source_compiler()
 
     (ROOT / "target").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(dir=ROOT / "target", prefix="release-") as made:
@@ -57,17 +58,18 @@ def main() -> None:
         for product in bill_of_materials.PRODUCTS:
             shutil.copyfile(product.bill, out / f"{product.name}.cdx.json")
         (out / "RELEASE_NOTES.md").write_text(notes, encoding="utf-8")
-        (out / "compilers.txt").write_text(compilers(options.libraries), encoding="utf-8")
+        (out / "compilers.txt").write_text(compilers(options.libraries, source_compiler), encoding="utf-8")
         (out / SUMS).write_text(checksums(out), encoding="utf-8")
         put(out)
     for path in sorted(DIST.iterdir()):
         print(f"dist/{path.name}: {path.stat().st_size / 1000:.0f} kB")
 
 
-def compilers(folder: Path) -> str:
-    """What compiled the libraries for each target."""
+def compilers(folder: Path, source_compiler: str) -> str:
+    """What compiled the libraries for each target, and what made the C sources."""
     paths = sorted(folder.glob(f"*/{libraries.COMPILER}"))
-    return "".join(f"{path.parent.name}: {path.read_text(encoding='utf-8')}" for path in paths)
+    lines = [f"{path.parent.name}: {path.read_text(encoding='utf-8')}" for path in paths]
+    return "".join([*lines, f"{WEBASSEMBLY.triple}: {source_compiler}\n"])
 
 
 def checksums(folder: Path) -> str:

@@ -43,6 +43,8 @@ def check_tag(tag: str, changelog: str, version: str) -> None:
     newest, _ = sections(changelog)[0]
     if _version_in(newest) != version:
         raise SystemExit(f"error: CHANGELOG.md has '## {newest}' above {version}; move it into that section")
+    if not re.fullmatch(r"\S+ \(\d{4}-\d\d-\d\d\)", newest):
+        raise SystemExit(f"error: CHANGELOG.md has no date in '## {newest}'; write '## {version} (YYYY-MM-DD)'")
 
 
 def sections(changelog: str) -> list[tuple[str, str]]:

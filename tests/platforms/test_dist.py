@@ -17,7 +17,7 @@ from cyclonedx.validation.json import JsonStrictValidator
 from fmpy.validation import validate_fmu
 from release import SUMS
 from release_notes import CHANGELOG, notes, version
-from targets import CONTROLLER, FMI3_FOLDERS, FOLDERS, MODEL, MODELS, TARGETS
+from targets import CONTROLLER, FMI3_FOLDERS, FOLDERS, MODEL, MODELS, TARGETS, WEBASSEMBLY
 
 ARM = f"{MODEL}-linux-arm64.fmu"
 SOURCE = f"{MODEL}-source.fmu"
@@ -56,7 +56,8 @@ def test_it_is_one_version():
 def test_each_compiler_is_named():
     lines = (DIST / "compilers.txt").read_text(encoding="utf-8").splitlines()
     assert all(": rustc 1." in line for line in lines)
-    assert sorted(line.split(":")[0] for line in lines) == sorted(target.triple for target in TARGETS)
+    assert sorted(line.split(":")[0] for line in lines) == sorted(target.triple for target in (*TARGETS, WEBASSEMBLY))
+    assert ", wasm2c 1." in lines[-1]
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -78,13 +79,14 @@ def test_the_system_has_these_fmus():
 
 
 def test_c_sources(fmu):
-    """In the place of the libraries; they are compiled by tests/source_fmu."""
+    """In the place of the libraries; the same as those of `make source-fmu`, which tests/source_fmu compiles."""
     source, both = names(DIST / SOURCE), names(fmu)
     assert {name for name in source if name.startswith("sources/")} == {
         f"sources/{MODEL}{end}" for end in (".c", "_fmi2.c", ".h", "_runtime.h")
     }
     assert all(name.startswith("sources/") for name in source - both)
     assert all(name.startswith("binaries/") for name in both - source)
+    assert (DIST / SOURCE).read_bytes() == (ROOT / "target" / "fmu" / "source" / f"{MODEL}.fmu").read_bytes()
 
 
 def test_the_other_for_importers_on_arm(fmu):

@@ -164,17 +164,22 @@ def arm_root(tmp_path) -> Path:
             pytest.skip(f"this machine's package sources have none for ARM: {done.stderr.strip()[-200:]}")
     for package in (tmp_path / "archives").glob("*.deb"):
         subprocess.run(["dpkg-deb", "--extract", package, tmp_path / "root"], check=True)
-    return Path(shutil.move(tmp_path / "root", root))
+    # Whole or not at all, even where these are two disks.
+    shutil.rmtree(partial := root.with_suffix(".partial"), ignore_errors=True)
+    shutil.move(tmp_path / "root", partial)
+    return partial.rename(root)
 
 
 def same_elsewhere(start: list, path: Callable[[Path], str], environment: dict[str, str], user: Installed) -> str:
     """Runs the wheels in another Python and compares with this machine's; says how many numbers and how far they differ."""
     worst = numbers = 0
+    # Where prw finds no FMU but that in its wheel.
+    (nowhere := user.folder / "nowhere").mkdir(exist_ok=True)
     recording = (ROOT / "examples" / "point_to_point.csv",)
     # Of each FMU its version and four outputs at 21 times of two runs; of eight outputs every tenth row.
     for program, arguments, least in (("wheel_run.py", FMUS, 2 * (1 + 4 * 42)), ("prw_run.py", recording, 3000)):
         files = (HERE / program, *arguments)
-        theirs = ran([*start, *map(path, files)], environment)
+        theirs = ran([*start, *map(path, files)], environment, cwd=nowhere)
         difference, count = disagreement(theirs, user.run("python", *map(str, files)))
         assert count >= least
         worst, numbers = max(worst, difference), numbers + count

@@ -20,8 +20,10 @@ OTHERS = re.compile(rb"/home/\w+/|/Users/\w+/|[A-Z]:\\(?:Users|a)\\", re.IGNOREC
 
 
 def contents(name: str, content: bytes) -> Iterator[tuple[str, bytes]]:
-    """A file and, if it is an archive, those in it, and those in these."""
+    """A file and, if it is an archive, those in it, and those in these; of C sources also the texts that are numbers."""
     yield name, content
+    if name.endswith(".c"):
+        yield name, bytes(int(number, 16) for number in re.findall(rb"\b0x([0-9a-f]{2})\b", content))
     if content.startswith(b"PK\3\4"):
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             for info in archive.infolist():
@@ -58,3 +60,9 @@ def test_a_name_is_found_in_an_archive_in_an_archive(said):
         content = archive.getvalue()
     (found, *_) = origins("package.whl", content)
     assert found.endswith(" in package.whl: model.fmu: library.so")
+
+
+def test_a_name_is_found_in_the_numbers_of_c_sources():
+    numbers = ", ".join(f"0x{byte:02x}" for byte in f"{ROOT}/src/fmu.rs".encode())
+    content = f"static const u8 data[] = {{ {numbers} }};\n".encode()
+    assert origins("model.c", content) and not origins("model.txt", content)
