@@ -15,7 +15,7 @@ TEXT = """# Changelog
 
 Newest first.
 
-## 0.2.0, second edition
+## 0.2.0 (2026-02-03)
 
 * New.
 
@@ -49,3 +49,8 @@ def test_the_tag_is_the_version() -> None:
 def test_what_changed_since_is_not_left_out() -> None:
     with pytest.raises(SystemExit, match="has '## Unreleased' above 0.2.0"):
         check_tag("v0.2.0", TEXT.replace("## 0.2.0", "## Unreleased\n\n* More.\n\n## 0.2.0"), "0.2.0")
+
+
+def test_what_is_released_has_a_day() -> None:
+    with pytest.raises(SystemExit, match=r"has no date in '## 0.2.0'; write '## 0.2.0 \(YYYY-MM-DD\)'"):
+        check_tag("v0.2.0", TEXT.replace("## 0.2.0 (2026-02-03)", "## 0.2.0"), "0.2.0")

@@ -80,17 +80,15 @@ def test_descriptions_have_this_version() -> None:
 
 
 def test_the_citation_is_of_this_version_and_its_day() -> None:
-    citation = dict(
-        re.findall(r"^(version|date-released): (.*)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.M)
-    )
-    (day,) = re.findall(
-        rf"^## {re.escape(VERSION)} \((.*)\)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M
-    )
-    assert citation == {"version": VERSION, "date-released": day}
+    """The day is that of the release, and what is not released yet has none."""
+    changelog, citation = ((ROOT / name).read_text(encoding="utf-8") for name in ("CHANGELOG.md", "CITATION.cff"))
+    said = dict(re.findall(r"^(version|date-released): (.*)$", citation, re.MULTILINE))
+    (day,) = re.findall(rf"^## {re.escape(VERSION)}(?: \((.*)\))?$", changelog, re.MULTILINE)
+    assert said == {"version": VERSION} | ({"date-released": day} if day else {})
 
 
 def test_the_changelog_begins_with_this_version() -> None:
     """What a release says of itself is cut out of the changelog by these headings."""
     headings = re.findall(r"^## (.*)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert all(re.fullmatch(r"\d+\.\d+\.\d+( \(\d{4}-\d\d-\d\d\))?", heading) for heading in headings), headings
-    assert headings[0].startswith(f"{VERSION} (")
+    assert headings[0].split()[0] == VERSION
