@@ -44,7 +44,9 @@ def test_grid_random_and_failures(prw, tmp_path, fmu):
 
 
 def test_goes_on_after_a_kill(prw, tmp_path, fmu):
-    arguments = ["sweep", "--random", "k1=10%", "--runs", "400", "--workers", "1", "--seed", "3", "--out", "study"]
+    # So many that they take longer than it takes to see the first and to kill.
+    count = 2000
+    arguments = ["sweep", "--random", "k1=10%", "--runs", str(count), "--workers", "1", "--seed", "3", "--out", "study"]
     command = [sys.executable, "-m", "prw", *arguments, "--fmu", str(fmu)]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     parts, patience = tmp_path / "study" / "parts", time.monotonic() + 120
@@ -54,17 +56,17 @@ def test_goes_on_after_a_kill(prw, tmp_path, fmu):
     process.send_signal(signal.SIGKILL)
     process.wait()
     kept = sum(pq.read_table(part).num_rows for part in parts.glob("[0-9]*.parquet"))
-    assert 0 < kept < 400
+    assert 0 < kept < count
     # As if it had been killed while it wrote.
-    (parts / ".000000390-000000399-abcdefgh.parquet").touch()
+    (parts / ".000001990-000001999-abcdefgh.parquet").touch()
     result = prw(*arguments)
     assert result.returncode == 0, result.stderr
     assert "were there already" in result.stdout
-    again = prw("sweep", "--random", "k1=10%", "--runs", 400, "--seed", 3, "--out", "other")
+    again = prw("sweep", "--random", "k1=10%", "--runs", count, "--seed", 3, "--out", "other")
     assert again.returncode == 0
     assert rows(tmp_path / "study") == rows(tmp_path / "other"), "as if nothing had happened"
-    assert "nothing: all 400 runs were there already" in prw(*arguments).stdout
-    result = prw(*arguments[:3], "--runs", 401, "--out", "study")
+    assert f"nothing: all {count} runs were there already" in prw(*arguments).stdout
+    result = prw(*arguments[:3], "--runs", count + 1, "--out", "study")
     assert result.returncode == 1 and "holds another study" in result.stderr
 
 
