@@ -453,26 +453,22 @@ static u32 to_module(const Instance *instance, fmi2FMUstate state) {
         *(place) = in_it == 0 ? NULL : (fmi2FMUstate)at(&call, in_it); \
     }
 
-fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
-    BEGIN("fmi2GetFMUstate")
-    STATE_PLACE("fmi2GetFMUstate", state, 0)
-    CALL(FMU_fmi2GetFMUstate, in_place);
-    STATE_OUT(state)
-    END
-}
+#define STATE_HANDLE(name)                                   \
+    fmi2Status name(fmi2Component c, fmi2FMUstate *state) {  \
+        BEGIN(#name)                                         \
+        STATE_PLACE(#name, state, 0)                         \
+        CALL(FMU_##name, in_place);                          \
+        STATE_OUT(state)                                     \
+        END                                                  \
+    }
+
+STATE_HANDLE(fmi2GetFMUstate)
+STATE_HANDLE(fmi2FreeFMUstate)
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     BEGIN("fmi2SetFMUstate")
     STATE("fmi2SetFMUstate", state)
     CALL(FMU_fmi2SetFMUstate, in_module);
-    END
-}
-
-fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
-    BEGIN("fmi2FreeFMUstate")
-    STATE_PLACE("fmi2FreeFMUstate", state, 0)
-    CALL(FMU_fmi2FreeFMUstate, in_place);
-    STATE_OUT(state)
     END
 }
 
