@@ -115,6 +115,8 @@ impl OutputDerivatives for TestbedFmu {
 }
 
 /// Those of eq. (11), by states and inputs, whatever a state starts from; by parameters, of all that is calculated.
+///
+/// While initializing, the states follow from the motors or are given.
 impl Partials for TestbedFmu {
     fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
         let is_given = !self.start.is_over && !self.start.at_rest;
@@ -123,6 +125,19 @@ impl Partials for TestbedFmu {
             (_, Some(state)) if is_given => self.partial(unknown, state)?,
             _ => self.change(unknown, &self.unit_change(known)),
         })
+    }
+
+    fn initial_partial(&self, unknown: Name, known: Name) -> Option<f64> {
+        let Some(mut change) = unit_instant(known) else { return self.partial(unknown, known) };
+        if self.start.at_rest {
+            change.x = self.start.from(change.motors.angle);
+        }
+        for motor in 0..2 {
+            if !self.takes_omega(motor) {
+                change.motors.rate[motor] = 0.0;
+            }
+        }
+        Some(self.at(unknown, &change))
     }
 }
 

@@ -48,6 +48,11 @@ impl TestbedFmu {
         }
     }
 
+    /// Whether a motor's rate is what is set for it.
+    pub(crate) fn takes_omega(&self, motor: usize) -> bool {
+        self.interface == Interface::ModelExchange || self.testbed.motors.takes_omega(motor)
+    }
+
     /// Sensor torques. Most often they are read right after a step: all else is a call, which keeps this short.
     #[inline]
     pub(crate) fn torques_now(&self) -> Sides {

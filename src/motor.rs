@@ -168,9 +168,15 @@ impl Motors {
     /// derivative that is set.
     #[inline]
     pub fn omega_set(&mut self, motor: usize) {
-        if self.use_omega && self.set_rate[motor].is_none() {
+        if self.takes_omega(motor) {
             self.path_end.rate[motor] = self.inputs[motor].omega;
         }
+    }
+
+    /// Whether the rate of motor 0 or 1 comes from omega.
+    #[inline]
+    pub fn takes_omega(&self, motor: usize) -> bool {
+        self.use_omega && self.set_rate[motor].is_none()
     }
 
     /// After `use_omega` has been set.

@@ -132,14 +132,29 @@ pub struct StepCompleted {
     pub terminate: bool,
 }
 
-/// The model knows its partial derivatives (section 2.1.9): directional and adjoint ones follow.
+/// The model knows its partial derivatives (section 2.1.9 of FMI 2.0, 2.2.11 of FMI 3.0): directional and adjoint ones
+/// follow. fmu-package compares all of them with differences before it describes the model.
 pub trait Partials: Model {
-    /// The partial derivative of one Real variable with respect to another, now. The unknown is an output or a
-    /// state's derivative, the known an input, a state or a parameter, in FMI 2.0 while
-    /// initializing, in FMI 3.0 at any time.
+    /// The partial derivative of one Real variable with respect to another, once the model is initialized. The unknown
+    /// is an output or a state's derivative, the known an input, a state or a parameter.
     ///
     /// `None` if the model does not know it: the importer is then refused.
     fn partial(&self, unknown: Self::Name, known: Self::Name) -> Option<f64>;
+
+    /// The same in Initialization Mode, where states that are [`calculated`](crate::Variable::calculated) are unknowns,
+    /// too, and follow from inputs and parameters: so does what is calculated from them, by the chain rule. The knowns
+    /// are the inputs and all that is exact (section 2.2.8 of FMI 2.0).
+    ///
+    /// Without such states, and where the equations are the same as later, it is the [`partial`](Self::partial).
+    fn initial_partial(&self, unknown: Self::Name, known: Self::Name) -> Option<f64> {
+        self.partial(unknown, known)
+    }
+
+    /// The partial derivative of a Real variable with respect to the time alone, inputs and states held: 0 where the
+    /// equations do not name the time.
+    fn partial_by_time(&self, _unknown: Self::Name) -> Option<f64> {
+        Some(0.0)
+    }
 }
 
 /// The model uses time derivatives of inputs in Co-Simulation (section 4.2.1).

@@ -36,7 +36,12 @@ pub trait Exported: Model {
     #[doc(hidden)]
     fn exported_nominals(&self, _nominals: &mut [f64]) {}
     #[doc(hidden)]
-    fn exported_partial(&self, _unknown: Self::Name, _known: Self::Name) -> Option<f64> {
+    fn exported_partial(
+        &self,
+        _unknown: Self::Name,
+        _known: Option<Self::Name>,
+        _initial: bool,
+    ) -> Option<f64> {
         None
     }
     #[doc(hidden)]
@@ -175,9 +180,16 @@ macro_rules! offer {
         fn exported_partial(
             &self,
             unknown: <Self as $crate::Variables>::Name,
-            known: <Self as $crate::Variables>::Name,
+            known: ::core::option::Option<<Self as $crate::Variables>::Name>,
+            initial: bool,
         ) -> ::core::option::Option<f64> {
-            $crate::Partials::partial(self, unknown, known)
+            match known {
+                ::core::option::Option::None => $crate::Partials::partial_by_time(self, unknown),
+                ::core::option::Option::Some(known) if initial => {
+                    $crate::Partials::initial_partial(self, unknown, known)
+                }
+                ::core::option::Option::Some(known) => $crate::Partials::partial(self, unknown, known),
+            }
         }
     };
     (@capability InputDerivatives) => {

@@ -44,11 +44,11 @@ pub use table::Variables;
 pub use types::{Attributes, BINARY, BOOLEAN, BaseType, INTEGER, Item, NUMBER, STRING, TIME, Type};
 pub use units::{BaseUnit, DisplayUnit, Unit};
 pub use value::{Enumeration, Scalar, Value};
-pub use variable::{Causality, Initial, Variability, Variable};
+pub use variable::{Causality, Index, Initial, Variability, Variable};
 
 #[doc(hidden)]
 pub use {
     table::{StateOfTable, check_names, count_states, find_states},
     value::visit_enumeration,
-    variable::{Index, Read, Store, base_of_calculation, base_of_place, read},
+    variable::{Read, Store, base_of_calculation, base_of_place, read},
 };

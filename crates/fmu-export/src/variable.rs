@@ -50,9 +50,13 @@ pub enum Initial {
 }
 
 /// A variable's place in the table. Authors write its name; see [`variables!`](crate::variables).
-#[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Index(pub u32);
+pub struct Index(#[doc(hidden)] pub u32);
+
+impl Index {
+    /// The time, also where it is no variable of the table; for [`depends_on`](Variable::depends_on).
+    pub const TIME: Self = Self(u32::MAX);
+}
 
 /// A variable of model `M`: an entry of the table that [`variables!`](crate::variables) makes.
 pub struct Variable<M> {
@@ -267,7 +271,8 @@ impl<M> Variable<M> {
     ///
     /// It is about direct dependence (section 2.2.8): at a communication point or instant, and while
     /// initializing. An output that an input reaches through a step or a state only does not depend on that
-    /// input. Where nothing is said, it depends on all of them, see [`Info::smooth`](crate::Info::smooth).
+    /// input. The time, which FMI 3.0 counts among the knowns, is [`Index::TIME`]. Where nothing is said, it depends on
+    /// all of them, see [`Info::smooth`](crate::Info::smooth).
     #[must_use]
     pub const fn depends_on(mut self, knowns: &'static [Index]) -> Self {
         self.depends_on = Some(knowns);
@@ -426,9 +431,15 @@ impl<M> Variable<M> {
         }
     }
 
-    /// What [`depends_on`](Self::depends_on) has said, as places in the table.
+    /// What [`depends_on`](Self::depends_on) has said, as places in the table, but for [`Index::TIME`].
     pub fn dependencies(&self) -> Option<impl Iterator<Item = u32> + use<M>> {
-        self.depends_on.map(|knowns| knowns.iter().map(|known| known.0))
+        self.depends_on
+            .map(|knowns| knowns.iter().filter(|known| **known != Index::TIME).map(|known| known.0))
+    }
+
+    /// Whether [`depends_on`](Self::depends_on) names [`Index::TIME`], if anything is said there.
+    pub fn depends_on_time(&self) -> Option<bool> {
+        self.depends_on.map(|knowns| knowns.contains(&Index::TIME))
     }
 
     /// Whether this is a continuous-time state.

@@ -44,6 +44,8 @@ mod connectors;
 #[cfg(feature = "package")]
 mod definitions;
 #[cfg(feature = "package")]
+mod derivatives;
+#[cfg(feature = "package")]
 mod describe;
 #[cfg(feature = "package")]
 pub mod fmi2;

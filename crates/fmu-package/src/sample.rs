@@ -14,7 +14,7 @@ pub(crate) struct Point {
     /// By value reference; `None` for what stays as it is.
     pub values: Vec<Option<Value>>,
     pub time: f64,
-    interface: Interface,
+    pub interface: Interface,
 }
 
 /// A model at a point. Samples with the same number have the same parameters of that variability.
@@ -110,7 +110,7 @@ impl<M: Exported> Sampler<M> {
 }
 
 /// A model at a point. An importer may set values before it enters Initialization Mode and in it, and sets states later.
-fn model_at<M: Exported>(point: &Point, running: bool) -> Result<M, Error> {
+pub(crate) fn model_at<M: Exported>(point: &Point, running: bool) -> Result<M, Error> {
     let mut model = M::new(&Setup::new(point.interface))?;
     set(&mut model, point, Variable::has_start)?;
     model.initialize(&Experiment { start_time: point.time, ..Experiment::default() })?;

@@ -7,6 +7,7 @@
 
 use crate::changes::Changes;
 use crate::check::{check, is_exact, is_known};
+use crate::derivatives::check as check_derivatives;
 use crate::sample::{FactorSample, Point, Sampler};
 use anyhow::{Result, bail, ensure};
 use fmu_export::fmi3::independent;
@@ -103,6 +104,9 @@ impl ModelStructure {
             find::<M>(|variable| is_known(variable) && (!variable.is_state() || is_exact(variable)));
         initial_knowns.extend(unlisted);
 
+        check_derivatives::<M>(&starts, true, &[&outputs[..], &derivatives].concat(), &knowns)?;
+        check_derivatives::<M>(&starts, false, &initial_unknowns, &initial_knowns)?;
+
         let mut sampler = Sampler::<M>::new(starts, tunable_parameters);
         sampler.running = true;
         let outputs = by_derivative(&mut sampler, &outputs, &knowns)?;
@@ -149,13 +153,14 @@ fn find<M: Exported>(is_it: impl Fn(&Variable<M>) -> bool) -> Vec<u32> {
 fn with_declared<M: Exported>(found: Unknown, knowns: &[u32]) -> Result<Unknown> {
     let unknown = variable::<M>(found.vr);
     let declared: Option<Vec<u32>> = unknown.dependencies().map(Iterator::collect);
-    // Nobody can name a time that is no variable.
-    let is_unlisted = |vr: u32| known::<M>(vr).is_none();
-    let is_declared =
-        |known: u32| is_unlisted(known) || declared.as_ref().is_none_or(|declared| declared.contains(&known));
-    if let Some((known, _)) = found.dependencies.iter().find(|(known, _)| !is_declared(*known)) {
-        let known = variable::<M>(*known).name();
-        bail!("{} reacts to {known}, which its depends_on does not name", unknown.name());
+    let (time, of_time) = independent::<M>();
+    let names_time = unknown.depends_on_time() == Some(true);
+    let is_declared = |known: u32| {
+        known == time && names_time || declared.as_ref().is_none_or(|declared| declared.contains(&known))
+    };
+    if let Some((hidden, _)) = found.dependencies.iter().find(|(vr, _)| !is_declared(*vr)) {
+        let hidden = known::<M>(*hidden).unwrap_or(of_time).name();
+        bail!("{} reacts to {hidden}, which its depends_on does not name", unknown.name());
     }
     if unknown.variability() == Variability::Constant {
         return Ok(found);
@@ -166,7 +171,7 @@ fn with_declared<M: Exported>(found: Unknown, knowns: &[u32]) -> Result<Unknown>
     };
     let kind = |known: u32| match found.dependencies.iter().find(|(found, _)| *found == known) {
         Some((_, kind)) if M::INFO.smooth => Some(*kind),
-        None if M::INFO.smooth && (declared.is_none() || is_unlisted(known)) && is_tried(known) => None,
+        None if M::INFO.smooth && declared.is_none() && is_tried(known) => None,
         _ => is_declared(known).then_some(DependencyKind::Dependent),
     };
     let dependencies = knowns.iter().filter_map(|&known| Some((known, kind(known)?))).collect();
@@ -191,7 +196,7 @@ fn by_derivative<M: Exported>(
             && variable::<M>(unknown).base() == BaseType::Real
             && self::known::<M>(known).is_some_and(is_variable);
         let partial = |sample: &FactorSample<M>| {
-            sample.model.exported_partial(M::NAMES[unknown as usize], M::NAMES[known as usize])
+            sample.model.exported_partial(M::NAMES[unknown as usize], Some(M::NAMES[known as usize]), false)
         };
         let samples = samples.iter().filter(|_| differentiable);
         let factors: Option<Vec<_>> = samples.map(|sample| Some((sample, partial(sample)?))).collect();

@@ -61,6 +61,7 @@ impl Partials for Branches {
             (Name::above | Name::declared, Name::u) => f64::from(self.u > 10.0),
             (Name::limited, Name::u) => f64::from(self.u.abs() < 100.0),
             (Name::limited, Name::v) => f64::from(self.stepped),
+            (Name::sum, Name::gain) => 1.0 + self.sum,
             _ => 0.0,
         })
     }
@@ -135,4 +136,104 @@ fn a_declaration_that_the_model_contradicts_is_refused() {
     ] {
         assert_eq!(error.to_string(), "y reacts to u, which its depends_on does not name");
     }
+}
+
+/// Models whose derivatives are wrong in one thing: dy/du = 2 u, y = u^2 + time.
+macro_rules! derivers {
+    ($($name:ident: $partial:expr, $initial:expr, $by_time:expr;)+) => { $(
+        mod $name {
+            use super::*;
+
+            #[derive(Clone, Default)]
+            pub struct Deriver {
+                u: f64,
+                time: f64,
+            }
+
+            variables! { for Deriver;
+                /// Input
+                u = input(&NUMBER) in u;
+                /// Its square, and the time
+                y = output(&NUMBER) by |model| model.u * model.u + model.time;
+            }
+
+            impl Model for Deriver {
+                const INFO: Info = Info::new("Deriver", "deriver", "{deriver}");
+
+                fn new(_: &Setup) -> Result<Self, Error> {
+                    Ok(Self::default())
+                }
+
+                fn calculate(&mut self, time: f64) {
+                    self.time = time;
+                }
+            }
+
+            impl CoSimulation for Deriver {
+                fn step(&mut self, _: Step) -> Result<Stepped, Error> {
+                    Ok(Stepped::Done)
+                }
+            }
+
+            impl Partials for Deriver {
+                fn partial(&self, _: Name, _: Name) -> Option<f64> {
+                    Some($partial * self.u)
+                }
+
+                fn initial_partial(&self, _: Name, _: Name) -> Option<f64> {
+                    Some($initial * self.u)
+                }
+
+                fn partial_by_time(&self, _: Name) -> Option<f64> {
+                    Some($by_time)
+                }
+            }
+
+            offer!(Deriver: CoSimulation + Partials);
+        }
+    )+ };
+}
+
+derivers! {
+    right: 2.0, 2.0, 1.0;
+    wrong_partial: 2.001, 2.0, 1.0;
+    wrong_initial_partial: 2.0, 0.0, 1.0;
+    wrong_by_time: 2.0, 2.0, 0.0;
+    no_number: f64::NAN, 2.0, 1.0;
+}
+
+#[test]
+fn derivatives_that_are_not_those_of_the_values_are_refused() {
+    use fmu_package::fmi3;
+    fmi3::describe::<right::Deriver>(&Changes::default()).unwrap();
+    for (described, beginning, function) in [
+        (
+            fmi3::describe::<wrong_partial::Deriver>(&Changes::default()),
+            "of y with respect to u is",
+            "Partials::partial,",
+        ),
+        (
+            fmi3::describe::<wrong_initial_partial::Deriver>(&Changes::default()),
+            "of y with respect to u in Initialization Mode is",
+            "Partials::initial_partial,",
+        ),
+        (
+            fmi3::describe::<wrong_by_time::Deriver>(&Changes::default()),
+            "of y with respect to time is",
+            "Partials::partial_by_time,",
+        ),
+        (
+            fmi3::describe::<no_number::Deriver>(&Changes::default()),
+            "of y with respect to u is NaN",
+            "Partials::partial,",
+        ),
+    ] {
+        let message = described.unwrap_err().to_string();
+        assert!(
+            message.starts_with(&format!("the derivative {beginning}")) && message.contains(function),
+            "{message}"
+        );
+    }
+    // Time is no variable here, so FMI 2.0 has no derivatives with respect to it.
+    describe::<wrong_by_time::Deriver>(&Changes::default()).unwrap();
 }

@@ -97,6 +97,7 @@ macro_rules! toys {
                 Some(match (unknown, known) {
                     (Name::der_x, Name::u) => 3.0,
                     (Name::der_x, Name::x) => -self.p,
+                    (Name::der_x, Name::p) => -self.x,
                     (Name::y, Name::u) => 2.0,
                     (Name::y, Name::x) => f64::from(self.n),
                     (Name::z, Name::x) => z_x,

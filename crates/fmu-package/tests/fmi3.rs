@@ -409,7 +409,9 @@ clocks! {
         /// Output
         y = output(&NUMBER).depends_on(&[u]) by |clock| clock.u;
         /// Output
-        z = output(&NUMBER).depends_on(&[]) by |_| 1.0;
+        z = output(&NUMBER).depends_on(&[Index::TIME]) by |_| 1.0;
+        /// Output
+        anything = output(&NUMBER) by |_| 1.0;
     }
     other_time: {
         /// Time of arrival
@@ -430,12 +432,13 @@ fn a_time_in_the_table_is_the_only_one() {
     has(&text, r#"<Output valueReference="2" dependencies="0" dependenciesKind="dependent"/>"#);
 }
 
-/// Nobody could declare that an output does not depend on a time that is no variable.
+/// The time is a known like others: declared by its name, or possible where nothing is said.
 #[test]
 fn what_may_depend_on_the_time_does() {
     let text = fmi3::describe::<without_time::Clock>(&Changes::default()).unwrap();
-    has(&text, r#"<Output valueReference="1" dependencies="0 3" dependenciesKind="dependent dependent"/>"#);
-    has(&text, r#"<Output valueReference="2" dependencies="3" dependenciesKind="dependent"/>"#);
+    has(&text, r#"<Output valueReference="1" dependencies="0" dependenciesKind="dependent"/>"#);
+    has(&text, r#"<Output valueReference="2" dependencies="4" dependenciesKind="dependent"/>"#);
+    has(&text, r#"<Output valueReference="3" dependencies="0 4" dependenciesKind="dependent dependent"/>"#);
 }
 
 #[test]

@@ -118,9 +118,20 @@ impl OutputDerivatives for Controller {
 }
 
 impl Partials for Controller {
-    /// An input acts from the sample after it on, so at a communication point nothing depends on it.
-    fn partial(&self, _unknown: Name, known: Name) -> Option<f64> {
-        let is_input = Self::TABLE[known as usize].causality() == fmu_export::Causality::Input;
-        is_input.then_some(0.0)
+    /// Inputs and parameters act from the sample after them on, so at a communication point nothing depends on them; the
+    /// motors' angles start where they are set.
+    fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
+        Some(f64::from(u8::from(unknown == known)))
+    }
+
+    fn partial_by_time(&self, unknown: Name) -> Option<f64> {
+        let [motor1, motor2] = self.motion();
+        Some(match unknown {
+            Name::theta1 => motor1.rate,
+            Name::theta2 => motor2.rate,
+            Name::omega1 => motor1.acceleration,
+            Name::omega2 => motor2.acceleration,
+            _ => 0.0,
+        })
     }
 }

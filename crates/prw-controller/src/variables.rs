@@ -2,7 +2,7 @@
 
 use crate::controller::Controller;
 use crate::parameters::{LARGEST, SMALLEST};
-use fmu_export::{Type, Unit, units, variables};
+use fmu_export::{Index, Type, Unit, units, variables};
 
 const ANGLE: Type = Type::real("Angle", &units::RAD);
 const RATE: Type = Type::real("AngularVelocity", &units::RAD_PER_S);
@@ -50,13 +50,13 @@ variables! {
     // Inputs and parameters act from the next sample on: at a communication point nothing depends on them.
 
     /// Angle of motor 1; its start value is where the motor stands when the simulation begins
-    theta1 = output(&ANGLE).exact().depends_on(&[]) in motors[0].angle by |c| c.motion()[0].angle;
+    theta1 = output(&ANGLE).exact().depends_on(&[Index::TIME]) in motors[0].angle by |c| c.motion()[0].angle;
     /// Angle of motor 2; its start value is where the motor stands when the simulation begins
-    theta2 = output(&ANGLE).exact().depends_on(&[]) in motors[1].angle by |c| c.motion()[1].angle;
+    theta2 = output(&ANGLE).exact().depends_on(&[Index::TIME]) in motors[1].angle by |c| c.motion()[1].angle;
     /// Angular velocity of motor 1
-    omega1 = output(&RATE).depends_on(&[]) by |c| c.motion()[0].rate;
+    omega1 = output(&RATE).depends_on(&[Index::TIME]) by |c| c.motion()[0].rate;
     /// Angular velocity of motor 2
-    omega2 = output(&RATE).depends_on(&[]) by |c| c.motion()[1].rate;
+    omega2 = output(&RATE).depends_on(&[Index::TIME]) by |c| c.motion()[1].rate;
     /// What the control adds to pitch_ref, as of the last sample
     pitch_correction = output(&ANGLE).discrete().depends_on(&[]) by |c| c.correction[0];
     /// What the control adds to roll_ref, as of the last sample

@@ -208,3 +208,43 @@ fn too_many_samples_at_once() {
     let message = fmu.refused("an hour of samples", |fmu| fmu.fmi2NewDiscreteStates(&mut said));
     assert!(message.contains("sample_time"), "{message}");
 }
+
+/// Between samples the motors' motion is a function of the time, which FMI 3.0 counts among the knowns: its partial
+/// derivatives, both ways, against differences.
+#[test]
+fn partial_derivatives_by_the_time() {
+    const WIDTH: f64 = 1.0 / 65_536.0;
+    let fmu = fmu_run::fmi3::Importer::of::<Controller>(ModelExchange);
+    fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
+    fmu.initialize(START);
+    let mut moves = [false; 6];
+    for sample in 0..20 {
+        let now = time_of(sample);
+        fmu.ok(fmu.fmi3SetTime(now));
+        fmu.set(&INPUTS, &inputs(now));
+        fmu.update();
+        fmu.ok(fmu.fmi3EnterContinuousTimeMode());
+        let middle = now + 0.5 * PERIOD;
+        let at = |time: f64| {
+            fmu.ok(fmu.fmi3SetTime(time));
+            fmu.get(OUTPUTS)
+        };
+        let (before, after) = (at(middle - WIDTH), at(middle + WIDTH));
+        at(middle);
+        for (place, unknown) in OUTPUTS.into_iter().enumerate() {
+            let (time, mut forward, mut adjoint) =
+                (fmu_export::fmi3::independent::<Controller>().0, 0.0, 0.0);
+            fmu.ok(fmu.fmi3GetDirectionalDerivative(&unknown, 1, &time, 1, &1.0, 1, &mut forward, 1));
+            fmu.ok(fmu.fmi3GetAdjointDerivative(&unknown, 1, &time, 1, &1.0, 1, &mut adjoint, 1));
+            let difference = (after[place] - before[place]) / (2.0 * WIDTH);
+            assert!(
+                (forward - difference).abs() <= 1e-9 * (1.0 + difference.abs()),
+                "{forward} {difference}"
+            );
+            assert_eq!(forward, adjoint);
+            moves[place] |= forward != 0.0;
+        }
+        fmu.ok(fmu.fmi3EnterEventMode());
+    }
+    assert_eq!(moves, [true, true, true, true, false, false], "corrections are held");
+}

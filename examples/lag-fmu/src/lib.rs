@@ -19,7 +19,12 @@ variables! { for Lag;
 }
 
 impl Model for Lag {
-    const INFO: Info = Info { description: "First-order lag with time constant 1 s", ..info!("Lag", "lag") };
+    const INFO: Info = Info {
+        description: "First-order lag with time constant 1 s",
+        // No branches and limits: what depends on what is found by trying.
+        smooth: true,
+        ..info!("Lag", "lag")
+    };
 
     fn new(_: &Setup) -> Result<Self, Error> {
         Ok(Self::default())

@@ -1,4 +1,5 @@
-//! What no model has here, refused with the reason: clocks, structural parameters, Scheduled Execution.
+//! What no model has here, refused with the reason: clocks, structural parameters, Scheduled Execution, dependencies of
+//! the elements of arrays.
 
 use super::types::*;
 use crate::export::Exported;
@@ -36,4 +37,11 @@ absent! { "this FMU has no structural parameters":
 
 absent! { "this FMU has no Scheduled Execution":
     fmi3ActivateModelPartition(fmi3ValueReference, fmi3Float64);
+}
+
+absent! { "what depends on what is in modelDescription.xml alone (providesPerElementDependencies is false)":
+    fmi3GetNumberOfVariableDependencies(fmi3ValueReference, *mut usize);
+    fmi3GetVariableDependencies(
+        fmi3ValueReference, *mut usize, *mut fmi3ValueReference, *mut usize, *mut fmi3DependencyKind, usize
+    );
 }

@@ -51,47 +51,6 @@ pub unsafe fn fmi3Reset<M: Exported>(instance: &mut Instance<M>) -> Outcome {
     instance.reset()
 }
 
-pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Exported>(
-    instance: &mut Instance<M>,
-    vr: fmi3ValueReference,
-    count: *mut usize,
-) -> Outcome {
-    // SAFETY: by contract NULL or a pointer to a value.
-    let count = unsafe { place(count, "nDependencies") }?;
-    count.write(instance.dependencies(vr)?.len());
-    Ok(())
-}
-
-pub unsafe fn fmi3GetVariableDependencies<M: Exported>(
-    instance: &mut Instance<M>,
-    dependent: fmi3ValueReference,
-    elements: *mut usize,
-    independents: *mut fmi3ValueReference,
-    elements_of_independents: *mut usize,
-    kinds: *mut fmi3DependencyKind,
-    count: usize,
-) -> Outcome {
-    // SAFETY: by contract arrays of this length that do not overlap.
-    let (elements, independents, elements_of_independents, kinds) = unsafe {
-        (
-            output(elements, count, "elementIndicesOfDependent")?,
-            output(independents, count, "independents")?,
-            output(elements_of_independents, count, "elementIndicesOfIndependents")?,
-            output(kinds, count, "dependencyKinds")?,
-        )
-    };
-    let found = instance.dependencies(dependent)?;
-    same("dependencies", found.len(), count)?;
-    for (place, known) in found.into_iter().enumerate() {
-        // 0: all elements of the variable.
-        elements[place].write(0);
-        independents[place].write(known);
-        elements_of_independents[place].write(0);
-        kinds[place].write(fmi3Dependent);
-    }
-    Ok(())
-}
-
 /// All variables are scalars: there are as many values as variables.
 #[inline]
 pub(super) fn same(what: &str, needed: usize, count: usize) -> Outcome {

@@ -1,11 +1,11 @@
 //! Derivatives with respect to variables (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0) and to time (section 4.2.1 of FMI
 //! 2.0, 4.1.2 of FMI 3.0).
 
-use super::{Instance, Outcome, finite, refuse};
+use super::{Instance, Outcome, finite, independent, refuse};
 use crate::export::Exported;
-use crate::mode::Standard;
+use crate::mode::{Mode, Standard};
 use crate::types::BaseType;
-use crate::variable::{Causality, Variability, Variable};
+use crate::variable::{Causality, Initial, Variability, Variable};
 use std::mem::MaybeUninit;
 
 /// Which way partial derivatives are summed up.
@@ -41,26 +41,12 @@ impl<M: Exported> Instance<M> {
                 }
             });
         }
+        let initial = self.mode() == Mode::Initialization;
         for vr in unknowns {
-            let variable = self.variable(*vr, BaseType::Real)?;
-            if variable.causality() != Causality::Output && variable.differentiates().is_none() {
-                return refuse(format!(
-                    "{} is no unknown: neither output nor state derivative",
-                    variable.name()
-                ));
-            }
+            check_unknown(self.variable(*vr, BaseType::Real)?, initial)?;
         }
         for vr in knowns {
-            let variable = self.variable(*vr, BaseType::Real)?;
-            // Parameters may be set at any time, whether the description calls them tunable or not. FMI 2.0 (section
-            // 2.1.9) has them among the knowns in initialization mode alone; CasADi asks later.
-            let input = matches!(variable.causality(), Causality::Input | Causality::Parameter);
-            if !input && !variable.is_state() {
-                return refuse(format!(
-                    "{} is no known: neither input, parameter nor state",
-                    variable.name()
-                ));
-            }
+            check_known(self.variable(*vr, BaseType::Real)?, initial)?;
         }
         let (seeded, wanted) = match direction {
             Direction::Forward => (knowns, unknowns),
@@ -68,28 +54,31 @@ impl<M: Exported> Instance<M> {
         };
         for (vr, seed) in seeded.iter().zip(seed) {
             if !seed.is_finite() {
-                let name = M::TABLE[*vr as usize].name();
+                let name = self.name(*vr, BaseType::Real)?;
                 return refuse(format!("the seed of {name} must be a finite number, it is {seed}"));
             }
         }
-        let model = self.calculated();
+        self.calculated();
+        let model = &self.state.model;
+        let (time, _) = independent::<M>();
         for (wanted, result) in wanted.iter().zip(result) {
             let mut sum = 0.0;
             for (seeded, seed) in seeded.iter().zip(seed) {
                 let (unknown, known) = match direction {
-                    Direction::Forward => (*wanted as usize, *seeded as usize),
-                    Direction::Adjoint => (*seeded as usize, *wanted as usize),
+                    Direction::Forward => (*wanted, *seeded),
+                    Direction::Adjoint => (*seeded, *wanted),
                 };
-                let Some(partial) = model.exported_partial(M::NAMES[unknown], M::NAMES[known]) else {
+                let by = (known != time).then(|| M::NAMES[known as usize]);
+                let Some(partial) = model.exported_partial(M::NAMES[unknown as usize], by, initial) else {
                     return refuse(format!(
                         "the derivative of {} with respect to {} is not provided",
-                        M::TABLE[unknown].name(),
-                        M::TABLE[known].name()
+                        self.name(unknown, BaseType::Real)?,
+                        self.name(known, BaseType::Real)?
                     ));
                 };
                 sum += partial * seed;
             }
-            result.write(finite(&M::TABLE[*wanted as usize], sum)?);
+            result.write(finite(self.variable(*wanted, BaseType::Real)?, sum)?);
         }
         Ok(())
     }
@@ -143,6 +132,39 @@ impl<M: Exported> Instance<M> {
             });
         }
         Ok(())
+    }
+}
+
+/// What the instance calculates: outputs and derivatives of states, while initializing all InitialUnknowns (section
+/// 2.1.9 of FMI 2.0).
+fn check_unknown<M>(variable: &Variable<M>, initial: bool) -> Outcome {
+    let calculated = matches!(variable.initial(), Some(Initial::Calculated | Initial::Approx));
+    let is_initial = variable.causality() == Causality::CalculatedParameter || variable.is_state();
+    if variable.causality() == Causality::Output
+        || variable.differentiates().is_some()
+        || initial && calculated && is_initial
+    {
+        return Ok(());
+    }
+    refuse(format!("{} is no unknown: neither output nor state derivative", variable.name()))
+}
+
+/// What the importer sets: inputs, states and parameters, while initializing all that is exact (section 2.2.8 of FMI 2.0).
+/// Parameters may be set at any time, whether the description calls them tunable or not. FMI 2.0 has them among the knowns
+/// in initialization mode alone; CasADi asks later.
+fn check_known<M>(variable: &Variable<M>, initial: bool) -> Outcome {
+    let name = variable.name();
+    match variable.causality() {
+        Causality::Input | Causality::Parameter | Causality::Independent => Ok(()),
+        _ if variable.variability() == Variability::Constant => {
+            refuse(format!("{name} is no known: it is constant"))
+        }
+        _ if initial && variable.initial() == Some(Initial::Exact) => Ok(()),
+        _ if initial && variable.is_state() => {
+            refuse(format!("{name} is no known in initialization mode, where it is calculated"))
+        }
+        _ if variable.is_state() => Ok(()),
+        _ => refuse(format!("{name} is no known: neither input, parameter nor state")),
     }
 }
 

@@ -3,7 +3,6 @@
 //! Every method checks all its arguments before it changes anything; a refusal leaves the instance as it was.
 
 mod co_simulation;
-mod dependencies;
 mod derivatives;
 mod model_exchange;
 mod refusal;

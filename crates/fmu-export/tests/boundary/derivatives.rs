@@ -86,6 +86,31 @@ fn pair_by_pair() {
     }
 }
 
+/// A state that is calculated is an unknown while initializing, and what follows from it goes by the chain rule; later it
+/// is a known.
+#[test]
+fn calculated_states() {
+    use crate::toys::balance::{Balance, Name::*};
+    let derivative = |fmu: &Importer, unknown: u32, known: u32, value: &mut f64| {
+        fmu.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, value)
+    };
+    for interface in [CoSimulation, ModelExchange] {
+        let fmu = in_mode::<Balance>(interface, Initialization);
+        fmu.set(&[load as u32, stiffness as u32], &[6.0, 4.0]);
+        let rows = [stretch, der_stretch].map(|unknown| {
+            [load, stiffness].map(|known| directional(&fmu, &[unknown as u32], &[known as u32], &[1.0])[0])
+        });
+        assert_eq!(rows, [[0.25, -0.375], [0.0, 0.0]]);
+        let message = fmu.refused("a state that is calculated", |fmu| {
+            derivative(fmu, der_stretch as u32, stretch as u32, &mut 0.0)
+        });
+        assert!(message.contains("stretch is no known in initialization mode"), "{message}");
+        fmu.ok(fmu.fmi2ExitInitializationMode());
+        assert_eq!(directional(&fmu, &[der_stretch as u32], &[stretch as u32], &[1.0]), [-4.0]);
+        assert_eq!(directional(&fmu, &[der_stretch as u32], &[load as u32], &[1.0]), [1.0]);
+    }
+}
+
 /// Several unknowns and knowns at once, in any order and repeated: a matrix product.
 #[test]
 fn several_at_once() {

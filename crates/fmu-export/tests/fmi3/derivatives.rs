@@ -3,7 +3,7 @@
 use crate::toys::oscillator::Name::{self, *};
 use crate::toys::{Oscillator, Sum};
 use fmu_export::Interface::*;
-use fmu_export::fmi3::types::*;
+use fmu_export::Variables;
 use fmu_run::fmi3::Importer;
 
 const UNKNOWNS: [Name; 5] = [position, der_position, der_velocity, spring_force, energy];
@@ -81,42 +81,11 @@ fn of_outputs() {
     fmu.refused("order 0", |fmu| fmu.fmi3GetOutputDerivatives(&time, 1, &0, &mut 0.0, 1));
 }
 
-use fmu_export::Variables;
-
-fn dependencies(fmu: &Importer, of: u32) -> Vec<u32> {
-    let mut count = usize::MAX;
-    fmu.ok(fmu.fmi3GetNumberOfVariableDependencies(of, &mut count));
-    let (mut own, mut vr, mut other, mut kinds) =
-        (vec![9; count], vec![0; count], vec![9; count], vec![9; count]);
-    fmu.ok(fmu.fmi3GetVariableDependencies(
-        of,
-        own.as_mut_ptr(),
-        vr.as_mut_ptr(),
-        other.as_mut_ptr(),
-        kinds.as_mut_ptr(),
-        count,
-    ));
-    assert!(own.iter().chain(&other).all(|element| *element == 0), "scalars");
-    assert!(kinds.iter().all(|kind| *kind == fmi3Dependent));
-    vr
-}
-
+/// No importer is told more by the functions than by the description.
 #[test]
-fn on_what() {
-    let fmu = Importer::of::<Oscillator>(ModelExchange);
-    let time = Oscillator::TABLE.len() as u32;
-    let initial = |name: Name| dependencies(&fmu, name as u32);
-    assert_eq!(initial(spring_force), [position, stiffness, springs].map(|name| name as u32));
-    assert_eq!(initial(position), [], "it has a start value");
-    let all = [force, position, velocity, mass, stiffness, springs, damping, damped].map(|name| name as u32);
-    assert_eq!(initial(energy), [&all[..], &[time]].concat());
-    fmu.initialize(0.0);
-    let now = |name: Name| dependencies(&fmu, name as u32);
-    assert_eq!(now(spring_force), [position as u32]);
-    assert_eq!(now(der_position), [velocity as u32]);
-    assert_eq!(now(energy), [force as u32, position as u32, velocity as u32, time]);
-    assert_eq!(now(force), []);
-    assert_eq!(dependencies(&fmu, time), []);
+fn dependencies_are_in_the_description_alone() {
+    let fmu = moving();
     let mut count = 0;
-    fmu.refused("which", |fmu| fmu.fmi3GetNumberOfVariableDependencies(time + 1, &mut count));
+    let text = fmu.refused("dependencies", |fmu| fmu.fmi3GetNumberOfVariableDependencies(0, &mut count));
+    assert!(text.contains("providesPerElementDependencies is false"), "{text}");
 }

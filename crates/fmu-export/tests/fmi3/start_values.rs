@@ -1,6 +1,6 @@
 //! Start values that are refused are not forgotten: some importers go on after a refusal.
 
-use crate::toys::{Balance, Oscillator, Talker, balance, oscillator, talker};
+use crate::toys::{Oscillator, Talker, oscillator, talker};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi3::types::Status;
 use fmu_run::fmi3::Importer;
@@ -39,29 +39,4 @@ fn an_enumeration() {
     fmu.refused("the initialization", enter);
     fmu.ok(fmu.fmi3Reset());
     fmu.ok(enter(&fmu));
-}
-
-/// What a state depends on is what its start follows from, then itself.
-#[test]
-fn dependencies_of_a_calculated_start() {
-    let fmu = Importer::of::<Balance>(CoSimulation);
-    let dependencies = || {
-        let (mut count, stretch) = (0, balance::Name::stretch as u32);
-        fmu.ok(fmu.fmi3GetNumberOfVariableDependencies(stretch, &mut count));
-        let (mut own, mut on, mut kinds) = (vec![0; count], vec![0; count], vec![0; count]);
-        let mut theirs = vec![0; count];
-        fmu.ok(fmu.fmi3GetVariableDependencies(
-            stretch,
-            own.as_mut_ptr(),
-            on.as_mut_ptr(),
-            theirs.as_mut_ptr(),
-            kinds.as_mut_ptr(),
-            count,
-        ));
-        on
-    };
-    fmu.ok(enter(&fmu));
-    assert_eq!(dependencies(), [balance::Name::load as u32, balance::Name::stiffness as u32]);
-    fmu.ok(fmu.fmi3ExitInitializationMode());
-    assert_eq!(dependencies(), [balance::Name::stretch as u32]);
 }

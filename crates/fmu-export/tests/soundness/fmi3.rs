@@ -158,24 +158,6 @@ fn memory_that_was_never_written() {
         fmu.ok(derivative(&fmu, &unknown, 1, &known, 1, &1.0, 1, start(&mut one), 1));
         assert_eq!(written(one), [0.5]);
     }
-    let mut count = unwritten();
-    let position = Name::der_position as u32;
-    fmu.ok(fmu.fmi3GetNumberOfVariableDependencies(position, start(&mut count)));
-    assert_eq!(written(count), [1]);
-    let (mut elements, mut independents) = (unwritten(), unwritten());
-    let (mut of_independents, mut kinds) = (unwritten(), unwritten());
-    fmu.ok(fmu.fmi3GetVariableDependencies(
-        position,
-        start(&mut elements),
-        start(&mut independents),
-        start(&mut of_independents),
-        start(&mut kinds),
-        1,
-    ));
-    assert_eq!((written(elements), written(of_independents)), ([0], [0]));
-    assert_eq!(written(independents), [Name::velocity as u32]);
-    assert_eq!(written(kinds), [fmi3Dependent]);
-
     let (state, mut size) = (fmu.save(), unwritten());
     fmu.ok(fmu.fmi3SerializedFMUStateSize(state, start(&mut size)));
     let [size] = written(size);

@@ -56,4 +56,24 @@ impl ModelExchange for Balance {
     }
 }
 
-offer!(Balance: CoSimulation + ModelExchange);
+impl Partials for Balance {
+    fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
+        Some(match (unknown, known) {
+            (Name::stretch, Name::stretch) | (Name::der_stretch, Name::load) => 1.0,
+            (Name::der_stretch, Name::stretch) => -self.stiffness,
+            (Name::der_stretch, Name::stiffness) => -self.stretch,
+            _ => 0.0,
+        })
+    }
+
+    /// stretch = load / stiffness, at rest.
+    fn initial_partial(&self, unknown: Name, known: Name) -> Option<f64> {
+        Some(match (unknown, known) {
+            (Name::stretch, Name::load) => 1.0 / self.stiffness,
+            (Name::stretch, Name::stiffness) => -self.load / (self.stiffness * self.stiffness),
+            _ => 0.0,
+        })
+    }
+}
+
+offer!(Balance: CoSimulation + ModelExchange + Partials);

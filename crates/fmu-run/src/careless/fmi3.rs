@@ -222,20 +222,27 @@ impl Call {
                 let binaries = vec![bytes.as_ptr(); room];
                 fmu.fmi3SetBinary(vr, n, a.pointer(2, &sizes), a.pointer(1, &binaries), m)
             }
-            "fmi3GetNumberOfVariableDependencies" | "fmi3GetVariableDependencies" => {
-                let (of, mut count) = (a.vr.first().copied().unwrap_or(u32::MAX), 0);
-                let status = fmu.fmi3GetNumberOfVariableDependencies(of, &mut count);
+            "fmi3GetNumberOfVariableDependencies" => {
+                let mut count = 0;
+                let status = fmu.fmi3GetNumberOfVariableDependencies(
+                    a.vr.first().copied().unwrap_or(u32::MAX),
+                    &mut count,
+                );
                 values.push(count as u64);
-                if status != Status::Ok || self.function == "fmi3GetNumberOfVariableDependencies" {
-                    status
-                } else {
-                    let (mut own, mut kinds) = (vec![9; count + 1], vec![0; count + 1]);
-                    let (mut known, mut other) = (vec![0; count + 1], vec![0; count + 1]);
-                    let count = if a.kind == 3 { count + 1 } else { count };
-                    let (own, known) = (a.output(0, &mut own), a.output(1, &mut known));
-                    let (other, kinds) = (a.output(2, &mut other), a.output(3, &mut kinds));
-                    fmu.fmi3GetVariableDependencies(of, own, known, other, kinds, count)
-                }
+                status
+            }
+            "fmi3GetVariableDependencies" => {
+                let (mut own, mut kinds, mut known, mut other) = ([9], [0], [0], [9]);
+                let (own, known) = (a.output(0, &mut own), a.output(1, &mut known));
+                let (other, kinds) = (a.output(2, &mut other), a.output(3, &mut kinds));
+                fmu.fmi3GetVariableDependencies(
+                    a.vr.first().copied().unwrap_or(u32::MAX),
+                    own,
+                    known,
+                    other,
+                    kinds,
+                    1,
+                )
             }
             "fmi3GetDirectionalDerivative" | "fmi3GetAdjointDerivative" => {
                 let forward = self.function == "fmi3GetDirectionalDerivative";
