@@ -1,8 +1,8 @@
 //! The FMU's C sources, compiled, against the library that is made of the same Rust: `make test-source-fmu`, which names
 //! the compiled sources in the environment variable `FMU_LIBRARY`.
 
-use fmu_run::careless::{random_bytes, record};
-use fmu_run::{Functions, functions_of};
+use fmu_test_kit::careless::{random_bytes, record};
+use fmu_test_kit::{Functions, functions_of};
 use prw_testbed::TestbedFmu;
 
 /// Any calls in any order: the same bits, statuses and texts.
@@ -17,7 +17,7 @@ fn random_sessions_are_answered_alike() {
     let (mut calls, mut refused) = (0, 0);
     for seed in 0..sessions {
         let bytes = random_bytes(seed, 1 << 12);
-        let native = record::<TestbedFmu>(Functions::of::<TestbedFmu>(), &bytes);
+        let native = record::<TestbedFmu>(fmu_export::fmi2::functions::<TestbedFmu>(), &bytes);
         let compiled = record::<TestbedFmu>(functions_of::<TestbedFmu>(), &bytes);
         for (native, compiled) in native.iter().zip(&compiled) {
             assert_eq!(native, compiled, "seed {seed}");

@@ -2,7 +2,7 @@
 #![cfg(unix)]
 #![allow(unsafe_code)]
 
-use fmu_run::careless::random_bytes;
+use fmu_test_kit::careless::random_bytes;
 use std::fs;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::Path;

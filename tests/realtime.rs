@@ -1,9 +1,9 @@
 //! What runs in a control loop neither allocates nor enters the kernel nor locks. `make sanitize` runs the same loop
 //! under the RealtimeSanitizer.
 
-use fmu_run::either::Either;
-use fmu_run::realtime::*;
-use fmu_run::{Importer, fmi3};
+use fmu_test_kit::either::Either;
+use fmu_test_kit::realtime::*;
+use fmu_test_kit::{Importer, fmi3};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 use std::ffi::c_void;

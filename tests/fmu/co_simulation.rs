@@ -3,7 +3,7 @@
 use crate::exact::{Random, STATES, advanced, distance, jumped, parameters, set_parameters, start_at};
 use crate::{new, vr};
 use fmu_export::Interface::CoSimulation;
-use fmu_run::Importer as Fmu;
+use fmu_test_kit::Importer as Fmu;
 use prw_testbed::variables::Name;
 use prw_testbed::{Parameters, state_space::state_space};
 

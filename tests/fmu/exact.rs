@@ -5,7 +5,7 @@
 
 use crate::{TABLE, vr};
 use fmu_export::{BaseType, Causality, Variable};
-use fmu_run::Importer as Fmu;
+use fmu_test_kit::Importer as Fmu;
 use nalgebra::SMatrix;
 use prw_testbed::Parameters;
 use prw_testbed::TestbedFmu;

@@ -8,7 +8,7 @@ use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Status;
 use fmu_export::{BaseType, Causality};
-use fmu_run::{Arguments, Importer as Fmu, Message, functions_of};
+use fmu_test_kit::{Arguments, Importer as Fmu, Message, functions_of};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 use std::ptr::null_mut;

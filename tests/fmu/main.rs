@@ -17,7 +17,7 @@ mod start;
 mod steps;
 
 use fmu_export::{Interface, Variable, Variables};
-use fmu_run::Importer;
+use fmu_test_kit::Importer;
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 

@@ -7,7 +7,7 @@ use crate::modes::{enter_continuous_time, in_mode};
 use crate::{new, vr};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
-use fmu_run::Importer as Fmu;
+use fmu_test_kit::Importer as Fmu;
 use nalgebra::SVector;
 use prw_testbed::Parameters;
 use prw_testbed::variables::Name;

@@ -4,8 +4,8 @@ use crate::new;
 use fmu_export::Interface;
 use fmu_export::Mode::{self, *};
 use fmu_export::fmi2::types::{fmi2EventInfo, fmi2True};
-use fmu_run::Importer as Fmu;
-use fmu_run::serialized::with_mode;
+use fmu_test_kit::Importer as Fmu;
+use fmu_test_kit::serialized::with_mode;
 
 pub const INTERFACES: [Interface; 2] = [Interface::CoSimulation, Interface::ModelExchange];
 

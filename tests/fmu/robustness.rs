@@ -1,7 +1,7 @@
 //! Any calls in any order; the library loaded and unloaded beside another FMU. (The rest of docs/robustness.md is tested
 //! in crates/fmu-export, on toy models.)
 
-use fmu_run::careless::{run, run_seeds};
+use fmu_test_kit::careless::{run, run_seeds};
 use prw_testbed::TestbedFmu;
 
 #[test]
@@ -13,7 +13,7 @@ fn no_sequence_of_calls_breaks_a_promise() {
 #[cfg(target_os = "linux")]
 #[test]
 fn unloading_leaves_nothing_behind() {
-    use fmu_run::c_programs::{compile, reload};
+    use fmu_test_kit::c_programs::{compile, reload};
     use std::path::Path;
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/fmu-export/tests/c/reload.c");
     let program = compile(&source, Path::new(env!("CARGO_TARGET_TMPDIR")));

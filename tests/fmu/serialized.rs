@@ -2,7 +2,7 @@
 
 use crate::TABLE;
 use fmu_export::BaseType;
-use fmu_run::serialized::VALUES;
+use fmu_test_kit::serialized::VALUES;
 use std::ops::Range;
 
 /// Where the value of a variable is; after the last one what the model remembers besides.

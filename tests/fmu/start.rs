@@ -7,7 +7,7 @@ use crate::{new, vr};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Status;
-use fmu_run::{Importer as Fmu, fmi3};
+use fmu_test_kit::{Importer as Fmu, fmi3};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 

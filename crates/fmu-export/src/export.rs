@@ -92,10 +92,7 @@ pub struct ModelExchangeOffer {
 macro_rules! export_fmu {
     ($model:ty : $first:ident $(+ $next:ident)*) => {
         $crate::offer!($model: $first $(+ $next)*);
-        $crate::fmi2_symbols!($model);
-        // C sources are made of FMI 2.0 alone.
-        #[cfg(not(target_family = "wasm"))]
-        $crate::fmi3_symbols!($model);
+        $crate::symbols!($model);
     };
 }
 

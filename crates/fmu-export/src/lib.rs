@@ -4,11 +4,10 @@
 //!
 //! What an author writes: [`Model`] with a table of [`variables!`], the capabilities, [`export_fmu!`]. Below it, from
 //! the inside out: `instance` has what each call checks and does, free of pointers and of versions of FMI; `boundary`
-//! what C functions have in common; [`fmi2`] and [`fmi3`] the C functions of the standards, each with its table of allowed
-//! calls. All `unsafe` is in these three.
+//! what C functions have in common; [`fmi2`] and [`fmi3`] the C functions of the standards, whose types and tables of
+//! allowed calls are in [`fmi_abi`]. All `unsafe` is in these three.
 
 mod boundary;
-mod c_types;
 mod capabilities;
 mod export;
 pub mod fmi2;
@@ -16,12 +15,10 @@ pub mod fmi3;
 mod info;
 mod instance;
 mod log;
-mod mode;
 mod model;
-mod rule;
 mod saved;
 mod settable;
-mod status;
+mod symbols;
 mod table;
 mod types;
 pub mod units;
@@ -33,13 +30,11 @@ pub use capabilities::{
     StepCompleted, Stepped,
 };
 pub use export::{CoSimulationOffer, Exported, ModelExchangeOffer};
+pub use fmi_abi::{Category, Interface, Mode, Rule, Situations, Standard, Status};
 pub use info::{DefaultExperiment, Info};
-pub use log::{Category, Log};
-pub use mode::{Interface, Mode, Situations, Standard};
+pub use log::Log;
 pub use model::{Error, Experiment, Model, Setup};
-pub use rule::Rule;
 pub use saved::{Saved, StateVisitor};
-pub use status::Status;
 pub use table::Variables;
 pub use types::{Attributes, BINARY, BOOLEAN, BaseType, INTEGER, Item, NUMBER, STRING, TIME, Type};
 pub use units::{BaseUnit, DisplayUnit, Unit};
@@ -48,6 +43,7 @@ pub use variable::{Causality, Index, Initial, Variability, Variable};
 
 #[doc(hidden)]
 pub use {
+    fmi_abi::{fmi2_functions, fmi3_functions},
     table::{StateOfTable, check_names, count_states, find_states},
     value::visit_enumeration,
     variable::{Read, Store, base_of_calculation, base_of_place, read},

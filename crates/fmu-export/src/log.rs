@@ -4,72 +4,13 @@
 //! for `#r1#` in it. So the text is complete before it is handed over, free of `%` and of `#`, and there are no
 //! further arguments.
 
-use crate::mode::Standard;
-use crate::status::Status;
+use fmi_abi::{Category, Standard, Status};
 use std::ffi::{CStr, CString};
 
-/// What a message is about; becomes `LogCategories` (section 2.2.4).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Category {
-    /// The course of the simulation.
-    Events,
-    /// Something is odd.
-    Warning,
-    /// A question that has no answer, or a step that ended early.
-    Discard,
-    /// A call was refused.
-    Error,
-    /// The instance is broken.
-    Fatal,
-    /// Every category.
-    All,
-}
-
-impl Category {
-    /// All categories, for the model description.
-    pub const ALL: [Self; 6] =
-        [Self::Events, Self::Warning, Self::Discard, Self::Error, Self::Fatal, Self::All];
-
-    /// The name, as section 2.2.4 proposes it.
-    pub const fn name(self) -> &'static CStr {
-        match self {
-            Self::Events => c"logEvents",
-            Self::Warning => c"logStatusWarning",
-            Self::Discard => c"logStatusDiscard",
-            Self::Error => c"logStatusError",
-            Self::Fatal => c"logStatusFatal",
-            Self::All => c"logAll",
-        }
-    }
-
-    /// One sentence for the model description.
-    pub const fn description(self) -> &'static str {
-        match self {
-            Self::Events => "The course of the simulation: instantiation, initialization, reset, termination",
-            Self::Warning => "Something is odd; the simulation goes on",
-            Self::Discard => "A question about the step has no answer; the simulation goes on",
-            Self::Error => "A call was refused; the message says why and what to do",
-            Self::Fatal => "The instance is broken and can only be freed",
-            Self::All => "All of the above",
-        }
-    }
-
-    const fn of(status: Status) -> Self {
-        match status {
-            Status::Ok => Self::Events,
-            Status::Warning => Self::Warning,
-            Status::Discard => Self::Discard,
-            Status::Error => Self::Error,
-            Status::Fatal => Self::Fatal,
-        }
-    }
-
-    const fn bit(self) -> u8 {
-        match self {
-            Self::All => 0b1_1111,
-            other => 1 << other as u8,
-        }
+const fn bit(category: Category) -> u8 {
+    match category {
+        Category::All => 0b1_1111,
+        other => 1 << other as u8,
     }
 }
 
@@ -148,9 +89,9 @@ impl Logger {
     /// Errors are always shown, the rest (a discard too) on demand (section 2.1.3 of FMI 2.0, 2.3.1 of FMI 3.0);
     /// warnings are in FMI 2.0 only.
     pub fn new(standard: Standard, logging_on: bool) -> Self {
-        let errors = Category::Error.bit() | Category::Fatal.bit();
+        let errors = bit(Category::Error) | bit(Category::Fatal);
         let (always, fixed) = match standard {
-            Standard::Fmi2 => (errors | Category::Warning.bit(), 0),
+            Standard::Fmi2 => (errors | bit(Category::Warning), 0),
             Standard::Fmi3 => (errors, errors),
         };
         let mut logger = Self { enabled: 0, always, fixed, waiting: Vec::new() };
@@ -160,7 +101,7 @@ impl Logger {
 
     /// Without a list: everything, or what is always shown.
     pub fn set_all(&mut self, on: bool) {
-        self.enabled = if on { Category::All.bit() } else { self.always };
+        self.enabled = if on { bit(Category::All) } else { self.always };
     }
 
     /// With a list: switches just these.
@@ -175,7 +116,7 @@ impl Logger {
     /// The bit of the category of this name.
     pub fn find(name: &[u8]) -> Option<u8> {
         let mut known = Category::ALL.iter();
-        known.find(|category| category.name().to_bytes() == name).map(|category| category.bit())
+        known.find(|category| category.name().to_bytes() == name).map(|category| bit(*category))
     }
 
     #[cold]
@@ -185,7 +126,7 @@ impl Logger {
 
     #[cold]
     pub fn add(&mut self, message: Message) {
-        if self.enabled & Category::of(message.status).bit() != 0 {
+        if self.enabled & bit(Category::of(message.status)) != 0 {
             self.waiting.push(message);
         }
     }
@@ -203,7 +144,7 @@ impl Logger {
 #[cfg(test)]
 mod tests {
     use super::Message;
-    use crate::status::Status;
+    use fmi_abi::Status;
 
     #[test]
     fn nothing_is_left_that_an_importer_would_expand() {

@@ -2,8 +2,8 @@
 
 use crate::info::Info;
 use crate::log::Log;
-use crate::mode::Interface;
 use crate::table::Variables;
+use fmi_abi::Interface;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -172,7 +172,7 @@ impl std::error::Error for Error {}
 #[cfg(test)]
 mod tests {
     use super::Setup;
-    use crate::mode::Interface;
+    use fmi_abi::Interface;
     use std::path::Path;
 
     #[test]

@@ -1,7 +1,7 @@
 //! Where a variable may be set: what the standard says, and apart from it what is tolerated because importers do it.
 
-use crate::mode::{Situations, Standard};
 use crate::variable::{Causality, Initial, Variability};
+use fmi_abi::{Situations, Standard};
 
 /// Where an importer may set a variable, in both standards, with what is tolerated.
 pub(crate) const fn settable(
@@ -13,10 +13,10 @@ pub(crate) const fn settable(
     real: bool,
 ) -> Situations {
     let of_both = in_both(Standard::Fmi2, causality, variability, initial, state)
-        .and(in_both(Standard::Fmi3, causality, variability, initial, state))
-        .and(tolerated(Standard::Fmi2, causality, real))
-        .and(tolerated(Standard::Fmi3, causality, real));
-    of_both.and(in_event_mode(causality, variability, state, reinit))
+        .union(in_both(Standard::Fmi3, causality, variability, initial, state))
+        .union(tolerated(Standard::Fmi2, causality, real))
+        .union(tolerated(Standard::Fmi3, causality, real));
+    of_both.union(in_event_mode(causality, variability, state, reinit))
 }
 
 /// Footnotes 1, 3, 4, 5 and 6 of the tables in sections 3.2.3 and 4.2.4 of FMI 2.0; the states of FMI 3.0 (sections
@@ -37,16 +37,16 @@ const fn in_both(
 
     let mut set = Situations::NONE;
     if exact || approx {
-        set = set.and(Situations::new(standard, "I", "I")); // footnote 1
+        set = set.union(Situations::new(standard, "I", "I")); // footnote 1
     }
     if exact || input {
-        set = set.and(Situations::new(standard, "N", "N")); // footnote 3
+        set = set.union(Situations::new(standard, "N", "N")); // footnote 3
     }
     if input || tunable {
-        set = set.and(Situations::new(standard, "C", "M")); // footnotes 6 and 4
+        set = set.union(Situations::new(standard, "C", "M")); // footnotes 6 and 4
     }
     if state || input && matches!(variability, Variability::Continuous) {
-        set = set.and(Situations::new(standard, "", "K")); // footnote 5
+        set = set.union(Situations::new(standard, "", "K")); // footnote 5
     }
     set
 }
@@ -75,3 +75,11 @@ const fn tolerated(standard: Standard, causality: Causality, real: bool) -> Situ
         _ => Situations::NONE,
     }
 }
+
+/// Where start values are set.
+pub(crate) const STARTING: Situations =
+    Situations::new(Standard::Fmi2, "IN", "IN").union(Situations::new(Standard::Fmi3, "IN", "IN"));
+
+/// The modes that instances can be in, short of fatal.
+pub(crate) const POSSIBLE: Situations = Situations::new(Standard::Fmi2, "INCFTE", "INMKTE")
+    .union(Situations::new(Standard::Fmi3, "INCMT", "INMKT"));

@@ -1,10 +1,10 @@
 //! Variables: what each is, and how the model's value is reached.
 
-use crate::mode::Situations;
 use crate::saved::StateVisitor;
 use crate::settable::settable;
 use crate::types::{BaseType, Type};
 use crate::value::{Scalar, Value};
+use fmi_abi::Situations;
 
 /// Who sets a variable and who reads it (section 2.2.7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -307,7 +307,7 @@ impl<M> Variable<M> {
             settable(self.causality, self.variability, self.initial, self.state, self.reinit, real);
         if real && !matches!(self.causality, Causality::Parameter) {
             // A start value that is refused is remembered, which takes further ado.
-            self.takes_reals = self.settable.without(crate::mode::STARTING);
+            self.takes_reals = self.settable.without(crate::settable::STARTING);
         }
         self
     }

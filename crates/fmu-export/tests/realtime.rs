@@ -4,9 +4,9 @@
 
 mod toys;
 
-use fmu_run::either::Either;
-use fmu_run::realtime::*;
-use fmu_run::{Importer, fmi3};
+use fmu_test_kit::either::Either;
+use fmu_test_kit::realtime::*;
+use fmu_test_kit::{Importer, fmi3};
 use std::ffi::c_void;
 use std::path::Path;
 use std::ptr::null_mut;

@@ -3,7 +3,7 @@
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::{fmi2EventInfo, fmi2False, fmi2True};
 use fmu_export::fmi3::types::{fmi3Boolean, fmi3False, fmi3True};
-use fmu_run::fmi3::{Arguments, Stepped, Updated};
+use fmu_test_kit::fmi3::{Arguments, Stepped, Updated};
 use prw_controller::Controller;
 use prw_controller::variables::Name;
 
@@ -57,7 +57,7 @@ fn bits(outputs: [f64; 6]) -> [u64; 6] {
 
 /// The outputs at each communication point, a sample apart; nobody but the controller knows of samples.
 fn steps_of_fmi2() -> Vec<[f64; 6]> {
-    let fmu = fmu_run::Importer::of::<Controller>(CoSimulation);
+    let fmu = fmu_test_kit::Importer::of::<Controller>(CoSimulation);
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
     fmu.initialize(START);
     let outputs = |sample| {
@@ -71,10 +71,10 @@ fn steps_of_fmi2() -> Vec<[f64; 6]> {
     path
 }
 
-fn with(event_mode_used: fmi3Boolean, early_return_allowed: fmi3Boolean) -> fmu_run::fmi3::Importer {
+fn with(event_mode_used: fmi3Boolean, early_return_allowed: fmi3Boolean) -> fmu_test_kit::fmi3::Importer {
     let arguments =
         Arguments { event_mode_used, early_return_allowed, ..Arguments::of::<Controller>(CoSimulation) };
-    let fmu = fmu_run::fmi3::Importer::with::<Controller>(&arguments);
+    let fmu = fmu_test_kit::fmi3::Importer::with::<Controller>(&arguments);
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
     fmu.initialize(START);
     fmu
@@ -159,7 +159,7 @@ const NOTHING_SAID: fmi2EventInfo = fmi2EventInfo {
 
 #[test]
 fn in_model_exchange_of_fmi2() {
-    let fmu = fmu_run::Importer::of::<Controller>(ModelExchange);
+    let fmu = fmu_test_kit::Importer::of::<Controller>(ModelExchange);
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
     fmu.initialize(START);
     for (sample, expected) in (0..).zip(steps_of_fmi2()) {
@@ -184,7 +184,7 @@ fn in_model_exchange_of_fmi2() {
 
 #[test]
 fn in_model_exchange_of_fmi3() {
-    let fmu = fmu_run::fmi3::Importer::of::<Controller>(ModelExchange);
+    let fmu = fmu_test_kit::fmi3::Importer::of::<Controller>(ModelExchange);
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
     fmu.initialize(START);
     for (sample, expected) in (0..).zip(steps_of_fmi2()) {
@@ -201,7 +201,7 @@ fn in_model_exchange_of_fmi3() {
 /// An importer that forgets the time events for hours is told so.
 #[test]
 fn too_many_samples_at_once() {
-    let fmu = fmu_run::Importer::of::<Controller>(ModelExchange);
+    let fmu = fmu_test_kit::Importer::of::<Controller>(ModelExchange);
     fmu.initialize(0.0);
     fmu.ok(fmu.fmi2SetTime(1e6));
     let mut said = NOTHING_SAID;
@@ -214,7 +214,7 @@ fn too_many_samples_at_once() {
 #[test]
 fn partial_derivatives_by_the_time() {
     const WIDTH: f64 = 1.0 / 65_536.0;
-    let fmu = fmu_run::fmi3::Importer::of::<Controller>(ModelExchange);
+    let fmu = fmu_test_kit::fmi3::Importer::of::<Controller>(ModelExchange);
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
     fmu.initialize(START);
     let mut moves = [false; 6];

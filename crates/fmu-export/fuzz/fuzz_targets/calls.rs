@@ -1,11 +1,11 @@
-//! libFuzzer looks for bytes that, read as calls of the FMU's functions, break a promise of `fmu_run::careless` or, under
+//! libFuzzer looks for bytes that, read as calls of the FMU's functions, break a promise of `fmu_test_kit::careless` or, under
 //! the AddressSanitizer, the memory.
 #![no_main]
 
 #[path = "../../tests/toys/mod.rs"]
 mod toys;
 
-use fmu_run::careless::{RunBytes, Tally, fmi3, run};
+use fmu_test_kit::careless::{RunBytes, Tally, fmi3, run};
 use libfuzzer_sys::fuzz_target;
 use std::sync::atomic::{AtomicU64, Ordering};
 use toys::*;

@@ -1,7 +1,7 @@
 //! The importer's arrays, places and strings.
 
-use crate::c_types::c_char;
 use crate::instance::{Outcome, refuse};
+use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 use std::mem::MaybeUninit;
 

@@ -1,14 +1,14 @@
 //! What every call on an instance has in common.
 
-use crate::c_types::c_void;
 use crate::export::Exported;
 use crate::fmi2::types::fmi2CallbackLogger;
 use crate::fmi3::types::fmi3LogMessageCallback;
 use crate::instance::{Instance, Outcome, Refusal};
 use crate::log::Message;
-use crate::mode::{Mode, Situations};
-use crate::rule::Rule;
-use crate::status::Status;
+use fmi_abi::Rule;
+use fmi_abi::Status;
+use fmi_abi::c_types::c_void;
+use fmi_abi::{Mode, Situations};
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
 use std::ffi::CString;
@@ -64,12 +64,12 @@ impl ImporterLog {
                 Callback::Fmi2(logger) => logger(
                     self.environment,
                     self.instance_name.as_ptr(),
-                    message.status,
+                    message.status as _,
                     category,
                     text.as_ptr(),
                 ),
                 Callback::Fmi3(logger) => {
-                    logger(self.environment, message.status, category, text.as_ptr());
+                    logger(self.environment, message.status as _, category, text.as_ptr());
                 }
             }
         }

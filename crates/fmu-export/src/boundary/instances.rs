@@ -1,13 +1,13 @@
 //! Making and freeing instances.
 
 use super::{Component, ImporterLog, forget_panic, panic_message};
-use crate::c_types::c_void;
 use crate::export::Exported;
 use crate::instance::{Importer, Instance, Outcome, refuse};
 use crate::log::{Logger, Message};
-use crate::mode::{Interface, Standard};
 use crate::model::Setup;
-use crate::status::Status;
+use fmi_abi::Status;
+use fmi_abi::c_types::c_void;
+use fmi_abi::{Interface, Standard};
 use std::cell::{Cell, UnsafeCell};
 use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};

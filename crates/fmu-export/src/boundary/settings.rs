@@ -1,9 +1,10 @@
 //! What is logged.
 
 use super::{array, string};
-use crate::c_types::c_char;
 use crate::instance::{Instance, Outcome, refuse};
-use crate::log::{Category, Logger};
+use crate::log::Logger;
+use fmi_abi::Category;
+use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 
 /// # Safety

@@ -1,9 +1,9 @@
 //! Saved states behind pointers.
 
 use super::{array, output, place};
-use crate::c_types::c_void;
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, SavedState, refuse};
+use fmi_abi::c_types::c_void;
 
 /// The importer owns the state until it frees it.
 ///

@@ -1,11 +1,11 @@
 //! Texts.
 
 use super::string;
-use crate::c_types::c_char;
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
 use crate::types::BaseType;
 use crate::value::Value;
+use fmi_abi::c_types::c_char;
 use std::ffi::{CStr, CString};
 use std::mem::MaybeUninit;
 

@@ -5,10 +5,10 @@
 
 use super::call::{Component, finish, panic_message};
 use super::string;
-use crate::c_types::{c_char, c_void};
 use crate::export::Exported;
 use crate::log::Message;
-use crate::status::Status;
+use fmi_abi::Status;
+use fmi_abi::c_types::{c_char, c_void};
 use std::any::Any;
 use std::cell::{Cell, RefCell};
 use std::panic::PanicHookInfo;

@@ -98,7 +98,7 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
 pub unsafe fn fmi2GetStatus<M: Exported>(
     _: &mut Instance<M>,
     kind: fmi2StatusKind,
-    _value: *mut Status,
+    _value: *mut fmi2Status,
 ) -> Outcome {
     nothing_to_say(status_kind(kind)?)
 }

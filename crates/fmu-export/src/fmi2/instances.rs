@@ -4,15 +4,15 @@ use super::types::*;
 use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};
 use crate::export::Exported;
 use crate::instance::{Importer, refuse};
-use crate::mode::Interface;
+use fmi_abi::Interface;
 
 /// `fmi2GetTypesPlatform`
-pub extern "C" fn fmi2GetTypesPlatform() -> fmi2String {
+pub unsafe extern "C" fn fmi2GetTypesPlatform<M: Exported>() -> fmi2String {
     c"default".as_ptr()
 }
 
 /// `fmi2GetVersion`
-pub extern "C" fn fmi2GetVersion() -> fmi2String {
+pub unsafe extern "C" fn fmi2GetVersion<M: Exported>() -> fmi2String {
     c"2.0".as_ptr()
 }
 

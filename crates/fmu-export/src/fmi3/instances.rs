@@ -4,10 +4,10 @@ use super::types::*;
 use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};
 use crate::export::Exported;
 use crate::instance::{Importer, Outcome, refuse};
-use crate::mode::{Interface, Standard};
+use fmi_abi::{Interface, Standard};
 
 /// `fmi3GetVersion`
-pub extern "C" fn fmi3GetVersion() -> fmi3String {
+pub unsafe extern "C" fn fmi3GetVersion<M: Exported>() -> fmi3String {
     c"3.0".as_ptr()
 }
 

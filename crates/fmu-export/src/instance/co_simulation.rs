@@ -4,9 +4,9 @@ use super::refusal::discard;
 use super::{Instance, Outcome, refuse, refuse_with};
 use crate::capabilities::{Events, Step, Stepped};
 use crate::export::Exported;
-use crate::mode::Mode;
 use crate::model::Error;
-use crate::status::Status;
+use fmi_abi::Mode;
+use fmi_abi::Status;
 
 /// Where a step has led in FMI 3.0.
 #[derive(Clone, Copy, Debug)]

@@ -3,9 +3,9 @@
 
 use super::{Instance, Outcome, finite, independent, refuse};
 use crate::export::Exported;
-use crate::mode::{Mode, Standard};
 use crate::types::BaseType;
 use crate::variable::{Causality, Initial, Variability, Variable};
+use fmi_abi::{Mode, Standard};
 use std::mem::MaybeUninit;
 
 /// Which way partial derivatives are summed up.

@@ -18,12 +18,12 @@ pub(crate) use saved_states::SavedState;
 use crate::capabilities::Events;
 use crate::export::Exported;
 use crate::log::Logger;
-use crate::mode::{Interface, Mode, Situation, Standard};
 use crate::model::{Error, Experiment, Setup};
-use crate::status::Status;
 use crate::types::{BaseType, NUMBER, TIME};
 use crate::value::Value;
 use crate::variable::{Causality, Read, Variable};
+use fmi_abi::Status;
+use fmi_abi::{Interface, Mode, Situation, Standard};
 use std::collections::BTreeMap;
 
 /// An instance of model `M`.

@@ -3,8 +3,8 @@
 use super::{Instance, Outcome, finite, refuse};
 use crate::capabilities::{Event, StepCompleted};
 use crate::export::Exported;
-use crate::mode::{Interface, Mode};
 use crate::table::StateOfTable;
+use fmi_abi::{Interface, Mode};
 use std::mem::MaybeUninit;
 
 impl<M: Exported> Instance<M> {

@@ -1,7 +1,7 @@
 //! Refusals: why a call is answered with another status than OK.
 
 use crate::model::Error;
-use crate::status::Status;
+use fmi_abi::Status;
 
 /// Why a call was refused.
 #[derive(Debug)]

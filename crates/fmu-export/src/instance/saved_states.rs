@@ -2,7 +2,7 @@
 
 use super::{Instance, Outcome, State, refuse, serialized};
 use crate::export::Exported;
-use crate::mode::{Interface, Mode, Standard};
+use fmi_abi::{Interface, Mode, Standard};
 use std::fmt;
 
 /// Where a saved state comes from, and what it is tied to: what is allowed next is another question in each standard and

@@ -4,8 +4,9 @@ use super::State;
 use super::saved_states::Origin;
 use super::values::check_value;
 use crate::export::Exported;
-use crate::mode::{Mode, POSSIBLE};
 use crate::saved::{Saved, StateVisitor};
+use crate::settable::POSSIBLE;
+use fmi_abi::Mode;
 
 impl<M: Exported> State<M> {
     /// Shows everything to the visitor but what follows from the rest.

@@ -2,7 +2,7 @@
 
 use super::{Instance, Outcome, finite, implicit_value, refuse, refuse_with};
 use crate::export::Exported;
-use crate::mode::STARTING;
+use crate::settable::STARTING;
 use crate::types::{Attributes, BaseType};
 use crate::value::Value;
 use crate::variable::{Causality, Initial, Variable};

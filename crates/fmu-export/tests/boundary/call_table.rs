@@ -10,7 +10,7 @@ use fmu_export::Mode::{self, *};
 use fmu_export::fmi2::ALLOWED;
 use fmu_export::fmi2::types::*;
 use fmu_export::{BaseType, Causality, Exported, Variable};
-use fmu_run::{FUNCTIONS, Functions, Importer};
+use fmu_test_kit::{FUNCTIONS, Functions, Importer};
 use std::ptr::{null, null_mut};
 
 /// Section 3.2.3: start/end, instantiated, Initialization Mode, Event Mode, Continuous-Time Mode,
@@ -366,7 +366,7 @@ fn fmu_can_be_freed_in_every_state() {
 
 #[test]
 fn versions_need_no_instance() {
-    assert_eq!(Importer::null(Functions::of::<Sum>()).version_and_platform(), [c"2.0", c"default"]);
+    assert_eq!(Importer::null(fmu_export::fmi2::functions::<Sum>()).version_and_platform(), [c"2.0", c"default"]);
 }
 
 /// The table in the code says the same, also about states that cannot be reached here, and tells standard and tolerance
@@ -401,7 +401,7 @@ fn table_in_the_code() {
 /// An importer that ignores a NULL from `fmi2Instantiate` (OMSimulator) gets errors, no crash.
 #[test]
 fn null_component() {
-    let answers = Importer::null(Functions::of::<Talker>()).call_all();
+    let answers = Importer::null(fmu_export::fmi2::functions::<Talker>()).call_all();
     assert_eq!(answers.len(), 40);
     for (function, status) in answers {
         assert_eq!(status, Status::Error, "{function}");

@@ -6,8 +6,8 @@ use crate::toys::{Oscillator, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::{BaseType, Causality, Variables};
-use fmu_run::Importer;
-use fmu_run::serialized::with_mode;
+use fmu_test_kit::Importer;
+use fmu_test_kit::serialized::with_mode;
 
 const UNKNOWNS: [u32; 5] = [
     Name::position as u32,

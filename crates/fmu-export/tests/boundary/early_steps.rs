@@ -3,7 +3,7 @@
 use crate::toys::{Fuse, fuse::Name};
 use fmu_export::Interface::CoSimulation;
 use fmu_export::fmi2::types::*;
-use fmu_run::{Importer, fmi3};
+use fmu_test_kit::{Importer, fmi3};
 
 const TEMPERATURE: u32 = Name::temperature as u32;
 /// `fmi2LastSuccessfulTime` and `fmi2Terminated`.

@@ -7,7 +7,7 @@ use fmu_export::Exported;
 use fmu_export::Interface::ModelExchange;
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::*;
-use fmu_run::Importer;
+use fmu_test_kit::Importer;
 
 /// A master of this size: Euler steps, halved as often as it takes to find a state event.
 struct Master {

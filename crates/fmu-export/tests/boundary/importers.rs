@@ -7,7 +7,7 @@ use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::Status;
 use fmu_export::{BaseType, Causality, Variables};
-use fmu_run::{Arguments, Functions, Importer};
+use fmu_test_kit::{Arguments, Functions, Importer};
 use std::ptr::null_mut;
 
 const FORCE: u32 = Name::force as u32;
@@ -15,7 +15,7 @@ const POSITION: u32 = Name::position as u32;
 const OUTPUTS: [u32; 3] = [POSITION, Name::spring_force as u32, Name::energy as u32];
 
 fn instantiate(arguments: &Arguments) -> Importer {
-    Importer::instantiate(Functions::of::<Oscillator>(), arguments).unwrap()
+    Importer::instantiate(fmu_export::fmi2::functions::<Oscillator>(), arguments).unwrap()
 }
 
 fn force(t: f64) -> f64 {
@@ -123,8 +123,8 @@ fn omsimulator() {
 #[test]
 fn omsimulator_without_instance() {
     let arguments = Arguments { guid: Some(c"{stale}".into()), ..Arguments::of::<Oscillator>(CoSimulation) };
-    assert!(Importer::instantiate(Functions::of::<Oscillator>(), &arguments).is_err());
-    for (function, status) in Importer::null(Functions::of::<Oscillator>()).call_all() {
+    assert!(Importer::instantiate(fmu_export::fmi2::functions::<Oscillator>(), &arguments).is_err());
+    for (function, status) in Importer::null(fmu_export::fmi2::functions::<Oscillator>()).call_all() {
         assert_eq!(status, Status::Error, "{function}");
     }
 }

@@ -5,14 +5,14 @@ use crate::variables::say;
 use fmu_export::Exported;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::Status;
-use fmu_run::testing::assert_clean;
-use fmu_run::{Arguments, Functions, Importer, Message};
+use fmu_test_kit::testing::assert_clean;
+use fmu_test_kit::{Arguments, Functions, Importer, Message};
 use std::ffi::CStr;
 use std::ptr::null;
 
 fn logging<M: Exported>(logging_on: bool) -> Importer {
     let arguments = Arguments { logging_on, ..Arguments::of::<M>(CoSimulation) };
-    Importer::instantiate(Functions::of::<M>(), &arguments).unwrap()
+    Importer::instantiate(fmu_export::fmi2::functions::<M>(), &arguments).unwrap()
 }
 
 /// What is logged of an event, a warning, a discarded question and an error: O, W, D, E for their statuses.
@@ -133,7 +133,7 @@ fn messages_of_the_model() {
 fn instances_do_not_mix() {
     let fmus = [c"left", c"right"].map(|name| {
         let arguments = Arguments { instance_name: Some(name), ..Arguments::of::<Talker>(CoSimulation) };
-        Importer::instantiate(Functions::of::<Talker>(), &arguments).unwrap()
+        Importer::instantiate(fmu_export::fmi2::functions::<Talker>(), &arguments).unwrap()
     });
     for (fmu, name) in fmus.iter().zip(["left", "right"]) {
         assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);
@@ -147,7 +147,7 @@ fn instances_do_not_mix() {
 #[test]
 fn no_logger() {
     let arguments = Arguments { logger: false, logging_on: true, ..Arguments::of::<Talker>(ModelExchange) };
-    let fmu = Importer::instantiate(Functions::of::<Talker>(), &arguments).unwrap();
+    let fmu = Importer::instantiate(fmu_export::fmi2::functions::<Talker>(), &arguments).unwrap();
     fmu.initialize(0.0);
     assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);
     assert_eq!(fmu.take_log(), []);

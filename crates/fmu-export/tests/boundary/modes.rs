@@ -3,8 +3,8 @@
 use fmu_export::Mode::{self, *};
 use fmu_export::fmi2::types::{fmi2EventInfo, fmi2True};
 use fmu_export::{Exported, Interface};
-use fmu_run::Importer;
-use fmu_run::serialized::with_mode;
+use fmu_test_kit::Importer;
+use fmu_test_kit::serialized::with_mode;
 
 pub const INTERFACES: [Interface; 2] = [Interface::CoSimulation, Interface::ModelExchange];
 

@@ -4,7 +4,7 @@ use crate::modes::{INTERFACES, enter_continuous_time, in_mode};
 use crate::toys::{Oscillator, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
-use fmu_run::Importer;
+use fmu_test_kit::Importer;
 
 const FORCE: u32 = Name::force as u32;
 const STATES: [u32; 2] = [Name::position as u32, Name::velocity as u32];

@@ -7,8 +7,8 @@ use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::Status;
 use fmu_export::{Model, Variables};
-use fmu_run::testing::assert_clean;
-use fmu_run::{Arguments, Functions, Importer};
+use fmu_test_kit::testing::assert_clean;
+use fmu_test_kit::{Arguments, Functions, Importer};
 use std::ffi::CString;
 use std::ptr::{null, null_mut};
 
@@ -487,7 +487,7 @@ fn instantiation() {
         ("fmuType 2", |a| a.fmu_type = 2, &["fmuType", "2"]),
         ("fmuType -1", |a| a.fmu_type = -1, &["fmuType", "-1"]),
     ];
-    let instantiate = |arguments: &Arguments| Importer::instantiate(Functions::of::<Oscillator>(), arguments);
+    let instantiate = |arguments: &Arguments| Importer::instantiate(fmu_export::fmi2::functions::<Oscillator>(), arguments);
     let usual = || Arguments::of::<Oscillator>(CoSimulation);
     for (label, change, words) in cases {
         let mut arguments = usual();

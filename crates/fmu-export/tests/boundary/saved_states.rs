@@ -8,8 +8,8 @@ use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::Status;
 use fmu_export::{Exported, Model};
-use fmu_run::Importer;
-use fmu_run::serialized::*;
+use fmu_test_kit::Importer;
+use fmu_test_kit::serialized::*;
 use std::ops::Range;
 use std::ptr::{null, null_mut};
 

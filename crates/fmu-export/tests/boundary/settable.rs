@@ -7,7 +7,7 @@ use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
 use fmu_export::fmi2::types::Status;
 use fmu_export::{BaseType, Causality, Exported, Initial, Variability, Variable};
-use fmu_run::Importer;
+use fmu_test_kit::Importer;
 use std::ffi::CStr;
 use std::ptr::null;
 

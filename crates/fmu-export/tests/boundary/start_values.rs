@@ -6,7 +6,7 @@ use crate::toys::{Balance, Oscillator, Talker, balance, oscillator::Name, talker
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::Status;
-use fmu_run::Importer;
+use fmu_test_kit::Importer;
 use std::ptr::null;
 
 const MASS: u32 = Name::mass as u32;

@@ -6,8 +6,8 @@ use fmu_export::Exported;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::{Status, fmi2False};
-use fmu_run::either::Either;
-use fmu_run::{Importer, fmi3};
+use fmu_test_kit::either::Either;
+use fmu_test_kit::{Importer, fmi3};
 use std::ops::Range;
 
 const FORCE: u32 = Name::force as u32;

@@ -5,7 +5,7 @@ use crate::toys::{Talker, talker::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::Status;
-use fmu_run::Importer;
+use fmu_test_kit::Importer;
 use std::ffi::{CStr, CString};
 use std::ptr::null;
 

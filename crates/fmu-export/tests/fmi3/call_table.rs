@@ -7,7 +7,7 @@ use fmu_export::Mode::{self, *};
 use fmu_export::fmi3::ALLOWED;
 use fmu_export::fmi3::types::*;
 use fmu_export::{Exported, Standard};
-use fmu_run::fmi3::{Arguments, FUNCTIONS, Importer};
+use fmu_test_kit::fmi3::{Arguments, FUNCTIONS, Importer};
 
 /// Section 2.3.1, super state FMU State Settable.
 const EVERYWHERE: &str = "SetDebugLogging Reset GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize \

@@ -4,7 +4,7 @@ use crate::toys::oscillator::Name::{self, *};
 use crate::toys::{Oscillator, Sum};
 use fmu_export::Interface::*;
 use fmu_export::Variables;
-use fmu_run::fmi3::Importer;
+use fmu_test_kit::fmi3::Importer;
 
 const UNKNOWNS: [Name; 5] = [position, der_position, der_velocity, spring_force, energy];
 const KNOWNS: [Name; 3] = [force, position, velocity];

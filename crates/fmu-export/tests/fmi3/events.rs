@@ -4,7 +4,7 @@ use crate::toys::ticker::Name;
 use crate::toys::*;
 use fmu_export::Interface::*;
 use fmu_export::fmi3::{indicator, types::*};
-use fmu_run::fmi3::{Arguments, Importer, Stepped, Updated};
+use fmu_test_kit::fmi3::{Arguments, Importer, Stepped, Updated};
 
 const SUM: u32 = Name::sum as u32;
 const AMOUNT: u32 = Name::amount as u32;
@@ -97,7 +97,7 @@ fn the_library_handles_them() {
         assert_eq!(fmu.get([SUM]), [3.0]);
         fmu.refused("no event mode", |fmu| fmu.fmi3EnterEventMode());
     }
-    let fmu = fmu_run::Importer::of::<Ticker>(CoSimulation);
+    let fmu = fmu_test_kit::Importer::of::<Ticker>(CoSimulation);
     fmu.initialize(0.0);
     fmu.step(0.0, 0.6);
     assert_eq!(fmu.get([SUM]), [3.0]);
@@ -170,6 +170,6 @@ fn early_return_that_is_not_allowed() {
 #[test]
 fn event_mode_must_be_offered() {
     let arguments = Arguments { event_mode_used: fmi3True, ..Arguments::of::<Fuse>(CoSimulation) };
-    let log = Importer::instantiate(fmu_run::fmi3::Functions::of::<Fuse>(), &arguments).unwrap_err();
+    let log = Importer::instantiate(fmu_export::fmi3::functions::<Fuse>(), &arguments).unwrap_err();
     assert!(log[0].text.contains("hasEventMode is false"), "{log:?}");
 }

@@ -1,6 +1,6 @@
 //! The functions have the types of the standard's headers: a C program says so when it is compiled.
 
-use fmu_run::fmi3::FUNCTIONS;
+use fmu_test_kit::fmi3::FUNCTIONS;
 use std::fmt::Write;
 use std::process::Command;
 
@@ -71,14 +71,14 @@ fn in_c(of: &str) -> String {
 }
 
 fn folder() -> std::path::PathBuf {
-    fmu_run::c_programs::headers(std::path::Path::new(env!("CARGO_MANIFEST_DIR")))
+    fmu_test_kit::c_programs::headers(std::path::Path::new(env!("CARGO_MANIFEST_DIR")))
 }
 
 fn compile(program: &str) {
     let source = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("fmi3_types.c");
     std::fs::write(&source, program).unwrap();
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
-    fmu_run::c_programs::output(
+    fmu_test_kit::c_programs::output(
         Command::new(compiler)
             .args(["-std=c11", "-Wall", "-Werror", "-c", "-o", "/dev/null", "-I"])
             .args([&folder(), &source]),

@@ -5,13 +5,13 @@ use crate::toys::*;
 use fmu_export::Interface::*;
 use fmu_export::fmi3::types::*;
 use fmu_export::{Exported, Mode, Variables};
-use fmu_run::fmi3::{Arguments, Functions, Importer};
+use fmu_test_kit::fmi3::{Arguments, Functions, Importer};
 use std::cell::RefCell;
 use std::ffi::CStr;
 use std::ptr::{null, null_mut};
 
 fn refusal(arguments: &Arguments) -> String {
-    let log = Importer::instantiate(Functions::of::<Sum>(), arguments).unwrap_err();
+    let log = Importer::instantiate(fmu_export::fmi3::functions::<Sum>(), arguments).unwrap_err();
     let [message] = log.as_slice() else { panic!("one message: {log:?}") };
     assert_eq!((message.status, message.category.as_str()), (Status::Error, "logStatusError"));
     message.text.clone()
@@ -34,7 +34,7 @@ fn instances_that_are_refused() {
         let text = refusal(&arguments);
         assert!(text.starts_with("fmi3Instantiate") && text.contains(expected), "{text}");
         let silent = Arguments { logger: false, ..arguments };
-        assert_eq!(Importer::instantiate(Functions::of::<Sum>(), &silent).unwrap_err(), []);
+        assert_eq!(Importer::instantiate(fmu_export::fmi3::functions::<Sum>(), &silent).unwrap_err(), []);
     }
 }
 
@@ -51,7 +51,7 @@ fn scheduled_execution_is_refused() {
         let text = unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned();
         LOG.with_borrow_mut(|log| log.push((status, text)));
     }
-    let functions = Functions::of::<Sum>();
+    let functions = fmu_export::fmi3::functions::<Sum>();
     // SAFETY: strings, NULL and a logger.
     let instance = unsafe {
         (functions.fmi3InstantiateScheduledExecution)(
@@ -75,7 +75,7 @@ fn scheduled_execution_is_refused() {
 
 #[test]
 fn without_an_instance() {
-    let nothing = Importer::null(Functions::of::<Sum>());
+    let nothing = Importer::null(fmu_export::fmi3::functions::<Sum>());
     for (function, status) in nothing.call_all() {
         assert_eq!(status, Status::Error, "{function}");
     }
@@ -100,8 +100,8 @@ fn zeros() {
 
 #[test]
 fn instances_of_the_other_standard() {
-    let old = fmu_run::Importer::of::<Sum>(CoSimulation);
-    let functions = Functions::of::<Sum>();
+    let old = fmu_test_kit::Importer::of::<Sum>(CoSimulation);
+    let functions = fmu_export::fmi3::functions::<Sum>();
     // SAFETY: an instance of the same model, alive.
     let status = unsafe { (functions.fmi3Reset)(old.component()) };
     assert_eq!(status, Status::Error);

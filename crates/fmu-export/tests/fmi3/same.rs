@@ -2,8 +2,8 @@
 
 use crate::toys::*;
 use fmu_export::{Causality, Exported, Interface::*};
-use fmu_run::fmi3;
-use fmu_run::{Importer, serialized};
+use fmu_test_kit::fmi3;
+use fmu_test_kit::{Importer, serialized};
 
 /// All but the byte with standard and interface type, the mode, and the checksum.
 fn content(bytes: &[u8]) -> &[u8] {

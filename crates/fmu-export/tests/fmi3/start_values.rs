@@ -3,7 +3,7 @@
 use crate::toys::{Oscillator, Talker, oscillator, talker};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi3::types::Status;
-use fmu_run::fmi3::Importer;
+use fmu_test_kit::fmi3::Importer;
 
 fn enter(fmu: &Importer) -> Status {
     fmu.fmi3EnterInitializationMode(0, 0.0, 0.0, 0, 0.0)

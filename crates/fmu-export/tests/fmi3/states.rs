@@ -5,7 +5,7 @@ use crate::toys::{Oscillator, Palette, Ticker};
 use fmu_export::Interface::*;
 use fmu_export::Mode;
 use fmu_export::fmi3::types::*;
-use fmu_run::fmi3::{Arguments, Importer};
+use fmu_test_kit::fmi3::{Arguments, Importer};
 use std::ptr::null_mut;
 
 #[test]
@@ -26,7 +26,7 @@ fn every_mode() {
 fn of_the_other_standard() {
     for interface in [CoSimulation, ModelExchange] {
         let (old, new) =
-            (fmu_run::Importer::of::<Oscillator>(interface), Importer::of::<Oscillator>(interface));
+            (fmu_test_kit::Importer::of::<Oscillator>(interface), Importer::of::<Oscillator>(interface));
         old.initialize(0.0);
         new.initialize(0.0);
         let (old_bytes, new_bytes, old_state, new_state) = (old.bytes(), new.bytes(), old.save(), new.save());

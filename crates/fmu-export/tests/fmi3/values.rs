@@ -5,7 +5,7 @@ use crate::toys::{Counter, Palette, Talker};
 use fmu_export::fmi3::independent;
 use fmu_export::fmi3::types::*;
 use fmu_export::{Causality, Enumeration, Exported, Interface::*, Variables};
-use fmu_run::fmi3::Importer;
+use fmu_test_kit::fmi3::Importer;
 use std::ffi::CStr;
 use std::ptr::{null, null_mut};
 
@@ -96,7 +96,7 @@ fn wrong_types() {
 
 #[test]
 fn fmi2_refuses_what_it_lacks() {
-    let fmu = fmu_run::Importer::of::<Palette>(CoSimulation);
+    let fmu = fmu_test_kit::Importer::of::<Palette>(CoSimulation);
     fmu.initialize(0.0);
     for (vr, variable) in (0..).zip(Palette::TABLE).filter(|(_, variable)| !variable.base().is_in_fmi2()) {
         let (mut real, mut whole, mut text) = (0.0, 0, null());
@@ -203,7 +203,7 @@ fn time() {
     let of_talker = Talker::TABLE.iter().position(|variable| variable.causality() == Causality::Independent);
     check::<Talker>(of_talker.map(|place| place as u32));
     // There is none in FMI 2.0.
-    let fmu = fmu_run::Importer::of::<Palette>(CoSimulation);
+    let fmu = fmu_test_kit::Importer::of::<Palette>(CoSimulation);
     fmu.initialize(0.0);
     fmu.refused("the time", |fmu| fmu.fmi2GetReal(&(Palette::TABLE.len() as u32), 1, &mut 0.0));
 }

@@ -4,7 +4,7 @@ use crate::toys::Faulty;
 use crate::toys::faulty::{Fault, Name, while_all_break};
 use crate::{Case, Standard, TEXT, TRUTH, U, X, Y, with_state};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
-use fmu_run::Importer;
+use fmu_test_kit::Importer;
 use std::ptr::{null, null_mut};
 
 /// A call that breaks an instance with this fault: every function that runs a model's code.

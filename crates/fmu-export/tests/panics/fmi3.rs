@@ -5,7 +5,7 @@ use crate::toys::faulty::{Fault, Name, while_all_break};
 use crate::{Case, Standard, TEXT, TRUTH, U, X, Y, with_state};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi3::indicator;
-use fmu_run::fmi3::Importer;
+use fmu_test_kit::fmi3::Importer;
 use std::ptr::{null, null_mut};
 
 /// The same in FMI 3.0: a call that breaks an instance with this fault: every function that runs a model's code.

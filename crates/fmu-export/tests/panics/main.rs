@@ -10,9 +10,9 @@ mod fmi3;
 
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Status;
-use fmu_run::Message;
-use fmu_run::testing::assert_clean;
-use fmu_run::{self as old, fmi3 as new};
+use fmu_test_kit::Message;
+use fmu_test_kit::testing::assert_clean;
+use fmu_test_kit::{self as old, fmi3 as new};
 use std::ffi::c_void;
 use toys::Faulty;
 use toys::faulty::{Fault, Name, while_all_break};
@@ -65,7 +65,7 @@ macro_rules! standard {
 
             fn try_new(interface: Interface) -> Result<Self, Vec<Message>> {
                 Self::instantiate(
-                    $module::Functions::of::<Faulty>(),
+                    fmu_export::$module::functions::<Faulty>(),
                     &$module::Arguments::of::<Faulty>(interface),
                 )
             }

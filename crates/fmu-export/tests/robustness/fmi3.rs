@@ -1,9 +1,9 @@
 //! Random sequences of calls of FMI 3.0.
 
 use crate::toys::*;
-use fmu_run::careless::fmi3::run;
-use fmu_run::careless::{RunBytes, run_seeds};
-use fmu_run::fmi3::FUNCTIONS;
+use fmu_test_kit::careless::fmi3::run;
+use fmu_test_kit::careless::{RunBytes, run_seeds};
+use fmu_test_kit::fmi3::FUNCTIONS;
 
 pub const TOYS: [(&str, RunBytes); 8] = [
     ("oscillator", run::<Oscillator>),

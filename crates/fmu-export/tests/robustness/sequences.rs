@@ -1,8 +1,8 @@
 //! Random sequences of calls; `fuzz` lets libFuzzer look for others.
 
 use crate::toys::*;
-use fmu_run::FUNCTIONS;
-use fmu_run::careless::{RunBytes, Tally, run, run_seeds};
+use fmu_test_kit::FUNCTIONS;
+use fmu_test_kit::careless::{RunBytes, Tally, run, run_seeds};
 
 /// All toys but the faulty one.
 const TOYS: [(&str, RunBytes); 8] = [

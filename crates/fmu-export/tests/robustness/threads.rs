@@ -2,8 +2,8 @@
 
 use crate::toys::{Oscillator, oscillator::Name};
 use fmu_export::Interface::ModelExchange;
-use fmu_run::either::Either;
-use fmu_run::{Importer, fmi3};
+use fmu_test_kit::either::Either;
+use fmu_test_kit::{Importer, fmi3};
 use std::sync::Mutex;
 
 const THREADS: usize = 4;

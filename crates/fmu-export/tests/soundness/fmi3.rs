@@ -5,7 +5,7 @@ use crate::{unwritten, written};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Model;
 use fmu_export::fmi3::{indicator, types::*};
-use fmu_run::fmi3::{Functions, Importer};
+use fmu_test_kit::fmi3::{Functions, Importer};
 use std::cell::{Cell, RefCell};
 use std::ffi::CString;
 use std::mem::MaybeUninit;
@@ -42,7 +42,7 @@ unsafe extern "C" fn call_back(
 /// A logger that calls back, on the way of every message. All it gets is fmi3Error, and nothing for freeing.
 #[test]
 fn the_log_callback_calls_back() {
-    let functions = Functions::of::<Talker>();
+    let functions = fmu_export::fmi3::functions::<Talker>();
     let environment = Box::new(Environment {
         functions,
         instance: Cell::new(null_mut()),

@@ -10,8 +10,8 @@ mod fmi3;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::*;
 use fmu_export::{Exported, Model};
-use fmu_run::either::Either;
-use fmu_run::{Functions, Importer};
+use fmu_test_kit::either::Either;
+use fmu_test_kit::{Functions, Importer};
 use std::cell::{Cell, RefCell};
 use std::ffi::CString;
 use std::mem::MaybeUninit;
@@ -62,7 +62,7 @@ unsafe extern "C" fn call_back(
 /// own. All it gets is fmi2Error, also for fmi2FreeInstance, which has no answer; the call goes on as if nothing was.
 #[test]
 fn the_log_callback_calls_back() {
-    let functions = Functions::of::<Talker>();
+    let functions = fmu_export::fmi2::functions::<Talker>();
     let environment = Box::new(Environment {
         functions,
         component: Cell::new(null_mut()),
@@ -71,7 +71,7 @@ fn the_log_callback_calls_back() {
         messages: Cell::new(0),
     });
     let callbacks = fmi2CallbackFunctions {
-        // SAFETY: named arguments travel the same way in variadic and plain calls, see fmu_run.
+        // SAFETY: named arguments travel the same way in variadic and plain calls, see fmu_test_kit.
         logger: Some(unsafe { std::mem::transmute::<CallBack, fmi2CallbackLogger>(call_back as CallBack) }),
         allocate_memory: None,
         free_memory: None,
@@ -214,7 +214,7 @@ fn freed_in_any_order() {
     }
     fn check_both<M: Exported>() {
         check::<Importer, M>();
-        check::<fmu_run::fmi3::Importer, M>();
+        check::<fmu_test_kit::fmi3::Importer, M>();
     }
     check_both::<Talker>();
     check_both::<Oscillator>();

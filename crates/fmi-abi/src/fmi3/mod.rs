@@ -1,17 +1,15 @@
-//! The functions of FMI 3.0 that work on an instance, listed once: arguments, and where each may be called.
-//!
-//! From this list come the table of allowed calls, the symbols of the library, and the table of function pointers
-//! that importers in Rust use.
+//! FMI 3.0: its C types, and its functions, listed once: arguments, and where each may be called.
 
-use crate::mode::Standard;
-use crate::rule::Rule;
+pub mod types;
 
-/// Passes the list of functions on to another macro: `name (arguments) CS ME tolerated;` for each, after whatever
-/// tokens are given behind the macro's name.
+use types::*;
+
+/// Passes the functions on to another macro, after whatever tokens are given behind its name: those that need no instance with
+/// arguments and result, those that work on one with `name CS ME tolerated (arguments);`.
 ///
 /// The letters are the states of sections 2.3, 3.2 and 4.2: I instantiated, N Initialization Mode, C Step Mode, M Event
 /// Mode, K Continuous-Time Mode, T terminated. In fatal nothing is allowed. For `fmi3Set...` the table has the states;
-/// which variable can be set in which of them is said by [`settable`](crate::settable).
+/// which variable can be set in which of them is said by the exporter.
 ///
 /// An error changes nothing here, so that the importer may go on where the text has the instance go to terminated
 /// (section 2.3.1).
@@ -28,6 +26,22 @@ use crate::rule::Rule;
 #[rustfmt::skip]
 macro_rules! fmi3_functions {
     ($with:path $(, $($before:tt)*)?) => { $with! { $($($before)*)?
+        Fmi3 fmi3Instance
+        without an instance {
+        fmi3GetVersion() -> fmi3String;
+        fmi3InstantiateModelExchange(instance_name: fmi3String, token: fmi3String, resources: fmi3String,
+            visible: fmi3Boolean, logging_on: fmi3Boolean, environment: fmi3InstanceEnvironment,
+            log: Option<fmi3LogMessageCallback>) -> fmi3Instance;
+        fmi3InstantiateCoSimulation(instance_name: fmi3String, token: fmi3String, resources: fmi3String,
+            visible: fmi3Boolean, logging_on: fmi3Boolean, event_mode: fmi3Boolean, early_return: fmi3Boolean,
+            required: *const fmi3ValueReference, n: usize, environment: fmi3InstanceEnvironment,
+            log: Option<fmi3LogMessageCallback>, update: Option<fmi3IntermediateUpdateCallback>) -> fmi3Instance;
+        fmi3InstantiateScheduledExecution(instance_name: fmi3String, token: fmi3String, resources: fmi3String,
+            visible: fmi3Boolean, logging_on: fmi3Boolean, environment: fmi3InstanceEnvironment,
+            log: Option<fmi3LogMessageCallback>, update: Option<fmi3ClockUpdateCallback>,
+            lock: Option<fmi3LockPreemptionCallback>, unlock: Option<fmi3UnlockPreemptionCallback>) -> fmi3Instance;
+        fmi3FreeInstance(c: fmi3Instance) -> ();
+        } with an instance {
         // function                            CS       ME       tolerated
         fmi3SetDebugLogging                    "INCMT"  "INMKT"  ""
             (logging_on: fmi3Boolean, n: usize, categories: *const fmi3String);
@@ -157,29 +171,8 @@ macro_rules! fmi3_functions {
              last_successful_time: *mut fmi3Float64);
         fmi3ActivateModelPartition             ""       ""       ""
             (clock: fmi3ValueReference, activation_time: fmi3Float64);
+        }
     } };
 }
 
-macro_rules! rules {
-    ($($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+) => {
-        /// The functions that work on an instance.
-        #[allow(non_camel_case_types, missing_docs)]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum Function { $($function),+ }
-
-        /// The table of allowed calls, in the order of [`Function`].
-        pub const ALLOWED: &[Rule] = &[
-            $(Rule::new(Standard::Fmi3, stringify!($function), $cs, $me, $tolerated)),+
-        ];
-    };
-}
-
-fmi3_functions!(rules);
-
-impl Function {
-    /// The function's row of the table.
-    #[inline]
-    pub const fn rule(self) -> &'static Rule {
-        &ALLOWED[self as usize]
-    }
-}
+fmi3_functions!(crate::table);

@@ -4,6 +4,8 @@
 use crate::c_types::{c_char, c_int, c_void};
 pub use crate::status::Status;
 
+/// What a call answers: a [`Status`] as C has it, an int, because a foreign library may answer any.
+pub type fmi3Status = c_int;
 /// An instance, as the importer holds it.
 pub type fmi3Instance = *mut c_void;
 /// The importer's own data, handed back to its callbacks.
@@ -62,7 +64,7 @@ pub type fmi3IntervalQualifier = c_int;
 /// The importer's log function.
 pub type fmi3LogMessageCallback = unsafe extern "C" fn(
     environment: fmi3InstanceEnvironment,
-    status: Status,
+    status: fmi3Status,
     category: fmi3String,
     message: fmi3String,
 );

@@ -1,12 +1,14 @@
 //! The C types of FMI 2.0, as in `fmi2TypesPlatform.h` and `fmi2FunctionTypes.h`, written by hand.
 //!
 //! Enumerations that a caller passes in arrive as plain integers ([`fmi2Type`], [`fmi2StatusKind`]),
-//! because a C caller can pass any value; the enumeration that goes out ([`Status`]) is a Rust enum.
+//! because a C caller can pass any value, and so does a [`Status`].
 #![allow(non_camel_case_types)]
 
 use crate::c_types::{c_char, c_int, c_uint, c_void};
 pub use crate::status::Status;
 
+/// What a call answers: a [`Status`] as C has it, an int, because a foreign library may answer any.
+pub type fmi2Status = c_int;
 /// An instance, as the importer holds it.
 pub type fmi2Component = *mut c_void;
 /// The importer's own data, handed back to its callbacks.
@@ -69,7 +71,7 @@ impl StatusKind {
 pub type fmi2CallbackLogger = unsafe extern "C" fn(
     environment: fmi2ComponentEnvironment,
     instance_name: fmi2String,
-    status: Status,
+    status: fmi2Status,
     category: fmi2String,
     message: fmi2String,
     ...
@@ -80,7 +82,7 @@ pub type fmi2CallbackAllocateMemory = unsafe extern "C" fn(count: usize, size: u
 /// The importer's `free`. Never called.
 pub type fmi2CallbackFreeMemory = unsafe extern "C" fn(memory: *mut c_void);
 /// Tells the importer that an asynchronous step has ended. Never called: no step is asynchronous.
-pub type fmi2StepFinished = unsafe extern "C" fn(environment: fmi2ComponentEnvironment, status: Status);
+pub type fmi2StepFinished = unsafe extern "C" fn(environment: fmi2ComponentEnvironment, status: fmi2Status);
 
 /// The importer's callbacks; each may be NULL.
 #[derive(Clone, Copy)]

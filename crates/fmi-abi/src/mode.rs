@@ -1,42 +1,7 @@
 //! The states of an instance in the standards' state machines, and sets of them.
 
+use crate::standard::{Interface, Standard};
 use std::fmt;
-
-/// The standard that an importer speaks with an instance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Standard {
-    /// FMI 2.0.
-    Fmi2 = 0,
-    /// FMI 3.0.
-    Fmi3 = 1,
-}
-
-impl fmt::Display for Standard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Fmi2 => "FMI 2.0",
-            Self::Fmi3 => "FMI 3.0",
-        })
-    }
-}
-
-/// The type of interface that an instance was made for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Interface {
-    /// The importer integrates.
-    ModelExchange = 0,
-    /// The FMU steps itself.
-    CoSimulation = 1,
-}
-
-impl fmt::Display for Interface {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::ModelExchange => "Model Exchange",
-            Self::CoSimulation => "Co-Simulation",
-        })
-    }
-}
 
 /// The state of an instance in the sense of the standards' state machines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +43,8 @@ const MODES: [(Mode, u8, &str); 9] = [
 ];
 
 impl Mode {
-    pub(crate) fn from_number(number: i64) -> Option<Self> {
+    /// The mode with this number, as serialized states have it.
+    pub fn from_number(number: i64) -> Option<Self> {
         MODES.into_iter().map(|(mode, ..)| mode).find(|mode| i64::from(*mode as u32) == number)
     }
 }
@@ -142,7 +108,7 @@ impl Situations {
 
     /// Both sets together.
     #[must_use]
-    pub const fn and(self, other: Self) -> Self {
+    pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
@@ -175,23 +141,17 @@ impl Situations {
 
 /// Where an instance is: its standard, its interface type and its mode, as one bit that a set is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Situation(u64);
+pub struct Situation(u64);
 
 impl Situation {
+    /// Of an instance.
     pub const fn new(standard: Standard, interface: Interface, mode: Mode) -> Self {
         Self(bit(standard, interface, mode))
     }
 
+    /// Whether the set has it.
     #[inline]
     pub const fn is_in(self, set: Situations) -> bool {
         self.0 & set.0 != 0
     }
 }
-
-/// Where start values are set.
-pub(crate) const STARTING: Situations =
-    Situations::new(Standard::Fmi2, "IN", "IN").and(Situations::new(Standard::Fmi3, "IN", "IN"));
-
-/// The modes that instances can be in, short of fatal.
-pub(crate) const POSSIBLE: Situations = Situations::new(Standard::Fmi2, "INCFTE", "INMKTE")
-    .and(Situations::new(Standard::Fmi3, "INCMT", "INMKT"));

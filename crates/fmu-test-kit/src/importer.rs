@@ -1,8 +1,8 @@
 //! An instance as an importer holds it: the C functions as methods.
 
 use crate::library::functions_of;
-use fmu_export::fmi2::Functions;
-use fmu_export::fmi2::types::*;
+use fmi_abi::fmi2::Functions;
+use fmi_abi::fmi2::types::*;
 use fmu_export::{Exported, Interface};
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ops::Deref;
@@ -20,19 +20,6 @@ pub struct Message {
     pub category: String,
     /// The text.
     pub text: String,
-}
-
-/// The answer of a library that may be anybody's: what is no status is an error, and so is `fmi2Pending`, as nothing here
-/// waits for steps.
-#[inline]
-pub(crate) fn status(code: c_int) -> Status {
-    match code {
-        0 => Status::Ok,
-        1 => Status::Warning,
-        2 => Status::Discard,
-        4 => Status::Fatal,
-        _ => Status::Error,
-    }
 }
 
 /// The importer's log; its address is the component environment.
@@ -73,7 +60,7 @@ pub(crate) unsafe fn remember_message(
         Some(_) => unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned(),
         None => String::new(),
     };
-    let status = self::status(status);
+    let status = Status::from_c(status);
     let [instance_name, category, text] = [instance_name, category, message].map(text);
     // SAFETY: NULL or the `Log` that was handed to fmi2Instantiate and lives as long as the instance.
     if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
@@ -223,9 +210,9 @@ impl Importer {
 
     /// What needs no instance: version and platform (section 2.1.4).
     pub fn version_and_platform(&self) -> [&CStr; 2] {
-        let texts = [(self.functions.fmi2GetVersion)(), (self.functions.fmi2GetTypesPlatform)()];
-        // SAFETY: both are strings that the library keeps.
-        texts.map(|text| unsafe { CStr::from_ptr(text) })
+        let Functions { fmi2GetVersion, fmi2GetTypesPlatform, .. } = self.functions;
+        // SAFETY: both give strings that the library keeps.
+        [fmi2GetVersion, fmi2GetTypesPlatform].map(|text| unsafe { CStr::from_ptr(text()) })
     }
 }
 
@@ -270,7 +257,13 @@ impl<T> Zero for *mut T {
 }
 
 macro_rules! methods {
-    ($($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+) => {
+    (
+        $standard:ident $handle:ident
+        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
+        with an instance {
+            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
+        }
+    ) => {
         /// The functions of the standard, under their names, with the arguments of C.
         #[allow(non_snake_case, missing_docs)]
         impl Importer {
@@ -279,13 +272,8 @@ macro_rules! methods {
                 #[inline]
                 pub fn $function(&self $(, $argument: $type)*) -> Status {
                     // SAFETY: the component is NULL or alive. Pointers are passed on as they are: who uses this type
-                    // passes NULL or pointers to as many values as it says, as in C. There an enumeration is returned
-                    // as an int is, and a foreign library may return any.
-                    status(unsafe {
-                        let function: unsafe extern "C" fn(fmi2Component $(, $type)*) -> c_int =
-                            std::mem::transmute(self.functions.$function);
-                        function(self.component $(, $argument)*)
-                    })
+                    // passes NULL or pointers to as many values as it says, as in C.
+                    Status::from_c(unsafe { (self.functions.$function)(self.component $(, $argument)*) })
                 }
             )+
 
@@ -300,4 +288,4 @@ macro_rules! methods {
     };
 }
 
-fmu_export::fmi2_functions!(methods);
+fmi_abi::fmi2_functions!(methods);

@@ -1,6 +1,6 @@
 //! The types of C: libc's, or where there is no C library, Rust's own.
 
 #[cfg(not(target_family = "wasm"))]
-pub(crate) use libc::{c_char, c_int, c_uint, c_void};
+pub use libc::{c_char, c_int, c_uint, c_void};
 #[cfg(target_family = "wasm")]
-pub(crate) use std::ffi::{c_char, c_int, c_uint, c_void};
+pub use std::ffi::{c_char, c_int, c_uint, c_void};

@@ -1,6 +1,7 @@
 //! A row of a standard's table of allowed calls.
 
-use crate::mode::{Situations, Standard};
+use crate::mode::Situations;
+use crate::standard::Standard;
 
 /// Where one function may be called.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +15,9 @@ pub struct Rule {
 }
 
 impl Rule {
-    pub(crate) const fn new(
+    /// A row: the letters of [`Situations::new`] for either interface type; what is tolerated holds for those that have the
+    /// function.
+    pub const fn new(
         of: Standard,
         name: &'static str,
         co_simulation: &str,
@@ -28,6 +31,6 @@ impl Rule {
 
     /// Where the call is accepted.
     pub const fn accepted(&self) -> Situations {
-        self.standard.and(self.tolerated)
+        self.standard.union(self.tolerated)
     }
 }

@@ -1,5 +1,7 @@
 //! The answer to a call.
 
+use crate::c_types::c_int;
+
 /// What a call answers (section 2.1.3).
 ///
 /// `Pending` is missing on purpose: no function here works asynchronously.
@@ -16,4 +18,19 @@ pub enum Status {
     Error = 3,
     /// The instance is broken for good.
     Fatal = 4,
+}
+
+impl Status {
+    /// The answer of a library that may be anybody's: what is no status is an error, and so is `Pending`, where nothing waits
+    /// for steps.
+    #[inline]
+    pub const fn from_c(code: c_int) -> Self {
+        match code {
+            0 => Self::Ok,
+            1 => Self::Warning,
+            2 => Self::Discard,
+            4 => Self::Fatal,
+            _ => Self::Error,
+        }
+    }
 }

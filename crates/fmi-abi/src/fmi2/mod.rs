@@ -1,18 +1,16 @@
-//! The functions of FMI 2.0 that work on an instance, listed once: arguments, and where each may be called.
-//!
-//! From this list come the table of allowed calls, the symbols of the library, and the table of function pointers
-//! that importers in Rust use.
+//! FMI 2.0: its C types, and its functions, listed once: arguments, and where each may be called.
 
-use crate::mode::Standard;
-use crate::rule::Rule;
+pub mod types;
 
-/// Passes the list of functions on to another macro: `name (arguments) CS ME tolerated;` for each, after whatever
-/// tokens are given behind the macro's name.
+use types::*;
+
+/// Passes the functions on to another macro, after whatever tokens are given behind its name: those that need no instance with
+/// arguments and result, those that work on one with `name CS ME tolerated (arguments);`.
 ///
 /// The letters are the columns of the standard's tables (sections 4.2.4 and 3.2.3): I instantiated,
 /// N initialization, C step complete, F step failed, M event, K continuous time, T terminated, E error. In fatal
 /// nothing is allowed. For `fmi2Set...` the table has the columns; which variable can be set in which of them is said
-/// by [`settable`](crate::settable). `fmi2CancelStep` belongs to asynchronous steps, which do not exist here.
+/// by the exporter. `fmi2CancelStep` belongs to asynchronous steps, which do not exist here.
 ///
 /// Tolerated, for interface types that have the function:
 ///   fmi2Terminate after an error (FMI Library calls it in a destructor);
@@ -24,6 +22,14 @@ use crate::rule::Rule;
 #[rustfmt::skip]
 macro_rules! fmi2_functions {
     ($with:path $(, $($before:tt)*)?) => { $with! { $($($before)*)?
+        Fmi2 fmi2Component
+        without an instance {
+        fmi2GetTypesPlatform() -> fmi2String;
+        fmi2GetVersion() -> fmi2String;
+        fmi2Instantiate(instance_name: fmi2String, fmu_type: fmi2Type, guid: fmi2String, resource_location: fmi2String,
+            functions: *const fmi2CallbackFunctions, visible: fmi2Boolean, logging_on: fmi2Boolean) -> fmi2Component;
+        fmi2FreeInstance(c: fmi2Component) -> ();
+        } with an instance {
         // function                         CS        ME        tolerated
         fmi2SetDebugLogging                 "INCFTE"  "INMKTE"  ""
             (logging_on: fmi2Boolean, n: usize, categories: *const fmi2String);
@@ -68,7 +74,7 @@ macro_rules! fmi2_functions {
         fmi2DoStep                          "C"       ""        ""
             (point: fmi2Real, step_size: fmi2Real, no_set_state_prior: fmi2Boolean);
         fmi2CancelStep                      ""        ""        "" ();
-        fmi2GetStatus                       "CFT"     ""        "" (kind: fmi2StatusKind, value: *mut Status);
+        fmi2GetStatus                       "CFT"     ""        "" (kind: fmi2StatusKind, value: *mut fmi2Status);
         fmi2GetRealStatus                   "CFT"     ""        "" (kind: fmi2StatusKind, value: *mut fmi2Real);
         fmi2GetIntegerStatus                "CFT"     ""        "" (kind: fmi2StatusKind, value: *mut fmi2Integer);
         fmi2GetBooleanStatus                "CFT"     ""        "" (kind: fmi2StatusKind, value: *mut fmi2Boolean);
@@ -84,27 +90,8 @@ macro_rules! fmi2_functions {
         fmi2GetEventIndicators              ""        "NMKTE"   "" (indicators: *mut fmi2Real, ni: usize);
         fmi2GetContinuousStates             ""        "NMKTE"   "" (x: *mut fmi2Real, nx: usize);
         fmi2GetNominalsOfContinuousStates   ""        "INMKTE"  "" (nominals: *mut fmi2Real, nx: usize);
+        }
     } };
 }
 
-macro_rules! rules {
-    ($($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+) => {
-        /// The functions that work on an instance.
-        #[allow(non_camel_case_types, missing_docs)]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum Function { $($function),+ }
-
-        /// The table of allowed calls, in the order of [`Function`].
-        pub const ALLOWED: &[Rule] = &[$(Rule::new(Standard::Fmi2, stringify!($function), $cs, $me, $tolerated)),+];
-    };
-}
-
-fmi2_functions!(rules);
-
-impl Function {
-    /// The function's row of the table.
-    #[inline]
-    pub const fn rule(self) -> &'static Rule {
-        &ALLOWED[self as usize]
-    }
-}
+fmi2_functions!(crate::table);

@@ -392,7 +392,7 @@ impl<M: Exported> Session<'_, M> {
             made_of.resource_path = *u.choose(&texts)?;
             made_of.required_intermediate_variables = if u.ratio(1, 8)? { &[0] } else { &[] };
         }
-        let made = Importer::instantiate(Functions::of::<M>(), &made_of);
+        let made = Importer::instantiate(fmu_export::fmi3::functions::<M>(), &made_of);
         let function = match made_of.interface {
             Interface::ModelExchange => "fmi3InstantiateModelExchange",
             Interface::CoSimulation => "fmi3InstantiateCoSimulation",
@@ -519,7 +519,7 @@ impl<M: Exported> Session<'_, M> {
             other.forget(state);
         }
         // What must survive that there is no instance.
-        for (function, status) in Importer::null(Functions::of::<M>()).call_all() {
+        for (function, status) in Importer::null(fmu_export::fmi3::functions::<M>()).call_all() {
             assert_eq!(status, Status::Error, "{function} without an instance");
             self.count(function, status);
         }

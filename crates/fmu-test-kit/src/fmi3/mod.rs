@@ -1,15 +1,13 @@
 //! The same for FMI 3.0: an instance as an importer holds it, the C functions as methods.
 
-mod library;
 mod testing;
 
-pub use fmu_export::fmi3::Functions;
-pub use library::{Library, load};
+pub use fmi_abi::fmi3::Functions;
 pub use testing::{Stepped, Updated};
 
-use crate::importer::{Log, Zero, remember_message, status};
+use crate::importer::{Log, Zero, remember_message};
 use crate::{Borrowed, Message};
-use fmu_export::fmi3::types::*;
+use fmi_abi::fmi3::types::*;
 use fmu_export::{Exported, Interface};
 use std::ffi::{CStr, CString, c_int};
 use std::ptr::{null, null_mut};
@@ -98,10 +96,7 @@ impl Importer {
             true => (&raw const *log).cast_mut().cast(),
             false => null_mut(),
         };
-        let remember: unsafe extern "C" fn(_, _, _, _) = remember;
-        // SAFETY: in C an enumeration is passed as an int is.
-        let callback =
-            arguments.logger.then(|| unsafe { std::mem::transmute::<_, fmi3LogMessageCallback>(remember) });
+        let callback = arguments.logger.then_some(remember as fmi3LogMessageCallback);
         let required = arguments.required_intermediate_variables;
         // SAFETY: NULL or living values, all of them.
         let instance = unsafe {
@@ -147,7 +142,7 @@ impl Importer {
     /// # Panics
     /// When there is none.
     pub fn with<M: Exported>(arguments: &Arguments) -> Self {
-        Self::instantiate(Functions::of::<M>(), arguments)
+        Self::instantiate(fmu_export::fmi3::functions::<M>(), arguments)
             .unwrap_or_else(|log| panic!("there is no instance: {log:?}"))
     }
 
@@ -182,7 +177,13 @@ impl Importer {
 }
 
 macro_rules! methods {
-    ($($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+) => {
+    (
+        $standard:ident $handle:ident
+        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
+        with an instance {
+            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
+        }
+    ) => {
         /// The functions of the standard, under their names, with the arguments of C.
         #[allow(non_snake_case, missing_docs, clippy::too_many_arguments)]
         impl Importer {
@@ -191,13 +192,8 @@ macro_rules! methods {
                 #[inline]
                 pub fn $function(&self $(, $argument: $type)*) -> Status {
                     // SAFETY: the instance is NULL or alive. Pointers are passed on as they are: who uses this type
-                    // passes NULL or pointers to as many values as it says, as in C. There an enumeration is returned
-                    // as an int is, and a foreign library may return any.
-                    status(unsafe {
-                        let function: unsafe extern "C" fn(fmi3Instance $(, $type)*) -> c_int =
-                            std::mem::transmute(self.functions.$function);
-                        function(self.instance $(, $argument)*)
-                    })
+                    // passes NULL or pointers to as many values as it says, as in C.
+                    Status::from_c(unsafe { (self.functions.$function)(self.instance $(, $argument)*) })
                 }
             )+
 
@@ -223,4 +219,4 @@ macro_rules! methods {
     };
 }
 
-fmu_export::fmi3_functions!(methods);
+fmi_abi::fmi3_functions!(methods);

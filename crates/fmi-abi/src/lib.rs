@@ -1,0 +1,54 @@
+#![doc = include_str!("../README.md")]
+
+pub mod c_types;
+pub mod fmi2;
+pub mod fmi3;
+mod log_category;
+mod mode;
+mod rule;
+mod standard;
+mod status;
+
+pub use log_category::Category;
+pub use mode::{Mode, Situation, Situations};
+pub use rule::Rule;
+pub use standard::{Interface, Standard};
+pub use status::Status;
+
+/// What the list of a standard's functions says, as items of its module.
+macro_rules! table {
+    (
+        $standard:ident $handle:ident
+        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
+        with an instance {
+            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
+        }
+    ) => {
+        /// The functions that work on an instance.
+        #[allow(non_camel_case_types, missing_docs)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Function { $($function),+ }
+
+        impl Function {
+            /// The function's row of the table.
+            #[inline]
+            pub const fn rule(self) -> &'static $crate::Rule {
+                &ALLOWED[self as usize]
+            }
+        }
+
+        /// The table of allowed calls, in the order of [`Function`].
+        pub const ALLOWED: &[$crate::Rule] = &[
+            $($crate::Rule::new($crate::Standard::$standard, stringify!($function), $cs, $me, $tolerated)),+
+        ];
+
+        /// Pointers to all functions of the standard: what an importer has of a library.
+        #[allow(missing_docs, non_snake_case, reason = "each has the name of its function")]
+        #[derive(Clone, Copy, Debug)]
+        pub struct Functions {
+            $(pub $free: unsafe extern "C" fn($($free_type),*) -> $result,)+
+            $(pub $function: unsafe extern "C" fn($handle $(, $type)*) -> $crate::c_types::c_int,)+
+        }
+    };
+}
+pub(crate) use table;
