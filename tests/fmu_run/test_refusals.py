@@ -159,6 +159,14 @@ def test_an_fmu_that_makes_no_instances(tmp_path, unruly):
     assert np.isnan(runs["y"]).all() and np.isnan(runs["y", "peak"]).all()
 
 
+def test_units_of_declared_types(unruly, unruly3):
+    of = {"slope": "m/s", "y": "m", "gap": "mm", "odd": None, "count": None}
+    of3 = {"y": "m", "gap": "mm", "number": None, "temper": None}
+    for path, units in ((unruly, of), (unruly3, of3)):
+        with fmu_run.Fmu(path) as fmu:
+            assert {name: fmu.variables[name].unit for name in units} == units
+
+
 def test_other_types(unruly):
     with fmu_run.Fmu(unruly) as fmu:
         assert fmu.variables["label"].type == "String" and fmu.variables["count"].start == "3"

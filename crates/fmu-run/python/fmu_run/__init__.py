@@ -32,7 +32,7 @@ class Variable:
     """A variable as the model description has it.
 
     type: Real, Integer, Boolean, String, Enumeration, or one of FMI 3.0's other types. causality: input, output, parameter,
-    local and so on. variability, start, unit: None where nothing is said; start as it is written.
+    local and so on. variability, start, unit: None where nothing is said; start as it is written, unit also from the declared type.
     """
 
     name: str
