@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from pathlib import Path
 
 import pytest
@@ -45,4 +46,4 @@ def unruly(tmp_path_factory) -> Path:
 @pytest.fixture(scope="session")
 def unruly3(tmp_path_factory) -> Path:
     """The same for FMI 3.0, in what FMI 3.0 has of its own (unruly3.c)."""
-    return build(tmp_path_factory.mktemp("unruly3"), name="unruly3", platform="x86_64-linux")
+    return build(tmp_path_factory.mktemp("unruly3"), name="unruly3", platform=f"{platform.machine()}-linux")

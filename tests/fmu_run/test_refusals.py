@@ -1,14 +1,17 @@
-"""What does not fit, FMUs that misbehave, and what stops runs."""
+"""What does not fit, FMUs that cannot be loaded, and what stops runs."""
 
 from __future__ import annotations
 
+import platform
 import re
 import signal
 import subprocess
 import sys
 import time as clock
 import zipfile
+from pathlib import Path
 
+import fmpy
 import fmu_run
 import numpy as np
 import pytest
@@ -115,6 +118,58 @@ def test_no_library_for_this_platform(tmp_path, testbed):
             archive.writestr(moved, whole.read(name))
     with pytest.raises(fmu_run.FmuError, match="has no library for this platform .*; it has: vax-vms"):
         fmu_run.Fmu(path)
+
+
+def repacked(fmu, path, change) -> Path:
+    """The FMU at `path`, each file as `change(name, content)` makes it."""
+    with zipfile.ZipFile(fmu) as whole, zipfile.ZipFile(path, "w") as archive:
+        for name in whole.namelist():
+            archive.writestr(name, change(name, whole.read(name)))
+    return path
+
+
+# Libraries that FMPy brings for the machines it knows, and the processor's number in an ELF header (ELF-64, e_machine).
+FMPY = Path(fmpy.__file__).parent
+FOREIGN = {
+    "Windows on x86_64": lambda _: (FMPY / "logging/win64/logging.dll").read_bytes(),
+    "Windows on x86": lambda _: (FMPY / "logging/win32/logging.dll").read_bytes(),
+    "macOS on x86_64 and aarch64": lambda _: (FMPY / "cswrapper/cswrapper.dylib").read_bytes(),
+    "Linux on loongarch64": lambda library: library[:18] + bytes([2, 1]) + library[20:],
+    "Linux on riscv64": lambda library: library[:18] + bytes([243, 0]) + library[20:],
+}
+
+
+@pytest.mark.parametrize("made_for", FOREIGN)
+def test_a_library_of_another_machine(tmp_path, testbed, made_for):
+    def change(name, content):
+        return FOREIGN[made_for](content) if name.startswith("binaries/") else content
+
+    path = repacked(testbed, tmp_path / "foreign.fmu", change)
+    this = f"{platform.system()} on {platform.machine()}"
+    with pytest.raises(fmu_run.FmuError) as raised:
+        fmu_run.Fmu(path)
+    assert str(raised.value).endswith(f"its library cannot be loaded: it is for {made_for}, and this is {this}")
+
+
+def test_a_library_that_is_damaged(tmp_path, testbed):
+    def change(name, content):
+        return content[:200] if name.startswith("binaries/") else content
+
+    path = repacked(testbed, tmp_path / "damaged.fmu", change)
+    # In the words of the system.
+    with pytest.raises(fmu_run.FmuError, match=r"its library cannot be loaded: dlopen failed: .*\.so: "):
+        fmu_run.Fmu(path)
+
+
+def test_an_execution_tool(tmp_path, unruly):
+    def change(name, content):
+        return content.replace(b"<CoSimulation ", b'<CoSimulation needsExecutionTool="true" ')
+
+    path = repacked(unruly, tmp_path / "tool.fmu", change)
+    with pytest.raises(fmu_run.FmuError, match=r"needsExecutionTool.*execution_tool=True"):
+        fmu_run.Fmu(path)
+    with fmu_run.Fmu(path, execution_tool=True) as fmu:
+        assert fmu.run(TIME, outputs=["y"]).ok.all()
 
 
 def test_an_fmu_that_is_closed(testbed):

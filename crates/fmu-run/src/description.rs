@@ -47,6 +47,8 @@ pub struct Description {
     pub identifier: String,
     /// One instance in a process is all there may be.
     pub once_per_process: bool,
+    /// Its library starts another program, which must be installed.
+    pub needs_execution_tool: bool,
     /// It takes input derivatives (FMI 2.0, `canInterpolateInputs`).
     pub input_derivatives: bool,
     /// In the order of the model description.
@@ -77,11 +79,6 @@ impl Description {
                 .ok_or_else(|| format!("modelDescription.xml: {} lacks {name}", node.tag_name().name()))
         };
         let is_true = |name| matches!(slave.attribute(name), Some("true" | "1"));
-        if is_true("needsExecutionTool") {
-            return Err(
-                "it needs another program to run (needsExecutionTool), which is not started here".to_owned()
-            );
-        }
         let (token, variables) = match standard {
             Standard::Fmi2 => ("guid", variables_of_fmi2(root)),
             Standard::Fmi3 => ("instantiationToken", variables_of_fmi3(root)),
@@ -93,6 +90,7 @@ impl Description {
             token: needed(root, token)?,
             identifier: needed(slave, "modelIdentifier")?,
             once_per_process: is_true("canBeInstantiatedOnlyOncePerProcess"),
+            needs_execution_tool: is_true("needsExecutionTool"),
             input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
             places: variables.iter().enumerate().map(|(place, of)| (of.name.clone(), place)).collect(),
             variables,

@@ -115,10 +115,12 @@ class Fmu:
 
     Its library runs in this process: where it crashes, the process is gone. Raises FmuError where the file is no FMU, or has
     no library for this platform.
+
+    execution_tool: run it also if its library starts another program (needsExecutionTool), which must be installed.
     """
 
-    def __init__(self, path: str | os.PathLike[str]):
-        self._loaded = _Loaded(os.fspath(path))
+    def __init__(self, path: str | os.PathLike[str], *, execution_tool: bool = False):
+        self._loaded = _Loaded(os.fspath(path), execution_tool)
         #: "2.0" or "3.0"; the name of the model; guid or instantiation token.
         self.fmi_version, self.model_name, self.token, self._once = self._loaded.about()
         #: The variables by name, in the order of the model description. Arrays and clocks of FMI 3.0 are left out.

@@ -52,10 +52,11 @@ fn python(error: Error) -> PyErr {
 #[pymethods]
 impl Loaded {
     #[new]
-    fn new(py: Python, path: PathBuf) -> PyResult<Self> {
+    fn new(py: Python, path: PathBuf, execution_tool: bool) -> PyResult<Self> {
+        let open = if execution_tool { Fmu::open_with_execution_tool } else { Fmu::open };
         // SAFETY: the user names a file that is an FMU; its library is trusted as any extension module is.
         #[allow(unsafe_code)]
-        let fmu = py.detach(|| unsafe { Fmu::open(&path) }).map_err(python)?;
+        let fmu = py.detach(|| unsafe { open(&path) }).map_err(python)?;
         Ok(Self(Mutex::new(Some(Arc::new(fmu)))))
     }
 
