@@ -79,6 +79,10 @@ def test_refused_runs_leave_the_others_alone(fmu):
     angle = np.where(TIME > 0.45, np.inf, 0.0)
     one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"])
     assert re.match(r"at 0\.5 s: .*theta1", one.errors[0]), one.errors
+    # Or at the last time, when all outputs have been read.
+    angle = np.where(TIME > 0.95, np.inf, 0.0)
+    one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"], read_before_set=True)
+    assert re.match(r"at 1 s: .*theta1", one.errors[0]) and np.isfinite(one["roll"]).all()
 
 
 @pytest.mark.parametrize(
@@ -178,40 +182,6 @@ def test_an_fmu_that_is_closed(testbed):
     fmu.close()
     with pytest.raises(fmu_run.FmuError, match="the FMU is closed"):
         fmu.run(TIME, outputs=["roll"])
-
-
-MOODS = {
-    "good": None,
-    "silent error": "at 0.5 s: fmi2DoStep was answered with Error, without a message",
-    "pending": "at 0.5 s: fmi2DoStep was answered with Error, without a message",
-    "fatal": "at 0.5 s: fmi2DoStep was answered with Fatal, without a message",
-    "discard": "at 0.5 s: fmi2DoStep: no more of this after %s",
-    "no status": "at 0.5 s: fmi2DoStep was answered with Error, without a message",
-    "no reset": None,
-    "warning": None,
-}
-
-
-def test_an_unruly_fmu(unruly):
-    with fmu_run.Fmu(unruly) as fmu:
-        moods = np.repeat(np.arange(len(MOODS)), 3)
-        runs = fmu.run(TIME, start={"mood": moods}, outputs=["y", "instances"], threads=4)
-    expected = {run: MOODS[list(MOODS)[mood]] for run, mood in enumerate(moods) if MOODS[list(MOODS)[mood]]}
-    assert runs.errors == expected
-    np.testing.assert_allclose(runs["y"][runs.ok], 4.0 + np.tile(TIME, (9, 1)), atol=1e-15)
-    # It may be there only once in a process; one that was fatal could not even be freed.
-    assert np.nanmax(runs["instances"]) <= 1 + 3
-
-
-def test_an_fmu_that_makes_no_instances(tmp_path, unruly):
-    path = tmp_path / "strange.fmu"
-    with zipfile.ZipFile(unruly) as whole, zipfile.ZipFile(path, "w") as archive:
-        for name in whole.namelist():
-            archive.writestr(name, whole.read(name).replace(b'guid="{unruly}"', b'guid="{strange}"'))
-    with fmu_run.Fmu(path) as fmu:
-        runs = fmu.run(TIME, start={"slope": [1.0, 2.0]}, outputs=["y"], every=1, measures=["peak"])
-    assert runs.errors == dict.fromkeys((0, 1), "Unruly makes no instance, and logs no message")
-    assert np.isnan(runs["y"]).all() and np.isnan(runs["y", "peak"]).all()
 
 
 def test_units_of_declared_types(unruly, unruly3):
