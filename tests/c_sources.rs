@@ -2,7 +2,7 @@
 //! the compiled sources in the environment variable `FMU_LIBRARY`.
 
 use fmu_test_kit::careless::{random_bytes, record};
-use fmu_test_kit::{Functions, functions_of};
+use fmu_test_kit::functions_of;
 use prw_testbed::TestbedFmu;
 
 /// Any calls in any order: the same bits, statuses and texts.

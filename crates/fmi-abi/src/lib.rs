@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod base_type;
 pub mod c_types;
 pub mod fmi2;
 pub mod fmi3;
@@ -9,6 +10,7 @@ mod rule;
 mod standard;
 mod status;
 
+pub use base_type::BaseType;
 pub use log_category::Category;
 pub use mode::{Mode, Situation, Situations};
 pub use rule::Rule;

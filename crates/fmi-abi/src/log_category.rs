@@ -5,7 +5,6 @@ use std::ffi::CStr;
 
 /// What a message is about; becomes `LogCategories` (section 2.2.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Category {
     /// The course of the simulation.
     Events,

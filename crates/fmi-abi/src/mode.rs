@@ -6,7 +6,6 @@ use std::fmt;
 /// The state of an instance in the sense of the standards' state machines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-#[non_exhaustive]
 pub enum Mode {
     /// After it was made or reset.
     Instantiated = 1,

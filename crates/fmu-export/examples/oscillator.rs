@@ -3,5 +3,4 @@
 #[path = "../tests/toys/oscillator.rs"]
 mod oscillator;
 
-fmu_export::fmi2_symbols!(oscillator::Oscillator);
-fmu_export::fmi3_symbols!(oscillator::Oscillator);
+fmu_export::symbols!(oscillator::Oscillator);

@@ -3,5 +3,4 @@
 #[path = "../tests/toys/talker.rs"]
 mod talker;
 
-fmu_export::fmi2_symbols!(talker::Talker);
-fmu_export::fmi3_symbols!(talker::Talker);
+fmu_export::symbols!(talker::Talker);

@@ -30,13 +30,13 @@ pub use capabilities::{
     StepCompleted, Stepped,
 };
 pub use export::{CoSimulationOffer, Exported, ModelExchangeOffer};
-pub use fmi_abi::{Category, Interface, Mode, Rule, Situations, Standard, Status};
+pub use fmi_abi::{BaseType, Category, Interface, Mode, Rule, Situations, Standard, Status};
 pub use info::{DefaultExperiment, Info};
 pub use log::Log;
 pub use model::{Error, Experiment, Model, Setup};
 pub use saved::{Saved, StateVisitor};
 pub use table::Variables;
-pub use types::{Attributes, BINARY, BOOLEAN, BaseType, INTEGER, Item, NUMBER, STRING, TIME, Type};
+pub use types::{Attributes, BINARY, BOOLEAN, INTEGER, Item, NUMBER, STRING, TIME, Type};
 pub use units::{BaseUnit, DisplayUnit, Unit};
 pub use value::{Enumeration, Scalar, Value};
 pub use variable::{Causality, Index, Initial, Variability, Variable};

@@ -1,81 +1,13 @@
 //! Types of variables: what kind of value, in which unit, in which range.
 
 use crate::units::{self, Unit};
-use std::fmt;
+use fmi_abi::BaseType;
 
-/// The kinds of values that variables have. FMI 2.0 has Real, Integer, Boolean, String and Enumeration only; FMI 3.0
-/// calls a Real Float64 and an Integer Int32, and has the others as well.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum BaseType {
-    /// A floating-point number, `f64` in Rust.
-    Real,
-    /// A floating-point number, `f32` in Rust.
-    Float32,
-    /// A whole number, `i32` in Rust.
-    Integer,
-    /// A whole number, `i8` in Rust.
-    Int8,
-    /// A whole number, `u8` in Rust.
-    UInt8,
-    /// A whole number, `i16` in Rust.
-    Int16,
-    /// A whole number, `u16` in Rust.
-    UInt16,
-    /// A whole number, `u32` in Rust.
-    UInt32,
-    /// A whole number, `i64` in Rust.
-    Int64,
-    /// A whole number, `u64` in Rust.
-    UInt64,
-    /// A truth value, `bool` in Rust.
-    Boolean,
-    /// A text, `String` in Rust.
-    String,
-    /// Bytes, `Vec<u8>` in Rust.
-    Binary,
-    /// One of a list of names, an enum in Rust made by [`enumeration!`](crate::enumeration).
-    Enumeration,
-}
-
-impl BaseType {
-    /// Whether FMI 2.0 has it.
-    pub const fn is_in_fmi2(self) -> bool {
-        matches!(self, Self::Real | Self::Integer | Self::Boolean | Self::String | Self::Enumeration)
-    }
-
-    /// Whether it is a floating-point number.
-    pub const fn is_float(self) -> bool {
-        matches!(self, Self::Real | Self::Float32)
-    }
-
-    /// The smallest and the largest value of a whole number; `None` for the rest.
-    pub const fn range(self) -> Option<(i128, i128)> {
-        Some(match self {
-            Self::Int8 => (i8::MIN as i128, i8::MAX as i128),
-            Self::UInt8 => (0, u8::MAX as i128),
-            Self::Int16 => (i16::MIN as i128, i16::MAX as i128),
-            Self::UInt16 => (0, u16::MAX as i128),
-            Self::Integer => (i32::MIN as i128, i32::MAX as i128),
-            Self::UInt32 => (0, u32::MAX as i128),
-            Self::Int64 => (i64::MIN as i128, i64::MAX as i128),
-            Self::UInt64 => (0, u64::MAX as i128),
-            _ => return None,
-        })
-    }
-
-    /// The whole number, if this kind has it; an error when compiling otherwise.
-    const fn has(self, number: i128) -> i128 {
-        match self.range() {
-            Some((min, max)) if min <= number && number <= max => number,
-            _ => panic!("this kind of number has no such value"),
-        }
-    }
-}
-
-impl fmt::Display for BaseType {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Debug::fmt(self, f)
+/// The whole number, if this kind has it; an error when compiling otherwise.
+const fn has(base: BaseType, number: i128) -> i128 {
+    match base.range() {
+        Some((min, max)) if min <= number && number <= max => number,
+        _ => panic!("this kind of number has no such value"),
     }
 }
 
@@ -227,7 +159,7 @@ impl Type {
     pub const fn from(mut self, smallest: i128) -> Self {
         let base = self.base;
         let Attributes::Integer { min, .. } = &mut self.of else { panic!("from is for whole numbers") };
-        *min = base.has(smallest);
+        *min = has(base, smallest);
         self
     }
 
@@ -236,7 +168,7 @@ impl Type {
     pub const fn to(mut self, largest: i128) -> Self {
         let base = self.base;
         let Attributes::Integer { max, .. } = &mut self.of else { panic!("to is for whole numbers") };
-        *max = base.has(largest);
+        *max = has(base, largest);
         self
     }
 

@@ -1,7 +1,8 @@
 //! Values of variables, and the Rust types that they live in.
 
 use crate::saved::{Saved, StateVisitor};
-use crate::types::{BaseType, Item};
+use crate::types::Item;
+use fmi_abi::BaseType;
 use std::fmt;
 
 /// A value of a variable.

@@ -2,8 +2,9 @@
 
 use crate::saved::StateVisitor;
 use crate::settable::settable;
-use crate::types::{BaseType, Type};
+use crate::types::Type;
 use crate::value::{Scalar, Value};
+use fmi_abi::BaseType;
 use fmi_abi::Situations;
 
 /// Who sets a variable and who reads it (section 2.2.7).

@@ -175,7 +175,13 @@ fn c_type(rust: &str) -> String {
 
 /// Declarations of C, made from the list that all of Rust's come from.
 macro_rules! declarations {
-    ($($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+) => {
+    (
+        $standard:ident $handle:ident
+        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
+        with an instance {
+            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
+        }
+    ) => {
         fn declarations() -> Vec<(&'static str, Vec<String>)> {
             vec![$((stringify!($function), vec![$(c_type(stringify!($type))),*])),+]
         }

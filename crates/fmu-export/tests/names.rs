@@ -133,7 +133,8 @@ fmi::export_fmu!(Idler: CoSimulation + ModelExchange + Partials + InputDerivativ
 
 #[test]
 fn the_functions_are_those_of_the_fmu() {
-    let version = fmi2_functions::fmi2GetVersion();
+    // SAFETY: it has no conditions.
+    let version = unsafe { fmi2_functions::fmi2GetVersion() };
     // SAFETY: a string that lives as long as the library.
     assert_eq!(unsafe { ::std::ffi::CStr::from_ptr(version) }, c"2.0");
     let table = <Idler as fmi::Variables>::TABLE;

@@ -1,83 +1,117 @@
-//! The shared library of an FMU.
+//! The shared library of an FMU, loaded for as long as anything needs it.
 
-use fmu_export::Exported;
-use fmu_export::fmi2::Functions;
-use fmu_export::fmi2::types::*;
-use std::ffi::OsString;
+use fmi_abi::Standard;
+use fmi_abi::c_types::{c_char, c_int, c_void};
 use std::path::Path;
-use std::sync::OnceLock;
+use std::ptr::{null, null_mut};
 
-/// A loaded library. It must outlive its instances.
+/// A loaded library.
 #[derive(Debug)]
-pub struct Library {
-    /// Its functions.
+pub(crate) struct Library {
     pub functions: Functions,
     _loaded: libloading::Library,
 }
 
-macro_rules! find_all {
-    ($($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+) => {
-        /// Finds the functions. An FMU need not have those of an interface type that it does not offer: calls of these
-        /// are errors.
+/// Its functions, of the one standard or the other.
+#[derive(Debug)]
+pub(crate) enum Functions {
+    Fmi2(Box<fmi_abi::fmi2::Functions>),
+    Fmi3(Box<fmi_abi::fmi3::Functions>),
+}
+
+impl Library {
+    /// Loads a library. An FMU need not have the functions of an interface type that it does not offer: calls of these
+    /// are errors.
+    ///
+    /// # Safety
+    /// The file is the library of an FMU for this standard: its functions have the types of the standard, and what it does
+    /// when it is loaded and called is sound.
+    ///
+    /// # Errors
+    /// When it cannot be loaded, or lacks the function that frees instances.
+    pub unsafe fn load(path: &Path, standard: Standard) -> Result<Self, libloading::Error> {
+        // SAFETY: the caller's promise, here and below.
+        let loaded = unsafe { libloading::Library::new(path) }?;
+        // SAFETY: see above.
+        let functions = unsafe {
+            match standard {
+                Standard::Fmi2 => {
+                    loaded.get::<*const c_void>("fmi2FreeInstance")?;
+                    Functions::Fmi2(fmi2::find(&loaded).into())
+                }
+                Standard::Fmi3 => {
+                    loaded.get::<*const c_void>("fmi3FreeInstance")?;
+                    Functions::Fmi3(fmi3::find(&loaded).into())
+                }
+            }
+        };
+        Ok(Self { functions, _loaded: loaded })
+    }
+}
+
+/// What a function answers that is not there.
+trait Absent {
+    const ANSWER: Self;
+}
+
+impl Absent for () {
+    const ANSWER: Self = ();
+}
+
+impl Absent for *mut c_void {
+    const ANSWER: Self = null_mut();
+}
+
+impl Absent for *const c_char {
+    const ANSWER: Self = null();
+}
+
+macro_rules! find {
+    (
+        $standard:ident $handle:ident
+        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
+        with an instance {
+            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
+        }
+    ) => {
+        /// The functions of a library.
         ///
         /// # Safety
-        /// As of [`load`].
-        unsafe fn find_all(library: &libloading::Library) -> Result<Functions, libloading::Error> {
+        /// As of [`Library::load`](super::Library::load).
+        pub unsafe fn find(library: &libloading::Library) -> Functions {
             // SAFETY: by the caller's promise functions of these names have these types.
             unsafe {
-                Ok(Functions {
-                    fmi2GetTypesPlatform: *library.get(b"fmi2GetTypesPlatform")?,
-                    fmi2GetVersion: *library.get(b"fmi2GetVersion")?,
-                    fmi2Instantiate: *library.get(b"fmi2Instantiate")?,
-                    fmi2FreeInstance: *library.get(b"fmi2FreeInstance")?,
-                    $($function: match library.get(stringify!($function).as_bytes()) {
-                        Ok(found) => *found,
-                        Err(_) => {
-                            unsafe extern "C" fn absent(_: fmi2Component $(, _: $type)*) -> Status {
-                                Status::Error
+                Functions {
+                    $($free: library.get(stringify!($free)).map_or(
+                        {
+                            unsafe extern "C" fn absent($(_: $free_type),*) -> $result {
+                                super::Absent::ANSWER
                             }
                             absent
-                        }
-                    },)+
-                })
+                        },
+                        |found| *found,
+                    ),)+
+                    $($function: library.get(stringify!($function)).map_or(
+                        {
+                            unsafe extern "C" fn absent(_: $handle $(, _: $type)*) -> super::c_int {
+                                fmi_abi::Status::Error as _
+                            }
+                            absent
+                        },
+                        |found| *found,
+                    ),)+
+                }
             }
         }
     };
 }
 
-fmu_export::fmi2_functions!(find_all);
-
-/// The functions of a model: those in this program or, for tests of what else was made of the model, those of the library
-/// that the environment variable `FMU_LIBRARY` names, which must be one that [`load`] may load.
-///
-/// # Panics
-/// When that library cannot be loaded.
-pub fn functions_of<M: Exported>() -> Functions {
-    other_library().map_or_else(Functions::of::<M>, |library| library.functions)
+mod fmi2 {
+    use fmi_abi::fmi2::{Functions, types::*};
+    fmi_abi::fmi2_functions!(find);
 }
 
-/// The library that `FMU_LIBRARY` names.
-pub(crate) fn other_library() -> Option<&'static Library> {
-    static LIBRARY: OnceLock<Option<Library>> = OnceLock::new();
-    let named = || std::env::var_os("FMU_LIBRARY").filter(|path| !path.is_empty());
-    // SAFETY: who sets the variable knows what it names.
-    let load =
-        |path: OsString| unsafe { load(Path::new(&path)) }.expect("FMU_LIBRARY names an FMU's library");
-    LIBRARY.get_or_init(|| named().map(load)).as_ref()
-}
-
-/// Loads the shared library of an FMU.
-///
-/// # Safety
-/// The file is the library of an FMU for FMI 2.0: its functions have the types of the standard, and what it does when it
-/// is loaded is sound.
-///
-/// # Errors
-/// When it cannot be loaded, or lacks a function that needs no instance; the message names it.
-pub unsafe fn load(path: &Path) -> Result<Library, libloading::Error> {
-    // SAFETY: the caller's promise.
-    let library = unsafe { libloading::Library::new(path) }?;
-    // SAFETY: the caller's promise.
-    let functions = unsafe { find_all(&library) }?;
-    Ok(Library { functions, _loaded: library })
+mod fmi3 {
+    use fmi_abi::fmi3::{Functions, types::*};
+    fmi_abi::fmi3_functions!(find);
 }

@@ -1,6 +1,6 @@
 //! The shared library of an FMU, loaded for as long as the program runs.
 
-use fmi_abi::fmi2::{Functions, types::*};
+use fmi_abi::fmi2::Functions;
 use fmu_export::Exported;
 use std::path::Path;
 use std::sync::OnceLock;

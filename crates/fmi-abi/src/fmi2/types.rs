@@ -85,7 +85,7 @@ pub type fmi2CallbackFreeMemory = unsafe extern "C" fn(memory: *mut c_void);
 pub type fmi2StepFinished = unsafe extern "C" fn(environment: fmi2ComponentEnvironment, status: fmi2Status);
 
 /// The importer's callbacks; each may be NULL.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct fmi2CallbackFunctions {
     /// Receives log messages.

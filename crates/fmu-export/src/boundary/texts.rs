@@ -3,8 +3,8 @@
 use super::string;
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
-use crate::types::BaseType;
 use crate::value::Value;
+use fmi_abi::BaseType;
 use fmi_abi::c_types::c_char;
 use std::ffi::{CStr, CString};
 use std::mem::MaybeUninit;

@@ -11,8 +11,8 @@ use crate::boundary::{
 use crate::export::Exported;
 use crate::instance::{Direction, Instance, Outcome};
 use crate::model::Experiment;
-use crate::types::BaseType;
 use crate::value::Value;
+use fmi_abi::BaseType;
 
 pub unsafe fn fmi2SetDebugLogging<M: Exported>(
     instance: &mut Instance<M>,

@@ -8,8 +8,8 @@ use super::types::*;
 use crate::boundary::{array, get_texts, output, set_texts};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
-use crate::types::BaseType;
 use crate::value::Value;
+use fmi_abi::BaseType;
 use std::mem::MaybeUninit;
 
 /// The importer's arrays for values that it reads. All variables are scalars: there are as many values as variables.

@@ -3,8 +3,8 @@
 
 use super::{Instance, Outcome, finite, independent, refuse};
 use crate::export::Exported;
-use crate::types::BaseType;
 use crate::variable::{Causality, Initial, Variability, Variable};
+use fmi_abi::BaseType;
 use fmi_abi::{Mode, Standard};
 use std::mem::MaybeUninit;
 

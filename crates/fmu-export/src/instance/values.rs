@@ -3,9 +3,10 @@
 use super::{Instance, Outcome, finite, implicit_value, refuse, refuse_with};
 use crate::export::Exported;
 use crate::settable::STARTING;
-use crate::types::{Attributes, BaseType};
+use crate::types::Attributes;
 use crate::value::Value;
 use crate::variable::{Causality, Initial, Variable};
+use fmi_abi::BaseType;
 use std::mem::MaybeUninit;
 
 impl<M: Exported> Instance<M> {

@@ -10,7 +10,7 @@ use fmu_export::Mode::{self, *};
 use fmu_export::fmi2::ALLOWED;
 use fmu_export::fmi2::types::*;
 use fmu_export::{BaseType, Causality, Exported, Variable};
-use fmu_test_kit::{FUNCTIONS, Functions, Importer};
+use fmu_test_kit::{FUNCTIONS, Importer};
 use std::ptr::{null, null_mut};
 
 /// Section 3.2.3: start/end, instantiated, Initialization Mode, Event Mode, Continuous-Time Mode,
@@ -143,7 +143,7 @@ fn first<M: Exported>(wanted: impl Fn(&Variable<M>) -> bool) -> Option<u32> {
 /// One harmless call of the function, with arguments that are right in this mode: where the model has no variable for it
 /// with an empty array.
 fn call<M: Exported>(fmu: &Importer, function: &str, interface: Interface, mode: Mode) -> Status {
-    let (mut real, mut integer, mut text, mut status) = (0.0, 0, null(), Status::Ok);
+    let (mut real, mut integer, mut text) = (0.0, 0, null());
     let (mut flags, mut array) = ([0; 2], [0.5; 8]);
     let states = M::STATES.len();
     let some = |vr: Option<u32>| (vr.unwrap_or(0), usize::from(vr.is_some()));
@@ -204,7 +204,7 @@ fn call<M: Exported>(fmu: &Importer, function: &str, interface: Interface, mode:
             fmu.fmi2DoStep(if known { real } else { 0.0 }, 0.01, fmi2True)
         }
         "fmi2CancelStep" => fmu.fmi2CancelStep(),
-        "fmi2GetStatus" => fmu.fmi2GetStatus(0, &mut status),
+        "fmi2GetStatus" => fmu.fmi2GetStatus(0, &mut integer),
         "fmi2GetRealStatus" => fmu.fmi2GetRealStatus(2, &mut real),
         "fmi2GetIntegerStatus" => fmu.fmi2GetIntegerStatus(0, &mut integer),
         "fmi2GetBooleanStatus" => fmu.fmi2GetBooleanStatus(3, &mut integer),
@@ -366,7 +366,10 @@ fn fmu_can_be_freed_in_every_state() {
 
 #[test]
 fn versions_need_no_instance() {
-    assert_eq!(Importer::null(fmu_export::fmi2::functions::<Sum>()).version_and_platform(), [c"2.0", c"default"]);
+    assert_eq!(
+        Importer::null(fmu_export::fmi2::functions::<Sum>()).version_and_platform(),
+        [c"2.0", c"default"]
+    );
 }
 
 /// The table in the code says the same, also about states that cannot be reached here, and tells standard and tolerance

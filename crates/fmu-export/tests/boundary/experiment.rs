@@ -3,7 +3,7 @@
 use crate::toys::{Talker, talker::Name};
 use crate::variables::texts;
 use fmu_export::Interface::CoSimulation;
-use fmu_test_kit::{Arguments, Functions, Importer};
+use fmu_test_kit::{Arguments, Importer};
 use std::ffi::{CStr, CString};
 use std::path::PathBuf;
 
@@ -112,8 +112,8 @@ fn resource_locations() {
 fn bad_resources() {
     let location = CString::new(resources("mute", "\n").to_str().unwrap()).unwrap();
     let arguments = Arguments { resource_location: Some(&location), ..Arguments::of::<Talker>(CoSimulation) };
-    let log =
-        Importer::instantiate(fmu_export::fmi2::functions::<Talker>(), &arguments).expect_err("there is nothing to say");
+    let log = Importer::instantiate(fmu_export::fmi2::functions::<Talker>(), &arguments)
+        .expect_err("there is nothing to say");
     assert_eq!(log.len(), 1);
     assert_eq!(log[0].text, "fmi2Instantiate: resources/words.txt is empty");
 }

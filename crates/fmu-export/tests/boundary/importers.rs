@@ -7,7 +7,7 @@ use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::Status;
 use fmu_export::{BaseType, Causality, Variables};
-use fmu_test_kit::{Arguments, Functions, Importer};
+use fmu_test_kit::{Arguments, Importer};
 use std::ptr::null_mut;
 
 const FORCE: u32 = Name::force as u32;

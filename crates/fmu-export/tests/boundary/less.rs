@@ -3,7 +3,7 @@
 use crate::toys::{Ball, Sum, sum::Name};
 use fmu_export::Exported;
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
-use fmu_test_kit::{Arguments, Functions, Importer};
+use fmu_test_kit::{Arguments, Importer};
 
 const U: u32 = Name::u as u32;
 const Y: u32 = Name::y as u32;

@@ -51,7 +51,13 @@ fn types() {
 }
 
 macro_rules! signatures {
-    ($($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+) => {
+    (
+        $standard:ident $handle:ident
+        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
+        with an instance {
+            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
+        }
+    ) => {
         /// The functions with the types of their arguments, as Rust writes them.
         const SIGNATURES: &[(&str, &[&str])] = &[$((stringify!($function), &[$(stringify!($type)),*])),+];
     };

@@ -5,7 +5,7 @@ use crate::toys::*;
 use fmu_export::Interface::*;
 use fmu_export::fmi3::types::*;
 use fmu_export::{Exported, Mode, Variables};
-use fmu_test_kit::fmi3::{Arguments, Functions, Importer};
+use fmu_test_kit::fmi3::{Arguments, Importer};
 use std::cell::RefCell;
 use std::ffi::CStr;
 use std::ptr::{null, null_mut};
@@ -43,13 +43,13 @@ fn scheduled_execution_is_refused() {
     thread_local!(static LOG: RefCell<Vec<(Status, String)>> = const { RefCell::new(Vec::new()) });
     unsafe extern "C" fn remember(
         _: fmi3InstanceEnvironment,
-        status: Status,
+        status: fmi3Status,
         _: fmi3String,
         text: fmi3String,
     ) {
         // SAFETY: a string.
         let text = unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned();
-        LOG.with_borrow_mut(|log| log.push((status, text)));
+        LOG.with_borrow_mut(|log| log.push((Status::from_c(status), text)));
     }
     let functions = fmu_export::fmi3::functions::<Sum>();
     // SAFETY: strings, NULL and a logger.
@@ -104,7 +104,7 @@ fn instances_of_the_other_standard() {
     let functions = fmu_export::fmi3::functions::<Sum>();
     // SAFETY: an instance of the same model, alive.
     let status = unsafe { (functions.fmi3Reset)(old.component()) };
-    assert_eq!(status, Status::Error);
+    assert_eq!(Status::from_c(status), Status::Error);
     old.take_log();
 }
 

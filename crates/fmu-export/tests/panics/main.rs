@@ -55,7 +55,7 @@ trait Standard: Sized + 'static {
 
 macro_rules! standard {
     (
-        $importer:ident of $module:ident, $calls:path, $functions:literal, $prefix:literal, |$fmu:ident, $fault:ident|
+        $importer:ident of $module:ident, $standard:ident, $calls:path, $functions:literal, $prefix:literal, |$fmu:ident, $fault:ident|
         $set_fault:expr, $initialize:expr, $continuous:ident, $reset:ident
     ) => {
         impl Standard for $module::$importer {
@@ -65,7 +65,7 @@ macro_rules! standard {
 
             fn try_new(interface: Interface) -> Result<Self, Vec<Message>> {
                 Self::instantiate(
-                    fmu_export::$module::functions::<Faulty>(),
+                    fmu_export::$standard::functions::<Faulty>(),
                     &$module::Arguments::of::<Faulty>(interface),
                 )
             }
@@ -110,12 +110,12 @@ macro_rules! standard {
 }
 
 standard! {
-    Importer of old, fmi2::CALLS, 40, "fmi2", |fmu, fault|
+    Importer of old, fmi2, fmi2::CALLS, 40, "fmi2", |fmu, fault|
     fmu.fmi2SetInteger(&FAULT, 1, &(fault as i32)),
     fmu.fmi2EnterInitializationMode(), fmi2EnterContinuousTimeMode, fmi2Reset
 }
 standard! {
-    Importer of new, fmi3::CALLS, 70, "fmi3", |fmu, fault|
+    Importer of new, fmi3, fmi3::CALLS, 70, "fmi3", |fmu, fault|
     fmu.fmi3SetInt32(&FAULT, 1, &(fault as i32), 1),
     fmu.fmi3EnterInitializationMode(0, 0.0, 0.0, 0, 0.0), fmi3EnterContinuousTimeMode, fmi3Reset
 }

@@ -5,7 +5,7 @@ use crate::{unwritten, written};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Model;
 use fmu_export::fmi3::{indicator, types::*};
-use fmu_test_kit::fmi3::{Functions, Importer};
+use fmu_test_kit::fmi3::Importer;
 use std::cell::{Cell, RefCell};
 use std::ffi::CString;
 use std::mem::MaybeUninit;
@@ -13,7 +13,7 @@ use std::ptr::{null, null_mut};
 
 /// What the log callback works with.
 struct Environment {
-    functions: Functions,
+    functions: fmu_export::fmi3::Functions,
     instance: Cell<fmi3Instance>,
     /// Another instance, which the callback may use.
     other: Importer,
@@ -24,7 +24,7 @@ struct Environment {
 /// Calls every function of the instance that is logging, and frees it.
 unsafe extern "C" fn call_back(
     environment: fmi3InstanceEnvironment,
-    _: Status,
+    _: fmi3Status,
     _: fmi3String,
     _: fmi3String,
 ) {

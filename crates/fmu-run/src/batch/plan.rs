@@ -4,7 +4,7 @@ use super::{Batch, Course, Measure, Start};
 use crate::description::Variable;
 use crate::error::Error;
 use crate::fmu::Fmu;
-use fmu_export::BaseType;
+use fmi_abi::BaseType;
 use std::ffi::CString;
 
 /// A batch after all checks.

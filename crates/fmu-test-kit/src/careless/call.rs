@@ -60,7 +60,7 @@ impl Call {
         let mut texts = vec![UNTOUCHED_TEXT.as_ptr(); room];
         let mut info = [fmi2EventInfo { next_event_time: f64::NAN, ..Default::default() }];
         let mut flags = [[-1], [-1]];
-        let mut no_status = [Status::Warning];
+        let mut no_status = [Status::Warning as i32];
         let [first, second, third] = a.numbers;
         let [flag, other_flag] = a.flags;
         let status = match self.function {
@@ -118,7 +118,7 @@ impl Call {
         let name = self.function;
         let discards = (name.ends_with("Status") || name == "fmi2DoStep") && status == Status::Discard;
         assert!(discards || [Status::Ok, Status::Error].contains(&status), "{name} answers {status:?}");
-        assert_eq!(no_status, [Status::Warning], "{name} has no status to give");
+        assert_eq!(no_status, [Status::Warning as i32], "{name} has no status to give");
 
         let written = self.written();
         assert_eq!(reals[written.reals].to_bits(), UNTOUCHED, "{name} writes too much: {self:?}");

@@ -2,7 +2,7 @@
 
 use super::arguments::{CallArguments, Variables};
 use super::{Tally, check_messages, damage, offered, place};
-use crate::fmi3::{Arguments, FUNCTIONS, Functions, Importer};
+use crate::fmi3::{Arguments, FUNCTIONS, Importer};
 use crate::serialized::time;
 use arbitrary::{Result, Unstructured};
 use fmu_export::fmi3::types::*;

@@ -1,0 +1,441 @@
+//! An instance of an FMU, whichever the standard: safe to call, because lengths are checked, the library stays, and nothing
+//! is called any more after fmi2Fatal.
+
+use crate::fmu::Fmu;
+use crate::library::{Functions, Library};
+use fmi_abi::c_types::{c_char, c_int, c_void};
+use fmi_abi::fmi2::types::*;
+use fmi_abi::fmi3::types::*;
+use fmi_abi::{BaseType, Interface, Status};
+use std::ffi::{CStr, CString};
+use std::ptr::null_mut;
+use std::rc::Rc;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What an FMU has logged.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// The status that goes with it.
+    pub status: Status,
+    /// One of the log categories.
+    pub category: String,
+    /// The text.
+    pub text: String,
+}
+
+/// What an instance answered instead of OK or Warning: the function, and what it logged.
+#[derive(Debug)]
+pub struct Refusal {
+    function: &'static str,
+    status: Status,
+    log: Vec<Message>,
+    /// When the FMU has ended the simulation, if that is what it wants.
+    pub(crate) ended: Option<f64>,
+}
+
+impl Refusal {
+    /// Whether it comes without a reason.
+    pub(crate) fn is_silent(&self) -> bool {
+        self.log.is_empty() && self.ended.is_none()
+    }
+}
+
+impl std::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let message = reason(&self.log);
+        if let Some(time) = self.ended {
+            write!(f, "ended by the FMU at t = {time} s")?;
+            return message.map_or(Ok(()), |message| write!(f, ": {}", message.text.trim()));
+        }
+        match message {
+            // Some FMUs name the function, some do not.
+            Some(message) if message.text.contains(self.function) => f.write_str(message.text.trim()),
+            Some(message) => write!(f, "{}: {}", self.function, message.text.trim()),
+            None => write!(f, "{} was answered with {:?}, without a message", self.function, self.status),
+        }
+    }
+}
+
+impl std::error::Error for Refusal {}
+
+/// What of a log tells why something was refused.
+pub(crate) fn reason(log: &[Message]) -> Option<&Message> {
+    let grave = log.iter().rev().find(|message| message.status as i32 >= Status::Discard as i32);
+    grave.or(log.last())
+}
+
+/// What the FMU logs; its address is the instance's environment.
+#[derive(Debug, Default)]
+struct Log(Mutex<Vec<Message>>);
+
+impl Log {
+    fn take(&self) -> Vec<Message> {
+        std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// # Safety
+    /// The environment is NULL or a `Log` that lives, the texts are NULL or strings.
+    unsafe fn remember(
+        environment: *mut c_void,
+        status: c_int,
+        category: *const c_char,
+        text: *const c_char,
+    ) {
+        let text_of = |pointer: *const c_char| match pointer.is_null() {
+            true => String::new(),
+            // SAFETY: the caller's promise.
+            false => unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned(),
+        };
+        let [category, text] = [category, text].map(text_of);
+        // SAFETY: the caller's promise.
+        if let Some(log) = unsafe { environment.cast::<Self>().as_ref() } {
+            let message = Message { status: Status::from_c(status), category, text };
+            log.0.lock().unwrap_or_else(PoisonError::into_inner).push(message);
+        }
+    }
+}
+
+type PlainLogger =
+    unsafe extern "C" fn(fmi2ComponentEnvironment, fmi2String, fmi2Status, fmi2String, fmi2String);
+
+/// The logger of FMI 2.0 without its `...`, which stable Rust cannot define. The FMU may pass variadic arguments, which
+/// are not looked at; named ones travel the same way in variadic and plain calls on every platform of this project.
+unsafe extern "C" fn log_of_fmi2(
+    environment: fmi2ComponentEnvironment,
+    _instance_name: fmi2String,
+    status: fmi2Status,
+    category: fmi2String,
+    message: fmi2String,
+) {
+    // SAFETY: section 2.1.5: NULL or zero-terminated strings, and the log that was handed over, which lives as long as the
+    // instance.
+    unsafe { Log::remember(environment, status, category, message) }
+}
+
+unsafe extern "C" fn log_of_fmi3(
+    environment: fmi3InstanceEnvironment,
+    status: fmi3Status,
+    category: fmi3String,
+    message: fmi3String,
+) {
+    // SAFETY: section 2.3.1 says the same.
+    unsafe { Log::remember(environment, status, category, message) }
+}
+
+/// An instance; freed when dropped. It keeps its library loaded.
+#[derive(Debug)]
+pub struct Instance {
+    /// NULL after fmi2Fatal: then not even its memory may be given back (section 2.1.3 of FMI 2.0).
+    handle: *mut c_void,
+    log: Arc<Log>,
+    /// The structure must live as long as the instance (section 2.1.5 of FMI 2.0).
+    _callbacks: Rc<fmi2CallbackFunctions>,
+    library: Arc<Library>,
+}
+
+// SAFETY: an instance may be used from any one thread at a time (masters have thread pools).
+unsafe impl Send for Instance {}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        if self.handle.is_null() {
+            return;
+        }
+        // SAFETY: made by the library and freed only here.
+        unsafe {
+            match &self.library.functions {
+                Functions::Fmi2(functions) => (functions.fmi2FreeInstance)(self.handle),
+                Functions::Fmi3(functions) => (functions.fmi3FreeInstance)(self.handle),
+            }
+        }
+    }
+}
+
+/// A call: the function of either standard with its arguments, or that which only FMI 2.0 has.
+macro_rules! call {
+    ($self:ident, $fmi2:ident ( $($of_fmi2:expr),* ) $(, $fmi3:ident ( $($of_fmi3:expr),* ))?) => {{
+        let handle = $self.handle;
+        if handle.is_null() {
+            return Err(broken(stringify!($fmi2)));
+        }
+        // SAFETY: the instance is alive; arrays are slices of the lengths that are passed, single values live.
+        let (function, code) = unsafe {
+            match &$self.library.functions {
+                Functions::Fmi2(of) => (stringify!($fmi2), (of.$fmi2)(handle $(, $of_fmi2)*)),
+                $(Functions::Fmi3(of) => (stringify!($fmi3), (of.$fmi3)(handle $(, $of_fmi3)*)),)?
+                #[allow(unreachable_patterns, reason = "where FMI 3.0 has the function")]
+                Functions::Fmi3(_) => (stringify!($fmi2), Status::Error as c_int),
+            }
+        };
+        $self.check(function, code)
+    }};
+}
+
+/// The numbers with their functions: those of FMI 3.0, and what FMI 2.0 has for them.
+macro_rules! numbers {
+    ($with:ident: $($before:tt)*) => { $with! { $($before)*;
+        Real fmi2SetReal fmi2GetReal f64 fmi3SetFloat64 fmi3GetFloat64 f64
+        Float32 fmi2SetReal fmi2GetReal f64 fmi3SetFloat32 fmi3GetFloat32 f32
+        Integer fmi2SetInteger fmi2GetInteger i32 fmi3SetInt32 fmi3GetInt32 i32
+        Int8 fmi2SetInteger fmi2GetInteger i32 fmi3SetInt8 fmi3GetInt8 i8
+        UInt8 fmi2SetInteger fmi2GetInteger i32 fmi3SetUInt8 fmi3GetUInt8 u8
+        Int16 fmi2SetInteger fmi2GetInteger i32 fmi3SetInt16 fmi3GetInt16 i16
+        UInt16 fmi2SetInteger fmi2GetInteger i32 fmi3SetUInt16 fmi3GetUInt16 u16
+        UInt32 fmi2SetInteger fmi2GetInteger i32 fmi3SetUInt32 fmi3GetUInt32 u32
+        Int64 fmi2SetInteger fmi2GetInteger i32 fmi3SetInt64 fmi3GetInt64 i64
+        UInt64 fmi2SetInteger fmi2GetInteger i32 fmi3SetUInt64 fmi3GetUInt64 u64
+        Enumeration fmi2SetInteger fmi2GetInteger i32 fmi3SetInt64 fmi3GetInt64 i64
+    } };
+}
+
+macro_rules! set {
+    ($self:ident $base:ident $vr:ident $value:ident;
+     $($name:ident $set2:ident $get2:ident $type2:ident $set3:ident $get3:ident $type3:ident)+) => {
+        match $base {
+            $(BaseType::$name => {
+                let (of_fmi2, of_fmi3) = ($value as $type2, $value as $type3);
+                call!($self, $set2(&$vr, 1, &of_fmi2), $set3(&$vr, 1, &of_fmi3, 1))
+            })+
+            _ => {
+                let of_fmi2 = fmi2Boolean::from($value != 0.0);
+                let of_fmi3 = fmi3Boolean::from($value != 0.0);
+                call!($self, fmi2SetBoolean(&$vr, 1, &of_fmi2), fmi3SetBoolean(&$vr, 1, &of_fmi3, 1))
+            }
+        }
+    };
+}
+
+macro_rules! get {
+    ($self:ident $base:ident $vr:ident;
+     $($name:ident $set2:ident $get2:ident $type2:ident $set3:ident $get3:ident $type3:ident)+) => {
+        match $base {
+            $(BaseType::$name => {
+                let (mut of_fmi2, mut of_fmi3) = ($type2::default(), $type3::default());
+                call!($self, $get2(&$vr, 1, &mut of_fmi2), $get3(&$vr, 1, &mut of_fmi3, 1))?;
+                Ok(if $self.is_of_fmi2() { of_fmi2 as f64 } else { of_fmi3 as f64 })
+            })+
+            _ => {
+                let (mut of_fmi2, mut of_fmi3) = (fmi2False, fmi3False);
+                call!($self, fmi2GetBoolean(&$vr, 1, &mut of_fmi2), fmi3GetBoolean(&$vr, 1, &mut of_fmi3, 1))?;
+                Ok(f64::from(u8::from(of_fmi2 != fmi2False || of_fmi3 != fmi3False)))
+            }
+        }
+    };
+}
+
+#[cold]
+fn broken(function: &'static str) -> Refusal {
+    Refusal { function, status: Status::Fatal, log: Vec::new(), ended: None }
+}
+
+impl Instance {
+    /// A new instance for Co-Simulation, or what was logged instead.
+    pub(crate) fn new(fmu: &Fmu, name: &CStr, logging_on: bool) -> Result<Self, Vec<Message>> {
+        let log = Arc::<Log>::default();
+        let environment = Arc::as_ptr(&log).cast_mut().cast();
+        let token = CString::new(fmu.description().token.as_str()).unwrap_or_default();
+        let (name, token, resources) = (name.as_ptr(), token.as_ptr(), fmu.resources.as_ptr());
+        let library = Arc::clone(&fmu.library);
+
+        let callbacks = Rc::new(fmi2CallbackFunctions {
+            // SAFETY: see `log_of_fmi2`.
+            logger: Some(unsafe { std::mem::transmute::<PlainLogger, fmi2CallbackLogger>(log_of_fmi2) }),
+            allocate_memory: None,
+            free_memory: None,
+            step_finished: None,
+            component_environment: environment,
+        });
+        // SAFETY: all strings live, the callbacks and the log as long as the instance.
+        let handle = unsafe {
+            match &library.functions {
+                Functions::Fmi2(functions) => (functions.fmi2Instantiate)(
+                    name,
+                    Interface::CoSimulation as fmi2Type,
+                    token,
+                    resources,
+                    Rc::as_ptr(&callbacks),
+                    fmi2False,
+                    logging_on.into(),
+                ),
+                Functions::Fmi3(functions) => (functions.fmi3InstantiateCoSimulation)(
+                    name,
+                    token,
+                    resources,
+                    fmi3False,
+                    logging_on.into(),
+                    fmi3False,
+                    fmi3False,
+                    std::ptr::null(),
+                    0,
+                    environment,
+                    Some(log_of_fmi3),
+                    None,
+                ),
+            }
+        };
+        match handle.is_null() {
+            true => Err(log.take()),
+            false => Ok(Self { handle, log, _callbacks: callbacks, library }),
+        }
+    }
+
+    /// What became of a call.
+    #[inline]
+    fn check(&mut self, function: &'static str, code: c_int) -> Result<(), Refusal> {
+        if code == Status::Ok as c_int { Ok(()) } else { self.not_ok(function, Status::from_c(code)) }
+    }
+
+    #[cold]
+    fn not_ok(&mut self, function: &'static str, status: Status) -> Result<(), Refusal> {
+        // What came with a warning must not be taken for the reason of something later.
+        let log = self.log.take();
+        if status == Status::Warning {
+            return Ok(());
+        }
+        if status == Status::Fatal {
+            self.handle = null_mut();
+        }
+        Err(Refusal { function, status, log, ended: None })
+    }
+
+    fn is_of_fmi2(&self) -> bool {
+        matches!(self.library.functions, Functions::Fmi2(_))
+    }
+
+    /// Whether it can still be used.
+    pub(crate) fn is_alive(&self) -> bool {
+        !self.handle.is_null()
+    }
+
+    pub(crate) fn forget_log(&self) {
+        self.log.take();
+    }
+
+    /// Before the start values are set, in FMI 2.0.
+    pub(crate) fn set_up(&mut self, start_time: f64, stop_time: f64) -> Result<(), Refusal> {
+        match &self.library.functions {
+            // It says this when it begins to initialize.
+            Functions::Fmi3(_) => Ok(()),
+            Functions::Fmi2(_) => {
+                call!(self, fmi2SetupExperiment(fmi2False, 0.0, start_time, fmi2True, stop_time))
+            }
+        }
+    }
+
+    pub(crate) fn enter_initialization_mode(
+        &mut self,
+        start_time: f64,
+        stop_time: f64,
+    ) -> Result<(), Refusal> {
+        call!(
+            self,
+            fmi2EnterInitializationMode(),
+            fmi3EnterInitializationMode(fmi3False, 0.0, start_time, fmi3True, stop_time)
+        )
+    }
+
+    pub(crate) fn exit_initialization_mode(&mut self) -> Result<(), Refusal> {
+        call!(self, fmi2ExitInitializationMode(), fmi3ExitInitializationMode())
+    }
+
+    #[inline]
+    pub(crate) fn set_reals(&mut self, vr: &[u32], values: &[f64]) -> Result<(), Refusal> {
+        assert_eq!(vr.len(), values.len());
+        let (vr, n, values) = (vr.as_ptr(), vr.len(), values.as_ptr());
+        call!(self, fmi2SetReal(vr, n, values), fmi3SetFloat64(vr, n, values, n))
+    }
+
+    #[inline]
+    pub(crate) fn get_reals(&mut self, vr: &[u32], values: &mut [f64]) -> Result<(), Refusal> {
+        assert_eq!(vr.len(), values.len());
+        let (vr, n, values) = (vr.as_ptr(), vr.len(), values.as_mut_ptr());
+        call!(self, fmi2GetReal(vr, n, values), fmi3GetFloat64(vr, n, values, n))
+    }
+
+    /// A number of any type, or 0 and 1 for a Boolean.
+    pub(crate) fn set_number(&mut self, base: BaseType, vr: u32, value: f64) -> Result<(), Refusal> {
+        numbers!(set: self base vr value)
+    }
+
+    pub(crate) fn get_number(&mut self, base: BaseType, vr: u32) -> Result<f64, Refusal> {
+        numbers!(get: self base vr)
+    }
+
+    pub(crate) fn set_text(&mut self, vr: u32, value: &CStr) -> Result<(), Refusal> {
+        let text = value.as_ptr();
+        call!(self, fmi2SetString(&vr, 1, &text), fmi3SetString(&vr, 1, &text, 1))
+    }
+
+    /// Time derivatives of order 1, which FMI 3.0 has no function for.
+    #[inline]
+    pub(crate) fn set_input_derivatives(
+        &mut self,
+        vr: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), Refusal> {
+        assert!(vr.len() == values.len() && vr.len() == orders.len());
+        let (vr, n, orders, values) = (vr.as_ptr(), vr.len(), orders.as_ptr(), values.as_ptr());
+        call!(self, fmi2SetRealInputDerivatives(vr, n, orders, values))
+    }
+
+    /// Refused also where the FMU ends the simulation.
+    #[inline]
+    pub(crate) fn step(&mut self, time: f64, size: f64) -> Result<(), Refusal> {
+        let (mut event, mut terminate, mut early, mut reached) = (fmi3False, fmi3False, fmi3False, time);
+        let stepped = call!(
+            self,
+            fmi2DoStep(time, size, fmi2True),
+            fmi3DoStep(time, size, fmi3True, &mut event, &mut terminate, &mut early, &mut reached)
+        );
+        match stepped {
+            Ok(()) if terminate == fmi3False && early == fmi3False => Ok(()),
+            Ok(()) => Err(self.stopped(terminate != fmi3False, reached)),
+            Err(refusal) => Err(self.ended(refusal, time)),
+        }
+    }
+
+    /// A step that was discarded may be the end that the FMU wants (section 4.2.3 of FMI 2.0).
+    #[cold]
+    fn ended(&self, refusal: Refusal, time: f64) -> Refusal {
+        let (mut wanted, mut reached) = (fmi2False, time);
+        let kinds =
+            [StatusKind::Terminated, StatusKind::LastSuccessfulTime].map(|kind| kind as fmi2StatusKind);
+        let Functions::Fmi2(functions) = &self.library.functions else { return refusal };
+        if refusal.status != Status::Discard {
+            return refusal;
+        }
+        // SAFETY: the instance is alive after fmi2Discard, the places live.
+        let [asked, told] = unsafe {
+            [
+                (functions.fmi2GetBooleanStatus)(self.handle, kinds[0], &mut wanted),
+                (functions.fmi2GetRealStatus)(self.handle, kinds[1], &mut reached),
+            ]
+        };
+        if asked != Status::Ok as c_int || wanted == fmi2False {
+            return refusal;
+        }
+        let told = told == Status::Ok as c_int && reached.is_finite();
+        Refusal { ended: Some(if told { reached } else { time }), ..refusal }
+    }
+
+    /// The end that the FMU wants, or an early return, which it has not been allowed (section 4.2.1 of FMI 3.0).
+    #[cold]
+    fn stopped(&self, wanted: bool, reached: f64) -> Refusal {
+        let (function, status) = ("fmi3DoStep", Status::Discard);
+        let mut log = self.log.take();
+        if !wanted {
+            let text = format!("the step ended early, at {reached} s");
+            log.push(Message { status, category: String::new(), text });
+        }
+        Refusal { function, status, log, ended: wanted.then_some(reached) }
+    }
+
+    pub(crate) fn terminate(&mut self) -> Result<(), Refusal> {
+        call!(self, fmi2Terminate(), fmi3Terminate())
+    }
+
+    pub(crate) fn reset(&mut self) -> Result<(), Refusal> {
+        call!(self, fmi2Reset(), fmi3Reset())
+    }
+}
