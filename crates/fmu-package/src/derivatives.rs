@@ -76,8 +76,7 @@ fn check_pair<M: Exported>(points: &[(M, f64)], running: bool, unknown: u32, kno
         let (Some(wide), Some(narrow)) = (slope(1e-3 * scale), slope(5e-4 * scale)) else { continue };
         let tolerance =
             1e-5 * said.abs().max(narrow.abs()) + 10.0 * (wide - narrow).abs() + 1e-7 * size / scale;
-        // Not a number is wrong, too.
-        if !((said - narrow).abs() <= tolerance) {
+        if said.is_nan() || (said - narrow).abs() > tolerance {
             wrong.push((said, narrow));
         }
     }
