@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from pathlib import Path
 
 import pytest
@@ -40,3 +41,9 @@ def controller(request) -> Path:
 def unruly(tmp_path_factory) -> Path:
     """An FMU in C, compiled here, whose parameter `mood` says how it misbehaves (unruly.c)."""
     return build(tmp_path_factory.mktemp("unruly"))
+
+
+@pytest.fixture(scope="session")
+def unruly3(tmp_path_factory) -> Path:
+    """The same for FMI 3.0, in what FMI 3.0 has of its own (unruly3.c)."""
+    return build(tmp_path_factory.mktemp("unruly3"), name="unruly3", platform=f"{platform.machine()}-linux")

@@ -1,14 +1,17 @@
-"""What does not fit, FMUs that misbehave, and what stops runs."""
+"""What does not fit, FMUs that cannot be loaded, and what stops runs."""
 
 from __future__ import annotations
 
+import platform
 import re
 import signal
 import subprocess
 import sys
 import time as clock
 import zipfile
+from pathlib import Path
 
+import fmpy
 import fmu_run
 import numpy as np
 import pytest
@@ -76,6 +79,10 @@ def test_refused_runs_leave_the_others_alone(fmu):
     angle = np.where(TIME > 0.45, np.inf, 0.0)
     one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"])
     assert re.match(r"at 0\.5 s: .*theta1", one.errors[0]), one.errors
+    # Or at the last time, when all outputs have been read.
+    angle = np.where(TIME > 0.95, np.inf, 0.0)
+    one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"], read_before_set=True)
+    assert re.match(r"at 1 s: .*theta1", one.errors[0]) and np.isfinite(one["roll"]).all()
 
 
 @pytest.mark.parametrize(
@@ -117,6 +124,58 @@ def test_no_library_for_this_platform(tmp_path, testbed):
         fmu_run.Fmu(path)
 
 
+def repacked(fmu, path, change) -> Path:
+    """The FMU at `path`, each file as `change(name, content)` makes it."""
+    with zipfile.ZipFile(fmu) as whole, zipfile.ZipFile(path, "w") as archive:
+        for name in whole.namelist():
+            archive.writestr(name, change(name, whole.read(name)))
+    return path
+
+
+# Libraries that FMPy brings for the machines it knows, and the processor's number in an ELF header (ELF-64, e_machine).
+FMPY = Path(fmpy.__file__).parent
+FOREIGN = {
+    "Windows on x86_64": lambda _: (FMPY / "logging/win64/logging.dll").read_bytes(),
+    "Windows on x86": lambda _: (FMPY / "logging/win32/logging.dll").read_bytes(),
+    "macOS on x86_64 and aarch64": lambda _: (FMPY / "cswrapper/cswrapper.dylib").read_bytes(),
+    "Linux on loongarch64": lambda library: library[:18] + bytes([2, 1]) + library[20:],
+    "Linux on riscv64": lambda library: library[:18] + bytes([243, 0]) + library[20:],
+}
+
+
+@pytest.mark.parametrize("made_for", FOREIGN)
+def test_a_library_of_another_machine(tmp_path, testbed, made_for):
+    def change(name, content):
+        return FOREIGN[made_for](content) if name.startswith("binaries/") else content
+
+    path = repacked(testbed, tmp_path / "foreign.fmu", change)
+    this = f"{platform.system()} on {platform.machine()}"
+    with pytest.raises(fmu_run.FmuError) as raised:
+        fmu_run.Fmu(path)
+    assert str(raised.value).endswith(f"its library cannot be loaded: it is for {made_for}, and this is {this}")
+
+
+def test_a_library_that_is_damaged(tmp_path, testbed):
+    def change(name, content):
+        return content[:200] if name.startswith("binaries/") else content
+
+    path = repacked(testbed, tmp_path / "damaged.fmu", change)
+    # In the words of the system.
+    with pytest.raises(fmu_run.FmuError, match=r"its library cannot be loaded: dlopen failed: .*\.so: "):
+        fmu_run.Fmu(path)
+
+
+def test_an_execution_tool(tmp_path, unruly):
+    def change(name, content):
+        return content.replace(b"<CoSimulation ", b'<CoSimulation needsExecutionTool="true" ')
+
+    path = repacked(unruly, tmp_path / "tool.fmu", change)
+    with pytest.raises(fmu_run.FmuError, match=r"needsExecutionTool.*execution_tool=True"):
+        fmu_run.Fmu(path)
+    with fmu_run.Fmu(path, execution_tool=True) as fmu:
+        assert fmu.run(TIME, outputs=["y"]).ok.all()
+
+
 def test_an_fmu_that_is_closed(testbed):
     fmu = fmu_run.Fmu(testbed)
     fmu.close()
@@ -125,38 +184,12 @@ def test_an_fmu_that_is_closed(testbed):
         fmu.run(TIME, outputs=["roll"])
 
 
-MOODS = {
-    "good": None,
-    "silent error": "at 0.5 s: fmi2DoStep was answered with Error, without a message",
-    "pending": "at 0.5 s: fmi2DoStep was answered with Error, without a message",
-    "fatal": "at 0.5 s: fmi2DoStep was answered with Fatal, without a message",
-    "discard": "at 0.5 s: fmi2DoStep: no more of this after %s",
-    "no status": "at 0.5 s: fmi2DoStep was answered with Error, without a message",
-    "no reset": None,
-    "warning": None,
-}
-
-
-def test_an_unruly_fmu(unruly):
-    with fmu_run.Fmu(unruly) as fmu:
-        moods = np.repeat(np.arange(len(MOODS)), 3)
-        runs = fmu.run(TIME, start={"mood": moods}, outputs=["y", "instances"], threads=4)
-    expected = {run: MOODS[list(MOODS)[mood]] for run, mood in enumerate(moods) if MOODS[list(MOODS)[mood]]}
-    assert runs.errors == expected
-    np.testing.assert_allclose(runs["y"][runs.ok], 4.0 + np.tile(TIME, (9, 1)), atol=1e-15)
-    # It may be there only once in a process; one that was fatal could not even be freed.
-    assert np.nanmax(runs["instances"]) <= 1 + 3
-
-
-def test_an_fmu_that_makes_no_instances(tmp_path, unruly):
-    path = tmp_path / "strange.fmu"
-    with zipfile.ZipFile(unruly) as whole, zipfile.ZipFile(path, "w") as archive:
-        for name in whole.namelist():
-            archive.writestr(name, whole.read(name).replace(b'guid="{unruly}"', b'guid="{strange}"'))
-    with fmu_run.Fmu(path) as fmu:
-        runs = fmu.run(TIME, start={"slope": [1.0, 2.0]}, outputs=["y"], every=1, measures=["peak"])
-    assert runs.errors == dict.fromkeys((0, 1), "Unruly makes no instance, and logs no message")
-    assert np.isnan(runs["y"]).all() and np.isnan(runs["y", "peak"]).all()
+def test_units_of_declared_types(unruly, unruly3):
+    of = {"slope": "m/s", "y": "m", "gap": "mm", "odd": None, "count": None}
+    of3 = {"y": "m", "gap": "mm", "number": None, "temper": None}
+    for path, units in ((unruly, of), (unruly3, of3)):
+        with fmu_run.Fmu(path) as fmu:
+            assert {name: fmu.variables[name].unit for name in units} == units
 
 
 def test_other_types(unruly):

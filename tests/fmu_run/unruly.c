@@ -1,21 +1,24 @@
 /* An FMU for Co-Simulation alone that does what its parameter says, and lacks all that it need not have: compiled with
- * COMPLETE it has what FMPy asks for before it loads an FMU. */
+ * COMPLETE it has what FMPy asks for before it loads an FMU. Where logging is on it gives more reasons. */
+#define _POSIX_C_SOURCE 199309L
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "fmi2Functions.h"
 
-enum { MOOD, COUNT, FLAG, SLOPE, Y, INSTANCES };
-enum { GOOD, SILENT_ERROR, PENDING, FATAL, DISCARD, NO_STATUS, NO_RESET, WARNING };
+enum { MOOD, COUNT, FLAG, SLOPE, Y, INSTANCES, LABEL, LOGGED };
+enum { GOOD, SILENT_ERROR, PENDING, FATAL, DISCARD, NO_STATUS, NO_RESET, WARNING,
+       ENDS_BETWEEN, ENDS_AT_POINT, NO_TERMINATE, NO_START, ERROR_IF_ASKED, FATAL_IF_ASKED, SLOW_IF_ASKED };
 
 typedef struct {
     fmi2CallbackFunctions callbacks;
-    int mood, count, flag;
-    double slope, y;
+    int mood, count, flag, logging;
+    double slope, y, time;
     char label[64];
 } Instance;
 
-static int alive, most;
+static int alive, most, logged_steps;
 
 const char *fmi2GetTypesPlatform(void) { return "default"; }
 const char *fmi2GetVersion(void) { return "2.0"; }
@@ -25,14 +28,26 @@ static void as_new(Instance *i) {
     strcpy(i->label, "none");
 }
 
+static void say(const Instance *i, fmi2Status status, const char *text) {
+#ifdef COMPLETE
+    if (status == fmi2OK) return; /* FMPy prints it. */
+#endif
+    i->callbacks.logger(i->callbacks.componentEnvironment, "unruly", status, "logAll", text, "half");
+}
+
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
-    (void)name, (void)resources, (void)visible, (void)logging;
-    if (type != fmi2CoSimulation || strcmp(guid, "{unruly}") != 0) return NULL;
+    (void)name, (void)resources, (void)visible;
+    if (type != fmi2CoSimulation || strcmp(guid, "{unruly}") != 0) {
+        if (logging && guid[1] != 'm')
+            callbacks->logger(callbacks->componentEnvironment, "x", fmi2Error, "e", "the guid is of another FMU");
+        return NULL;
+    }
     Instance *i = calloc(1, sizeof *i);
     if (i == NULL) return NULL;
-    i->callbacks = *callbacks;
+    i->callbacks = *callbacks, i->logging = logging;
     as_new(i);
+    say(i, fmi2OK, "here I am");
     if (++alive > most) most = alive;
     return i;
 }
@@ -49,8 +64,13 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return c != NULL ? fmi2OK : fmi2Error; }
-fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return c != NULL ? fmi2OK : fmi2Error; }
-fmi2Status fmi2Terminate(fmi2Component c) { return c != NULL ? fmi2OK : fmi2Error; }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+    Instance *i = c;
+    if (i->mood == NO_START) return fmi2Error;
+    say(i, fmi2OK, "ready");
+    return fmi2OK;
+}
+fmi2Status fmi2Terminate(fmi2Component c) { return ((Instance *)c)->mood != NO_TERMINATE ? fmi2OK : fmi2Error; }
 
 fmi2Status fmi2Reset(fmi2Component c) {
     Instance *i = c;
@@ -91,7 +111,8 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[]) {
     Instance *i = c;
-    for (size_t k = 0; k < n; k++) value[k] = vr[k] == INSTANCES ? most : vr[k] == MOOD ? i->mood : i->count;
+    for (size_t k = 0; k < n; k++)
+        value[k] = vr[k] == INSTANCES ? most : vr[k] == LOGGED ? logged_steps : vr[k] == MOOD ? i->mood : i->count;
     return fmi2OK;
 }
 
@@ -104,19 +125,45 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_set_state) {
     (void)no_set_state;
     Instance *i = c;
-    i->y += i->slope * size;
+    logged_steps += i->logging;
+    if (i->logging && i->mood >= ERROR_IF_ASKED) {
+        if (time < 0.45) say(i, fmi2Error, "not the reason");
+        else say(i, fmi2OK, "the pump ran dry");
+    }
+    if (i->mood == SLOW_IF_ASKED && i->logging) nanosleep(&(struct timespec){.tv_nsec = 300000000}, NULL);
+    double reached = time + (i->mood == ENDS_BETWEEN && time > 0.45 ? 0.25 * size : size);
+    i->y += i->slope * (reached - time);
+    i->time = reached;
+    if (time < 0.45 && i->mood == PENDING) {
+        say(i, fmi2Warning, "not the reason");
+        return fmi2Warning;
+    }
     if (time < 0.45) return fmi2OK;
     switch (i->mood) {
     case SILENT_ERROR: return fmi2Error;
     case PENDING: return fmi2Pending;
     case FATAL: return fmi2Fatal;
     case NO_STATUS: return (fmi2Status)77;
-    case WARNING: i->callbacks.logger(i->callbacks.componentEnvironment, "x", fmi2Warning, "w", "a warning"); return fmi2Warning;
-    case DISCARD:
-        i->callbacks.logger(i->callbacks.componentEnvironment, "unruly", fmi2Discard, "logAll", "no more of this after %s", "half");
-        return fmi2Discard;
+    case WARNING: say(i, fmi2Warning, "a warning"); return fmi2Warning;
+    case DISCARD: say(i, fmi2Discard, "no more of this after %s"); return fmi2Discard;
+    case ENDS_BETWEEN: say(i, fmi2Discard, "the tank is empty"); return fmi2Discard;
+    case ENDS_AT_POINT: return fmi2Discard;
+    case ERROR_IF_ASKED:
+    case SLOW_IF_ASKED: return fmi2Error;
+    case FATAL_IF_ASKED: return fmi2Fatal;
     }
     return fmi2OK;
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
+    int mood = ((Instance *)c)->mood;
+    *value = mood == ENDS_BETWEEN || mood == ENDS_AT_POINT;
+    return kind == fmi2Terminated ? fmi2OK : fmi2Discard;
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
+    *value = ((Instance *)c)->time;
+    return kind == fmi2LastSuccessfulTime ? fmi2OK : fmi2Discard;
 }
 
 #ifdef COMPLETE
@@ -139,8 +186,6 @@ REFUSED(fmi2GetRealOutputDerivatives, fmi2Component c, const fmi2ValueReference 
         fmi2Real value[])
 REFUSED(fmi2CancelStep, fmi2Component c)
 REFUSED(fmi2GetStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
-REFUSED(fmi2GetRealStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
 REFUSED(fmi2GetIntegerStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
-REFUSED(fmi2GetBooleanStatus, fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
 REFUSED(fmi2GetStringStatus, fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
 #endif

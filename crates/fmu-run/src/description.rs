@@ -28,7 +28,7 @@ pub struct Variable {
     pub variability: Option<String>,
     /// Its start value as it is written, if it has one.
     pub start: Option<String>,
-    /// Its unit, if it has one.
+    /// Its unit, or that of its declared type, if there is one.
     pub unit: Option<String>,
     /// What it means.
     pub description: String,
@@ -47,6 +47,8 @@ pub struct Description {
     pub identifier: String,
     /// One instance in a process is all there may be.
     pub once_per_process: bool,
+    /// Its library starts another program, which must be installed.
+    pub needs_execution_tool: bool,
     /// It takes input derivatives (FMI 2.0, `canInterpolateInputs`).
     pub input_derivatives: bool,
     /// In the order of the model description.
@@ -77,11 +79,6 @@ impl Description {
                 .ok_or_else(|| format!("modelDescription.xml: {} lacks {name}", node.tag_name().name()))
         };
         let is_true = |name| matches!(slave.attribute(name), Some("true" | "1"));
-        if is_true("needsExecutionTool") {
-            return Err(
-                "it needs another program to run (needsExecutionTool), which is not started here".to_owned()
-            );
-        }
         let (token, variables) = match standard {
             Standard::Fmi2 => ("guid", variables_of_fmi2(root)),
             Standard::Fmi3 => ("instantiationToken", variables_of_fmi3(root)),
@@ -93,6 +90,7 @@ impl Description {
             token: needed(root, token)?,
             identifier: needed(slave, "modelIdentifier")?,
             once_per_process: is_true("canBeInstantiatedOnlyOncePerProcess"),
+            needs_execution_tool: is_true("needsExecutionTool"),
             input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
             places: variables.iter().enumerate().map(|(place, of)| (of.name.clone(), place)).collect(),
             variables,
@@ -109,14 +107,25 @@ fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
     node.children().find(|child| child.has_tag_name(name))
 }
 
+/// Units by the names of the types that have one (section 2.2.3 of FMI 2.0, where it stands in an element for the kind of
+/// type, and 2.4.4 of FMI 3.0).
+fn units_of_types<'a>(root: Node<'a, 'a>) -> Units<'a> {
+    let types = elements(root, "TypeDefinitions");
+    let unit = |of: Node<'a, 'a>| of.children().chain([of]).find_map(|node| node.attribute("unit"));
+    types.filter_map(|of| Some((of.attribute("name")?, unit(of)?))).collect()
+}
+
+type Units<'a> = HashMap<&'a str, &'a str>;
+
 /// Each is a `ScalarVariable` with an element for its type (section 2.2.7 of FMI 2.0).
 fn variables_of_fmi2(root: Node) -> Result<Vec<Variable>, String> {
     let mut found = Vec::new();
-    for node in elements(root) {
+    let units = units_of_types(root);
+    for node in elements(root, "ModelVariables") {
         let of_type = node.children().find_map(|child| Some((child, base_of_fmi2(child.tag_name().name())?)));
         let (of_type, base) =
             of_type.ok_or_else(|| format!("modelDescription.xml: {} has no type", name_of(node)))?;
-        found.push(variable(node, of_type, base)?);
+        found.push(variable(node, of_type, base, &units)?);
     }
     Ok(found)
 }
@@ -125,25 +134,26 @@ fn variables_of_fmi2(root: Node) -> Result<Vec<Variable>, String> {
 /// reads them.
 fn variables_of_fmi3(root: Node) -> Result<Vec<Variable>, String> {
     let mut found = Vec::new();
-    for node in elements(root) {
+    let units = units_of_types(root);
+    for node in elements(root, "ModelVariables") {
         if let Some(base) = base_of_fmi3(node.tag_name().name())
             && child(node, "Dimension").is_none()
         {
-            found.push(variable(node, node, base)?);
+            found.push(variable(node, node, base, &units)?);
         }
     }
     Ok(found)
 }
 
-fn elements<'a>(root: Node<'a, 'a>) -> impl Iterator<Item = Node<'a, 'a>> {
-    child(root, "ModelVariables").into_iter().flat_map(|node| node.children()).filter(Node::is_element)
+fn elements<'a>(root: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a, 'a>> {
+    child(root, list).into_iter().flat_map(|node| node.children()).filter(Node::is_element)
 }
 
 fn name_of<'a>(node: Node<'a, 'a>) -> &'a str {
     node.attribute("name").unwrap_or("a variable without a name")
 }
 
-fn variable(node: Node, of_type: Node, base: BaseType) -> Result<Variable, String> {
+fn variable(node: Node, of_type: Node, base: BaseType, units: &Units) -> Result<Variable, String> {
     let reference = node.attribute("valueReference").and_then(|text| text.parse().ok());
     let text = |name: &str| node.attribute(name).map(str::to_owned);
     let start = match base {
@@ -153,6 +163,7 @@ fn variable(node: Node, of_type: Node, base: BaseType) -> Result<Variable, Strin
         }
         _ => of_type.attribute("start"),
     };
+    let declared = || units.get(of_type.attribute("declaredType")?).copied();
     Ok(Variable {
         name: name_of(node).to_owned(),
         reference: reference
@@ -161,7 +172,7 @@ fn variable(node: Node, of_type: Node, base: BaseType) -> Result<Variable, Strin
         causality: text("causality").unwrap_or_else(|| "local".to_owned()),
         variability: text("variability"),
         start: start.map(str::to_owned),
-        unit: of_type.attribute("unit").map(str::to_owned),
+        unit: of_type.attribute("unit").or_else(declared).map(str::to_owned),
         description: text("description").unwrap_or_default(),
     })
 }

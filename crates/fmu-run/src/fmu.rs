@@ -2,8 +2,9 @@
 
 use crate::description::{Description, Standard};
 use crate::error::Error;
-use crate::{fmi3, library};
+use crate::{fmi3, library, machine};
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
+use std::error::Error as _;
 use std::ffi::{CString, OsStr};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -32,23 +33,56 @@ impl Fmu {
     /// The library's functions have the types of the standard, and what it does when it is loaded and called is sound.
     ///
     /// # Errors
-    /// [`Error::Fmu`], when the file is no FMU for Co-Simulation, or has no library for this platform.
+    /// [`Error::Fmu`], when the file is no FMU for Co-Simulation, has no library for this platform, or needs another
+    /// program.
     pub unsafe fn open(path: &Path) -> Result<Self, Error> {
+        // SAFETY: the caller's promise.
+        unsafe { Self::open_checked(path, false) }
+    }
+
+    /// The same, also if the FMU's library starts another program (`needsExecutionTool`), which must be installed. What
+    /// an FMU says when it does not find its program, it says when it is run.
+    ///
+    /// # Safety
+    /// As of [`open`](Self::open), and the program may be started.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub unsafe fn open_with_execution_tool(path: &Path) -> Result<Self, Error> {
+        // SAFETY: the caller's promise.
+        unsafe { Self::open_checked(path, true) }
+    }
+
+    /// # Safety
+    /// As of [`open`](Self::open), and the program may be started if there is to be an execution tool.
+    unsafe fn open_checked(path: &Path, execution_tool: bool) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let folder = unpacked(path).map_err(fail)?;
         let file = folder.path().join("modelDescription.xml");
         let text = std::fs::read_to_string(&file)
             .map_err(|_| fail("there is no readable modelDescription.xml in it; it is no FMU".to_owned()))?;
         let description = Description::parse(&text).map_err(fail)?;
-        let library = library_of(folder.path(), &description).map_err(fail)?;
+        if description.needs_execution_tool && !execution_tool {
+            let why = "it starts another program, which must be installed (needsExecutionTool); to run it all the same, \
+                open it with execution_tool=True, in Rust with open_with_execution_tool";
+            return Err(fail(why.to_owned()));
+        }
+        let file = library_of(folder.path(), &description).map_err(fail)?;
         // SAFETY: the caller's promise.
         let loaded = unsafe {
             match description.standard {
-                Standard::Fmi2 => library::load(&library).map(|library| Library::Fmi2(library.into())),
-                Standard::Fmi3 => fmi3::load(&library).map(|library| Library::Fmi3(library.into())),
+                Standard::Fmi2 => library::load(&file).map(|library| Library::Fmi2(library.into())),
+                Standard::Fmi3 => fmi3::load(&file).map(|library| Library::Fmi3(library.into())),
             }
         };
-        let library = loaded.map_err(|error| fail(format!("its library cannot be loaded: {error}")))?;
+        let library = loaded.map_err(|error| {
+            // The loader's error says which call failed, its source why.
+            let why = machine::mismatch(&file).unwrap_or_else(|| match error.source() {
+                Some(source) => format!("{error}: {source}"),
+                None => error.to_string(),
+            });
+            fail(format!("its library cannot be loaded: {why}"))
+        })?;
         let resources = folder.path().join("resources");
         Ok(Self {
             resources: location(&resources, description.standard),

@@ -25,6 +25,7 @@ pub mod fmi3;
 mod fmu;
 mod importer;
 mod library;
+mod machine;
 #[cfg(feature = "realtime")]
 pub mod realtime;
 pub mod serialized;

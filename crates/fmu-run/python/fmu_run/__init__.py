@@ -32,7 +32,7 @@ class Variable:
     """A variable as the model description has it.
 
     type: Real, Integer, Boolean, String, Enumeration, or one of FMI 3.0's other types. causality: input, output, parameter,
-    local and so on. variability, start, unit: None where nothing is said; start as it is written.
+    local and so on. variability, start, unit: None where nothing is said; start as it is written, unit also from the declared type.
     """
 
     name: str
@@ -47,14 +47,18 @@ class Variable:
 class Runs(Mapping[str, _Array]):
     """What came of `Fmu.run`: courses by output, measures by output and measure.
 
-    runs["roll"]: (runs, times), what was kept. runs["roll", "peak"]: (runs,). What a refused run would have is not a
-    number.
+    runs["roll"]: (runs, times), what was kept. runs["roll", "peak"]: (runs,). Where a run has not reached a time there is
+    not a number. Nor are there measures of a run that the FMU refused; those of one that it ended are of the times until
+    then.
     """
 
     #: (times,), s: the times that were kept.
     time: _Array
-    #: The runs that the FMU refused, by their numbers, and why, in the words of the FMU.
+    #: The runs that the FMU refused or ended before the last time, by their numbers, how far they got and why, in the
+    #: words of the FMU ("at 0.5 s: ...", "ended by the FMU at t = 0.5 s: ...").
     errors: dict[int, str]
+    #: What is to be said of finished runs: that the FMU ended at the last time by itself, or refused to be terminated.
+    notes: dict[int, str]
 
     def __init__(
         self,
@@ -64,8 +68,9 @@ class Runs(Mapping[str, _Array]):
         measures: Sequence[str],
         measured: _Array,
         errors: dict[int, str],
+        notes: dict[int, str],
     ):
-        self.time, self.errors = time, errors
+        self.time, self.errors, self.notes = time, errors, notes
         self._outputs = {name: place for place, name in enumerate(outputs)}
         self._measures = {name: place for place, name in enumerate(measures)}
         self._courses, self._measured = courses, measured
@@ -77,7 +82,7 @@ class Runs(Mapping[str, _Array]):
 
     @property
     def ok(self) -> NDArray[np.bool_]:
-        """(runs,): which the FMU has finished."""
+        """(runs,): which have reached the last time."""
         finished = np.ones(self.count, dtype=bool)
         finished[list(self.errors)] = False
         return finished
@@ -115,10 +120,12 @@ class Fmu:
 
     Its library runs in this process: where it crashes, the process is gone. Raises FmuError where the file is no FMU, or has
     no library for this platform.
+
+    execution_tool: run it also if its library starts another program (needsExecutionTool), which must be installed.
     """
 
-    def __init__(self, path: str | os.PathLike[str]):
-        self._loaded = _Loaded(os.fspath(path))
+    def __init__(self, path: str | os.PathLike[str], *, execution_tool: bool = False):
+        self._loaded = _Loaded(os.fspath(path), execution_tool)
         #: "2.0" or "3.0"; the name of the model; guid or instantiation token.
         self.fmi_version, self.model_name, self.token, self._once = self._loaded.about()
         #: The variables by name, in the order of the model description. Arrays and clocks of FMI 3.0 are left out.
@@ -170,7 +177,8 @@ class Fmu:
         read_before_set: read outputs before the inputs of their time are set, as FMPy does.
         progress: called with the number of finished runs and of all, ten times a second.
 
-        A run that the FMU refuses does not stop the others, see `Runs.errors` and `Runs.check`. Raises ValueError for what
+        A run that the FMU refuses or ends does not stop the others, see `Runs.errors` and `Runs.check`. If it is refused
+        without a reason, it is made once more with logging on, after all others, for the FMU's words alone. Raises ValueError for what
         does not fit the FMU or itself, FmuError if the FMU is closed. Ctrl-C stops after the runs under way.
         """
         times = _array("time", time)
@@ -181,7 +189,7 @@ class Fmu:
         kept = 1 if every is None and not wanted else every
         if kept is not None and kept < 1:
             raise ValueError(f"every must be at least 1, it is {kept}")
-        courses, measured, errors = self._loaded.run(
+        courses, measured, errors, notes = self._loaded.run(
             times,
             [(name, _course(name, values, len(times))) for name, values in (inputs or {}).items()],
             [(name, _course(name, values, len(times))) for name, values in (input_derivatives or {}).items()],
@@ -193,7 +201,8 @@ class Fmu:
             read_before_set,
             progress,
         )
-        return Runs(times[:: kept or len(times)][: courses.shape[2]], names, courses, wanted, measured, dict(errors))
+        kept_times = times[:: kept or len(times)][: courses.shape[2]]
+        return Runs(kept_times, names, courses, wanted, measured, dict(errors), dict(notes))
 
 
 def _array(name: str, values: ArrayLike) -> _Array:

@@ -38,8 +38,10 @@ enum StartValue<'py> {
 
 /// Name, type, causality, variability, start value, unit, description.
 type Described = (String, String, String, Option<String>, Option<String>, Option<String>, String);
-/// Courses and measures, (runs, outputs, times or measures) each, and errors by run.
-type Result3<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>, Vec<(usize, String)>);
+/// Texts by run.
+type Told = Vec<(usize, String)>;
+/// Courses and measures, (runs, outputs, times or measures) each, errors and notes.
+type Result4<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>, Told, Told);
 
 fn python(error: Error) -> PyErr {
     match error {
@@ -52,10 +54,11 @@ fn python(error: Error) -> PyErr {
 #[pymethods]
 impl Loaded {
     #[new]
-    fn new(py: Python, path: PathBuf) -> PyResult<Self> {
+    fn new(py: Python, path: PathBuf, execution_tool: bool) -> PyResult<Self> {
+        let open = if execution_tool { Fmu::open_with_execution_tool } else { Fmu::open };
         // SAFETY: the user names a file that is an FMU; its library is trusted as any extension module is.
         #[allow(unsafe_code)]
-        let fmu = py.detach(|| unsafe { Fmu::open(&path) }).map_err(python)?;
+        let fmu = py.detach(|| unsafe { open(&path) }).map_err(python)?;
         Ok(Self(Mutex::new(Some(Arc::new(fmu)))))
     }
 
@@ -99,7 +102,7 @@ impl Loaded {
         threads: Option<usize>,
         read_before_set: bool,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Result3<'py>> {
+    ) -> PyResult<Result4<'py>> {
         let fmu = self.fmu()?;
         let measures = measures.iter().map(|name| name.parse()).collect::<Result<Vec<_>, String>>();
         let batch = Batch {
@@ -124,12 +127,12 @@ impl Loaded {
             Ok(numpy.call_method1("zeros", ((size.runs, size.outputs, each),))?.cast_into()?)
         };
         let (courses, measures) = (array(size.kept)?, array(size.measures)?);
-        let errors = {
+        let [errors, notes] = {
             let (mut courses, mut measures) = (courses.readwrite(), measures.readwrite());
             let room = [courses.as_slice_mut()?, measures.as_slice_mut()?];
             carry_out(py, &planned, room, progress.as_ref())?
         };
-        Ok((courses, measures, errors))
+        Ok((courses, measures, errors, notes))
     }
 }
 
@@ -174,7 +177,7 @@ fn carry_out(
     planned: &Planned,
     [courses, measures]: [&mut [f64]; 2],
     progress: Option<&Py<PyAny>>,
-) -> PyResult<Vec<(usize, String)>> {
+) -> PyResult<[Told; 2]> {
     let watch = Watch::default();
     let (sender, receiver) = channel();
     // Messages may be sent to one thread only.
@@ -186,7 +189,7 @@ fn carry_out(
             let waited =
                 py.detach(|| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK));
             match waited {
-                Ok(errors) => return raised.map_or_else(|| errors.map_err(python), Err),
+                Ok(told) => return raised.map_or_else(|| told.map_err(python), Err),
                 Err(RecvTimeoutError::Disconnected) => {
                     return Err(FmuError::new_err("the thread of the runs has panicked"));
                 }

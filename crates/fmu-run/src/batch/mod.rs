@@ -95,12 +95,18 @@ impl Size {
 pub struct Runs {
     /// The shape of what follows.
     pub size: Size,
-    /// Courses: runs, outputs, times, the last fastest. Those of runs that were refused are not a number.
+    /// Courses: runs, outputs, times, the last fastest. What a run has not reached is not a number.
     pub courses: Vec<f64>,
-    /// Measures: runs, outputs, measures, the last fastest. Those of runs that were refused are not a number.
+    /// Measures: runs, outputs, measures, the last fastest. Those of runs that were refused are not a number, those of runs
+    /// that the FMU itself has ended are of the times until then.
     pub measures: Vec<f64>,
-    /// The runs that were refused, in their order, and why, in the words of the FMU.
+    /// The runs that have not reached the last time, in their order, how far they got and why, in the words of the FMU:
+    /// those it has refused, and those it has ended. Where it gave no reason, the run is made once more with logging on,
+    /// after all others, unless that takes much longer than these.
     pub errors: Vec<(usize, String)>,
+    /// What is to be said of runs that have reached the last time: that the FMU ended there by itself, or refused to be
+    /// terminated.
+    pub notes: Vec<(usize, String)>,
 }
 
 impl Fmu {
@@ -114,8 +120,8 @@ impl Fmu {
         let planned = self.plan(batch)?;
         let size = planned.size();
         let [mut courses, mut measures] = [zeros(size.courses())?, zeros(size.measures())?];
-        let errors = planned.run(watch, &mut courses, &mut measures)?;
-        Ok(Runs { size, courses, measures, errors })
+        let [errors, notes] = planned.run(watch, &mut courses, &mut measures)?;
+        Ok(Runs { size, courses, measures, errors, notes })
     }
 
     /// Checks a batch, for who has memory for its results.
@@ -140,7 +146,7 @@ impl Planned<'_> {
         Size { runs: plan.runs, outputs: plan.outputs, kept: plan.kept(), measures: plan.measures.len() }
     }
 
-    /// Carries out the runs, into memory of the caller, as [`Runs`] has it; returns [`Runs::errors`].
+    /// Carries out the runs, into memory of the caller, as [`Runs`] has it; returns [`Runs::errors`] and [`Runs::notes`].
     ///
     /// # Errors
     /// As [`Fmu::run`].
@@ -152,7 +158,7 @@ impl Planned<'_> {
         watch: &Watch,
         courses: &mut [f64],
         measures: &mut [f64],
-    ) -> Result<Vec<(usize, String)>, Error> {
+    ) -> Result<[Vec<(usize, String)>; 2], Error> {
         run::run(self.fmu, &self.plan, watch, [courses, measures])
     }
 }

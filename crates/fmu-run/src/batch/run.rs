@@ -2,14 +2,21 @@
 
 use super::measure::Measured;
 use super::plan::{ByTime, Plan, Values};
-use super::slave::{Refusal, Slave};
+use super::slave::{Refusal, Slave, reason};
 use crate::description::Standard;
 use crate::error::Error;
 use crate::fmu::Fmu;
-use crate::{Importer, fmi3};
+use crate::{Importer, Message, fmi3};
 use fmu_export::BaseType;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// What is told of runs, by their numbers.
+pub(super) type Told = Vec<(usize, String)>;
+
+/// How much longer than the runs took [`ask`] may take.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// How the caller of [`Fmu::run`] looks on from another thread.
 #[derive(Debug, Default)]
@@ -34,13 +41,8 @@ impl Watch {
     }
 }
 
-/// Fills the courses and the measures; returns the refused runs.
-pub(super) fn run(
-    fmu: &Fmu,
-    plan: &Plan,
-    watch: &Watch,
-    into: [&mut [f64]; 2],
-) -> Result<Vec<(usize, String)>, Error> {
+/// Fills the courses and the measures; returns the errors and the notes.
+pub(super) fn run(fmu: &Fmu, plan: &Plan, watch: &Watch, into: [&mut [f64]; 2]) -> Result<[Told; 2], Error> {
     match fmu.description().standard {
         Standard::Fmi2 => on_threads::<Importer>(fmu, plan, watch, into),
         Standard::Fmi3 => on_threads::<fmi3::Importer>(fmu, plan, watch, into),
@@ -59,7 +61,8 @@ fn on_threads<S: Slave + Send>(
     plan: &Plan,
     watch: &Watch,
     [courses, measures]: [&mut [f64]; 2],
-) -> Result<Vec<(usize, String)>, Error> {
+) -> Result<[Told; 2], Error> {
+    let begin = Instant::now();
     let (course, measured) = (plan.outputs * plan.kept(), plan.outputs * plan.measures.len());
     let room = courses.len() >= plan.runs * course && measures.len() >= plan.runs * measured;
     assert!(room, "there is too little room for {} runs", plan.runs);
@@ -70,31 +73,68 @@ fn on_threads<S: Slave + Send>(
     let rows = split(courses, course).zip(split(measures, measured));
     let rows = rows.take(plan.runs).enumerate();
     let rows = Mutex::new(rows.map(|(run, (courses, measures))| Row { run, courses, measures }));
-    let next = || rows.lock().unwrap_or_else(std::sync::PoisonError::into_inner).next();
+    let next = || rows.lock().unwrap_or_else(PoisonError::into_inner).next();
     // One instance a thread, whoever takes the next run.
     let found = pool.broadcast(|_| {
-        let mut worker = Worker::<S> { fmu, plan, instance: None, room: Room::of(plan) };
-        let mut errors = Vec::new();
+        let mut worker = Worker::<S>::new(fmu, plan, None);
+        let (mut failures, mut notes) = (Vec::new(), Vec::new());
         while !watch.is_cancelled()
             && let Some(row) = next()
         {
             let Row { run, courses, measures } = row;
-            if let Err(error) = worker.run(run, courses, measures) {
-                courses.fill(f64::NAN);
-                measures.fill(f64::NAN);
-                errors.push((run, error));
+            match worker.run(run, plan.time, courses, measures) {
+                Ok(None) => {}
+                Ok(Some(note)) => notes.push((run, note)),
+                Err(failure) => failures.push((run, failure)),
             }
             watch.done.fetch_add(1, Ordering::Relaxed);
         }
-        errors
+        (failures, notes)
     });
     drop(rows);
     if watch.is_cancelled() && watch.done() < plan.runs {
         return Err(Error::Cancelled);
     }
-    let mut errors: Vec<_> = found.into_iter().flatten().collect();
-    errors.sort_unstable_by_key(|(run, _)| *run);
-    Ok(errors)
+    let (failures, notes): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+    let mut failures: Vec<_> = failures.into_iter().flatten().collect();
+    let mut notes: Told = notes.into_iter().flatten().collect();
+    failures.sort_unstable_by_key(|(run, _)| *run);
+    notes.sort_unstable_by_key(|(run, _)| *run);
+    let until = Instant::now() + begin.elapsed() + PATIENCE;
+    if failures.iter().any(|(_, failure)| failure.is_silent) {
+        pool.install(|| ask::<S>(fmu, plan, watch, until, &mut failures));
+    }
+    Ok([failures.into_iter().map(|(run, failure)| (run, failure.text)).collect(), notes])
+}
+
+/// Many FMUs give their reasons only where logging is on. Runs that failed without one are made again with it, as far as
+/// they got, after all others and with nothing kept of them but the reason.
+fn ask<S: Slave + Send>(
+    fmu: &Fmu,
+    plan: &Plan,
+    watch: &Watch,
+    until: Instant,
+    failures: &mut [(usize, Failure)],
+) {
+    let silent = Mutex::new(failures.iter_mut().filter(|(_, failure)| failure.is_silent));
+    let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
+    rayon::broadcast(|_| {
+        let mut worker = Worker::<S>::new(fmu, plan, Some(until));
+        let mut courses = vec![0.0; plan.outputs * plan.kept()];
+        let mut measures = vec![0.0; plan.outputs * plan.measures.len()];
+        while !watch.is_cancelled()
+            && Instant::now() < until
+            && let Some((run, failure)) = next()
+        {
+            let times = failure.at.map_or(0, |at| at + 2).min(plan.time.len());
+            let again = worker.run(*run, &plan.time[..times], &mut courses, &mut measures);
+            if let Err(again) = again
+                && again.at == failure.at
+            {
+                *failure = again;
+            }
+        }
+    });
 }
 
 /// Parts of the same length, of which there are enough also when that is 0.
@@ -107,10 +147,21 @@ fn split(values: &mut [f64], length: usize) -> impl Iterator<Item = &mut [f64]> 
     })
 }
 
+/// Why a run has not reached its last time.
+struct Failure {
+    /// The number of the time at which it was refused, if it was initialized.
+    at: Option<usize>,
+    text: String,
+    /// The FMU has not said why.
+    is_silent: bool,
+}
+
 /// A thread's instance, and room for what goes to and fro.
 struct Worker<'a, S> {
     fmu: &'a Fmu,
     plan: &'a Plan<'a>,
+    /// Logging is on, until then at most.
+    logging: Option<Instant>,
     instance: Option<S>,
     room: Room<'a>,
 }
@@ -127,6 +178,8 @@ struct Room<'a> {
     got: Vec<f64>,
     /// The outputs of a time, in their order.
     row: Vec<f64>,
+    /// How many times the run has reached.
+    rows: usize,
     measured: Measured,
 }
 
@@ -141,6 +194,7 @@ impl<'a> Room<'a> {
             orders: vec![1; plan.derivatives.references.len()],
             got: vec![0.0; plan.real_outputs.0.len()],
             row: vec![0.0; plan.outputs],
+            rows: 0,
             measured: Measured::new(plan.measures, plan.outputs),
         }
     }
@@ -152,71 +206,115 @@ impl<'a> Room<'a> {
         let others = plan.other_inputs.iter();
         self.others =
             others.map(|(base, reference, values)| (*base, *reference, values.of_run(run))).collect();
+        self.rows = 0;
         self.measured.begin();
     }
 }
 
-impl<S: Slave> Worker<'_, S> {
-    fn run(&mut self, run: usize, courses: &mut [f64], measures: &mut [f64]) -> Result<(), String> {
-        let instance = self.instance()?;
-        self.room.begin(self.plan, run);
-        let done = follow(self.plan, &instance, &mut self.room, run, courses);
-        let done = done.and_then(|()| instance.terminate().map_err(|refusal| (None, refusal)));
-        let Err((time, refusal)) = done else {
-            for (output, row) in measures.chunks_mut(self.plan.measures.len().max(1)).enumerate() {
-                for (value, measure) in row.iter_mut().zip(self.plan.measures) {
-                    *value = self.room.measured.measure(*measure, output);
-                }
+impl<'a, S: Slave> Worker<'a, S> {
+    fn new(fmu: &'a Fmu, plan: &'a Plan<'a>, logging: Option<Instant>) -> Self {
+        Self { fmu, plan, logging, instance: None, room: Room::of(plan) }
+    }
+
+    /// A run over these times. There may be something to note of one that reaches the last of them.
+    fn run(
+        &mut self,
+        run: usize,
+        times: &[f64],
+        courses: &mut [f64],
+        measures: &mut [f64],
+    ) -> Result<Option<String>, Failure> {
+        let plan = self.plan;
+        let instance = match self.instance() {
+            Ok(instance) => instance,
+            Err(log) => {
+                courses.fill(f64::NAN);
+                measures.fill(f64::NAN);
+                let mute = || {
+                    format!("{} makes no instance, and logs no message", self.fmu.description().model_name)
+                };
+                let text = reason(&log).map_or_else(mute, |message| message.text.trim().to_owned());
+                return Err(Failure { at: None, text, is_silent: log.is_empty() });
             }
-            self.instance = Some(instance);
-            return Ok(());
         };
-        match refusal.is_fatal() {
+        self.room.begin(plan, run);
+        let stopped = follow(plan, times, &instance, &mut self.room, run, courses, self.logging).err();
+        let filled = plan.every.map_or(0, |every| self.room.rows.div_ceil(every));
+        for course in courses.chunks_mut(plan.kept().max(1)) {
+            course[filled..].fill(f64::NAN);
+        }
+        let refused = stopped.as_ref().is_some_and(|(_, refusal)| refusal.ended.is_none());
+        for (output, row) in measures.chunks_mut(plan.measures.len().max(1)).enumerate() {
+            for (value, measure) in row.iter_mut().zip(plan.measures) {
+                *value = if refused { f64::NAN } else { self.room.measured.measure(*measure, output) };
+            }
+        }
+        let terminated = if refused { Ok(()) } else { instance.terminate() };
+        let mut refusals = stopped.iter().map(|(_, refusal)| refusal).chain(terminated.as_ref().err());
+        match refusals.any(Refusal::is_fatal) {
             // Not even its memory may be given back.
             true => std::mem::forget(instance),
             false => self.instance = Some(instance),
         }
-        Err(match time {
-            Some(time) => format!("at {time} s: {refusal}"),
-            None => refusal.to_string(),
-        })
+        let Some((at, refusal)) = stopped else {
+            return Ok(terminated.err().map(|refusal| format!("finished; then {refusal}")));
+        };
+        if !refused && self.room.rows == plan.time.len() {
+            return Ok(Some(refusal.to_string()));
+        }
+        let text = match at {
+            Some(at) if refused => format!("at {} s: {refusal}", times[at]),
+            _ => refusal.to_string(),
+        };
+        Err(Failure { at, text, is_silent: refusal.is_silent() })
     }
 
-    /// An instance as new.
-    fn instance(&mut self) -> Result<S, String> {
-        if let Some(used) = self.instance.take()
-            && used.reset().is_ok()
-        {
-            return Ok(used);
-        }
+    /// An instance as new, or what was logged instead.
+    fn instance(&mut self) -> Result<S, Vec<Message>> {
+        let used = self.instance.take().filter(|used| used.reset().is_ok());
         // Some FMUs cannot be reset. The old instance is gone by now: there may be one at a time only.
-        S::instantiate(self.fmu)
+        let instance = used.map_or_else(|| S::instantiate(self.fmu, self.logging.is_some()), Ok)?;
+        instance.forget_log();
+        Ok(instance)
     }
 }
 
-type Refused = (Option<f64>, Refusal);
+/// The number of the time, after the initialization, and what was refused.
+type Refused = (Option<usize>, Refusal);
 
-/// From the start values to the last time.
+/// From the start values to the last of these times, or until logging has taken too long.
 fn follow<S: Slave>(
     plan: &Plan,
+    times: &[f64],
     instance: &S,
     room: &mut Room,
     run: usize,
     courses: &mut [f64],
+    logging: Option<Instant>,
 ) -> Result<(), Refused> {
     start(plan, instance, room, run).map_err(|refusal| (None, refusal))?;
+    instance.forget_log();
     let measures = !plan.measures.is_empty();
     // The places in a course that are filled, and how many times go by until the next is.
     let (kept, mut place, mut wait) = (plan.kept(), 0, 0);
-    let times = plan.time;
+    let mut ended = None;
     for (k, &time) in times.iter().enumerate() {
-        let at = |refusal| (Some(time), refusal);
-        if !plan.read_before_set {
+        let at = |refusal| (Some(k), refusal);
+        if let Some(until) = logging {
+            // What it says of earlier steps is no reason.
+            instance.forget_log();
+            if Instant::now() > until {
+                return Ok(());
+            }
+        }
+        if !plan.read_before_set && ended.is_none() {
             set_inputs(plan, instance, room, k).map_err(at)?;
         }
         let keep = wait == 0 && place < kept;
-        if keep || measures {
-            read(plan, instance, room).map_err(at)?;
+        if (keep || measures)
+            && let Err(refusal) = read(plan, instance, room)
+        {
+            return Err(ended.unwrap_or((Some(k), refusal)));
         }
         if keep {
             // Not by chunks, whose number would be calculated anew each time.
@@ -230,11 +328,24 @@ fn follow<S: Slave>(
         if measures {
             room.measured.add(time, &room.row);
         }
+        room.rows = k + 1;
+        if let Some(ended) = ended {
+            return Err(ended);
+        }
         if plan.read_before_set {
             set_inputs(plan, instance, room, k).map_err(at)?;
         }
         if let Some(next) = times.get(k + 1) {
-            instance.step(time, next - time).map_err(at)?;
+            let size = next - time;
+            match instance.step(time, size) {
+                Ok(()) => {}
+                // The end is at the next time, whose outputs can be read, but inputs no longer set (section 4.2.4 of
+                // FMI 2.0).
+                Err(refusal) if refusal.ended.is_some_and(|end| next - end <= 1e-9 * size) => {
+                    ended = Some(at(refusal));
+                }
+                Err(refusal) => return Err(at(refusal)),
+            }
         }
     }
     Ok(())

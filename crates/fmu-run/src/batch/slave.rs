@@ -14,6 +14,8 @@ pub(super) struct Refusal {
     function: &'static str,
     status: Status,
     log: Vec<Message>,
+    /// When the FMU has ended the simulation, if that is what it wants.
+    pub ended: Option<f64>,
 }
 
 impl Refusal {
@@ -21,12 +23,21 @@ impl Refusal {
     pub fn is_fatal(&self) -> bool {
         self.status == Status::Fatal
     }
+
+    /// Whether it comes without a reason.
+    pub fn is_silent(&self) -> bool {
+        self.log.is_empty() && self.ended.is_none()
+    }
 }
 
 impl std::fmt::Display for Refusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let grave = self.log.iter().rev().find(|message| message.status as i32 >= Status::Discard as i32);
-        match grave.or(self.log.last()) {
+        let message = reason(&self.log);
+        if let Some(time) = self.ended {
+            write!(f, "ended by the FMU at t = {time} s")?;
+            return message.map_or(Ok(()), |message| write!(f, ": {}", message.text.trim()));
+        }
+        match message {
             // Some FMUs name the function, some do not.
             Some(message) if message.text.contains(self.function) => f.write_str(message.text.trim()),
             Some(message) => write!(f, "{}: {}", self.function, message.text.trim()),
@@ -35,9 +46,17 @@ impl std::fmt::Display for Refusal {
     }
 }
 
+/// What of a log tells why something was refused.
+pub(super) fn reason(log: &[Message]) -> Option<&Message> {
+    let grave = log.iter().rev().find(|message| message.status as i32 >= Status::Discard as i32);
+    grave.or(log.last())
+}
+
 /// The calls of a run. Each that returns a `Status` accepts OK and Warning.
 pub(super) trait Slave: Sized {
-    fn instantiate(fmu: &Fmu) -> Result<Self, String>;
+    /// An instance, or what was logged instead.
+    fn instantiate(fmu: &Fmu, logging_on: bool) -> Result<Self, Vec<Message>>;
+    fn forget_log(&self);
     fn set_up(&self, start_time: f64, stop_time: f64) -> Result<(), Refusal>;
     fn initialize(&self, start_time: f64, stop_time: f64) -> Result<(), Refusal>;
     fn initialized(&self) -> Result<(), Refusal>;
@@ -47,6 +66,7 @@ pub(super) trait Slave: Sized {
     fn get_number(&self, base: BaseType, vr: u32) -> Result<f64, Refusal>;
     fn set_text(&self, vr: u32, value: &CStr) -> Result<(), Refusal>;
     fn set_input_derivatives(&self, vr: &[u32], orders: &[i32], values: &[f64]) -> Result<(), Refusal>;
+    /// Refused also where the FMU ends the simulation.
     fn step(&self, time: f64, size: f64) -> Result<(), Refusal>;
     fn terminate(&self) -> Result<(), Refusal>;
     fn reset(&self) -> Result<(), Refusal>;
@@ -55,25 +75,21 @@ pub(super) trait Slave: Sized {
 /// One call; what it logged goes with its refusal.
 macro_rules! call {
     ($importer:expr, $function:ident ( $($argument:expr),* )) => {{
-        let status = $importer.$function($($argument),*);
-        if status as i32 <= Status::Warning as i32 {
-            Ok(())
-        } else {
-            Err(refusal(stringify!($function), status, $importer.take_log()))
+        match $importer.$function($($argument),*) {
+            Status::Ok => Ok(()),
+            Status::Warning => {
+                // It must not be taken for the reason of something later.
+                $importer.take_log();
+                Ok(())
+            }
+            status => Err(refusal(stringify!($function), status, $importer.take_log())),
         }
     }};
 }
 
 #[cold]
 fn refusal(function: &'static str, status: Status, log: Vec<Message>) -> Refusal {
-    Refusal { function, status, log }
-}
-
-fn no_instance(description: &Description, log: &[Message]) -> String {
-    match log.last() {
-        Some(message) => message.text.trim().to_owned(),
-        None => format!("{} makes no instance, and logs no message", description.model_name),
-    }
+    Refusal { function, status, log, ended: None }
 }
 
 fn token(description: &Description) -> Option<CString> {
@@ -81,15 +97,20 @@ fn token(description: &Description) -> Option<CString> {
 }
 
 impl Slave for Importer {
-    fn instantiate(fmu: &Fmu) -> Result<Self, String> {
+    fn instantiate(fmu: &Fmu, logging_on: bool) -> Result<Self, Vec<Message>> {
         let Library::Fmi2(library) = &fmu.library else { unreachable!("the library is of FMI 2.0") };
         let arguments = Arguments {
             guid: token(fmu.description()),
             resource_location: Some(&fmu.resources),
+            logging_on,
             ..Arguments::new(Interface::CoSimulation, "")
         };
         let functions: Functions = library.functions;
-        Importer::instantiate(functions, &arguments).map_err(|log| no_instance(fmu.description(), &log))
+        Importer::instantiate(functions, &arguments)
+    }
+
+    fn forget_log(&self) {
+        self.take_log();
     }
 
     fn set_up(&self, start_time: f64, stop_time: f64) -> Result<(), Refusal> {
@@ -144,7 +165,7 @@ impl Slave for Importer {
 
     #[inline]
     fn step(&self, time: f64, size: f64) -> Result<(), Refusal> {
-        call!(self, fmi2DoStep(time, size, fmi2True))
+        call!(self, fmi2DoStep(time, size, fmi2True)).map_err(|refusal| ended(self, refusal, time))
     }
 
     fn terminate(&self) -> Result<(), Refusal> {
@@ -198,15 +219,19 @@ macro_rules! get {
 }
 
 impl Slave for fmi3::Importer {
-    fn instantiate(fmu: &Fmu) -> Result<Self, String> {
+    fn instantiate(fmu: &Fmu, logging_on: bool) -> Result<Self, Vec<Message>> {
         let Library::Fmi3(library) = &fmu.library else { unreachable!("the library is of FMI 3.0") };
         let arguments = fmi3::Arguments {
             instantiation_token: token(fmu.description()),
             resource_path: Some(&fmu.resources),
+            logging_on: logging_on.into(),
             ..fmi3::Arguments::new(Interface::CoSimulation, "")
         };
         fmi3::Importer::instantiate(library.functions, &arguments)
-            .map_err(|log| no_instance(fmu.description(), &log))
+    }
+
+    fn forget_log(&self) {
+        self.take_log();
     }
 
     fn set_up(&self, _: f64, _: f64) -> Result<(), Refusal> {
@@ -251,10 +276,10 @@ impl Slave for fmi3::Importer {
     fn step(&self, time: f64, size: f64) -> Result<(), Refusal> {
         let (mut event, mut terminate, mut early, mut reached) = (0, 0, 0, time);
         call!(self, fmi3DoStep(time, size, fmi3True, &mut event, &mut terminate, &mut early, &mut reached))?;
-        if terminate == fmi3False && early == fmi3False {
-            return Ok(());
+        match (terminate != fmi3False, early != fmi3False) {
+            (false, false) => Ok(()),
+            (wanted, _) => Err(stopped(self, wanted, reached)),
         }
-        Err(refusal("fmi3DoStep", Status::Discard, vec![ended(terminate != fmi3False, reached)]))
     }
 
     fn terminate(&self) -> Result<(), Refusal> {
@@ -266,11 +291,30 @@ impl Slave for fmi3::Importer {
     }
 }
 
+/// A step that was discarded may be the end that the FMU wants (section 4.2.3 of FMI 2.0).
 #[cold]
-fn ended(wanted: bool, time: f64) -> Message {
-    let text = match wanted {
-        true => format!("the FMU ends the simulation at {time}"),
-        false => format!("the step ended early, at {time}"),
-    };
-    Message { instance_name: String::new(), status: Status::Discard, category: String::new(), text }
+fn ended(importer: &Importer, refusal: Refusal, time: f64) -> Refusal {
+    let (mut wanted, mut reached) = (fmi2False, time);
+    let kinds = [StatusKind::Terminated, StatusKind::LastSuccessfulTime].map(|kind| kind as fmi2StatusKind);
+    if refusal.status != Status::Discard
+        || importer.fmi2GetBooleanStatus(kinds[0], &mut wanted) != Status::Ok
+        || wanted == fmi2False
+    {
+        return refusal;
+    }
+    let told = importer.fmi2GetRealStatus(kinds[1], &mut reached) == Status::Ok && reached.is_finite();
+    Refusal { ended: Some(if told { reached } else { time }), ..refusal }
+}
+
+/// The end that the FMU wants, or an early return, which it has not been allowed (section 4.2.1 of FMI 3.0).
+#[cold]
+fn stopped(importer: &fmi3::Importer, wanted: bool, reached: f64) -> Refusal {
+    let mut refusal = refusal("fmi3DoStep", Status::Discard, importer.take_log());
+    if wanted {
+        return Refusal { ended: Some(reached), ..refusal };
+    }
+    let text = format!("the step ended early, at {reached} s");
+    let [instance_name, category] = Default::default();
+    refusal.log.push(Message { instance_name, status: Status::Discard, category, text });
+    refusal
 }

@@ -1,0 +1,107 @@
+//! Which machine a library is for, as the first bytes of the file say it.
+
+use std::env::consts::{ARCH, OS};
+use std::path::Path;
+
+/// What a library is for and what this machine is, if that differs.
+pub(crate) fn mismatch(library: &Path) -> Option<String> {
+    let bytes = std::fs::read(library).ok()?;
+    let (system, processors) = made_for(&bytes)?;
+    let here = match OS {
+        "linux" => "Linux",
+        "macos" => "macOS",
+        "windows" => "Windows",
+        other => other,
+    };
+    let fits = system == here && processors.contains(&ARCH);
+    (!fits)
+        .then(|| format!("it is for {system} on {}, and this is {here} on {ARCH}", processors.join(" and ")))
+}
+
+/// The system, and the processors by Rust's names; nothing of what is not known here.
+fn made_for(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
+    let at = |place: usize| bytes.get(place..)?.first_chunk::<4>().copied();
+    let number = |place| at(place).map(u32::from_le_bytes);
+    let half = |place| number(place).map(|word| word & 0xffff);
+    let mach = |processor: u32| match processor {
+        7 => Some("x86"),
+        0x0100_0007 => Some("x86_64"),
+        12 => Some("arm"),
+        0x0100_000c => Some("aarch64"),
+        _ => None,
+    };
+    Some(match at(0)? {
+        // The class says how wide words are, the byte after it which end comes first; then e_machine.
+        [0x7f, b'E', b'L', b'F'] => {
+            let [class, order, ..] = at(4)?;
+            let machine = if order == 2 { half(18)?.swap_bytes() >> 16 } else { half(18)? };
+            let processor = match (machine, class) {
+                (3, _) => "x86",
+                (40, _) => "arm",
+                (62, _) => "x86_64",
+                (183, _) => "aarch64",
+                (243, 1) => "riscv32",
+                (243, _) => "riscv64",
+                (21, _) => "powerpc64",
+                (22, _) => "s390x",
+                (258, _) => "loongarch64",
+                _ => return None,
+            };
+            ("Linux", vec![processor])
+        }
+        // The place of the header of PE, and in it the machine.
+        [b'M', b'Z', ..] => {
+            let header = number(0x3c)? as usize;
+            let processor = match (at(header)?, half(header.checked_add(4)?)?) {
+                ([b'P', b'E', 0, 0], 0x014c) => "x86",
+                ([b'P', b'E', 0, 0], 0x01c4) => "arm",
+                ([b'P', b'E', 0, 0], 0x8664) => "x86_64",
+                ([b'P', b'E', 0, 0], 0xaa64) => "aarch64",
+                _ => return None,
+            };
+            ("Windows", vec![processor])
+        }
+        [0xce | 0xcf, 0xfa, 0xed, 0xfe] => ("macOS", vec![mach(number(4)?)?]),
+        // Several in one: how many, and of each 20 bytes.
+        [0xca, 0xfe, 0xba, 0xbe] => {
+            let count = u32::from_be_bytes(at(4)?).min(16) as usize;
+            let processors = (0..count).map(|of| mach(u32::from_be_bytes(at(8 + 20 * of)?)));
+            ("macOS", processors.collect::<Option<_>>()?)
+        }
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::made_for;
+
+    /// Headers as their specifications draw them; files of linkers are in the tests of the Python package.
+    #[test]
+    fn headers() {
+        let elf = |class, order, machine: [u8; 2]| {
+            let mut bytes = [b"\x7fELF".as_slice(), &[class, order], &[0; 12], &machine].concat();
+            bytes.resize(64, 0);
+            made_for(&bytes).expect("ELF")
+        };
+        assert_eq!(elf(2, 1, [62, 0]), ("Linux", vec!["x86_64"]));
+        assert_eq!(elf(1, 1, [243, 0]), ("Linux", vec!["riscv32"]));
+        assert_eq!(elf(2, 2, [0, 22]), ("Linux", vec!["s390x"]));
+        assert_eq!(elf(2, 1, [2, 1]), ("Linux", vec!["loongarch64"]));
+        let mach = [&[0xcf, 0xfa, 0xed, 0xfe, 0x0c, 0, 0, 1][..], &[0; 24]].concat();
+        assert_eq!(made_for(&mach), Some(("macOS", vec!["aarch64"])));
+        // Whatever is cut off, nothing is read that is not there.
+        let mut pe = vec![0; 0x48];
+        pe[..2].copy_from_slice(b"MZ");
+        pe[0x3c] = 0x40;
+        pe[0x40..0x46].copy_from_slice(b"PE\0\0\x64\xaa");
+        assert_eq!(made_for(&pe), Some(("Windows", vec!["aarch64"])));
+        for bytes in [&pe[..], &mach, b"\xca\xfe\xba\xbe\0\0\0\x02", b"MZ", b"#!/bin/sh\n"] {
+            for length in 0..bytes.len() {
+                let _ = made_for(&bytes[..length]);
+            }
+        }
+        pe[0x3c..0x40].fill(0xff);
+        assert_eq!(made_for(&pe), None);
+    }
+}

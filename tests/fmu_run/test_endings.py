@@ -1,0 +1,104 @@
+"""Runs that end before their time: what is kept of them, and what is told."""
+
+from __future__ import annotations
+
+import time as clock
+import zipfile
+
+import fmu_run
+import numpy as np
+import pytest
+
+TIME = np.arange(11) / 10
+
+# By the number of the mood: how many of the 11 rows there are, what stands among the errors, and what among the notes.
+MOODS = {
+    "good": (11, None, None),
+    "silent error": (6, "at 0.5 s: fmi2DoStep was answered with Error, without a message", None),
+    "pending": (6, "at 0.5 s: fmi2DoStep was answered with Error, without a message", None),
+    "fatal": (6, "at 0.5 s: fmi2DoStep was answered with Fatal, without a message", None),
+    "discard": (6, "at 0.5 s: fmi2DoStep: no more of this after %s", None),
+    "no status": (6, "at 0.5 s: fmi2DoStep was answered with Error, without a message", None),
+    "no reset": (11, None, None),
+    "warning": (11, None, None),
+    "ends between": (6, "ended by the FMU at t = 0.525 s: the tank is empty", None),
+    "ends at point": (7, "ended by the FMU at t = 0.6 s", None),
+    "no terminate": (11, None, "finished; then fmi2Terminate was answered with Error, without a message"),
+    "no start": (0, "fmi2ExitInitializationMode was answered with Error, without a message", None),
+    "error if asked": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
+    "fatal if asked": (6, "at 0.5 s: fmi2DoStep: the pump ran dry", None),
+}
+MOODS3 = {
+    "good": (11, None, None),
+    "ends between": (6, "ended by the FMU at t = 0.525 s", None),
+    "ends at point": (7, "ended by the FMU at t = 0.6 s", None),
+    "returns early": (6, "at 0.5 s: fmi3DoStep: the step ended early, at 0.525 s", None),
+    "no terminate": (11, None, "finished; then fmi3Terminate was answered with Fatal, without a message"),
+    "error if asked": (6, "at 0.5 s: fmi3DoStep: the pump ran dry", None),
+}
+
+
+@pytest.mark.parametrize(
+    "moods, fixture, first", [(MOODS, "unruly", 4.0), (MOODS3, "unruly3", 0.0)], ids=["fmi2", "fmi3"]
+)
+@pytest.mark.parametrize("read_before_set", [False, True])
+def test_moods(request, moods, fixture, first, read_before_set):
+    number = np.repeat(np.arange(len(moods)), 3)
+    with fmu_run.Fmu(request.getfixturevalue(fixture)) as fmu:
+        ask = {"start": {"mood": number}, "outputs": ["y"], "threads": 4, "read_before_set": read_before_set}
+        runs = fmu.run(TIME, every=1, measures=["end", "mean"], **ask)
+        thinned = fmu.run(TIME, every=2, **ask)
+    rows, errors, notes = (dict(enumerate(np.repeat(column, 3))) for column in zip(*moods.values()))
+    assert runs.errors == thinned.errors == {run: why for run, why in errors.items() if why}
+    assert runs.notes == thinned.notes == {run: why for run, why in notes.items() if why}
+    for run, count in rows.items():
+        course = np.where(np.arange(11) < count, first + TIME, np.nan)
+        np.testing.assert_allclose(runs["y"][run], course, atol=1e-15)
+        np.testing.assert_allclose(thinned["y"][run], course[::2], atol=1e-15)
+        # Who ends the simulation has measures until then; who is refused has none.
+        whole = runs.ok[run] or runs.errors[run].startswith("ended")
+        measures = [course[count - 1], course[:count].mean()] if whole else [np.nan, np.nan]
+        np.testing.assert_allclose([runs["y", "end"][run], runs["y", "mean"][run]], measures, atol=1e-14)
+
+
+def test_an_end_at_the_last_time(unruly):
+    with fmu_run.Fmu(unruly) as fmu:
+        runs = fmu.run(TIME[:7], start={"mood": list(MOODS).index("ends at point")}, outputs=["y"])
+    assert runs.ok.all() and runs.notes == {0: "ended by the FMU at t = 0.6 s"}
+    np.testing.assert_allclose(runs["y"][0], 4.0 + TIME[:7], atol=1e-15)
+
+
+def test_the_reason_is_asked_for_once_and_apart_from_the_results(unruly):
+    moods = [
+        list(MOODS).index(name) for name in ("error if asked", "good", "silent error", "discard", "error if asked")
+    ]
+    with fmu_run.Fmu(unruly) as fmu:
+        runs = fmu.run(TIME, start={"mood": moods}, outputs=["y", "logged", "instances"])
+        after = fmu.run(TIME, outputs=["logged", "instances"])
+    assert runs.errors.keys() == {0, 2, 3, 4} and np.nanmax(runs["logged"]) == 0
+    # Three failed without a word: the six steps of each were made once more, with never two instances at a time.
+    assert after["logged"].max() == 3 * 6 and after["instances"].max() == 1
+
+
+def test_an_fmu_that_is_slow_to_talk(unruly):
+    with fmu_run.Fmu(unruly) as fmu:
+        begin = clock.monotonic()
+        runs = fmu.run(np.linspace(0, 0.6, 101), start={"mood": len(MOODS)}, outputs=["y"])
+    # 76 steps of 0.3 s each would be 23 s.
+    assert clock.monotonic() - begin < 10
+    assert runs.errors[0].endswith("fmi2DoStep was answered with Error, without a message")
+
+
+@pytest.mark.parametrize(
+    "guid, why",
+    [("strange", "the guid is of another FMU"), ("mute", "Unruly makes no instance, and logs no message")],
+)
+def test_an_fmu_that_makes_no_instances(tmp_path, unruly, guid, why):
+    path = tmp_path / "strange.fmu"
+    with zipfile.ZipFile(unruly) as whole, zipfile.ZipFile(path, "w") as archive:
+        for name in whole.namelist():
+            archive.writestr(name, whole.read(name).replace(b'guid="{unruly}"', f'guid="{{{guid}}}"'.encode()))
+    with fmu_run.Fmu(path) as fmu:
+        runs = fmu.run(TIME, start={"slope": [1.0, 2.0]}, outputs=["y"], every=1, measures=["peak"])
+    assert runs.errors == dict.fromkeys((0, 1), why)
+    assert np.isnan(runs["y"]).all() and np.isnan(runs["y", "peak"]).all()
