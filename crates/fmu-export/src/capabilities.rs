@@ -151,7 +151,7 @@ pub trait InputDerivatives: CoSimulation {
 
 /// The model knows time derivatives of its variables in Co-Simulation (section 4.2.1).
 pub trait OutputDerivatives: CoSimulation {
-    /// The highest order it knows.
+    /// The highest order it knows (`maxOutputDerivativeOrder`); the importer is refused higher ones.
     const HIGHEST: u32 = 1;
 
     /// The time derivative of order 1 or higher of any Real variable that is no parameter, now; 0 for orders above
