@@ -78,8 +78,12 @@ impl<M: Exported> Instance<M> {
         let time = self.state.time;
         let model = self.calculated();
         for (place, vr) in vr.iter().enumerate() {
-            let value = M::TABLE.get(*vr as usize).and_then(|of| of.value(model));
-            each(place, value.unwrap_or(Value::Real(time)));
+            let variable = M::TABLE.get(*vr as usize);
+            let value = variable.and_then(|of| of.value(model)).unwrap_or(Value::Real(time));
+            if let (Some(variable), Value::Real(value)) = (variable, &value) {
+                finite(variable, *value)?;
+            }
+            each(place, value);
         }
         Ok(())
     }
