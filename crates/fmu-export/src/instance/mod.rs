@@ -14,7 +14,6 @@ mod values;
 pub(crate) use co_simulation::no_status;
 pub(crate) use derivatives::Direction;
 pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
-pub(crate) use saved_states::SavedState;
 
 use crate::capabilities::Events;
 use crate::export::Exported;
@@ -38,6 +37,8 @@ pub(crate) struct Instance<M> {
     state: State<M>,
     /// Why start values were refused, of the variables that have been set to no other since.
     refused: BTreeMap<u32, String>,
+    /// The states that the importer has saved and not freed.
+    kept: saved_states::Kept<M>,
     /// Texts that the importer reads until the next call.
     pub texts: Vec<std::ffi::CString>,
     /// Bytes that the importer reads until the next call.
@@ -122,9 +123,11 @@ impl<M: Exported> Instance<M> {
             setup,
             state,
             refused: BTreeMap::new(),
+            kept: BTreeMap::new(),
             texts: Vec::new(),
             bytes: Vec::new(),
         };
+        instance.listen();
         instance.logger.log(Status::Ok, "instantiated");
         Ok(instance)
     }
@@ -167,11 +170,7 @@ impl<M: Exported> Instance<M> {
     /// Takes over what the model has to say.
     #[inline]
     pub fn listen(&mut self) {
-        if let Some(log) = self.state.model.log()
-            && !log.is_empty()
-        {
-            log.take().into_iter().for_each(|message| self.logger.add(message));
-        }
+        self.logger.listen(&mut self.state.model);
     }
 
     pub fn setup_experiment(&mut self, experiment: Experiment) -> Outcome {
@@ -245,9 +244,16 @@ impl<M: Exported> Instance<M> {
     /// What a model may refuse is tried on a copy first; nothing has changed if it does.
     #[cold]
     #[inline(never)]
-    fn try_on_copy<T>(&mut self, change: impl FnOnce(&mut M) -> Result<T, Error>) -> Outcome<T> {
+    fn try_on_copy<T, E: Into<Box<Refusal>>>(
+        &mut self,
+        change: impl FnOnce(&mut M) -> Result<T, E>,
+    ) -> Outcome<T> {
+        // A copy has nothing to say yet, and one that is dropped has been heard.
+        self.listen();
         let mut draft = self.state.model.clone();
-        let changed = change(&mut draft)?;
+        let changed = change(&mut draft);
+        self.logger.listen(&mut draft);
+        let changed = changed.map_err(Into::into)?;
         self.state.model = draft;
         self.state.stale = true;
         Ok(changed)
