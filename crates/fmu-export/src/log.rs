@@ -148,7 +148,7 @@ impl Logger {
         let errors = Category::Error.bit() | Category::Fatal.bit();
         let (always, fixed) = match standard {
             Standard::Fmi2 => (errors | Category::Warning.bit(), 0),
-            Standard::Fmi3 => (errors, errors),
+            Standard::Fmi3 => (errors | Category::Discard.bit(), errors),
         };
         let mut logger = Self { enabled: 0, always, fixed, waiting: Vec::new() };
         logger.set_all(logging_on);

@@ -39,6 +39,9 @@ pub(crate) struct Instance<M> {
     refused: BTreeMap<u32, String>,
     /// The states that the importer has saved and not freed.
     kept: saved_states::Kept<M>,
+    /// Where the last step began, if one may fail half way: of FMI 3.0, unless each early end and event is the
+    /// importer's at once.
+    before: Option<Box<State<M>>>,
     /// Texts that the importer reads until the next call.
     pub texts: Vec<std::ffi::CString>,
     /// Bytes that the importer reads until the next call.
@@ -116,11 +119,16 @@ impl<M: Exported> Instance<M> {
             return refuse("this FMU has no event mode in Co-Simulation (hasEventMode is false)");
         }
         let state = State::new(&setup)?;
+        let may_fail_half_way = Self::ENDS_EARLY
+            && setup.interface == Interface::CoSimulation
+            && importer.standard == Standard::Fmi3
+            && !(importer.event_mode && importer.early_return);
         let mut instance = Self {
             logger: Logger::new(importer.standard, logging_on),
             situation: Situation::new(importer.standard, setup.interface, state.mode),
             importer,
             setup,
+            before: may_fail_half_way.then(|| Box::new(state.clone())),
             state,
             refused: BTreeMap::new(),
             kept: BTreeMap::new(),

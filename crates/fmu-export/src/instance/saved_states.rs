@@ -97,7 +97,7 @@ impl<M: Exported> Instance<M> {
 
     /// Gives any of its states away, as long as there are some.
     pub fn give_any(&mut self) -> Option<impl Sized + use<M>> {
-        self.kept.pop_first()
+        self.before.take().or_else(|| self.kept.pop_first().map(|(_, state)| state))
     }
 
     pub fn serialized_size(&mut self, handle: usize) -> Outcome<usize> {
