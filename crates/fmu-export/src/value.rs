@@ -52,15 +52,20 @@ pub trait Scalar: Saved {
     /// Takes a value of the right kind. What cannot be is left out: the importer has been refused before.
     fn assign(&mut self, value: &Value);
 
-    /// The value of a Real, without a detour.
+    /// The [`value`](Self::value) of a Real, for types that have it without a detour; of others it is no number.
     #[inline]
     fn real(&self) -> f64 {
-        f64::NAN
+        match self.value() {
+            Value::Real(value) => value,
+            _ => f64::NAN,
+        }
     }
 
-    /// Takes the value of a Real, without a detour.
+    /// [Takes](Self::assign) the value of a Real, for types that can without a detour.
     #[inline]
-    fn set_real(&mut self, _value: f64) {}
+    fn set_real(&mut self, value: f64) {
+        self.assign(&Value::Real(value));
+    }
 }
 
 impl Scalar for f64 {

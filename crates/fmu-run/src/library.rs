@@ -57,7 +57,7 @@ pub fn functions_of<M: Exported>() -> Functions {
 }
 
 /// The library that `FMU_LIBRARY` names.
-pub(crate) fn other_library() -> Option<&'static Library> {
+fn other_library() -> Option<&'static Library> {
     static LIBRARY: OnceLock<Option<Library>> = OnceLock::new();
     let named = || std::env::var_os("FMU_LIBRARY").filter(|path| !path.is_empty());
     // SAFETY: who sets the variable knows what it names.

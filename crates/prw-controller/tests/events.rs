@@ -2,7 +2,7 @@
 
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::{fmi2EventInfo, fmi2False, fmi2True};
-use fmu_export::fmi3::types::{fmi3Boolean, fmi3False, fmi3True};
+use fmu_export::fmi3::types::{Status, fmi3Boolean, fmi3False, fmi3True};
 use fmu_run::fmi3::{Arguments, Stepped, Updated};
 use prw_controller::Controller;
 use prw_controller::variables::Name;
@@ -130,6 +130,21 @@ fn in_event_mode_with_samples_within_a_step() {
         assert_eq!(bits(fmu.get(OUTPUTS)), bits(unaware.get(OUTPUTS)), "at {next}");
         fmu.ok(fmu.fmi3EnterEventMode());
     }
+}
+
+/// A step with more samples than a step may have is not begun, and a shorter one goes on from where it is.
+#[test]
+fn too_many_samples_within_a_step() {
+    let fmu = with(fmi3True, fmi3False);
+    fmu.set(&INPUTS, &inputs(START));
+    fmu.update();
+    fmu.ok(fmu.fmi3EnterStepMode());
+    let before = (fmu.bytes(), bits(fmu.get(OUTPUTS)));
+    assert_eq!(fmu.try_step(START, 1000.0), Err(Status::Discard));
+    let log = fmu.take_log();
+    assert!(log[0].text.contains("more than 10000 events; make shorter steps"), "{log:?}");
+    assert_eq!((fmu.bytes(), bits(fmu.get(OUTPUTS))), before);
+    assert!(fmu.try_step(START, 70.0).unwrap().event_handling_needed);
 }
 
 /// Whoever does not handle the event that a step ended with has it handled by the next step.

@@ -66,13 +66,12 @@ pub unsafe fn fmi3GetFMUState<M: Exported>(instance: &mut Instance<M>, state: *m
 }
 
 pub unsafe fn fmi3SetFMUState<M: Exported>(instance: &mut Instance<M>, state: fmi3FMUState) -> Outcome {
-    // SAFETY: see above.
-    unsafe { set_state(instance, state) }
+    instance.restore(state.addr())
 }
 
-pub unsafe fn fmi3FreeFMUState<M: Exported>(_: &mut Instance<M>, state: *mut fmi3FMUState) -> Outcome {
+pub unsafe fn fmi3FreeFMUState<M: Exported>(instance: &mut Instance<M>, state: *mut fmi3FMUState) -> Outcome {
     // SAFETY: see above.
-    unsafe { free_state::<M>(state) }
+    unsafe { free_state(instance, state) }
 }
 
 pub unsafe fn fmi3SerializedFMUStateSize<M: Exported>(

@@ -118,7 +118,16 @@ impl<M: Exported> Instance<M> {
             return refuse("this FMU has no output derivatives (maxOutputDerivativeOrder is 0)");
         }
         for (vr, order) in vr.iter().zip(orders) {
-            check_order(self.variable(*vr, BaseType::Real)?, *order)?;
+            let variable = self.variable(*vr, BaseType::Real)?;
+            check_order(variable, *order)?;
+            // Section 4.3.1 of FMI 2.0, 4.4.1 of FMI 3.0.
+            if order.unsigned_abs() > M::OUTPUT_DERIVATIVES {
+                return refuse(format!(
+                    "the order of the derivative of {} must be at most {} (maxOutputDerivativeOrder), it is {order}",
+                    variable.name(),
+                    M::OUTPUT_DERIVATIVES
+                ));
+            }
             if super::indicator::<M>(*vr).is_some() {
                 return refuse("event indicators have no output derivatives");
             }

@@ -13,7 +13,6 @@ mod values;
 pub(crate) use co_simulation::no_status;
 pub(crate) use derivatives::Direction;
 pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
-pub(crate) use saved_states::SavedState;
 
 use crate::capabilities::Events;
 use crate::export::Exported;
@@ -37,6 +36,11 @@ pub(crate) struct Instance<M> {
     state: State<M>,
     /// Why start values were refused, of the variables that have been set to no other since.
     refused: BTreeMap<u32, String>,
+    /// The states that the importer has saved and not freed.
+    kept: saved_states::Kept<M>,
+    /// Where the last step began, if one may fail half way: of FMI 3.0, unless each early end and event is the
+    /// importer's at once.
+    before: Option<Box<State<M>>>,
     /// Texts that the importer reads until the next call.
     pub texts: Vec<std::ffi::CString>,
     /// Bytes that the importer reads until the next call.
@@ -114,16 +118,23 @@ impl<M: Exported> Instance<M> {
             return refuse("this FMU has no event mode in Co-Simulation (hasEventMode is false)");
         }
         let state = State::new(&setup)?;
+        let may_fail_half_way = Self::ENDS_EARLY
+            && setup.interface == Interface::CoSimulation
+            && importer.standard == Standard::Fmi3
+            && !(importer.event_mode && importer.early_return);
         let mut instance = Self {
             logger: Logger::new(importer.standard, logging_on),
             situation: Situation::new(importer.standard, setup.interface, state.mode),
             importer,
             setup,
+            before: may_fail_half_way.then(|| Box::new(state.clone())),
             state,
             refused: BTreeMap::new(),
+            kept: BTreeMap::new(),
             texts: Vec::new(),
             bytes: Vec::new(),
         };
+        instance.listen();
         instance.logger.log(Status::Ok, "instantiated");
         Ok(instance)
     }
@@ -166,11 +177,7 @@ impl<M: Exported> Instance<M> {
     /// Takes over what the model has to say.
     #[inline]
     pub fn listen(&mut self) {
-        if let Some(log) = self.state.model.log()
-            && !log.is_empty()
-        {
-            log.take().into_iter().for_each(|message| self.logger.add(message));
-        }
+        self.logger.listen(&mut self.state.model);
     }
 
     pub fn setup_experiment(&mut self, experiment: Experiment) -> Outcome {
@@ -244,9 +251,16 @@ impl<M: Exported> Instance<M> {
     /// What a model may refuse is tried on a copy first; nothing has changed if it does.
     #[cold]
     #[inline(never)]
-    fn try_on_copy<T>(&mut self, change: impl FnOnce(&mut M) -> Result<T, Error>) -> Outcome<T> {
+    fn try_on_copy<T, E: Into<Box<Refusal>>>(
+        &mut self,
+        change: impl FnOnce(&mut M) -> Result<T, E>,
+    ) -> Outcome<T> {
+        // A copy has nothing to say yet, and one that is dropped has been heard.
+        self.listen();
         let mut draft = self.state.model.clone();
-        let changed = change(&mut draft)?;
+        let changed = change(&mut draft);
+        self.logger.listen(&mut draft);
+        let changed = changed.map_err(Into::into)?;
         self.state.model = draft;
         self.state.stale = true;
         Ok(changed)

@@ -78,8 +78,12 @@ impl<M: Exported> Instance<M> {
         let time = self.state.time;
         let model = self.calculated();
         for (place, vr) in vr.iter().enumerate() {
-            let value = M::TABLE.get(*vr as usize).and_then(|of| of.value(model));
-            each(place, value.unwrap_or(Value::Real(time)));
+            let variable = M::TABLE.get(*vr as usize);
+            let value = variable.and_then(|of| of.value(model)).unwrap_or(Value::Real(time));
+            if let (Some(variable), Value::Real(value)) = (variable, &value) {
+                finite(variable, *value)?;
+            }
+            each(place, value);
         }
         Ok(())
     }
@@ -99,8 +103,17 @@ impl<M: Exported> Instance<M> {
         values: impl Iterator<Item = Value> + Clone,
     ) -> Outcome {
         self.check_all_settable(vr, bases)?;
-        let set = self.set_settable(vr, values);
-        self.remember(vr, set)
+        let to_blame = vr.iter().zip(values.clone()).find_map(|(vr, value)| {
+            let refusal = check_value(&M::TABLE[*vr as usize], &value).err()?;
+            Some((*vr, refusal))
+        });
+        match to_blame {
+            Some((blamed, refusal)) => self.remember(vr, Some(blamed), Err(refusal)),
+            None => {
+                let set = self.set_settable(vr, values);
+                self.remember(vr, None, set)
+            }
+        }
     }
 
     /// Refuses to set variables because the value at one place is none of its type. `why` is given the variable's name.
@@ -114,7 +127,7 @@ impl<M: Exported> Instance<M> {
     ) -> Outcome {
         self.check_all_settable(vr, bases)?;
         let refusal = refuse(why(M::TABLE[vr[place] as usize].name()));
-        self.remember(vr, refusal)
+        self.remember(vr, Some(vr[place]), refusal)
     }
 
     fn check_all_settable(&self, vr: &[u32], bases: &[BaseType]) -> Outcome {
@@ -122,30 +135,42 @@ impl<M: Exported> Instance<M> {
     }
 
     /// Some importers go on after a start value was refused, and the simulation would have another one than the user
-    /// wants: until it is set to one that is possible, the initialization is refused with the same words.
-    fn remember(&mut self, vr: &[u32], set: Outcome) -> Outcome {
+    /// wants: until it is set to one that is possible, the initialization is refused. So it is for those that were to
+    /// be set in the same call, which one of them may be to blame for.
+    fn remember(&mut self, vr: &[u32], blamed: Option<u32>, set: Outcome) -> Outcome {
         if self.situation().is_in(STARTING) {
             for vr in vr {
-                match &set {
-                    Ok(()) => _ = self.refused.remove(vr),
-                    Err(refusal) => _ = self.refused.insert(*vr, refusal.message.clone()),
-                }
+                let Err(refusal) = &set else {
+                    self.refused.remove(vr);
+                    continue;
+                };
+                let message = match blamed.filter(|blamed| blamed != vr) {
+                    None => refusal.message.clone(),
+                    Some(blamed) => {
+                        let [name, other] = [*vr, blamed].map(|vr| M::TABLE[vr as usize].name());
+                        format!(
+                            "{name} was not set, because {other} in the same call was refused: set it again"
+                        )
+                    }
+                };
+                self.refused.insert(*vr, message);
             }
         }
         set
     }
 
     pub(super) fn check_start_values(&self) -> Outcome {
-        self.refused.first_key_value().map_or(Ok(()), |(_, message)| refuse(message.clone()))
+        let mut reasons: Vec<&str> = Vec::new();
+        for reason in self.refused.values() {
+            if !reasons.contains(&reason.as_str()) {
+                reasons.push(reason);
+            }
+        }
+        if reasons.is_empty() { Ok(()) } else { refuse(reasons.join("; ")) }
     }
 
     fn set_settable(&mut self, vr: &[u32], values: impl Iterator<Item = Value> + Clone) -> Outcome {
-        let mut parameters = false;
-        for (vr, value) in vr.iter().zip(values.clone()) {
-            let variable = &M::TABLE[*vr as usize];
-            check_value(variable, &value)?;
-            parameters |= variable.causality() == Causality::Parameter;
-        }
+        let parameters = vr.iter().any(|vr| M::TABLE[*vr as usize].causality() == Causality::Parameter);
         let set = |model: &mut M| {
             for (vr, value) in vr.iter().zip(values) {
                 M::TABLE[*vr as usize].set(model, &value);

@@ -75,10 +75,17 @@ fn of_outputs() {
     fmu.set(&[position as u32, velocity as u32], &[0.25, -3.0]);
     fmu.initialize(0.0);
     let time = Oscillator::TABLE.len() as u32;
-    let (vr, orders, mut values) = ([position as u32, time, time], [1, 1, 2], [f64::NAN; 3]);
-    fmu.ok(fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 3, orders.as_ptr(), values.as_mut_ptr(), 3));
-    assert_eq!(values, [-3.0, 1.0, 0.0]);
+    let (vr, mut values) = ([position as u32, time], [f64::NAN; 2]);
+    fmu.ok(fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 2, [1, 1].as_ptr(), values.as_mut_ptr(), 2));
+    assert_eq!(values, [-3.0, 1.0]);
     fmu.refused("order 0", |fmu| fmu.fmi3GetOutputDerivatives(&time, 1, &0, &mut 0.0, 1));
+    // Section 4.4.1 allows orders up to maxOutputDerivativeOrder.
+    for orders in [[1, 2], [2, 1], [1, i32::MAX]] {
+        let text = fmu.refused("an order above 1", |fmu| {
+            fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 2, orders.as_ptr(), values.as_mut_ptr(), 2)
+        });
+        assert!(text.contains("must be at most 1 (maxOutputDerivativeOrder)"), "{text}");
+    }
 }
 
 /// No importer is told more by the functions than by the description.

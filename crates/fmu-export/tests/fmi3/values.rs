@@ -1,7 +1,8 @@
 //! Values of every type.
 
+use crate::toys::grumbler::{self, Trouble};
 use crate::toys::palette::{Colour, Name};
-use crate::toys::{Counter, Palette, Talker};
+use crate::toys::{Counter, Grumbler, Palette, Talker};
 use fmu_export::fmi3::independent;
 use fmu_export::fmi3::types::*;
 use fmu_export::{Causality, Enumeration, Exported, Interface::*, Variables};
@@ -47,6 +48,26 @@ fn numbers() {
     let other = palette();
     other.restore(&bytes);
     assert_eq!(other.bytes(), bytes);
+}
+
+/// A type of the author's with no more than it must have; and numbers that are none.
+#[test]
+fn types_of_authors() {
+    let fmu = Importer::of::<Grumbler>(CoSimulation);
+    let [ambient, warmer] = [grumbler::Name::ambient, grumbler::Name::warmer].map(|name| name as u32);
+    fmu.set(&[ambient], &[-273.25]);
+    fmu.initialize(0.0);
+    assert_eq!(fmu.get([ambient]), [-273.25]);
+    fmu.set(&[ambient], &[4.5]);
+    assert_eq!(fmu.get([ambient, ambient]), [4.5; 2]);
+    let mut value = f32::NAN;
+    fmu.ok(fmu.fmi3GetFloat32(&warmer, 1, &mut value, 1));
+    assert_eq!(value, 0.0);
+    fmu.ok(fmu.fmi3SetInt64(&(grumbler::Name::trouble as u32), 1, &(Trouble::Heat as i64), 1));
+    fmu.step(0.0, 0.5);
+    assert_eq!(fmu.fmi3GetFloat32(&warmer, 1, &mut value, 1), Status::Error);
+    let log = fmu.take_log();
+    assert!(log.last().unwrap().text.contains("warmer is out of the range of numbers"), "{log:?}");
 }
 
 #[test]
