@@ -3,10 +3,10 @@
 //! # Safety
 //! As in the [module above](super): each argument is what the standard says it is.
 
-use super::types::*;
+use super::{FromOne, reference, types::*};
 use crate::boundary::*;
 use crate::export::Exported;
-use crate::instance::{Direction, Instance, Outcome, refuse};
+use crate::instance::{Direction, Instance, Outcome, Reference, refuse};
 use crate::model::Experiment;
 
 pub unsafe fn fmi3SetDebugLogging<M: Exported>(
@@ -58,7 +58,7 @@ pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Exported>(
 ) -> Outcome {
     // SAFETY: by contract NULL or a pointer to a value.
     let count = unsafe { place(count, "nDependencies") }?;
-    count.write(instance.dependencies(vr)?.len());
+    count.write(instance.dependencies(FromOne(vr).place())?.len());
     Ok(())
 }
 
@@ -80,12 +80,12 @@ pub unsafe fn fmi3GetVariableDependencies<M: Exported>(
             output(kinds, count, "dependencyKinds")?,
         )
     };
-    let found = instance.dependencies(dependent)?;
+    let found = instance.dependencies(FromOne(dependent).place())?;
     same("dependencies", found.len(), count)?;
     for (place, known) in found.into_iter().enumerate() {
         // 0: all elements of the variable.
         elements[place].write(0);
-        independents[place].write(known);
+        independents[place].write(reference(known));
         elements_of_independents[place].write(0);
         kinds[place].write(fmi3Dependent);
     }
@@ -206,8 +206,8 @@ unsafe fn derivatives<M: Exported>(
     // SAFETY: this function's contract.
     let (unknown, known, seed, sensitivity) = unsafe {
         (
-            array(unknown, unknown_count, "unknowns")?,
-            array(known, known_count, "knowns")?,
+            array::<FromOne>(unknown.cast(), unknown_count, "unknowns")?,
+            array(known.cast(), known_count, "knowns")?,
             array(seed, seed_count, "seed")?,
             output(sensitivity, sensitivity_count, "sensitivity")?,
         )

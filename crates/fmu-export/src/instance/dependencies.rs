@@ -1,20 +1,18 @@
 //! What depends on what (section 2.2.9 of FMI 3.0).
 
-use super::{Instance, Outcome, independent, refuse};
+use super::{Instance, Outcome, independent};
 use crate::export::Exported;
 use crate::mode::Mode;
 use crate::variable::{Causality, Initial, Variability, Variable};
 
 impl<M: Exported> Instance<M> {
-    /// The value references of what a variable depends on directly.
+    /// The places of what a variable depends on directly.
     ///
     /// Known is what the table says by [`depends_on`](Variable::depends_on). Where it says nothing, these are all knowns
     /// there are, as in a description without dependencies. The description may say less, where fmu-package has found
     /// out more by trying.
-    pub fn dependencies(&self, vr: u32) -> Outcome<Vec<u32>> {
-        let Some(variable) = self.find(vr) else {
-            return refuse(format!("there is no variable with value reference {vr}"));
-        };
+    pub fn dependencies(&self, place: u32) -> Outcome<Vec<u32>> {
+        let Some(variable) = self.find(place) else { return self.refuse_place(place) };
         let initial = matches!(self.mode(), Mode::Instantiated | Mode::Initialization);
         let is_output = variable.causality() == Causality::Output;
         let is_unknown = matches!(variable.initial(), Some(Initial::Calculated | Initial::Approx))
@@ -23,7 +21,7 @@ impl<M: Exported> Instance<M> {
             return Ok(Vec::new());
         }
         if !initial && variable.is_state() {
-            return Ok(vec![vr]);
+            return Ok(vec![place]);
         }
         let is_known = |known: &Variable<M>| match known.causality() {
             Causality::Input | Causality::Independent => true,

@@ -1,7 +1,7 @@
 //! Derivatives with respect to variables (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0) and to time (section 4.2.1 of FMI
 //! 2.0, 4.1.2 of FMI 3.0).
 
-use super::{Instance, Outcome, finite, refuse};
+use super::{Instance, Outcome, Reference, finite, refuse};
 use crate::export::Exported;
 use crate::mode::Standard;
 use crate::types::BaseType;
@@ -20,10 +20,10 @@ pub(crate) enum Direction {
 impl<M: Exported> Instance<M> {
     /// The partial derivatives of unknowns with respect to knowns, times the seed: by rows for a directional
     /// derivative, by columns for an adjoint one.
-    pub fn derivatives(
+    pub fn derivatives<R: Reference>(
         &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
+        unknowns: &[R],
+        knowns: &[R],
         seed: &[f64],
         result: &mut [MaybeUninit<f64>],
         direction: Direction,
@@ -42,7 +42,7 @@ impl<M: Exported> Instance<M> {
             });
         }
         for vr in unknowns {
-            let variable = self.variable(*vr, BaseType::Real)?;
+            let variable = self.variable(vr.place(), BaseType::Real)?;
             if variable.causality() != Causality::Output && variable.differentiates().is_none() {
                 return refuse(format!(
                     "{} is no unknown: neither output nor state derivative",
@@ -51,7 +51,7 @@ impl<M: Exported> Instance<M> {
             }
         }
         for vr in knowns {
-            let variable = self.variable(*vr, BaseType::Real)?;
+            let variable = self.variable(vr.place(), BaseType::Real)?;
             // Parameters may be set at any time, whether the description calls them tunable or not. FMI 2.0 (section
             // 2.1.9) has them among the knowns in initialization mode alone; CasADi asks later.
             let input = matches!(variable.causality(), Causality::Input | Causality::Parameter);
@@ -68,7 +68,7 @@ impl<M: Exported> Instance<M> {
         };
         for (vr, seed) in seeded.iter().zip(seed) {
             if !seed.is_finite() {
-                let name = M::TABLE[*vr as usize].name();
+                let name = M::TABLE[vr.place() as usize].name();
                 return refuse(format!("the seed of {name} must be a finite number, it is {seed}"));
             }
         }
@@ -77,8 +77,8 @@ impl<M: Exported> Instance<M> {
             let mut sum = 0.0;
             for (seeded, seed) in seeded.iter().zip(seed) {
                 let (unknown, known) = match direction {
-                    Direction::Forward => (*wanted as usize, *seeded as usize),
-                    Direction::Adjoint => (*seeded as usize, *wanted as usize),
+                    Direction::Forward => (wanted.place() as usize, seeded.place() as usize),
+                    Direction::Adjoint => (seeded.place() as usize, wanted.place() as usize),
                 };
                 let Some(partial) = model.exported_partial(M::NAMES[unknown], M::NAMES[known]) else {
                     return refuse(format!(
@@ -89,7 +89,7 @@ impl<M: Exported> Instance<M> {
                 };
                 sum += partial * seed;
             }
-            result.write(finite(&M::TABLE[*wanted as usize], sum)?);
+            result.write(finite(&M::TABLE[wanted.place() as usize], sum)?);
         }
         Ok(())
     }
@@ -99,7 +99,7 @@ impl<M: Exported> Instance<M> {
             return refuse("this FMU does not use input derivatives (canInterpolateInputs is false)");
         }
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {
-            let variable = self.variable(*vr, BaseType::Real)?;
+            let variable = self.variable(vr.place(), BaseType::Real)?;
             if variable.causality() != Causality::Input || variable.variability() != Variability::Continuous {
                 return refuse(format!("{} is no continuous input", variable.name()));
             }
@@ -119,9 +119,9 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    pub fn get_output_derivatives(
+    pub fn get_output_derivatives<R: Reference>(
         &mut self,
-        vr: &[u32],
+        vr: &[R],
         orders: &[i32],
         values: &mut [MaybeUninit<f64>],
     ) -> Outcome {
@@ -129,14 +129,14 @@ impl<M: Exported> Instance<M> {
             return refuse("this FMU has no output derivatives (maxOutputDerivativeOrder is 0)");
         }
         for (vr, order) in vr.iter().zip(orders) {
-            check_order(self.variable(*vr, BaseType::Real)?, *order)?;
-            if super::indicator::<M>(*vr).is_some() {
+            check_order(self.variable(vr.place(), BaseType::Real)?, *order)?;
+            if super::indicator::<M>(vr.place()).is_some() {
                 return refuse("event indicators have no output derivatives");
             }
         }
         let model = self.calculated();
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {
-            let place = *vr as usize;
+            let place = vr.place() as usize;
             value.write(match M::TABLE.get(place) {
                 Some(variable) => finite(variable, derivative(model, place, order.unsigned_abs()))?,
                 None => derivative_of_time(*order),
