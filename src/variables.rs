@@ -104,10 +104,11 @@ variables! {
     M = parameter(&COUNT) in testbed.parameters.M;
     /// Number of rollers on each side of the roller-carriers
     N = parameter(&COUNT) in testbed.parameters.N;
-    /// Co-Simulation: take the motor rates from omega1 and omega2 instead of differentiating theta1 and theta2
-    use_omega = parameter(&BOOLEAN) in testbed.motors.use_omega then |fmu| { fmu.testbed.motors.use_omega_set() };
+    // Before the other Boolean: OpenModelica 1.27.0 hands over the second one of an array as false.
     /// Start at rest wherever the motors are (theta3 = theta5 = theta1, theta4 = theta6 = theta2, rates 0); if false, start at theta3_start ... omega6_start
     start_at_rest = parameter(&BOOLEAN) in start.at_rest then |fmu| { fmu.follow() };
+    /// Co-Simulation: take the motor rates from omega1 and omega2 instead of differentiating theta1 and theta2
+    use_omega = parameter(&BOOLEAN) in testbed.motors.use_omega then |fmu| { fmu.testbed.motors.use_omega_set() };
     /// theta3 at the start; used only if start_at_rest is false
     theta3_start = parameter(&ANGLE) in start.state[0] then |fmu| { fmu.follow() };
     /// theta4 at the start; used only if start_at_rest is false

@@ -93,7 +93,7 @@ fn refused_parameters_stop_the_initialization() {
             fmu.ok(fmu.fmi2ExitInitializationMode());
 
             let fmu = fmi3::Importer::of::<TestbedFmu>(interface);
-            let first = words(fmu.refused("a start value", |fmu| fmu.fmi3SetFloat64(&vr, 1, &wrong, 1)));
+            let first = words(fmu.refused("a start value", |fmu| fmu.try_set(&[vr], &[wrong])));
             let enter = |fmu: &fmi3::Importer| fmu.fmi3EnterInitializationMode(0, 0.0, 0.0, 0, 0.0);
             assert_eq!(words(fmu.refused("to begin", enter)), first);
             fmu.set(&[vr], &[right]);

@@ -2,6 +2,7 @@
 
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::{fmi2EventInfo, fmi2False, fmi2True};
+use fmu_export::fmi3::reference;
 use fmu_export::fmi3::types::{Status, fmi3Boolean, fmi3False, fmi3True};
 use fmu_run::fmi3::{Arguments, Stepped, Updated};
 use prw_controller::Controller;
@@ -247,8 +248,9 @@ fn partial_derivatives_by_the_time() {
         let (before, after) = (at(middle - WIDTH), at(middle + WIDTH));
         at(middle);
         for (place, unknown) in OUTPUTS.into_iter().enumerate() {
-            let (time, mut forward, mut adjoint) =
-                (fmu_export::fmi3::independent::<Controller>().0, 0.0, 0.0);
+            let unknown = reference(unknown);
+            let time = reference(fmu_export::fmi3::independent::<Controller>().0);
+            let (mut forward, mut adjoint) = (0.0, 0.0);
             fmu.ok(fmu.fmi3GetDirectionalDerivative(&unknown, 1, &time, 1, &1.0, 1, &mut forward, 1));
             fmu.ok(fmu.fmi3GetAdjointDerivative(&unknown, 1, &time, 1, &1.0, 1, &mut adjoint, 1));
             let difference = (after[place] - before[place]) / (2.0 * WIDTH);

@@ -3,7 +3,7 @@
 //! # Safety
 //! As in the [module above](super): each argument is what the standard says it is.
 
-use super::types::*;
+use super::{FromOne, types::*};
 use crate::boundary::*;
 use crate::export::Exported;
 use crate::instance::{Direction, Instance, Outcome, refuse};
@@ -164,8 +164,8 @@ unsafe fn derivatives<M: Exported>(
     // SAFETY: this function's contract.
     let (unknown, known, seed, sensitivity) = unsafe {
         (
-            array(unknown, unknown_count, "unknowns")?,
-            array(known, known_count, "knowns")?,
+            array::<FromOne>(unknown.cast(), unknown_count, "unknowns")?,
+            array(known.cast(), known_count, "knowns")?,
             array(seed, seed_count, "seed")?,
             output(sensitivity, sensitivity_count, "sensitivity")?,
         )

@@ -62,6 +62,19 @@ impl Importer {
     pub const FMI2: Self = Self { standard: Standard::Fmi2, event_mode: false, early_return: true };
 }
 
+/// How an importer calls a variable: by a number that stands for its place in the table, or behind it.
+pub(crate) trait Reference: Copy {
+    fn place(self) -> u32;
+}
+
+/// Of FMI 2.0: the place itself.
+impl Reference for u32 {
+    #[inline]
+    fn place(self) -> u32 {
+        self
+    }
+}
+
 /// What a saved state brings back.
 struct State<M> {
     mode: Mode,
@@ -278,22 +291,38 @@ impl<M: Exported> Instance<M> {
 }
 
 impl<M: Exported> Instance<M> {
-    /// The variable of this value reference.
+    /// The variable at this place.
     #[inline]
-    fn find(&self, vr: u32) -> Option<&'static Variable<M>> {
-        match M::TABLE.get(vr as usize) {
-            None if self.importer.standard == Standard::Fmi3 => implicit(vr),
+    fn find(&self, place: u32) -> Option<&'static Variable<M>> {
+        match M::TABLE.get(place as usize) {
+            None if self.importer.standard == Standard::Fmi3 => implicit(place),
             found => found,
         }
     }
 
-    /// The variable of this value reference, if it has the type.
+    /// The variable at this place, if it has the type.
     #[inline]
-    fn variable(&self, vr: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
-        match self.find(vr) {
+    fn variable(&self, place: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
+        match self.find(place) {
             Some(variable) if variable.base() == base => Ok(variable),
-            other => refuse_variable(vr, other, base),
+            other => self.refuse_variable(place, other, base),
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn refuse_variable<T>(&self, place: u32, variable: Option<&Variable<M>>, base: BaseType) -> Outcome<T> {
+        match variable {
+            Some(variable) => {
+                refuse(format!("{} is of type {}, not {base}", variable.name(), variable.base()))
+            }
+            None => self.refuse_place(place),
+        }
+    }
+
+    fn refuse_place<T>(&self, place: u32) -> Outcome<T> {
+        let reference = self.standard().reference(place);
+        refuse(format!("there is no variable with value reference {reference}"))
     }
 }
 
@@ -308,43 +337,40 @@ impl<M: 'static> Implicit<M> {
         .finished("eventIndicator", "An event happens where it changes its sign");
 }
 
-/// What FMI 3.0 asks for in every model, behind the table: with the value reference behind the last one of the table the
-/// time (section 2.4.7.4), if the table has none; then the event indicators (section 2.4.8).
+/// What FMI 3.0 asks for in every model, behind the table: the time (section 2.4.7.4), if the table has none; then the
+/// event indicators (section 2.4.8).
 #[cold]
-fn implicit<M: Exported>(vr: u32) -> Option<&'static Variable<M>> {
-    let (place, variable) = independent::<M>();
-    let variable = (vr == place).then_some(variable);
-    variable.or_else(|| indicator::<M>(vr).map(|_| Implicit::INDICATOR))
+fn implicit<M: Exported>(place: u32) -> Option<&'static Variable<M>> {
+    let (time, variable) = independent::<M>();
+    let variable = (place == time).then_some(variable);
+    variable.or_else(|| indicator::<M>(place).map(|_| Implicit::INDICATOR))
 }
 
-/// Which of the event indicators has this value reference.
-fn indicator<M: Exported>(vr: u32) -> Option<usize> {
-    let place = (vr as usize).checked_sub(M::TABLE.len() + 1)?;
-    (place < Instance::<M>::INDICATORS).then_some(place)
+/// Which of the event indicators is at this place.
+fn indicator<M: Exported>(place: u32) -> Option<usize> {
+    let number = place.checked_sub(first_indicator::<M>())? as usize;
+    (number < Instance::<M>::INDICATORS).then_some(number)
 }
 
 /// The value of a variable behind the table.
 #[cold]
-fn implicit_value<M: Exported>(model: &M, time: f64, vr: u32) -> f64 {
-    let Some(place) = indicator::<M>(vr) else { return time };
+fn implicit_value<M: Exported>(model: &M, time: f64, place: u32) -> f64 {
+    let Some(number) = indicator::<M>(place) else { return time };
     let mut indicators = vec![0.0; Instance::<M>::INDICATORS];
     model.exported_indicators(&mut indicators);
-    indicators[place]
+    indicators[number]
 }
 
-/// The independent variable as FMI 3.0 has it, with its value reference.
+/// The place of the first event indicator: behind the table and behind the time.
+pub(crate) fn first_indicator<M: crate::Variables>() -> u32 {
+    let (time, _) = independent::<M>();
+    (M::TABLE.len() as u32).max(time + 1)
+}
+
+/// The independent variable as FMI 3.0 has it, with its place.
 pub(crate) fn independent<M: crate::Variables>() -> (u32, &'static Variable<M>) {
     let of_table = (0..).zip(M::TABLE).find(|(_, variable)| variable.causality() == Causality::Independent);
     of_table.unwrap_or((M::TABLE.len() as u32, Implicit::TIME))
-}
-
-#[cold]
-#[inline(never)]
-fn refuse_variable<T, M>(vr: u32, variable: Option<&Variable<M>>, base: BaseType) -> Outcome<T> {
-    match variable {
-        Some(variable) => refuse(format!("{} is of type {}, not {base}", variable.name(), variable.base())),
-        None => refuse(format!("there is no variable with value reference {vr}")),
-    }
 }
 
 #[inline]

@@ -4,7 +4,7 @@ use crate::toys::grumbler::{self, Trouble};
 use crate::toys::ticker::Name;
 use crate::toys::*;
 use fmu_export::Interface::*;
-use fmu_export::fmi3::{indicator, types::*};
+use fmu_export::fmi3::{indicator, reference, types::*};
 use fmu_run::fmi3::{Arguments, Importer, Stepped, Updated};
 
 const SUM: u32 = Name::sum as u32;
@@ -40,8 +40,8 @@ fn in_model_exchange() {
     fmu.ok(fmu.fmi3GetEventIndicators(&mut z, 1));
     assert_eq!(z, -0.1);
     // Section 2.4.8: a variable stands for it.
-    let vr = indicator::<Ball>(0);
-    assert_eq!(fmu.get([vr]), [-0.1]);
+    let vr = reference(indicator::<Ball>(0));
+    assert_eq!(fmu.get([indicator::<Ball>(0)]), [-0.1]);
     fmu.refused("a calculated local", |fmu| fmu.fmi3SetFloat64(&vr, 1, &1.0, 1));
     fmu.refused("no variable", |fmu| fmu.fmi3GetFloat64(&(vr + 1), 1, &mut 0.0, 1));
     fmu.ok(fmu.fmi3GetNominalsOfContinuousStates(nominals.as_mut_ptr(), 2));
@@ -114,7 +114,7 @@ fn the_library_handles_them() {
 #[test]
 fn an_event_ends_the_simulation() {
     let fmu = Importer::of::<Ticker>(CoSimulation);
-    fmu.ok(fmu.fmi3SetInt32(&(Name::last as u32), 1, &3, 1));
+    fmu.ok(fmu.fmi3SetInt32(&reference(Name::last as u32), 1, &3, 1));
     fmu.initialize(0.0);
     let stepped = fmu.try_step(0.0, 1.0).unwrap();
     assert_eq!((stepped.terminate, stepped.last_successful_time), (true, 0.5));

@@ -10,6 +10,7 @@ mod fmi3;
 
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Status;
+use fmu_export::fmi3::reference;
 use fmu_run::Message;
 use fmu_run::testing::assert_clean;
 use fmu_run::{self as old, fmi3 as new};
@@ -112,7 +113,7 @@ standard! {
 }
 standard! {
     Importer of new, fmi3::CALLS, 70, "fmi3", |fmu, fault|
-    fmu.fmi3SetInt32(&FAULT, 1, &(fault as i32), 1),
+    fmu.fmi3SetInt32(&reference(FAULT), 1, &(fault as i32), 1),
     fmu.fmi3EnterInitializationMode(0, 0.0, 0.0, 0, 0.0), fmi3EnterContinuousTimeMode, fmi3Reset
 }
 

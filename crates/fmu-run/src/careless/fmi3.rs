@@ -5,7 +5,7 @@ use super::{Tally, check_messages, damage, offered, place};
 use crate::fmi3::{Arguments, FUNCTIONS, Functions, Importer};
 use crate::serialized::time;
 use arbitrary::{Result, Unstructured};
-use fmu_export::fmi3::types::*;
+use fmu_export::fmi3::{reference, types::*};
 use fmu_export::{Exported, Interface};
 use std::ffi::{CStr, CString};
 use std::marker::PhantomData;
@@ -21,7 +21,7 @@ pub fn run<M: Exported>(bytes: &[u8], tally: &mut Tally) {
         instances: [const { None }; 2],
         states: [[null_mut(); 2]; 2],
         saved: Vec::new(),
-        variables: Variables::of::<M>(),
+        variables: Variables::of::<M>(reference),
         tally,
         model: PhantomData,
     };

@@ -58,7 +58,7 @@ fn session<M: Exported>(
         instances: [const { None }; 3],
         states: [[null_mut(); 3]; 3],
         saved: Vec::new(),
-        variables: arguments::Variables::of::<M>(),
+        variables: arguments::Variables::of::<M>(|place| place),
         tally,
         model: PhantomData,
     };

@@ -5,6 +5,7 @@ mod testing;
 
 pub use fmu_export::fmi3::Functions;
 pub use library::{Library, load};
+pub(crate) use testing::references;
 pub use testing::{Stepped, Updated};
 
 use crate::importer::{Log, Zero, remember_message, status};
