@@ -151,7 +151,7 @@ fn grumbler(trouble: Trouble, event_mode_used: fmi3Boolean, early_return_allowed
     let arguments =
         Arguments { event_mode_used, early_return_allowed, ..Arguments::of::<Grumbler>(CoSimulation) };
     let fmu = Importer::with::<Grumbler>(&arguments);
-    fmu.ok(fmu.fmi3SetInt64(&(grumbler::Name::trouble as u32), 1, &(trouble as i64), 1));
+    fmu.ok(fmu.fmi3SetInt64(&reference(grumbler::Name::trouble as u32), 1, &(trouble as i64), 1));
     fmu.initialize(0.0);
     fmu
 }
@@ -179,11 +179,11 @@ fn a_step_that_fails_half_way() {
             fmu.ok(fmu.fmi3EnterStepMode());
         }
         for (trouble, failed) in [(Trouble::SecondRound, "SecondRound"), (Trouble::Step, "Step")] {
-            fmu.ok(fmu.fmi3SetInt64(&(grumbler::Name::trouble as u32), 1, &(trouble as i64), 1));
+            fmu.ok(fmu.fmi3SetInt64(&reference(grumbler::Name::trouble as u32), 1, &(trouble as i64), 1));
             let text = undone(&fmu, Status::Error, 0.0, 1.5);
             assert_eq!(text, format!("fmi3DoStep: the step cannot go on at 1: {failed} has failed"));
         }
-        fmu.ok(fmu.fmi3SetInt64(&(grumbler::Name::trouble as u32), 1, &0, 1));
+        fmu.ok(fmu.fmi3SetInt64(&reference(grumbler::Name::trouble as u32), 1, &0, 1));
         fmu.step(0.0, 1.5);
     }
 }
@@ -195,7 +195,7 @@ fn more_events_than_a_step_may_have() {
         [(fmi3False, fmi3False), (fmi3False, fmi3True), (fmi3True, fmi3False)]
     {
         let fmu = ticker(event_mode_used, early_return_allowed);
-        fmu.ok(fmu.fmi3SetInt32(&(Name::last as u32), 1, &i32::MAX, 1));
+        fmu.ok(fmu.fmi3SetInt32(&reference(Name::last as u32), 1, &i32::MAX, 1));
         if event_mode_used == fmi3True {
             fmu.ok(fmu.fmi3EnterStepMode());
         }
