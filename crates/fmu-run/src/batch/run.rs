@@ -251,7 +251,7 @@ impl<'a, S: Slave> Worker<'a, S> {
         }
         let terminated = if refused { Ok(()) } else { instance.terminate() };
         let mut refusals = stopped.iter().map(|(_, refusal)| refusal).chain(terminated.as_ref().err());
-        match refusals.any(Refusal::is_fatal) {
+        match refusals.any(|refusal| refusal.is_fatal()) {
             // Not even its memory may be given back.
             true => std::mem::forget(instance),
             false => self.instance = Some(instance),
@@ -280,7 +280,7 @@ impl<'a, S: Slave> Worker<'a, S> {
 }
 
 /// The number of the time, after the initialization, and what was refused.
-type Refused = (Option<usize>, Refusal);
+type Stopped = (Option<usize>, Refusal);
 
 /// From the start values to the last of these times, or until logging has taken too long.
 fn follow<S: Slave>(
@@ -291,13 +291,13 @@ fn follow<S: Slave>(
     run: usize,
     courses: &mut [f64],
     logging: Option<Instant>,
-) -> Result<(), Refused> {
+) -> Result<(), Stopped> {
     start(plan, instance, room, run).map_err(|refusal| (None, refusal))?;
     instance.forget_log();
     let measures = !plan.measures.is_empty();
     // The places in a course that are filled, and how many times go by until the next is.
     let (kept, mut place, mut wait) = (plan.kept(), 0, 0);
-    let mut ended = None;
+    let mut ended: Option<Refusal> = None;
     for (k, &time) in times.iter().enumerate() {
         let at = |refusal| (Some(k), refusal);
         if let Some(until) = logging {
@@ -314,7 +314,7 @@ fn follow<S: Slave>(
         if (keep || measures)
             && let Err(refusal) = read(plan, instance, room)
         {
-            return Err(ended.unwrap_or((Some(k), refusal)));
+            return Err(at(ended.unwrap_or(refusal)));
         }
         if keep {
             // Not by chunks, whose number would be calculated anew each time.
@@ -330,7 +330,7 @@ fn follow<S: Slave>(
         }
         room.rows = k + 1;
         if let Some(ended) = ended {
-            return Err(ended);
+            return Err(at(ended));
         }
         if plan.read_before_set {
             set_inputs(plan, instance, room, k).map_err(at)?;
@@ -342,7 +342,7 @@ fn follow<S: Slave>(
                 // The end is at the next time, whose outputs can be read, but inputs no longer set (section 4.2.4 of
                 // FMI 2.0).
                 Err(refusal) if refusal.ended.is_some_and(|end| next - end <= 1e-9 * size) => {
-                    ended = Some(at(refusal));
+                    ended = Some(refusal);
                 }
                 Err(refusal) => return Err(at(refusal)),
             }

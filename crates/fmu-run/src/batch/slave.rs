@@ -8,9 +8,12 @@ use fmu_export::fmi3::types::*;
 use fmu_export::{BaseType, Interface};
 use std::ffi::{CStr, CString};
 
-/// What an instance answered instead of OK: the function, and what it logged.
+/// What an instance answered instead of OK: the function, and what it logged. In a box, as it is seldom made and each call
+/// may answer with it.
+pub(super) type Refusal = Box<Refused>;
+
 #[derive(Debug)]
-pub(super) struct Refusal {
+pub(super) struct Refused {
     function: &'static str,
     status: Status,
     log: Vec<Message>,
@@ -18,7 +21,7 @@ pub(super) struct Refusal {
     pub ended: Option<f64>,
 }
 
-impl Refusal {
+impl Refused {
     /// After it no function may be called, not even to free the instance (section 2.1.3 of FMI 2.0).
     pub fn is_fatal(&self) -> bool {
         self.status == Status::Fatal
@@ -30,7 +33,7 @@ impl Refusal {
     }
 }
 
-impl std::fmt::Display for Refusal {
+impl std::fmt::Display for Refused {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let message = reason(&self.log);
         if let Some(time) = self.ended {
@@ -75,21 +78,20 @@ pub(super) trait Slave: Sized {
 /// One call; what it logged goes with its refusal.
 macro_rules! call {
     ($importer:expr, $function:ident ( $($argument:expr),* )) => {{
-        match $importer.$function($($argument),*) {
-            Status::Ok => Ok(()),
-            Status::Warning => {
-                // It must not be taken for the reason of something later.
-                $importer.take_log();
-                Ok(())
-            }
-            status => Err(refusal(stringify!($function), status, $importer.take_log())),
-        }
+        let status = $importer.$function($($argument),*);
+        if status == Status::Ok { Ok(()) } else { not_ok(stringify!($function), status, $importer.take_log()) }
     }};
+}
+
+/// A warning is forgotten: it must not be taken for the reason of something later.
+#[cold]
+fn not_ok(function: &'static str, status: Status, log: Vec<Message>) -> Result<(), Refusal> {
+    if status == Status::Warning { Ok(()) } else { Err(refusal(function, status, log)) }
 }
 
 #[cold]
 fn refusal(function: &'static str, status: Status, log: Vec<Message>) -> Refusal {
-    Refusal { function, status, log, ended: None }
+    Box::new(Refused { function, status, log, ended: None })
 }
 
 fn token(description: &Description) -> Option<CString> {
@@ -293,7 +295,7 @@ impl Slave for fmi3::Importer {
 
 /// A step that was discarded may be the end that the FMU wants (section 4.2.3 of FMI 2.0).
 #[cold]
-fn ended(importer: &Importer, refusal: Refusal, time: f64) -> Refusal {
+fn ended(importer: &Importer, mut refusal: Refusal, time: f64) -> Refusal {
     let (mut wanted, mut reached) = (fmi2False, time);
     let kinds = [StatusKind::Terminated, StatusKind::LastSuccessfulTime].map(|kind| kind as fmi2StatusKind);
     if refusal.status != Status::Discard
@@ -303,7 +305,8 @@ fn ended(importer: &Importer, refusal: Refusal, time: f64) -> Refusal {
         return refusal;
     }
     let told = importer.fmi2GetRealStatus(kinds[1], &mut reached) == Status::Ok && reached.is_finite();
-    Refusal { ended: Some(if told { reached } else { time }), ..refusal }
+    refusal.ended = Some(if told { reached } else { time });
+    refusal
 }
 
 /// The end that the FMU wants, or an early return, which it has not been allowed (section 4.2.1 of FMI 3.0).
@@ -311,10 +314,11 @@ fn ended(importer: &Importer, refusal: Refusal, time: f64) -> Refusal {
 fn stopped(importer: &fmi3::Importer, wanted: bool, reached: f64) -> Refusal {
     let mut refusal = refusal("fmi3DoStep", Status::Discard, importer.take_log());
     if wanted {
-        return Refusal { ended: Some(reached), ..refusal };
+        refusal.ended = Some(reached);
+    } else {
+        let text = format!("the step ended early, at {reached} s");
+        let [instance_name, category] = Default::default();
+        refusal.log.push(Message { instance_name, status: Status::Discard, category, text });
     }
-    let text = format!("the step ended early, at {reached} s");
-    let [instance_name, category] = Default::default();
-    refusal.log.push(Message { instance_name, status: Status::Discard, category, text });
     refusal
 }
