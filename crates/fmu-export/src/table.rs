@@ -22,6 +22,15 @@ pub trait Variables: Sized + 'static {
     /// Shows what the model remembers besides its variables.
     #[doc(hidden)]
     fn visit_memory(&mut self, visitor: &mut dyn StateVisitor);
+
+    /// Shows all that a serialized state holds of the model.
+    #[doc(hidden)]
+    fn visit_state(&mut self, visitor: &mut dyn StateVisitor) {
+        for variable in Self::TABLE {
+            variable.visit(self, visitor);
+        }
+        self.visit_memory(visitor);
+    }
 }
 
 /// A continuous-time state.

@@ -7,6 +7,7 @@ use crate::changes::Changes;
 use crate::check::check;
 use crate::definitions::{filled, items, type_definitions, unit_definitions, with_attributes, with_range};
 use crate::describe::{default_experiment, is_reinit, log_categories, root, with_dependencies, with_facts};
+use crate::memory;
 use crate::structure::{ModelStructure, Unknown};
 use crate::xml::Element;
 use anyhow::{Result, ensure};
@@ -19,6 +20,7 @@ use fmu_export::{BaseType, Exported, Interface, Type, Value, Variable};
 /// As [`fmi2::describe`](crate::fmi2::describe), and when a variable has the name of one that FMI 3.0 asks for.
 pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
     let starts = check::<M>(changes)?;
+    memory::check::<M>(&starts)?;
     let structure = ModelStructure::of_fmi3::<M>(changes.tunable_parameters)?;
     let types: Vec<_> = M::TABLE.iter().map(Variable::of).collect();
     let names: Vec<_> = M::TABLE.iter().map(Variable::name).collect();
