@@ -125,7 +125,8 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// is a path of fields, such as `motors[0].theta`. Start values are those of the model that
 /// [`Model::new`](crate::Model::new) makes.
 ///
-/// What lives in a place and all that is in the `memory` belongs to a serialized state; see [`Saved`](crate::Saved).
+/// What lives in a place and all that is in the `memory` belongs to a serialized state; see [`Saved`](crate::Saved). What
+/// `initialize`, a step or an event changes must be there; `build_fmu` of fmu-package refuses models where something is missing.
 ///
 /// The macro implements [`Variables`] for the model and defines `Name`, an enum with the names of the variables,
 /// for [`Partials`](crate::Partials) and its like.
