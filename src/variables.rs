@@ -8,9 +8,11 @@ const ANGLE: Type = Type::real("Angle", &RAD).nominal(1.0);
 const ANGULAR_VELOCITY: Type = Type::real("AngularVelocity", &RAD_PER_S).nominal(1.0);
 const ANGULAR_ACCELERATION: Type = Type::real("AngularAcceleration", &RAD_PER_S2).nominal(100.0);
 const TORQUE: Type = Type::real("Torque", &N_M).nominal(1.0);
-// The ranges include 0, which FMI cannot exclude; `Parameters::check` does where it must.
-const INERTIA: Type = Type::real("MomentOfInertia", &KG_M2).min(0.0).nominal(0.01);
-const STIFFNESS: Type = Type::real("RotationalSpringConstant", &N_M_PER_RAD).min(0.0).nominal(100.0);
+/// FMI's ranges include their ends, so this is what is more than 0. Below 1e-307 C++ refuses to read numbers (`std::stod`),
+/// and in another unit they may become 0.
+const MORE_THAN_0: f64 = 1e-300;
+const INERTIA: Type = Type::real("MomentOfInertia", &KG_M2).min(MORE_THAN_0).nominal(0.01);
+const STIFFNESS: Type = Type::real("RotationalSpringConstant", &N_M_PER_RAD).min(MORE_THAN_0).nominal(100.0);
 const DAMPING: Type = Type::real("RotationalDampingConstant", &N_M_S_PER_RAD).min(0.0).nominal(1.0);
 const COUNT: Type = Type::integer("Integer_from_1").from(1);
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
+from zipfile import ZipFile
 
 import fmpy
 import numpy as np
@@ -11,6 +13,7 @@ from fmpy import simulate_fmu
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 from lagrange import OUTPUTS
+from lxml import etree
 from packaging.version import Version
 
 #: Let go with the couplings wound up, while both motors turn.
@@ -54,6 +57,28 @@ def testbed3(fmu3):
 def test_fmpy_finds_no_problem(fmu3):
     assert fmpy.read_model_description(str(fmu3), validate=True).fmiVersion == "3.0"
     assert validate_fmu(str(fmu3)) == []
+
+
+def test_units_and_nominal_values_are_in_the_types(fmu3):
+    """fmi-sim 0.7 refuses to read FMUs with variables that have them themselves."""
+    root = etree.fromstring(ZipFile(fmu3).read("modelDescription.xml"))
+    units = {of.get("name") for of in root.find("TypeDefinitions") if of.get("unit") and of.get("nominal")}
+    for variable in root.find("ModelVariables"):
+        assert not {"quantity", "unit", "displayUnit", "nominal"} & set(variable.keys()), variable.get("name")
+        is_real = variable.tag == "Float64" and variable.get("causality") != "independent"
+        assert (variable.get("declaredType") in units) == is_real, variable.get("name")
+
+
+def test_the_terminals_are_the_same(fmu, fmu3):
+    """FMI 2.0 has them since 2.0.4 (section 2.3), in the file that FMI 3.0 defines."""
+    two, three = (ZipFile(path).read("terminalsAndIcons/terminalsAndIcons.xml") for path in (fmu, fmu3))
+    assert two == three
+    root = etree.fromstring(two)
+    schema = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
+    etree.XMLSchema(etree.parse(schema)).assertValid(root)
+    known = {variable.name for variable in fmpy.read_model_description(str(fmu)).modelVariables}
+    members = [member.get("variableName") for member in root.iter("TerminalMemberVariable")]
+    assert len(members) == 10 and known.issuperset(members)
 
 
 def test_the_variables_are_the_same(fmu, fmu3):

@@ -30,6 +30,10 @@ impl From<f64> for Value {
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            // Where hundreds of zeros may have to be written.
+            Self::Real(value) if *value != 0.0 && value.abs() < 1e-15 || value.abs() > 1e17 => {
+                write!(f, "{value:e}")
+            }
             Self::Real(value) => write!(f, "{value}"),
             Self::Integer(value) => write!(f, "{value}"),
             Self::Boolean(value) => write!(f, "{value}"),

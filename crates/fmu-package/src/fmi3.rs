@@ -5,8 +5,9 @@
 
 use crate::changes::Changes;
 use crate::check::check;
-use crate::definitions::{filled, items, type_definitions, unit_definitions, with_attributes};
+use crate::definitions::{filled, items, type_definitions, unit_definitions, with_attributes, with_range};
 use crate::describe::{default_experiment, is_reinit, log_categories, root, with_dependencies, with_facts};
+use crate::memory;
 use crate::structure::{ModelStructure, Unknown};
 use crate::xml::Element;
 use anyhow::{Result, ensure};
@@ -19,6 +20,7 @@ use fmu_export::{BaseType, Exported, Interface, Type, Value, Variable};
 /// As [`fmi2::describe`](crate::fmi2::describe), and when a variable has the name of one that FMI 3.0 asks for.
 pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
     let starts = check::<M>(changes)?;
+    memory::check::<M>(&starts)?;
     let structure = ModelStructure::of_fmi3::<M>(changes.tunable_parameters)?;
     let types: Vec<_> = M::TABLE.iter().map(Variable::of).collect();
     let names: Vec<_> = M::TABLE.iter().map(Variable::name).collect();
@@ -122,7 +124,8 @@ fn type_definition(of: &Type) -> Element {
     element.containing(items(of))
 }
 
-/// As in FMI 2.0, what a type says is repeated at the variable.
+/// Of what the type says, only the range is repeated: fmi-sim 0.7 reads no FMU whose variables have a quantity, a unit or a
+/// nominal value themselves, although they may (section 2.4.7.3).
 fn variable<M: Exported>(of: &Variable<M>, vr: u32, start: Option<Value>, changes: &Changes) -> Element {
     let variable_type = of.of();
     let start = start.map(|start| match start {
@@ -138,8 +141,8 @@ fn variable<M: Exported>(of: &Variable<M>, vr: u32, start: Option<Value>, change
         .with_some("start", attribute)
         .with_some("derivative", of.differentiates().map(reference))
         .with_some("reinit", is_reinit(of));
-    with_attributes(element, variable_type)
-        .containing(child.map(|start| Element::new("Start").with("value", start)))
+    let with = if variable_type.name.is_empty() { with_attributes } else { with_range };
+    with(element, variable_type).containing(child.map(|start| Element::new("Start").with("value", start)))
 }
 
 fn model_structure<M: Exported>(structure: &ModelStructure) -> Element {

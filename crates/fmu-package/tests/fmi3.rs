@@ -166,6 +166,7 @@ fn has(text: &str, part: &str) {
 
 #[test]
 fn every_kind_of_variable_is_described() {
+    // What fmi-sim 0.7 does not read at a variable is in the types only.
     let text = text();
     // For validators that are not in Rust.
     fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join("room-fmi3.xml"), &text).unwrap();
@@ -195,11 +196,11 @@ fn every_kind_of_variable_is_described() {
         r#"    <Category name="logStatusWarning""#,
         r#"  <DefaultExperiment startTime="0" stopTime="1" tolerance="0.000001" stepSize="0.001"/>"#,
         r#"
-    <Float64 name="outside" valueReference="1" description="Outside temperature" causality="input" variability="continuous" declaredType="Temperature" start="10" quantity="Temperature" unit="degC" displayUnit="degF" min="-273.15" nominal="20"/>
-    <Float64 name="temperature" valueReference="2" description="Temperature" causality="output" variability="continuous" initial="exact" declaredType="Temperature" start="20" reinit="true" quantity"#,
+    <Float64 name="outside" valueReference="1" description="Outside temperature" causality="input" variability="continuous" declaredType="Temperature" start="10" min="-273.15"/>
+    <Float64 name="temperature" valueReference="2" description="Temperature" causality="output" variability="continuous" initial="exact" declaredType="Temperature" start="20" reinit="true" min="-273.15"/>"#,
         r#"
-    <Float64 name="der(temperature)" valueReference="3" description="Its rate" causality="local" variability="continuous" initial="calculated" declaredType="Number" derivative="2" quantity"#,
-        r#"<Float32 name="single" valueReference="6" description="Single precision" causality="input" variability="continuous" declaredType="Single" start="0.1" quantity="Single" unit="1" max="0.1"/>"#,
+    <Float64 name="der(temperature)" valueReference="3" description="Its rate" causality="local" variability="continuous" initial="calculated" declaredType="Number" derivative="2"/>"#,
+        r#"<Float32 name="single" valueReference="6" description="Single precision" causality="input" variability="continuous" declaredType="Single" start="0.1" max="0.1"/>"#,
         r#"<Int8 name="small" valueReference="8" description="Eight bits" causality="parameter" variability="fixed" initial="exact" start="-128"/>"#,
         r#"causality="input" variability="discrete" declaredType="Byte" start="3" max="200"/>"#,
         r#"<Int16 name="short" valueReference="10" description="Sixteen bits" causality="parameter" variability="fixed" initial="exact" start="-5"/>"#,

@@ -22,10 +22,7 @@ impl<M: Exported> State<M> {
         self.experiment.start_time.visit(visitor);
         self.experiment.stop_time.visit(visitor);
         self.experiment.tolerance.visit(visitor);
-        for variable in M::TABLE {
-            variable.visit(&mut self.model, visitor);
-        }
-        self.model.visit_memory(visitor);
+        self.model.visit_state(visitor);
     }
 }
 

@@ -234,11 +234,11 @@ pub(super) fn check_value<M>(variable: &Variable<M>, value: &Value) -> Outcome {
         (_, Value::Real(value)) if !value.is_finite() => {
             refuse(format!("{name} must be a finite number, it is {value}"))
         }
-        (Attributes::Real { min: Some(min), .. }, Value::Real(value)) if enforced && value < min => {
-            refuse(format!("{name} must not be below {min}, it is {value}"))
+        (Attributes::Real { min: Some(min), .. }, Value::Real(real)) if enforced && real < min => {
+            refuse(format!("{name} must not be below {}, it is {value}", Value::Real(*min)))
         }
-        (Attributes::Real { max: Some(max), .. }, Value::Real(value)) if enforced && value > max => {
-            refuse(format!("{name} must not be above {max}, it is {value}"))
+        (Attributes::Real { max: Some(max), .. }, Value::Real(real)) if enforced && real > max => {
+            refuse(format!("{name} must not be above {}, it is {value}", Value::Real(*max)))
         }
         (Attributes::Integer { min, max }, Value::Integer(value))
             if enforced && !(min..=max).contains(&value) =>
