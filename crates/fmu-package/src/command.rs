@@ -71,7 +71,7 @@ pub struct Builder {
     /// The versions that FMUs are made for if nothing else is said. The description of the first is kept with the
     /// sources.
     pub fmi: Vec<Fmi>,
-    /// The terminals of the FMUs.
+    /// The terminals of the FMU for FMI 3.0.
     pub terminals: Vec<Terminal>,
     /// The cargo profile of the library.
     pub profile: &'static str,
@@ -180,7 +180,8 @@ impl Builder {
             };
             let fmu = folder.join(format!("{identifier}.fmu"));
             let (libraries, sources, content) = (&libraries, &sources, &content);
-            let terminals = terminals.as_deref();
+            // FMI Library calls those of FMI 2.0 a fatal mismatch (and goes on).
+            let terminals = terminals.as_deref().filter(|_| *fmi == Fmi::V3);
             let parts = Parts { fmi: *fmi, identifier, description, terminals, libraries, sources, content };
             let size = pack(&fmu, &parts)?;
             let mut platforms: Vec<_> =

@@ -1,5 +1,5 @@
-//! Terminals: variables that belong together where an FMU is connected (section 2.4.9 of FMI 3.0; FMI 2.0 has the same since
-//! 2.0.4, section 2.3).
+//! Terminals: variables that belong together where an FMU is connected (section 2.4.9 of FMI 3.0; FMI 2.0 may have the same
+//! since 2.0.4, section 2.3).
 
 use crate::content::ContentFile;
 use crate::definitions::{filled, list};
@@ -8,7 +8,7 @@ use anyhow::{Context, Result, ensure};
 use fmu_export::{Causality, Exported};
 use std::collections::HashSet;
 
-/// A terminal of an FMU: a connector with variables as its members.
+/// A terminal of an FMU for FMI 3.0: a connector with variables as its members.
 ///
 /// ```
 /// use fmu_package::Terminal;
