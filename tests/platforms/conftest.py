@@ -155,7 +155,14 @@ def include(description, tmp_path_factory) -> Path:
     outputs = [unknown.variable for unknown in description.outputs]
     derivatives = [unknown.variable for unknown in description.derivatives]
     inputs = [variable for variable in by_name.values() if variable.causality == "input"]
-    lines = [f'#define GUID "{description.guid}"', "#ifdef FMI3", "#define FIRST 1", "#else", "#define FIRST 0", "#endif"]
+    lines = [
+        f'#define GUID "{description.guid}"',
+        "#ifdef FMI3",
+        "#define FIRST 1",
+        "#else",
+        "#define FIRST 0",
+        "#endif",
+    ]
     lines += [f"#define VR_{name} {reference(variable)}" for name, variable in by_name.items() if name.isidentifier()]
     for name, variables in (
         ("outputs", outputs),

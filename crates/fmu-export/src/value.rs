@@ -306,7 +306,7 @@ mod tests {
     fn texts_of_values() {
         for (value, text) in [
             (Value::Real(0.1), "0.1"),
-            (Value::Real(-1e-300), "-0.000"),
+            (Value::Real(-1e-300), "-1e-300"),
             (Value::Integer(-3), "-3"),
             (Value::Boolean(true), "true"),
             (Value::String("<a>".to_owned()), "<a>"),

@@ -22,6 +22,8 @@ const NEVER: [&str; 14] = [
     "fmi3SetClock",
     "fmi3EnterConfigurationMode",
     "fmi3ExitConfigurationMode",
+    "fmi3GetNumberOfVariableDependencies",
+    "fmi3GetVariableDependencies",
     "fmi3GetIntervalDecimal",
     "fmi3GetIntervalFraction",
     "fmi3GetShiftDecimal",
