@@ -8,9 +8,11 @@ const ANGLE: Type = Type::real("Angle", &RAD).nominal(1.0);
 const ANGULAR_VELOCITY: Type = Type::real("AngularVelocity", &RAD_PER_S).nominal(1.0);
 const ANGULAR_ACCELERATION: Type = Type::real("AngularAcceleration", &RAD_PER_S2).nominal(100.0);
 const TORQUE: Type = Type::real("Torque", &N_M).nominal(1.0);
-// The ranges include 0, which FMI cannot exclude; `Parameters::check` does where it must.
-const INERTIA: Type = Type::real("MomentOfInertia", &KG_M2).min(0.0).nominal(0.01);
-const STIFFNESS: Type = Type::real("RotationalSpringConstant", &N_M_PER_RAD).min(0.0).nominal(100.0);
+/// FMI's ranges include their ends, so this is what is more than 0. Below 1e-307 C++ refuses to read numbers (`std::stod`),
+/// and in another unit they may become 0.
+const MORE_THAN_0: f64 = 1e-300;
+const INERTIA: Type = Type::real("MomentOfInertia", &KG_M2).min(MORE_THAN_0).nominal(0.01);
+const STIFFNESS: Type = Type::real("RotationalSpringConstant", &N_M_PER_RAD).min(MORE_THAN_0).nominal(100.0);
 const DAMPING: Type = Type::real("RotationalDampingConstant", &N_M_S_PER_RAD).min(0.0).nominal(1.0);
 const COUNT: Type = Type::integer("Integer_from_1").from(1);
 
@@ -104,10 +106,11 @@ variables! {
     M = parameter(&COUNT) in testbed.parameters.M;
     /// Number of rollers on each side of the roller-carriers
     N = parameter(&COUNT) in testbed.parameters.N;
-    /// Co-Simulation: take the motor rates from omega1 and omega2 instead of differentiating theta1 and theta2
-    use_omega = parameter(&BOOLEAN) in testbed.motors.use_omega then |fmu| { fmu.testbed.motors.use_omega_set() };
+    // Before the other Boolean: OpenModelica 1.27.0 hands over the second one of an array as false.
     /// Start at rest wherever the motors are (theta3 = theta5 = theta1, theta4 = theta6 = theta2, rates 0); if false, start at theta3_start ... omega6_start
     start_at_rest = parameter(&BOOLEAN) in start.at_rest then |fmu| { fmu.follow() };
+    /// Co-Simulation: take the motor rates from omega1 and omega2 instead of differentiating theta1 and theta2
+    use_omega = parameter(&BOOLEAN) in testbed.motors.use_omega then |fmu| { fmu.testbed.motors.use_omega_set() };
     /// theta3 at the start; used only if start_at_rest is false
     theta3_start = parameter(&ANGLE) in start.state[0] then |fmu| { fmu.follow() };
     /// theta4 at the start; used only if start_at_rest is false

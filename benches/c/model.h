@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { THETA1, THETA2, OMEGA1, OMEGA2, TAU1, TAU2, PITCH, ROLL, PITCH_RATE, ROLL_RATE, THETA3, USE_OMEGA = 32 };
+enum { THETA1, THETA2, OMEGA1, OMEGA2, TAU1, TAU2, PITCH, ROLL, PITCH_RATE, ROLL_RATE, THETA3, USE_OMEGA = 33 };
 
 /* x' = A x + B u, y = C x + D u with u = [theta1, theta2, omega1, omega2] and
  * y = [tau1, tau2, pitch, roll, pitch_rate, roll_rate]. */

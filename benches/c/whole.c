@@ -66,7 +66,7 @@ static double now(void) {
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static const unsigned INPUTS[4] = {0, 1, 2, 3}, OUTPUTS[4] = {4, 5, 6, 7}, USE_OMEGA = 32;
+static const unsigned INPUTS[4] = {0, 1, 2, 3}, OUTPUTS[4] = {4, 5, 6, 7}, USE_OMEGA = 33;
 static const int ORDERS[2] = {1, 1};
 
 static Component start(const Library *l, int use_omega) {

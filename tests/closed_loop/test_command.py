@@ -12,6 +12,7 @@ from conftest import FMUS, ROOT, built
 from fmpy.validation import validate_fmu
 
 from tools.closed_loop import masters
+from tools.documentation.sources import read_table
 
 
 def tools(*arguments):
@@ -37,10 +38,10 @@ def test_what_is_missing_is_named(tmp_path):
 
 
 def test_the_compatibility_table_names_the_versions_that_run_here():
-    table = (ROOT / "docs" / "compatibility.md").read_text()
+    rows = read_table(ROOT / "docs/compatibility.md", "At a glance").rows
     for master in masters.MASTERS:
         if master.version() is not None:
-            assert any(master.name in line and master.version() in line for line in table.splitlines()), master.name
+            assert any(master.name in tool and master.version() in tool for tool, *_ in rows), master.name
 
 
 @pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange"])

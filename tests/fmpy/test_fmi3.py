@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
+from zipfile import ZipFile
 
 import fmpy
 import numpy as np
@@ -11,6 +13,7 @@ from fmpy import simulate_fmu
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 from lagrange import OUTPUTS
+from lxml import etree
 from packaging.version import Version
 
 #: Let go with the couplings wound up, while both motors turn.
@@ -56,14 +59,37 @@ def test_fmpy_finds_no_problem(fmu3):
     assert validate_fmu(str(fmu3)) == []
 
 
-def test_the_variables_are_the_same(fmu, fmu3):
-    """Names, value references, causality, variability, start values, units and ranges; the time is one more."""
+def test_units_and_nominal_values_are_in_the_types(fmu3):
+    """fmi-sim 0.7 refuses to read FMUs with variables that have them themselves."""
+    root = etree.fromstring(ZipFile(fmu3).read("modelDescription.xml"))
+    units = {of.get("name") for of in root.find("TypeDefinitions") if of.get("unit") and of.get("nominal")}
+    for variable in root.find("ModelVariables"):
+        assert not {"quantity", "unit", "displayUnit", "nominal"} & set(variable.keys()), variable.get("name")
+        is_real = variable.tag == "Float64" and variable.get("causality") != "independent"
+        assert (variable.get("declaredType") in units) == is_real, variable.get("name")
 
-    def variables(path):
+
+def test_the_terminals_are_valid_and_in_fmi3_alone(fmu, fmu3):
+    """FMI 2.0 may have them since 2.0.4 (section 2.3), but FMI Library calls that a fatal mismatch."""
+    file = "terminalsAndIcons/terminalsAndIcons.xml"
+    assert file not in ZipFile(fmu).namelist()
+    root = etree.fromstring(ZipFile(fmu3).read(file))
+    schema = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
+    etree.XMLSchema(etree.parse(schema)).assertValid(root)
+    known = {variable.name for variable in fmpy.read_model_description(str(fmu)).modelVariables}
+    members = [member.get("variableName") for member in root.iter("TerminalMemberVariable")]
+    assert len(members) == 10 and known.issuperset(members)
+
+
+def test_the_variables_are_the_same(fmu, fmu3):
+    """Names, causality, variability, start values, units and ranges; the time is one more. Only the value references
+    count from 0 in one, in the other from 1 in the order of the variables, which OMSimulator 3.0.0 needs."""
+
+    def variables(path, first):
         kind = {"Real": "Float64", "Integer": "Int32"}
         return {
             v.name: (
-                v.valueReference,
+                v.valueReference + first,
                 kind.get(v.type, v.type),
                 v.causality,
                 v.variability,
@@ -74,9 +100,10 @@ def test_the_variables_are_the_same(fmu, fmu3):
             for v in fmpy.read_model_description(str(path)).modelVariables
         }
 
-    two, three = variables(fmu), variables(fmu3)
+    two, three = variables(fmu, first=1), variables(fmu3, first=0)
     assert [name for name in three if name not in two] == ["time"]
     assert {name: three[name] for name in two} == two
+    assert [facts[0] for facts in three.values()] == list(range(1, len(three) + 1))
 
 
 @pytest.mark.parametrize(
@@ -113,8 +140,9 @@ def test_the_same_partial_derivatives_both_ways(testbed3, make_slave):
     slave.start()
     instance.exitInitializationMode()
     inputs = ("theta1", "theta2", "omega1", "omega2")
-    outputs, knowns = ([references[name] for name in names] for names in (OUTPUTS, inputs))
+    outputs, knowns = ([slave.variables[name].valueReference for name in names] for names in (OUTPUTS, inputs))
     two = [slave.fmi.getDirectionalDerivative(outputs, [known], [1.0]) for known in knowns]
+    outputs, knowns = ([references[name] for name in names] for names in (OUTPUTS, inputs))
     forward = [instance.getDirectionalDerivative(outputs, [known], [1.0], len(outputs)) for known in knowns]
     adjoint = [instance.getAdjointDerivative([output], knowns, [1.0], len(knowns)) for output in outputs]
     assert np.any(two)

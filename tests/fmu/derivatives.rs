@@ -246,22 +246,17 @@ fn acceleration_of_samples() {
     }
 }
 
-/// Any Real variable has derivatives of any order: 0 for parameters, 0 above the first.
+/// Any Real variable has a derivative, 0 for parameters, and none of a higher order.
 #[test]
 fn derivatives_of_every_variable_and_order() {
     let fmu = in_mode(CoSimulation, StepComplete);
     fmu.set(&[vr(Name::theta1), vr(Name::omega1)], &[0.4, 1.0]);
     fmu.step(0.0, 0.05);
     for (place, variable) in (0..).zip(TABLE).filter(|(_, variable)| variable.base() == BaseType::Real) {
-        for order in [1, 2, 3, i32::MAX] {
-            let mut value = f64::NAN;
-            fmu.ok(fmu.fmi2GetRealOutputDerivatives(&place, 1, &order, &mut value));
-            assert!(value.is_finite(), "{}, order {order}", variable.name());
-            assert!(
-                value == 0.0 || (order == 1 && variable.causality() != Causality::Parameter),
-                "{}, order {order}: {value}",
-                variable.name()
-            );
+        let [rate] = fmu.rates([place]);
+        assert!(rate.is_finite() && (rate == 0.0 || variable.causality() != Causality::Parameter));
+        for order in [0, 2, i32::MAX] {
+            fmu.refused("the order", |fmu| fmu.fmi2GetRealOutputDerivatives(&place, 1, &order, &mut 0.0));
         }
     }
 }

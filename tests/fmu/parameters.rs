@@ -1,10 +1,10 @@
 //! Parameters that make no testbed are refused: one message that says what is wrong, and nothing changed.
 
 use crate::modes::{INTERFACES, in_mode};
-use crate::vr;
+use crate::{TABLE, vr};
 use fmu_export::Interface::CoSimulation;
 use fmu_export::Mode::*;
-use fmu_export::Status;
+use fmu_export::{Attributes, Causality, Status};
 use fmu_test_kit::{Importer as Fmu, fmi3};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
@@ -26,10 +26,10 @@ fn all_refused(fmu: &Fmu, cases: &[Case]) {
 
 /// Parameters out of their range, with what the message must tell.
 const PARAMETERS: &[Case] = &[
-    ("J2 = 0", |fmu| fmu.try_set(&[vr(Name::J2)], &[0.0]), &["J2", "> 0"]),
+    ("J2 = 0", |fmu| fmu.try_set(&[vr(Name::J2)], &[0.0]), &["J2", "1e-300", "0"]),
     ("J3 < 0", |fmu| fmu.try_set(&[vr(Name::J3)], &[-0.1]), &["J3", "-0.1"]),
     ("H3 = -0", |fmu| fmu.try_set(&[vr(Name::H3)], &[-0.0]), &["H3"]),
-    ("k1 = 0", |fmu| fmu.try_set(&[vr(Name::k1)], &[0.0]), &["k1", "> 0"]),
+    ("k1 = 0", |fmu| fmu.try_set(&[vr(Name::k1)], &[0.0]), &["k1", "1e-300", "0"]),
     ("k2 < 0", |fmu| fmu.try_set(&[vr(Name::k2)], &[-1e-300]), &["k2"]),
     ("c1 < 0", |fmu| fmu.try_set(&[vr(Name::c1)], &[-1.0]), &["c1", "0", "-1"]),
     ("c2 < 0", |fmu| fmu.try_set(&[vr(Name::c2)], &[-1.0]), &["c2"]),
@@ -63,6 +63,36 @@ fn parameters_out_of_range() {
     all_refused(&in_mode(CoSimulation, StepComplete), PARAMETERS);
 }
 
+/// What a slider of an importer reaches: the least value that is declared is accepted and runs, what is below is refused.
+#[test]
+fn declared_limits_are_those() {
+    let mut found = 0;
+    for (place, variable) in (0..).zip(TABLE).filter(|(_, of)| of.causality() == Causality::Parameter) {
+        let fmu = in_mode(CoSimulation, Instantiated);
+        match variable.of().of {
+            Attributes::Real { min: Some(min), .. } => {
+                let below = if min == 0.0 { -1e-300 } else { 0.999 * min };
+                fmu.refused(variable.name(), |fmu| fmu.try_set(&[place], &[below]));
+                fmu.set(&[place], &[min]);
+            }
+            Attributes::Integer { min, .. } => {
+                let min = i32::try_from(min).unwrap();
+                fmu.refused(variable.name(), |fmu| fmu.fmi2SetInteger(&place, 1, &(min - 1)));
+                fmu.ok(fmu.fmi2SetInteger(&place, 1, &min));
+            }
+            _ => continue,
+        }
+        fmu.initialize(0.0);
+        fmu.step(0.0, 0.01);
+        fmu.set(&[vr(Name::theta1)], &[0.3]);
+        fmu.step(0.01, 0.01);
+        let [torque, pitch] = fmu.get([vr(Name::tau1), vr(Name::pitch)]);
+        assert!(torque != 0.0 && pitch != 0.0, "{}: {torque} {pitch}", variable.name());
+        found += 1;
+    }
+    assert_eq!(found, 10);
+}
+
 /// One of the dampings may be 0, in either order of setting them.
 #[test]
 fn one_damping_may_be_zero() {
@@ -93,7 +123,7 @@ fn refused_parameters_stop_the_initialization() {
             fmu.ok(fmu.fmi2ExitInitializationMode());
 
             let fmu = fmi3::Importer::of::<TestbedFmu>(interface);
-            let first = words(fmu.refused("a start value", |fmu| fmu.fmi3SetFloat64(&vr, 1, &wrong, 1)));
+            let first = words(fmu.refused("a start value", |fmu| fmu.try_set(&[vr], &[wrong])));
             let enter = |fmu: &fmi3::Importer| fmu.fmi3EnterInitializationMode(0, 0.0, 0.0, 0, 0.0);
             assert_eq!(words(fmu.refused("to begin", enter)), first);
             fmu.set(&[vr], &[right]);

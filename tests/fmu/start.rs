@@ -7,6 +7,7 @@ use crate::{new, vr};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Status;
+use fmu_export::fmi3::reference;
 use fmu_test_kit::{Importer as Fmu, fmi3};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
@@ -236,7 +237,7 @@ fn fmi3() {
     // And what is given is given, late, too.
     let fmu = fmi3::Importer::of::<TestbedFmu>(ModelExchange);
     initialize3(&fmu, |_| {});
-    fmu.ok(fmu.fmi3SetBoolean(&vr(Name::start_at_rest), 1, &0, 1));
+    fmu.ok(fmu.fmi3SetBoolean(&reference(vr(Name::start_at_rest)), 1, &0, 1));
     fmu.set(&STARTS, &GIVEN);
     assert_eq!(get3(&fmu), GIVEN);
 }
@@ -264,5 +265,5 @@ fn states_are_not_set() {
         }
     }
     let fmu = fmi3::Importer::of::<TestbedFmu>(Interface::CoSimulation);
-    told(&fmu.refused("a state", |fmu| fmu.fmi3SetFloat64(&vr(Name::theta3), 1, &0.5, 1)), "theta3");
+    told(&fmu.refused("a state", |fmu| fmu.try_set(&[vr(Name::theta3)], &[0.5])), "theta3");
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import importlib.util
 import json
+import re
 import shutil
 import sys
 from importlib import metadata
@@ -12,6 +13,9 @@ from pathlib import Path
 
 import fmpy
 import pytest
+
+from tools.compatibility import HEADING, PAGE
+from tools.documentation.sources import read_table
 
 ROOT = Path(__file__).resolve().parents[2]
 FMUS = ROOT / "target" / "fmu"
@@ -82,5 +86,13 @@ def saw(request):
         row["date"] = datetime.date.today().isoformat()
         name = "".join(c if c.isalnum() else "_" for c in request.node.name)
         (SEEN / f"{request.path.stem}-{name}.json").write_text(json.dumps(row), encoding="utf-8")
+        written = [said[:4] for said in read_table(ROOT / PAGE, HEADING).rows]
+        assert list(row.values())[:4] in written, (
+            f"{PAGE} is out of date; `python -m tools compatibility` writes it anew"
+        )
+        name, glance = re.split(r",| \(", tool)[0], read_table(ROOT / PAGE, "At a glance").rows
+        assert any(name in said and row["version"] in said for said, *_ in glance), (
+            f"{PAGE}: “At a glance” lacks {tool}"
+        )
 
     return saw

@@ -74,12 +74,17 @@ def test_the_tables_follow_the_rules_of_the_cross_check(texts):
             assert (np.diff(numbers(text)[:, 0]) > 0).all()
 
 
-def test_the_parameter_sets_are_valid(texts):
+def test_the_parameter_sets_are_valid_and_complete(texts):
+    """All parameters, so that none keeps what was set before; the start, too."""
     schema = Path(fmpy.__file__).parent / "ssp" / "schema" / "SystemStructureParameterValues.xsd"
     valid = etree.XMLSchema(etree.parse(schema))
+    variables = etree.parse(COMMITTED / "modelDescription.xml").iter("ScalarVariable")
+    parameters = {v.get("name"): v[0].tag for v in variables if v.get("causality") == "parameter"}
     for place, text in texts.items():
         if place.suffix == ".ssv":
-            valid.assertValid(etree.fromstring(text.encode()))
+            root = etree.fromstring(text.encode())
+            valid.assertValid(root)
+            assert {p.get("name"): etree.QName(p[0]).localname for p in root.iter("{*}Parameter")} == parameters
 
 
 def test_the_manifest_names_every_file_and_no_other(texts):

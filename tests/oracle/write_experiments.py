@@ -25,6 +25,10 @@ LS = "http://fmi-standard.org/fmi-ls-manifest"
 SSV, SSC = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("ParameterValues", "Common"))
 #: Decimals of all numbers: a hundredth of the smallest tolerance and less.
 DECIMALS = 8
+#: What every experiment starts with: rest, wherever the motors are. The states that are then of no use are the FMU's.
+START = {"start_at_rest": True} | {
+    f"{state}_start": 0.0 for state in ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
+}
 #: Relative tolerance of solvers for which the tolerances in Model Exchange are meant.
 SOLVER = 1e-7
 
@@ -59,7 +63,7 @@ def parameter_set(experiment: Experiment) -> str:
         description=experiment.description,
     )
     parameters = etree.SubElement(root, f"{{{SSV}}}Parameters")
-    for name, value in experiment.parameters.items():
+    for name, value in {**experiment.parameters, **START}.items():
         kind = {bool: "Boolean", int: "Integer", float: "Real"}[type(value)]
         element = etree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
         etree.SubElement(element, f"{{{SSV}}}{kind}", value=json.dumps(value))

@@ -146,21 +146,30 @@ def folder(request) -> str:
 
 @pytest.fixture(scope="session")
 def include(description, tmp_path_factory) -> Path:
-    """A folder with variables.h: guid, value references, and what depends on what; FMI 3.0 has the same."""
+    """A folder with variables.h: guid, value references, and what depends on what; those of FMI 3.0 are higher by 1."""
+
+    def reference(variable) -> str:
+        return f"(FIRST + {variable.valueReference})"
+
     by_name = {variable.name: variable for variable in description.modelVariables}
     outputs = [unknown.variable for unknown in description.outputs]
     derivatives = [unknown.variable for unknown in description.derivatives]
     inputs = [variable for variable in by_name.values() if variable.causality == "input"]
-    lines = [f'#define GUID "{description.guid}"']
-    lines += [
-        f"#define VR_{name} {variable.valueReference}" for name, variable in by_name.items() if name.isidentifier()
+    lines = [
+        f'#define GUID "{description.guid}"',
+        "#ifdef FMI3",
+        "#define FIRST 1",
+        "#else",
+        "#define FIRST 0",
+        "#endif",
     ]
+    lines += [f"#define VR_{name} {reference(variable)}" for name, variable in by_name.items() if name.isidentifier()]
     for name, variables in (
         ("outputs", outputs),
         ("unknowns", outputs + derivatives),
         ("knowns", inputs + [variable.derivative for variable in derivatives]),
     ):
-        references = ", ".join(str(variable.valueReference) for variable in variables)
+        references = ", ".join(map(reference, variables))
         lines.append(f"#define {name.upper()} {{{references}}}")
     folder = tmp_path_factory.mktemp("include")
     (folder / "variables.h").write_text("\n".join(lines) + "\n")

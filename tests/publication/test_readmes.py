@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tools.documentation.sources import read_table
+
 ROOT = Path(__file__).resolve().parents[2]
 LISTED = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
 FILES = [name for name in LISTED.split("\0") if name]
@@ -61,12 +63,30 @@ def test_a_crate_has_all_that_its_page_needs(home: Path) -> None:
     assert (home / "src/lib.rs").read_text(encoding="utf-8").startswith('#![doc = include_str!("../README.md")]')
 
 
+def anchors(page: Path) -> set[str]:
+    """Where a link may lead within a page: what has an id, and in Markdown the headings as GitHub names them."""
+    text = page.read_text(encoding="utf-8")
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE) if page.suffix == ".md" else []
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings} | {
+        *re.findall(r'\bid="([^"]+)"', text)
+    }
+
+
 @pytest.mark.parametrize("name", PAGES)
 def test_relative_links_lead_somewhere(name: str) -> None:
     page = ROOT / name
-    found = [re.sub(r"#.*", "", link) for link in links(page.read_text(encoding="utf-8"))]
-    missing = [link for link in found if link and not re.match(r"[a-z]+:", link) and not (page.parent / link).exists()]
-    assert not missing
+    for link in links(page.read_text(encoding="utf-8")):
+        if not re.match(r"[a-z]+:", link):
+            path, _, anchor = link.partition("#")
+            target = page.parent / path if path else page
+            assert target.exists() and (not anchor or anchor in anchors(target)), link
+
+
+def test_the_marks_in_the_table_of_importers() -> None:
+    """At a glance only with few and short marks; a tool's name leads to what they mean of it."""
+    for tool, *marks in read_table(ROOT / "docs/compatibility.md", "At a glance").rows:
+        assert re.fullmatch(r"\[[^\]]+\]\(#[\w-]+\)[\w .,-]{,20}", tool), tool
+        assert set(marks) <= {"✓", "(✓)", "✗", "–", "?"}, tool
 
 
 @pytest.mark.parametrize("name", PAGES)

@@ -257,11 +257,7 @@ def test_the_tests_of_the_library_pass(sources: Path, tmp_path: Path) -> None:
     files = [str(sources / name) for name in ("prw_testbed.c", "prw_testbed_fmi2.c")]
     # Arrays of 5000 values are among the arguments.
     COMPILERS["gcc"].compile(sources, library, "-O2", "-fPIC", "-shared", "-DFMU_MEMORY_PAGES=64", *files, "-lm")
-    # Here a saved state belongs to its instance, which those hand to another.
-    skipped = ("--skip", "replay_is_bit_identical", "--skip", "states_of_the_other_standard")
-    said = cargo_test(
-        library, "--test", "c_sources", "--test", "fmu", "--", "--include-ignored", "--nocapture", *skipped
-    )
+    said = cargo_test(library, "--test", "c_sources", "--test", "fmu", "--", "--include-ignored", "--nocapture")
     assert f"in {os.environ.get('SESSIONS', '300')} sessions" in said
 
 

@@ -58,7 +58,7 @@ def render(project: Path, page: Page) -> str:
         "figure": lambda name, meaning: _figure(sources / "figures" / f"{name}.svg", meaning),
         "picture": lambda name, meaning: _picture(sources / "figures" / f"{name}.png", meaning),
         "program": lambda name: _program(name, read(project / PROGRAMS / f"{name}.py")),
-        "table_of": lambda path, heading, about="": tables.text_table(read_table(project / path, heading).about(about)),
+        "table_of": lambda path, heading: tables.text_table(read_table(project / path, heading)),
         "variable_table": lambda causality, title: tables.variable_table(description, causality, title),
         "parameter_table": lambda: tables.parameter_table(description, {}),
         "parameter_table_as_printed": lambda: tables.parameter_table(description, printed),

@@ -20,10 +20,6 @@ class Table(NamedTuple):
     heads: list[str]
     rows: list[list[str]]
 
-    def about(self, word: str) -> Table:
-        """The rows with that word in them."""
-        return self._replace(rows=[row for row in self.rows if any(word in cell for cell in row)])
-
 
 def read(path: Path) -> str:
     """The text of a file. Raises UserError."""

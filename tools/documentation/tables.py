@@ -75,6 +75,7 @@ def text_table(table: Table) -> str:
 
 
 def _inline(text: str) -> str:
+    text = re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", text)  # where a link leads is not in the FMU
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False))
 
 

@@ -11,6 +11,14 @@ pub enum Standard {
     Fmi3 = 1,
 }
 
+impl Standard {
+    /// The value reference that fmu-export gives the variable at this place of a model's list: in FMI 2.0 the place itself,
+    /// in FMI 3.0 counted from 1.
+    pub const fn reference(self, place: u32) -> u32 {
+        place.wrapping_add(self as u32)
+    }
+}
+
 impl fmt::Display for Standard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

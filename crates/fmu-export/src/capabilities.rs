@@ -24,6 +24,9 @@ pub trait CoSimulation: Model {
 }
 
 /// Whether the steps of Co-Simulation stop at events.
+///
+/// Where this crate handles them, a step may have 10,000, and each may take 10,000 rounds: more count as a loop without
+/// end. In FMI 2.0 the step ends early then; in FMI 3.0 it is undone, and the importer told to make shorter ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Events {
     /// There are none.
@@ -63,7 +66,7 @@ pub enum Stepped {
     /// At an earlier time, s, which the model has reached: the importer is told. Only if
     /// [`ENDS_EARLY`](CoSimulation::ENDS_EARLY) or [`EVENTS`](CoSimulation::EVENTS) says so. In FMI 2.0 (`fmi2Discard`) it goes
     /// back to a saved state or ends the simulation. In FMI 3.0 (`earlyReturn`) it goes on from there; if it has not
-    /// allowed it, the step ends with an error.
+    /// allowed it, the step is undone (`fmi3Discard`), and it may make a shorter one.
     Early(f64),
     /// At an event, at an earlier time, s, which the model has reached, or at the next communication point. Only if
     /// [`EVENTS`](CoSimulation::EVENTS) says so.
@@ -166,10 +169,10 @@ pub trait InputDerivatives: CoSimulation {
 
 /// The model knows time derivatives of its variables in Co-Simulation (section 4.2.1).
 pub trait OutputDerivatives: CoSimulation {
-    /// The highest order it knows.
+    /// The highest order it knows (`maxOutputDerivativeOrder`); the importer is refused higher ones.
     const HIGHEST: u32 = 1;
 
-    /// The time derivative of order 1 or higher of any Real variable that is no parameter, now; 0 for orders above
-    /// the model's.
+    /// The time derivative of an order from 1 to [`HIGHEST`](Self::HIGHEST) of any Real variable that is no parameter,
+    /// now.
     fn output_derivative(&self, of: Self::Name, order: u32) -> f64;
 }

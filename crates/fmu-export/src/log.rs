@@ -4,6 +4,7 @@
 //! for `#r1#` in it. So the text is complete before it is handed over, free of `%` and of `#`, and there are no
 //! further arguments.
 
+use crate::model::Model;
 use fmi_abi::{Category, Standard, Status};
 use std::ffi::{CStr, CString};
 
@@ -59,10 +60,6 @@ impl Log {
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
-
-    pub(crate) fn take(&mut self) -> Vec<Message> {
-        std::mem::take(&mut self.0)
-    }
 }
 
 /// A copy of a model has nothing to say yet.
@@ -86,13 +83,13 @@ pub(crate) struct Logger {
 }
 
 impl Logger {
-    /// Errors are always shown, the rest (a discard too) on demand (section 2.1.3 of FMI 2.0, 2.3.1 of FMI 3.0);
-    /// warnings are in FMI 2.0 only.
+    /// Errors are always shown, the rest on demand (section 2.1.3 of FMI 2.0, 2.3.1 of FMI 3.0). Warnings are in FMI
+    /// 2.0 only; a discard there has other ways to tell its reason, in FMI 3.0 it is like an error for most importers.
     pub fn new(standard: Standard, logging_on: bool) -> Self {
         let errors = bit(Category::Error) | bit(Category::Fatal);
         let (always, fixed) = match standard {
             Standard::Fmi2 => (errors | bit(Category::Warning), 0),
-            Standard::Fmi3 => (errors, errors),
+            Standard::Fmi3 => (errors | bit(Category::Discard), errors),
         };
         let mut logger = Self { enabled: 0, always, fixed, waiting: Vec::new() };
         logger.set_all(logging_on);
@@ -128,6 +125,16 @@ impl Logger {
     pub fn add(&mut self, message: Message) {
         if self.enabled & bit(Category::of(message.status)) != 0 {
             self.waiting.push(message);
+        }
+    }
+
+    /// Takes over what a model has to say.
+    #[inline]
+    pub fn listen(&mut self, model: &mut impl Model) {
+        if let Some(log) = model.log()
+            && !log.is_empty()
+        {
+            std::mem::take(&mut log.0).into_iter().for_each(|message| self.add(message));
         }
     }
 

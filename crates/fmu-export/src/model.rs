@@ -96,28 +96,47 @@ impl Setup {
         Self { interface, instance_name: String::new(), resource_location: None }
     }
 
-    /// The folder `resources` of the unpacked FMU. `None` if the importer names none, or no file.
+    /// The folder `resources` of the unpacked FMU. `None` if the importer names none, or no file of this machine.
     ///
-    /// Importers write it as `file:/`, `file:///` or `file:////`, with `localhost` or without, with `%20` for spaces
-    /// or not, or as a path.
+    /// FMI 3.0 has a path here, FMI 2.0 a URI, which importers write as `file:/`, `file:///` or `file:////`, with
+    /// `localhost` or without, with `%20` for spaces or not, or as a path. Another host's folder is one on Windows
+    /// only.
     pub fn resources(&self) -> Option<PathBuf> {
-        let location = self.resource_location.as_deref().filter(|location| !location.trim().is_empty())?;
-        let Some((scheme, rest)) = location.split_once(':').filter(|(scheme, _)| scheme.len() > 1) else {
-            return Some(location.into());
-        };
-        if !scheme.eq_ignore_ascii_case("file") {
-            return None;
-        }
-        let rest = match rest.strip_prefix("//") {
-            Some(authority) => authority.strip_prefix("localhost").unwrap_or(authority),
-            None => rest,
-        };
-        let path = percent_decoded(rest);
-        let path = format!("/{}", path.trim_start_matches('/'));
-        // file:///C:/folder
-        let drive = path.as_bytes().get(2) == Some(&b':') && path.as_bytes()[1].is_ascii_alphabetic();
-        Some(if drive { path[1..].into() } else { path.into() })
+        resources(self.resource_location.as_deref()?, cfg!(windows))
     }
+}
+
+fn resources(location: &str, windows: bool) -> Option<PathBuf> {
+    if location.trim().is_empty() {
+        return None;
+    }
+    // A path, which may have a colon anywhere: no scheme has a separator in it (section 3.1 of RFC 3986), or is as
+    // short as a drive.
+    let is_scheme = |scheme: &str| scheme.len() > 1 && !scheme.contains(['/', '\\']);
+    let Some((scheme, rest)) = location.split_once(':').filter(|(scheme, _)| is_scheme(scheme)) else {
+        return Some(location.into());
+    };
+    if !scheme.eq_ignore_ascii_case("file") {
+        return None;
+    }
+    let is_drive = |path: &str| matches!(path.as_bytes(), [letter, b':', ..] if letter.is_ascii_alphabetic());
+    let rest = percent_decoded(rest);
+    let (host, path) = match rest.strip_prefix("//") {
+        // file://C:/folder, which some write
+        Some(path) if is_drive(path) => ("", path),
+        Some(rest) => rest.split_at(rest.find('/').unwrap_or(rest.len())),
+        None => ("", rest.as_str()),
+    };
+    let local = path.trim_start_matches('/');
+    if !(host.is_empty() || host.eq_ignore_ascii_case("localhost")) {
+        return windows.then(|| format!("//{host}{path}").into());
+    }
+    // file:///C:/folder
+    if is_drive(local) {
+        return Some(local.into());
+    }
+    // file:////host/folder
+    Some(if windows && path.starts_with("//") { format!("//{local}") } else { format!("/{local}") }.into())
 }
 
 fn percent_decoded(text: &str) -> String {
@@ -171,29 +190,41 @@ impl std::error::Error for Error {}
 
 #[cfg(test)]
 mod tests {
-    use super::Setup;
-    use fmi_abi::Interface;
+    use super::resources;
     use std::path::Path;
 
     #[test]
     fn resources_are_found_however_they_are_written() {
-        let resources = |location: &str| {
-            let location = Some(location.to_owned());
-            Setup { resource_location: location, ..Setup::new(Interface::CoSimulation) }.resources()
-        };
         for (location, path) in [
             ("file:///tmp/a%20b/resources", "/tmp/a b/resources"),
             ("file:/tmp/resources", "/tmp/resources"),
-            ("file:////tmp/100%/r", "/tmp/100%/r"),
+            ("FILE:////tmp/100%/r", "/tmp/100%/r"),
             ("file://localhost/tmp/r", "/tmp/r"),
             ("file:///C:/temp/r", "C:/temp/r"),
+            ("file://C:/temp/r", "C:/temp/r"),
             ("/tmp/no scheme", "/tmp/no scheme"),
+            ("/tmp/a:b/100%20/", "/tmp/a:b/100%20/"),
             ("C:\\temp\\r", "C:\\temp\\r"),
+            ("\\\\server\\a:b", "\\\\server\\a:b"),
         ] {
-            assert_eq!(resources(location).as_deref(), Some(Path::new(path)), "{location}");
+            assert_eq!(resources(location, false).as_deref(), Some(Path::new(path)), "{location}");
         }
-        for location in ["", " ", "fmi2://elsewhere/r", "https://a/b"] {
-            assert_eq!(resources(location), None, "{location}");
+        let elsewhere = ["file://localhostname/tmp/r", "file://server/share/r"];
+        for location in ["", " ", "fmi2://elsewhere/r", "https://a/b"].into_iter().chain(elsewhere) {
+            assert_eq!(resources(location, false), None, "{location}");
+        }
+    }
+
+    #[test]
+    fn resources_on_other_hosts_are_for_windows() {
+        for (location, path) in [
+            ("file://localhostname/share/r", "//localhostname/share/r"),
+            ("file://server/share/a%20b", "//server/share/a b"),
+            ("file:////server/share/r", "//server/share/r"),
+            ("file:////C:/temp/r", "C:/temp/r"),
+            ("file://localhost/C:/temp/r", "C:/temp/r"),
+        ] {
+            assert_eq!(resources(location, true).as_deref(), Some(Path::new(path)), "{location}");
         }
     }
 }

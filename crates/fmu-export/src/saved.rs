@@ -2,7 +2,7 @@
 
 /// Sees every value of a model's state in turn; counts it, writes it or replaces it.
 pub trait StateVisitor {
-    /// A finite floating-point value. Reading one that is not finite makes the state invalid.
+    /// A floating-point value, of any kind.
     fn real(&mut self, value: &mut f64);
     /// A whole number.
     fn integer(&mut self, value: &mut i64);
@@ -15,6 +15,10 @@ pub trait StateVisitor {
     fn length(&mut self, value: &mut usize);
     /// What was read cannot be: the state is refused.
     fn invalid(&mut self);
+    /// Whether there may be more: not after what was read has been found invalid.
+    fn goes_on(&self) -> bool {
+        true
+    }
 }
 
 /// A value that can be written into a serialized state and read back.
@@ -76,7 +80,7 @@ impl Saved for f32 {
         visitor.real(&mut number);
         // What is no `f32` has not been written by one.
         match number as f32 {
-            read if f64::from(read) == number => *self = read,
+            read if f64::from(read) == number || number.is_nan() => *self = read,
             _ => visitor.invalid(),
         }
     }
@@ -110,8 +114,14 @@ impl<T: Saved + Default> Saved for Vec<T> {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut length = self.len();
         visitor.length(&mut length);
-        self.resize_with(length, T::default);
+        self.truncate(length);
         self.iter_mut().for_each(|value| value.visit(visitor));
+        // Hostile bytes may claim any length: an element is made when those before it were there.
+        while self.len() < length && visitor.goes_on() {
+            let mut value = T::default();
+            value.visit(visitor);
+            self.push(value);
+        }
     }
 }
 

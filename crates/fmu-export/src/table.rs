@@ -22,6 +22,15 @@ pub trait Variables: Sized + 'static {
     /// Shows what the model remembers besides its variables.
     #[doc(hidden)]
     fn visit_memory(&mut self, visitor: &mut dyn StateVisitor);
+
+    /// Shows all that a serialized state holds of the model.
+    #[doc(hidden)]
+    fn visit_state(&mut self, visitor: &mut dyn StateVisitor) {
+        for variable in Self::TABLE {
+            variable.visit(self, visitor);
+        }
+        self.visit_memory(visitor);
+    }
 }
 
 /// A continuous-time state.
@@ -116,7 +125,8 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// is a path of fields, such as `motors[0].theta`. Start values are those of the model that
 /// [`Model::new`](crate::Model::new) makes.
 ///
-/// What lives in a place and all that is in the `memory` belongs to a serialized state; see [`Saved`](crate::Saved).
+/// What lives in a place and all that is in the `memory` belongs to a serialized state; see [`Saved`](crate::Saved). What
+/// `initialize`, a step or an event changes must be there; `build_fmu` of fmu-package refuses models where something is missing.
 ///
 /// The macro implements [`Variables`] for the model and defines `Name`, an enum with the names of the variables,
 /// for [`Partials`](crate::Partials) and its like.

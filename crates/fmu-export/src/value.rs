@@ -31,6 +31,10 @@ impl From<f64> for Value {
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            // Where hundreds of zeros may have to be written.
+            Self::Real(value) if *value != 0.0 && value.abs() < 1e-15 || value.abs() > 1e17 => {
+                write!(f, "{value:e}")
+            }
             Self::Real(value) => write!(f, "{value}"),
             Self::Integer(value) => write!(f, "{value}"),
             Self::Boolean(value) => write!(f, "{value}"),
@@ -53,15 +57,20 @@ pub trait Scalar: Saved {
     /// Takes a value of the right kind. What cannot be is left out: the importer has been refused before.
     fn assign(&mut self, value: &Value);
 
-    /// The value of a Real, without a detour.
+    /// The [`value`](Self::value) of a Real, for types that have it without a detour; of others it is no number.
     #[inline]
     fn real(&self) -> f64 {
-        f64::NAN
+        match self.value() {
+            Value::Real(value) => value,
+            _ => f64::NAN,
+        }
     }
 
-    /// Takes the value of a Real, without a detour.
+    /// [Takes](Self::assign) the value of a Real, for types that can without a detour.
     #[inline]
-    fn set_real(&mut self, _value: f64) {}
+    fn set_real(&mut self, value: f64) {
+        self.assign(&Value::Real(value));
+    }
 }
 
 impl Scalar for f64 {
@@ -298,7 +307,7 @@ mod tests {
     fn texts_of_values() {
         for (value, text) in [
             (Value::Real(0.1), "0.1"),
-            (Value::Real(-1e-300), "-0.000"),
+            (Value::Real(-1e-300), "-1e-300"),
             (Value::Integer(-3), "-3"),
             (Value::Boolean(true), "true"),
             (Value::String("<a>".to_owned()), "<a>"),

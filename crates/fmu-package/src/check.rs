@@ -288,13 +288,15 @@ fn new_model<M: Exported>(interface: Interface) -> Result<M> {
 /// Whether the type has the value.
 fn check_value(what: &str, of: &Type, value: &Value) -> Result<()> {
     match (of.of, value) {
-        (Attributes::Real { min, max, .. }, Value::Real(value)) => {
-            ensure!(value.is_finite(), "{what} must be a finite number, it is {value}");
+        (Attributes::Real { min, max, .. }, Value::Real(real)) => {
+            ensure!(real.is_finite(), "{what} must be a finite number, it is {value}");
             if let Some(min) = min {
-                ensure!(*value >= rounded(of.base(), min), "{what} must be >= {min}, it is {value}");
+                let fits = *real >= rounded(of.base(), min);
+                ensure!(fits, "{what} must be >= {}, it is {value}", Value::Real(min));
             }
             if let Some(max) = max {
-                ensure!(*value <= rounded(of.base(), max), "{what} must be <= {max}, it is {value}");
+                let fits = *real <= rounded(of.base(), max);
+                ensure!(fits, "{what} must be <= {}, it is {value}", Value::Real(max));
             }
         }
         (Attributes::Integer { min, max }, Value::Integer(value)) => {

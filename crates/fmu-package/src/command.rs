@@ -144,14 +144,11 @@ impl Builder {
             "FMI 3.0 has a folder for every processor; --any-processor goes with --fmi 2 only"
         );
         let content = self.sources.content_files()?;
+        let terminals = terminals::<M>(&self.terminals, &content)?;
         let mut descriptions = Vec::new();
         for &fmi in &versions {
             let guid = if options.describe { NO_GUID } else { &guid };
-            let terminals = match fmi {
-                Fmi::V2 => None,
-                Fmi::V3 => terminals::<M>(&self.terminals, &content)?,
-            };
-            descriptions.push((fmi, describe(fmi, guid)?, terminals));
+            descriptions.push((fmi, describe(fmi, guid)?));
         }
         let committed = self.sources.folder.join(DESCRIPTION);
         let is_default = self.is_default && !options.tunable;
@@ -161,8 +158,7 @@ impl Builder {
                 None if is_default => committed,
                 None => bail!("{DESCRIPTION} is for the defaults; name another folder with --out"),
             };
-            let (_, description, _) =
-                descriptions.first().context("there is no version to describe it for")?;
+            let (_, description) = descriptions.first().context("there is no version to describe it for")?;
             // Kept with the sources, it must not change whenever they do.
             return write_description(&path, description);
         }
@@ -176,7 +172,7 @@ impl Builder {
             None => Neighbourhood::of(&self.sources.folder)?.workspace.join("target/fmu"),
         };
         let identifier = M::INFO.identifier;
-        for (fmi, description, terminals) in &descriptions {
+        for (fmi, description) in &descriptions {
             let folder = match fmi {
                 Fmi::V2 if options.c_sources => folder.join("source"),
                 Fmi::V2 => folder.clone(),
@@ -184,7 +180,8 @@ impl Builder {
             };
             let fmu = folder.join(format!("{identifier}.fmu"));
             let (libraries, sources, content) = (&libraries, &sources, &content);
-            let terminals = terminals.as_deref();
+            // FMI Library calls those of FMI 2.0 a fatal mismatch (and goes on).
+            let terminals = terminals.as_deref().filter(|_| *fmi == Fmi::V3);
             let parts = Parts { fmi: *fmi, identifier, description, terminals, libraries, sources, content };
             let size = pack(&fmu, &parts)?;
             let mut platforms: Vec<_> =
@@ -203,7 +200,7 @@ impl Builder {
         println!("guid {guid}{start}{tunable}");
         if is_default
             && !options.c_sources
-            && let Some((fmi, description, _)) = descriptions.first()
+            && let Some((fmi, description)) = descriptions.first()
             && self.fmi.first() == Some(fmi)
             && let Ok(text) = fs::read_to_string(&committed)
             && text != description.replace(&guid, NO_GUID)

@@ -1,4 +1,5 @@
-//! Terminals: variables that belong together where an FMU is connected (section 2.4.9 of FMI 3.0).
+//! Terminals: variables that belong together where an FMU is connected (section 2.4.9 of FMI 3.0; FMI 2.0 may have the same
+//! since 2.0.4, section 2.3).
 
 use crate::content::ContentFile;
 use crate::definitions::{filled, list};
@@ -171,6 +172,7 @@ pub fn terminals<M: Exported>(terminals: &[Terminal], content: &[ContentFile]) -
         terminal.check::<M>(content).with_context(|| format!("the terminal {name}"))?;
     }
     let Some(list) = list("Terminals", terminals.iter().map(Terminal::element)) else { return Ok(None) };
+    // In an FMU for FMI 2.0, too: there it is the version that defines this file (section 2.4.9 of FMI 3.0).
     let root = Element::new("fmiTerminalsAndIcons").with("fmiVersion", "3.0");
     root.containing([list]).document().map(Some)
 }

@@ -2,7 +2,7 @@
 
 use crate::xml::Element;
 use anyhow::{Result, ensure};
-use fmu_export::{Attributes, Type, Unit};
+use fmu_export::{Attributes, Type, Unit, Value};
 
 /// The units of these types, in the order of their first use.
 ///
@@ -86,14 +86,20 @@ pub(crate) fn items(of: &Type) -> impl Iterator<Item = Element> {
 
 /// The element with what its type says: quantity, unit, range, nominal value, kind of bytes.
 pub(crate) fn with_attributes(element: Element, of: &Type) -> Element {
+    let Attributes::Real { quantity, unit, nominal, .. } = of.of else { return with_range(element, of) };
+    let element = element
+        .with_some("quantity", filled(quantity))
+        .with("unit", unit.name)
+        .with_some("displayUnit", unit.display.map(|display| display.name));
+    with_range(element, of).with_some("nominal", nominal)
+}
+
+/// The element with the values that its type has: their range, or the kind of bytes.
+pub(crate) fn with_range(element: Element, of: &Type) -> Element {
     match of.of {
-        Attributes::Real { quantity, unit, min, max, nominal } => element
-            .with_some("quantity", filled(quantity))
-            .with("unit", unit.name)
-            .with_some("displayUnit", unit.display.map(|display| display.name))
-            .with_some("min", min)
-            .with_some("max", max)
-            .with_some("nominal", nominal),
+        Attributes::Real { min, max, .. } => {
+            element.with_some("min", min.map(Value::Real)).with_some("max", max.map(Value::Real))
+        }
         Attributes::Integer { min, max } => element
             .with_some("min", (Some(min) != of.base().range().map(|range| range.0)).then_some(min))
             .with_some("max", (Some(max) != of.base().range().map(|range| range.1)).then_some(max)),

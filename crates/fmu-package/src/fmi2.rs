@@ -4,6 +4,7 @@ use crate::changes::Changes;
 use crate::check::check;
 use crate::definitions::{filled, items, list, type_definitions, unit_definitions, with_attributes};
 use crate::describe::{default_experiment, is_reinit, log_categories, root, with_dependencies, with_facts};
+use crate::memory;
 use crate::structure::{ModelStructure, Unknown};
 use crate::xml::Element;
 use anyhow::{Result, ensure};
@@ -25,6 +26,7 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
         );
     }
     let starts = check::<M>(changes)?;
+    memory::check::<M>(&starts)?;
     let structure = ModelStructure::of::<M>(changes.tunable_parameters)?;
     let types: Vec<_> = M::TABLE.iter().map(Variable::of).collect();
     let names: Vec<_> = M::TABLE.iter().map(Variable::name).collect();

@@ -1,17 +1,17 @@
 //! The model description of FMI 3.0 (section 2.4).
 //!
-//! A variable has the same value reference as in FMI 2.0, its place in the table. Behind the table come variables that
-//! only FMI 3.0 asks for: the [time](independent), where it is no variable of the model, and the
-//! [event indicators](indicator).
+//! Behind the table come variables that only FMI 3.0 asks for: the [time](independent), where it is no variable of the
+//! model, and the [event indicators](indicator). [Value references](reference) count from 1 in this order.
 
 use crate::changes::Changes;
 use crate::check::check;
-use crate::definitions::{filled, items, type_definitions, unit_definitions, with_attributes};
+use crate::definitions::{filled, items, type_definitions, unit_definitions, with_attributes, with_range};
 use crate::describe::{default_experiment, is_reinit, log_categories, root, with_dependencies, with_facts};
+use crate::memory;
 use crate::structure::{ModelStructure, Unknown};
 use crate::xml::Element;
 use anyhow::{Result, ensure};
-use fmu_export::fmi3::{independent, indicator};
+use fmu_export::fmi3::{independent, indicator, reference};
 use fmu_export::{BaseType, Exported, Interface, Type, Value, Variable};
 
 /// The text of `modelDescription.xml` for a model as FMU of FMI 3.0.
@@ -20,6 +20,7 @@ use fmu_export::{BaseType, Exported, Interface, Type, Value, Variable};
 /// As [`fmi2::describe`](crate::fmi2::describe), and when a variable has the name of one that FMI 3.0 asks for.
 pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
     let starts = check::<M>(changes)?;
+    memory::check::<M>(&starts)?;
     let structure = ModelStructure::of_fmi3::<M>(changes.tunable_parameters)?;
     let types: Vec<_> = M::TABLE.iter().map(Variable::of).collect();
     let names: Vec<_> = M::TABLE.iter().map(Variable::name).collect();
@@ -32,7 +33,8 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
         );
     }
     let variables = M::TABLE.iter().zip(starts).zip(0..);
-    let variables = variables.map(|((of, start), vr)| variable(of, vr, start, changes)).chain(generated);
+    let variables =
+        variables.map(|((of, start), place)| variable(of, reference(place), start, changes)).chain(generated);
 
     let children = [
         M::MODEL_EXCHANGE.map(|_| interface::<M>(Interface::ModelExchange)),
@@ -51,10 +53,10 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
 /// The variables that are not in the table. Every FMU has a time (section 2.4.7.4); indicators that no variable stands
 /// for get one of their own (section 2.4.8).
 fn generated<M: Exported>() -> Vec<Element> {
-    let variable = |name: String, vr: u32, description: &str, causality: &str| {
+    let variable = |name: String, place: u32, description: &str, causality: &str| {
         Element::new("Float64")
             .with("name", name)
-            .with("valueReference", vr)
+            .with("valueReference", reference(place))
             .with("description", description)
             .with("causality", causality)
             .with("variability", "continuous")
@@ -122,7 +124,8 @@ fn type_definition(of: &Type) -> Element {
     element.containing(items(of))
 }
 
-/// As in FMI 2.0, what a type says is repeated at the variable.
+/// Of what the type says, only the range is repeated: fmi-sim 0.7 reads no FMU whose variables have a quantity, a unit or a
+/// nominal value themselves, although they may (section 2.4.7.3).
 fn variable<M: Exported>(of: &Variable<M>, vr: u32, start: Option<Value>, changes: &Changes) -> Element {
     let variable_type = of.of();
     let start = start.map(|start| match start {
@@ -136,10 +139,10 @@ fn variable<M: Exported>(of: &Variable<M>, vr: u32, start: Option<Value>, change
     let element = with_facts(element, of, vr, changes.tunable_parameters)
         .with_some("declaredType", filled(variable_type.name))
         .with_some("start", attribute)
-        .with_some("derivative", of.differentiates())
+        .with_some("derivative", of.differentiates().map(reference))
         .with_some("reinit", is_reinit(of));
-    with_attributes(element, variable_type)
-        .containing(child.map(|start| Element::new("Start").with("value", start)))
+    let with = if variable_type.name.is_empty() { with_attributes } else { with_range };
+    with(element, variable_type).containing(child.map(|start| Element::new("Start").with("value", start)))
 }
 
 fn model_structure<M: Exported>(structure: &ModelStructure) -> Element {
@@ -150,10 +153,11 @@ fn model_structure<M: Exported>(structure: &ModelStructure) -> Element {
     ];
     let unknowns = unknowns.into_iter().flat_map(|(name, list)| list.iter().map(|of| unknown(name, of)));
     // Without a list of dependencies they depend on everything.
-    let of_indicator = |number| Element::new("EventIndicator").with("valueReference", indicator::<M>(number));
+    let of_indicator =
+        |number| Element::new("EventIndicator").with("valueReference", reference(indicator::<M>(number)));
     Element::new("ModelStructure").containing(unknowns).containing((0..indicators::<M>()).map(of_indicator))
 }
 
 fn unknown(name: &str, of: &Unknown) -> Element {
-    with_dependencies(Element::new(name).with("valueReference", of.vr), of, |vr| vr)
+    with_dependencies(Element::new(name).with("valueReference", reference(of.vr)), of, reference)
 }

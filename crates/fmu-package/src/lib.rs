@@ -14,7 +14,7 @@
 //! |---|---|
 //! | the guid | `fingerprint`, `folder`, `content`, `packages`, `sources`, `variant` |
 //! | files | `xml`, `files` |
-//! | the description | `changes`, `check`, `sample`, `structure`, `definitions`, `describe`, `fmi2`, `fmi3` |
+//! | the description | `changes`, `check`, `sample`, `memory`, `structure`, `definitions`, `describe`, `fmi2`, `fmi3` |
 //! | the FMU | `connectors`, `version`, `platform`, `cargo`, `pack` |
 //! | the command | `library`, `c_sources`, `terminal`, `command` |
 
@@ -51,6 +51,8 @@ mod describe;
 pub mod fmi2;
 #[cfg(feature = "package")]
 pub mod fmi3;
+#[cfg(feature = "package")]
+mod memory;
 #[cfg(feature = "package")]
 mod pack;
 #[cfg(feature = "package")]

@@ -136,7 +136,12 @@ fn set<M: Exported>(model: &mut M, point: &Point, which: impl Fn(&Variable<M>) -
 
 /// A value in the range of the type, near the start value; another one than before where possible. `None` for
 /// texts and bytes, of which nobody knows what else they could be.
-fn draw_value(random: &mut fastrand::Rng, of: &Type, start: &Value, before: Option<&Value>) -> Option<Value> {
+pub(crate) fn draw_value(
+    random: &mut fastrand::Rng,
+    of: &Type,
+    start: &Value,
+    before: Option<&Value>,
+) -> Option<Value> {
     Some(match (of.of, start) {
         (Attributes::Real { min, max, nominal, .. }, &Value::Real(start)) => {
             let reach = if start == 0.0 { nominal.unwrap_or(1.0) } else { 0.5 * start.abs() };

@@ -28,9 +28,9 @@ pub struct ModelStructure {
 /// What depends on others.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unknown {
-    /// Its value reference.
+    /// Its place in the table, which is its value reference in FMI 2.0.
     pub vr: u32,
-    /// Value references of what it depends on, and how each of them enters.
+    /// The places of what it depends on, and how each of them enters.
     pub dependencies: Vec<(u32, DependencyKind)>,
 }
 

@@ -23,35 +23,49 @@ pub struct Message {
     pub text: String,
 }
 
-/// What an instance answered instead of OK or Warning: the function, and what it logged.
+/// What an instance answered instead of OK or Warning: the function, and what it logged. In a box, as it is seldom made and
+/// each call may answer with it.
 #[derive(Debug)]
-pub struct Refusal {
+pub struct Refusal(Box<Refused>);
+
+#[derive(Debug)]
+struct Refused {
     function: &'static str,
     status: Status,
     log: Vec<Message>,
-    /// When the FMU has ended the simulation, if that is what it wants.
-    pub(crate) ended: Option<f64>,
+    ended: Option<f64>,
 }
 
 impl Refusal {
+    #[cold]
+    fn new(function: &'static str, status: Status, log: Vec<Message>) -> Self {
+        Self(Box::new(Refused { function, status, log, ended: None }))
+    }
+
+    /// When the FMU has ended the simulation, if that is what it wants.
+    pub(crate) fn ended(&self) -> Option<f64> {
+        self.0.ended
+    }
+
     /// Whether it comes without a reason.
     pub(crate) fn is_silent(&self) -> bool {
-        self.log.is_empty() && self.ended.is_none()
+        self.0.log.is_empty() && self.0.ended.is_none()
     }
 }
 
 impl std::fmt::Display for Refusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let message = reason(&self.log);
-        if let Some(time) = self.ended {
+        let Refused { function, status, log, ended } = &*self.0;
+        let message = reason(log);
+        if let Some(time) = ended {
             write!(f, "ended by the FMU at t = {time} s")?;
             return message.map_or(Ok(()), |message| write!(f, ": {}", message.text.trim()));
         }
         match message {
             // Some FMUs name the function, some do not.
-            Some(message) if message.text.contains(self.function) => f.write_str(message.text.trim()),
-            Some(message) => write!(f, "{}: {}", self.function, message.text.trim()),
-            None => write!(f, "{} was answered with {:?}, without a message", self.function, self.status),
+            Some(message) if message.text.contains(function) => f.write_str(message.text.trim()),
+            Some(message) => write!(f, "{}: {}", function, message.text.trim()),
+            None => write!(f, "{} was answered with {:?}, without a message", function, status),
         }
     }
 }
@@ -156,7 +170,7 @@ macro_rules! call {
     ($self:ident, $fmi2:ident ( $($of_fmi2:expr),* ) $(, $fmi3:ident ( $($of_fmi3:expr),* ))?) => {{
         let handle = $self.handle;
         if handle.is_null() {
-            return Err(broken(stringify!($fmi2)));
+            return Err(Refusal::new(stringify!($fmi2), Status::Fatal, Vec::new()));
         }
         // SAFETY: the instance is alive; arrays are slices of the lengths that are passed, single values live.
         let (function, code) = unsafe {
@@ -221,11 +235,6 @@ macro_rules! get {
             }
         }
     };
-}
-
-#[cold]
-fn broken(function: &'static str) -> Refusal {
-    Refusal { function, status: Status::Fatal, log: Vec::new(), ended: None }
 }
 
 impl Instance {
@@ -295,7 +304,7 @@ impl Instance {
         if status == Status::Fatal {
             self.handle = null_mut();
         }
-        Err(Refusal { function, status, log, ended: None })
+        Err(Refusal::new(function, status, log))
     }
 
     fn is_of_fmi2(&self) -> bool {
@@ -397,12 +406,12 @@ impl Instance {
 
     /// A step that was discarded may be the end that the FMU wants (section 4.2.3 of FMI 2.0).
     #[cold]
-    fn ended(&self, refusal: Refusal, time: f64) -> Refusal {
+    fn ended(&self, mut refusal: Refusal, time: f64) -> Refusal {
         let (mut wanted, mut reached) = (fmi2False, time);
         let kinds =
             [StatusKind::Terminated, StatusKind::LastSuccessfulTime].map(|kind| kind as fmi2StatusKind);
         let Functions::Fmi2(functions) = &self.library.functions else { return refusal };
-        if refusal.status != Status::Discard {
+        if refusal.0.status != Status::Discard {
             return refusal;
         }
         // SAFETY: the instance is alive after fmi2Discard, the places live.
@@ -416,7 +425,8 @@ impl Instance {
             return refusal;
         }
         let told = told == Status::Ok as c_int && reached.is_finite();
-        Refusal { ended: Some(if told { reached } else { time }), ..refusal }
+        refusal.0.ended = Some(if told { reached } else { time });
+        refusal
     }
 
     /// The end that the FMU wants, or an early return, which it has not been allowed (section 4.2.1 of FMI 3.0).
@@ -428,7 +438,9 @@ impl Instance {
             let text = format!("the step ended early, at {reached} s");
             log.push(Message { status, category: String::new(), text });
         }
-        Refusal { function, status, log, ended: wanted.then_some(reached) }
+        let mut refusal = Refusal::new(function, status, log);
+        refusal.0.ended = wanted.then_some(reached);
+        refusal
     }
 
     pub(crate) fn terminate(&mut self) -> Result<(), Refusal> {

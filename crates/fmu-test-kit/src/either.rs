@@ -1,11 +1,14 @@
 //! Co-Simulation in either standard, for tests that run in both.
 
-use crate::{Importer, fmi3};
+use crate::Importer;
+use crate::fmi3::{self, references};
+use fmu_export::fmi3::reference;
 use fmu_export::fmi3::types::{fmi3False, fmi3True};
 use fmu_export::{Exported, Interface};
 use std::ffi::c_void;
 
-/// An instance as an importer of FMI 2.0 or FMI 3.0 holds it. All calls must succeed.
+/// An instance as an importer of FMI 2.0 or FMI 3.0 holds it. All calls must succeed; variables are named by their
+/// places in the table.
 #[allow(clippy::missing_panics_doc, reason = "that is what they are for")]
 pub trait Either: Send {
     /// A new instance, initialized at time 0.
@@ -125,15 +128,17 @@ impl Either for fmi3::Importer {
         fmu
     }
 
-    fn read(&self, vr: &[u32], values: &mut [f64]) {
-        self.ok(self.fmi3GetFloat64(vr.as_ptr(), vr.len(), values.as_mut_ptr(), values.len()));
+    fn read(&self, places: &[u32], values: &mut [f64]) {
+        let vr = references(places);
+        self.ok(self.fmi3GetFloat64(vr.as_ptr(), places.len(), values.as_mut_ptr(), values.len()));
     }
 
-    fn write(&self, vr: &[u32], values: &[f64]) {
-        self.set(vr, values);
+    fn write(&self, places: &[u32], values: &[f64]) {
+        self.set(places, values);
     }
 
-    fn decide(&self, vr: u32, value: bool) {
+    fn decide(&self, place: u32, value: bool) {
+        let vr = reference(place);
         self.ok(self.fmi3SetBoolean(&vr, 1, &if value { fmi3True } else { fmi3False }, 1));
     }
 
@@ -141,14 +146,15 @@ impl Either for fmi3::Importer {
         self.step(point, step_size);
     }
 
-    fn read_rate(&self, vr: u32) -> f64 {
+    fn read_rate(&self, place: u32) -> f64 {
         let mut rate = f64::NAN;
-        self.ok(self.fmi3GetOutputDerivatives(&vr, 1, &1, &mut rate, 1));
+        self.ok(self.fmi3GetOutputDerivatives(&reference(place), 1, &1, &mut rate, 1));
         rate
     }
 
     /// Backward and forward: of one with respect to one it is the same number.
     fn read_partial(&self, unknown: u32, known: u32) -> f64 {
+        let [unknown, known] = [unknown, known].map(reference);
         let (mut forward, mut adjoint) = (f64::NAN, f64::NAN);
         self.ok(self.fmi3GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut forward, 1));
         self.ok(self.fmi3GetAdjointDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut adjoint, 1));

@@ -110,8 +110,8 @@ impl OutputDerivatives for Controller {
             (Name::tau2, 1) => slopes.torque[1],
             (Name::theta1, 1) => motor1.rate,
             (Name::theta2, 1) => motor2.rate,
-            (Name::theta1, 2) | (Name::omega1, 1) => motor1.acceleration,
-            (Name::theta2, 2) | (Name::omega2, 1) => motor2.acceleration,
+            (Name::omega1, 1) => motor1.acceleration,
+            (Name::omega2, 1) => motor2.acceleration,
             _ => 0.0,
         }
     }

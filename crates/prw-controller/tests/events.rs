@@ -2,7 +2,8 @@
 
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::{fmi2EventInfo, fmi2False, fmi2True};
-use fmu_export::fmi3::types::{fmi3Boolean, fmi3False, fmi3True};
+use fmu_export::fmi3::reference;
+use fmu_export::fmi3::types::{Status, fmi3Boolean, fmi3False, fmi3True};
 use fmu_test_kit::fmi3::{Arguments, Stepped, Updated};
 use prw_controller::Controller;
 use prw_controller::variables::Name;
@@ -132,6 +133,21 @@ fn in_event_mode_with_samples_within_a_step() {
     }
 }
 
+/// A step with more samples than a step may have is not begun, and a shorter one goes on from where it is.
+#[test]
+fn too_many_samples_within_a_step() {
+    let fmu = with(fmi3True, fmi3False);
+    fmu.set(&INPUTS, &inputs(START));
+    fmu.update();
+    fmu.ok(fmu.fmi3EnterStepMode());
+    let before = (fmu.bytes(), bits(fmu.get(OUTPUTS)));
+    assert_eq!(fmu.try_step(START, 1000.0), Err(Status::Discard));
+    let log = fmu.take_log();
+    assert!(log[0].text.contains("more than 10000 events; make shorter steps"), "{log:?}");
+    assert_eq!((fmu.bytes(), bits(fmu.get(OUTPUTS))), before);
+    assert!(fmu.try_step(START, 70.0).unwrap().event_handling_needed);
+}
+
 /// Whoever does not handle the event that a step ended with has it handled by the next step.
 #[test]
 fn an_event_that_nobody_handles() {
@@ -232,8 +248,9 @@ fn partial_derivatives_by_the_time() {
         let (before, after) = (at(middle - WIDTH), at(middle + WIDTH));
         at(middle);
         for (place, unknown) in OUTPUTS.into_iter().enumerate() {
-            let (time, mut forward, mut adjoint) =
-                (fmu_export::fmi3::independent::<Controller>().0, 0.0, 0.0);
+            let unknown = reference(unknown);
+            let time = reference(fmu_export::fmi3::independent::<Controller>().0);
+            let (mut forward, mut adjoint) = (0.0, 0.0);
             fmu.ok(fmu.fmi3GetDirectionalDerivative(&unknown, 1, &time, 1, &1.0, 1, &mut forward, 1));
             fmu.ok(fmu.fmi3GetAdjointDerivative(&unknown, 1, &time, 1, &1.0, 1, &mut adjoint, 1));
             let difference = (after[place] - before[place]) / (2.0 * WIDTH);

@@ -63,10 +63,7 @@ fn build_fmu_describes_the_model() {
     assert!(output.status.success(), "{output:?}");
     let text = std::fs::read_to_string(folder.path().join("modelDescription.xml")).unwrap();
     assert!(text.contains("instantiationToken=\"{00000000-0000-0000-0000-000000000000}\""), "{text}");
-    assert!(
-        text.contains("<ContinuousStateDerivative valueReference=\"2\" dependencies=\"0 1 3\""),
-        "{text}"
-    );
+    assert!(text.contains("<ContinuousStateDerivative valueReference=\"3\" dependencies=\"1 2\""), "{text}");
 }
 
 #[test]

@@ -20,7 +20,8 @@ use types::*;
 ///
 /// Tolerated, for interface types that have the function:
 ///   fmi3SetTime while initializing and in event mode, fmi3SetContinuousStates in event mode, as in FMI 2.0;
-///   the two numbers and the nominal values in every state: they never change.
+///   the two numbers and the nominal values in every state: they never change;
+///   fmi3EnterEventMode in Event Mode, as in FMI 2.0 (OpenModelica).
 #[doc(hidden)]
 #[macro_export]
 #[rustfmt::skip]
@@ -49,7 +50,7 @@ macro_rules! fmi3_functions {
             (tolerance_defined: fmi3Boolean, tolerance: fmi3Float64, start_time: fmi3Float64,
              stop_time_defined: fmi3Boolean, stop_time: fmi3Float64);
         fmi3ExitInitializationMode             "N"      "N"      "" ();
-        fmi3EnterEventMode                     "C"      "K"      "" ();
+        fmi3EnterEventMode                     "C"      "K"      "M" ();
         fmi3Terminate                          "CM"     "MK"     "" ();
         fmi3Reset                              "INCMT"  "INMKT"  "" ();
         fmi3GetFloat32                         "INCMT"  "INMKT"  ""

@@ -95,6 +95,10 @@ pub(crate) unsafe fn free<M: Exported>(c: *mut c_void) {
         return;
     }
     // SAFETY: by contract from `instantiate`, which gave the box away, and not freed before.
-    let component = unsafe { Box::from_raw(component) };
+    let mut component = unsafe { Box::from_raw(component) };
+    // One at a time: a second panic on the way out of a first would end the process.
+    while let Some(model) = component.instance.get_mut().give_any() {
+        forget_panic(catch_unwind(AssertUnwindSafe(|| drop(model))));
+    }
     forget_panic(catch_unwind(AssertUnwindSafe(|| drop(component))));
 }

@@ -2,7 +2,7 @@
 
 use super::string;
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome};
+use crate::instance::{Instance, Outcome, Reference};
 use crate::value::Value;
 use fmi_abi::BaseType;
 use fmi_abi::c_types::c_char;
@@ -10,9 +10,9 @@ use std::ffi::{CStr, CString};
 use std::mem::MaybeUninit;
 
 /// The texts are the instance's until the next call on it.
-pub(crate) fn get_texts<M: Exported>(
+pub(crate) fn get_texts<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
-    vr: &[u32],
+    vr: &[R],
     values: &mut [MaybeUninit<*const c_char>],
 ) -> Outcome {
     let mut texts = Vec::with_capacity(vr.len());
@@ -31,9 +31,9 @@ pub(crate) fn get_texts<M: Exported>(
 
 /// # Safety
 /// Each value is NULL or a string.
-pub(crate) unsafe fn set_texts<M: Exported>(
+pub(crate) unsafe fn set_texts<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
-    vr: &[u32],
+    vr: &[R],
     values: &[*const c_char],
 ) -> Outcome {
     let mut texts = Vec::with_capacity(vr.len());

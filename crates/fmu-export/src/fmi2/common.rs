@@ -6,7 +6,7 @@
 use super::types::*;
 use crate::boundary::{
     array, deserialize, free_state, get_state, get_texts, output, serialize, serialized_size,
-    set_debug_logging, set_state, set_texts,
+    set_debug_logging, set_texts,
 };
 use crate::export::Exported;
 use crate::instance::{Direction, Instance, Outcome};
@@ -164,13 +164,12 @@ pub unsafe fn fmi2GetFMUstate<M: Exported>(instance: &mut Instance<M>, state: *m
 }
 
 pub unsafe fn fmi2SetFMUstate<M: Exported>(instance: &mut Instance<M>, state: fmi2FMUstate) -> Outcome {
-    // SAFETY: see above.
-    unsafe { set_state(instance, state) }
+    instance.restore(state.addr())
 }
 
-pub unsafe fn fmi2FreeFMUstate<M: Exported>(_: &mut Instance<M>, state: *mut fmi2FMUstate) -> Outcome {
+pub unsafe fn fmi2FreeFMUstate<M: Exported>(instance: &mut Instance<M>, state: *mut fmi2FMUstate) -> Outcome {
     // SAFETY: see above.
-    unsafe { free_state::<M>(state) }
+    unsafe { free_state(instance, state) }
 }
 
 pub unsafe fn fmi2SerializedFMUstateSize<M: Exported>(

@@ -9,10 +9,9 @@
 //! All functions share one contract with the importer, the standard's:
 //! * a component is NULL or comes from `fmi2Instantiate` of this library, with the same model, and has not been freed;
 //!   it is not used by two threads at once (the log callback may try: it is refused);
-//! * a saved state is NULL or comes from `fmi2GetFMUstate` or `fmi2DeSerializeFMUstate` of this library, with the same
-//!   model, and has not been freed. That goes for the handle that `fmi2GetFMUstate` and `fmi2DeSerializeFMUstate` are
-//!   given a pointer to, as well: it must be NULL before it is used first (section 2.1.8). A wild handle cannot be told
-//!   from a state;
+//! * the handle that `fmi2GetFMUstate`, `fmi2DeSerializeFMUstate` and `fmi2FreeFMUstate` are given a pointer to is
+//!   initialized: NULL before it is used first (section 2.1.8). What it points to does not matter: a handle that is none
+//!   of a state of this instance is refused, not followed;
 //! * a pointer with a length is NULL or points to that many values; a pointer to one value is NULL or points to one;
 //!   strings end with a zero byte; arrays that are written do not overlap others; they may hold anything before, memory
 //!   that was never written as well;

@@ -4,7 +4,7 @@
 //! As in the [module above](super): each argument is what the standard says it is.
 
 use super::common::same;
-use super::types::*;
+use super::{FromOne, types::*};
 use crate::boundary::{array, output, place};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
@@ -25,7 +25,7 @@ pub unsafe fn fmi3GetOutputDerivatives<M: Exported>(
     // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
     let (vr, order, value) = unsafe {
         (
-            array(vr, count, "valueReferences")?,
+            array::<FromOne>(vr.cast(), count, "valueReferences")?,
             array(order, count, "orders")?,
             output(value, value_count, "values")?,
         )

@@ -3,7 +3,7 @@
 //! # Safety
 //! As in the [module above](super): each argument is what the standard says it is.
 
-use super::types::*;
+use super::{FromOne, types::*};
 use crate::boundary::*;
 use crate::export::Exported;
 use crate::instance::{Direction, Instance, Outcome, refuse};
@@ -66,13 +66,12 @@ pub unsafe fn fmi3GetFMUState<M: Exported>(instance: &mut Instance<M>, state: *m
 }
 
 pub unsafe fn fmi3SetFMUState<M: Exported>(instance: &mut Instance<M>, state: fmi3FMUState) -> Outcome {
-    // SAFETY: see above.
-    unsafe { set_state(instance, state) }
+    instance.restore(state.addr())
 }
 
-pub unsafe fn fmi3FreeFMUState<M: Exported>(_: &mut Instance<M>, state: *mut fmi3FMUState) -> Outcome {
+pub unsafe fn fmi3FreeFMUState<M: Exported>(instance: &mut Instance<M>, state: *mut fmi3FMUState) -> Outcome {
     // SAFETY: see above.
-    unsafe { free_state::<M>(state) }
+    unsafe { free_state(instance, state) }
 }
 
 pub unsafe fn fmi3SerializedFMUStateSize<M: Exported>(
@@ -165,8 +164,8 @@ unsafe fn derivatives<M: Exported>(
     // SAFETY: this function's contract.
     let (unknown, known, seed, sensitivity) = unsafe {
         (
-            array(unknown, unknown_count, "unknowns")?,
-            array(known, known_count, "knowns")?,
+            array::<FromOne>(unknown.cast(), unknown_count, "unknowns")?,
+            array(known.cast(), known_count, "knowns")?,
             array(seed, seed_count, "seed")?,
             output(sensitivity, sensitivity_count, "sensitivity")?,
         )

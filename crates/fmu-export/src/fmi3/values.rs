@@ -4,7 +4,7 @@
 //! As in the [module above](super): each argument is what the standard says it is.
 
 use super::common::same;
-use super::types::*;
+use super::{FromOne, types::*};
 use crate::boundary::{array, get_texts, output, set_texts};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
@@ -22,10 +22,10 @@ unsafe fn to_write<'a, T>(
     count: usize,
     values: *mut T,
     value_count: usize,
-) -> Outcome<(&'a [fmi3ValueReference], &'a mut [MaybeUninit<T>])> {
+) -> Outcome<(&'a [FromOne], &'a mut [MaybeUninit<T>])> {
     same("values", count, value_count)?;
     // SAFETY: the caller's promise.
-    Ok(unsafe { (array(vr, count, "valueReferences")?, output(values, value_count, "values")?) })
+    Ok(unsafe { (array(vr.cast(), count, "valueReferences")?, output(values, value_count, "values")?) })
 }
 
 /// The importer's arrays of values that it sets.
@@ -38,10 +38,10 @@ unsafe fn to_read<'a, T>(
     count: usize,
     values: *const T,
     value_count: usize,
-) -> Outcome<(&'a [fmi3ValueReference], &'a [T])> {
+) -> Outcome<(&'a [FromOne], &'a [T])> {
     same("values", count, value_count)?;
     // SAFETY: the caller's promise.
-    Ok(unsafe { (array(vr, count, "valueReferences")?, array(values, value_count, "values")?) })
+    Ok(unsafe { (array(vr.cast(), count, "valueReferences")?, array(values, value_count, "values")?) })
 }
 
 #[inline]

@@ -1,11 +1,12 @@
 //! Co-Simulation (section 4.2).
 
 use super::refusal::discard;
-use super::{Instance, Outcome, refuse, refuse_with};
+use super::{Instance, Outcome, Refusal, State, refuse, refuse_with};
 use crate::capabilities::{Events, Step, Stepped};
 use crate::export::Exported;
 use crate::model::Error;
 use fmi_abi::Mode;
+use fmi_abi::Standard;
 use fmi_abi::Status;
 
 /// Where a step has led in FMI 3.0.
@@ -22,6 +23,12 @@ pub(crate) struct Reached {
 const MOST_EVENTS: u32 = 10_000;
 
 impl<M: Exported> Instance<M> {
+    /// Whether steps may end early. If not, nothing is paid for it.
+    pub(super) const ENDS_EARLY: bool = match M::CO_SIMULATION {
+        Some(offer) => offer.ends_early,
+        None => false,
+    };
+
     /// A step of FMI 2.0 (section 4.2.2 there).
     #[inline]
     pub fn do_step(&mut self, point: f64, step_size: f64) -> Outcome {
@@ -31,25 +38,16 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// A step of FMI 3.0 (section 4.2.1 there).
+    /// A step of FMI 3.0 (section 4.2.1 there). One that is not OK has not begun.
     #[inline]
     pub fn do_step_to(&mut self, point: f64, step_size: f64) -> Outcome<Reached> {
-        if self.state.ended {
-            return refuse("the model has ended the simulation; terminate");
-        }
         let stepped = self.step(point, step_size)?;
         let (time, end) = (self.state.time, point + step_size);
         let early = time < end;
         match stepped {
             Stepped::Early(_) if early && !self.importer.early_return => {
-                // The text wants an error, unless all is as it was before; and after an error this mode.
-                self.enter(Mode::Terminated);
-                return refuse_with(|| {
-                    format!(
-                        "the step to {end} ended early, at {time}, which earlyReturnAllowed has ruled out; \
-                         set a saved state or reset"
-                    )
-                });
+                let why = "the model stops there, and earlyReturnAllowed has ruled that out";
+                return self.go_back(discard(format!("the step to {end} ends early, at {time}: {why}")));
             }
             Stepped::Terminate(_) => {
                 self.state.ended = true;
@@ -63,6 +61,17 @@ impl<M: Exported> Instance<M> {
             early: early && self.importer.early_return,
             time,
         })
+    }
+
+    /// To where the step began, whose answer is then an error, or `fmi3Discard` where a shorter one may help (section
+    /// 4.2.1 of FMI 3.0: in the same state as before, and nothing is to be said with earlyReturn).
+    #[cold]
+    fn go_back<T>(&mut self, why: Outcome<T>) -> Outcome<T> {
+        self.listen();
+        if let Some(before) = &self.before {
+            self.state.clone_from(before);
+        }
+        why
     }
 
     #[inline]
@@ -89,13 +98,23 @@ impl<M: Exported> Instance<M> {
                 format!("the step would end at {end}, after the stop time {stop_time}")
             });
         }
+        if Self::ENDS_EARLY {
+            // The importer has not heard of it, or has not listened.
+            if self.state.ended {
+                self.state.time = point;
+                return Ok(Stepped::Terminate(point));
+            }
+            if let Some(before) = &mut self.before {
+                State::clone_from(before, &self.state);
+            }
+        }
         let stepped = self.exported_step(point, step_size)?;
         self.state.stale = true;
         if let Stepped::Done = stepped {
             self.state.time = end;
             return Ok(stepped);
         }
-        Ok(self.through_events(stepped, point, end))
+        self.through_events(stepped, point, end)
     }
 
     #[inline]
@@ -107,53 +126,69 @@ impl<M: Exported> Instance<M> {
 
     /// The rest of a step that has not simply reached its end: over the events that the importer does not handle.
     #[cold]
-    fn through_events(&mut self, mut stepped: Stepped, point: f64, end: f64) -> Stepped {
+    fn through_events(&mut self, mut stepped: Stepped, point: f64, end: f64) -> Outcome<Stepped> {
         self.state.time = point;
         let mut events = 0;
         loop {
             let (Stepped::Early(time) | Stepped::Terminate(time) | Stepped::Event(time)) = stepped else {
                 self.state.time = end;
-                return stepped;
+                return Ok(stepped);
             };
             self.state.time = if time >= self.state.time && time <= end { time } else { end };
             self.state.stale = true;
             let time = self.state.time;
-            let Stepped::Event(_) = stepped else { return stepped };
+            let Stepped::Event(_) = stepped else { return Ok(stepped) };
             if self.importer.event_mode && (time == end || self.importer.early_return) {
-                return stepped;
+                return Ok(stepped);
             }
-            events += 1;
-            let handled = match events {
-                MOST_EVENTS => refuse(format!("more than {MOST_EVENTS} events in one step")),
-                _ => self.handle_event(),
+            let handled = if events < MOST_EVENTS {
+                self.handle_event()
+            } else {
+                discard(format!("it has more than {MOST_EVENTS} events; make shorter steps"))
             };
-            stepped = match handled {
-                Ok(()) if self.state.ended => Stepped::Terminate(time),
-                Ok(()) if time == end => Stepped::Done,
-                Ok(()) => match self.exported_step(time, end - time) {
-                    Ok(stepped) => stepped,
-                    Err(error) => self.stuck(time, &error.to_string()),
-                },
-                Err(refusal) => self.stuck(time, &refusal.message),
+            events += 1;
+            let next = handled.and_then(|()| match () {
+                () if self.state.ended => Ok(Stepped::Terminate(time)),
+                () if time == end => Ok(Stepped::Done),
+                () => Ok(self.exported_step(time, end - time)?),
+            });
+            stepped = match next {
+                Ok(stepped) => stepped,
+                Err(refusal) => return self.stuck(time, *refusal),
             };
             self.state.stale = true;
         }
     }
 
-    /// A part of the step is done, so it cannot be refused any more: it ends early.
-    fn stuck(&mut self, time: f64, why: &str) -> Stepped {
-        self.logger.log(Status::Warning, format!("the step cannot go on at {time}: {why}"));
-        Stepped::Early(time)
+    /// A part of the step is done. In FMI 2.0, it ends early; in FMI 3.0, that is not for errors: nothing is done.
+    fn stuck(&mut self, time: f64, mut why: Refusal) -> Outcome<Stepped> {
+        why.message = format!("the step cannot go on at {time}: {}", why.message);
+        match self.standard() {
+            Standard::Fmi2 => {
+                self.logger.log(Status::Warning, why.message);
+                Ok(Stepped::Early(time))
+            }
+            Standard::Fmi3 => self.go_back(Err(Box::new(why))),
+        }
     }
 
     /// The event iteration, for importers that leave it to the model in Co-Simulation.
     pub(super) fn handle_event(&mut self) -> Outcome {
-        for _ in 0..MOST_EVENTS {
-            if !self.event()?.again {
-                return Ok(());
+        let time = self.state.time;
+        let ended = self.try_on_copy(|model| {
+            let mut ended = false;
+            for _ in 0..MOST_EVENTS {
+                model.calculate(time);
+                let event = model.exported_event(time)?;
+                ended |= event.terminate;
+                if !event.again {
+                    return Ok(ended);
+                }
             }
-        }
-        refuse(format!("the event at {} does not come to an end", self.state.time))
+            refuse(format!("the event at {time} does not come to an end in {MOST_EVENTS} rounds"))
+        })?;
+        self.state.ended |= ended;
+        Ok(())
     }
 
     #[cold]

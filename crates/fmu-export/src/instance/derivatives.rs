@@ -1,7 +1,7 @@
 //! Derivatives with respect to variables (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0) and to time (section 4.2.1 of FMI
 //! 2.0, 4.1.2 of FMI 3.0).
 
-use super::{Instance, Outcome, finite, independent, refuse};
+use super::{Instance, Outcome, Reference, finite, independent, refuse};
 use crate::export::Exported;
 use crate::variable::{Causality, Initial, Variability, Variable};
 use fmi_abi::BaseType;
@@ -20,10 +20,10 @@ pub(crate) enum Direction {
 impl<M: Exported> Instance<M> {
     /// The partial derivatives of unknowns with respect to knowns, times the seed: by rows for a directional
     /// derivative, by columns for an adjoint one.
-    pub fn derivatives(
+    pub fn derivatives<R: Reference>(
         &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
+        unknowns: &[R],
+        knowns: &[R],
         seed: &[f64],
         result: &mut [MaybeUninit<f64>],
         direction: Direction,
@@ -43,10 +43,10 @@ impl<M: Exported> Instance<M> {
         }
         let initial = self.mode() == Mode::Initialization;
         for vr in unknowns {
-            check_unknown(self.variable(*vr, BaseType::Real)?, initial)?;
+            check_unknown(self.variable(vr.place(), BaseType::Real)?, initial)?;
         }
         for vr in knowns {
-            check_known(self.variable(*vr, BaseType::Real)?, initial)?;
+            check_known(self.variable(vr.place(), BaseType::Real)?, initial)?;
         }
         let (seeded, wanted) = match direction {
             Direction::Forward => (knowns, unknowns),
@@ -54,7 +54,7 @@ impl<M: Exported> Instance<M> {
         };
         for (vr, seed) in seeded.iter().zip(seed) {
             if !seed.is_finite() {
-                let name = self.name(*vr, BaseType::Real)?;
+                let name = self.name(vr.place(), BaseType::Real)?;
                 return refuse(format!("the seed of {name} must be a finite number, it is {seed}"));
             }
         }
@@ -65,8 +65,8 @@ impl<M: Exported> Instance<M> {
             let mut sum = 0.0;
             for (seeded, seed) in seeded.iter().zip(seed) {
                 let (unknown, known) = match direction {
-                    Direction::Forward => (*wanted, *seeded),
-                    Direction::Adjoint => (*seeded, *wanted),
+                    Direction::Forward => (wanted.place(), seeded.place()),
+                    Direction::Adjoint => (seeded.place(), wanted.place()),
                 };
                 let by = (known != time).then(|| M::NAMES[known as usize]);
                 let Some(partial) = model.exported_partial(M::NAMES[unknown as usize], by, initial) else {
@@ -78,7 +78,7 @@ impl<M: Exported> Instance<M> {
                 };
                 sum += partial * seed;
             }
-            result.write(finite(self.variable(*wanted, BaseType::Real)?, sum)?);
+            result.write(finite(self.variable(wanted.place(), BaseType::Real)?, sum)?);
         }
         Ok(())
     }
@@ -88,7 +88,7 @@ impl<M: Exported> Instance<M> {
             return refuse("this FMU does not use input derivatives (canInterpolateInputs is false)");
         }
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {
-            let variable = self.variable(*vr, BaseType::Real)?;
+            let variable = self.variable(vr.place(), BaseType::Real)?;
             if variable.causality() != Causality::Input || variable.variability() != Variability::Continuous {
                 return refuse(format!("{} is no continuous input", variable.name()));
             }
@@ -108,9 +108,9 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    pub fn get_output_derivatives(
+    pub fn get_output_derivatives<R: Reference>(
         &mut self,
-        vr: &[u32],
+        vr: &[R],
         orders: &[i32],
         values: &mut [MaybeUninit<f64>],
     ) -> Outcome {
@@ -118,14 +118,23 @@ impl<M: Exported> Instance<M> {
             return refuse("this FMU has no output derivatives (maxOutputDerivativeOrder is 0)");
         }
         for (vr, order) in vr.iter().zip(orders) {
-            check_order(self.variable(*vr, BaseType::Real)?, *order)?;
-            if super::indicator::<M>(*vr).is_some() {
+            let variable = self.variable(vr.place(), BaseType::Real)?;
+            check_order(variable, *order)?;
+            // Section 4.3.1 of FMI 2.0, 4.4.1 of FMI 3.0.
+            if order.unsigned_abs() > M::OUTPUT_DERIVATIVES {
+                return refuse(format!(
+                    "the order of the derivative of {} must be at most {} (maxOutputDerivativeOrder), it is {order}",
+                    variable.name(),
+                    M::OUTPUT_DERIVATIVES
+                ));
+            }
+            if super::indicator::<M>(vr.place()).is_some() {
                 return refuse("event indicators have no output derivatives");
             }
         }
         let model = self.calculated();
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {
-            let place = *vr as usize;
+            let place = vr.place() as usize;
             value.write(match M::TABLE.get(place) {
                 Some(variable) => finite(variable, derivative(model, place, order.unsigned_abs()))?,
                 None => derivative_of_time(*order),

@@ -13,7 +13,6 @@ mod values;
 pub(crate) use co_simulation::no_status;
 pub(crate) use derivatives::Direction;
 pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
-pub(crate) use saved_states::SavedState;
 
 use crate::capabilities::Events;
 use crate::export::Exported;
@@ -38,6 +37,11 @@ pub(crate) struct Instance<M> {
     state: State<M>,
     /// Why start values were refused, of the variables that have been set to no other since.
     refused: BTreeMap<u32, String>,
+    /// The states that the importer has saved and not freed.
+    kept: saved_states::Kept<M>,
+    /// Where the last step began, if one may fail half way: of FMI 3.0, unless each early end and event is the
+    /// importer's at once.
+    before: Option<Box<State<M>>>,
     /// Texts that the importer reads until the next call.
     pub texts: Vec<std::ffi::CString>,
     /// Bytes that the importer reads until the next call.
@@ -57,6 +61,19 @@ pub(crate) struct Importer {
 impl Importer {
     /// One of FMI 2.0.
     pub const FMI2: Self = Self { standard: Standard::Fmi2, event_mode: false, early_return: true };
+}
+
+/// How an importer calls a variable: by a number that stands for its place in the table, or behind it.
+pub(crate) trait Reference: Copy {
+    fn place(self) -> u32;
+}
+
+/// Of FMI 2.0: the place itself.
+impl Reference for u32 {
+    #[inline]
+    fn place(self) -> u32 {
+        self
+    }
 }
 
 /// What a saved state brings back.
@@ -115,16 +132,23 @@ impl<M: Exported> Instance<M> {
             return refuse("this FMU has no event mode in Co-Simulation (hasEventMode is false)");
         }
         let state = State::new(&setup)?;
+        let may_fail_half_way = Self::ENDS_EARLY
+            && setup.interface == Interface::CoSimulation
+            && importer.standard == Standard::Fmi3
+            && !(importer.event_mode && importer.early_return);
         let mut instance = Self {
             logger: Logger::new(importer.standard, logging_on),
             situation: Situation::new(importer.standard, setup.interface, state.mode),
             importer,
             setup,
+            before: may_fail_half_way.then(|| Box::new(state.clone())),
             state,
             refused: BTreeMap::new(),
+            kept: BTreeMap::new(),
             texts: Vec::new(),
             bytes: Vec::new(),
         };
+        instance.listen();
         instance.logger.log(Status::Ok, "instantiated");
         Ok(instance)
     }
@@ -167,11 +191,7 @@ impl<M: Exported> Instance<M> {
     /// Takes over what the model has to say.
     #[inline]
     pub fn listen(&mut self) {
-        if let Some(log) = self.state.model.log()
-            && !log.is_empty()
-        {
-            log.take().into_iter().for_each(|message| self.logger.add(message));
-        }
+        self.logger.listen(&mut self.state.model);
     }
 
     pub fn setup_experiment(&mut self, experiment: Experiment) -> Outcome {
@@ -245,9 +265,16 @@ impl<M: Exported> Instance<M> {
     /// What a model may refuse is tried on a copy first; nothing has changed if it does.
     #[cold]
     #[inline(never)]
-    fn try_on_copy<T>(&mut self, change: impl FnOnce(&mut M) -> Result<T, Error>) -> Outcome<T> {
+    fn try_on_copy<T, E: Into<Box<Refusal>>>(
+        &mut self,
+        change: impl FnOnce(&mut M) -> Result<T, E>,
+    ) -> Outcome<T> {
+        // A copy has nothing to say yet, and one that is dropped has been heard.
+        self.listen();
         let mut draft = self.state.model.clone();
-        let changed = change(&mut draft)?;
+        let changed = change(&mut draft);
+        self.logger.listen(&mut draft);
+        let changed = changed.map_err(Into::into)?;
         self.state.model = draft;
         self.state.stale = true;
         Ok(changed)
@@ -265,22 +292,38 @@ impl<M: Exported> Instance<M> {
 }
 
 impl<M: Exported> Instance<M> {
-    /// The variable of this value reference.
+    /// The variable at this place.
     #[inline]
-    fn find(&self, vr: u32) -> Option<&'static Variable<M>> {
-        match M::TABLE.get(vr as usize) {
-            None if self.importer.standard == Standard::Fmi3 => implicit(vr),
+    fn find(&self, place: u32) -> Option<&'static Variable<M>> {
+        match M::TABLE.get(place as usize) {
+            None if self.importer.standard == Standard::Fmi3 => implicit(place),
             found => found,
         }
     }
 
-    /// The variable of this value reference, if it has the type.
+    /// The variable at this place, if it has the type.
     #[inline]
-    fn variable(&self, vr: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
-        match self.find(vr) {
+    fn variable(&self, place: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
+        match self.find(place) {
             Some(variable) if variable.base() == base => Ok(variable),
-            other => refuse_variable(vr, other, base),
+            other => self.refuse_variable(place, other, base),
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn refuse_variable<T>(&self, place: u32, variable: Option<&Variable<M>>, base: BaseType) -> Outcome<T> {
+        match variable {
+            Some(variable) => {
+                refuse(format!("{} is of type {}, not {base}", variable.name(), variable.base()))
+            }
+            None => self.refuse_place(place),
+        }
+    }
+
+    fn refuse_place<T>(&self, place: u32) -> Outcome<T> {
+        let reference = self.standard().reference(place);
+        refuse(format!("there is no variable with value reference {reference}"))
     }
 }
 
@@ -295,43 +338,40 @@ impl<M: 'static> Implicit<M> {
         .finished("eventIndicator", "An event happens where it changes its sign");
 }
 
-/// What FMI 3.0 asks for in every model, behind the table: with the value reference behind the last one of the table the
-/// time (section 2.4.7.4), if the table has none; then the event indicators (section 2.4.8).
+/// What FMI 3.0 asks for in every model, behind the table: the time (section 2.4.7.4), if the table has none; then the
+/// event indicators (section 2.4.8).
 #[cold]
-fn implicit<M: Exported>(vr: u32) -> Option<&'static Variable<M>> {
-    let (place, variable) = independent::<M>();
-    let variable = (vr == place).then_some(variable);
-    variable.or_else(|| indicator::<M>(vr).map(|_| Implicit::INDICATOR))
+fn implicit<M: Exported>(place: u32) -> Option<&'static Variable<M>> {
+    let (time, variable) = independent::<M>();
+    let variable = (place == time).then_some(variable);
+    variable.or_else(|| indicator::<M>(place).map(|_| Implicit::INDICATOR))
 }
 
-/// Which of the event indicators has this value reference.
-fn indicator<M: Exported>(vr: u32) -> Option<usize> {
-    let place = (vr as usize).checked_sub(M::TABLE.len() + 1)?;
-    (place < Instance::<M>::INDICATORS).then_some(place)
+/// Which of the event indicators is at this place.
+fn indicator<M: Exported>(place: u32) -> Option<usize> {
+    let number = place.checked_sub(first_indicator::<M>())? as usize;
+    (number < Instance::<M>::INDICATORS).then_some(number)
 }
 
 /// The value of a variable behind the table.
 #[cold]
-fn implicit_value<M: Exported>(model: &M, time: f64, vr: u32) -> f64 {
-    let Some(place) = indicator::<M>(vr) else { return time };
+fn implicit_value<M: Exported>(model: &M, time: f64, place: u32) -> f64 {
+    let Some(number) = indicator::<M>(place) else { return time };
     let mut indicators = vec![0.0; Instance::<M>::INDICATORS];
     model.exported_indicators(&mut indicators);
-    indicators[place]
+    indicators[number]
 }
 
-/// The independent variable as FMI 3.0 has it, with its value reference.
+/// The place of the first event indicator: behind the table and behind the time.
+pub(crate) fn first_indicator<M: crate::Variables>() -> u32 {
+    let (time, _) = independent::<M>();
+    (M::TABLE.len() as u32).max(time + 1)
+}
+
+/// The independent variable as FMI 3.0 has it, with its place.
 pub(crate) fn independent<M: crate::Variables>() -> (u32, &'static Variable<M>) {
     let of_table = (0..).zip(M::TABLE).find(|(_, variable)| variable.causality() == Causality::Independent);
     of_table.unwrap_or((M::TABLE.len() as u32, Implicit::TIME))
-}
-
-#[cold]
-#[inline(never)]
-fn refuse_variable<T, M>(vr: u32, variable: Option<&Variable<M>>, base: BaseType) -> Outcome<T> {
-    match variable {
-        Some(variable) => refuse(format!("{} is of type {}, not {base}", variable.name(), variable.base())),
-        None => refuse(format!("there is no variable with value reference {vr}")),
-    }
 }
 
 #[inline]

@@ -3,9 +3,10 @@
 use super::{Instance, Outcome, State, refuse, serialized};
 use crate::export::Exported;
 use fmi_abi::{Interface, Mode, Standard};
+use std::collections::BTreeMap;
 use std::fmt;
 
-/// Where a saved state comes from, and what it is tied to: what is allowed next is another question in each standard and
+/// Where a serialized state comes from, and what it is tied to: what is allowed next is another question in each standard and
 /// interface type, and some modes are in one of them only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Origin(pub Standard, pub Interface);
@@ -28,11 +29,11 @@ impl Origin {
     }
 
     /// Why an instance does not take a state from elsewhere.
-    pub fn check(self, own: Self) -> Result<(), String> {
+    pub fn check(self, own: Self) -> Outcome {
         if self == own {
             return Ok(());
         }
-        Err(format!(
+        refuse(format!(
             "the state comes from {self}, this instance is {own}; states stay within their standard and interface type"
         ))
     }
@@ -44,55 +45,86 @@ impl fmt::Display for Origin {
     }
 }
 
-/// A saved state.
-pub(crate) struct SavedState<M> {
-    origin: Origin,
-    state: State<M>,
-}
+/// The states that an importer keeps. It knows them by their addresses, which are only ever looked up here: one that
+/// was freed, another instance's or no state at all is no address of these, and is never followed.
+///
+/// They are the instance's, whose end frees them (section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0).
+pub(super) type Kept<M> = BTreeMap<usize, Box<State<M>>>;
+
+/// The handle of no state.
+const NULL: usize = 0;
 
 impl<M: Exported> Instance<M> {
     fn origin(&self) -> Origin {
         Origin(self.standard(), self.interface())
     }
 
-    pub fn save(&self) -> SavedState<M> {
-        SavedState { origin: self.origin(), state: self.state.clone() }
-    }
-
     /// How many bytes a saved state takes now, with all that it points to.
     #[cfg(target_family = "wasm")]
     pub fn size_of_state(&mut self) -> usize {
-        size_of::<SavedState<M>>() + serialized::size_in_place(&mut self.state)
+        size_of::<State<M>>() + serialized::size(&mut self.state)
     }
 
-    /// Saves into a state that exists already, without allocation if the model clones without.
-    pub fn save_into(&self, saved: &mut SavedState<M>) {
-        saved.origin = self.origin();
-        saved.state.clone_from(&self.state);
+    /// Saves into the state of this handle, without allocation if the model clones without, or into a new one; gives
+    /// its handle.
+    pub fn save(&mut self, handle: usize) -> Outcome<usize> {
+        if handle == NULL {
+            return Ok(self.keep(self.state.clone()));
+        }
+        find(&mut self.kept, handle)?.clone_from(&self.state);
+        Ok(handle)
     }
 
-    pub fn restore(&mut self, saved: &SavedState<M>) -> Outcome {
-        saved.origin.check(self.origin()).or_else(refuse)?;
-        self.check_event_mode(&saved.state)?;
-        self.state.clone_from(&saved.state);
+    fn keep(&mut self, state: State<M>) -> usize {
+        let state = Box::new(state);
+        let handle = (&raw const *state).addr();
+        self.kept.insert(handle, state);
+        handle
+    }
+
+    pub fn restore(&mut self, handle: usize) -> Outcome {
+        self.state.clone_from(find(&mut self.kept, handle)?);
         self.refused.clear();
         self.enter(self.state.mode);
         Ok(())
     }
 
-    pub fn serialized_size(&self, saved: &SavedState<M>) -> usize {
-        serialized::size(&saved.state)
+    /// Gives the state away, to be dropped.
+    pub fn give(&mut self, handle: usize) -> Outcome<impl Sized + use<M>> {
+        find(&mut self.kept, handle)?;
+        Ok(self.kept.remove(&handle))
+    }
+
+    /// Gives any of its states away, as long as there are some.
+    pub fn give_any(&mut self) -> Option<impl Sized + use<M>> {
+        self.before.take().or_else(|| self.kept.pop_first().map(|(_, state)| state))
+    }
+
+    pub fn serialized_size(&mut self, handle: usize) -> Outcome<usize> {
+        Ok(serialized::size(find(&mut self.kept, handle)?))
     }
 
     /// Fills `bytes`, which must have the length that [`serialized_size`](Self::serialized_size) tells.
-    pub fn serialize(&self, saved: &SavedState<M>, bytes: &mut [u8]) {
-        serialized::write(&saved.state, saved.origin, bytes);
+    pub fn serialize(&mut self, handle: usize, bytes: &mut [u8]) -> Outcome {
+        let origin = self.origin();
+        serialized::write(find(&mut self.kept, handle)?, origin, bytes)
     }
 
-    pub fn deserialize(&self, bytes: &[u8]) -> Outcome<SavedState<M>> {
-        let state = serialized::read(bytes, self.origin(), &self.state).or_else(refuse)?;
+    /// Into the state of this handle or a new one, whose handle this gives.
+    pub fn deserialize(&mut self, bytes: &[u8], handle: usize) -> Outcome<usize> {
+        if handle != NULL {
+            find(&mut self.kept, handle)?;
+        }
+        let mut state = self.state.clone();
+        let read = serialized::read(bytes, self.origin(), &mut state);
+        self.logger.listen(&mut state.model);
+        read?;
         self.check_event_mode(&state)?;
-        Ok(SavedState { origin: self.origin(), state })
+        if handle == NULL {
+            return Ok(self.keep(state));
+        }
+        *find(&mut self.kept, handle)? = state;
+        Ok(handle)
     }
 
     /// In Co-Simulation not every instance has an event mode.
@@ -105,4 +137,18 @@ impl<M: Exported> Instance<M> {
         }
         Ok(())
     }
+}
+
+fn find<M>(kept: &mut Kept<M>, handle: usize) -> Outcome<&mut State<M>> {
+    kept.get_mut(&handle).map_or_else(|| refuse_handle(handle), |state| Ok(&mut **state))
+}
+
+#[cold]
+fn refuse_handle<T>(handle: usize) -> Outcome<T> {
+    refuse(if handle == NULL {
+        "the state is NULL; save one first"
+    } else {
+        "the handle holds no state of this instance: it was freed, never set to NULL, or is another instance's, which \
+         can be serialized there and de-serialized here"
+    })
 }

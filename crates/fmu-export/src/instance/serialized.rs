@@ -1,9 +1,10 @@
 //! Saved states as bytes, with version and checksum.
 
-use super::State;
 use super::saved_states::Origin;
 use super::values::check_value;
+use super::{Outcome, State, refuse};
 use crate::export::Exported;
+use crate::model::Experiment;
 use crate::saved::{Saved, StateVisitor};
 use crate::settable::POSSIBLE;
 use fmi_abi::Mode;
@@ -22,10 +23,7 @@ impl<M: Exported> State<M> {
         self.experiment.start_time.visit(visitor);
         self.experiment.stop_time.visit(visitor);
         self.experiment.tolerance.visit(visitor);
-        for variable in M::TABLE {
-            variable.visit(&mut self.model, visitor);
-        }
-        self.model.visit_memory(visitor);
+        self.model.visit_state(visitor);
     }
 }
 
@@ -35,73 +33,76 @@ const MAGIC: &[u8; 8] = b"fmustat2";
 const HEADER_LENGTH: usize = 8 + 8 + 1;
 const CHECKSUM_LENGTH: usize = 8;
 
-/// The number of bytes of a serialized state.
-pub(super) fn size<M: Exported>(state: &State<M>) -> usize {
-    size_in_place(&mut state.clone())
-}
-
-/// The same without a copy; the state stays as it is.
-pub(super) fn size_in_place<M: Exported>(state: &mut State<M>) -> usize {
+/// The number of bytes of a serialized state, which stays as it is.
+pub(super) fn size<M: Exported>(state: &mut State<M>) -> usize {
     let mut counter = Counter(0);
     state.visit(&mut counter);
     HEADER_LENGTH + counter.0 + CHECKSUM_LENGTH
 }
 
-/// Fills `bytes`, which must have the length that [`size`] tells.
-pub(super) fn write<M: Exported>(state: &State<M>, origin: Origin, bytes: &mut [u8]) {
+/// Fills `bytes`, which must have the length that [`size`] tells. What could not be read is not written.
+pub(super) fn write<M: Exported>(state: &mut State<M>, origin: Origin, bytes: &mut [u8]) -> Outcome {
+    check(state)?;
     let (content, checksum) = bytes.split_at_mut(bytes.len() - CHECKSUM_LENGTH);
     let mut writer = Writer { rest: &mut *content };
     writer.put(MAGIC);
     writer.put(&guid_hash::<M>());
     writer.put(&[origin.byte()]);
-    state.clone().visit(&mut writer);
+    state.visit(&mut writer);
     checksum.copy_from_slice(&fnv1a(content).to_le_bytes());
+    Ok(())
 }
 
-/// Rebuilds a state from bytes that may come from anywhere. `template` is any state of the model.
-pub(super) fn read<M: Exported>(
-    bytes: &[u8],
-    origin: Origin,
-    template: &State<M>,
-) -> Result<State<M>, String> {
+/// Rebuilds a state from bytes that may come from anywhere, in place of any state of the model.
+pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<M>) -> Outcome {
     let version = MAGIC.len() - 1;
     if bytes.len() < MAGIC.len() || bytes[..version] != MAGIC[..version] {
-        return Err("the bytes are no saved state of an FMU of this kind".into());
+        return refuse("the bytes are no saved state of an FMU of this kind");
     }
     if bytes[version] != MAGIC[version] {
-        return Err("the saved state has another version of the layout; save it again with this FMU".into());
+        return refuse("the saved state has another version of the layout; save it again with this FMU");
     }
     if bytes.len() < HEADER_LENGTH + CHECKSUM_LENGTH {
-        return Err("the saved state is cut short".into());
+        return refuse("the saved state is cut short");
     }
     if bytes[8..16] != guid_hash::<M>() {
-        return Err("the saved state comes from another FMU (its guid differs)".into());
+        return refuse("the saved state comes from another FMU (its guid differs)");
     }
     let (content, checksum) = bytes.split_at(bytes.len() - CHECKSUM_LENGTH);
     if fnv1a(content).to_le_bytes() != *checksum {
-        return Err("the saved state is damaged or has the wrong length (its checksum is wrong)".into());
+        return refuse("the saved state is damaged or has the wrong length (its checksum is wrong)");
     }
     let Some(from) = Origin::from_byte(content[16]) else {
-        return Err("the saved state holds impossible values".into());
+        return refuse("the saved state holds impossible values");
     };
     from.check(origin)?;
     let mut reader = Reader { rest: &content[HEADER_LENGTH..], valid: true };
-    let mut state = template.clone();
     state.visit(&mut reader);
     if !reader.rest.is_empty() {
-        return Err("the saved state has the wrong length".into());
+        return refuse("the saved state has the wrong length");
     }
     if !reader.valid || !POSSIBLE.contain(origin.0, origin.1, state.mode) {
-        return Err("the saved state holds impossible values".into());
+        return refuse("the saved state holds impossible values");
+    }
+    check(state)?;
+    state.model.update()?;
+    state.stale = true;
+    Ok(())
+}
+
+/// Values that could be set are as if they had been, and the times are finite; the model's memory is its own affair.
+fn check<M: Exported>(state: &State<M>) -> Outcome {
+    let Experiment { start_time, stop_time, tolerance } = state.experiment;
+    let times = [Some(state.time), Some(start_time), stop_time, tolerance];
+    if !times.into_iter().flatten().all(f64::is_finite) {
+        return refuse("the saved state holds impossible values");
     }
     for variable in M::TABLE.iter().filter(|variable| variable.has_start()) {
         if let Some(value) = variable.value(&state.model) {
-            check_value(variable, &value).map_err(|refusal| refusal.message)?;
+            check_value(variable, &value)?;
         }
     }
-    state.model.update().map_err(|error| error.to_string())?;
-    state.stale = true;
-    Ok(state)
+    Ok(())
 }
 
 fn guid_hash<M: Exported>() -> [u8; 8] {
@@ -187,7 +188,6 @@ impl Reader<'_> {
 impl StateVisitor for Reader<'_> {
     fn real(&mut self, value: &mut f64) {
         *value = f64::from_bits(u64::from_le_bytes(self.take()));
-        self.valid &= value.is_finite();
     }
     fn integer(&mut self, value: &mut i64) {
         *value = i64::from_le_bytes(self.take());
@@ -208,7 +208,6 @@ impl StateVisitor for Reader<'_> {
             None => self.invalid(),
         }
     }
-    /// Hostile bytes may claim any length; nothing is reserved for elements that cannot be there.
     fn length(&mut self, length: &mut usize) {
         let claimed = u64::from_le_bytes(self.take());
         *length = match usize::try_from(claimed) {
@@ -221,6 +220,9 @@ impl StateVisitor for Reader<'_> {
     }
     fn invalid(&mut self) {
         self.valid = false;
+    }
+    fn goes_on(&self) -> bool {
+        self.valid
     }
 }
 
@@ -257,7 +259,12 @@ mod tests {
     #[test]
     fn every_type_comes_back() {
         comes_back(-0.25);
-        comes_back(f64::MIN_POSITIVE);
+        comes_back([f64::MIN_POSITIVE, f64::INFINITY]);
+        comes_back([f32::MAX, f32::NEG_INFINITY]);
+        assert!(
+            read::<(f64, f32)>(&written((f64::NAN, f32::NAN))).is_some_and(|(a, b)| a.is_nan() && b.is_nan())
+        );
+        assert_eq!(read::<f32>(&written(f64::MAX)), None);
         comes_back(true);
         comes_back("Gödel".to_owned());
         comes_back([i8::MIN, -1, i8::MAX]);
@@ -270,7 +277,6 @@ mod tests {
 
     #[test]
     fn what_cannot_be_is_invalid() {
-        assert_eq!(read::<f64>(&written(f64::NAN)), None);
         assert_eq!(read::<bool>(&[2]), None);
         assert_eq!(read::<u8>(&written(256_i32)), None);
         assert_eq!(read::<u32>(&written(-1_i64)), None);
@@ -285,10 +291,16 @@ mod tests {
         }
     }
 
-    /// However many: what was saved can be read.
+    /// However many: what was saved can be read. Of elements that are not there none is made, whatever is claimed.
     #[test]
     fn long_vectors() {
         let value = vec![true; (1 << 20) + 1];
         assert_eq!(read(&written(value.clone())), Some(value));
+
+        let mut bytes = written(1_i64 << 20);
+        bytes.resize(8 + (1 << 20), 0);
+        let mut large = Vec::<[f64; 32]>::new();
+        large.visit(&mut Reader { rest: &bytes, valid: true });
+        assert_eq!(large.len(), (1 << 20) / 256 + 1);
     }
 }

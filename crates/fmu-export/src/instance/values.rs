@@ -1,6 +1,6 @@
 //! Values (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI 3.0).
 
-use super::{Instance, Outcome, finite, implicit_value, refuse, refuse_with};
+use super::{Instance, Outcome, Reference, finite, implicit_value, refuse, refuse_with};
 use crate::export::Exported;
 use crate::settable::STARTING;
 use crate::types::Attributes;
@@ -11,8 +11,9 @@ use std::mem::MaybeUninit;
 
 impl<M: Exported> Instance<M> {
     #[inline]
-    pub fn get_reals(&mut self, vr: &[u32], values: &mut [MaybeUninit<f64>]) -> Outcome {
-        let in_table = |vr: &u32| M::TABLE.get(*vr as usize).is_some_and(|of| of.base() == BaseType::Real);
+    pub fn get_reals<R: Reference>(&mut self, vr: &[R], values: &mut [MaybeUninit<f64>]) -> Outcome {
+        let in_table =
+            |vr: &R| M::TABLE.get(vr.place() as usize).is_some_and(|of| of.base() == BaseType::Real);
         if !vr.iter().all(in_table) {
             return self.get_reals_one_by_one(vr, values);
         }
@@ -21,7 +22,7 @@ impl<M: Exported> Instance<M> {
         // 0 as long as all values are finite: one question at the end costs less than one for each.
         let mut none = 0.0;
         for (vr, value) in vr.iter().zip(&mut *values) {
-            let read = M::TABLE[*vr as usize].real(model).unwrap_or(time);
+            let read = M::TABLE[vr.place() as usize].real(model).unwrap_or(time);
             none += read * 0.0;
             value.write(read);
         }
@@ -32,16 +33,16 @@ impl<M: Exported> Instance<M> {
     /// is named.
     #[cold]
     #[inline(never)]
-    fn get_reals_one_by_one(&mut self, vr: &[u32], values: &mut [MaybeUninit<f64>]) -> Outcome {
+    fn get_reals_one_by_one<R: Reference>(&mut self, vr: &[R], values: &mut [MaybeUninit<f64>]) -> Outcome {
         for vr in vr {
-            self.variable(*vr, BaseType::Real)?;
+            self.variable(vr.place(), BaseType::Real)?;
         }
         let time = self.state.time;
         let model = self.calculated();
         for (vr, value) in vr.iter().zip(values) {
-            let (variable, read) = match M::TABLE.get(*vr as usize) {
+            let (variable, read) = match M::TABLE.get(vr.place() as usize) {
                 Some(variable) => (variable, variable.real(model).unwrap_or(time)),
-                None => (super::Implicit::<M>::INDICATOR, implicit_value(model, time, *vr)),
+                None => (super::Implicit::<M>::INDICATOR, implicit_value(model, time, vr.place())),
             };
             value.write(finite(variable, read)?);
         }
@@ -49,10 +50,10 @@ impl<M: Exported> Instance<M> {
     }
 
     #[inline]
-    pub fn set_reals(&mut self, vr: &[u32], values: &[f64]) -> Outcome {
+    pub fn set_reals<R: Reference>(&mut self, vr: &[R], values: &[f64]) -> Outcome {
         let situation = self.situation();
-        let simple = |(vr, value): (&u32, &f64)| {
-            let variable = M::TABLE.get(*vr as usize);
+        let simple = |(vr, value): (&R, &f64)| {
+            let variable = M::TABLE.get(vr.place() as usize);
             variable.is_some_and(|variable| situation.is_in(variable.takes_reals)) && value.is_finite()
         };
         if !vr.iter().zip(values).all(simple) {
@@ -60,96 +61,132 @@ impl<M: Exported> Instance<M> {
         }
         self.state.stale = true;
         for (vr, value) in vr.iter().zip(values) {
-            M::TABLE[*vr as usize].set_real(&mut self.state.model, *value);
+            M::TABLE[vr.place() as usize].set_real(&mut self.state.model, *value);
         }
         Ok(())
     }
 
     #[cold]
     #[inline(never)]
-    fn set_reals_and_parameters(&mut self, vr: &[u32], values: &[f64]) -> Outcome {
+    fn set_reals_and_parameters<R: Reference>(&mut self, vr: &[R], values: &[f64]) -> Outcome {
         self.set(vr, &[BaseType::Real], values.iter().map(|value| Value::Real(*value)))
     }
 
     /// Values of any other type: all are checked, then each is handed over with its place.
-    pub fn get(&mut self, vr: &[u32], bases: &[BaseType], mut each: impl FnMut(usize, Value)) -> Outcome {
+    pub fn get<R: Reference>(
+        &mut self,
+        vr: &[R],
+        bases: &[BaseType],
+        mut each: impl FnMut(usize, Value),
+    ) -> Outcome {
         for vr in vr {
-            self.variable_of(*vr, bases)?;
+            self.variable_of(vr.place(), bases)?;
         }
         let time = self.state.time;
         let model = self.calculated();
         for (place, vr) in vr.iter().enumerate() {
-            let value = M::TABLE.get(*vr as usize).and_then(|of| of.value(model));
-            each(place, value.unwrap_or(Value::Real(time)));
+            let variable = M::TABLE.get(vr.place() as usize);
+            let value = variable.and_then(|of| of.value(model)).unwrap_or(Value::Real(time));
+            if let (Some(variable), Value::Real(value)) = (variable, &value) {
+                finite(variable, *value)?;
+            }
+            each(place, value);
         }
         Ok(())
     }
 
-    fn variable_of(&self, vr: u32, bases: &[BaseType]) -> Outcome<&'static Variable<M>> {
-        match self.find(vr) {
+    fn variable_of(&self, place: u32, bases: &[BaseType]) -> Outcome<&'static Variable<M>> {
+        match self.find(place) {
             Some(variable) if bases.contains(&variable.base()) => Ok(variable),
-            other => super::refuse_variable(vr, other, bases[0]),
+            other => self.refuse_variable(place, other, bases[0]),
         }
     }
 
     /// Sets values of any type: all are checked, then all are set.
-    pub fn set(
+    pub fn set<R: Reference>(
         &mut self,
-        vr: &[u32],
+        vr: &[R],
         bases: &[BaseType],
         values: impl Iterator<Item = Value> + Clone,
     ) -> Outcome {
         self.check_all_settable(vr, bases)?;
-        let set = self.set_settable(vr, values);
-        self.remember(vr, set)
+        let to_blame = vr.iter().zip(values.clone()).find_map(|(vr, value)| {
+            let refusal = check_value(&M::TABLE[vr.place() as usize], &value).err()?;
+            Some((*vr, refusal))
+        });
+        match to_blame {
+            Some((blamed, refusal)) => self.remember(vr, Some(blamed.place()), Err(refusal)),
+            None => {
+                let set = self.set_settable(vr, values);
+                self.remember(vr, None, set)
+            }
+        }
     }
 
     /// Refuses to set variables because the value at one place is none of its type. `why` is given the variable's name.
     #[cold]
-    pub fn refuse_value(
+    pub fn refuse_value<R: Reference>(
         &mut self,
-        vr: &[u32],
+        vr: &[R],
         bases: &[BaseType],
         place: usize,
         why: impl FnOnce(&str) -> String,
     ) -> Outcome {
         self.check_all_settable(vr, bases)?;
-        let refusal = refuse(why(M::TABLE[vr[place] as usize].name()));
-        self.remember(vr, refusal)
+        let blamed = vr[place].place();
+        let refusal = refuse(why(M::TABLE[blamed as usize].name()));
+        self.remember(vr, Some(blamed), refusal)
     }
 
-    fn check_all_settable(&self, vr: &[u32], bases: &[BaseType]) -> Outcome {
-        vr.iter().try_for_each(|vr| self.check_settable(self.variable_of(*vr, bases)?))
+    fn check_all_settable<R: Reference>(&self, vr: &[R], bases: &[BaseType]) -> Outcome {
+        vr.iter().try_for_each(|vr| self.check_settable(self.variable_of(vr.place(), bases)?))
     }
 
     /// Some importers go on after a start value was refused, and the simulation would have another one than the user
-    /// wants: until it is set to one that is possible, the initialization is refused with the same words.
-    fn remember(&mut self, vr: &[u32], set: Outcome) -> Outcome {
+    /// wants: until it is set to one that is possible, the initialization is refused. So it is for those that were to
+    /// be set in the same call, which one of them may be to blame for.
+    fn remember<R: Reference>(&mut self, vr: &[R], blamed: Option<u32>, set: Outcome) -> Outcome {
         if self.situation().is_in(STARTING) {
-            for vr in vr {
-                match &set {
-                    Ok(()) => _ = self.refused.remove(vr),
-                    Err(refusal) => _ = self.refused.insert(*vr, refusal.message.clone()),
-                }
+            for vr in vr.iter().map(|vr| vr.place()) {
+                let Err(refusal) = &set else {
+                    self.refused.remove(&vr);
+                    continue;
+                };
+                let message = match blamed.filter(|blamed| *blamed != vr) {
+                    None => refusal.message.clone(),
+                    Some(blamed) => {
+                        let [name, other] = [vr, blamed].map(|vr| M::TABLE[vr as usize].name());
+                        format!(
+                            "{name} was not set, because {other} in the same call was refused: set it again"
+                        )
+                    }
+                };
+                self.refused.insert(vr, message);
             }
         }
         set
     }
 
     pub(super) fn check_start_values(&self) -> Outcome {
-        self.refused.first_key_value().map_or(Ok(()), |(_, message)| refuse(message.clone()))
+        let mut reasons: Vec<&str> = Vec::new();
+        for reason in self.refused.values() {
+            if !reasons.contains(&reason.as_str()) {
+                reasons.push(reason);
+            }
+        }
+        if reasons.is_empty() { Ok(()) } else { refuse(reasons.join("; ")) }
     }
 
-    fn set_settable(&mut self, vr: &[u32], values: impl Iterator<Item = Value> + Clone) -> Outcome {
-        let mut parameters = false;
-        for (vr, value) in vr.iter().zip(values.clone()) {
-            let variable = &M::TABLE[*vr as usize];
-            check_value(variable, &value)?;
-            parameters |= variable.causality() == Causality::Parameter;
-        }
+    fn set_settable<R: Reference>(
+        &mut self,
+        vr: &[R],
+        values: impl Iterator<Item = Value> + Clone,
+    ) -> Outcome {
+        let parameters =
+            vr.iter().any(|vr| M::TABLE[vr.place() as usize].causality() == Causality::Parameter);
         let set = |model: &mut M| {
             for (vr, value) in vr.iter().zip(values) {
-                M::TABLE[*vr as usize].set(model, &value);
+                M::TABLE[vr.place() as usize].set(model, &value);
             }
         };
         if !parameters {
@@ -164,8 +201,8 @@ impl<M: Exported> Instance<M> {
     }
 
     /// The name of a variable that has the type.
-    pub fn name(&self, vr: u32, base: BaseType) -> Outcome<&'static str> {
-        Ok(self.variable(vr, base)?.name())
+    pub fn name(&self, vr: impl Reference, base: BaseType) -> Outcome<&'static str> {
+        Ok(self.variable(vr.place(), base)?.name())
     }
 
     fn check_settable(&self, variable: &Variable<M>) -> Outcome {
@@ -198,11 +235,11 @@ pub(super) fn check_value<M>(variable: &Variable<M>, value: &Value) -> Outcome {
         (_, Value::Real(value)) if !value.is_finite() => {
             refuse(format!("{name} must be a finite number, it is {value}"))
         }
-        (Attributes::Real { min: Some(min), .. }, Value::Real(value)) if enforced && value < min => {
-            refuse(format!("{name} must not be below {min}, it is {value}"))
+        (Attributes::Real { min: Some(min), .. }, Value::Real(real)) if enforced && real < min => {
+            refuse(format!("{name} must not be below {}, it is {value}", Value::Real(*min)))
         }
-        (Attributes::Real { max: Some(max), .. }, Value::Real(value)) if enforced && value > max => {
-            refuse(format!("{name} must not be above {max}, it is {value}"))
+        (Attributes::Real { max: Some(max), .. }, Value::Real(real)) if enforced && real > max => {
+            refuse(format!("{name} must not be above {}, it is {value}", Value::Real(*max)))
         }
         (Attributes::Integer { min, max }, Value::Integer(value))
             if enforced && !(min..=max).contains(&value) =>

@@ -1,6 +1,7 @@
 //! Steps that end early, and models that end the simulation (sections 4.2.1 and 4.2.3).
 
-use crate::toys::{Fuse, fuse::Name};
+use crate::toys::grumbler::{self, Trouble};
+use crate::toys::{Fuse, Grumbler, Ticker, fuse::Name, ticker};
 use fmu_export::Interface::CoSimulation;
 use fmu_export::fmi2::types::*;
 use fmu_test_kit::{Importer, fmi3};
@@ -90,6 +91,66 @@ fn silence() {
     fmu.initialize(0.0);
     assert_eq!(fmu.try_step(0.0, 10.0), Status::Discard);
     assert_eq!(fmu.take_log(), []);
+}
+
+fn grumbler(trouble: Trouble) -> Importer {
+    let fmu = Importer::of::<Grumbler>(CoSimulation);
+    fmu.ok(fmu.fmi2SetInteger(&(grumbler::Name::trouble as u32), 1, &(trouble as i32)));
+    fmu
+}
+
+fn rounds(fmu: &Importer) -> i32 {
+    let mut rounds = -1;
+    fmu.ok(fmu.fmi2GetInteger(&(grumbler::Name::rounds as u32), 1, &mut rounds));
+    rounds
+}
+
+/// Nothing is left of its first round, and the step has come as far as there.
+#[test]
+fn an_event_that_fails_in_its_second_round() {
+    let fmu = grumbler(Trouble::SecondRound);
+    fmu.enter_initialization(0.0, None);
+    let before = fmu.bytes();
+    assert_eq!(fmu.fmi2ExitInitializationMode(), Status::Error);
+    assert_eq!(fmu.bytes(), before);
+    let fmu = grumbler(Trouble::Nowhere);
+    fmu.initialize(0.0);
+    assert_eq!(rounds(&fmu), 2);
+    fmu.ok(fmu.fmi2SetInteger(&(grumbler::Name::trouble as u32), 1, &(Trouble::SecondRound as i32)));
+    assert_eq!(fmu.try_step(0.0, 1.5), Status::Discard);
+    assert_eq!((progress(&fmu), rounds(&fmu)), ((1.0, false), 2));
+}
+
+/// Section 4.2.3: the importer of FMI 2.0 hears of it with the first step.
+#[test]
+fn the_initial_event_ends_the_simulation() {
+    let fmu = grumbler(Trouble::End);
+    fmu.initialize(3.0);
+    assert_eq!(fmu.try_step(3.0, 0.5), Status::Discard);
+    assert_eq!(progress(&fmu), (3.0, true));
+    fmu.refused("a step after the end", |fmu| fmu.try_step(3.0, 0.5));
+    fmu.ok(fmu.fmi2Terminate());
+}
+
+/// More events than a step may have, and an event without end.
+#[test]
+fn endless_events() {
+    let fmu = Importer::of::<Ticker>(CoSimulation);
+    fmu.initialize(0.0);
+    fmu.ok(fmu.fmi2SetInteger(&(ticker::Name::last as u32), 1, &i32::MAX));
+    fmu.step(0.0, 2500.0);
+    assert_eq!(fmu.try_step(2500.0, 2500.25), Status::Discard);
+    assert_eq!(progress(&fmu), (5000.25, false));
+    let log = fmu.take_log();
+    assert!(log[0].text.contains("at 5000.25: it has more than 10000 events; make shorter steps"), "{log:?}");
+    let fmu = grumbler(Trouble::Rounds);
+    fmu.enter_initialization(0.0, None);
+    assert_eq!(fmu.fmi2ExitInitializationMode(), Status::Error);
+    let log = fmu.take_log();
+    assert!(
+        log.iter().any(|message| message.text.contains("does not come to an end in 10000 rounds")),
+        "{log:?}"
+    );
 }
 
 /// Ends every step early and does not say so.

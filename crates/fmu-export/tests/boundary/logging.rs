@@ -1,14 +1,16 @@
 //! What the importer's log shows, and when (sections 2.1.5 and 2.2.4).
 
-use crate::toys::{Oscillator, Talker, talker::Name};
+use crate::toys::grumbler::{self, Trouble};
+use crate::toys::{Grumbler, Oscillator, Talker, talker::Name};
 use crate::variables::say;
 use fmu_export::Exported;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::Status;
+use fmu_test_kit::serialized::{VALUES, with};
 use fmu_test_kit::testing::assert_clean;
 use fmu_test_kit::{Arguments, Importer, Message};
 use std::ffi::CStr;
-use std::ptr::null;
+use std::ptr::{null, null_mut};
 
 fn logging<M: Exported>(logging_on: bool) -> Importer {
     let arguments = Arguments { logging_on, ..Arguments::of::<M>(CoSimulation) };
@@ -126,6 +128,39 @@ fn messages_of_the_model() {
     let bytes = fmu.bytes();
     fmu.restore(&bytes);
     assert_eq!(fmu.take_log(), []);
+}
+
+/// Also in a call that is refused, and from the first moment on.
+#[test]
+fn messages_of_a_model_that_fails() {
+    let fmu = logging::<Grumbler>(false);
+    let said = |fmu: &Importer| fmu.take_log().into_iter().map(|message| message.text).collect::<Vec<_>>();
+    let trouble =
+        |trouble: Trouble| fmu.fmi2SetInteger(&(grumbler::Name::trouble as u32), 1, &(trouble as i32));
+    assert_eq!(said(&fmu), ["made"]);
+    let failed =
+        |function: &str, at: &str| [format!("{at} will fail"), format!("{function}: {at} has failed")];
+    assert_eq!(trouble(Trouble::Update), Status::Error);
+    assert_eq!(said(&fmu), failed("fmi2SetInteger", "Update"));
+    fmu.ok(trouble(Trouble::Initialize));
+    assert_eq!(fmu.fmi2EnterInitializationMode(), Status::Error);
+    assert_eq!(said(&fmu), failed("fmi2EnterInitializationMode", "Initialize"));
+    fmu.ok(trouble(Trouble::SecondRound));
+    fmu.ok(fmu.fmi2EnterInitializationMode());
+    assert_eq!(fmu.fmi2ExitInitializationMode(), Status::Error);
+    assert_eq!(said(&fmu), failed("fmi2ExitInitializationMode", "SecondRound"));
+    // Bytes that the model does not take.
+    let bytes = with(fmu.bytes(), VALUES..VALUES + 8, &(Trouble::Update as i64).to_le_bytes());
+    let status = fmu.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut null_mut());
+    assert_eq!(status, Status::Error);
+    assert_eq!(said(&fmu), failed("fmi2DeSerializeFMUstate", "Update"));
+    fmu.ok(fmu.fmi2Reset());
+    assert_eq!(said(&fmu), ["made"]);
+    // What a step says before an event.
+    fmu.initialize(0.0);
+    fmu.ok(fmu.set_debug_logging(true, &[c"logEvents"]));
+    fmu.step(0.0, 2.0);
+    assert_eq!(said(&fmu), ["stops at 1", "stops at 2"]);
 }
 
 /// Every instance logs under its own name to its own environment.

@@ -2,7 +2,7 @@
 
 use crate::modes::{INTERFACES, all_modes, enter_continuous_time, in_mode, modes_of_model};
 use crate::random::Random;
-use crate::toys::{Counter, Oscillator, Talker, counter, oscillator::Name, talker};
+use crate::toys::{Counter, Grumbler, Oscillator, Talker, counter, grumbler, oscillator::Name, talker};
 use crate::variables::{say, texts};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
@@ -11,7 +11,7 @@ use fmu_export::{Exported, Model};
 use fmu_test_kit::Importer;
 use fmu_test_kit::serialized::*;
 use std::ops::Range;
-use std::ptr::{null, null_mut};
+use std::ptr::{null, null_mut, without_provenance_mut};
 
 const FORCE: u32 = Name::force as u32;
 /// The Real variables of the oscillator.
@@ -90,11 +90,11 @@ fn replay_is_bit_identical() {
             fmu.restore(&bytes);
             assert_eq!(run.go(&fmu, saved_at..Run::STEPS), expected, "from {saved_at}, serialized");
 
-            // Another instance, even one that was never initialized, takes the state.
+            // Another instance, even one that was never initialized, takes the bytes.
             let other = Importer::of::<Oscillator>(CoSimulation);
-            other.ok(other.fmi2SetFMUstate(state));
+            other.restore(&bytes);
             assert_eq!(run.go(&other, saved_at..Run::STEPS), expected, "from {saved_at}, elsewhere");
-            other.forget(state);
+            fmu.forget(state);
         }
     }
 }
@@ -266,18 +266,58 @@ fn handles_are_reused() {
     fmu.forget(state);
 }
 
-/// A saved state outlives the instance it came from and can be freed through another.
+/// What an instance has saved goes with it (section 2.1.5), and is its own: handles of others, freed ones and any other
+/// address are told from its states, and not followed.
 #[test]
-fn states_outlive_instances() {
-    let run = Run::new(false);
-    let fmu = run.start();
-    run.go(&fmu, 0..3);
-    let (state, expected) = (fmu.save(), observe(&fmu));
-    drop(fmu);
-    let other = Importer::of::<Oscillator>(CoSimulation);
-    other.ok(other.fmi2SetFMUstate(state));
-    assert_eq!(observe(&other), expected);
-    other.forget(state);
+fn handles_that_are_none() {
+    let [fmu, other] = [(); 2].map(|()| in_mode::<Talker>(CoSimulation, StepComplete));
+    let (own, foreign, freed) = (fmu.save(), other.save(), fmu.save());
+    fmu.forget(freed);
+    let on_the_stack = (&raw const own).cast_mut().cast();
+    let none = [foreign, freed, on_the_stack, without_provenance_mut(8), without_provenance_mut(usize::MAX)];
+    let bytes = fmu.bytes();
+    for wild in none {
+        let mut handle = wild;
+        let mut buffer = vec![0; bytes.len()];
+        for message in [
+            fmu.refused("get", |fmu| fmu.fmi2GetFMUstate(&mut handle)),
+            fmu.refused("set", |fmu| fmu.fmi2SetFMUstate(handle)),
+            fmu.refused("free", |fmu| fmu.fmi2FreeFMUstate(&mut handle)),
+            fmu.refused("size", |fmu| fmu.fmi2SerializedFMUstateSize(handle, &mut 0)),
+            fmu.refused("serialize", |fmu| {
+                fmu.fmi2SerializeFMUstate(handle, buffer.as_mut_ptr().cast(), buffer.len())
+            }),
+            fmu.refused("de-serialize", |fmu| {
+                fmu.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut handle)
+            }),
+        ] {
+            assert!(message.contains("no state of this instance"), "{message}");
+            assert_eq!(handle, wild);
+        }
+    }
+    other.ok(other.fmi2SetFMUstate(foreign));
+    fmu.ok(fmu.fmi2SetFMUstate(own));
+}
+
+/// In the model's memory any number may have a meaning; a variable that is none could not be read, so it is not written.
+#[test]
+fn infinite_numbers() {
+    let fmu = Importer::of::<Grumbler>(CoSimulation);
+    fmu.set(&[grumbler::Name::last as u32], &[0.5]);
+    fmu.initialize(0.0);
+    let other = Importer::of::<Grumbler>(CoSimulation);
+    other.restore(&fmu.bytes());
+    other.step(0.0, 1e6);
+
+    fmu.ok(fmu.fmi2SetInteger(&(grumbler::Name::trouble as u32), 1, &(grumbler::Trouble::Heat as i32)));
+    fmu.step(0.0, 0.1);
+    let (state, mut size) = (fmu.save(), 0);
+    fmu.ok(fmu.fmi2SerializedFMUstateSize(state, &mut size));
+    let mut buffer = vec![0; size];
+    let message = fmu.refused("an infinite variable", |fmu| {
+        fmu.fmi2SerializeFMUstate(state, buffer.as_mut_ptr().cast(), size)
+    });
+    assert!(message.contains("warmer must be a finite number, it is inf"), "{message}");
 }
 
 #[test]
@@ -327,12 +367,9 @@ fn states_of_the_other_interface_type() {
     let slave = in_mode::<Oscillator>(CoSimulation, Instantiated);
     let model = in_mode::<Oscillator>(ModelExchange, Instantiated);
     for (from, to) in [(&slave, &model), (&model, &slave)] {
-        let (state, bytes) = (from.save(), from.bytes());
-        let message = to.refused("set", |fmu| fmu.fmi2SetFMUstate(state));
+        let message = refused_bytes(to, &from.bytes());
         assert!(message.contains("Co-Simulation") && message.contains("Model Exchange"), "{message}");
-        let message = refused_bytes(to, &bytes);
         assert!(message.contains("interface type"), "{message}");
-        from.forget(state);
     }
 }
 

@@ -86,13 +86,24 @@ fn a_refused_start_value_is_remembered() {
 #[test]
 fn every_variable_of_a_refused_call() {
     let fmu = in_mode::<Oscillator>(CoSimulation, Instantiated);
+    let enter = |fmu: &Importer| fmu.refused("the start", |fmu| fmu.fmi2EnterInitializationMode());
+    let of_mass = "mass must not be below 0.001, it is -1";
+    let of_stiffness = "stiffness was not set, because mass in the same call was refused: set it again";
     assert_eq!(fmu.try_set(&[STIFFNESS, MASS], &[60.0, -1.0]), Status::Error);
+    assert_eq!(enter(&fmu), format!("fmi2EnterInitializationMode: {of_mass}; {of_stiffness}"));
     fmu.set(&[MASS], &[1.0]);
-    fmu.take_log();
-    assert_eq!(fmu.fmi2EnterInitializationMode(), Status::Error);
+    assert_eq!(enter(&fmu), format!("fmi2EnterInitializationMode: {of_stiffness}"));
     fmu.set(&[STIFFNESS], &[60.0]);
-    fmu.take_log();
     fmu.initialize(0.0);
+}
+
+/// What several values are to blame for together is said once.
+#[test]
+fn values_that_do_not_fit_together() {
+    let fmu = in_mode::<Oscillator>(CoSimulation, Instantiated);
+    assert_eq!(fmu.try_set(&[MASS, Name::damping as u32], &[1.0, 1e6]), Status::Error);
+    let message = fmu.refused("the start", |fmu| fmu.fmi2EnterInitializationMode());
+    assert_eq!(message.matches("nothing oscillates").count(), 1, "{message}");
 }
 
 #[test]

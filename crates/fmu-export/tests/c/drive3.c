@@ -2,7 +2,7 @@
    Prints "name value" for what the Rust side of the test compares. */
 #include "fmu3.h"
 
-enum { FORCE, POSITION, VELOCITY, DER_POSITION, DER_VELOCITY, SPRING_FORCE, ENERGY, DAMPED = 11 };
+enum { FORCE = 1, POSITION, VELOCITY, DER_POSITION, DER_VELOCITY, SPRING_FORCE, ENERGY, DAMPED = 12 };
 
 static const char *token;
 static int messages;

@@ -66,8 +66,9 @@ const STATES: [(Mode, &str, &str, &str); 6] = [
     ),
 ];
 
-/// The calls beyond the standard, in Model Exchange.
-const TOLERATED: [(&str, &[Mode]); 5] = [
+/// The calls beyond the standard, in interface types that have the function.
+const TOLERATED: [(&str, &[Mode]); 6] = [
+    ("EnterEventMode", &[Event]),
     ("SetTime", &[Initialization, Event]),
     ("SetContinuousStates", &[Event]),
     ("GetNominalsOfContinuousStates", &[Instantiated]),
@@ -96,7 +97,7 @@ fn standard(function: &str, interface: Interface, mode: Mode) -> bool {
 
 fn tolerated(function: &str, interface: Interface, mode: Mode) -> bool {
     let name = function.strip_prefix("fmi3").unwrap();
-    interface == ModelExchange
+    (interface == ModelExchange || name == "EnterEventMode")
         && TOLERATED.into_iter().any(|(tolerated, modes)| tolerated == name && modes.contains(&mode))
 }
 

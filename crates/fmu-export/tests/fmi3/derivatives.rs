@@ -4,6 +4,7 @@ use crate::toys::oscillator::Name::{self, *};
 use crate::toys::{Oscillator, Sum};
 use fmu_export::Interface::*;
 use fmu_export::Variables;
+use fmu_export::fmi3::reference;
 use fmu_test_kit::fmi3::Importer;
 
 const UNKNOWNS: [Name; 5] = [position, der_position, der_velocity, spring_force, energy];
@@ -20,8 +21,8 @@ fn moving() -> Importer {
 #[test]
 fn adjoint_is_transposed() {
     let fmu = moving();
-    for unknown in UNKNOWNS.map(|name| name as u32) {
-        for known in KNOWNS.map(|name| name as u32) {
+    for unknown in UNKNOWNS.map(|name| reference(name as u32)) {
+        for known in KNOWNS.map(|name| reference(name as u32)) {
             let (mut forward, mut adjoint) = (f64::NAN, f64::NAN);
             fmu.ok(fmu.fmi3GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut forward, 1));
             fmu.ok(fmu.fmi3GetAdjointDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut adjoint, 1));
@@ -29,7 +30,8 @@ fn adjoint_is_transposed() {
         }
     }
     // And of all at once: seeds that are powers of two add up without rounding.
-    let (unknowns, knowns) = (UNKNOWNS.map(|name| name as u32), KNOWNS.map(|name| name as u32));
+    let (unknowns, knowns) =
+        (UNKNOWNS.map(|name| reference(name as u32)), KNOWNS.map(|name| reference(name as u32)));
     let (rows, columns) = ([1.0, 2.0, -4.0, 0.5, 0.25], [1.0, -2.0, 8.0]);
     let (mut forward, mut adjoint) = ([f64::NAN; 5], [f64::NAN; 3]);
     let (u, k) = (unknowns.as_ptr(), knowns.as_ptr());
@@ -43,7 +45,7 @@ fn adjoint_is_transposed() {
 #[test]
 fn lengths_and_kinds() {
     let fmu = moving();
-    let (u, k, mut out) = (energy as u32, position as u32, 0.0);
+    let (u, k, mut out) = (reference(energy as u32), reference(position as u32), 0.0);
     fmu.refused("seeds", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 0, &mut out, 1));
     fmu.refused("results", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 1, &mut out, 0));
     fmu.refused("seeds", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 0, &1.0, 0, &mut out, 0));
@@ -60,12 +62,12 @@ fn lengths_and_kinds() {
 #[test]
 fn with_respect_to_parameters() {
     let fmu = moving();
-    let (u, mut forward, mut adjoint) = (spring_force as u32, f64::NAN, f64::NAN);
-    let k = stiffness as u32;
+    let (u, mut forward, mut adjoint) = (reference(spring_force as u32), f64::NAN, f64::NAN);
+    let k = reference(stiffness as u32);
     fmu.ok(fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &2.0, 1, &mut forward, 1));
     fmu.ok(fmu.fmi3GetAdjointDerivative(&u, 1, &k, 1, &2.0, 1, &mut adjoint, 1));
     assert_eq!((forward, adjoint), (-0.5, -0.5), "force = -stiffness springs position");
-    let k = springs as u32;
+    let k = reference(springs as u32);
     fmu.refused("Int32", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 1, &mut forward, 1));
 }
 
@@ -74,11 +76,18 @@ fn of_outputs() {
     let fmu = Importer::of::<Oscillator>(CoSimulation);
     fmu.set(&[position as u32, velocity as u32], &[0.25, -3.0]);
     fmu.initialize(0.0);
-    let time = Oscillator::TABLE.len() as u32;
-    let (vr, orders, mut values) = ([position as u32, time, time], [1, 1, 2], [f64::NAN; 3]);
-    fmu.ok(fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 3, orders.as_ptr(), values.as_mut_ptr(), 3));
-    assert_eq!(values, [-3.0, 1.0, 0.0]);
+    let time = reference(Oscillator::TABLE.len() as u32);
+    let (vr, mut values) = ([reference(position as u32), time], [f64::NAN; 2]);
+    fmu.ok(fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 2, [1, 1].as_ptr(), values.as_mut_ptr(), 2));
+    assert_eq!(values, [-3.0, 1.0]);
     fmu.refused("order 0", |fmu| fmu.fmi3GetOutputDerivatives(&time, 1, &0, &mut 0.0, 1));
+    // Section 4.4.1 allows orders up to maxOutputDerivativeOrder.
+    for orders in [[1, 2], [2, 1], [1, i32::MAX]] {
+        let text = fmu.refused("an order above 1", |fmu| {
+            fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 2, orders.as_ptr(), values.as_mut_ptr(), 2)
+        });
+        assert!(text.contains("must be at most 1 (maxOutputDerivativeOrder)"), "{text}");
+    }
 }
 
 /// No importer is told more by the functions than by the description.

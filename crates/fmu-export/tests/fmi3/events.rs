@@ -1,9 +1,10 @@
 //! Events: of Model Exchange, of Co-Simulation with event mode and without, and steps that end early.
 
+use crate::toys::grumbler::{self, Trouble};
 use crate::toys::ticker::Name;
 use crate::toys::*;
 use fmu_export::Interface::*;
-use fmu_export::fmi3::{indicator, types::*};
+use fmu_export::fmi3::{indicator, reference, types::*};
 use fmu_test_kit::fmi3::{Arguments, Importer, Stepped, Updated};
 
 const SUM: u32 = Name::sum as u32;
@@ -39,8 +40,8 @@ fn in_model_exchange() {
     fmu.ok(fmu.fmi3GetEventIndicators(&mut z, 1));
     assert_eq!(z, -0.1);
     // Section 2.4.8: a variable stands for it.
-    let vr = indicator::<Ball>(0);
-    assert_eq!(fmu.get([vr]), [-0.1]);
+    let vr = reference(indicator::<Ball>(0));
+    assert_eq!(fmu.get([indicator::<Ball>(0)]), [-0.1]);
     fmu.refused("a calculated local", |fmu| fmu.fmi3SetFloat64(&vr, 1, &1.0, 1));
     fmu.refused("no variable", |fmu| fmu.fmi3GetFloat64(&(vr + 1), 1, &mut 0.0, 1));
     fmu.ok(fmu.fmi3GetNominalsOfContinuousStates(nominals.as_mut_ptr(), 2));
@@ -113,12 +114,95 @@ fn the_library_handles_them() {
 #[test]
 fn an_event_ends_the_simulation() {
     let fmu = Importer::of::<Ticker>(CoSimulation);
-    fmu.ok(fmu.fmi3SetInt32(&(Name::last as u32), 1, &3, 1));
+    fmu.ok(fmu.fmi3SetInt32(&reference(Name::last as u32), 1, &3, 1));
     fmu.initialize(0.0);
     let stepped = fmu.try_step(0.0, 1.0).unwrap();
     assert_eq!((stepped.terminate, stepped.last_successful_time), (true, 0.5));
-    fmu.refused("it has ended", |fmu| fmu.try_step(0.5, 1.0).unwrap_err());
+    // Who has not listened hears it again.
+    assert_eq!(fmu.try_step(0.5, 1.0), Ok(stepped));
     fmu.ok(fmu.fmi3Terminate());
+}
+
+/// With event mode, an importer that does not listen to fmi3UpdateDiscreteStates (FMPy) hears of it with the step;
+/// without, everyone does.
+#[test]
+fn the_initial_event_ends_the_simulation() {
+    for (event_mode_used, early_return) in [(fmi3False, false), (fmi3True, false), (fmi3True, true)] {
+        let fmu = grumbler(Trouble::End, event_mode_used, early_return.into());
+        if event_mode_used == fmi3True {
+            assert!(fmu.update().terminate);
+            fmu.ok(fmu.fmi3EnterStepMode());
+        }
+        let before = fmu.bytes();
+        let ended = Stepped {
+            event_handling_needed: false,
+            terminate: true,
+            early_return,
+            last_successful_time: 0.0,
+        };
+        assert_eq!(fmu.try_step(0.0, 1.0), Ok(ended));
+        assert_eq!(fmu.bytes(), before);
+        fmu.refused("a wrong point", |fmu| fmu.try_step(1.0, 1.0).unwrap_err());
+        fmu.ok(fmu.fmi3Terminate());
+    }
+}
+
+fn grumbler(trouble: Trouble, event_mode_used: fmi3Boolean, early_return_allowed: fmi3Boolean) -> Importer {
+    let arguments =
+        Arguments { event_mode_used, early_return_allowed, ..Arguments::of::<Grumbler>(CoSimulation) };
+    let fmu = Importer::with::<Grumbler>(&arguments);
+    fmu.ok(fmu.fmi3SetInt64(&reference(grumbler::Name::trouble as u32), 1, &(trouble as i64), 1));
+    fmu.initialize(0.0);
+    fmu
+}
+
+/// The step as it must be refused: all is as it was before. Returns what is said last.
+#[track_caller]
+fn undone(fmu: &Importer, expected: Status, point: f64, step_size: f64) -> String {
+    let before = fmu.bytes();
+    fmu.take_log();
+    assert_eq!(fmu.try_step(point, step_size), Err(expected));
+    let said = fmu.take_log().pop().unwrap();
+    assert_eq!((said.status, fmu.bytes()), (expected, before), "{said:?}");
+    said.text
+}
+
+/// Section 4.2.1: no earlyReturn for what is an error; and what is discarded has not happened.
+#[test]
+fn a_step_that_fails_half_way() {
+    for (event_mode_used, early_return_allowed) in
+        [(fmi3False, fmi3False), (fmi3False, fmi3True), (fmi3True, fmi3False)]
+    {
+        let fmu = grumbler(Trouble::Nowhere, event_mode_used, early_return_allowed);
+        if event_mode_used == fmi3True {
+            while fmu.update().again {}
+            fmu.ok(fmu.fmi3EnterStepMode());
+        }
+        for (trouble, failed) in [(Trouble::SecondRound, "SecondRound"), (Trouble::Step, "Step")] {
+            fmu.ok(fmu.fmi3SetInt64(&reference(grumbler::Name::trouble as u32), 1, &(trouble as i64), 1));
+            let text = undone(&fmu, Status::Error, 0.0, 1.5);
+            assert_eq!(text, format!("fmi3DoStep: the step cannot go on at 1: {failed} has failed"));
+        }
+        fmu.ok(fmu.fmi3SetInt64(&reference(grumbler::Name::trouble as u32), 1, &0, 1));
+        fmu.step(0.0, 1.5);
+    }
+}
+
+/// A shorter step helps.
+#[test]
+fn more_events_than_a_step_may_have() {
+    for (event_mode_used, early_return_allowed) in
+        [(fmi3False, fmi3False), (fmi3False, fmi3True), (fmi3True, fmi3False)]
+    {
+        let fmu = ticker(event_mode_used, early_return_allowed);
+        fmu.ok(fmu.fmi3SetInt32(&reference(Name::last as u32), 1, &i32::MAX, 1));
+        if event_mode_used == fmi3True {
+            fmu.ok(fmu.fmi3EnterStepMode());
+        }
+        let text = undone(&fmu, Status::Discard, 0.0, 2501.0);
+        assert!(text.ends_with("it has more than 10000 events; make shorter steps"), "{text}");
+        fmu.step(0.0, 2499.1);
+    }
 }
 
 fn fuse(early_return_allowed: fmi3Boolean) -> Importer {
@@ -142,29 +226,23 @@ fn early_return() {
     // It goes on from there, until it melts.
     let stepped = fmu.try_step(8.0, 20.0).unwrap();
     assert_eq!(stepped, Stepped { terminate: true, last_successful_time: 18.0, ..early });
-    fmu.refused("it has melted", |fmu| fmu.try_step(18.0, 1.0).unwrap_err());
+    assert_eq!(fmu.try_step(18.0, 1.0), Ok(stepped));
     fmu.ok(fmu.fmi3Reset());
     fmu.initialize(0.0);
     fmu.step(0.0, 1.0);
 }
 
-/// An error, and after it the state that the standard has for that; a saved state helps.
+/// Section 4.2.1: a step that has not happened, so that a shorter one can.
 #[test]
 fn early_return_that_is_not_allowed() {
     let fmu = fuse(fmi3False);
-    let before = fmu.save();
-    assert_eq!(fmu.try_step(0.0, 10.0), Err(Status::Error));
-    let log = fmu.take_log();
-    assert!(log[0].text.contains("ended early, at 8, which earlyReturnAllowed has ruled out"), "{log:?}");
-    assert_eq!(fmu.get([1]), [100.0], "for debugging");
-    fmu.refused("it is terminated", |fmu| fmu.try_step(8.0, 1.0).unwrap_err());
-    fmu.ok(fmu.fmi3SetFMUState(before));
+    let text = undone(&fmu, Status::Discard, 0.0, 10.0);
+    assert!(text.contains("ends early, at 8: the model stops there, and earlyReturnAllowed has"), "{text}");
     fmu.step(0.0, 8.0);
     // The end of the simulation is said without.
     let stepped = fmu.try_step(8.0, 20.0).unwrap();
     assert_eq!((stepped.terminate, stepped.early_return), (true, false));
     assert_eq!(stepped.last_successful_time, 18.0);
-    fmu.forget(before);
 }
 
 #[test]

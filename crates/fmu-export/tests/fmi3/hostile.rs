@@ -4,7 +4,7 @@ use crate::call_table::{in_mode, modes_of};
 use crate::toys::*;
 use fmu_export::Interface::*;
 use fmu_export::fmi3::types::*;
-use fmu_export::{Exported, Mode, Variables};
+use fmu_export::{Exported, Mode};
 use fmu_test_kit::fmi3::{Arguments, Importer};
 use std::cell::RefCell;
 use std::ffi::CStr;
@@ -130,7 +130,7 @@ fn what_no_model_has() {
 #[test]
 fn logging() {
     let fmu = Importer::of::<Talker>(CoSimulation);
-    let volume = Talker::TABLE.iter().position(|of| of.name() == "volume").unwrap() as u32;
+    let volume = talker::Name::volume as u32;
     fmu.set(&[volume], &[10.5]);
     assert_eq!(fmu.take_log(), [], "a warning is no error");
     fmu.ok(fmu.fmi3SetDebugLogging(fmi3True, 1, &c"logStatusWarning".as_ptr()));

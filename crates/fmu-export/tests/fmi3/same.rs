@@ -17,11 +17,12 @@ fn steps<M: Exported>() {
     let inputs: Vec<u32> = (0..)
         .zip(M::TABLE)
         .filter(|(_, of)| of.causality() == Causality::Input && of.base() == fmu_export::BaseType::Real)
-        .map(|(vr, _)| vr)
+        .map(|(place, _)| place)
         .collect();
     let mut time = 0.5;
     for step in 0..20 {
-        let values: Vec<f64> = inputs.iter().map(|vr| 0.1 * (f64::from(step + *vr as i32)).sin()).collect();
+        let values: Vec<f64> =
+            inputs.iter().map(|place| 0.1 * (f64::from(step + *place as i32)).sin()).collect();
         old.set(&inputs, &values);
         new.set(&inputs, &values);
         let size = 0.01 * f64::from(1 + step % 3);

@@ -1,9 +1,9 @@
 //! Values of every type.
 
+use crate::toys::grumbler::{self, Trouble};
 use crate::toys::palette::{Colour, Name};
-use crate::toys::{Counter, Palette, Talker};
-use fmu_export::fmi3::independent;
-use fmu_export::fmi3::types::*;
+use crate::toys::{Counter, Grumbler, Oscillator, Palette, Talker, oscillator, talker};
+use fmu_export::fmi3::{independent, reference, types::*};
 use fmu_export::{Causality, Enumeration, Exported, Interface::*, Variables};
 use fmu_test_kit::fmi3::Importer;
 use std::ffi::CStr;
@@ -18,7 +18,7 @@ fn palette() -> Importer {
 macro_rules! every_number {
     ($fmu:ident: $($name:ident $get:ident $set:ident [$($value:expr),+];)+) => {
         $(for value in [$($value),+] {
-            let vr = Name::$name as u32;
+            let vr = reference(Name::$name as u32);
             $fmu.ok($fmu.$set(&vr, 1, &value, 1));
             let mut read = value - value;
             $fmu.ok($fmu.$get(&vr, 1, &mut read, 1));
@@ -49,14 +49,34 @@ fn numbers() {
     assert_eq!(other.bytes(), bytes);
 }
 
+/// A type of the author's with no more than it must have; and numbers that are none.
+#[test]
+fn types_of_authors() {
+    let fmu = Importer::of::<Grumbler>(CoSimulation);
+    let [ambient, warmer] = [grumbler::Name::ambient, grumbler::Name::warmer].map(|name| name as u32);
+    fmu.set(&[ambient], &[-273.25]);
+    fmu.initialize(0.0);
+    assert_eq!(fmu.get([ambient]), [-273.25]);
+    fmu.set(&[ambient], &[4.5]);
+    assert_eq!(fmu.get([ambient, ambient]), [4.5; 2]);
+    let mut value = f32::NAN;
+    fmu.ok(fmu.fmi3GetFloat32(&reference(warmer), 1, &mut value, 1));
+    assert_eq!(value, 0.0);
+    fmu.ok(fmu.fmi3SetInt64(&reference(grumbler::Name::trouble as u32), 1, &(Trouble::Heat as i64), 1));
+    fmu.step(0.0, 0.5);
+    assert_eq!(fmu.fmi3GetFloat32(&reference(warmer), 1, &mut value, 1), Status::Error);
+    let log = fmu.take_log();
+    assert!(log.last().unwrap().text.contains("warmer is out of the range of numbers"), "{log:?}");
+}
+
 #[test]
 fn ranges() {
     let fmu = palette();
-    let port = Name::uint16 as u32;
+    let port = reference(Name::uint16 as u32);
     let text = fmu.refused("a port", |fmu| fmu.fmi3SetUInt16(&port, 1, &80, 1));
     assert!(text.contains("uint16 must be between 1024 and 65535, it is 80"), "{text}");
     let fmu = Importer::of::<Palette>(CoSimulation);
-    let shade = Name::shade as u32;
+    let shade = reference(Name::shade as u32);
     let text = fmu.refused("a shade", |fmu| fmu.fmi3SetFloat32(&shade, 1, &8.5, 1));
     assert!(text.contains("shade must not be above 8, it is 8.5"), "{text}");
     let text = fmu.refused("no number", |fmu| fmu.fmi3SetFloat32(&shade, 1, &f32::NAN, 1));
@@ -68,7 +88,7 @@ fn ranges() {
 fn wrong_types() {
     let fmu = palette();
     let (mut number, mut text, mut bytes, mut size) = (0_u64, null(), null(), 0);
-    for (vr, variable) in (0_u32..).zip(Palette::TABLE) {
+    for (vr, variable) in (reference(0)..).zip(Palette::TABLE) {
         let number = &raw mut number;
         let answers = [
             ("Real", fmu.fmi3GetFloat64(&vr, 1, number.cast(), 1)),
@@ -115,7 +135,7 @@ fn fmi2_refuses_what_it_lacks() {
 
 #[test]
 fn truths() {
-    let (fmu, vr) = (palette(), Name::boolean as u32);
+    let (fmu, vr) = (palette(), reference(Name::boolean as u32));
     fmu.ok(fmu.fmi3SetBoolean(&vr, 1, &1, 1));
     let mut read = 7;
     fmu.ok(fmu.fmi3GetBoolean(&vr, 1, &mut read, 1));
@@ -126,7 +146,7 @@ fn truths() {
 
 #[test]
 fn texts() {
-    let (fmu, vr) = (palette(), Name::string as u32);
+    let (fmu, vr) = (palette(), reference(Name::string as u32));
     fmu.ok(fmu.fmi3SetString(&vr, 1, &c"Gödel".as_ptr(), 1));
     let mut read = null();
     fmu.ok(fmu.fmi3GetString(&vr, 1, &mut read, 1));
@@ -138,7 +158,7 @@ fn texts() {
 
 #[test]
 fn bytes() {
-    let (fmu, vr) = (palette(), Name::binary as u32);
+    let (fmu, vr) = (palette(), reference(Name::binary as u32));
     let read = || {
         let (mut size, mut value) = (usize::MAX, null());
         fmu.ok(fmu.fmi3GetBinary(&vr, 1, &mut size, &mut value, 1));
@@ -160,42 +180,60 @@ fn bytes() {
 #[test]
 fn enumerations() {
     let (fmu, mut read) = (palette(), 0);
-    fmu.ok(fmu.fmi3GetInt64(&(Name::colour as u32), 1, &mut read, 1));
+    fmu.ok(fmu.fmi3GetInt64(&reference(Name::colour as u32), 1, &mut read, 1));
     assert_eq!(read, i64::from(Colour::Red.number()));
     let fmu = Importer::of::<Talker>(CoSimulation);
-    let mood = Talker::TABLE.iter().position(|variable| variable.name() == "mood").unwrap() as u32;
+    let mood = reference(talker::Name::mood as u32);
     fmu.ok(fmu.fmi3SetInt64(&mood, 1, &7, 1));
     let text = fmu.refused("no mood", |fmu| fmu.fmi3SetInt64(&mood, 1, &3, 1));
     assert!(text.contains("it is 3"), "{text}");
     fmu.refused("beyond Int32", |fmu| fmu.fmi3SetInt64(&mood, 1, &(7 + (1 << 32)), 1));
 }
 
+/// The first variable has the value reference 1; 0 is nobody's, whatever it is used for.
+#[test]
+fn value_references_count_from_1() {
+    let (fmu, mut value) = (Importer::of::<Oscillator>(CoSimulation), 0.0);
+    fmu.initialize(0.0);
+    fmu.set(&[oscillator::Name::force as u32], &[7.0]);
+    fmu.ok(fmu.fmi3GetFloat64(&1, 1, &mut value, 1));
+    assert_eq!((value, Oscillator::TABLE[0].name()), (7.0, "force"));
+    let nobody = |text: String| assert!(text.contains("no variable with value reference 0"), "{text}");
+    nobody(fmu.refused("get", |fmu| fmu.fmi3GetFloat64(&0, 1, &mut value, 1)));
+    nobody(fmu.refused("set", |fmu| fmu.fmi3SetFloat64(&0, 1, &1.0, 1)));
+    nobody(fmu.refused("of a type", |fmu| fmu.fmi3SetInt8(&0, 1, &1, 1)));
+    nobody(fmu.refused("a rate", |fmu| fmu.fmi3GetOutputDerivatives(&0, 1, &1, &mut value, 1)));
+    nobody(fmu.refused("a partial derivative", |fmu| {
+        fmu.fmi3GetDirectionalDerivative(&0, 1, &1, 1, &1.0, 1, &mut value, 1)
+    }));
+}
+
 /// As many values as variables: all are scalars.
 #[test]
 fn counts() {
-    let (fmu, vr) = (palette(), Name::float64 as u32);
+    let (fmu, vr) = (palette(), reference(Name::float64 as u32));
     let mut values = [0.0; 2];
     for count in [0, 2, usize::MAX] {
         let text = fmu.refused("get", |fmu| fmu.fmi3GetFloat64(&vr, 1, values.as_mut_ptr(), count));
         assert!(text.contains("there are 1 values, the array has"), "{text}");
         fmu.refused("set", |fmu| fmu.fmi3SetFloat64(&vr, 1, values.as_ptr(), count));
     }
-    fmu.refused("texts", |fmu| fmu.fmi3GetString(&(Name::string as u32), 1, null_mut(), 0));
+    fmu.refused("texts", |fmu| fmu.fmi3GetString(&reference(Name::string as u32), 1, null_mut(), 0));
 }
 
 /// Every model has a time: its own, or one behind all others.
 #[test]
 fn time() {
     fn check<M: Exported>(expected: Option<u32>) {
-        let (vr, variable) = independent::<M>();
-        assert_eq!(vr, expected.unwrap_or(M::TABLE.len() as u32));
+        let (place, variable) = independent::<M>();
+        assert_eq!(place, expected.unwrap_or(M::TABLE.len() as u32));
         assert_eq!((variable.name(), variable.causality()), ("time", Causality::Independent));
         let fmu = Importer::of::<M>(CoSimulation);
         fmu.initialize(2.0);
-        assert_eq!(fmu.get([vr]), [2.0]);
+        assert_eq!(fmu.get([place]), [2.0]);
         fmu.step(2.0, 0.5);
-        assert_eq!(fmu.get([vr]), [2.5]);
-        fmu.refused("the time is no input", |fmu| fmu.try_set(&[vr], &[1.0]));
+        assert_eq!(fmu.get([place]), [2.5]);
+        fmu.refused("the time is no input", |fmu| fmu.try_set(&[place], &[1.0]));
         fmu.refused("what is behind it", |fmu| fmu.try_set(&[M::TABLE.len() as u32 + 1], &[1.0]));
     }
     check::<Palette>(None);

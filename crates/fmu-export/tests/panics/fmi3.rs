@@ -2,11 +2,16 @@
 
 use crate::toys::Faulty;
 use crate::toys::faulty::{Fault, Name, while_all_break};
-use crate::{Case, Standard, TEXT, TRUTH, U, X, Y, with_state};
+use crate::{Case, Standard, X, with_state};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
-use fmu_export::fmi3::indicator;
+use fmu_export::fmi3::{indicator, reference};
 use fmu_test_kit::fmi3::Importer;
 use std::ptr::{null, null_mut};
+
+const U: u32 = reference(crate::U);
+const Y: u32 = reference(crate::Y);
+const TRUTH: u32 = reference(crate::TRUTH);
+const TEXT: u32 = reference(crate::TEXT);
 
 /// The same in FMI 3.0: a call that breaks an instance with this fault: every function that runs a model's code.
 pub const CALLS: &[Case<Importer>] = &[
@@ -14,10 +19,12 @@ pub const CALLS: &[Case<Importer>] = &[
     (CoSimulation, "fmi3GetFloat64", Fault::NoMessage, |fmu| fmu.fmi3GetFloat64(&Y, 1, &mut 0.0, 1)),
     (CoSimulation, "fmi3GetFloat64", Fault::Bomb, |fmu| fmu.fmi3GetFloat64(&Y, 1, &mut 0.0, 1)),
     (CoSimulation, "fmi3GetFloat64", Fault::Calculate, |fmu| fmu.fmi3GetFloat64(&Y, 1, &mut 0.0, 1)),
-    (CoSimulation, "fmi3GetInt32", Fault::Read, |fmu| fmu.fmi3GetInt32(&(Name::n as u32), 1, &mut 0, 1)),
+    (CoSimulation, "fmi3GetInt32", Fault::Read, |fmu| {
+        fmu.fmi3GetInt32(&reference(Name::n as u32), 1, &mut 0, 1)
+    }),
     (CoSimulation, "fmi3GetBoolean", Fault::Read, |fmu| fmu.fmi3GetBoolean(&TRUTH, 1, &mut 0, 1)),
     (CoSimulation, "fmi3GetString", Fault::ReadText, |fmu| fmu.fmi3GetString(&TEXT, 1, &mut null(), 1)),
-    (CoSimulation, "fmi3SetFloat64", Fault::Then, |fmu| fmu.try_set(&[U], &[1.0])),
+    (CoSimulation, "fmi3SetFloat64", Fault::Then, |fmu| fmu.try_set(&[crate::U], &[1.0])),
     (CoSimulation, "fmi3SetInt32", Fault::Update, |fmu| fmu.set_fault(Fault::Update)),
     (CoSimulation, "fmi3SetInt32", Fault::None, |fmu| {
         while_all_break(Fault::Clone, || fmu.set_fault(Fault::None))
@@ -38,7 +45,7 @@ pub const CALLS: &[Case<Importer>] = &[
     }),
     // A variable stands for the indicator.
     (ModelExchange, "fmi3GetFloat64", Fault::Indicators, |fmu| {
-        fmu.fmi3GetFloat64(&indicator::<Faulty>(0), 1, &mut 0.0, 1)
+        fmu.fmi3GetFloat64(&reference(indicator::<Faulty>(0)), 1, &mut 0.0, 1)
     }),
     (ModelExchange, "fmi3UpdateDiscreteStates", Fault::Event, |fmu| {
         fmu.ok(fmu.fmi3EnterEventMode());

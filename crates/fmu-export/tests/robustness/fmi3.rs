@@ -17,11 +17,13 @@ pub const TOYS: [(&str, RunBytes); 8] = [
 ];
 
 /// What no model here has.
-const NEVER: [&str; 14] = [
+const NEVER: [&str; 16] = [
     "fmi3GetClock",
     "fmi3SetClock",
     "fmi3EnterConfigurationMode",
     "fmi3ExitConfigurationMode",
+    "fmi3GetNumberOfVariableDependencies",
+    "fmi3GetVariableDependencies",
     "fmi3GetIntervalDecimal",
     "fmi3GetIntervalFraction",
     "fmi3GetShiftDecimal",

@@ -4,7 +4,7 @@ use crate::toys::{Ball, Oscillator, Palette, Talker, oscillator::Name, palette, 
 use crate::{unwritten, written};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Model;
-use fmu_export::fmi3::{indicator, types::*};
+use fmu_export::fmi3::{indicator, reference, types::*};
 use fmu_test_kit::fmi3::Importer;
 use std::cell::{Cell, RefCell};
 use std::ffi::CString;
@@ -76,7 +76,7 @@ fn the_log_callback_calls_back() {
 
     fmu.initialize(0.0);
     let text = c"Ping".as_ptr();
-    fmu.ok(fmu.fmi3SetString(&(talker::Name::heard as u32), 1, &text, 1));
+    fmu.ok(fmu.fmi3SetString(&reference(talker::Name::heard as u32), 1, &text, 1));
     fmu.step(0.0, 1.0);
     fmu.set(&[talker::Name::volume as u32], &[10.5]);
     assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);
@@ -107,7 +107,7 @@ fn values_into_memory_that_was_never_written() {
         ($($get:ident $name:ident $expected:expr;)+) => {
             $(
                 let mut value = unwritten();
-                fmu.ok(fmu.$get(&(palette::Name::$name as u32), 1, start(&mut value), 1));
+                fmu.ok(fmu.$get(&reference(palette::Name::$name as u32), 1, start(&mut value), 1));
                 assert_eq!(written(value), [$expected], stringify!($name));
             )+
         };
@@ -127,7 +127,7 @@ fn values_into_memory_that_was_never_written() {
         fmi3GetBoolean boolean fmi3False;
     }
     let (mut size, mut bytes) = (unwritten(), unwritten::<fmi3Binary, 1>());
-    let binary = palette::Name::binary as u32;
+    let binary = reference(palette::Name::binary as u32);
     fmu.ok(fmu.fmi3GetBinary(&binary, 1, start(&mut size), start(&mut bytes), 1));
     assert_eq!(written(size), [0]);
     written(bytes);
@@ -135,7 +135,7 @@ fn values_into_memory_that_was_never_written() {
     let talker = Importer::of::<Talker>(CoSimulation);
     talker.initialize(0.0);
     let mut texts = unwritten::<fmi3String, 2>();
-    let vr = [talker::Name::who as u32, talker::Name::said as u32];
+    let vr = [reference(talker::Name::who as u32), reference(talker::Name::said as u32)];
     talker.ok(talker.fmi3GetString(vr.as_ptr(), 2, start(&mut texts), 2));
     assert!(written(texts).iter().all(|text| !text.is_null()));
 }
@@ -150,9 +150,9 @@ fn memory_that_was_never_written() {
     fmu.ok(fmu.fmi3DoStep(0.0, 0.5, fmi3True, event, terminate, early, start(&mut time)));
     assert_eq!((written(flags), written(time)), ([fmi3False; 3], [0.5]));
     let mut one = unwritten();
-    fmu.ok(fmu.fmi3GetOutputDerivatives(&(Name::position as u32), 1, &1, start(&mut one), 1));
+    fmu.ok(fmu.fmi3GetOutputDerivatives(&reference(Name::position as u32), 1, &1, start(&mut one), 1));
     assert_eq!(written(one), [0.0]);
-    let (unknown, known) = (Name::der_velocity as u32, Name::force as u32);
+    let (unknown, known) = (reference(Name::der_velocity as u32), reference(Name::force as u32));
     for derivative in [Importer::fmi3GetDirectionalDerivative, Importer::fmi3GetAdjointDerivative] {
         let mut one = unwritten();
         fmu.ok(derivative(&fmu, &unknown, 1, &known, 1, &1.0, 1, start(&mut one), 1));
@@ -196,7 +196,7 @@ fn memory_that_was_never_written_in_model_exchange() {
     let mut values = unwritten();
     fmu.ok(fmu.fmi3GetEventIndicators(start(&mut values), 1));
     // Once more as the variable that stands for it.
-    fmu.ok(fmu.fmi3GetFloat64(&indicator::<Ball>(0), 1, start(&mut values).wrapping_add(1), 1));
+    fmu.ok(fmu.fmi3GetFloat64(&reference(indicator::<Ball>(0)), 1, start(&mut values).wrapping_add(1), 1));
     assert_eq!(written(values), [1.0, 1.0]);
     let (mut event, mut terminate) = (unwritten(), unwritten());
     fmu.ok(fmu.fmi3CompletedIntegratorStep(fmi3True, start(&mut event), start(&mut terminate)));

@@ -206,11 +206,11 @@ fn freed_in_any_order() {
         let (mut first, mut second) = (null_mut(), null_mut());
         one.save_into(&mut first);
         other.save_into(&mut second);
-        one.go_back(second);
+        one.go_back(first);
         drop(one);
-        other.go_back(first);
-        other.free(first);
+        other.go_back(second);
         other.free(second);
+        other.save_into(&mut null_mut());
         other.advance(0.0, 0.1);
     }
     fn check_both<M: Exported>() {

@@ -162,11 +162,10 @@ impl InputDerivatives for Oscillator {
 }
 
 impl OutputDerivatives for Oscillator {
-    fn output_derivative(&self, of: Name, order: u32) -> f64 {
+    fn output_derivative(&self, of: Name, _: u32) -> f64 {
         let (k, c, slope) = (self.all_springs(), self.damper(), self.slope.unwrap_or(0.0));
         let (x, v, a) = (self.position, self.velocity, self.acceleration());
         match of {
-            _ if order > 1 => 0.0,
             Name::force => slope,
             Name::position => v,
             Name::velocity | Name::der_position => a,

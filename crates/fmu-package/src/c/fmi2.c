@@ -419,7 +419,7 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     END
 }
 
-/* A state that the importer keeps lies in the module's memory. */
+/* A state that the importer keeps lies in the module's memory; what does not is no state there. */
 
 static u32 to_module(const Instance *instance, fmi2FMUstate state) {
     uintptr_t place = (uintptr_t)state - (uintptr_t)instance->module.w2c_memory.data.bytes;
@@ -429,20 +429,13 @@ static u32 to_module(const Instance *instance, fmi2FMUstate state) {
     return place != 0 && place < FMU_MEMORY ? (u32)place : UINT32_MAX;
 }
 
-#define STATE(name, state)                                                                     \
-    u32 in_module = to_module(instance, state);                                                \
-    if (in_module == UINT32_MAX) {                                                             \
-        return refuse(&call, name ": the state is another instance's; serialize it there, and " \
-                                  "deserialize it here");                                      \
-    }
-
 /* A place for a state; what it holds is looked at only if there is a place. */
 #define STATE_PLACE(name, place, n)                                         \
     u32 in_place;                                                           \
     ROOM(name, n, 1, 64)                                                    \
     in_place = output(&call, place, 1, sizeof(u32), ALIGNMENT(fmi2FMUstate)); \
     if (in_place != 0 && in_place % sizeof(u32) == 0) {                     \
-        STATE(name, *place)                                                 \
+        u32 in_module = to_module(instance, *place);                   \
         memcpy(at(&call, in_place), &in_module, sizeof in_module);          \
     }
 
@@ -467,18 +460,16 @@ STATE_HANDLE(fmi2FreeFMUstate)
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     BEGIN("fmi2SetFMUstate")
-    STATE("fmi2SetFMUstate", state)
-    CALL(FMU_fmi2SetFMUstate, in_module);
+    CALL(FMU_fmi2SetFMUstate, to_module(instance, state));
     END
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
     u32 sizes, written;
     BEGIN("fmi2SerializedFMUstateSize")
-    STATE("fmi2SerializedFMUstateSize", state)
     ROOM("fmi2SerializedFMUstateSize", 0, 1, 64)
     sizes = output(&call, size, 1, sizeof(u32), ALIGNMENT(size_t));
-    CALL(FMU_fmi2SerializedFMUstateSize, in_module, sizes);
+    CALL(FMU_fmi2SerializedFMUstateSize, to_module(instance, state), sizes);
     if (status == fmi2OK) {
         memcpy(&written, at(&call, sizes), sizeof written);
         *size = written;
@@ -489,10 +480,9 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte byte[], size_t n) {
     u32 bytes;
     BEGIN("fmi2SerializeFMUstate")
-    STATE("fmi2SerializeFMUstate", state)
     ROOM("fmi2SerializeFMUstate", n, 1, 64)
     bytes = OUT(byte, n, fmi2Byte);
-    CALL(FMU_fmi2SerializeFMUstate, in_module, bytes, count(&call, n));
+    CALL(FMU_fmi2SerializeFMUstate, to_module(instance, state), bytes, count(&call, n));
     COPY_OUT(byte, bytes, n)
     END
 }

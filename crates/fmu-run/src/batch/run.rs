@@ -228,7 +228,7 @@ impl<'a> Worker<'a> {
         for course in courses.chunks_mut(plan.kept().max(1)) {
             course[filled..].fill(f64::NAN);
         }
-        let refused = stopped.as_ref().is_some_and(|(_, refusal)| refusal.ended.is_none());
+        let refused = stopped.as_ref().is_some_and(|(_, refusal)| refusal.ended().is_none());
         for (output, row) in measures.chunks_mut(plan.measures.len().max(1)).enumerate() {
             for (value, measure) in row.iter_mut().zip(plan.measures) {
                 *value = if refused { f64::NAN } else { self.room.measured.measure(*measure, output) };
@@ -261,7 +261,7 @@ impl<'a> Worker<'a> {
 }
 
 /// The number of the time, after the initialization, and what was refused.
-type Refused = (Option<usize>, Refusal);
+type Stopped = (Option<usize>, Refusal);
 
 /// From the start values to the last of these times, or until logging has taken too long.
 fn follow(
@@ -272,13 +272,13 @@ fn follow(
     run: usize,
     courses: &mut [f64],
     logging: Option<time::Instant>,
-) -> Result<(), Refused> {
+) -> Result<(), Stopped> {
     start(plan, instance, room, run).map_err(|refusal| (None, refusal))?;
     instance.forget_log();
     let measures = !plan.measures.is_empty();
     // The places in a course that are filled, and how many times go by until the next is.
     let (kept, mut place, mut wait) = (plan.kept(), 0, 0);
-    let mut ended = None;
+    let mut ended: Option<Refusal> = None;
     for (k, &time) in times.iter().enumerate() {
         let at = |refusal| (Some(k), refusal);
         if let Some(until) = logging {
@@ -295,7 +295,7 @@ fn follow(
         if (keep || measures)
             && let Err(refusal) = read(plan, instance, room)
         {
-            return Err(ended.unwrap_or((Some(k), refusal)));
+            return Err(at(ended.unwrap_or(refusal)));
         }
         if keep {
             // Not by chunks, whose number would be calculated anew each time.
@@ -311,7 +311,7 @@ fn follow(
         }
         room.rows = k + 1;
         if let Some(ended) = ended {
-            return Err(ended);
+            return Err(at(ended));
         }
         if plan.read_before_set {
             set_inputs(plan, instance, room, k).map_err(at)?;
@@ -322,8 +322,8 @@ fn follow(
                 Ok(()) => {}
                 // The end is at the next time, whose outputs can be read, but inputs no longer set (section 4.2.4 of
                 // FMI 2.0).
-                Err(refusal) if refusal.ended.is_some_and(|end| next - end <= 1e-9 * size) => {
-                    ended = Some(at(refusal));
+                Err(refusal) if refusal.ended().is_some_and(|end| next - end <= 1e-9 * size) => {
+                    ended = Some(refusal);
                 }
                 Err(refusal) => return Err(at(refusal)),
             }

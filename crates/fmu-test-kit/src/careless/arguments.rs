@@ -24,15 +24,16 @@ pub struct Variables {
 }
 
 impl Variables {
-    pub fn of<M: Exported>() -> Self {
+    /// Those of a standard, by the place in the table.
+    pub fn of<M: Exported>(reference: fn(u32) -> u32) -> Self {
         let those = |wanted: &dyn Fn(&fmu_export::Variable<M>) -> bool| {
             let places = (0..).zip(M::TABLE).filter(|(_, variable)| wanted(variable));
-            places.map(|(vr, _)| vr).collect::<Vec<u32>>()
+            places.map(|(place, _)| reference(place)).collect::<Vec<u32>>()
         };
         let real = |variable: &fmu_export::Variable<M>| variable.base() == BaseType::Real;
         let bases = |bases: &[BaseType]| those(&|variable| bases.contains(&variable.base()));
         Self {
-            all: M::TABLE.len() as u32,
+            all: reference(M::TABLE.len() as u32),
             reals: those(&real),
             real_inputs: those(&|variable| real(variable) && variable.causality() == Causality::Input),
             real_starts: those(&|variable| real(variable) && variable.has_start()),

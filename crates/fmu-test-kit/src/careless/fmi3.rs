@@ -5,7 +5,7 @@ use super::{Tally, check_messages, damage, offered, place};
 use crate::fmi3::{Arguments, FUNCTIONS, Importer};
 use crate::serialized::time;
 use arbitrary::{Result, Unstructured};
-use fmu_export::fmi3::types::*;
+use fmu_export::fmi3::{reference, types::*};
 use fmu_export::{Exported, Interface};
 use std::ffi::{CStr, CString};
 use std::marker::PhantomData;
@@ -19,9 +19,9 @@ use std::slice::from_mut;
 pub fn run<M: Exported>(bytes: &[u8], tally: &mut Tally) {
     let mut session = Session::<M> {
         instances: [const { None }; 2],
-        states: [null_mut(); 2],
+        states: [[null_mut(); 2]; 2],
         saved: Vec::new(),
-        variables: Variables::of::<M>(),
+        variables: Variables::of::<M>(reference),
         tally,
         model: PhantomData,
     };
@@ -32,7 +32,8 @@ pub fn run<M: Exported>(bytes: &[u8], tally: &mut Tally) {
 
 struct Session<'a, M> {
     instances: [Option<Slot>; 2],
-    states: [fmi3FMUState; 2],
+    /// Saved states of each instance.
+    states: [[fmi3FMUState; 2]; 2],
     saved: Vec<u8>,
     variables: Variables,
     tally: &'a mut Tally,
@@ -109,10 +110,9 @@ fn has_handles(function: &str) -> bool {
 }
 
 impl Call {
-    /// Whether the state must be the same after this answer. A step that ends early where it must not has got somewhere.
-    fn must_not_change(&self, status: Status, log: &[crate::Message]) -> bool {
-        let early = log.iter().any(|message| message.text.contains("earlyReturnAllowed has ruled out"));
-        status != Status::Ok && !early || self.function.starts_with("fmi3Get")
+    /// Whether the state must be the same after this answer.
+    fn must_not_change(&self, status: Status) -> bool {
+        status != Status::Ok || self.function.starts_with("fmi3Get")
     }
 
     /// Calls the function. Panics if it answers what it must not.
@@ -320,7 +320,8 @@ impl Call {
             }
             name => fmu.call_with_zeros(name),
         };
-        assert!([Status::Ok, Status::Error].contains(&status), "{status:?}: {self:?}");
+        let discards = self.function == "fmi3DoStep" && status == Status::Discard;
+        assert!(discards || [Status::Ok, Status::Error].contains(&status), "{status:?}: {self:?}");
         Answer { status, values }
     }
 }
@@ -339,7 +340,11 @@ fn finite(value: f64) -> u64 {
 
 impl<M: Exported> Session<'_, M> {
     fn count(&mut self, function: &'static str, status: Status) {
-        let column = if status == Status::Ok { 0 } else { 2 };
+        let column = match status {
+            Status::Ok => 0,
+            Status::Discard => 1,
+            _ => 2,
+        };
         self.tally.entry(function).or_default()[column] += 1;
     }
 
@@ -368,8 +373,14 @@ impl<M: Exported> Session<'_, M> {
         Ok(())
     }
 
-    fn instantiate(&mut self, index: usize, u: &mut Unstructured) -> Result<()> {
+    /// Frees an instance, and with it what it has saved.
+    fn free(&mut self, index: usize) {
         self.instances[index] = None;
+        self.states[index] = [null_mut(); 2];
+    }
+
+    fn instantiate(&mut self, index: usize, u: &mut Unstructured) -> Result<()> {
+        self.free(index);
         let both = M::CO_SIMULATION.is_some() && M::MODEL_EXCHANGE.is_some();
         let any = *u.choose(&[Interface::CoSimulation, Interface::ModelExchange])?;
         let mut made_of = Arguments::of::<M>(if both { any } else { offered::<M>() });
@@ -433,7 +444,7 @@ impl<M: Exported> Session<'_, M> {
         slot.fmu.take_log();
         let answer = call.run(&slot.fmu);
         let log = slot.fmu.take_log();
-        if call.must_not_change(answer.status, &log) {
+        if call.must_not_change(answer.status) {
             assert_eq!(before, slot.fmu.bytes(), "changed by a call that answered {answer:?}: {call:?}");
         }
         check_messages(log);
@@ -460,11 +471,13 @@ impl<M: Exported> Session<'_, M> {
         slot.start_over();
     }
 
-    /// The six functions of saved states. States go from any instance to any other.
+    /// The six functions of saved states, at times on those of another instance.
     fn handle(&mut self, index: usize, u: &mut Unstructured) -> Result<()> {
         let which = u.int_in_range(0..=self.states.len() - 1)?;
+        let owner = if u.ratio(1, 8)? && !self.states[which][which].is_null() { which } else { index };
         let Some(slot) = &mut self.instances[index] else { return Ok(()) };
-        let (fmu, state) = (&slot.fmu, &mut self.states[which]);
+        let (fmu, state) = (&slot.fmu, &mut self.states[owner][which]);
+        let foreign = owner != index;
         let before = fmu.bytes();
         fmu.take_log();
         let (function, status) = match u.int_in_range(0..=6_u8)? {
@@ -499,6 +512,9 @@ impl<M: Exported> Session<'_, M> {
         };
         check_messages(fmu.take_log());
         assert!([Status::Ok, Status::Error].contains(&status), "{function} answers {status:?}");
+        // Nowhere to free one is no error.
+        let refused = status == Status::Error || function == "fmi3FreeFMUState";
+        assert!(!foreign || refused && !state.is_null(), "{function} takes another instance's state");
         if function == "fmi3SetFMUState" && status == Status::Ok {
             slot.start_over();
         } else {
@@ -508,15 +524,11 @@ impl<M: Exported> Session<'_, M> {
         Ok(())
     }
 
-    /// Replays what is left, then frees everything, states after their instances too.
+    /// Replays what is left, then frees everything, instances with their states.
     fn end(mut self) {
         for index in 0..self.instances.len() {
             self.replay(index, index % 2 == 0);
-            self.instances[index] = None;
-        }
-        let other = Importer::of::<M>(offered::<M>());
-        for state in self.states {
-            other.forget(state);
+            self.free(index);
         }
         // What must survive that there is no instance.
         for (function, status) in Importer::null(fmu_export::fmi3::functions::<M>()).call_all() {

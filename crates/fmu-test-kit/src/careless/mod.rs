@@ -11,7 +11,7 @@ mod arguments;
 mod call;
 pub mod fmi3;
 
-use crate::library::{functions_of, other_library};
+use crate::library::functions_of;
 use crate::serialized::{fnv1a, sealed, time};
 use crate::{Arguments, Functions, Importer};
 use arbitrary::{Result, Unstructured};
@@ -33,36 +33,32 @@ pub type Tally = BTreeMap<&'static str, [u64; 3]>;
 /// # Panics
 /// At the first broken promise.
 pub fn run<M: Exported>(bytes: &[u8], tally: &mut Tally) {
-    let at_home = other_library().is_some();
-    session::<M>(functions_of::<M>(), at_home, bytes, tally, None);
+    session::<M>(functions_of::<M>(), bytes, tally, None);
 }
 
-/// Makes the calls on these functions of a model, saved states staying with their instances, and tells what was
-/// answered and logged, call by call.
+/// Makes the calls on these functions of a model, and tells what was answered and logged, call by call.
 ///
 /// # Panics
 /// At the first broken promise.
 pub fn record<M: Exported>(functions: Functions, bytes: &[u8]) -> Vec<String> {
     let mut record = Vec::new();
-    session::<M>(functions, true, bytes, &mut Tally::new(), Some(&mut record));
+    session::<M>(functions, bytes, &mut Tally::new(), Some(&mut record));
     record
 }
 
 fn session<M: Exported>(
     functions: Functions,
-    at_home: bool,
     bytes: &[u8],
     tally: &mut Tally,
     record: Option<&mut Vec<String>>,
 ) {
     let mut session = Session::<M> {
         functions,
-        at_home,
         record,
         instances: [const { None }; 3],
         states: [[null_mut(); 3]; 3],
         saved: Vec::new(),
-        variables: arguments::Variables::of::<M>(),
+        variables: arguments::Variables::of::<M>(|place| place),
         tally,
         model: PhantomData,
     };
@@ -121,11 +117,9 @@ pub fn random_bytes(seed: u64, count: usize) -> Vec<u8> {
 
 struct Session<'a, M> {
     functions: Functions,
-    /// Whether saved states stay with their instances: compiled C sources keep them there.
-    at_home: bool,
     record: Option<&'a mut Vec<String>>,
     instances: [Option<Slot>; 3],
-    /// Saved states: of any instance, all in the first place, or of each.
+    /// Saved states of each instance.
     states: [[fmi2FMUstate; 3]; 3],
     /// A serialized state, intact or not.
     saved: Vec<u8>,
@@ -192,12 +186,10 @@ impl<M: Exported> Session<'_, M> {
         }
     }
 
-    /// Frees an instance.
+    /// Frees an instance, and with it what it has saved.
     fn free(&mut self, index: usize) {
         self.instances[index] = None;
-        if self.at_home {
-            self.states[index] = [null_mut(); 3];
-        }
+        self.states[index] = [null_mut(); 3];
     }
 
     fn act(&mut self, u: &mut Unstructured) -> Result<()> {
@@ -343,14 +335,16 @@ impl<M: Exported> Session<'_, M> {
         }
     }
 
-    /// The six functions of saved states. States go from any instance to any other, if they do not stay at home.
+    /// The six functions of saved states, at times on those of another instance.
     fn handle(&mut self, index: usize, u: &mut Unstructured) -> Result<()> {
         let which = u.int_in_range(0..=self.states.len() - 1)?;
+        let owner = if u.ratio(1, 8)? && !self.states[which][which].is_null() { which } else { index };
         let Some(slot) = &mut self.instances[index] else { return Ok(()) };
         let fmu = &slot.fmu;
         let before = fmu.bytes();
         fmu.take_log();
-        let state = &mut self.states[if self.at_home { index } else { 0 }][which];
+        let state = &mut self.states[owner][which];
+        let foreign = owner != index;
         let (function, status) = match u.int_in_range(0..=7_u8)? {
             0 | 1 => ("fmi2GetFMUstate", fmu.fmi2GetFMUstate(place(state, u)?)),
             2 | 3 => ("fmi2SetFMUstate", fmu.fmi2SetFMUstate(*state)),
@@ -388,6 +382,9 @@ impl<M: Exported> Session<'_, M> {
         }
         check_messages(messages);
         assert!([Status::Ok, Status::Error].contains(&status), "{function} answers {status:?}");
+        // Nowhere to free one is no error.
+        let refused = status == Status::Error || function == "fmi2FreeFMUstate";
+        assert!(!foreign || refused && !state.is_null(), "{function} takes another instance's state");
         if function == "fmi2SetFMUstate" && status == Status::Ok {
             slot.start_over();
         } else {
@@ -397,16 +394,11 @@ impl<M: Exported> Session<'_, M> {
         Ok(())
     }
 
-    /// Replays what is left, then frees everything, states after their instances too.
+    /// Replays what is left, then frees everything: instances with their states.
     fn end(mut self) {
         for index in 0..self.instances.len() {
             self.replay(index, index % 2 == 0);
             self.free(index);
-        }
-        let other = Importer::instantiate(self.functions, &Arguments::of::<M>(offered::<M>()));
-        let other = other.expect("an instance like the others");
-        for state in self.states.into_iter().flatten() {
-            other.forget(state);
         }
     }
 }

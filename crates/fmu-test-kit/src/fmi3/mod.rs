@@ -3,6 +3,7 @@
 mod testing;
 
 pub use fmi_abi::fmi3::Functions;
+pub(crate) use testing::references;
 pub use testing::{Stepped, Updated};
 
 use crate::importer::{Log, Zero, remember_message};

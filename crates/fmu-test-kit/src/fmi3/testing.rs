@@ -2,7 +2,7 @@
 
 use super::Importer;
 use crate::testing::shorthands;
-use fmu_export::fmi3::types::*;
+use fmu_export::fmi3::{reference, types::*};
 
 shorthands! { Importer, "fmi3":
     fmi3GetFMUState fmi3SetFMUState fmi3FreeFMUState
@@ -30,7 +30,15 @@ pub struct Updated {
     pub next: Option<f64>,
 }
 
-/// Shorthands that assert.
+/// The value references of variables at these places, up to 16; without an allocation, which tests of control loops
+/// would count.
+pub(crate) fn references(places: &[u32]) -> [u32; 16] {
+    let mut references = [0; 16];
+    references[..places.len()].copy_from_slice(places);
+    references.map(reference)
+}
+
+/// Shorthands that assert. As those for FMI 2.0 they take variables by their places in the table.
 #[allow(clippy::missing_panics_doc, reason = "that is what they are for")]
 impl Importer {
     /// From instantiated to initialization mode.
@@ -49,21 +57,23 @@ impl Importer {
 
     /// Values of Float64.
     #[track_caller]
-    pub fn get<const COUNT: usize>(&self, vr: [u32; COUNT]) -> [f64; COUNT] {
+    pub fn get<const COUNT: usize>(&self, places: [u32; COUNT]) -> [f64; COUNT] {
+        let vr = places.map(reference);
         let mut values = [f64::NAN; COUNT];
         self.ok(self.fmi3GetFloat64(vr.as_ptr(), COUNT, values.as_mut_ptr(), COUNT));
         values
     }
 
     /// Sets values of Float64, or not.
-    pub fn try_set(&self, vr: &[u32], values: &[f64]) -> Status {
-        self.fmi3SetFloat64(vr.as_ptr(), vr.len(), values.as_ptr(), values.len())
+    pub fn try_set(&self, places: &[u32], values: &[f64]) -> Status {
+        let vr = references(places);
+        self.fmi3SetFloat64(vr.as_ptr(), places.len(), values.as_ptr(), values.len())
     }
 
     /// Sets values of Float64.
     #[track_caller]
-    pub fn set(&self, vr: &[u32], values: &[f64]) {
-        self.ok(self.try_set(vr, values));
+    pub fn set(&self, places: &[u32], values: &[f64]) {
+        self.ok(self.try_set(places, values));
     }
 
     /// A step, or not.
