@@ -1,7 +1,7 @@
 //! The model description of FMI 3.0 (section 2.4).
 //!
 //! Behind the table come variables that only FMI 3.0 asks for: the [time](independent), where it is no variable of the
-//! model, and the [event indicators](indicator). [Value references](reference) count from 1 in this order.
+//! model, and the [event indicators](indicator). [Value references](reference()) count from 1 in this order.
 
 use crate::changes::Changes;
 use crate::check::check;

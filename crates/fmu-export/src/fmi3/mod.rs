@@ -7,7 +7,7 @@
 //! Every model has a time, as the standard asks for: the independent variable of the table, or one behind all others
 //! ([`independent`]). Behind it there is a local variable for each event indicator ([`indicator`]).
 //!
-//! [Value references](reference) count from 1 in the order of the variables: OMSimulator 3.0.0 takes those of
+//! [Value references](reference()) count from 1 in the order of the variables: OMSimulator 3.0.0 takes those of
 //! dependencies for places in the list, which count from 1 in FMI 2.0, and both readings lead to the same variable.
 //!
 //! # Safety
@@ -42,7 +42,7 @@ pub const fn reference(place: u32) -> fmi3ValueReference {
     Standard::Fmi3.reference(place)
 }
 
-/// A [value reference](reference) as an importer passes it.
+/// A [value reference](reference()) as an importer passes it.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 struct FromOne(fmi3ValueReference);
