@@ -204,7 +204,8 @@ $(VENV)/made.stamp $(DIST_VENV)/made.stamp: | need-python
 	@touch $@
 
 FMU_RUN := $(wildcard crates/fmu-run/*.toml crates/fmu-run/python/*.toml $(addprefix crates/fmu-run/,\
-  src/*.rs src/fmi3/*.rs src/batch/*.rs python/src/*.rs python/fmu_run/*))
+  src/*.rs src/batch/*.rs python/src/*.rs python/fmu_run/*)\
+  crates/fmi-abi/*.toml crates/fmi-abi/src/*.rs crates/fmi-abi/src/*/*.rs)
 
 $(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | need-rust
 	@echo 'compiling fmu-run, which runs FMUs for Python (once)'
