@@ -49,6 +49,10 @@ impl Model for TestbedFmu {
     }
 
     fn update(&mut self) -> Result<(), Error> {
+        Ok(self.testbed.parameters_changed()?)
+    }
+
+    fn restored(&mut self) -> Result<(), Error> {
         let times = &mut self.testbed.motors.times;
         if !times.are_possible() {
             return Err(Error::new(
@@ -56,7 +60,7 @@ impl Model for TestbedFmu {
             ));
         }
         times.update();
-        Ok(self.testbed.parameters_changed()?)
+        Ok(())
     }
 
     fn initialize(&mut self, _: &Experiment) -> Result<(), Error> {

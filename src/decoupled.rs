@@ -17,7 +17,7 @@
 
 use crate::motor::Motion;
 use crate::number::Number;
-use crate::pair::Pair;
+use crate::pair::PitchRoll;
 use crate::parameters::{InvalidParameter, Parameters};
 use nalgebra::{Matrix3, Vector3};
 use std::ops::{Add, Mul, Sub};
@@ -130,27 +130,6 @@ impl<T: Number> Subsystem<T> {
             b_rate: Vector3::new(motor_share, T::zero(), damping.over(inertia)),
         }
     }
-}
-
-/// A quantity of both sides.
-pub type Sides = Pair;
-
-/// A quantity of the pitch and of the roll subsystem.
-pub type PitchRoll = Pair;
-
-/// Sum and difference of the two sides, twice the quantities of pitch and roll. The factor 1/2 is left
-/// to the matrices that they meet.
-#[inline]
-pub fn sum_difference(sides: Sides) -> PitchRoll {
-    let [side1, side2] = sides.array();
-    PitchRoll::new(side1 + side2, side1 - side2)
-}
-
-/// The two sides from the quantities of pitch and roll, their mean and half difference.
-#[inline]
-pub fn sides(z: PitchRoll) -> Sides {
-    let [pitch, roll] = z.array();
-    Sides::new(pitch + roll, pitch - roll)
 }
 
 /// The decoupled testbed.

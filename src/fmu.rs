@@ -1,8 +1,9 @@
 //! The testbed as an importer has it: with an interface type, and with what several of its variables share.
 
-use crate::decoupled::{Decoupled, Sides};
+use crate::decoupled::Decoupled;
 use crate::instant::{Instant, torques};
 use crate::motor::{Motion, Motions};
+use crate::pair::Sides;
 use crate::start::Start;
 use crate::testbed::Testbed;
 use fmu_export::Interface;

@@ -5,8 +5,9 @@
 //! `tau = k1 (q_I - u) + c1 (q_I' - w)`, eq. (9), and the motion of the SECT shafts splits into pitch and roll,
 //! `J v' = -tau - c v` (see [`decoupled`](crate::decoupled)).
 
-use crate::decoupled::{Decoupled, PitchRoll, Sides, sides, sum_difference};
+use crate::decoupled::Decoupled;
 use crate::motor::{Motion, Motions};
+use crate::pair::{PitchRoll, Sides, sides, sum_difference};
 use crate::parameters::Parameters;
 use crate::testbed::{State, by_sides};
 

@@ -1,6 +1,6 @@
 //! How the motors move between communication points, known only by samples of their angles.
 
-use crate::decoupled::Sides;
+use crate::pair::Sides;
 
 /// When the last two samples before the current one were taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -103,26 +103,26 @@ impl Motions {
 /// after its halves were written makes the processor wait.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inputs {
-    /// Angle, rad; see [`Motors::theta_set`].
+    /// Angle, rad; see [`Motors::theta_changed`].
     pub theta: f64,
-    /// Rate, rad/s; see [`Motors::omega_set`].
+    /// Rate, rad/s; see [`Motors::omega_changed`].
     pub omega: f64,
 }
 
 /// The motors as the FMU sees them: their inputs and what is remembered of earlier steps.
 ///
-/// Inputs may be set as fields; then the method named after the field must follow.
+/// Inputs may be set as fields; then [`theta_changed`](Self::theta_changed) or its like must follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motors {
     /// What the importer sets.
     pub inputs: [Inputs; 2],
     /// Whether the rates come from omega where no derivative is set, else from a backward difference of
-    /// the sampled angles; see [`use_omega_set`](Self::use_omega_set).
+    /// the sampled angles; see [`use_omega_changed`](Self::use_omega_changed).
     pub use_omega: bool,
     /// Whether theta has been set since the last step; if not, the path's end stands in for it.
     pub is_sampled: [bool; 2],
     /// Derivatives of theta that the importer has set since the last step, rad/s.
-    pub set_rate: [Option<f64>; 2],
+    pub given_rate: [Option<f64>; 2],
     /// theta of the previous samples and of those before, rad.
     pub earlier: [Sides; 2],
     /// Where the last step's straight lines ended.
@@ -148,26 +148,26 @@ impl Motors {
     #[inline]
     pub fn set_theta(&mut self, motor: usize, theta: f64) {
         self.inputs[motor].theta = theta;
-        self.theta_set(motor);
+        self.theta_changed(motor);
     }
 
     /// Takes a new rate of motor 0 or 1 from the input omega.
     #[inline]
     pub fn set_omega(&mut self, motor: usize, omega: f64) {
         self.inputs[motor].omega = omega;
-        self.omega_set(motor);
+        self.omega_changed(motor);
     }
 
     /// After theta of motor 0 or 1 has been set: there is a new sample.
     #[inline]
-    pub fn theta_set(&mut self, motor: usize) {
+    pub fn theta_changed(&mut self, motor: usize) {
         self.is_sampled[motor] = true;
     }
 
     /// After omega of motor 0 or 1 has been set. If rates come from there, it holds at once, but for a
     /// derivative that is set.
     #[inline]
-    pub fn omega_set(&mut self, motor: usize) {
+    pub fn omega_changed(&mut self, motor: usize) {
         if self.takes_omega(motor) {
             self.path_end.rate[motor] = self.inputs[motor].omega;
         }
@@ -176,34 +176,34 @@ impl Motors {
     /// Whether the rate of motor 0 or 1 comes from omega.
     #[inline]
     pub fn takes_omega(&self, motor: usize) -> bool {
-        self.use_omega && self.set_rate[motor].is_none()
+        self.use_omega && self.given_rate[motor].is_none()
     }
 
     /// After `use_omega` has been set.
-    pub fn use_omega_set(&mut self) {
-        self.omega_set(0);
-        self.omega_set(1);
+    pub fn use_omega_changed(&mut self) {
+        self.omega_changed(0);
+        self.omega_changed(1);
     }
 
     /// Takes the derivative of theta of motor 0 or 1 at the current communication point. It precedes
     /// omega, in whatever order they are set.
     #[inline]
     pub fn set_rate(&mut self, motor: usize, rate: f64) {
-        self.set_rate[motor] = Some(rate);
+        self.given_rate[motor] = Some(rate);
         self.path_end.rate[motor] = rate;
     }
 
     /// Forgets the samples: the next one is the first.
     pub fn forget_samples(&mut self) {
-        let Self { inputs, use_omega, set_rate, .. } = *self;
-        *self = Self { inputs, use_omega, set_rate, ..Self::default() };
+        let Self { inputs, use_omega, given_rate, .. } = *self;
+        *self = Self { inputs, use_omega, given_rate, ..Self::default() };
     }
 
     /// Whether all rates come from parabolas, and the step size `h` is that of the last two steps.
     #[inline]
     pub fn are_steady(&self, h: f64) -> bool {
         // Together, because one branch costs more than they do.
-        let is_rate_given = self.use_omega | self.set_rate[0].is_some() | self.set_rate[1].is_some();
+        let is_rate_given = self.use_omega | self.given_rate[0].is_some() | self.given_rate[1].is_some();
         h == self.times.steady_step && !is_rate_given
     }
 
@@ -228,7 +228,7 @@ impl Motors {
             _ => self.parabolas(),
         };
         for motor in 0..2 {
-            let given = self.set_rate[motor].or(self.use_omega.then_some(self.inputs[motor].omega));
+            let given = self.given_rate[motor].or(self.use_omega.then_some(self.inputs[motor].omega));
             if let Some(rate) = given {
                 motions.rate[motor] = rate;
                 motions.acceleration[motor] = 0.0;
@@ -270,7 +270,7 @@ impl Motors {
         self.earlier[1] = self.earlier[0];
         self.earlier[0] = self.theta();
         self.path_end = *end;
-        self.set_rate = [None; 2];
+        self.given_rate = [None; 2];
         self.is_sampled = [false; 2];
     }
 }

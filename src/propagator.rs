@@ -11,8 +11,9 @@
 //! because `A [1, 1, 0] + b_angle = 0`. The step is an increment of z: a testbed at rest stays at rest to
 //! the last bit, and tiny steps lose nothing to `exp(A h)` being close to 1.
 
-use crate::decoupled::{Decoupled, PitchRoll, Subsystem};
+use crate::decoupled::{Decoupled, Subsystem};
 use crate::number::Number;
+use crate::pair::PitchRoll;
 use nalgebra::{Matrix3, Vector3};
 use twofloat::TwoFloat;
 
@@ -220,7 +221,7 @@ impl StepMatrices {
 const ZERO: PitchRoll = PitchRoll::both(0.0);
 
 /// The step matrices of the step sizes used last. Masters use one step size or alternate among a few.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct StepCache {
     /// One of the others, at a place that needs no looking up.
     current: StepMatrices,
@@ -231,9 +232,10 @@ pub struct StepCache {
 impl StepCache {
     const SIZE: usize = 8;
 
-    /// A cache without entries.
-    pub const fn new() -> Self {
-        Self { current: StepMatrices::UNUSED, entries: [StepMatrices::UNUSED; Self::SIZE], oldest: 0 }
+    /// Forgets all of them.
+    pub fn clear(&mut self) {
+        self.current.h = 0.0;
+        self.entries.iter_mut().for_each(|entry| entry.h = 0.0);
     }
 
     /// The matrices for step size `h > 0`, computed if they are not at hand.
@@ -258,7 +260,8 @@ impl StepCache {
 }
 
 impl Default for StepCache {
+    /// A cache without entries.
     fn default() -> Self {
-        Self::new()
+        Self { current: StepMatrices::UNUSED, entries: [StepMatrices::UNUSED; Self::SIZE], oldest: 0 }
     }
 }

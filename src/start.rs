@@ -1,6 +1,6 @@
 //! Where the motion begins.
 
-use crate::decoupled::Sides;
+use crate::pair::Sides;
 use crate::testbed::State;
 
 /// Where the testbed starts, and whether it has.

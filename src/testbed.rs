@@ -1,7 +1,8 @@
 //! The testbed: parameters, motors and state, advanced exactly from point to point.
 
-use crate::decoupled::{Decoupled, Sides, sides, sum_difference};
+use crate::decoupled::Decoupled;
 use crate::motor::{Motions, Motors};
+use crate::pair::{Sides, sides, sum_difference};
 use crate::parameters::{InvalidParameter, Parameters};
 use crate::propagator::StepCache;
 
@@ -22,17 +23,18 @@ pub struct Testbed {
 }
 
 impl Clone for Testbed {
+    /// Without the step matrices, which are calculated again where they are needed.
     fn clone(&self) -> Self {
-        Self { cache: self.cache.clone(), ..*self }
+        Self { cache: StepCache::default(), ..*self }
     }
 
-    /// With the same parameters what follows from them stays good; the rest is little.
+    /// With the same parameters the step matrices stay good.
     fn clone_from(&mut self, source: &Self) {
         if self.parameters != source.parameters {
-            *self = source.clone();
+            self.cache.clear();
         }
-        self.state = source.state;
-        self.motors = source.motors;
+        let Self { parameters, state, motors, system, cache: _ } = *source;
+        (self.parameters, self.state, self.motors, self.system) = (parameters, state, motors, system);
     }
 }
 
@@ -47,7 +49,7 @@ impl Testbed {
             state: [0.0; 6],
             motors: Motors::default(),
             system: Decoupled::new(&parameters)?,
-            cache: StepCache::new(),
+            cache: StepCache::default(),
         })
     }
 
@@ -62,7 +64,7 @@ impl Testbed {
     /// When the parameters make no testbed; they stay as they are.
     pub fn parameters_changed(&mut self) -> Result<(), InvalidParameter> {
         self.system = Decoupled::new(&self.parameters)?;
-        self.cache = StepCache::new();
+        self.cache.clear();
         Ok(())
     }
 

@@ -19,23 +19,23 @@ const COUNT: Type = Type::integer("Integer_from_1").from(1);
 variables! {
     for TestbedFmu, memory in
         testbed.motors.times.count, testbed.motors.times.last_step, testbed.motors.times.step_before,
-        testbed.motors.is_sampled, testbed.motors.set_rate, testbed.motors.earlier, testbed.motors.path_end,
+        testbed.motors.is_sampled, testbed.motors.given_rate, testbed.motors.earlier, testbed.motors.path_end,
         start.is_over;
 
     /// Angle of motor 1
     theta1 = input(&ANGLE) in testbed.motors.inputs[0].theta then |fmu| {
-        fmu.testbed.motors.theta_set(0);
+        fmu.testbed.motors.theta_changed(0);
         fmu.follow();
     };
     /// Angle of motor 2
     theta2 = input(&ANGLE) in testbed.motors.inputs[1].theta then |fmu| {
-        fmu.testbed.motors.theta_set(1);
+        fmu.testbed.motors.theta_changed(1);
         fmu.follow();
     };
     /// Angular velocity of motor 1; used in Co-Simulation only if use_omega is true
-    omega1 = input(&ANGULAR_VELOCITY) in testbed.motors.inputs[0].omega then |fmu| { fmu.testbed.motors.omega_set(0) };
+    omega1 = input(&ANGULAR_VELOCITY) in testbed.motors.inputs[0].omega then |fmu| { fmu.testbed.motors.omega_changed(0) };
     /// Angular velocity of motor 2; used in Co-Simulation only if use_omega is true
-    omega2 = input(&ANGULAR_VELOCITY) in testbed.motors.inputs[1].omega then |fmu| { fmu.testbed.motors.omega_set(1) };
+    omega2 = input(&ANGULAR_VELOCITY) in testbed.motors.inputs[1].omega then |fmu| { fmu.testbed.motors.omega_changed(1) };
 
     /// Torque measured by sensor 1 between motor 1 and the SECT, eq. (9a)
     tau1 = output(&TORQUE) by |fmu| fmu.torques[0];
@@ -110,7 +110,7 @@ variables! {
     /// Start at rest wherever the motors are (theta3 = theta5 = theta1, theta4 = theta6 = theta2, rates 0); if false, start at theta3_start ... omega6_start
     start_at_rest = parameter(&BOOLEAN) in start.at_rest then |fmu| { fmu.follow() };
     /// Co-Simulation: take the motor rates from omega1 and omega2 instead of differentiating theta1 and theta2
-    use_omega = parameter(&BOOLEAN) in testbed.motors.use_omega then |fmu| { fmu.testbed.motors.use_omega_set() };
+    use_omega = parameter(&BOOLEAN) in testbed.motors.use_omega then |fmu| { fmu.testbed.motors.use_omega_changed() };
     /// theta3 at the start; used only if start_at_rest is false
     theta3_start = parameter(&ANGLE) in start.state[0] then |fmu| { fmu.follow() };
     /// theta4 at the start; used only if start_at_rest is false

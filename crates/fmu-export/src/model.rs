@@ -32,7 +32,7 @@ use std::path::PathBuf;
 /// | step, event | [`CoSimulation::step`](crate::CoSimulation::step), [`ModelExchange::event`](crate::ModelExchange::event) |
 /// | enter Continuous-Time Mode | [`ModelExchange::continuous_time_entered`](crate::ModelExchange::continuous_time_entered) |
 /// | save, restore | `clone_from` |
-/// | de-serialize | on a copy, the values of the places and memory of the table; then [`update`](Self::update) |
+/// | de-serialize | on a copy, the values of the places and memory of the table; then [`restored`](Self::restored) and [`update`](Self::update) |
 pub trait Model: Variables + Clone + Send + Sync {
     /// The facts about the model.
     const INFO: Info;
@@ -43,7 +43,7 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// When it cannot be made; the importer gets no instance, and the message.
     fn new(setup: &Setup) -> Result<Self, Error>;
 
-    /// Called after parameters have changed, once for all that one call of the importer changes, and after a state
+    /// Called after parameters have changed, once for all that one call of the importer changes, or because a state
     /// was read from bytes: checks what concerns several values and prepares what depends on them. Ranges of single
     /// parameters have been checked.
     ///
@@ -55,6 +55,15 @@ pub trait Model: Variables + Clone + Send + Sync {
     /// # Errors
     /// When the values do not fit together. The change is then undone and the importer told.
     fn update(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Called after a state was read from bytes, before [`update`](Self::update): checks what the table's `memory` has
+    /// brought, which knows no ranges, and prepares what depends on it.
+    ///
+    /// # Errors
+    /// When the model is never like that. The bytes are then refused.
+    fn restored(&mut self) -> Result<(), Error> {
         Ok(())
     }
 

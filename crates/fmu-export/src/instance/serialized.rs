@@ -85,6 +85,7 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
         return refuse("the saved state holds impossible values");
     }
     check(state)?;
+    state.model.restored()?;
     state.model.update()?;
     state.stale = true;
     Ok(())
