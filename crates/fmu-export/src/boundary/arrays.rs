@@ -38,6 +38,15 @@ pub(crate) unsafe fn output<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), length) })
 }
 
+/// All variables are scalars: there are as many values as variables.
+#[inline]
+pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
+    if count == needed {
+        return Ok(());
+    }
+    refuse(format!("there are {needed} {what}, the array has {count} elements"))
+}
+
 /// The importer's place for one value.
 ///
 /// # Safety

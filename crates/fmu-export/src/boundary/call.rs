@@ -1,17 +1,14 @@
 //! What every call on an instance has in common.
 
+use super::ImporterLog;
 use crate::export::Exported;
-use crate::fmi2::types::fmi2CallbackLogger;
-use crate::fmi3::types::fmi3LogMessageCallback;
 use crate::instance::{Instance, Outcome, Refusal};
-use crate::log::Message;
 use fmi_abi::Rule;
 use fmi_abi::Status;
 use fmi_abi::c_types::c_void;
 use fmi_abi::{Mode, Situations};
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
-use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 // WebAssembly traps instead, which ends the call and not the process.
@@ -28,52 +25,6 @@ pub(crate) struct Component<M> {
     pub delivering: Cell<bool>,
     pub instance: UnsafeCell<Instance<M>>,
     pub importer: ImporterLog,
-}
-
-/// The importer's log callback, as its standard has it.
-#[derive(Clone, Copy)]
-#[cfg_attr(target_family = "wasm", allow(dead_code, reason = "the C around the module knows the importer"))]
-pub(crate) enum Callback {
-    Fmi2(fmi2CallbackLogger),
-    Fmi3(fmi3LogMessageCallback),
-}
-
-/// The importer's log callback, if it has one, and what it wants back with every call. Copied, because the callbacks
-/// structure of FMI 2.0 may go after `fmi2Instantiate`.
-#[cfg_attr(target_family = "wasm", allow(dead_code, reason = "the C around the module knows the importer"))]
-pub(crate) struct ImporterLog {
-    pub callback: Option<Callback>,
-    pub environment: *mut c_void,
-    pub instance_name: CString,
-}
-
-impl ImporterLog {
-    #[cfg(target_family = "wasm")]
-    pub fn deliver(&self, message: &Message) {
-        super::webassembly::log(message);
-    }
-
-    #[cfg(not(target_family = "wasm"))]
-    pub fn deliver(&self, message: &Message) {
-        let Some(callback) = self.callback else { return };
-        let (category, text) = (message.category().as_ptr(), message.printable());
-        // SAFETY: the importer's promise that the logger works until the instance is freed; all strings end with a
-        // zero byte, and the message holds no format directive that would ask the variadic one for further arguments.
-        unsafe {
-            match callback {
-                Callback::Fmi2(logger) => logger(
-                    self.environment,
-                    self.instance_name.as_ptr(),
-                    message.status as _,
-                    category,
-                    text.as_ptr(),
-                ),
-                Callback::Fmi3(logger) => {
-                    logger(self.environment, message.status as _, category, text.as_ptr());
-                }
-            }
-        }
-    }
 }
 
 /// Runs a function's body on the instance behind `c` if the table of allowed calls has it.

@@ -1,18 +1,32 @@
-//! What the C functions of all versions of FMI have in common: an instance behind a pointer, calls on it, arrays of the
-//! importer's. With [`fmi2`](crate::fmi2) and [`fmi3`](crate::fmi3), which are on top of it, the only place with pointers
-//! and `unsafe`.
+//! What the C functions of both standards have in common: an instance behind a pointer, calls on it, arrays of the
+//! importer's; and the functions that are the same in both but for their names. With [`fmi2`](crate::fmi2) and
+//! [`fmi3`](crate::fmi3), which are on top of it, the only place with pointers and `unsafe`.
 
 mod arrays;
 mod call;
+mod derivatives;
+mod importer_log;
 mod instances;
-mod settings;
-mod states;
-mod texts;
+pub(crate) mod life_cycle;
+pub(crate) mod model_exchange;
+pub(crate) mod states;
+pub(crate) mod values;
 pub(crate) mod webassembly;
 
-pub(crate) use arrays::{array, output, place, string};
-pub(crate) use call::{Callback, Component, ImporterLog, call, forget_panic, panic_message};
+pub(crate) use arrays::{array, output, place, same, string};
+pub(crate) use call::{Component, call, forget_panic, panic_message};
+pub(crate) use derivatives::{output_derivatives, partial_derivatives};
+pub(crate) use importer_log::{Callback, ImporterLog};
 pub(crate) use instances::{Arguments, free, instantiate};
-pub(crate) use settings::set_debug_logging;
-pub(crate) use states::*;
-pub(crate) use texts::{get_texts, set_texts};
+
+use crate::export::Exported;
+use crate::instance::Instance;
+use fmi_abi::Standard;
+
+/// The name of an argument, as the instance's standard has it.
+fn named<M: Exported>(instance: &Instance<M>, fmi2: &'static str, fmi3: &'static str) -> &'static str {
+    match instance.standard() {
+        Standard::Fmi2 => fmi2,
+        Standard::Fmi3 => fmi3,
+    }
+}

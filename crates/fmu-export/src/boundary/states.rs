@@ -1,4 +1,7 @@
 //! Saved states behind pointers. A handle is only ever compared: what it points to is the business of the instance.
+//!
+//! # Safety
+//! As in the contract of the [standards' modules](crate::fmi2).
 
 use super::{array, output, place};
 use crate::export::Exported;
@@ -7,10 +10,7 @@ use fmi_abi::c_types::c_void;
 use std::ptr::without_provenance_mut;
 
 /// The state is the instance's until the importer frees it, or the instance.
-///
-/// # Safety
-/// As in the contract of the standards' modules.
-pub(crate) unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
+pub unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
     // SAFETY: by contract NULL or a pointer to a handle, which is initialized.
     let handle = unsafe { place(state, "FMUstate")?.assume_init_mut() };
     check_memory(instance, *handle)?;
@@ -18,11 +18,12 @@ pub(crate) unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *
     Ok(())
 }
 
+pub unsafe fn set_state<M: Exported>(instance: &mut Instance<M>, state: *mut c_void) -> Outcome {
+    instance.restore(state.addr())
+}
+
 /// Takes the state back and clears the handle; NULL is ignored.
-///
-/// # Safety
-/// As in the contract of the standards' modules.
-pub(crate) unsafe fn free_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
+pub unsafe fn free_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
     if state.is_null() {
         return Ok(());
     }
@@ -36,9 +37,7 @@ pub(crate) unsafe fn free_state<M: Exported>(instance: &mut Instance<M>, state: 
     Ok(())
 }
 
-/// # Safety
-/// As in the contract of the standards' modules.
-pub(crate) unsafe fn serialized_size<M: Exported>(
+pub unsafe fn serialized_size<M: Exported>(
     instance: &mut Instance<M>,
     state: *mut c_void,
     size: *mut usize,
@@ -49,16 +48,14 @@ pub(crate) unsafe fn serialized_size<M: Exported>(
     Ok(())
 }
 
-/// # Safety
-/// As in the contract of the standards' modules.
-pub(crate) unsafe fn serialize<M: Exported>(
+pub unsafe fn serialize<M: Exported, Byte>(
     instance: &mut Instance<M>,
     state: *mut c_void,
-    bytes: *mut u8,
+    bytes: *mut Byte,
     size: usize,
 ) -> Outcome {
     // SAFETY: by contract an array of this length.
-    let bytes = unsafe { output(bytes, size, "serializedState")? };
+    let bytes = unsafe { output(bytes.cast::<u8>(), size, "serializedState")? };
     let needed = instance.serialized_size(state.addr())?;
     if size != needed {
         return refuse(format!(
@@ -75,18 +72,16 @@ pub(crate) unsafe fn serialize<M: Exported>(
 
 /// The state is the instance's until the importer frees it, or the instance; one that the handle held before is
 /// overwritten.
-///
-/// # Safety
-/// As in the contract of the standards' modules.
-pub(crate) unsafe fn deserialize<M: Exported>(
+pub unsafe fn deserialize<M: Exported, Byte>(
     instance: &mut Instance<M>,
-    bytes: *const u8,
+    bytes: *const Byte,
     size: usize,
     state: *mut *mut c_void,
 ) -> Outcome {
     // SAFETY: by contract an array of this length; NULL or a pointer to a handle, which is initialized.
-    let (bytes, handle) =
-        unsafe { (array(bytes, size, "serializedState")?, place(state, "FMUstate")?.assume_init_mut()) };
+    let (bytes, handle) = unsafe {
+        (array(bytes.cast::<u8>(), size, "serializedState")?, place(state, "FMUstate")?.assume_init_mut())
+    };
     check_memory(instance, std::ptr::null_mut())?;
     *handle = without_provenance_mut(instance.deserialize(bytes, handle.addr())?);
     Ok(())

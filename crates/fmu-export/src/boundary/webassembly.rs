@@ -4,6 +4,7 @@
 #![cfg(target_family = "wasm")]
 
 use super::call::{Component, finish, panic_message};
+use super::importer_log::log;
 use super::string;
 use crate::export::Exported;
 use crate::log::Message;
@@ -13,19 +14,9 @@ use std::any::Any;
 use std::cell::{Cell, RefCell};
 use std::panic::PanicHookInfo;
 
-#[link(wasm_import_module = "fmu")]
-unsafe extern "C" {
-    safe fn fmu_log(status: Status, category: *const c_char, message: *const c_char);
-}
-
 thread_local! {
     static ROOM: RefCell<Vec<u64>> = const { RefCell::new(Vec::new()) };
     static PANIC: Cell<Option<String>> = const { Cell::new(None) };
-}
-
-/// Hands a message to the importer's log callback, if it has one.
-pub(super) fn log(message: &Message) {
-    fmu_log(message.status, message.category().as_ptr(), message.printable().as_ptr());
 }
 
 /// Keeps what panics say, for [`broken`] to tell.

@@ -4,7 +4,7 @@
 //! As in the [module above](super): each argument is what the standard says it is.
 
 use super::types::*;
-use crate::boundary::{array, output, place};
+use crate::boundary::{array, output_derivatives, place};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, no_status, refuse};
 
@@ -29,9 +29,9 @@ pub unsafe fn fmi2GetRealOutputDerivatives<M: Exported>(
     value: *mut fmi2Real,
 ) -> Outcome {
     // SAFETY: by contract arrays of this length; the written one does not overlap the others.
-    let (vr, order, value) =
-        unsafe { (array(vr, count, "vr")?, array(order, count, "order")?, output(value, count, "value")?) };
-    instance.get_output_derivatives(vr, order, value)
+    unsafe {
+        output_derivatives::<M, fmi2ValueReference>(instance, vr, count, (order, "order"), value, count)
+    }
 }
 
 #[inline]

@@ -22,7 +22,6 @@
 mod co_simulation;
 mod common;
 mod instances;
-mod model_exchange;
 
 pub use fmi_abi::fmi2::{ALLOWED, Function, Functions, types};
 pub use instances::{fmi2FreeInstance, fmi2GetTypesPlatform, fmi2GetVersion, fmi2Instantiate};
@@ -38,5 +37,20 @@ fmi_abi::fmi2_functions!(crate::symbols::c_functions);
 mod bodies {
     pub(super) use super::co_simulation::*;
     pub(super) use super::common::*;
-    pub(super) use super::model_exchange::*;
+    pub(super) use crate::boundary::life_cycle::{
+        enter_event_mode as fmi2EnterEventMode, exit_initialization_mode as fmi2ExitInitializationMode,
+        reset as fmi2Reset, set_debug_logging as fmi2SetDebugLogging, terminate as fmi2Terminate,
+    };
+    pub(super) use crate::boundary::model_exchange::{
+        completed_integrator_step as fmi2CompletedIntegratorStep,
+        enter_continuous_time_mode as fmi2EnterContinuousTimeMode,
+        get_continuous_states as fmi2GetContinuousStates, get_derivatives as fmi2GetDerivatives,
+        get_event_indicators as fmi2GetEventIndicators, get_nominals as fmi2GetNominalsOfContinuousStates,
+        set_continuous_states as fmi2SetContinuousStates, set_time as fmi2SetTime,
+    };
+    pub(super) use crate::boundary::states::{
+        deserialize as fmi2DeSerializeFMUstate, free_state as fmi2FreeFMUstate, get_state as fmi2GetFMUstate,
+        serialize as fmi2SerializeFMUstate, serialized_size as fmi2SerializedFMUstateSize,
+        set_state as fmi2SetFMUstate,
+    };
 }

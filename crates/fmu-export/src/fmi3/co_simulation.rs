@@ -3,9 +3,8 @@
 //! # Safety
 //! As in the [module above](super): each argument is what the standard says it is.
 
-use super::common::same;
 use super::{FromOne, types::*};
-use crate::boundary::{array, output, place};
+use crate::boundary::{output_derivatives, place};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
 
@@ -23,15 +22,7 @@ pub unsafe fn fmi3GetOutputDerivatives<M: Exported>(
     value_count: usize,
 ) -> Outcome {
     // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
-    let (vr, order, value) = unsafe {
-        (
-            array::<FromOne>(vr.cast(), count, "valueReferences")?,
-            array(order, count, "orders")?,
-            output(value, value_count, "values")?,
-        )
-    };
-    same("values", count, value_count)?;
-    instance.get_output_derivatives(vr, order, value)
+    unsafe { output_derivatives::<M, FromOne>(instance, vr, count, (order, "orders"), value, value_count) }
 }
 
 #[inline]

@@ -1,23 +1,16 @@
-//! What both interface types have (sections 2.2 and 2.3).
+//! What both interface types have (sections 2.2 and 2.3), and the sizes that Model Exchange asks for (section 3.2).
 //!
 //! # Safety
 //! As in the [module above](super): each argument is what the standard says it is.
 
 use super::{FromOne, types::*};
-use crate::boundary::*;
+use crate::boundary::life_cycle::experiment;
+use crate::boundary::values::*;
+use crate::boundary::{array, output, partial_derivatives, place};
 use crate::export::Exported;
 use crate::instance::{Direction, Instance, Outcome, refuse};
-use crate::model::Experiment;
-
-pub unsafe fn fmi3SetDebugLogging<M: Exported>(
-    instance: &mut Instance<M>,
-    logging_on: fmi3Boolean,
-    count: usize,
-    categories: *const fmi3String,
-) -> Outcome {
-    // SAFETY: by contract an array of this length, of strings.
-    unsafe { set_debug_logging(instance, logging_on != fmi3False, count, categories) }
-}
+use crate::value::Value;
+use fmi_abi::BaseType::{self, *};
 
 pub unsafe fn fmi3EnterInitializationMode<M: Exported>(
     instance: &mut Instance<M>,
@@ -27,156 +20,113 @@ pub unsafe fn fmi3EnterInitializationMode<M: Exported>(
     stop_time_defined: fmi3Boolean,
     stop_time: fmi3Float64,
 ) -> Outcome {
-    instance.enter_initialization_mode_at(Experiment {
+    instance.enter_initialization_mode_at(experiment(
+        tolerance_defined,
+        tolerance,
         start_time,
-        stop_time: (stop_time_defined != fmi3False).then_some(stop_time),
-        tolerance: (tolerance_defined != fmi3False).then_some(tolerance),
-    })
+        stop_time_defined,
+        stop_time,
+    ))
 }
 
-pub unsafe fn fmi3ExitInitializationMode<M: Exported>(instance: &mut Instance<M>) -> Outcome {
-    instance.exit_initialization_mode()
+// An Enumeration goes through the functions of Int64 (section 2.2.7.2).
+getters_and_setters! { FromOne, [value_count];
+    fmi3GetFloat64 get_reals, fmi3SetFloat64 set_reals, fmi3Float64: [Real];
+    fmi3GetFloat32 get_float32, fmi3SetFloat32 set_float32, fmi3Float32: [Float32];
+    fmi3GetInt8 get_integers, fmi3SetInt8 set_integers, fmi3Int8: [Int8];
+    fmi3GetUInt8 get_integers, fmi3SetUInt8 set_integers, fmi3UInt8: [UInt8];
+    fmi3GetInt16 get_integers, fmi3SetInt16 set_integers, fmi3Int16: [Int16];
+    fmi3GetUInt16 get_integers, fmi3SetUInt16 set_integers, fmi3UInt16: [UInt16];
+    fmi3GetInt32 get_integers, fmi3SetInt32 set_integers, fmi3Int32: [Integer];
+    fmi3GetUInt32 get_integers, fmi3SetUInt32 set_integers, fmi3UInt32: [UInt32];
+    fmi3GetInt64 get_integers, fmi3SetInt64 set_integers, fmi3Int64: [Int64, Enumeration];
+    fmi3GetUInt64 get_integers, fmi3SetUInt64 set_integers, fmi3UInt64: [UInt64];
+    fmi3GetBoolean get_booleans, fmi3SetBoolean set_booleans, fmi3Boolean: [Boolean];
+    fmi3GetString get_texts, fmi3SetString set_texts, fmi3String: [String];
 }
 
-pub unsafe fn fmi3EnterEventMode<M: Exported>(instance: &mut Instance<M>) -> Outcome {
-    instance.enter_event_mode()
-}
-
-pub unsafe fn fmi3Terminate<M: Exported>(instance: &mut Instance<M>) -> Outcome {
-    instance.terminate();
+/// The bytes are the instance's until the next call on it.
+pub unsafe fn fmi3GetBinary<M: Exported>(
+    instance: &mut Instance<M>,
+    vr: *const fmi3ValueReference,
+    count: usize,
+    sizes: *mut usize,
+    values: *mut fmi3Binary,
+    value_count: usize,
+) -> Outcome {
+    // SAFETY: by contract arrays of these lengths that do not overlap.
+    let ((vr, values), sizes) = unsafe {
+        (to_write::<FromOne, _>(vr, count, values, value_count)?, output(sizes, value_count, "valueSizes")?)
+    };
+    let mut found = Vec::with_capacity(count);
+    instance.get(vr, &[BaseType::Binary], |_, value| {
+        if let Value::Binary(bytes) = value {
+            found.push(bytes);
+        }
+    })?;
+    for ((bytes, size), value) in found.iter().zip(sizes).zip(values) {
+        size.write(bytes.len());
+        value.write(bytes.as_ptr());
+    }
+    instance.bytes = found;
     Ok(())
 }
 
-pub unsafe fn fmi3Reset<M: Exported>(instance: &mut Instance<M>) -> Outcome {
-    instance.reset()
-}
-
-/// All variables are scalars: there are as many values as variables.
-#[inline]
-pub(super) fn same(what: &str, needed: usize, count: usize) -> Outcome {
-    if count == needed {
-        return Ok(());
-    }
-    refuse(format!("there are {needed} {what}, the array has {count} elements"))
-}
-
-pub unsafe fn fmi3GetFMUState<M: Exported>(instance: &mut Instance<M>, state: *mut fmi3FMUState) -> Outcome {
-    // SAFETY: the module's contract, here and below.
-    unsafe { get_state(instance, state) }
-}
-
-pub unsafe fn fmi3SetFMUState<M: Exported>(instance: &mut Instance<M>, state: fmi3FMUState) -> Outcome {
-    instance.restore(state.addr())
-}
-
-pub unsafe fn fmi3FreeFMUState<M: Exported>(instance: &mut Instance<M>, state: *mut fmi3FMUState) -> Outcome {
-    // SAFETY: see above.
-    unsafe { free_state(instance, state) }
-}
-
-pub unsafe fn fmi3SerializedFMUStateSize<M: Exported>(
+pub unsafe fn fmi3SetBinary<M: Exported>(
     instance: &mut Instance<M>,
-    state: fmi3FMUState,
-    size: *mut usize,
+    vr: *const fmi3ValueReference,
+    count: usize,
+    sizes: *const usize,
+    values: *const fmi3Binary,
+    value_count: usize,
 ) -> Outcome {
-    // SAFETY: see above.
-    unsafe { serialized_size(instance, state, size) }
-}
-
-pub unsafe fn fmi3SerializeFMUState<M: Exported>(
-    instance: &mut Instance<M>,
-    state: fmi3FMUState,
-    bytes: *mut fmi3Byte,
-    size: usize,
-) -> Outcome {
-    // SAFETY: see above.
-    unsafe { serialize(instance, state, bytes, size) }
-}
-
-pub unsafe fn fmi3DeserializeFMUState<M: Exported>(
-    instance: &mut Instance<M>,
-    bytes: *const fmi3Byte,
-    size: usize,
-    state: *mut fmi3FMUState,
-) -> Outcome {
-    // SAFETY: see above.
-    unsafe { deserialize(instance, bytes, size, state) }
-}
-
-pub unsafe fn fmi3GetDirectionalDerivative<M: Exported>(
-    instance: &mut Instance<M>,
-    unknown: *const fmi3ValueReference,
-    unknown_count: usize,
-    known: *const fmi3ValueReference,
-    known_count: usize,
-    seed: *const fmi3Float64,
-    seed_count: usize,
-    sensitivity: *mut fmi3Float64,
-    sensitivity_count: usize,
-) -> Outcome {
-    // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
-    unsafe {
-        derivatives(
-            instance,
-            (unknown, unknown_count),
-            (known, known_count),
-            (seed, seed_count),
-            (sensitivity, sensitivity_count),
-            Direction::Forward,
-        )
-    }
-}
-
-pub unsafe fn fmi3GetAdjointDerivative<M: Exported>(
-    instance: &mut Instance<M>,
-    unknown: *const fmi3ValueReference,
-    unknown_count: usize,
-    known: *const fmi3ValueReference,
-    known_count: usize,
-    seed: *const fmi3Float64,
-    seed_count: usize,
-    sensitivity: *mut fmi3Float64,
-    sensitivity_count: usize,
-) -> Outcome {
-    // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
-    unsafe {
-        derivatives(
-            instance,
-            (unknown, unknown_count),
-            (known, known_count),
-            (seed, seed_count),
-            (sensitivity, sensitivity_count),
-            Direction::Adjoint,
-        )
-    }
-}
-
-/// # Safety
-/// Arrays of these lengths; the written one does not overlap the others.
-unsafe fn derivatives<M: Exported>(
-    instance: &mut Instance<M>,
-    (unknown, unknown_count): (*const fmi3ValueReference, usize),
-    (known, known_count): (*const fmi3ValueReference, usize),
-    (seed, seed_count): (*const fmi3Float64, usize),
-    (sensitivity, sensitivity_count): (*mut fmi3Float64, usize),
-    direction: Direction,
-) -> Outcome {
-    // SAFETY: this function's contract.
-    let (unknown, known, seed, sensitivity) = unsafe {
-        (
-            array::<FromOne>(unknown.cast(), unknown_count, "unknowns")?,
-            array(known.cast(), known_count, "knowns")?,
-            array(seed, seed_count, "seed")?,
-            output(sensitivity, sensitivity_count, "sensitivity")?,
-        )
+    // SAFETY: by contract arrays of these lengths.
+    let ((vr, values), sizes) = unsafe {
+        (to_read::<FromOne, _>(vr, count, values, value_count)?, array(sizes, value_count, "valueSizes")?)
     };
-    let (seeded, wanted) = match direction {
-        Direction::Forward => (("knowns", known_count), ("unknowns", unknown_count)),
-        Direction::Adjoint => (("unknowns", unknown_count), ("knowns", known_count)),
+    let mut bytes = Vec::with_capacity(count);
+    for ((vr, size), value) in vr.iter().zip(sizes).zip(values) {
+        let name = instance.name(*vr, BaseType::Binary)?;
+        // SAFETY: by contract NULL or an array of this length.
+        bytes.push(Value::Binary(unsafe { array(*value, *size, name) }?.to_vec()));
+    }
+    instance.set(vr, &[BaseType::Binary], bytes.iter().cloned())
+}
+
+macro_rules! derivatives {
+    ($($function:ident: $direction:ident;)+) => {
+        $(
+            pub unsafe fn $function<M: Exported>(
+                instance: &mut Instance<M>,
+                unknown: *const fmi3ValueReference,
+                unknown_count: usize,
+                known: *const fmi3ValueReference,
+                known_count: usize,
+                seed: *const fmi3Float64,
+                seed_count: usize,
+                sensitivity: *mut fmi3Float64,
+                sensitivity_count: usize,
+            ) -> Outcome {
+                // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
+                unsafe {
+                    partial_derivatives::<M, FromOne>(
+                        instance,
+                        ["unknowns", "knowns", "seed", "sensitivity"],
+                        (unknown, unknown_count),
+                        (known, known_count),
+                        (seed, seed_count),
+                        (sensitivity, sensitivity_count),
+                        Direction::$direction,
+                    )
+                }
+            }
+        )+
     };
-    same(seeded.0, seeded.1, seed_count)?;
-    same(wanted.0, wanted.1, sensitivity_count)?;
-    instance.derivatives(unknown, known, seed, sensitivity, direction)
+}
+
+derivatives! {
+    fmi3GetDirectionalDerivative: Forward;
+    fmi3GetAdjointDerivative: Adjoint;
 }
 
 pub unsafe fn fmi3EvaluateDiscreteStates<M: Exported>(_: &mut Instance<M>) -> Outcome {
@@ -210,5 +160,20 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
     states_changed.write(event.states_changed.into());
     next_defined.write(event.next.is_some().into());
     next.write(event.next.unwrap_or(0.0));
+    Ok(())
+}
+
+pub unsafe fn fmi3GetNumberOfEventIndicators<M: Exported>(_: &mut Instance<M>, count: *mut usize) -> Outcome {
+    // SAFETY: by contract NULL or a pointer to a value.
+    unsafe { place(count, "nEventIndicators") }?.write(Instance::<M>::INDICATORS);
+    Ok(())
+}
+
+pub unsafe fn fmi3GetNumberOfContinuousStates<M: Exported>(
+    _: &mut Instance<M>,
+    count: *mut usize,
+) -> Outcome {
+    // SAFETY: by contract NULL or a pointer to a value.
+    unsafe { place(count, "nContinuousStates") }?.write(M::STATES.len());
     Ok(())
 }

@@ -22,8 +22,6 @@ mod absent;
 mod co_simulation;
 mod common;
 mod instances;
-mod model_exchange;
-mod values;
 
 pub use fmi_abi::fmi3::{ALLOWED, Function, Functions, types};
 pub use instances::{
@@ -48,6 +46,14 @@ pub const fn reference(place: u32) -> fmi3ValueReference {
 struct FromOne(fmi3ValueReference);
 
 impl Reference for FromOne {
+    const REFERENCES: &str = "valueReferences";
+    const VALUES: &str = "values";
+
+    #[inline]
+    fn cast(array: *const u32) -> *const Self {
+        array.cast()
+    }
+
     #[inline]
     fn place(self) -> u32 {
         self.0.wrapping_sub(reference(0))
@@ -71,6 +77,21 @@ mod bodies {
     pub(super) use super::absent::*;
     pub(super) use super::co_simulation::*;
     pub(super) use super::common::*;
-    pub(super) use super::model_exchange::*;
-    pub(super) use super::values::*;
+    pub(super) use crate::boundary::life_cycle::{
+        enter_event_mode as fmi3EnterEventMode, exit_initialization_mode as fmi3ExitInitializationMode,
+        reset as fmi3Reset, set_debug_logging as fmi3SetDebugLogging, terminate as fmi3Terminate,
+    };
+    pub(super) use crate::boundary::model_exchange::{
+        completed_integrator_step as fmi3CompletedIntegratorStep,
+        enter_continuous_time_mode as fmi3EnterContinuousTimeMode,
+        get_continuous_states as fmi3GetContinuousStates,
+        get_derivatives as fmi3GetContinuousStateDerivatives, get_event_indicators as fmi3GetEventIndicators,
+        get_nominals as fmi3GetNominalsOfContinuousStates, set_continuous_states as fmi3SetContinuousStates,
+        set_time as fmi3SetTime,
+    };
+    pub(super) use crate::boundary::states::{
+        deserialize as fmi3DeserializeFMUState, free_state as fmi3FreeFMUState, get_state as fmi3GetFMUState,
+        serialize as fmi3SerializeFMUState, serialized_size as fmi3SerializedFMUStateSize,
+        set_state as fmi3SetFMUState,
+    };
 }

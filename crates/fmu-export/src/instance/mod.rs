@@ -65,11 +65,26 @@ impl Importer {
 
 /// How an importer calls a variable: by a number that stands for its place in the table, or behind it.
 pub(crate) trait Reference: Copy {
+    /// What the standard calls an array of these, and one of values.
+    const REFERENCES: &str;
+    const VALUES: &str;
+
     fn place(self) -> u32;
+
+    /// An importer's array, as one of these.
+    fn cast(array: *const u32) -> *const Self;
 }
 
 /// Of FMI 2.0: the place itself.
 impl Reference for u32 {
+    const REFERENCES: &str = "vr";
+    const VALUES: &str = "value";
+
+    #[inline]
+    fn cast(array: *const u32) -> *const Self {
+        array
+    }
+
     #[inline]
     fn place(self) -> u32 {
         self

@@ -1,0 +1,69 @@
+//! The importer's log callback.
+
+use crate::fmi2::types::fmi2CallbackLogger;
+use crate::fmi3::types::fmi3LogMessageCallback;
+use crate::log::Message;
+use fmi_abi::c_types::c_void;
+use std::ffi::CString;
+
+/// The callback, as its standard has it.
+#[derive(Clone, Copy)]
+#[cfg_attr(target_family = "wasm", allow(dead_code, reason = "the C around the module knows the importer"))]
+pub(crate) enum Callback {
+    Fmi2(fmi2CallbackLogger),
+    Fmi3(fmi3LogMessageCallback),
+}
+
+/// The callback, if the importer has one, and what it wants back with every call. Copied, because the callbacks
+/// structure of FMI 2.0 may go after `fmi2Instantiate`.
+#[cfg_attr(target_family = "wasm", allow(dead_code, reason = "the C around the module knows the importer"))]
+pub(crate) struct ImporterLog {
+    pub callback: Option<Callback>,
+    pub environment: *mut c_void,
+    pub instance_name: CString,
+}
+
+#[cfg(target_family = "wasm")]
+#[link(wasm_import_module = "fmu")]
+unsafe extern "C" {
+    safe fn fmu_log(
+        status: fmi_abi::Status,
+        category: *const fmi_abi::c_types::c_char,
+        message: *const fmi_abi::c_types::c_char,
+    );
+}
+
+/// Hands a message to the C around the module.
+#[cfg(target_family = "wasm")]
+pub(super) fn log(message: &Message) {
+    fmu_log(message.status, message.category().as_ptr(), message.printable().as_ptr());
+}
+
+impl ImporterLog {
+    #[cfg(target_family = "wasm")]
+    pub fn deliver(&self, message: &Message) {
+        log(message);
+    }
+
+    #[cfg(not(target_family = "wasm"))]
+    pub fn deliver(&self, message: &Message) {
+        let Some(callback) = self.callback else { return };
+        let (category, text) = (message.category().as_ptr(), message.printable());
+        // SAFETY: the importer's promise that the logger works until the instance is freed; all strings end with a
+        // zero byte, and the message holds no format directive that would ask the variadic one for further arguments.
+        unsafe {
+            match callback {
+                Callback::Fmi2(logger) => logger(
+                    self.environment,
+                    self.instance_name.as_ptr(),
+                    message.status as _,
+                    category,
+                    text.as_ptr(),
+                ),
+                Callback::Fmi3(logger) => {
+                    logger(self.environment, message.status as _, category, text.as_ptr());
+                }
+            }
+        }
+    }
+}

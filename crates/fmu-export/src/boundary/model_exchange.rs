@@ -1,0 +1,81 @@
+//! Model Exchange (section 3.2 of both standards).
+//!
+//! # Safety
+//! As in the contract of the [standards' modules](crate::fmi2).
+
+use super::{array, named, output, place};
+use crate::export::Exported;
+use crate::instance::{Instance, Outcome};
+
+pub unsafe fn enter_continuous_time_mode<M: Exported>(instance: &mut Instance<M>) -> Outcome {
+    instance.enter_continuous_time_mode();
+    Ok(())
+}
+
+pub unsafe fn completed_integrator_step<M: Exported, Truth: From<bool>>(
+    instance: &mut Instance<M>,
+    _no_set_fmu_state_prior_to_current_point: Truth,
+    enter_event_mode: *mut Truth,
+    terminate_simulation: *mut Truth,
+) -> Outcome {
+    // SAFETY: by contract each NULL or a pointer to a value.
+    let (enter_event_mode, terminate_simulation) = unsafe {
+        (place(enter_event_mode, "enterEventMode")?, place(terminate_simulation, "terminateSimulation")?)
+    };
+    let wanted = instance.step_completed();
+    enter_event_mode.write(wanted.event.into());
+    terminate_simulation.write(wanted.terminate.into());
+    Ok(())
+}
+
+pub unsafe fn set_time<M: Exported>(instance: &mut Instance<M>, time: f64) -> Outcome {
+    instance.set_time(time)
+}
+
+pub unsafe fn set_continuous_states<M: Exported>(
+    instance: &mut Instance<M>,
+    x: *const f64,
+    count: usize,
+) -> Outcome {
+    let name = named(instance, "x", "continuousStates");
+    // SAFETY: by contract an array of this length.
+    instance.set_continuous_states(unsafe { array(x, count, name) }?)
+}
+
+pub unsafe fn get_derivatives<M: Exported>(
+    instance: &mut Instance<M>,
+    derivatives: *mut f64,
+    count: usize,
+) -> Outcome {
+    // SAFETY: by contract an array of this length.
+    instance.get_derivatives(unsafe { output(derivatives, count, "derivatives") }?)
+}
+
+pub unsafe fn get_event_indicators<M: Exported>(
+    instance: &mut Instance<M>,
+    indicators: *mut f64,
+    count: usize,
+) -> Outcome {
+    // SAFETY: by contract an array of this length.
+    instance.get_event_indicators(unsafe { output(indicators, count, "eventIndicators") }?)
+}
+
+pub unsafe fn get_continuous_states<M: Exported>(
+    instance: &mut Instance<M>,
+    x: *mut f64,
+    count: usize,
+) -> Outcome {
+    let name = named(instance, "x", "continuousStates");
+    // SAFETY: by contract an array of this length.
+    instance.get_continuous_states(unsafe { output(x, count, name) }?)
+}
+
+pub unsafe fn get_nominals<M: Exported>(
+    instance: &mut Instance<M>,
+    nominals: *mut f64,
+    count: usize,
+) -> Outcome {
+    let name = named(instance, "x_nominal", "nominals");
+    // SAFETY: by contract an array of this length.
+    instance.get_nominals(unsafe { output(nominals, count, name) }?)
+}

@@ -1,0 +1,230 @@
+//! Values of variables in arrays of the importer's (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI 3.0).
+
+use super::{array, output, same, string};
+use crate::export::Exported;
+use crate::instance::{Instance, Outcome, Reference};
+use crate::value::Value;
+use fmi_abi::BaseType;
+use fmi_abi::c_types::c_char;
+use std::ffi::{CStr, CString};
+use std::fmt::Display;
+use std::mem::MaybeUninit;
+
+/// Getters and setters of a standard under their C names: who carries them out, and for which types of variables. In
+/// FMI 3.0 they are told the number of values as well.
+macro_rules! getters_and_setters {
+    (
+        $reference:ty, $value_count:tt;
+        $($get:ident $get_values:ident, $set:ident $set_values:ident, $type:ty: $bases:expr;)+
+    ) => {
+        $(
+            getters_and_setters! {
+                @each $reference, $value_count, $get $get_values, $set $set_values, $type, $bases
+            }
+        )+
+    };
+    (
+        @each $reference:ty, [$($value_count:ident)?],
+        $get:ident $get_values:ident, $set:ident $set_values:ident, $type:ty, $bases:expr
+    ) => {
+        #[inline]
+        pub unsafe fn $get<M: Exported>(
+            instance: &mut Instance<M>,
+            vr: *const u32,
+            count: usize,
+            values: *mut $type
+            $(, $value_count: usize)?
+        ) -> Outcome {
+            let value_count = [$($value_count,)? count][0];
+            // SAFETY: by contract arrays of these lengths that do not overlap.
+            let (vr, values) = unsafe { to_write::<$reference, _>(vr, count, values, value_count) }?;
+            $get_values(instance, vr, values, &$bases)
+        }
+
+        #[inline]
+        pub unsafe fn $set<M: Exported>(
+            instance: &mut Instance<M>,
+            vr: *const u32,
+            count: usize,
+            values: *const $type
+            $(, $value_count: usize)?
+        ) -> Outcome {
+            let value_count = [$($value_count,)? count][0];
+            // SAFETY: by contract arrays of these lengths, texts strings.
+            unsafe {
+                let (vr, values) = to_read::<$reference, _>(vr, count, values, value_count)?;
+                $set_values(instance, vr, values, &$bases)
+            }
+        }
+    };
+}
+pub(crate) use getters_and_setters;
+
+/// The importer's arrays for values that it reads.
+///
+/// # Safety
+/// Each is NULL or an array of its length; nobody else uses the values for `'a`.
+#[inline]
+pub(crate) unsafe fn to_write<'a, R: Reference, T>(
+    vr: *const u32,
+    count: usize,
+    values: *mut T,
+    value_count: usize,
+) -> Outcome<(&'a [R], &'a mut [MaybeUninit<T>])> {
+    same("values", count, value_count)?;
+    // SAFETY: the caller's promise.
+    Ok(unsafe { (array(R::cast(vr), count, R::REFERENCES)?, output(values, value_count, R::VALUES)?) })
+}
+
+/// The importer's arrays of values that it sets.
+///
+/// # Safety
+/// Each is NULL or an array of its length, which stays as it is for `'a`.
+#[inline]
+pub(crate) unsafe fn to_read<'a, R: Reference, T>(
+    vr: *const u32,
+    count: usize,
+    values: *const T,
+    value_count: usize,
+) -> Outcome<(&'a [R], &'a [T])> {
+    same("values", count, value_count)?;
+    // SAFETY: the caller's promise.
+    Ok(unsafe { (array(R::cast(vr), count, R::REFERENCES)?, array(values, value_count, R::VALUES)?) })
+}
+
+#[inline]
+pub(crate) fn get_reals<M: Exported, R: Reference>(
+    instance: &mut Instance<M>,
+    vr: &[R],
+    values: &mut [MaybeUninit<f64>],
+    _: &[BaseType],
+) -> Outcome {
+    instance.get_reals(vr, values)
+}
+
+#[inline]
+pub(crate) fn set_reals<M: Exported, R: Reference>(
+    instance: &mut Instance<M>,
+    vr: &[R],
+    values: &[f64],
+    _: &[BaseType],
+) -> Outcome {
+    instance.set_reals(vr, values)
+}
+
+pub(crate) fn get_float32<M: Exported, R: Reference>(
+    instance: &mut Instance<M>,
+    vr: &[R],
+    values: &mut [MaybeUninit<f32>],
+    bases: &[BaseType],
+) -> Outcome {
+    instance.get(vr, bases, |place, value| {
+        if let Value::Real(value) = value {
+            values[place].write(value as f32);
+        }
+    })
+}
+
+pub(crate) fn set_float32<M: Exported, R: Reference>(
+    instance: &mut Instance<M>,
+    vr: &[R],
+    values: &[f32],
+    bases: &[BaseType],
+) -> Outcome {
+    instance.set(vr, bases, values.iter().map(|value| Value::Real((*value).into())))
+}
+
+/// `Value` has them in a wider type, and no value is outside of the narrow one.
+pub(crate) fn get_integers<M: Exported, R: Reference, T: TryFrom<i128> + Default>(
+    instance: &mut Instance<M>,
+    vr: &[R],
+    values: &mut [MaybeUninit<T>],
+    bases: &[BaseType],
+) -> Outcome {
+    instance.get(vr, bases, |place, value| {
+        if let Value::Integer(value) = value {
+            values[place].write(T::try_from(value).unwrap_or_default());
+        }
+    })
+}
+
+pub(crate) fn set_integers<M: Exported, R: Reference, T: Into<i128> + Copy>(
+    instance: &mut Instance<M>,
+    vr: &[R],
+    values: &[T],
+    bases: &[BaseType],
+) -> Outcome {
+    instance.set(vr, bases, values.iter().map(|value| Value::Integer((*value).into())))
+}
+
+pub(crate) fn get_booleans<M: Exported, R: Reference, T: From<bool>>(
+    instance: &mut Instance<M>,
+    vr: &[R],
+    values: &mut [MaybeUninit<T>],
+    bases: &[BaseType],
+) -> Outcome {
+    instance.get(vr, bases, |place, value| {
+        values[place].write((value == Value::Boolean(true)).into());
+    })
+}
+
+/// Truth values are numbers in C: callers may pass any.
+pub(crate) fn set_booleans<M: Exported, R: Reference, T: From<bool> + PartialEq + Display>(
+    instance: &mut Instance<M>,
+    vr: &[R],
+    values: &[T],
+    bases: &[BaseType],
+) -> Outcome {
+    let known = [false, true].map(T::from);
+    if let Some(place) = values.iter().position(|value| !known.contains(value)) {
+        return instance.refuse_value(vr, bases, place, |name| {
+            format!("{name} must be 0 (false) or 1 (true), it is {}", values[place])
+        });
+    }
+    instance.set(vr, bases, values.iter().map(|value| Value::Boolean(*value == known[1])))
+}
+
+/// The texts are the instance's until the next call on it.
+pub(crate) fn get_texts<M: Exported, R: Reference>(
+    instance: &mut Instance<M>,
+    vr: &[R],
+    values: &mut [MaybeUninit<*const c_char>],
+    bases: &[BaseType],
+) -> Outcome {
+    let mut texts = Vec::with_capacity(vr.len());
+    instance.get(vr, bases, |_, value| {
+        if let Value::String(text) = value {
+            // A zero byte would end the text for C.
+            texts.push(CString::new(text.replace('\0', " ")).unwrap_or_default());
+        }
+    })?;
+    values.iter_mut().zip(&texts).for_each(|(value, text)| {
+        value.write(text.as_ptr());
+    });
+    instance.texts = texts;
+    Ok(())
+}
+
+/// # Safety
+/// Each value is NULL or a string.
+pub(crate) unsafe fn set_texts<M: Exported, R: Reference>(
+    instance: &mut Instance<M>,
+    vr: &[R],
+    values: &[*const c_char],
+    bases: &[BaseType],
+) -> Outcome {
+    let mut texts = Vec::with_capacity(vr.len());
+    for (place, value) in values.iter().enumerate() {
+        // SAFETY: by contract NULL or a string.
+        let fault = match unsafe { string(*value) }.map(CStr::to_str) {
+            Some(Ok(text)) => {
+                texts.push(Value::String(text.to_owned()));
+                continue;
+            }
+            Some(Err(_)) => "not UTF-8",
+            None => "NULL",
+        };
+        return instance.refuse_value(vr, bases, place, |name| format!("the text for {name} is {fault}"));
+    }
+    instance.set(vr, bases, texts.iter().cloned())
+}
