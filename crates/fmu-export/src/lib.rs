@@ -9,6 +9,7 @@
 
 mod boundary;
 mod capabilities;
+mod causality;
 mod export;
 pub mod fmi2;
 pub mod fmi3;
@@ -29,6 +30,7 @@ pub use capabilities::{
     CoSimulation, Event, Events, InputDerivatives, ModelExchange, OutputDerivatives, Partials, Step,
     StepCompleted, Stepped,
 };
+pub use causality::{Causality, Initial, Variability};
 pub use export::{CoSimulationOffer, Exported, ModelExchangeOffer};
 pub use fmi_abi::{BaseType, Category, Interface, Mode, Rule, Situations, Standard, Status};
 pub use info::{DefaultExperiment, Info};
@@ -39,7 +41,7 @@ pub use table::Variables;
 pub use types::{Attributes, BINARY, BOOLEAN, INTEGER, Item, NUMBER, STRING, TIME, Type};
 pub use units::{BaseUnit, DisplayUnit, Unit};
 pub use value::{Enumeration, Scalar, Value};
-pub use variable::{Causality, Index, Initial, Variability, Variable};
+pub use variable::{Index, Variable};
 
 #[doc(hidden)]
 pub use {

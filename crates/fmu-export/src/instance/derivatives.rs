@@ -2,8 +2,9 @@
 //! 2.0, 4.1.2 of FMI 3.0).
 
 use super::{Instance, Outcome, Reference, finite, independent, refuse};
+use crate::causality::{Causality, Initial, Variability};
 use crate::export::Exported;
-use crate::variable::{Causality, Initial, Variability, Variable};
+use crate::variable::Variable;
 use fmi_abi::BaseType;
 use fmi_abi::{Mode, Standard};
 use std::mem::MaybeUninit;

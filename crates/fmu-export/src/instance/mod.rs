@@ -5,6 +5,7 @@
 mod co_simulation;
 mod derivatives;
 mod model_exchange;
+mod origin;
 mod refusal;
 mod saved_states;
 mod serialized;
@@ -15,12 +16,13 @@ pub(crate) use derivatives::Direction;
 pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
 
 use crate::capabilities::Events;
+use crate::causality::Causality;
 use crate::export::Exported;
 use crate::log::Logger;
 use crate::model::{Error, Experiment, Setup};
 use crate::types::{NUMBER, TIME};
 use crate::value::Value;
-use crate::variable::{Causality, Read, Variable};
+use crate::variable::{Read, Variable};
 use fmi_abi::BaseType;
 use fmi_abi::Status;
 use fmi_abi::{Interface, Mode, Situation, Standard};

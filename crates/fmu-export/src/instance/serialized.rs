@@ -1,6 +1,6 @@
 //! Saved states as bytes, with version and checksum.
 
-use super::saved_states::Origin;
+use super::origin::Origin;
 use super::values::check_value;
 use super::{Outcome, State, refuse};
 use crate::export::Exported;
