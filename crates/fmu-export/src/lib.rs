@@ -46,6 +46,7 @@ pub use variable::{Index, Variable};
 #[doc(hidden)]
 pub use {
     fmi_abi::{fmi2_functions, fmi3_functions},
+    instance::{SavedTrial, Trial},
     table::{StateOfTable, check_names, count_states, find_states},
     value::visit_enumeration,
     variable::{Read, Store, base_of_calculation, base_of_place, read},

@@ -24,12 +24,14 @@ pub(crate) fn check<M: Exported>(
     sampler.running = running;
     let mut points = Vec::new();
     for _ in 0..POINTS {
-        let (mut point, _) = sampler.draw(None, true, |_| true)?;
+        let (mut point, mut model) = sampler.draw(None, true, |_| true)?;
         // What is set in Co-Simulation may act in the step that follows.
-        if running && M::MODEL_EXCHANGE.is_some() {
+        if running && M::MODEL_EXCHANGE.is_some() && point.interface != Interface::ModelExchange {
             point.interface = Interface::ModelExchange;
+            let Ok(same) = model_at::<M>(&point, running) else { continue };
+            model = same;
         }
-        points.extend(model_at::<M>(&point, running).map(|model| (model, point.time)));
+        points.push((model, point.time));
     }
     let is_real = |vr: &&u32| M::TABLE.get(**vr as usize).is_none_or(|of| of.base() == BaseType::Real);
     for unknown in unknowns.iter().filter(is_real) {
@@ -43,8 +45,11 @@ pub(crate) fn check<M: Exported>(
 fn check_pair<M: Exported>(points: &[(M, f64)], running: bool, unknown: u32, known: u32) -> Result<()> {
     let (time, of_time) = independent::<M>();
     let of = &M::TABLE[unknown as usize];
-    let size =
-        points.iter().filter_map(|(model, _)| real(of, model)).fold(nominal(of), |a, b| a.max(b.abs()));
+    let nominal = match of.of().of {
+        Attributes::Real { nominal, .. } => nominal.unwrap_or_default(),
+        _ => 0.0,
+    };
+    let size = points.iter().filter_map(|(model, _)| real(of, model)).fold(nominal, |a, b| a.max(b.abs()));
     let mut wrong = Vec::new();
     for (model, now) in points {
         let by = (known != time).then(|| M::NAMES[known as usize]);
@@ -53,11 +58,8 @@ fn check_pair<M: Exported>(points: &[(M, f64)], running: bool, unknown: u32, kno
         };
         let variable = M::TABLE.get(known as usize).filter(|_| known != time);
         let Some(at) = variable.map_or(Some(*now), |known| real(known, model)) else { continue };
-        let scale = if at == 0.0 {
-            Some(variable.map_or(1.0, nominal)).filter(|n| *n != 0.0).unwrap_or(1.0)
-        } else {
-            at.abs()
-        };
+        let scale =
+            if at == 0.0 { variable.map_or(1.0, |known| known.of().nominal_or_one()) } else { at.abs() };
         let value = |offset: f64| {
             let mut model = model.clone();
             let time = match variable {
@@ -100,13 +102,5 @@ fn real<M>(of: &Variable<M>, model: &M) -> Option<f64> {
     match of.value(model) {
         Some(Value::Real(value)) => Some(value),
         _ => None,
-    }
-}
-
-/// The order of magnitude that the type says.
-fn nominal<M>(of: &Variable<M>) -> f64 {
-    match of.of().of {
-        Attributes::Real { nominal: Some(nominal), .. } => nominal,
-        _ => 0.0,
     }
 }

@@ -75,7 +75,7 @@ impl<M: Exported> Instance<M> {
     }
 
     #[inline]
-    fn step(&mut self, point: f64, step_size: f64) -> Outcome<Stepped> {
+    pub(super) fn step(&mut self, point: f64, step_size: f64) -> Outcome<Stepped> {
         let end = point + step_size;
         // False for what is no number, too.
         if !(point > f64::NEG_INFINITY && end > point && end < f64::INFINITY) {

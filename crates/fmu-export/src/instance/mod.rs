@@ -9,11 +9,13 @@ mod origin;
 mod refusal;
 mod saved_states;
 mod serialized;
+mod trial;
 mod values;
 
 pub(crate) use co_simulation::no_status;
 pub(crate) use derivatives::Direction;
 pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
+pub use trial::{SavedTrial, Trial};
 
 use crate::capabilities::Events;
 use crate::causality::Causality;
