@@ -1,9 +1,8 @@
-//! XML files as trees of elements.
+//! XML files to be written, as trees of elements.
 
-use anyhow::{Context, Result, bail};
-use quick_xml::XmlVersion;
+use anyhow::Result;
+use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesStart, BytesText, Event};
-use quick_xml::{Reader, Writer};
 use std::fmt::Display;
 use std::io;
 
@@ -61,35 +60,6 @@ impl Element {
         self.attributes.iter().find(|(known, _)| known == name).map(|(_, value)| value.as_str())
     }
 
-    /// The children of the children of this name.
-    pub fn children_of(&self, name: &str) -> impl Iterator<Item = &Self> {
-        self.children.iter().filter(move |child| child.name == name).flat_map(|child| &child.children)
-    }
-
-    /// Reads a document; text between elements is left out.
-    ///
-    /// # Errors
-    /// When it is no XML.
-    pub fn parse(text: &str) -> Result<Self> {
-        let mut reader = Reader::from_str(text);
-        reader.config_mut().expand_empty_elements = true;
-        let mut open: Vec<Self> = Vec::new();
-        loop {
-            match reader.read_event()? {
-                Event::Start(start) => open.push(element(&start)?),
-                Event::End(_) => {
-                    let closed = open.pop().context("an element ends that has not begun")?;
-                    match open.last_mut() {
-                        Some(parent) => parent.children.push(closed),
-                        None => return Ok(closed),
-                    }
-                }
-                Event::Eof => bail!("it ends too early"),
-                _ => {}
-            }
-        }
-    }
-
     /// The document with this element as its root, indented.
     ///
     /// # Errors
@@ -122,13 +92,4 @@ impl Element {
         self.children.iter().try_for_each(|child| child.write(writer))?;
         writer.write_event(Event::End(end))
     }
-}
-
-fn element(start: &BytesStart) -> Result<Element> {
-    let mut element = Element::new(start.name().as_ref());
-    for attribute in start.attributes() {
-        let attribute = attribute?;
-        element = element.with(attribute.key.as_ref(), attribute.normalized_value(XmlVersion::Explicit1_0)?);
-    }
-    Ok(element)
 }

@@ -1,8 +1,8 @@
-//! What the model description says, as far as running the FMU needs it.
+//! What the model description says, as far as running or wiring the FMU needs it.
 
-use fmi_abi::{BaseType, Standard};
+use fmi_abi::{BaseType, Interface, Standard};
 use roxmltree::{Document, Node};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// A variable of an FMU.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,19 +21,19 @@ pub struct Variable {
     pub start: Option<String>,
     /// Its unit, or that of its declared type, if there is one.
     pub unit: Option<String>,
+    /// Its smallest value, or that of its declared type, if there is one.
+    pub min: Option<f64>,
+    /// Its largest value, or that of its declared type, if there is one.
+    pub max: Option<f64>,
+    /// The name of its declared type, if it has one.
+    pub declared_type: Option<String>,
     /// What it means.
     pub description: String,
 }
 
-/// The model description of an FMU, as far as running it needs it.
+/// What an FMU offers to those who use it by one type of interface.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Description {
-    /// The edition of the standard.
-    pub standard: Standard,
-    /// The name of the model.
-    pub model_name: String,
-    /// `guid` of FMI 2.0, `instantiationToken` of FMI 3.0.
-    pub token: String,
+pub struct Offer {
     /// What the library is called.
     pub identifier: String,
     /// One instance in a process is all there may be.
@@ -42,8 +42,27 @@ pub struct Description {
     pub needs_execution_tool: bool,
     /// It takes input derivatives (FMI 2.0, `canInterpolateInputs`).
     pub input_derivatives: bool,
+}
+
+/// The model description of an FMU, as far as running or wiring it needs it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    /// The edition of the standard.
+    pub standard: Standard,
+    /// The name of the model.
+    pub model_name: String,
+    /// `guid` of FMI 2.0, `instantiationToken` of FMI 3.0.
+    pub token: String,
+    /// What it offers in Co-Simulation, if it has that.
+    pub co_simulation: Option<Offer>,
+    /// What it offers in Model Exchange, if it has that.
+    pub model_exchange: Option<Offer>,
     /// In the order of the model description.
     pub variables: Vec<Variable>,
+    /// The units by their names, each with the exponents of SI's base units, factor and offset as they are written.
+    pub units: BTreeMap<String, Vec<(String, String)>>,
+    /// The enumerations by their names, each with the names and numbers of its items.
+    pub enumerations: BTreeMap<String, Vec<(String, String)>>,
     places: HashMap<String, usize>,
 }
 
@@ -51,7 +70,7 @@ impl Description {
     /// Reads a `modelDescription.xml`.
     ///
     /// # Errors
-    /// A sentence on what is wrong, or missing for Co-Simulation.
+    /// A sentence on what is wrong or missing.
     pub fn parse(text: &str) -> Result<Self, String> {
         let document =
             Document::parse(text).map_err(|error| format!("modelDescription.xml is no XML: {error}"))?;
@@ -62,14 +81,8 @@ impl Description {
             version if version.starts_with("3.") => Standard::Fmi3,
             _ => return Err(format!("its fmiVersion is {version:?}; 2.0 and 3.0 can be run")),
         };
-        let slave = child(root, "CoSimulation")
-            .ok_or("it has no Co-Simulation, only Model Exchange, which needs a solver")?;
-        let needed = |node: Node, name: &str| {
-            node.attribute(name)
-                .map(str::to_owned)
-                .ok_or_else(|| format!("modelDescription.xml: {} lacks {name}", node.tag_name().name()))
-        };
-        let is_true = |name| matches!(slave.attribute(name), Some("true" | "1"));
+        let offer = |name: &str| child(root, name).map(|node| offer(standard, node)).transpose();
+        let (co_simulation, model_exchange) = (offer("CoSimulation")?, offer("ModelExchange")?);
         let (token, variables) = match standard {
             Standard::Fmi2 => ("guid", variables_of_fmi2(root)),
             Standard::Fmi3 => ("instantiationToken", variables_of_fmi3(root)),
@@ -79,13 +92,21 @@ impl Description {
             standard,
             model_name: needed(root, "modelName")?,
             token: needed(root, token)?,
-            identifier: needed(slave, "modelIdentifier")?,
-            once_per_process: is_true("canBeInstantiatedOnlyOncePerProcess"),
-            needs_execution_tool: is_true("needsExecutionTool"),
-            input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
+            co_simulation,
+            model_exchange,
             places: variables.iter().enumerate().map(|(place, of)| (of.name.clone(), place)).collect(),
             variables,
+            units: elements(root, "UnitDefinitions").map(unit).collect(),
+            enumerations: elements(root, "TypeDefinitions").filter_map(enumeration).collect(),
         })
+    }
+
+    /// What it offers for this type of interface, if it has that.
+    pub fn offer(&self, interface: Interface) -> Option<&Offer> {
+        match interface {
+            Interface::CoSimulation => self.co_simulation.as_ref(),
+            Interface::ModelExchange => self.model_exchange.as_ref(),
+        }
     }
 
     /// The variable of this name.
@@ -94,29 +115,61 @@ impl Description {
     }
 }
 
+fn needed(node: Node, name: &str) -> Result<String, String> {
+    node.attribute(name)
+        .map(str::to_owned)
+        .ok_or_else(|| format!("modelDescription.xml: {} lacks {name}", node.tag_name().name()))
+}
+
+fn offer(standard: Standard, node: Node) -> Result<Offer, String> {
+    let is_true = |name| matches!(node.attribute(name), Some("true" | "1"));
+    Ok(Offer {
+        identifier: needed(node, "modelIdentifier")?,
+        once_per_process: is_true("canBeInstantiatedOnlyOncePerProcess"),
+        needs_execution_tool: is_true("needsExecutionTool"),
+        input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
+    })
+}
+
+fn attributes(node: Node) -> Vec<(String, String)> {
+    node.attributes().map(|of| (of.name().to_owned(), of.value().to_owned())).collect()
+}
+
+/// Section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0.
+fn unit(node: Node) -> (String, Vec<(String, String)>) {
+    let base = child(node, "BaseUnit").map(attributes).unwrap_or_default();
+    (node.attribute("name").unwrap_or_default().to_owned(), base)
+}
+
+/// A type's element in FMI 2.0 holds one for its kind (section 2.2.3); in FMI 3.0 it is that itself (2.4.4).
+fn enumeration(node: Node) -> Option<(String, Vec<(String, String)>)> {
+    let items = node.descendants().filter(|item| item.has_tag_name("Item"));
+    let item = |item: Node| Some((item.attribute("name")?.to_owned(), item.attribute("value")?.to_owned()));
+    let items: Vec<_> = items.filter_map(item).collect();
+    (!items.is_empty()).then(|| Some((node.attribute("name")?.to_owned(), items)))?
+}
+
 fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
     node.children().find(|child| child.has_tag_name(name))
 }
 
-/// Units by the names of the types that have one (section 2.2.3 of FMI 2.0, where it stands in an element for the kind of
-/// type, and 2.4.4 of FMI 3.0).
-fn units_of_types<'a>(root: Node<'a, 'a>) -> Units<'a> {
-    let types = elements(root, "TypeDefinitions");
-    let unit = |of: Node<'a, 'a>| of.children().chain([of]).find_map(|node| node.attribute("unit"));
-    types.filter_map(|of| Some((of.attribute("name")?, unit(of)?))).collect()
-}
+/// The declared types by name, each as the elements that have attributes: in FMI 2.0 one for the kind is in the type's.
+type Types<'a> = HashMap<&'a str, Vec<Node<'a, 'a>>>;
 
-type Units<'a> = HashMap<&'a str, &'a str>;
+fn types<'a>(root: Node<'a, 'a>) -> Types<'a> {
+    let types = elements(root, "TypeDefinitions");
+    types.filter_map(|of| Some((of.attribute("name")?, of.children().chain([of]).collect()))).collect()
+}
 
 /// Each is a `ScalarVariable` with an element for its type (section 2.2.7 of FMI 2.0).
 fn variables_of_fmi2(root: Node) -> Result<Vec<Variable>, String> {
     let mut found = Vec::new();
-    let units = units_of_types(root);
+    let types = types(root);
     for node in elements(root, "ModelVariables") {
         let of_type = node.children().find_map(|child| Some((child, base_of_fmi2(child.tag_name().name())?)));
         let (of_type, base) =
             of_type.ok_or_else(|| format!("modelDescription.xml: {} has no type", name_of(node)))?;
-        found.push(variable(node, of_type, base, &units)?);
+        found.push(variable(node, of_type, base, &types)?);
     }
     Ok(found)
 }
@@ -125,12 +178,12 @@ fn variables_of_fmi2(root: Node) -> Result<Vec<Variable>, String> {
 /// reads them.
 fn variables_of_fmi3(root: Node) -> Result<Vec<Variable>, String> {
     let mut found = Vec::new();
-    let units = units_of_types(root);
+    let types = types(root);
     for node in elements(root, "ModelVariables") {
         if let Some(base) = base_of_fmi3(node.tag_name().name())
             && child(node, "Dimension").is_none()
         {
-            found.push(variable(node, node, base, &units)?);
+            found.push(variable(node, node, base, &types)?);
         }
     }
     Ok(found)
@@ -144,7 +197,7 @@ fn name_of<'a>(node: Node<'a, 'a>) -> &'a str {
     node.attribute("name").unwrap_or("a variable without a name")
 }
 
-fn variable(node: Node, of_type: Node, base: BaseType, units: &Units) -> Result<Variable, String> {
+fn variable(node: Node, of_type: Node, base: BaseType, types: &Types) -> Result<Variable, String> {
     let reference = node.attribute("valueReference").and_then(|text| text.parse().ok());
     let text = |name: &str| node.attribute(name).map(str::to_owned);
     let start = match base {
@@ -154,7 +207,12 @@ fn variable(node: Node, of_type: Node, base: BaseType, units: &Units) -> Result<
         }
         _ => of_type.attribute("start"),
     };
-    let declared = || units.get(of_type.attribute("declaredType")?).copied();
+    let declared_type = of_type.attribute("declaredType");
+    let declared = declared_type.and_then(|name| types.get(name)).map_or(&[][..], Vec::as_slice);
+    let of_both = |name: &str| {
+        of_type.attribute(name).or_else(|| declared.iter().find_map(|node| node.attribute(name)))
+    };
+    let number = |name: &str| of_both(name).and_then(|text| text.parse().ok());
     Ok(Variable {
         name: name_of(node).to_owned(),
         reference: reference
@@ -163,7 +221,10 @@ fn variable(node: Node, of_type: Node, base: BaseType, units: &Units) -> Result<
         causality: text("causality").unwrap_or_else(|| "local".to_owned()),
         variability: text("variability"),
         start: start.map(str::to_owned),
-        unit: of_type.attribute("unit").or_else(declared).map(str::to_owned),
+        unit: of_both("unit").map(str::to_owned),
+        min: number("min"),
+        max: number("max"),
+        declared_type: declared_type.map(str::to_owned),
         description: text("description").unwrap_or_default(),
     })
 }

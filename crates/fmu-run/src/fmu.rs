@@ -1,6 +1,6 @@
 //! An FMU that has been unpacked and loaded.
 
-use crate::description::Description;
+use crate::description::{Description, Offer};
 use crate::error::Error;
 use crate::library::Library;
 use crate::machine;
@@ -59,12 +59,15 @@ impl Fmu {
         let text = std::fs::read_to_string(&file)
             .map_err(|_| fail("there is no readable modelDescription.xml in it; it is no FMU".to_owned()))?;
         let description = Description::parse(&text).map_err(fail)?;
-        if description.needs_execution_tool && !execution_tool {
+        let offer = description.co_simulation.as_ref().ok_or_else(|| {
+            fail("it has no Co-Simulation, only Model Exchange, which needs a solver".to_owned())
+        })?;
+        if offer.needs_execution_tool && !execution_tool {
             let why = "it starts another program, which must be installed (needsExecutionTool); to run it all the same, \
                 open it with execution_tool=True, in Rust with open_with_execution_tool";
             return Err(fail(why.to_owned()));
         }
-        let file = library_of(folder.path(), &description).map_err(fail)?;
+        let file = library_of(folder.path(), description.standard, offer).map_err(fail)?;
         // SAFETY: the caller's promise.
         let loaded = unsafe { Library::load(&file, description.standard) };
         let library = loaded.map_err(|error| {
@@ -119,9 +122,9 @@ fn folders(standard: Standard) -> Vec<String> {
     }
 }
 
-fn library_of(folder: &Path, description: &Description) -> Result<PathBuf, String> {
-    let name = format!("{}{DLL_SUFFIX}", description.identifier);
-    let folders = folders(description.standard);
+fn library_of(folder: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
+    let name = format!("{}{DLL_SUFFIX}", offer.identifier);
+    let folders = folders(standard);
     let binaries = folder.join("binaries");
     if let Some(found) =
         folders.iter().map(|folder| binaries.join(folder).join(&name)).find(|path| path.is_file())

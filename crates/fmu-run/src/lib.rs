@@ -15,7 +15,7 @@ mod library;
 mod machine;
 
 pub use batch::{Batch, Course, Measure, Planned, Runs, Size, Start, Watch};
-pub use description::{Description, Variable};
+pub use description::{Description, Offer, Variable};
 pub use error::Error;
-pub use fmi_abi::{BaseType, Standard};
+pub use fmi_abi::{BaseType, Interface, Standard};
 pub use fmu::Fmu;

@@ -1,105 +1,102 @@
 //! What a system needs to know of an FMU.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, anyhow, bail, ensure};
 use fmu_package::files::unzip;
-use fmu_package::xml::Element;
-use std::collections::BTreeMap;
+use fmu_run::{BaseType, Description, Variable};
 
 /// An FMU that has been read.
 pub struct Fmu {
     pub bytes: Vec<u8>,
-    pub variables: BTreeMap<String, Variable>,
-    /// By name, as SSP has them.
-    pub units: BTreeMap<String, Element>,
+    pub description: Description,
 }
 
-/// A variable of an FMU.
-pub struct Variable {
-    pub causality: String,
-    /// `Real`, `Integer`, `Boolean`, `String` or `Enumeration`.
-    pub kind: String,
-    pub unit: Option<String>,
-    /// Of an Enumeration.
-    pub items: Option<Items>,
-}
-
-/// The items of an enumeration: its name, and name and number of each item.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Items {
-    pub name: String,
-    pub items: Vec<(String, String)>,
-}
+/// The names and numbers of an enumeration's items.
+pub type Items = [(String, String)];
 
 impl Fmu {
     /// From the content of its file.
     pub fn read(bytes: Vec<u8>) -> Result<Self> {
         let text = String::from_utf8(unzip(&bytes, "modelDescription.xml")?)?;
-        let description = Element::parse(&text).context("its modelDescription.xml cannot be read")?;
-        let version = description.attribute("fmiVersion").unwrap_or_default();
-        ensure!(!version.starts_with("3."), "it is for FMI {version}; systems are of FMUs for FMI 2.0");
-        let units = description.children_of("UnitDefinitions").map(unit).collect();
-        let types: BTreeMap<&str, &Element> = description
-            .children_of("TypeDefinitions")
-            .filter_map(|of| Some((of.attribute("name")?, of.children.first()?)))
-            .collect();
-        let named = |variable: &Element| {
-            Some((variable.attribute("name")?.to_owned(), self::variable(variable, &types)?))
-        };
-        let variables = description.children_of("ModelVariables").filter_map(named).collect();
-        Ok(Self { bytes, variables, units })
+        Ok(Self { bytes, description: Description::parse(&text).map_err(|why| anyhow!(why))? })
+    }
+
+    /// A variable of it.
+    pub fn variable(&self, name: &str) -> Option<Own<'_>> {
+        Some(Own { fmu: self, variable: self.description.variable(name)? })
     }
 }
 
-fn unit(unit: &Element) -> (String, Element) {
-    let name = unit.attribute("name").unwrap_or_default();
-    let base = unit.children.iter().find(|child| child.name == "BaseUnit");
-    let attributes = base.map(|base| base.attributes.clone()).unwrap_or_default();
-    let base = Element { attributes, ..Element::new("ssc:BaseUnit") };
-    (name.to_owned(), Element::new("ssc:Unit").with("name", name).containing([base]))
+/// A variable of an FMU.
+#[derive(Clone, Copy)]
+pub struct Own<'a> {
+    fmu: &'a Fmu,
+    pub variable: &'a Variable,
 }
 
-fn variable(variable: &Element, types: &BTreeMap<&str, &Element>) -> Option<Variable> {
-    let kind = variable.children.first()?;
-    let declared = kind.attribute("declaredType");
-    let of = declared.and_then(|name| types.get(name));
-    let unit = kind.attribute("unit").or_else(|| of?.attribute("unit"));
-    let item =
-        |item: &Element| Some((item.attribute("name")?.to_owned(), item.attribute("value")?.to_owned()));
-    let items = of.filter(|of| of.name == "Enumeration").map(|of| Items {
-        name: declared.unwrap_or_default().to_owned(),
-        items: of.children.iter().filter_map(item).collect(),
-    });
-    Some(Variable {
-        causality: variable.attribute("causality").unwrap_or("local").to_owned(),
-        kind: kind.name.clone(),
-        unit: unit.map(str::to_owned),
-        items,
-    })
-}
+impl<'a> Own<'a> {
+    /// Its type as SSP 1.0 and OSP have them, which tell numbers of FMI 3.0 apart as little as FMI 2.0.
+    pub fn kind(self) -> &'static str {
+        match self.variable.base {
+            BaseType::Real | BaseType::Float32 => "Real",
+            BaseType::Boolean => "Boolean",
+            BaseType::String => "String",
+            BaseType::Binary => "Binary",
+            BaseType::Enumeration => "Enumeration",
+            _ => "Integer",
+        }
+    }
 
-impl Variable {
-    /// Fails unless this text is a value of the variable: a number, `true` or `false`, any text, the name of an item.
-    pub fn check_start(&self, name: &str, text: &str) -> Result<()> {
-        let possible = match self.kind.as_str() {
-            "Real" => {
-                let value: Option<f64> = text.parse().ok();
-                if let Some(value) = value.filter(|value| !value.is_finite()) {
-                    anyhow::bail!("the start value of {name} must be a finite number, it is {value}");
-                }
-                value.is_some()
-            }
-            "Integer" => text.parse::<i32>().is_ok(),
-            "Boolean" => text.parse::<bool>().is_ok(),
-            "Enumeration" => self.number_of(text).is_some(),
-            _ => true,
-        };
-        ensure!(possible, "{name} is {}, its start value cannot be '{}'", self.kind, text.escape_debug());
-        Ok(())
+    /// Name and items of its enumeration, if it is of one.
+    pub fn items(self) -> Option<(&'a str, &'a Items)> {
+        let name = self.variable.declared_type.as_deref()?;
+        let (name, items) = self.fmu.description.enumerations.get_key_value(name)?;
+        Some((name, items))
     }
 
     /// The number of an item.
-    pub fn number_of(&self, item: &str) -> Option<&str> {
-        let items = &self.items.as_ref()?.items;
+    pub fn number_of(self, item: &str) -> Option<&'a str> {
+        let (_, items) = self.items()?;
         items.iter().find(|(name, _)| name == item).map(|(_, number)| number.as_str())
+    }
+
+    /// Fails unless a system may start this variable otherwise.
+    pub fn check_settable(self, name: &str) -> Result<()> {
+        let Variable { start, variability, causality, .. } = self.variable;
+        let is_constant = variability.as_deref() == Some("constant");
+        ensure!(start.is_some() && !is_constant, "{name} is {causality} and takes no start value");
+        Ok(())
+    }
+
+    /// Fails unless this text is a value of the variable: a number in its range, `true` or `false`, any text, the name of an
+    /// item.
+    pub fn check_start(self, name: &str, text: &str) -> Result<()> {
+        let number: Option<f64> = match self.kind() {
+            "Real" => text.parse().ok(),
+            "Integer" => text.parse::<i64>().ok().map(|value| value as f64),
+            _ => None,
+        };
+        if let Some(value) = number {
+            let Variable { min, max, base, .. } = self.variable;
+            ensure!(value.is_finite(), "the start value of {name} must be a finite number, it is {value}");
+            let [least, most] = match base.range() {
+                Some((least, most)) => [Some(least as f64), Some(most as f64)],
+                None => [None, None],
+            };
+            if let Some(min) = min.or(least).filter(|min| value < *min) {
+                bail!("the start value of {name} must not be below {min}, it is {value}");
+            }
+            if let Some(max) = max.or(most).filter(|max| value > *max) {
+                bail!("the start value of {name} must not be above {max}, it is {value}");
+            }
+        }
+        let possible = match self.kind() {
+            "Real" | "Integer" => number.is_some(),
+            "Boolean" => text.parse::<bool>().is_ok(),
+            "Enumeration" => self.number_of(text).is_some(),
+            "Binary" => false,
+            _ => true,
+        };
+        ensure!(possible, "{name} is {}, its start value cannot be '{}'", self.kind(), text.escape_debug());
+        Ok(())
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! ## Inside
 //!
-//! `fmu` reads what an FMU says of itself, `system` checks the wiring against it; `ssp` and `osp` write.
+//! `fmu` has what an FMU says of itself, `system` checks the wiring against it; `ssp` and `osp` write.
 
 mod fmu;
 mod osp;

@@ -65,7 +65,7 @@ impl CheckedSystem<'_> {
         let variable = self.variable(name)?;
         Ok(match variable.number_of(start) {
             Some(number) => Element::new("Integer").with("value", number),
-            None => Element::new(&*variable.kind).with("value", start),
+            None => Element::new(variable.kind()).with("value", start),
         })
     }
 }

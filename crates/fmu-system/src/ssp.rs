@@ -1,6 +1,6 @@
 //! As SSP: System Structure and Parameterization 1.0.
 
-use crate::fmu::{Items, Variable};
+use crate::fmu::{Items, Own};
 use crate::system::{CheckedSystem, System, file_name, split};
 use anyhow::{Result, ensure};
 use fmu_package::files::{write_atomically, zip};
@@ -56,7 +56,7 @@ impl CheckedSystem<'_> {
                 .with("name", component)
                 .with("type", "application/x-fmu-sharedlibrary")
                 .with("source", format!("resources/{}", file_name(path)?))
-                .containing([Element::new("ssd:Connectors").containing(connectors)])
+                .containing(list("ssd:Connectors", connectors))
                 .containing(start.then(|| binding(component)));
             elements.push(element);
         }
@@ -70,13 +70,11 @@ impl CheckedSystem<'_> {
         let system = Element::new("ssd:System")
             .with("name", name)
             .with("description", description)
-            .containing([Element::new("ssd:Connectors").containing(connectors)])
+            .containing(list("ssd:Connectors", connectors))
             .containing((!inputs.is_empty()).then(|| binding("experiment")))
-            .containing([
-                Element::new("ssd:Elements").containing(elements),
-                Element::new("ssd:Connections").containing(from_inputs.chain(inside).chain(to_outputs)),
-                self.omsimulator(),
-            ]);
+            .containing([Element::new("ssd:Elements").containing(elements)])
+            .containing(list("ssd:Connections", from_inputs.chain(inside).chain(to_outputs).collect()))
+            .containing([self.omsimulator()]);
         let root = Element::new("ssd:SystemStructureDescription")
             .with("xmlns:ssd", "http://ssp-standard.org/SSP1/SystemStructureDescription")
             .with("xmlns:ssc", COMMON)
@@ -90,7 +88,8 @@ impl CheckedSystem<'_> {
         Ok(root
             .containing([system])
             .containing(enumerations(&used)?)
-            .containing([self.units_of(&used), experiment]))
+            .containing(list("ssd:Units", self.units_of(&used)))
+            .containing([experiment]))
     }
 
     /// The kind of master, without which OMSimulator does not take the file; others skip it. The tolerances are
@@ -113,7 +112,7 @@ impl CheckedSystem<'_> {
     }
 
     /// The variables that have connectors.
-    fn connected(&self) -> Result<Vec<&Variable>> {
+    fn connected(&self) -> Result<Vec<Own<'_>>> {
         let System { inputs, outputs, connections, .. } = self.system;
         let ends = connections.iter().map(|(_, to)| *to).chain(inputs.iter().map(|(_, to, _)| *to));
         let ends = ends.chain(outputs.iter().map(|(_, from)| *from));
@@ -121,19 +120,24 @@ impl CheckedSystem<'_> {
     }
 
     /// The units of variables, and no others.
-    fn units_of(&self, variables: &[&Variable]) -> Element {
-        let used: HashSet<_> = variables.iter().map(|variable| variable.unit.as_deref()).collect();
-        let in_use = |(name, _): &(&String, &Element)| used.contains(&Some(name.as_str()));
-        let units = self.units.iter().filter(in_use).map(|(_, unit)| unit.clone());
-        Element::new("ssd:Units").containing(units)
+    fn units_of(&self, variables: &[Own]) -> Vec<Element> {
+        let used: HashSet<_> = variables.iter().map(|of| of.variable.unit.as_deref()).collect();
+        let units = self.units.keys().filter(|name| used.contains(&Some(name.as_str())));
+        units.filter_map(|name| self.unit(name)).collect()
+    }
+
+    fn unit(&self, name: &str) -> Option<Element> {
+        let attributes = self.units.get(name)?.clone();
+        let base = Element { attributes, ..Element::new("ssc:BaseUnit") };
+        Some(Element::new("ssc:Unit").with("name", name).containing([base]))
     }
 
     /// A connector with the type and unit of a variable.
     fn connector(&self, name: &str, of: &str, kind: &str) -> Result<Element> {
-        let Variable { kind: base_type, unit, items, .. } = self.variable(of)?;
-        let base_type = Element::new(format!("ssc:{base_type}"))
-            .with_some("unit", unit.as_ref())
-            .with_some("name", items.as_ref().map(|items| &items.name));
+        let of = self.variable(of)?;
+        let base_type = Element::new(format!("ssc:{}", of.kind()))
+            .with_some("unit", of.variable.unit.as_ref())
+            .with_some("name", of.items().map(|(name, _)| name));
         Ok(Element::new("ssd:Connector").with("name", name).with("kind", kind).containing([base_type]))
     }
 
@@ -146,10 +150,11 @@ impl CheckedSystem<'_> {
         let mut units = BTreeMap::new();
         let mut parameters = Vec::new();
         for (name, variable, start) in start {
-            let Variable { kind, unit, .. } = self.variable(variable)?;
+            let of = self.variable(variable)?;
+            let unit = of.variable.unit.as_ref();
             let value =
-                Element::new(format!("ssv:{kind}")).with("value", start).with_some("unit", unit.as_ref());
-            units.extend(unit.as_ref().and_then(|unit| Some((unit, self.units.get(unit)?.clone()))));
+                Element::new(format!("ssv:{}", of.kind())).with("value", start).with_some("unit", unit);
+            units.extend(unit.and_then(|unit| Some((unit, self.unit(unit)?))));
             parameters.push(Element::new("ssv:Parameter").with("name", name).containing([value]));
         }
         if parameters.is_empty() {
@@ -169,20 +174,24 @@ impl CheckedSystem<'_> {
 }
 
 /// The enumerations of variables, if there are any.
-fn enumerations(variables: &[&Variable]) -> Result<Option<Element>> {
+fn enumerations(variables: &[Own]) -> Result<Option<Element>> {
     let mut known: BTreeMap<&str, &Items> = BTreeMap::new();
-    for items in variables.iter().filter_map(|variable| variable.items.as_ref()) {
-        let before = known.entry(&items.name).or_insert(items);
-        ensure!(*before == items, "two FMUs have different enumerations with the name {}", items.name);
+    for (name, items) in variables.iter().filter_map(|of| of.items()) {
+        let before = known.entry(name).or_insert(items);
+        ensure!(*before == items, "two FMUs have different enumerations with the name {name}");
     }
-    let element = |items: &Items| {
+    let element = |(name, items): (&str, &Items)| {
         let item = |(name, value): &(String, String)| {
             Element::new("ssc:Item").with("name", name).with("value", value)
         };
-        Element::new("ssc:Enumeration").with("name", &items.name).containing(items.items.iter().map(item))
+        Element::new("ssc:Enumeration").with("name", name).containing(items.iter().map(item))
     };
-    let all = known.into_values().map(element);
-    Ok(Some(Element::new("ssd:Enumerations").containing(all)).filter(|list| !list.children.is_empty()))
+    Ok(list("ssd:Enumerations", known.into_iter().map(element).collect()))
+}
+
+/// A list that must not be empty; none if it would be.
+fn list(name: &str, children: Vec<Element>) -> Option<Element> {
+    (!children.is_empty()).then(|| Element::new(name).containing(children))
 }
 
 fn connection(from: (&str, &str), to: (&str, &str)) -> Element {

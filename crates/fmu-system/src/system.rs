@@ -1,8 +1,7 @@
 //! A system, and whether it fits together.
 
-use crate::fmu::{Fmu, Variable};
+use crate::fmu::{Fmu, Own};
 use anyhow::{Context, Result, bail, ensure};
-use fmu_package::xml::Element;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -37,7 +36,8 @@ pub struct System<'a> {
 pub struct CheckedSystem<'a> {
     pub(crate) system: &'a System<'a>,
     fmus: Vec<Fmu>,
-    pub(crate) units: BTreeMap<String, Element>,
+    /// By their names, each with the exponents of SI's base units, factor and offset.
+    pub(crate) units: BTreeMap<String, Vec<(String, String)>>,
 }
 
 impl<'a> System<'a> {
@@ -67,20 +67,20 @@ impl<'a> System<'a> {
         checked.check_files()?;
         let mut fed = Vec::new();
         for (_, to, start) in &self.inputs {
-            checked.find(to, &["input"])?.check_start(to, start)?;
+            checked.find(to, "input")?.check_start(to, start)?;
             fed.push(*to);
         }
         for (_, from) in &self.outputs {
-            checked.find(from, &["output"])?;
+            checked.find(from, "output")?;
         }
         for (from, to) in &self.connections {
-            let (a, b) = (checked.find(from, &["output"])?, checked.find(to, &["input"])?);
-            ensure!(a.kind == b.kind, "{from} is {}, {to} is {}", a.kind, b.kind);
-            if let (Some(one), Some(other)) = (&a.unit, &b.unit) {
+            let (a, b) = (checked.find(from, "output")?, checked.find(to, "input")?);
+            ensure!(a.kind() == b.kind(), "{from} is {}, {to} is {}", a.kind(), b.kind());
+            if let (Some(one), Some(other)) = (&a.variable.unit, &b.variable.unit) {
                 ensure!(one == other, "{from} is in {one}, {to} in {other}");
             }
-            if let (Some(one), Some(other)) = (&a.items, &b.items) {
-                ensure!(one.items == other.items, "{from} and {to} have different items");
+            if let (Some((_, one)), Some((_, other))) = (a.items(), b.items()) {
+                ensure!(one == other, "{from} and {to} have different items");
             }
             fed.push(*to);
         }
@@ -89,7 +89,9 @@ impl<'a> System<'a> {
             bail!("{} is fed twice", pair[0]);
         }
         for (name, start) in &self.start {
-            checked.find(name, &["parameter", "input"])?.check_start(name, start)?;
+            let variable = checked.variable(name)?;
+            variable.check_settable(name)?;
+            variable.check_start(name, start)?;
         }
         Ok(checked)
     }
@@ -98,7 +100,7 @@ impl<'a> System<'a> {
 impl CheckedSystem<'_> {
     fn read(&mut self, path: &Path) -> Result<()> {
         let fmu = Fmu::read(fs::read(path).context("it cannot be read")?)?;
-        for (name, unit) in &fmu.units {
+        for (name, unit) in &fmu.description.units {
             let before = self.units.entry(name.clone()).or_insert_with(|| unit.clone());
             ensure!(before == unit, "its unit {name} differs from that of another FMU");
         }
@@ -127,21 +129,17 @@ impl CheckedSystem<'_> {
         fmus.map(|((_, path), fmu)| Ok((file_name(path)?, fmu.bytes.as_slice()))).collect()
     }
 
-    fn find(&self, name: &str, causalities: &[&str]) -> Result<&Variable> {
-        let variable = self.variable(name)?;
-        ensure!(
-            causalities.contains(&variable.causality.as_str()),
-            "{name} is {}, not {}",
-            variable.causality,
-            causalities.join(" or ")
-        );
-        Ok(variable)
+    fn find(&self, name: &str, wanted: &str) -> Result<Own<'_>> {
+        let found = self.variable(name)?;
+        let causality = &found.variable.causality;
+        ensure!(causality == wanted, "{name} is {causality}, not {wanted}");
+        Ok(found)
     }
 
-    pub(crate) fn variable(&self, name: &str) -> Result<&Variable> {
+    pub(crate) fn variable(&self, name: &str) -> Result<Own<'_>> {
         let (component, own) = split(name);
         let place = self.system.components.iter().position(|(known, _)| *known == component);
-        let variable = place.and_then(|place| self.fmus[place].variables.get(own));
+        let variable = place.and_then(|place| self.fmus[place].variable(own));
         variable.with_context(|| format!("no FMU has a variable {name}"))
     }
 

@@ -16,7 +16,8 @@ fn fmu(folder: &Path, name: &str, variables: &str) -> PathBuf {
     let mut zip = zip::ZipWriter::new(fs::File::create(&path).unwrap());
     zip.start_file("modelDescription.xml", zip::write::SimpleFileOptions::default()).unwrap();
     let text = format!(
-        "<fmiModelDescription>{UNITS}<ModelVariables>{variables}</ModelVariables></fmiModelDescription>"
+        "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"m\" guid=\"g\"><CoSimulation modelIdentifier=\"m\"/>{UNITS}\
+         <ModelVariables>{variables}</ModelVariables></fmiModelDescription>"
     );
     zip.write_all(text.as_bytes()).unwrap();
     zip.finish().unwrap();
@@ -24,7 +25,10 @@ fn fmu(folder: &Path, name: &str, variables: &str) -> PathBuf {
 }
 
 fn variable(name: &str, causality: &str, kind: &str) -> String {
-    format!(r#"<ScalarVariable name="{name}" causality="{causality}"><{kind}/></ScalarVariable>"#)
+    let start = if causality == "output" { "" } else { r#" start="0""# };
+    format!(
+        r#"<ScalarVariable name="{name}" valueReference="0" causality="{causality}"><{kind}{start}/></ScalarVariable>"#
+    )
 }
 
 /// Two FMUs: the unit of an angle once at the variable, once by its type.
@@ -34,7 +38,9 @@ fn fmus(folder: &Path) -> Vec<(&'static str, PathBuf)> {
         variable("y", "output", r#"Real declaredType="Angle""#),
         variable("delay", "output", r#"Real unit="s""#),
         variable("bare", "output", "Real"),
+        variable("angle", "output", r#"Real start="0" min="-1" declaredType="Angle""#),
         variable("on", "parameter", "Boolean"),
+        variable("count", "parameter", r#"Integer max="9""#),
         variable("gear", "parameter", r#"Enumeration declaredType="Gear""#),
         variable("gear_now", "output", r#"Enumeration declaredType="Gear""#),
         variable("note", "parameter", "String"),
@@ -79,7 +85,15 @@ fn what_does_not_fit_is_named() {
         (|s| s.connections.push(("plant.y", "law.n")), "plant.y is Real, law.n is Integer"),
         (|s| s.connections.push(("plant.y", "law.r")), "law.r is fed twice"),
         (|s| s.outputs.push(("x", "plant.on")), "plant.on is parameter, not output"),
-        (|s| s.start.push(("plant.y", "0".into())), "plant.y is output, not parameter or input"),
+        (|s| s.start.push(("plant.y", "0".into())), "plant.y is output and takes no start value"),
+        (
+            |s| s.start.push(("plant.angle", "-2".into())),
+            "the start value of plant.angle must not be below -1, it is -2",
+        ),
+        (
+            |s| s.start.push(("plant.count", "10".into())),
+            "the start value of plant.count must not be above 9, it is 10",
+        ),
         (|s| s.start.push(("plant.on", "0".into())), "plant.on is Boolean, its start value cannot be '0'"),
         (|s| s.inputs[0].2 = "far".into(), "law.r is Real, its start value cannot be 'far'"),
         (
@@ -106,6 +120,10 @@ fn what_does_not_fit_is_named() {
     ] {
         assert_eq!(refusal(change).split(": No such file").next(), Some(message));
     }
+    // A state starts where its FMU lets it.
+    let mut elsewhere = system(folder.path());
+    elsewhere.start.push(("plant.angle", "0.5".into()));
+    elsewhere.check().unwrap();
     // A unit that nobody tells cannot be wrong.
     let mut untold = system(folder.path());
     untold.connections[1].0 = "plant.bare";
@@ -157,6 +175,54 @@ fn the_ssp_has_everything_and_is_the_same_every_time() {
     assert!(ssd.contains(r#"<ssc:Unit name="rad">"#) && !ssd.contains(r#"<ssc:Unit name="s">"#), "{ssd}");
     assert!(read("resources/plant.ssv").contains(r#"<ssv:Boolean value="true"/>"#));
     assert!(read("resources/experiment.ssv").contains(r#"<ssv:Real value="0.5" unit="rad"/>"#));
+}
+
+/// The schema wants no empty list of connectors.
+#[test]
+fn a_component_that_is_not_connected_has_no_connectors() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut alone = system(folder.path());
+    (alone.inputs, alone.outputs, alone.connections) = (Vec::new(), Vec::new(), Vec::new());
+    let ssp = folder.path().join("alone.ssp");
+    alone.check().unwrap().write_ssp(&ssp).unwrap();
+    let mut ssd = String::new();
+    let mut zip = ZipArchive::new(fs::File::open(&ssp).unwrap()).unwrap();
+    zip.by_name("SystemStructure.ssd").unwrap().read_to_string(&mut ssd).unwrap();
+    assert!(!ssd.contains("ssd:Connectors") && !ssd.contains("ssd:Connections"), "{ssd}");
+}
+
+/// Numbers of FMI 3.0 are Reals and Integers to SSP 1.0.
+#[test]
+fn fmus_for_fmi_3_are_wired_as_well() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("new.fmu");
+    let mut zip = zip::ZipWriter::new(fs::File::create(&path).unwrap());
+    zip.start_file("modelDescription.xml", zip::write::SimpleFileOptions::default()).unwrap();
+    let text = r#"<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t">
+        <CoSimulation modelIdentifier="m"/><UnitDefinitions><Unit name="rad"><BaseUnit rad="1"/></Unit></UnitDefinitions>
+        <TypeDefinitions><Float64Type name="Angle" unit="rad" max="3"/></TypeDefinitions><ModelVariables>
+        <Float64 name="u" valueReference="1" causality="input" declaredType="Angle" start="0"/>
+        <Int16 name="n" valueReference="2" causality="parameter" start="0"/>
+        <Float64 name="y" valueReference="3" causality="output" declaredType="Angle"/></ModelVariables></fmiModelDescription>"#;
+    zip.write_all(text.as_bytes()).unwrap();
+    zip.finish().unwrap();
+    let mut new = system(folder.path());
+    new.components.push(("new", path));
+    new.connections.push(("law.u", "new.u"));
+    new.start.push(("new.n", "7".into()));
+    let ssp = folder.path().join("new.ssp");
+    new.check().unwrap().write_ssp(&ssp).unwrap();
+    let mut ssv = String::new();
+    let mut zip = ZipArchive::new(fs::File::open(&ssp).unwrap()).unwrap();
+    zip.by_name("resources/new.ssv").unwrap().read_to_string(&mut ssv).unwrap();
+    assert!(ssv.contains(r#"<ssv:Integer value="7"/>"#), "{ssv}");
+    for (start, message) in [
+        (("new.u", "4"), "the start value of new.u must not be above 3, it is 4"),
+        (("new.n", "40000"), "the start value of new.n must not be above 32767, it is 40000"),
+    ] {
+        new.start = vec![(start.0, start.1.into())];
+        assert_eq!(new.check().err().unwrap().to_string(), message);
+    }
 }
 
 #[test]

@@ -75,7 +75,8 @@ impl Loaded {
             fmu_run::Standard::Fmi2 => "2.0",
             fmu_run::Standard::Fmi3 => "3.0",
         };
-        Ok((version.to_owned(), about.model_name.clone(), about.token.clone(), about.once_per_process))
+        let once = about.co_simulation.as_ref().is_some_and(|offer| offer.once_per_process);
+        Ok((version.to_owned(), about.model_name.clone(), about.token.clone(), once))
     }
 
     fn variables(&self) -> PyResult<Vec<Described>> {

@@ -139,7 +139,9 @@ impl<'a> Plan<'a> {
                 base => self.other_inputs.push((base, of.reference, values)),
             }
         }
-        if !batch.input_derivatives.is_empty() && !description.input_derivatives {
+        if !batch.input_derivatives.is_empty()
+            && description.co_simulation.as_ref().is_none_or(|offer| !offer.input_derivatives)
+        {
             return request(format!(
                 "{} takes no input derivatives (canInterpolateInputs of FMI 2.0)",
                 description.model_name
@@ -261,7 +263,7 @@ fn threads(fmu: &Fmu, asked: Option<usize>) -> Result<usize, Error> {
     if asked == Some(0) {
         return request("threads must be at least 1".to_owned());
     }
-    if fmu.description().once_per_process {
+    if fmu.description().co_simulation.as_ref().is_some_and(|offer| offer.once_per_process) {
         return Ok(1);
     }
     Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)))
