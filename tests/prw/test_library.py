@@ -170,7 +170,7 @@ def test_sweep_draws(testbed: Path) -> None:
     """The draws are those of the seed, whoever runs them."""
     table = prw.sweep(random={"k1": 0.1, "c3": (0.5, 0.2)}, runs=300, seed=4, motion=MOTION, fmu=testbed)
     assert table == prw.sweep(
-        random={"k1": 0.1, "c3": (0.5, 0.2)}, runs=300, seed=4, motion=MOTION, fmu=testbed, workers=1
+        random={"k1": 0.1, "c3": (0.5, 0.2)}, runs=300, seed=4, motion=MOTION, fmu=testbed, threads=1
     )
     for name, middle, relative in (("k1", table_1()["k1"], 0.1), ("c3", 0.5, 0.2)):
         logarithms = np.log(np.array(table.column(name)) / middle)
@@ -185,7 +185,7 @@ def test_wrong_sweeps(testbed: Path) -> None:
         ({"grid": {"k1": [1.0]}, "random": {"k1": 0.1}}, "k1 is in the grid and random; choose one"),
         ({"random": {"k1": -0.1}}, "k1: -0.1; the value and its relative standard deviation must be positive"),
         ({"random": {"k1": 0.1}, "runs": 0}, "runs 0: at least 1"),
-        ({"random": {"k1": 0.1}, "workers": 0}, "workers 0: at least 1"),
+        ({"random": {"k1": 0.1}, "threads": 0}, "threads 0: at least 1"),
         ({"grid": {"k1": np.ones(4000), "k2": np.ones(4000)}}, "16000000 runs are more than"),
     ]:
         with pytest.raises(prw.UserError, match=complaint):

@@ -63,7 +63,8 @@ def add_parser(subparsers: Any) -> None:
         "--input", type=Path, metavar="FILE", help="motor recording, as for `prw simulate` (default: that of Fig. 4)"
     )
     parser.add_argument("--degrees", action="store_true", help="the recording is in degrees and degrees per second")
-    parser.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: one per core)")
+    parser.add_argument("--threads", type=int, metavar="N", help="on this machine (default: one per core)")
+    parser.add_argument("--workers", type=int, dest="threads", help=argparse.SUPPRESS)  # its name in 0.2.0
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, like tcp://head:8786")
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
     parser.add_argument(
@@ -76,12 +77,10 @@ def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw sweep`. Raises UserError with one line on what is wrong."""
     need("sweep", "pyarrow", *(["distributed"] if arguments.scheduler else []))
     motion = fig4() if arguments.input is None else read_motion(arguments.input, degrees=arguments.degrees)
-    workers = arguments.workers if arguments.workers is not None else os.cpu_count() or 1
-    for option, number in (("--workers", workers), ("--runs", arguments.runs)):
+    threads = arguments.threads if arguments.threads is not None else os.cpu_count() or 1
+    for option, number in (("--threads", threads), ("--runs", arguments.runs)):
         if number < 1:
             raise UserError(f"{option} {number}: at least 1 is needed")
-    with Testbed(arguments.fmu) as testbed:
-        starts = testbed.starts
     grid = {name: _steps(name, text) for name, text in pairs(arguments.grid, "--grid").items()}
     random = spreads(arguments.random, "--random")
     for name in random:
@@ -89,16 +88,17 @@ def run(arguments: argparse.Namespace) -> None:
             raise UserError(f"{name} is in --grid and in --random; choose one")
     if not grid and not random:
         raise UserError("nothing varies; add --grid NAME=LOW:HIGH:N or --random NAME=PERCENT% (see --help)")
-    with said_of_options(grid="grid", random="random"):
-        values = layout(grid, random, arguments.runs, arguments.seed, starts)
-    study = Study(arguments.fmu.read_bytes(), motion, tuple(values), np.column_stack(list(values.values())))
-    swept = carry_out(study, arguments.out, workers, arguments.scheduler)
-    print("\n".join(_summary(arguments, swept, workers)))
+    with Testbed(arguments.fmu) as testbed:
+        with said_of_options(grid="grid", random="random"):
+            values = layout(grid, random, arguments.runs, arguments.seed, testbed.starts)
+        study = Study(arguments.fmu.read_bytes(), motion, tuple(values), np.column_stack(list(values.values())))
+        swept = carry_out(study, testbed, arguments.out, threads, arguments.scheduler)
+    print("\n".join(_summary(arguments, swept, threads)))
 
 
-def _summary(arguments: argparse.Namespace, swept: Swept, workers: int) -> list[str]:
+def _summary(arguments: argparse.Namespace, swept: Swept, threads: int) -> list[str]:
     """What was done, one line each."""
-    where = arguments.scheduler or f"{workers} process{'es' if workers > 1 else ''}"
+    where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
     total = swept.table.num_rows
     lines = [f"ran         nothing: all {total} runs were there already"]
     if swept.runs:

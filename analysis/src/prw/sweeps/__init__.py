@@ -19,17 +19,14 @@ from prw.motion import Array, Motion
 from prw.progress import Progress
 from prw.recording import Recording
 from prw.simulation import motion_of
-from prw.sweeps.study import Study, chunks
-from prw.sweeps.workers import Rows, in_this_process, on_cluster, on_this_machine
+from prw.sweeps.study import Rows, Study, chunks, run_chunk
 from prw.testbed import Testbed, existing_fmu
 
 if TYPE_CHECKING:
     import pyarrow
 
-#: A chunk is kept when it is done, and is the unit of what an interruption loses.
-LONGEST_CHUNK = 256
-#: So many chunks for each worker, so that all finish about at the same time.
-CHUNKS_PER_WORKER = 8
+#: A chunk is kept when it is done, and is the unit of what an interruption loses: so many in a study, of so many runs.
+CHUNKS, LONGEST_CHUNK = 16, 256
 MOST_RUNS = 10_000_000
 
 
@@ -48,7 +45,7 @@ def sweep(
     runs: int = 1000,
     seed: int = 0,
     motion: Motion | Recording | str | os.PathLike[str] | None = None,
-    workers: int | None = None,
+    threads: int | None = None,
     scheduler: str | None = None,
     fmu: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] | None = None,
@@ -57,10 +54,9 @@ def sweep(
 
     grid: values by parameter, in SI; all combinations are run. random: by parameter the relative standard deviation
     (0.1 is 10 %) about the start value, or (value, relative) about another one; `runs` log-normal draws for each
-    combination, from the seed `seed`. motion: as for `prw.simulate`. workers: processes on this machine; default: the
-    threads of this process, which is fastest, and safe with an FMU that is trusted. scheduler: the address of a Dask
-    cluster instead. out: a folder in which what is done is kept, so that the same call goes on after an interruption,
-    and the table in the end.
+    combination, from the seed `seed`. motion: as for `prw.simulate`. threads: default one for each processor. scheduler:
+    the address of a Dask cluster instead. out: a folder in which what is done is kept, so that the same call goes on
+    after an interruption, and the table in the end.
 
     Returns an Arrow table (`.to_pandas()` makes a DataFrame of it), a row each run: `run`; `status`, "done" or
     "failed"; `message`, why it failed; the parameters; and of each output the peak (of its magnitude), rms and value
@@ -73,30 +69,28 @@ def sweep(
     path = existing_fmu(fmu)
     with Testbed(path) as testbed:
         values = layout(grid or {}, random or {}, runs, seed, testbed.starts)
-    study = Study(path.read_bytes(), motion_of(motion), tuple(values), np.column_stack(list(values.values())))
-    return carry_out(study, None if out is None else Path(out), workers, scheduler).table
+        study = Study(path.read_bytes(), motion_of(motion), tuple(values), np.column_stack(list(values.values())))
+        return carry_out(study, testbed, None if out is None else Path(out), threads, scheduler).table
 
 
-def carry_out(study: Study, out: Path | None, workers: int | None, scheduler: str | None) -> Swept:
-    """Make the runs of the study that are missing in the folder `out`; the rest as for `sweep`."""
+def carry_out(study: Study, testbed: Testbed, out: Path | None, threads: int | None, scheduler: str | None) -> Swept:
+    """Make the runs of the study that are missing in the folder `out`, here with `testbed`; the rest as for `sweep`."""
     from prw.sweeps.store import Memory, Store
 
-    if workers is not None and workers < 1:
-        raise UserError(f"workers {workers}: at least 1 is needed")
+    if threads is not None and threads < 1:
+        raise UserError(f"threads {threads}: at least 1 is needed")
+    threads = threads or os.cpu_count() or 1
     store = Memory(study) if out is None else Store(out, study)
     total, done = len(study.table), store.done()
     missing = [number for number in range(total) if number not in done]
-    several = workers or os.cpu_count() or 1
-    parts = chunks(missing, max(1, min(LONGEST_CHUNK, -(-len(missing) // (several * CHUNKS_PER_WORKER)))))
     start, finished = time.monotonic(), len(done)
-    if parts:
-        results: Iterable[Rows]
+    if missing:
+        parts = chunks(missing, max(threads, min(LONGEST_CHUNK, -(-len(missing) // CHUNKS))))
+        results: Iterable[Rows] = (run_chunk(study, testbed, part, threads) for part in parts)
         if scheduler:
+            from prw.sweeps.cluster import on_cluster
+
             results = on_cluster(study, parts, scheduler)
-        elif workers is None:
-            results = in_this_process(study, chunks(missing, LONGEST_CHUNK))
-        else:
-            results = on_this_machine(study, parts, min(workers, len(parts)))
         with Progress(f"{total} runs", total) as progress:
             for rows in results:
                 store.add(rows)

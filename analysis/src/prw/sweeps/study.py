@@ -1,13 +1,10 @@
-"""What a sweep consists of, and one run of it. Everything here is sent to the workers."""
+"""What a sweep consists of, and how its runs are made."""
 
 from __future__ import annotations
 
-import atexit
 import hashlib
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import fmu_run
@@ -18,6 +15,9 @@ from prw.testbed import OUTPUTS, Testbed, driven_by, stopped
 
 #: What is kept of each output's course.
 MEASURES: tuple[fmu_run.Measure, ...] = ("peak", "rms", "end")
+#: Neighbouring runs, (first, last + 1), and what came of runs.
+Chunk = tuple[int, int]
+Rows = list[dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -45,34 +45,9 @@ class Study:
         return [*self.names, *(f"{output}_{measure}" for output in OUTPUTS for measure in MEASURES)]
 
 
-#: The study and the FMU of this worker process, kept from chunk to chunk.
-_bench: dict[str, Any] = {}
-
-
-def prepare(study: Study) -> None:
-    """Load the study's FMU in this process, unless it is there already."""
-    if _bench.get("key") == study.key:
-        return
-    _leave()
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "study.fmu"
-        path.write_bytes(study.fmu)
-        testbed = Testbed(path)
-    if not _bench:
-        atexit.register(_leave)
-    _bench.update(key=study.key, study=study, testbed=testbed)
-
-
-def run_chunk(study: Study | None, first: int, last: int) -> list[dict[str, Any]]:
-    """Results of runs first ... last - 1. study: or None where prepare() has been called in this process."""
-    if study is not None:
-        prepare(study)
-    # The processes are the parallel part: one that dies costs the others nothing.
-    return run_rows(_bench["study"], _bench["testbed"], first, last, threads=1)
-
-
-def run_rows(study: Study, testbed: Testbed, first: int, last: int, threads: int | None) -> list[dict[str, Any]]:
-    """Results of runs first ... last - 1 on so many threads; None: one for each processor."""
+def run_chunk(study: Study, testbed: Testbed, chunk: Chunk, threads: int) -> Rows:
+    """Results of the runs of the chunk, made by so many threads."""
+    first, last = chunk
     table = study.table[first:last]
     runs = testbed.loaded.run(
         study.motion.time,
@@ -98,15 +73,9 @@ def failed(study: Study, number: int, message: str) -> dict[str, Any]:
     return {**dict.fromkeys(study.columns()), "run": number, "status": "failed", "message": message, **values}
 
 
-def _leave() -> None:
-    if "testbed" in _bench:
-        _bench.pop("testbed").close()
-    _bench.pop("key", None)
-
-
-def chunks(missing: Sequence[int], size: int) -> list[tuple[int, int]]:
-    """Runs that are not done yet, as (first, last + 1) of at most `size` neighbours."""
-    found: list[tuple[int, int]] = []
+def chunks(missing: Sequence[int], size: int) -> list[Chunk]:
+    """Runs that are not done yet, in chunks of at most `size`."""
+    found: list[Chunk] = []
     for number in missing:
         if found and found[-1][1] == number and number - found[-1][0] < size:
             found[-1] = (found[-1][0], number + 1)
