@@ -26,10 +26,6 @@ class Columns(NamedTuple):
     units: dict[str, str]
     notes: list[str]
 
-    def factors(self) -> dict[str, float]:
-        """What the values of each column are multiplied with to be in SI."""
-        return {name: factor(name, unit) for name, unit in self.units.items()}
-
 
 def columns(
     path: Path,

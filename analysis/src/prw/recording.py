@@ -1,27 +1,20 @@
-"""Reading a recorded experiment from a CSV file. Every complaint names the file, the line and the column."""
+"""Reading a recorded experiment, and saying what looks like a slip in it."""
 
 from __future__ import annotations
 
-import csv
-import math
 import os
-import re
-from array import array
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from prw.channels import MEASURED, QUANTITIES
+from prw.channels import MEASURED, QUANTITIES, factor
 from prw.columns import ANGLES, RATES, Columns, columns
 from prw.errors import UserError
 from prw.motion import Array, Motion
 from prw.output import inputs_of
-from prw.progress import Progress
-
-DELIMITERS = {",": "comma", ";": "semicolon", "\t": "tab"}
+from prw.table import read_table
 
 #: Faster than the testbed's motors will turn on any wrist move, in rad/s; degrees taken for radians are beyond it.
 PLAUSIBLE_SPEED = 30.0
@@ -35,16 +28,6 @@ SLOW = 0.1
 SLOW_SAMPLING = 0.5
 #: A motor does not turn this far, in rad, from sample to sample; angles that jump by a turn do.
 JUMP = 0.9 * np.pi
-#: Rows between two progress reports.
-REPORT_ROWS = 4096
-
-
-class Table(NamedTuple):
-    """columns: which were taken. time: (n,) s. values: (n, len(columns.taken) - 1), in SI."""
-
-    columns: Columns
-    time: Array
-    values: Array
 
 
 @dataclass(frozen=True)
@@ -119,116 +102,21 @@ def _read(path: Path, units: Mapping[str, str] | None, degrees: bool, measured: 
         if name not in QUANTITIES:
             raise UserError(f"units: {name} is not known; there are {', '.join(QUANTITIES)}")
 
-    def choose(path: Path, header: Sequence[str], line: int) -> Columns:
-        return columns(path, header, line, measured, units, degrees)
+    found = Columns([], {}, [])
 
-    found, time, values = read_columns(path, choose, may_be_empty=measured)
-    table = dict(zip((name for name, _ in found.taken[1:]), values.T))
+    def choose(header: Sequence[str], line: int) -> Sequence[tuple[str, int]]:
+        nonlocal found
+        found = columns(path, header, line, measured, units, degrees)
+        return found.taken
+
+    values = read_table(path, choose, may_be_empty=measured, increasing=True)
+    table = {name: values[:, i] * factor(name, found.units[name]) for i, (name, _) in enumerate(found.taken)}
+    time = table.pop("time")
     theta = np.column_stack([table.pop(name) for name in ANGLES])
     omega = np.column_stack([table.pop(name) for name in RATES]) if RATES[0] in table else None
     with np.errstate(all="ignore"):  # angles near the largest number are the FMU's to refuse
         notes = found.notes + doubts(time, theta, omega, found.units)
     return Recording(path, Motion(time, theta, omega, path.stem, notes), table, found.units)
-
-
-def read_columns(path: Path, choose: Callable[..., Columns], may_be_empty: Container[str] = ()) -> Table:
-    """Read numbers from a CSV file like `read` does.
-
-    choose(path, header, line) returns the Columns to take. An empty cell in a column of `may_be_empty` becomes NaN.
-    Raises UserError naming file, line and column.
-    """
-    try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            return _parse(path, file, choose, may_be_empty)
-    except UnicodeDecodeError:
-        raise UserError(
-            f"{_where(path, _undecodable_line(path))}: not UTF-8 text; save the file as UTF-8 CSV"
-        ) from None
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
-
-
-def _parse(path: Path, file: IO[str], choose: Callable[..., Columns], may_be_empty: Container[str]) -> Table:
-    begin, first = _top(file)
-    if not first:
-        raise UserError(
-            f"{path}: the file is empty; a header with time, theta1, theta2 and at least two rows are needed"
-        )
-    delimiter = next((d for d in DELIMITERS if d in first), ",")
-    file.seek(0)
-    table = csv.reader(file, delimiter=delimiter, skipinitialspace=True)
-    try:
-        header = [name.strip() for name in next(row for row in table if row and table.line_num > begin)]
-        header[0] = header[0].lstrip("# ")
-        found = choose(path, header, table.line_num)
-        size = os.fstat(file.fileno()).st_size
-        time, values = _rows(path, table, len(header), found.taken, delimiter == ";", size, may_be_empty)
-    except csv.Error as error:
-        raise UserError(f"{_where(path, table.line_num)}: not a readable CSV row ({error})") from None
-    if len(time) < 2:
-        rows = "no rows below the header" if len(time) == 0 else "only one row below the header"
-        raise UserError(f"{_where(path, table.line_num)}: {rows}; at least two are needed")
-    factors = found.factors()
-    scale = np.array([factors[name] for name, _ in found.taken])
-    return Table(found, time * scale[0], values * scale[1:])
-
-
-def _top(file: IO[str]) -> tuple[int, str]:
-    """How many lines stand above the header, blank or comments after `#`, and the header, "" if there is none. numpy
-    writes a `#` before the header as well: it is the last comment then, with numbers right below."""
-    count, comment, line = 0, "", file.readline()
-    while line and (not line.strip() or line.lstrip().startswith("#")):
-        count, comment, line = count + 1, line.strip() and line, file.readline()
-    if comment and line.strip() and re.match(r"[-+.\d]", line.lstrip()):
-        return count - 1, comment
-    return count, line
-
-
-def _rows(
-    path: Path,
-    table: Any,
-    width: int,
-    columns: Sequence[tuple[str, int]],
-    decimal_comma: bool,
-    size: int,
-    may_be_empty: Container[str],
-) -> tuple[Array, Array]:
-    """All rows below the header as time (n,) and values (n, len(columns) - 1), checked cell by cell."""
-    cells, previous, bytes_read = array("d"), -math.inf, 0
-    with Progress(f"reading {path}", size) as progress:
-        for count, row in enumerate(table):
-            if len(row) != width:
-                if not row:
-                    continue
-                raise UserError(f"{_where(path, table.line_num)}: {_cells(len(row))}, but the header has {width}")
-            for name, index in columns:
-                text = row[index]
-                try:
-                    value = float(text.replace(",", ".") if decimal_comma else text)
-                except ValueError:
-                    value = None
-                # float() would take 1_000 for a thousand
-                if name in may_be_empty and text.strip().lower() in ("", "nan"):
-                    value = math.nan
-                elif value is None or "_" in text:
-                    shown = f"{text.strip()[:40]!r} is not a number" if text.strip() else "empty cell"
-                    raise UserError(f"{_where(path, table.line_num)}, column {name}: {shown}")
-                elif not math.isfinite(value):
-                    raise UserError(f"{_where(path, table.line_num)}, column {name}: {text.strip()} is not finite")
-                cells.append(value)
-            time = cells[-len(columns)]
-            if time <= previous:
-                complaint = "is the time of the row before again" if time == previous else "runs backwards"
-                raise UserError(
-                    f"{_where(path, table.line_num)}, column time: {row[columns[0][1]].strip()} {complaint}"
-                    f" (after {previous!r}); time must increase from row to row"
-                )
-            previous = time
-            if count % REPORT_ROWS == 0:
-                progress(bytes_read)
-            bytes_read += sum(map(len, row)) + width
-    values = np.frombuffer(cells, dtype=float).reshape(-1, len(columns)) if cells else np.empty((0, len(columns)))
-    return values[:, 0].copy(), values[:, 1:].copy()
 
 
 def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, str]) -> list[str]:
@@ -273,21 +161,3 @@ def _mismatch(time: Array, theta: Array, omega: Array, side: int) -> str:
     if 0.8 < ratio < 1.25:
         return ""
     return f"{RATES[side]} adds up to {ratio:.3g} times the motion of {ANGLES[side]}; check units and sign"
-
-
-def _undecodable_line(path: Path) -> int:
-    with open(path, "rb") as file:
-        for number, line in enumerate(file, start=1):
-            try:
-                line.decode("utf-8-sig" if number == 1 else "utf-8")
-            except UnicodeDecodeError:
-                return number
-    return 1
-
-
-def _where(path: Path, line: int) -> str:
-    return f"{path}, row {line}"
-
-
-def _cells(count: int) -> str:
-    return "1 cell" if count == 1 else f"{count} cells"

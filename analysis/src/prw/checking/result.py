@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from prw.columns import NAMES, column, shown
 from prw.errors import UserError
 from prw.extras import need
 from prw.motion import Array
-from prw.recording import DELIMITERS
+from prw.table import read_table
 
 #: What stands before a name: components, separated by dots in Modelica and SSP, by slashes in Simulink.
 PREFIXED = re.compile(rf"^(.*[./:|])?((?:{NAMES}|tout).*)$", re.IGNORECASE)
@@ -64,12 +63,9 @@ def _choose(
     """The columns that are known, in SI, by what they are."""
     candidates: dict[str, list[tuple[str, str, Array]]] = {}
     for title, values in columns.items():
-        match = PREFIXED.match(title.strip())
-        if not match:
-            continue
-        name, unit = column(re.sub(r"^tout\b", "time", match[2], flags=re.IGNORECASE))
+        owner, name, unit = _known(title)
         if name:
-            candidates.setdefault(name, []).append(((match[1] or "")[:-1], unit, values))
+            candidates.setdefault(name, []).append((owner, unit, values))
     found = {}
     for name, same in candidates.items():
         wanted = [c for c in same if re.split(r"[./:|]", c[0])[-1].lower() == (component or TESTBED).lower()]
@@ -92,33 +88,27 @@ def _choose(
     return found
 
 
+def _known(title: str) -> tuple[str, str, str]:
+    """The component, what it is of QUANTITIES, and the unit in the title of a column; "" for the last two otherwise."""
+    match = PREFIXED.match(title.strip())
+    owner, name = (match[1] or "", match[2]) if match else ("", "")
+    return owner[:-1], *column(re.sub(r"^tout\b", "time", name, flags=re.IGNORECASE))
+
+
 def _csv(path: Path) -> dict[str, Array]:
-    """The columns of a CSV file by title. Comments after # and blank lines are left out."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read as UTF-8 text ({error})") from None
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
-    if len(lines) < 3:
-        raise UserError(f"{path}: there are {len(lines)} lines; a header and at least two rows are needed")
-    delimiter = next((d for d in DELIMITERS if d in lines[0][1]), ",")
-    header, *rows = csv.reader((line for _, line in lines), delimiter=delimiter, skipinitialspace=True)
-    numbers = np.empty((len(rows), len(header)))
-    for (number, _), row, into in zip(lines[1:], rows, numbers):
-        cells = row[:-1] if len(row) == len(header) + 1 and not row[-1].strip() else row
-        if len(cells) != len(header):
-            raise UserError(f"{path}, row {number}: {len(cells)} cells, but the header has {len(header)}")
-        try:
-            into[:] = [_number(cell, delimiter) for cell in cells]
-        except ValueError as error:
-            raise UserError(f"{path}, row {number}: {error}") from None
-    return dict(zip(header, numbers.T))
+    """The columns of a CSV file by title; of those that are not known the title alone."""
+    titles: list[str] = []
+    taken: list[tuple[str, int]] = []
 
+    def choose(header: Sequence[str], line: int) -> Sequence[tuple[str, int]]:
+        titles.extend(header)
+        taken.extend((title, index) for index, title in enumerate(header) if _known(title)[1])
+        if not taken:
+            raise UserError(f"{path}: there is no column time; it has {shown(header)}")
+        return taken
 
-def _number(cell: str, delimiter: str) -> float:
-    words = {"true": 1.0, "false": 0.0}
-    text = cell.strip().replace(",", ".") if delimiter == ";" else cell.strip()
-    return words[text.lower()] if text.lower() in words else float(text)
+    values = read_table(path, choose)
+    return dict.fromkeys(titles, np.empty(0)) | {title: values[:, i] for i, (title, _) in enumerate(taken)}
 
 
 def _mat(path: Path) -> dict[str, Array]:
