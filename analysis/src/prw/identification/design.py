@@ -13,14 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from prw.channels import MEASURED
-from prw.identification.excitation import FADE
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Fitter, Task
 from prw.identification.model import Model
-from prw.identification.statistics import condition, genuine, information_of
+from prw.identification.statistics import condition, information_of, noise_corrected
 from prw.motion import Array, Motion
 from prw.testbed import ANGLE_OF, OUTPUTS
 
+#: Seconds in which a motion fades in and out.
+FADE = 0.5
 #: At most so many frequencies in a multisine.
 MOST_LINES = 60
 #: Frequencies in Hz: of the slow multisine, up to; and of the widest motions, up to.
@@ -79,7 +80,7 @@ def information(
     channels = {name for experiment in experiments for name in experiment.channels}
     fitter = Fitter(model, unmeasured, task, {name: noise[name] for name in channels})
     jacobians, of_noise = fitter.jacobians(np.asarray(logarithms, dtype=float))
-    return genuine(information_of(jacobians), of_noise)
+    return noise_corrected(information_of(jacobians), of_noise)
 
 
 def default_noise() -> dict[str, float]:

@@ -14,8 +14,6 @@ from prw.extras import need
 from prw.identification import DEFAULT_ESTIMATE, task_of
 from prw.motion import Motion
 
-#: Seconds in which a motion fades in and out.
-FADE = 0.5
 #: Samples and samples per second that make sense.
 MOST_SAMPLES, SLOWEST = 2_000_000, 50.0
 
@@ -71,8 +69,10 @@ def excite(
             raise UserError(f"measure: {name} is not known; there are {', '.join(MEASURED)}")
     if not channels:
         raise UserError(f"measure: nothing is named; there are {', '.join(MEASURED)}")
-    if not 4 * FADE <= duration <= MOST_SAMPLES / rate:
-        raise UserError(f"duration {duration:g}: it must be {4 * FADE:g} s or more, and at most 2 million samples")
+    if not 4 * design.FADE <= duration <= MOST_SAMPLES / rate:
+        raise UserError(
+            f"duration {duration:g}: it must be {4 * design.FADE:g} s or more, and at most 2 million samples"
+        )
     if rate < SLOWEST:
         raise UserError(f"rate {rate:g}: the testbed moves at up to 30 Hz; sample with 50 Hz or more")
     ranking = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib
@@ -13,7 +14,9 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from prw.channels import si_unit
-from prw.identification.results import ChannelFit, Identification
+from prw.identification.experiment import Experiment
+from prw.identification.fit import Solution
+from prw.identification.model import Parameters
 from prw.motion import Array
 from prw.plots import BLUE, PAGE_STYLE, VERMILION, envelope
 
@@ -37,14 +40,23 @@ CLOSE = 1.0
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def page(found: Identification) -> str:
-    """The page as text."""
+def page(
+    known: Parameters,
+    experiments: Sequence[Experiment],
+    solution: Solution,
+    residuals: Sequence[Array],
+    channels: Sequence[Mapping[str, Any]],
+    estimates: Mapping[str, Any],
+    **shown: Any,
+) -> str:
+    """The page as text. residuals: (s, c) of each experiment. channels: the fields of each ChannelFit. estimates: by
+    name. shown: what the template takes besides."""
     environment = Environment(
         loader=PackageLoader("prw.identification", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters.update(digits=_digits, percent=_percent, shade=_shade)
-    solution, estimates, rows = found.solution, found.parameters, []
-    for name, parameter in found.known.real.items():
+    rows = []
+    for name, parameter in known.real.items():
         rows.append(
             {
                 "name": name,
@@ -56,28 +68,26 @@ def page(found: Identification) -> str:
             }
         )
     return environment.get_template("report.html.j2").render(
-        found=found,
         solution=solution,
-        sure=found.sure,
         rows=rows,
-        channels=[_shown(channel) for channel in found.channels],
-        figures=figures(found),
+        channels=[_shown(channel) for channel in channels],
+        figures=figures(experiments, solution, residuals),
+        **shown,
     )
 
 
-def figures(found: Identification) -> list[dict[str, str]]:
+def figures(experiments: Sequence[Experiment], solution: Solution, residuals: Sequence[Array]) -> list[dict[str, str]]:
     """A figure for every channel of every experiment: a close-up of measured and modelled, and the residual."""
     drawn = []
     with matplotlib.rc_context(FIGURE_STYLE):
         figure = _Curves()
-        for i, experiment in enumerate(found.experiments):
-            residual, modelled = found.residual(i), found.solution.modelled[i]
+        for experiment, residual, modelled in zip(experiments, residuals, solution.modelled):
             for j, name in enumerate(experiment.channels):
                 unit, factor = SHOWN.get(si_unit(name), (si_unit(name), 1.0))
                 keep = np.isfinite(residual[:, j])
                 curves = factor * modelled[keep, j], factor * residual[keep, j]
                 svg = figure.svg(experiment.sampled[keep], *curves, unit.replace("N.m", "N m"))
-                title = f"{experiment.name}: {name}" if len(found.experiments) > 1 else name
+                title = f"{experiment.name}: {name}" if len(experiments) > 1 else name
                 drawn.append({"title": title, "svg": Markup(svg)})
     return drawn
 
@@ -121,10 +131,10 @@ class _Curves:
         return re.sub(r'width="[\d.]+pt" height="[\d.]+pt"', 'role="img"', svg, count=1)
 
 
-def _shown(channel: ChannelFit) -> dict[str, Any]:
-    unit, factor = SHOWN.get(channel.unit, (channel.unit, 1.0))
-    scaled = {name: getattr(channel, name) * factor for name in ("noise", "residual", "offset")}
-    return {**channel._asdict(), **scaled, "unit": unit}
+def _shown(channel: Mapping[str, Any]) -> dict[str, Any]:
+    unit, factor = SHOWN.get(channel["unit"], (channel["unit"], 1.0))
+    scaled = {name: channel[name] * factor for name in ("noise", "residual", "offset")}
+    return {**channel, **scaled, "unit": unit}
 
 
 def _digits(value: float, count: int = 4) -> str:

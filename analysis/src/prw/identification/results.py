@@ -187,7 +187,10 @@ class Identification:
         need("identify", "jinja2", "matplotlib")
         from prw.identification.report import page
 
-        write_text(Path(path), page(self))
+        residuals = [self.residual(i) for i in range(len(self.experiments))]
+        channels = [channel._asdict() for channel in self.channels]
+        fitted = (self.known, self.experiments, self.solution, residuals, channels, self.parameters)
+        write_text(Path(path), page(*fitted, found=self, sure=self.sure))
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """Everything in numbers, as JSON; written to `path`, too, where that is given."""

@@ -81,10 +81,10 @@ def certainty(solution: Solution, level: float = 0.95) -> Certainty:
     errors = np.maximum(np.sqrt(np.maximum(np.diag(shown), 0.0)), scale)
     whiteness = errors / scale
     covariance = expected * np.outer(whiteness, whiteness)
-    honest = genuine(squares, solution.noise_information)
-    open_ones = undetermined(names, honest)
+    corrected = noise_corrected(squares, solution.noise_information)
+    open_ones = undetermined(names, corrected)
     if open_ones:
-        errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(honest))))
+        errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(corrected))))
     low, high = ends(solution, inverse, errors, float(ndtri(0.5 + level / 2)))
     unit = np.outer(scale, scale)
     return Certainty(
@@ -94,8 +94,8 @@ def certainty(solution: Solution, level: float = 0.95) -> Certainty:
         np.exp(np.minimum(high, solution.logarithms + WIDEST)),
         covariance,
         np.clip(np.divide(expected, unit, out=np.eye(len(names)), where=unit > 0), -1, 1),
-        honest,
-        condition(honest),
+        corrected,
+        condition(corrected),
         whiteness,
         open_ones,
     )
@@ -118,8 +118,8 @@ def scores(comparison: Comparison, jacobian: Array, inverse: Array) -> Array:
     return total
 
 
-def genuine(information: Array, noise: Array) -> Array:
-    """Information (p, p) without what encoders' errors add to it, and something to be safe."""
+def noise_corrected(information: Array, noise: Array) -> Array:
+    """Information (p, p) without what encoders' errors add to it, `noise` (p, p) times a margin."""
     return _positive(information - MARGIN * noise)
 
 
