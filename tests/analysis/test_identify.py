@@ -12,9 +12,9 @@ import fmpy
 import numpy as np
 import pytest
 import rig
+from built import ROOT
 from lxml import etree
 
-ROOT = Path(__file__).resolve().parents[2]
 DEGREES = dict.fromkeys(("theta1", "theta2", "theta3", "theta4", "pitch", "roll"), ("deg", np.pi / 180))
 
 

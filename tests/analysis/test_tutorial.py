@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from built import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 TUTORIAL = ROOT / "analysis" / "tutorial.md"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
 

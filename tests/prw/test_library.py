@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from built import ROOT
 from lagrange import linear_model, table_1
 from reference import follow
 
 import prw
 
-HERE = Path(__file__).resolve().parent
-MOTION = HERE.parents[1] / "examples" / "point_to_point.csv"
+MOTION = ROOT / "examples" / "point_to_point.csv"
 
 
 def python(program: str, folder: Path) -> str:
@@ -225,9 +225,9 @@ def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
 
 def test_the_programs_in_the_readme(monkeypatch: pytest.MonkeyPatch) -> None:
     """They run as they stand, from the project's folder."""
-    readme = (HERE.parents[1] / "README.md").read_text(encoding="utf-8")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
     short, program = re.findall(r"^```python\n(.*?)^```", readme, flags=re.S | re.M)
-    monkeypatch.chdir(HERE.parents[1])
+    monkeypatch.chdir(ROOT)
     names: dict[str, Any] = {}
     exec(compile(short, "README.md", "exec"), names)
     assert names["run"].motion.name == "fig4" and names["run"].parameters["k1"] == 100.0

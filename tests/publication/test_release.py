@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
+import prw_wheel
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "platforms"))
-
-import prw_wheel  # noqa: E402
-import release  # noqa: E402
-import wheels  # noqa: E402
-from targets import TARGETS  # noqa: E402
+import release
+import wheels
+from targets import TARGETS
 
 
 def test_nothing_is_left_of_an_earlier_release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

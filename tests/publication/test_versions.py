@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
+from built import ROOT
 
 
 def tracked(pattern: str) -> list[Path]:

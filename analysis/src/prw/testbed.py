@@ -1,4 +1,4 @@
-"""The testbed FMU as a Co-Simulation slave."""
+"""The testbed FMU as an instance for Co-Simulation."""
 
 from __future__ import annotations
 

@@ -155,19 +155,19 @@ def cvode(loop: Loop):
 
 
 @pytest.fixture
-def loop(testbed_fmu, controller_fmu, closed_loop: System):
-    made = Loop(testbed_fmu, controller_fmu, {end.split(".")[1]: value for end, value in closed_loop.inputs.values()})
+def loop(fmu, controller_fmu, closed_loop: System):
+    made = Loop(fmu, controller_fmu, {end.split(".")[1]: value for end, value in closed_loop.inputs.values()})
     yield made
     made.close()
 
 
 @pytest.fixture(scope="module")
-def exact(testbed_fmu, controller_fmu, closed_loop: System) -> np.ndarray:
+def exact(fmu, controller_fmu, closed_loop: System) -> np.ndarray:
     """By Runge and Kutta with steps so small that halving them changes nothing to speak of."""
     references = {end.split(".")[1]: value for end, value in closed_loop.inputs.values()}
     found = []
     for steps in (8, 16):
-        loop = Loop(testbed_fmu, controller_fmu, references)
+        loop = Loop(fmu, controller_fmu, references)
         found.append(loop.run(runge_kutta(steps)))
         loop.close()
     assert np.abs(found[1] - found[0]).max() < 1e-9

@@ -15,10 +15,10 @@ from prw.motion import Array
 from prw.testbed import Value, existing_fmu
 
 
-class Slave:
+class Instance:
     """An instance of a Co-Simulation FMU of FMI 2.0, initialized at time 0. A context manager: leaving it frees it.
 
-        with Slave(start={"use_omega": True}) as testbed:
+        with Instance(start={"use_omega": True}) as testbed:
             testbed.set({"theta1": 0.1})
             testbed.step(1e-3)
             pitch, roll = testbed.get("pitch", "roll")
@@ -46,7 +46,7 @@ class Slave:
             self.close()
             raise
 
-    def __enter__(self) -> Slave:
+    def __enter__(self) -> Instance:
         return self
 
     def __exit__(self, *_: object) -> None:

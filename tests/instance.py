@@ -14,7 +14,7 @@ from fmpy.fmi2 import (
 from lagrange import OUTPUTS
 
 
-class Slave:
+class Instance:
     """A Co-Simulation instance. `messages` holds what it logged as (status, category, text)."""
 
     def __init__(self, unpacked, description, name: str = "testbed"):

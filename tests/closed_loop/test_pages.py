@@ -11,7 +11,7 @@ import zipfile
 from unittest.mock import Mock, call, patch
 
 import pytest
-from conftest import ROOT
+from built import ROOT
 
 from tools.documentation.pages import CONTROLLER, TESTBED
 from tools.documentation.sources import read_description
