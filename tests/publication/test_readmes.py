@@ -45,7 +45,9 @@ def test_links_are_found() -> None:
 
 def test_the_published_crates() -> None:
     names = {folder.name for folder in published()}
-    assert names == {"fmi-abi", "fmu-export", "fmu-package", "fmu-run", "fmu-system"}, "a package without `publish = false`"
+    assert names == {"fmi-abi", "fmu-export", "fmu-package", "fmu-run", "fmu-system"}, (
+        "a package without `publish = false`"
+    )
 
 
 @pytest.mark.parametrize("home", published(), ids=lambda folder: folder.name)

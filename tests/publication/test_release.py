@@ -37,5 +37,5 @@ def test_a_wheel_for_each_platform(tmp_path: Path) -> None:
 
 
 def test_prw_has_the_version_of_the_rest() -> None:
-    with pytest.raises(SystemExit, match=r"in analysis/pyproject.toml is [\d.]+, in Cargo.toml it is 9.9.9"):
+    with pytest.raises(SystemExit, match=r"in python/prw/pyproject.toml is [\d.]+, in Cargo.toml it is 9.9.9"):
         prw_wheel.check_version("9.9.9")

@@ -31,7 +31,7 @@ def default_fmu() -> Path:
     """The testbed FMU that is used if none is named: that built in the working directory, in the checkout this package
     belongs to, or the one that was installed with it. Where there is none, the path at which `make fmu` would leave it.
     """
-    places = (BUILT, _PACKAGE.parents[2] / BUILT, _PACKAGE / "fmu" / BUILT.name)
+    places = (BUILT, *(folder / BUILT for folder in _PACKAGE.parents[3:4]), _PACKAGE / "fmu" / BUILT.name)
     return next((path for path in places if path.is_file()), BUILT)
 
 
