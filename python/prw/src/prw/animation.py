@@ -16,12 +16,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import ArrayLike
 from PIL import Image
 
 from prw.errors import UserError
 from prw.files import replacing
 from prw.motion import Array
-from prw.moving import movie_writer, write_gif, write_page
+from prw.moving import write_gif, write_movie, write_page
 from prw.plots import BLUE, GREEN, PURPLE, STYLE, VERMILION
 from prw.wrist import DARK, PALE, STEEL, Wrist
 
@@ -138,7 +139,7 @@ def animate(
             elif suffix == ".html":
                 write_page(temporary, pictures, rate)
             else:
-                animation.save(str(temporary), writer=movie_writer(rate), dpi=DPI)
+                write_movie(temporary, pictures, rate)
     return animation
 
 
@@ -177,6 +178,7 @@ class _Picture:
         captions: Sequence[tuple[float, str]],
     ):
         self.time, self.courses, self.captions = time, courses, captions
+        self._ground: Any = None
         pairs = (("theta1", "theta3"), ("theta3", "theta5"), ("theta2", "theta4"), ("theta4", "theta6"))
         twist = max(float(np.abs(courses[a] - courses[b]).max()) for a, b in pairs)
         factor = _round_below(min(SHOWN_TWIST / max(twist, 1e-6), MOST_TWISTED))
@@ -199,7 +201,7 @@ class _Picture:
         axes.set(**{f"{axis}lim": (-side / 2, side / 2) for axis, side in zip("xyz", box)})
         axes.set_box_aspect(box, zoom=0.97)
         self.scene = axes
-        self.bodies: Poly3DCollection | None = None
+        self.bodies: Any = None
         self.caption = self.figure.text(0.02, 0.955, "", fontsize=11.5, fontweight="bold", va="center")
         note = f"couplings' twist × {factor:g}"
         if abs(speed - 1) > 1e-3:
@@ -233,9 +235,10 @@ class _Picture:
         if self.bodies is not None:
             self.bodies.remove()
         # matplotlib's axes have the depth second and the height third: Y, the roll axis, is up.
-        faces = [(np.column_stack([c[:, 0], -c[:, 2], c[:, 1]]), colour) for c, colour in self.wrist.faces(at)]
-        colours = [_lit(corners, colour) for corners, colour in faces]
-        self.bodies = Poly3DCollection([c for c, _ in faces], facecolors=colours, edgecolors=colours, linewidths=0.8)
+        faces = self.wrist.faces(at)
+        corners = [face.corners[:, [0, 2, 1]] * (1, -1, 1) for face in faces]
+        colours = _lit(corners, [face.colour for face in faces])
+        self.bodies = Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.8)
         self.scene.add_collection3d(self.bodies, autolim=False)
         passed = [text for begin, text in self.captions if begin <= instant + 1e-9]
         self.caption.set_text(passed[-1] if passed else "")
@@ -253,29 +256,43 @@ class _Picture:
         """The picture at the instant (s), with its transparency."""
         self.draw(instant)
         canvas: Any = self.figure.canvas
-        canvas.draw()
-        return Image.fromarray(np.asarray(canvas.buffer_rgba()))
+        moved = [self.bodies, *(artist for one in self.moving for artist in one[2:]), *self.figure.texts]
+        if self._ground is None:
+            # What never moves, axes and whole courses, takes longest: it is drawn once.
+            for artist in moved:
+                artist.set_visible(False)
+            canvas.draw()
+            self._ground = canvas.copy_from_bbox(self.figure.bbox)
+            for artist in moved:
+                artist.set_visible(True)
+        canvas.restore_region(self._ground)
+        self.bodies.do_3d_projection()
+        for artist in moved:
+            self.figure.draw_artist(artist)
+        return Image.fromarray(np.array(canvas.buffer_rgba()))
 
 
-def _colours() -> Iterator[tuple[float, ...]]:
+def _colours() -> Iterator[ArrayLike]:
     """All there are but for smooth edges: bodies in every brightness, pale courses, text and grid."""
     for name in (BLUE, VERMILION, GREEN, PURPLE, STEEL, DARK, PALE):
         yield from (_bright(to_rgb(name), level) for level in range(LEVELS + 1))
     for name in (BLUE, VERMILION, GREEN, PURPLE):
-        yield tuple(1 - FAINT * (1 - part) for part in to_rgb(name))
+        yield 1 - FAINT * (1 - np.array(to_rgb(name)))
     yield from ((grey, grey, grey) for grey in (0.0, 0.35, 0.63, 0.9, 1.0))
 
 
-def _lit(corners: Array, colour: tuple[float, float, float]) -> tuple[float, ...]:
-    """The colour of a face in the light: that of the side which the viewer sees."""
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[1])
-    normal = normal * np.sign(normal @ VIEWER) / max(float(np.linalg.norm(normal)), 1e-12)
-    return _bright(colour, round(LEVELS * max(float(normal @ LAMP), 0.0)))
+def _lit(faces: Sequence[Array], colours: Sequence[tuple[float, float, float]]) -> Array:
+    """The colours (n, 3) of the faces, corners (k, 3) each, in the light: of the sides which the viewer sees."""
+    first, second, third = np.moveaxis(np.array([corners[:3] for corners in faces]), 1, 0)
+    normal = np.cross(second - first, third - second)
+    normal *= (np.sign(normal @ VIEWER) / np.maximum(np.linalg.norm(normal, axis=1), 1e-12))[:, None]
+    return _bright(colours, np.rint(LEVELS * np.maximum(normal @ LAMP, 0.0))[:, None])
 
 
-def _bright(colour: tuple[float, float, float], level: int) -> tuple[float, ...]:
+def _bright(colour: ArrayLike, level: ArrayLike) -> Array:
     """The colour at one of the degrees of brightness, 0 ... LEVELS."""
-    return tuple((0.6 + 0.4 * level / LEVELS) * part for part in colour)
+    bright: Array = (0.6 + 0.4 * np.asarray(level) / LEVELS) * np.asarray(colour)
+    return bright
 
 
 def _round_below(value: float) -> float:

@@ -8,8 +8,8 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-import matplotlib
-from matplotlib.animation import AbstractMovieWriter, FFMpegWriter
+import numpy as np
+from numpy.typing import ArrayLike
 from PIL import Image
 
 from prw.extras import need
@@ -38,13 +38,13 @@ show();
 """
 
 
-def write_gif(path: Path, pictures: Iterable[Image.Image], rate: int, colours: Iterable[tuple[float, ...]]) -> None:
+def write_gif(path: Path, pictures: Iterable[Image.Image], rate: int, colours: Iterable[ArrayLike]) -> None:
     """Write a GIF of `rate` pictures a second in the colours (red, green, blue: 0 ... 1).
 
     All pictures share them, without dithering: nothing flickers, and what stays takes no room.
     """
     table = Image.new("P", (1, 1))
-    table.putpalette([round(255 * part) for colour in colours for part in colour])
+    table.putpalette(np.rint(255 * np.array(list(colours))).astype(int).ravel().tolist())
     reduced = [one.convert("RGB").quantize(palette=table, dither=Image.Dither.NONE) for one in pictures]
     first, *others = reduced
     first.save(
@@ -67,12 +67,20 @@ def write_page(path: Path, pictures: Iterable[Image.Image], rate: int) -> None:
     path.write_text(page, encoding="utf-8")
 
 
-def movie_writer(rate: int) -> AbstractMovieWriter:
-    """What writes an MP4 of `rate` pictures a second. Raises UserError where a package is missing."""
+def write_movie(path: Path, pictures: Iterable[Image.Image], rate: int) -> None:
+    """Write an MP4 of `rate` pictures a second. Raises UserError where a package is missing."""
     need("movie", "imageio_ffmpeg")
     import imageio_ffmpeg
 
-    matplotlib.rcParams["animation.ffmpeg_path"] = imageio_ffmpeg.get_ffmpeg_exe()
-    # Players want even sides and this order of colours.
-    extra = ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-crf", "20"]
-    return FFMpegWriter(fps=rate, extra_args=extra)
+    writer = None
+    # Players want even sides.
+    options = ["-vf", "crop=floor(iw/2)*2:floor(ih/2)*2", "-crf", "20"]
+    for one in pictures:
+        if writer is None:
+            writer = imageio_ffmpeg.write_frames(
+                str(path), one.size, fps=rate, quality=None, macro_block_size=1, output_params=options
+            )
+            writer.send(None)
+        writer.send(one.convert("RGB").tobytes())
+    if writer is not None:
+        writer.close()

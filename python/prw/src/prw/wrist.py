@@ -56,7 +56,8 @@ class Wrist:
 
     def faces(self, at: Mapping[str, float]) -> list[Face]:
         """Everything at the angles `at`: theta1 ... theta6, pitch and roll in rad."""
-        faces = [Face(face.corners @ part.turn(at).T, face.colour) for part in self.parts for face in part.faces]
+        turned = [(part.turn(at).T, part.faces) for part in self.parts]
+        faces = [Face(face.corners @ turn, face.colour) for turn, bodies in turned for face in bodies]
         for side, angles, colour in (
             (-1, ("theta1", "theta3", "theta5"), BLUE),
             (1, ("theta2", "theta4", "theta6"), VERMILION),
