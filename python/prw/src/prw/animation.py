@@ -100,12 +100,25 @@ def animate(
 ) -> FuncAnimation:
     """Animate `run`, and write it to `path`: a GIF, an MP4 (with the package imageio-ffmpeg) or an HTML page.
 
-    run: from `prw.simulate`, with the outputs theta3, theta4, pitch, roll, tau1 and tau2. speed: seconds of the run
-    that pass in a second of the animation (default: 1, but so that the whole takes 6 s at least and 40 s at most).
-    captions: lines to show from a time (s) of the run on, in order.
+    Parameters
+    ----------
+    run
+        From `prw.simulate`, with the outputs theta3, theta4, pitch, roll, tau1 and tau2.
+    speed
+        Seconds of the run that pass in a second of the animation (default: 1, but so that the whole takes 6 s at
+        least and 40 s at most).
+    captions
+        Lines to show from a time (s) of the run on, in order.
 
-    Returns the animation, for a notebook to show. Raises UserError where the run lacks an output, `path` has another
-    suffix or cannot be written, or a package is missing.
+    Returns
+    -------
+    FuncAnimation
+        The animation, for a notebook to show.
+
+    Raises
+    ------
+    UserError
+        The run lacks an output, `path` has another suffix or cannot be written, or a package is missing.
     """
     target = None if path is None else Path(path)
     suffix = "" if target is None else target.suffix.lower()

@@ -34,11 +34,20 @@ def linearize(
 ) -> StateSpace:
     """The linear model of any FMU of FMI 2.0 or 3.0 that has directional derivatives, at its initial state.
 
-    fmu: default, the testbed's. parameters: start values of parameters, states and inputs by name, in the FMU's
-    units; others keep their own. The testbed is linear, so of these only parameters matter there. outputs, fmi_type:
-    as for `Linearizer`, which is faster where this is asked for again and again.
+    Parameters
+    ----------
+    fmu
+        The FMU (default: the testbed's).
+    parameters
+        Start values of parameters, states and inputs by name, in the FMU's units; others keep their own. The
+        testbed is linear, so of these only parameters matter there.
+    outputs, fmi_type
+        As for `Linearizer`, which is faster where this is asked for again and again.
 
-    Raises UserError where the FMU is missing, has no directional derivatives, lacks a name or refuses a value.
+    Raises
+    ------
+    UserError
+        The FMU is missing, has no directional derivatives, lacks a name or refuses a value.
     """
     with Linearizer(fmu, outputs=outputs, fmi_type=fmi_type) as linearizer:
         return linearizer.at(parameters)

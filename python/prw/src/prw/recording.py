@@ -80,14 +80,25 @@ class Recording:
 
 
 def read(path: str | os.PathLike[str], units: Mapping[str, str] | None = None, degrees: bool = False) -> Recording:
-    """Read a recorded experiment: time (s), theta1, theta2 (rad) and, where present, omega1, omega2 (rad/s) and any
-    of tau1, tau2 (N.m), theta3, theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s).
+    """Read a recorded experiment from a CSV file.
 
-    The file is UTF-8 text with a header line, perhaps below comments after `#`; columns in any order, others ignored;
-    separated by commas, semicolons or tabs (with semicolons, a decimal comma is understood). A column's unit is in
-    its header (`pitch [deg]`) or in `units` by name; without either it is SI, or degrees and degrees per second if
-    `degrees`. Time may be uneven but must increase. A measured column may have empty cells. Raises UserError naming
-    file, row and column.
+    Its columns: time (s), theta1, theta2 (rad) and, where present, omega1, omega2 (rad/s) and any of tau1, tau2
+    (N.m), theta3, theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s), in any order; others are ignored. It is
+    UTF-8 text with a header line, perhaps below comments after `#`, separated by commas, semicolons or tabs (with
+    semicolons, a decimal comma is understood). Time may be uneven but must increase. A measured column may have
+    empty cells.
+
+    Parameters
+    ----------
+    units
+        Unit by column, where the header has none (`pitch [deg]` has one). Default: SI.
+    degrees
+        Columns without a unit are in degrees and degrees per second.
+
+    Raises
+    ------
+    UserError
+        Something cannot be read; file, row and column are named.
     """
     return _read(Path(path), units, degrees, tuple(MEASURED))
 

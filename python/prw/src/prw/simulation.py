@@ -103,13 +103,28 @@ def simulate(
 ) -> Run:
     """Let the testbed follow the motors, from rest at their first angles.
 
-    motion: what the motors do, or a recording of it (a CSV file as `prw.read` takes it; only its motors matter here).
-    Default: the paper's experiment of Fig. 4. parameters: values in SI by name; others keep the FMU's start values.
-    fmu: the testbed FMU, of FMI 2.0 or 3.0 (default: the one built in this checkout, or installed with this package).
-    outputs: names of any Real variables.
+    Parameters
+    ----------
+    motion
+        What the motors do, or a recording of it (a CSV file as `prw.read` takes it; only its motors matter here).
+        Default: the paper's experiment of Fig. 4.
+    parameters
+        Values in SI by name; others keep the FMU's start values.
+    fmu
+        The testbed FMU, of FMI 2.0 or 3.0 (default: the one built in this checkout, or installed with this
+        package).
+    outputs
+        Names of any Real variables.
 
-    Row k of the outputs is read at time[k], with the motors where they are then. Raises UserError where the FMU is
-    missing or refuses a value, a name is unknown or a file unreadable.
+    Returns
+    -------
+    Run
+        The run. Row k of its outputs is read at time[k], with the motors where they are then.
+
+    Raises
+    ------
+    UserError
+        The FMU is missing or refuses a value, a name is unknown or a file unreadable.
     """
     course = motion_of(motion)
     names = [outputs] if isinstance(outputs, str) else list(outputs)

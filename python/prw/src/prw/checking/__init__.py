@@ -28,15 +28,32 @@ def check(
 ) -> Agreement:
     """Compare what another tool wrote with a reference experiment.
 
-    result: CSV, a .mat file as OpenModelica writes it, or one that MATLAB saved with `-v7` or earlier. Its columns are
-    found by name, also behind that of a component, as in `testbed.roll`; what is not known is left out. Units stand in
-    the names (`roll [deg]`) or in `units` by name, otherwise SI. experiment: its name (default: the one that is
-    nearest). model_exchange: judge by the tolerances for that interface type instead of those for Co-Simulation.
-    component: the name before the dot, where several have columns of the same name (default: `testbed`). fmu: the one
-    whose experiments are taken (default: the testbed's).
+    Parameters
+    ----------
+    result
+        CSV, a .mat file as OpenModelica writes it, or one that MATLAB saved with `-v7` or earlier. Its columns are
+        found by name, also behind that of a component, as in `testbed.roll`; what is not known is left out. Units
+        stand in the names (`roll [deg]`) or in `units`, otherwise they are SI.
+    experiment
+        Its name (default: the one that is nearest).
+    model_exchange
+        Judge by the tolerances for that interface type instead of those for Co-Simulation.
+    component
+        The name before the dot, where several have columns of the same name (default: `testbed`).
+    units
+        Unit by name.
+    fmu
+        The one whose experiments are taken (default: the testbed's).
 
-    A result that does not agree is no error. Raises UserError for files that cannot be read, names that are not known,
-    results without any output, and those that cover none of the experiment's times.
+    Returns
+    -------
+    Agreement
+        How far each output is off. A result that does not agree is no error.
+
+    Raises
+    ------
+    UserError
+        A file cannot be read, a name is not known, or the result has no output at any of the experiment's times.
     """
     # They take a while to load.
     from prw.checking.agreement import compare, nearest

@@ -45,16 +45,44 @@ def identify(
 ) -> Identification:
     """Estimate parameters of the testbed from one experiment or several.
 
-    files: CSV tables as `prw.read` reads them, or what it returned. estimate: names of the parameters. priors: what is
-    known beforehand of a parameter, by name: the standard deviation as a fraction of its start value, or (value,
-    fraction); it is then estimated along. fixed: other start values, or values of what is not estimated. bounds: (least,
-    greatest). noise: standard deviations of channels where they are known. units, degrees: as for `prw.read`. quantum:
-    resolution of the motors' encoders in rad (default: found in the data). offsets: whether sensors may have any.
-    starts: places to search from, at random with `seed`. fmu: default, the testbed's. All in SI.
+    Sensor offsets and the state at the first sample are unknown, too, and estimated along. All values are in SI.
 
-    Sensor offsets and the state at the first sample are estimated along. Raises UserError for what cannot be read,
-    names that are not known, and values that the FMU refuses; parameters that the data leave open are no error but the
-    result's `undetermined`.
+    Parameters
+    ----------
+    files
+        CSV tables as `prw.read` reads them, or what it returned.
+    estimate
+        Names of the parameters.
+    priors
+        What is known beforehand of a parameter, by name: the standard deviation as a fraction of its start value,
+        or (value, fraction). It is then estimated along.
+    fixed
+        Other start values, or values of what is not estimated.
+    bounds
+        (least, greatest) by parameter.
+    noise
+        Standard deviations of channels, where they are known.
+    units, degrees
+        As for `prw.read`.
+    quantum
+        Resolution of the motors' encoders, rad (default: found in the data).
+    offsets
+        Whether sensors may have any.
+    starts
+        Places to search from, at random with `seed`.
+    fmu
+        The testbed FMU (default: as for `prw.simulate`).
+
+    Returns
+    -------
+    Identification
+        Estimates, standard errors and doubts. Parameters that the data leave open are no error: see its
+        `undetermined`.
+
+    Raises
+    ------
+    UserError
+        A file cannot be read, a name is not known, or the FMU refuses a value.
     """
     need("identify", "scipy", "threadpoolctl", "lxml")
     # They take a while to load.

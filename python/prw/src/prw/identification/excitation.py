@@ -51,9 +51,25 @@ def excite(
     """Motions within the motors' limits, those first that tell most about the parameters.
 
     Kinds: multisines (slow, wide, and one whose spectrum is optimal for the parameters) and chirps, with equal,
-    opposite, single and independent motors. measure: channels that will be measured (default: all). angle, speed,
-    acceleration: limits of the motors in rad, rad/s, rad/s2. duration: s. rate: samples per second. estimate, fixed,
-    noise, fmu: as for `prw.identify`. Raises UserError for what cannot be.
+    opposite, single and independent motors.
+
+    Parameters
+    ----------
+    measure
+        Channels that will be measured (default: all).
+    angle, speed, acceleration
+        Limits of the motors, rad, rad/s, rad/s2.
+    duration
+        Of a motion, s.
+    rate
+        Samples per second.
+    estimate, fixed, noise, fmu
+        As for `prw.identify`.
+
+    Raises
+    ------
+    UserError
+        A name is not known, or a number makes no sense.
     """
     need("identify", "scipy", "threadpoolctl")
     from threadpoolctl import threadpool_limits

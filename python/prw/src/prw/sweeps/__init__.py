@@ -52,16 +52,34 @@ def sweep(
 ) -> pyarrow.Table:
     """Run the testbed with many sets of parameters.
 
-    grid: values by parameter, in SI; all combinations are run. random: by parameter the relative standard deviation
-    (0.1 is 10 %) about the start value, or (value, relative) about another one; `runs` log-normal draws for each
-    combination, from the seed `seed`. motion: as for `prw.simulate`. threads: default one for each processor. scheduler:
-    the address of a Dask cluster instead. out: a folder in which what is done is kept, so that the same call goes on
-    after an interruption, and the table in the end.
+    Parameters
+    ----------
+    grid
+        Values by parameter, in SI; all combinations are run.
+    random
+        By parameter the relative standard deviation (0.1 is 10 %) about the start value, or (value, relative) about
+        another one; `runs` log-normal draws for each combination of the grid, from the seed `seed`.
+    motion
+        As for `prw.simulate`; so is `fmu`.
+    threads
+        How many make the runs (default: one for each processor).
+    scheduler
+        The address of a Dask cluster that makes the runs instead.
+    out
+        A folder in which what is done is kept, so that the same call goes on after an interruption, and the table
+        in the end.
 
-    Returns an Arrow table (`.to_pandas()` makes a DataFrame of it), a row each run: `run`; `status`, "done" or
-    "failed"; `message`, why it failed; the parameters; and of each output the peak (of its magnitude), rms and value
-    at the end, such as `roll_peak`, in SI. A run that the FMU refuses is a row with its message. Raises UserError for
-    what cannot be.
+    Returns
+    -------
+    pyarrow.Table
+        An Arrow table (`.to_pandas()` makes a DataFrame of it), a row each run: `run`; `status`, "done" or
+        "failed"; `message`, why it failed, as where the FMU refuses a value; the parameters; and of each output the
+        peak (of its magnitude), rms and value at the end, such as `roll_peak`, in SI.
+
+    Raises
+    ------
+    UserError
+        An argument makes no sense, a file cannot be read or written, or the cluster does not answer.
     """
     need("sweep", "pyarrow")
     if scheduler:
