@@ -1,4 +1,4 @@
-"""Every command of analysis/tutorial.md, run in order, and what it promises."""
+"""Every command of python/prw/tutorial.md, run in order, and what it promises."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from built import ROOT
 
-TUTORIAL = ROOT / "analysis" / "tutorial.md"
+TUTORIAL = ROOT / "python" / "prw" / "tutorial.md"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
 
 
