@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -47,3 +49,14 @@ def unpack() -> Iterator[Callable[[Path], str]]:
     yield unpack
     for folder in folders:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture
+def prw(tmp_path: Path, fmu: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Runs `prw` with arguments in a folder of its own."""
+
+    def run(*arguments: object, with_fmu: bool = True) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "prw", *map(str, arguments), *(["--fmu", str(fmu)] if with_fmu else [])]
+        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=300)
+
+    return run

@@ -1,9 +1,6 @@
-"""Fixtures: a linear model of the FMU, the command `prw` in a folder of its own, and experiments on a simulated rig."""
+"""Fixtures: a linear model of the FMU, and experiments on a simulated rig."""
 
 from __future__ import annotations
-
-import subprocess
-import sys
 
 import pytest
 import rig
@@ -16,17 +13,6 @@ def model(fmu):
 
     with Model(fmu) as instance:
         yield instance
-
-
-@pytest.fixture
-def prw(tmp_path, fmu):
-    """Runs `prw` with arguments in a folder of its own."""
-
-    def run(*arguments):
-        command = [sys.executable, "-m", "prw", *map(str, arguments), "--fmu", str(fmu)]
-        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=300)
-
-    return run
 
 
 @pytest.fixture(scope="session")

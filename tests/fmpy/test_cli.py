@@ -20,17 +20,6 @@ EXAMPLES = ROOT / "examples"
 GOOD = "time,theta1,theta2\n0,0.1,0.2\n0.001,0.1,0.2\n0.002,0.1,0.2\n"
 
 
-@pytest.fixture
-def prw(tmp_path, fmu):
-    """Runs `prw` with arguments in a directory of its own."""
-
-    def run(*arguments, with_fmu=True):
-        command = [sys.executable, "-m", "prw", *map(str, arguments), *(["--fmu", str(fmu)] if with_fmu else [])]
-        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120)
-
-    return run
-
-
 def table(path):
     with open(path, newline="") as file:
         rows = list(csv.reader(file))
