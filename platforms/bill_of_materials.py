@@ -14,6 +14,7 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -99,19 +100,12 @@ def _cargo(command: list[str]) -> str:
 
 def copyright_of(package: dict[str, Any]) -> str:
     """The holders named in the package's licence files, else its authors."""
-    folder = Path(package["manifest_path"]).parent
-    lines = []
-    for path in sorted(folder.iterdir()):
+    lines: dict[str, None] = {}
+    for path in sorted(Path(package["manifest_path"]).parent.iterdir()):
         if re.match(r"(licen[cs]e|copyright)", path.name, re.IGNORECASE) and path.is_file():
-            for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-                match = HOLDER.match(line)
-                if (
-                    match
-                    and "owner" not in match[1]
-                    and match[1] not in lines
-                    and not re.fullmatch(r"[\d\s-]+", match[1])
-                ):
-                    lines.append(match[1])
+            named = map(HOLDER.match, path.read_text(encoding="utf-8", errors="replace").splitlines())
+            holders = (match[1] for match in named if match)
+            lines |= dict.fromkeys(h for h in holders if "owner" not in h and not re.fullmatch(r"[\d\s-]+", h))
     authors = [re.sub(r"\s*<.*>", "", author) for author in package["authors"]]
     return "; ".join(lines or authors) or "its authors"
 
@@ -121,57 +115,27 @@ def licence_of(package: dict[str, Any]) -> str:
     return str(package["license"]).replace("/", " OR ")
 
 
-def other_licences(product: Product) -> str:
-    """The licence files of the packages that are not available under the Apache License."""
-    texts = []
-    for package in packages(product):
-        if package["source"] and "Apache-2.0" not in licence_of(package):
-            for path in sorted(Path(package["manifest_path"]).parent.glob("LICEN[CS]E*")):
-                heading = f"==== {package['name']} {package['version']} ===="
-                texts.append(f"\n\n{heading}\n\n{path.read_text(encoding='utf-8')}")
-    return "".join(texts)
-
-
-def checksums() -> dict[tuple[str, str], str]:
-    """The SHA-256 of the packages in Cargo.lock."""
-    text = (ROOT / "Cargo.lock").read_text(encoding="utf-8")
-    pattern = r'name = "(.+)"\nversion = "(.+)"\nsource = .+\nchecksum = "(.+)"'
-    return {(name, version): checksum for name, version, checksum in re.findall(pattern, text)}
-
-
 def bill(product: Product) -> str:
     """The list for tools."""
-    sums = checksums()
-    main, components = None, []
+    locked = tomllib.loads((ROOT / "Cargo.lock").read_text(encoding="utf-8"))["package"]
+    sums = {(package["name"], package["version"]): package.get("checksum") for package in locked}
+    components = {}
     for package in packages(product):
         name, version = package["name"], package["version"]
-        component = {
-            "type": "library",
-            "bom-ref": f"pkg:cargo/{name}@{version}",
-            "name": name,
-            "version": version,
-            "licenses": [{"expression": licence_of(package)}],
-        }
+        purl = f"pkg:cargo/{name}@{version}"
+        component = {"type": "library", "bom-ref": purl, "name": name, "version": version}
+        component["licenses"] = [{"expression": licence_of(package)}]
         if package["source"]:
-            component["copyright"] = copyright_of(package)
-            component["purl"] = component["bom-ref"]
+            component |= {"copyright": copyright_of(package), "purl": purl}
             component["hashes"] = [{"alg": "SHA-256", "content": sums[name, version]}]
-        if name == product.package:
-            main = component
-        else:
-            components.append(component)
+        components[name, version] = component
+    (main,) = (key for key in components if key[0] == product.package)
+    metadata = {"component": components.pop(main)}
+    every = list(components.values())
     for name, licence, holder, where in BESIDE_CRATES:
-        components.append(
-            {
-                "type": "library",
-                "bom-ref": name,
-                "name": name,
-                "description": where,
-                "licenses": [{"expression": licence}],
-                "copyright": holder,
-            }
-        )
-    content = {"metadata": {"component": main}, "components": components}
+        component = {"type": "library", "bom-ref": name, "name": name, "description": where}
+        every.append(component | {"licenses": [{"expression": licence}], "copyright": holder})
+    content = {"metadata": metadata, "components": every}
     # The serial number follows from the content, so that it stays when the content does.
     serial = uuid.uuid5(uuid.NAMESPACE_URL, json.dumps(content, sort_keys=True))
     head = {"bomFormat": "CycloneDX", "specVersion": "1.6", "serialNumber": f"urn:uuid:{serial}", "version": 1}
@@ -179,41 +143,42 @@ def bill(product: Product) -> str:
 
 
 def notice(product: Product) -> str:
-    """The list for people."""
-    rows = [("package", "version", "licence", "copyright")]
+    """The list for people, with the licence files of what is not available under the Apache License."""
+    rows, texts = [("package", "version", "licence", "copyright")], []
     for package in packages(product):
         if package["source"]:
-            rows.append((package["name"], package["version"], licence_of(package), copyright_of(package)))
-    table = [_row(rows, row) for row in rows]
-    beside = [("beside packages", "licence", "copyright", "in the libraries for")]
-    beside += [(name, licence, holder, where) for name, licence, holder, where in BESIDE_CRATES]
-    lists = "".join(table) + "\n" + "".join(_row(beside, row) for row in beside)
-    return HEADER.format(kind=product.kind) + lists + FOOTER.format(kind=product.kind) + other_licences(product)
+            name, version, licence = package["name"], package["version"], licence_of(package)
+            rows.append((name, version, licence, copyright_of(package)))
+            if "Apache-2.0" not in licence:
+                paths = sorted(Path(package["manifest_path"]).parent.glob("LICEN[CS]E*"))
+                texts += [f"\n\n==== {name} {version} ====\n\n{path.read_text(encoding='utf-8')}" for path in paths]
+    beside = [("beside packages", "licence", "copyright", "in the libraries for"), *BESIDE_CRATES]
+    kind = {"kind": product.kind}
+    return "".join([HEADER.format(**kind), _table(rows), "\n", _table(beside), FOOTER.format(**kind), *texts])
 
 
-def _row(rows: Sequence[tuple[str, ...]], row: tuple[str, ...]) -> str:
-    widths = [max(len(line[column]) for line in rows) for column in range(len(row))]
-    return "  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() + "\n"
+def _table(rows: Sequence[tuple[str, ...]]) -> str:
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths)) for row in rows)
+    return "".join(f"{line.rstrip()}\n" for line in lines)
 
 
-def _lists() -> list[tuple[Path, str]]:
-    return [(path, text) for p in PRODUCTS for path, text in ((p.bill, bill(p)), (p.notice, notice(p)))]
+def out_of_date() -> dict[Path, str]:
+    """The lists that are not what they should be, with what they should."""
+    lists = {path: text for p in PRODUCTS for path, text in ((p.bill, bill(p)), (p.notice, notice(p)))}
+    return {path: text for path, text in lists.items() if not path.is_file() or path.read_text("utf-8") != text}
 
 
 def check() -> None:
     """Stops if a list is out of date."""
-    for path, text in _lists():
-        if not path.is_file() or path.read_text(encoding="utf-8") != text:
-            name = path.relative_to(ROOT).as_posix()
-            raise SystemExit(f"error: {name} is out of date; write it anew: python3 platforms/bill_of_materials.py")
+    for path in out_of_date():
+        name = path.relative_to(ROOT).as_posix()
+        raise SystemExit(f"error: {name} is out of date; write it anew: python3 platforms/bill_of_materials.py")
 
 
 def write() -> None:
-    """Writes the lists."""
-    for path, text in _lists():
-        if path.is_file() and path.read_text(encoding="utf-8") == text:
-            print(f"{path.relative_to(ROOT)} is up to date")
-            continue
+    """Writes the lists that are out of date."""
+    for path, text in out_of_date().items():
         unfinished = path.with_name(f".{path.name}.unfinished")
         unfinished.write_bytes(text.encode())
         os.replace(unfinished, path)
@@ -221,9 +186,6 @@ def write() -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["--check"]:
-        check()
-    elif not sys.argv[1:]:
-        write()
-    else:
+    if sys.argv[1:] not in ([], ["--check"]):
         raise SystemExit(__doc__)
+    check() if sys.argv[1:] else write()

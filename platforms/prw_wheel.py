@@ -12,7 +12,7 @@ from pathlib import Path
 
 from targets import MODEL, ROOT
 
-PACKAGE = ROOT / "analysis"
+PACKAGE = ROOT / "python" / "prw"
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
 #: The first time that a zip can hold: the same sources give the same bytes.
 EPOCH = "315532800"
@@ -22,7 +22,9 @@ def check_version(version: str) -> None:
     """Stops if the package is not of this version, that of everything else."""
     own = tomllib.loads((PACKAGE / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     if own != version:
-        raise SystemExit(f"error: the version in analysis/pyproject.toml is {own}, in Cargo.toml it is {version}")
+        raise SystemExit(
+            f"error: the version in {PACKAGE.relative_to(ROOT).as_posix()}/pyproject.toml is {own}, in Cargo.toml it is {version}"
+        )
 
 
 def build(fmu: Path, out: Path) -> Path:

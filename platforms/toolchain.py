@@ -122,7 +122,7 @@ def install(packages: list[str], purpose: str) -> None:
 
 
 def zigbuild() -> str:
-    """cargo's subcommand that links against an old glibc; from this environment (platforms/requirements.txt)."""
+    """cargo's subcommand that links against an old glibc; from this environment (requirements/release.txt)."""
     path = shutil.which("cargo-zigbuild", path=sysconfig.get_path("scripts"))
     if not path:
         raise SystemExit("error: cargo-zigbuild is missing in this Python environment; start this with make release")

@@ -1,26 +1,9 @@
-"""Fixtures: the packed FMU, the command `prw` in a folder of its own, and experiments on a simulated rig."""
+"""Fixtures: a linear model of the FMU, and experiments on a simulated rig."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "oracle"))
-
-import rig  # noqa: E402
-
-
-@pytest.fixture(scope="session")
-def fmu() -> Path:
-    """The packed FMU."""
-    path = ROOT / "target" / "fmu" / "prw_testbed.fmu"
-    if not path.is_file():
-        pytest.exit(f"{path} is missing; build it with `make fmu`", returncode=1)
-    return path
+import rig
 
 
 @pytest.fixture(scope="session")
@@ -30,17 +13,6 @@ def model(fmu):
 
     with Model(fmu) as instance:
         yield instance
-
-
-@pytest.fixture
-def prw(tmp_path, fmu):
-    """Runs `prw` with arguments in a folder of its own."""
-
-    def run(*arguments):
-        command = [sys.executable, "-m", "prw", *map(str, arguments), "--fmu", str(fmu)]
-        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=300)
-
-    return run
 
 
 @pytest.fixture(scope="session")

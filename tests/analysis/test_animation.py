@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from built import ROOT
 from matplotlib.colors import to_rgb
 from PIL import Image, ImageSequence
 
@@ -19,8 +20,6 @@ from prw.motion import Motion
 from prw.plots import GREEN, PURPLE
 from prw.simulation import Run
 from prw.wrist import Wrist, about_x, about_y
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def swing(**changed: np.ndarray | None) -> Run:

@@ -146,6 +146,10 @@ def test_names_units_and_separators_of_others(right, fmu, tmp_path):
     path.write_text(path.read_text().replace(".0", ",0").replace(".", ",").replace("wrist,root,testbed,", "a.testbed."))
     assert prw.check(path, fmu=fmu).agrees
     plain = write_csv(tmp_path / "plain.csv", degrees)
+    header, *rows = plain.read_text().splitlines()
+    spoken = tmp_path / "words.csv"
+    spoken.write_text("\n".join([f"# a tool's\nmode,{header}", "# begins", *(f"true,{row}," for row in rows)]))
+    assert prw.check(spoken, units=dict.fromkeys(DEGREES, "deg"), fmu=fmu).agrees
     assert prw.check(plain, units=dict.fromkeys(DEGREES, "deg"), fmu=fmu).agrees
     assert "roll looks like degrees; say so with --units roll=deg" in prw.check(plain, fmu=fmu).notes
 
@@ -204,12 +208,13 @@ def test_what_may_be_the_reason(right, fmu, tmp_path, spoil, note):
 @pytest.mark.parametrize(
     "text, complaint",
     [
-        ("", "there are 0 lines"),
+        ("", "the file is empty"),
         ("time,a\n0,1\n1,2\n", "there is none of time, theta1"),
+        ("a,b\n0,1\n1,2\n", "there is no column time; it has a, b"),
         ("roll,pitch\n0,1\n1,2\n", "there is no column time; it has roll, pitch"),
-        ("time,roll\n0,1\n1\n", "row 3: 1 cells, but the header has 2"),
-        ("time,roll\n0,1\n1,x\n", "row 3: could not convert string to float: 'x'"),
-        ("time,roll\n0,1\n1,nan\n", "row 2 of the numbers has one that is not finite"),
+        ("time,roll\n0,1\n1\n", "row 3: 1 cell, but the header has 2"),
+        ("time,roll\n0,1\n1,x\n", "row 3, column roll: 'x' is not a number"),
+        ("time,roll\n0,1\n1,nan\n", "row 3, column roll: nan is not finite"),
         ("time,roll\n1,1\n0,2\n", "time runs backwards after 1 s"),
         ("time,roll\n5,1\n6,2\n", "runs from 5 to 6 s"),
         ("time,roll [N.m]\n0,1\n1,2\n", "column roll: roll cannot be in 'N.m'"),

@@ -12,9 +12,9 @@ import fmpy
 import numpy as np
 import pytest
 import rig
+from built import ROOT
 from lxml import etree
 
-ROOT = Path(__file__).resolve().parents[2]
 DEGREES = dict.fromkeys(("theta1", "theta2", "theta3", "theta4", "pitch", "roll"), ("deg", np.pi / 180))
 
 
@@ -90,42 +90,35 @@ def test_several_experiments_in_motion_with_gaps_and_uneven_rows(prw, tmp_path, 
     assert {c["samples"] for c in found["channels"] if c["channel"] == "pitch"} == {400}
 
 
-def test_build_fmu_takes_what_was_identified(prw, tmp_path, experiment, fmu):
-    if not shutil.which("cargo"):
-        pytest.skip("no cargo")
+def test_others_take_what_was_identified(prw, tmp_path, experiment):
+    """`build_fmu`, whose description alone has the parameters that were read; and by its schema any tool with SSP."""
     rig.write(tmp_path / "run.csv", rig.measure(experiment, 5, ("tau1", "theta3", "theta4")), rows=slice(0, 4000))
     assert prw("identify", "run.csv", "--starts", 1).returncode == 0
     out = tmp_path / "out" / "identified"
-    # The description alone: it is made of the parameters that were read, and nothing has to be compiled.
+    found = report(out)["parameters"]
+    schema = Path(fmpy.__file__).parent / "ssp" / "schema" / "SystemStructureParameterValues.xsd"
+    document = etree.parse(str(out / "identified.ssv"))
+    etree.XMLSchema(etree.parse(str(schema))).assertValid(document)
+    parameters = document.findall(".//{*}Parameter[{*}Real]")
+    assert {element.get("name") for element in parameters} == found.keys()
+    for element in parameters:
+        entry = found[element.get("name")]
+        assert float(element[0].get("value")) == entry["value"] and element[0].get("unit") == entry["unit"]
+    if not shutil.which("cargo"):
+        pytest.skip("no cargo")
     command = ["cargo", "run", "--quiet", "--locked", "--release", "--bin", "build_fmu", "--", "--describe"]
     command += ["--parameters", str(out / "identified.json"), "--out", str(tmp_path / "mine")]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
-    start = _starts(tmp_path / "mine" / "modelDescription.xml")
-    for name, entry in report(out)["parameters"].items():
+    variables = etree.parse(str(tmp_path / "mine" / "modelDescription.xml")).iterfind(".//ScalarVariable")
+    start = {
+        v.get("name"): float(v[0].get("start"))
+        for v in variables
+        if v[0].tag in ("Real", "Integer") and v[0].get("start")
+    }
+    for name, entry in found.items():
         assert start[name] == pytest.approx(entry["value"], rel=1e-14), name
     assert start["M"] == 4 and start["N"] == 7
-
-
-def _starts(path) -> dict:
-    found = {}
-    for variable in etree.parse(str(path)).iterfind(".//ScalarVariable[@causality='parameter']"):
-        if variable[0].tag in ("Real", "Integer"):
-            found[variable.get("name")] = float(variable[0].get("start"))
-    return found
-
-
-def test_the_parameter_set_is_ssp(prw, tmp_path, experiment):
-    rig.write(tmp_path / "run.csv", rig.measure(experiment, 5, ("tau1", "theta3", "theta4")), rows=slice(0, 4000))
-    assert prw("identify", "run.csv", "--starts", 1).returncode == 0
-    schema = Path(fmpy.__file__).parent / "ssp" / "schema" / "SystemStructureParameterValues.xsd"
-    document = etree.parse(str(tmp_path / "out" / "identified" / "identified.ssv"))
-    etree.XMLSchema(etree.parse(str(schema))).assertValid(document)
-    found = report(tmp_path / "out" / "identified")["parameters"]
-    name_space = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
-    for element in document.iterfind(".//ssv:Parameter[ssv:Real]", name_space):
-        entry = found[element.get("name")]
-        assert float(element[0].get("value")) == entry["value"] and element[0].get("unit") == entry["unit"]
 
 
 def test_equal_motors_say_nothing_of_the_roll_inertia(prw, tmp_path):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import signal
 import subprocess
 import sys
@@ -14,8 +12,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from prw.motion import fig4
-from prw.sweeps.study import Study, chunks
-from prw.sweeps.workers import on_this_machine
 from prw.testbed import OUTPUTS, Testbed
 
 
@@ -24,9 +20,11 @@ def rows(folder):
 
 
 def test_grid_random_and_failures(prw, tmp_path, fmu):
-    result = prw("sweep", "--grid", "k1=-50:150:3", "--random", "c3=0.4:20%", "--runs", 4, "--workers", 2)
+    result = prw(
+        "sweep", "--grid", "k1=-50:150:3", "--random", "c3=0.4:20%", "--runs", 4, "--workers", 2
+    )  # as 0.2.0 called threads
     assert result.returncode == 0, result.stderr
-    assert "ran         12 runs on 2 processes" in result.stdout
+    assert "ran         12 runs on 2 threads" in result.stdout
     assert "failed      4 runs; run 0: the FMU stopped: fmi2SetReal: k1 must not be below 1e-300" in result.stdout
     table = rows(tmp_path / "out" / "sweep")
     assert [row["run"] for row in table] == list(range(12))
@@ -46,7 +44,7 @@ def test_grid_random_and_failures(prw, tmp_path, fmu):
 def test_goes_on_after_a_kill(prw, tmp_path, fmu):
     # So many that they take longer than it takes to see the first and to kill.
     count = 2000
-    arguments = ["sweep", "--random", "k1=10%", "--runs", str(count), "--workers", "1", "--seed", "3", "--out", "study"]
+    arguments = ["sweep", "--random", "k1=10%", "--runs", str(count), "--threads", "1", "--seed", "3", "--out", "study"]
     command = [sys.executable, "-m", "prw", *arguments, "--fmu", str(fmu)]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     parts, patience = tmp_path / "study" / "parts", time.monotonic() + 120
@@ -70,18 +68,6 @@ def test_goes_on_after_a_kill(prw, tmp_path, fmu):
     assert result.returncode == 1 and "holds another study" in result.stderr
 
 
-def test_a_dying_worker_costs_no_run(fmu):
-    """A process is killed in the middle; its runs are made again."""
-    study = Study(fmu.read_bytes(), fig4(), ("k1",), np.linspace(60, 200, 120)[:, None])
-    results, found = on_this_machine(study, chunks(range(120), 4), 2), []
-    for part in results:
-        if not found:
-            os.kill(multiprocessing.active_children()[0].pid, signal.SIGKILL)
-        found += part
-    assert sorted(row["run"] for row in found) == list(range(120))
-    assert {row["status"] for row in found} == {"done"}
-
-
 def test_dask_cluster(prw, tmp_path):
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
@@ -102,7 +88,7 @@ def test_dask_cluster(prw, tmp_path):
         (["--grid", "k1=1:2:3", "--random", "k1=5%"], "k1 is in --grid and in --random"),
         (["--random", "k1=5"], "--random k1=5: write k1=10%"),
         (["--random", "k1=5%", "--runs", "0"], "--runs 0: at least 1"),
-        (["--random", "k1=5%", "--workers", "0"], "--workers 0: at least 1"),
+        (["--random", "k1=5%", "--threads", "0"], "--threads 0: at least 1"),
         (["--random", "k1=5%", "--input", "none.csv"], "none.csv: cannot be read"),
     ],
 )

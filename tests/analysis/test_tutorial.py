@@ -1,4 +1,4 @@
-"""Every command of analysis/tutorial.md, run in order, and what it promises."""
+"""Every command of python/prw/tutorial.md, run in order, and what it promises."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from built import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
-TUTORIAL = ROOT / "analysis" / "tutorial.md"
+TUTORIAL = ROOT / "python" / "prw" / "tutorial.md"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
 
 

@@ -1,27 +1,13 @@
-"""Fixtures: the FMUs, the closed loop made of them, and its runs under the masters that are installed."""
+"""Fixtures: the closed loop made of them, and its runs under the masters that are installed."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
+from built import built
 
 from tools.closed_loop import masters, system
-
-ROOT = Path(__file__).resolve().parents[2]
-FMUS = ROOT / "target" / "fmu"
-
-
-def built(name: str) -> Path:
-    path = FMUS / name
-    if not path.exists():
-        pytest.exit(f"{path} is missing; build it with `make closed-loop-fmus`", returncode=1)
-    return path
-
-
-@pytest.fixture(scope="session")
-def testbed_fmu() -> Path:
-    return built("prw_testbed.fmu")
 
 
 @pytest.fixture(scope="session")

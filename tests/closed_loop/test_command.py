@@ -8,7 +8,7 @@ import sys
 import fmpy
 import numpy as np
 import pytest
-from conftest import FMUS, ROOT, built
+from built import FMUS, ROOT, built
 from fmpy.validation import validate_fmu
 
 from tools.closed_loop import masters

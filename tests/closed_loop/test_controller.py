@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
-
 import fmpy
 import numpy as np
 import pytest
-from conftest import ROOT
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
-
-sys.path[:0] = [str(ROOT / "tests" / "oracle"), str(ROOT / "tests" / "fmpy")]
-
-from slave import Slave  # noqa: E402
+from instance import Instance
 
 MEASURED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
 MOTORS = ("theta1", "theta2", "omega1", "omega2")
@@ -22,24 +15,21 @@ STEP = 1e-3
 
 
 @pytest.fixture(scope="module")
-def folders(testbed_fmu, controller_fmu):
-    unpacked = {fmu.stem: fmpy.extract(str(fmu)) for fmu in (testbed_fmu, controller_fmu)}
-    yield unpacked
-    for folder in unpacked.values():
-        shutil.rmtree(folder, ignore_errors=True)
+def folders(fmu, controller_fmu, unpack):
+    return {each.stem: unpack(each) for each in (fmu, controller_fmu)}
 
 
 @pytest.fixture
 def make(folders):
-    slaves = []
+    instances = []
 
-    def make(name: str) -> Slave:
-        slaves.append(Slave(folders[name], fmpy.read_model_description(folders[name]), name))
-        return slaves[-1]
+    def make(name: str) -> Instance:
+        instances.append(Instance(folders[name], fmpy.read_model_description(folders[name]), name))
+        return instances[-1]
 
     yield make
-    for slave in slaves:
-        slave.free()
+    for instance in instances:
+        instance.free()
 
 
 @pytest.fixture
@@ -47,11 +37,11 @@ def controller(make):
     return make("prw_controller")
 
 
-def start(slave: Slave, **values) -> None:
-    slave.fmi.setupExperiment(startTime=0.0)
-    slave.set(**values)
-    slave.fmi.enterInitializationMode()
-    slave.fmi.exitInitializationMode()
+def start(instance: Instance, **values) -> None:
+    instance.fmi.setupExperiment(startTime=0.0)
+    instance.set(**values)
+    instance.fmi.enterInitializationMode()
+    instance.fmi.exitInitializationMode()
 
 
 def run(make, duration: float, reference, measure=lambda t, values: values, **parameters):

@@ -7,13 +7,13 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from built import ROOT
 
 from tools.closed_loop import masters, settling_time, system
 
 
 @pytest.fixture(scope="module")
-def python_loop(tmp_path_factory, testbed_fmu):
+def python_loop(tmp_path_factory, fmu):
     pytest.importorskip("pythonfmu")
     folder = tmp_path_factory.mktemp("python")
     source = ROOT / "examples" / "python_controller.py"
@@ -21,7 +21,7 @@ def python_loop(tmp_path_factory, testbed_fmu):
         [sys.executable, "-m", "pythonfmu", "build", "-f", source, "-d", folder], check=True, capture_output=True
     )
     build = ["cargo", "run", "--quiet", "--release", "-p", "prw_controller", "--bin", "build_closed_loop", "--"]
-    options = ["--testbed", testbed_fmu, "--controller", folder / "PythonController.fmu", "--out", folder]
+    options = ["--testbed", fmu, "--controller", folder / "PythonController.fmu", "--out", folder]
     subprocess.run([*build, *options], check=True, cwd=ROOT, capture_output=True)
     return system.read(folder / "prw_closed_loop.ssp", folder / "prw_closed_loop")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import fmpy.ssp
 import pytest
-from conftest import ROOT
+from built import ROOT
 from lxml import etree
 
 SCHEMAS = Path(fmpy.ssp.__file__).parent / "schema"
@@ -33,10 +33,10 @@ def test_every_part_is_valid(archive):
     assert {Path(name).suffix for name in archive.namelist()} == {".ssd", ".ssv", ".fmu"}
 
 
-def test_the_fmus_in_it_are_those_that_were_built(archive, closed_loop, testbed_fmu, controller_fmu):
-    for fmu in (testbed_fmu, controller_fmu):
-        assert archive.read(f"resources/{fmu.name}") == fmu.read_bytes()
-        assert (closed_loop.osp / fmu.name).read_bytes() == fmu.read_bytes()
+def test_the_fmus_in_it_are_those_that_were_built(archive, closed_loop, fmu, controller_fmu):
+    for each in (fmu, controller_fmu):
+        assert archive.read(f"resources/{each.name}") == each.read_bytes()
+        assert (closed_loop.osp / each.name).read_bytes() == each.read_bytes()
 
 
 def test_connections_have_the_units_of_the_fmus(archive, closed_loop):

@@ -8,7 +8,7 @@ import re
 
 import numpy as np
 import pytest
-from conftest import FMUS, ROOT
+from built import FMUS, ROOT
 
 from prw.checking.experiments import read_experiments
 from prw.cli import run
@@ -17,7 +17,7 @@ from tools.validation import runs
 
 
 @pytest.fixture
-def validate(monkeypatch, tmp_path, testbed_fmu):
+def validate(monkeypatch, tmp_path, fmu):
     """Runs the command with one importer and one master; returns its status and both files."""
     monkeypatch.chdir(ROOT)
     monkeypatch.setattr(runs, "IMPORTERS", [i for i in runs.IMPORTERS if i.name == "fmu_run"])
@@ -34,9 +34,9 @@ def validate(monkeypatch, tmp_path, testbed_fmu):
     return validate
 
 
-def test_the_report(validate, testbed_fmu, closed_loop):
+def test_the_report(validate, fmu, closed_loop):
     status, found, page = validate()
-    known = read_experiments(testbed_fmu)
+    known = read_experiments(fmu)
     assert status == 0 and all(row["agrees"] and row["share"] < 0.5 for row in found["rows"])
     assert len(found["rows"]) == 2 * len(known) + 1 and found["guid"] in page
     assert "No measured data of the real testbed were available" in page
@@ -49,8 +49,8 @@ def test_the_report(validate, testbed_fmu, closed_loop):
         assert f"{shares['c3']:.1f}" in text
 
 
-def test_a_file_of_another_tool(validate, testbed_fmu, tmp_path, capsys):
-    reference = read_experiments(testbed_fmu)[0].reference
+def test_a_file_of_another_tool(validate, fmu, tmp_path, capsys):
+    reference = read_experiments(fmu)[0].reference
     table = np.column_stack([reference["time"], 1.01 * reference["roll"]])
     np.savetxt(tmp_path / "far.csv", table, delimiter=",", header="time,wrist.roll", comments="")
     status, found, page = validate("--result", f"Tool 1.0={tmp_path / 'far.csv'}")

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "examples"), str(ROOT / "tests" / "oracle")]
+from built import ROOT, built
 
 
 @pytest.fixture(autouse=True)
@@ -16,5 +11,4 @@ def in_the_project(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the examples look for the FMUs."""
     monkeypatch.chdir(ROOT)
     for name in ("prw_testbed.fmu", "prw_controller.fmu"):
-        if not (ROOT / "target" / "fmu" / name).is_file():
-            pytest.exit(f"target/fmu/{name} is missing; build it with `make closed-loop-fmus`", returncode=1)
+        built(name)

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from built import ROOT
 from lagrange import linear_model, table_1
 from reference import at_rest, follow
 
-ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("lqr", "quiet_motion", "identify", "tolerances")
 #: The eigenvalues of eq. (11) with Table 1, 1/s, those with positive imaginary parts for their pairs.
 POLES = np.array([-174.87270665, -174.36733032, -18.94465405 + 32.14568305j, -9.68285129 + 34.67786598j])

@@ -1,28 +1,11 @@
-"""Fixtures: the packed FMU, its description, and instances of it that are freed at the end of a test."""
+"""Fixtures: the FMU's description, and instances of it that are freed at the end of a test."""
 
 from __future__ import annotations
 
-import shutil
-import sys
-from pathlib import Path
-
 import fmpy
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests" / "oracle"))
-
-from lagrange import linear_model, table_1  # noqa: E402
-from slave import Slave  # noqa: E402
-
-
-@pytest.fixture(scope="session")
-def fmu() -> Path:
-    """The packed FMU."""
-    path = ROOT / "target" / "fmu" / "prw_testbed.fmu"
-    if not path.is_file():
-        pytest.exit(f"{path} is missing; build it with `make fmu`", returncode=1)
-    return path
+from instance import Instance
+from lagrange import linear_model, table_1
 
 
 @pytest.fixture(scope="session")
@@ -32,31 +15,29 @@ def description(fmu):
 
 
 @pytest.fixture(scope="session")
-def unpacked(fmu):
+def unpacked(fmu, unpack):
     """The folder of the unpacked FMU."""
-    folder = fmpy.extract(str(fmu))
-    yield folder
-    shutil.rmtree(folder, ignore_errors=True)
+    return unpack(fmu)
 
 
 @pytest.fixture
-def make_slave(unpacked, description):
+def make_instance(unpacked, description):
     """Makes Co-Simulation instances; frees them all when the test ends."""
-    slaves = []
+    instances = []
 
-    def make(name: str = "testbed") -> Slave:
-        slaves.append(Slave(unpacked, description, name))
-        return slaves[-1]
+    def make(name: str = "testbed") -> Instance:
+        instances.append(Instance(unpacked, description, name))
+        return instances[-1]
 
     yield make
-    for slave in slaves:
-        slave.free()
+    for instance in instances:
+        instance.free()
 
 
 @pytest.fixture
-def slave(make_slave):
+def instance(make_instance):
     """One Co-Simulation instance."""
-    return make_slave()
+    return make_instance()
 
 
 @pytest.fixture(scope="session")

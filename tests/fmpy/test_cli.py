@@ -6,29 +6,18 @@ import csv
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from built import ROOT
+from instance import assert_close
 from lagrange import OUTPUTS
 from reference import backward_slope, follow
-from slave import assert_close
 
 from prw.recording import read_motion as read
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+EXAMPLES = ROOT / "examples"
 GOOD = "time,theta1,theta2\n0,0.1,0.2\n0.001,0.1,0.2\n0.002,0.1,0.2\n"
-
-
-@pytest.fixture
-def prw(tmp_path, fmu):
-    """Runs `prw` with arguments in a directory of its own."""
-
-    def run(*arguments, with_fmu=True):
-        command = [sys.executable, "-m", "prw", *map(str, arguments), *(["--fmu", str(fmu)] if with_fmu else [])]
-        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120)
-
-    return run
 
 
 def table(path):

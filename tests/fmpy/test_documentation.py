@@ -14,6 +14,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from built import ROOT
 from fmpy import simulate_fmu
 from lxml import etree
 from reference import integrate
@@ -30,7 +31,6 @@ from tools.figures.icon import draw_controller, draw_testbed
 from tools.figures.results import numbers, results
 from tools.figures.writing import write_for_page, write_json, write_png, write_small_png, write_svg
 
-ROOT = Path(__file__).resolve().parents[2]
 EPSILON = np.finfo(float).eps
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 

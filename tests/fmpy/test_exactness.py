@@ -5,9 +5,9 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
+from instance import assert_close
 from lagrange import OUTPUTS, REAL, linear_model, table_1
 from reference import backward_slope, follow
-from slave import assert_close
 
 
 def random_case(seed: int, points: int, decades: float):
@@ -31,26 +31,26 @@ def exact(parameters, t, theta, slope):
         return tuple({name: v.astype(float) for name, v in values.items()} for values in (at, after))
 
 
-def check(slave, parameters, t, theta, slope, expected):
-    slave.start(theta[0], time=t[0], **parameters)
-    found = slave.run(t, theta, derivative=slope)
+def check(instance, parameters, t, theta, slope, expected):
+    instance.start(theta[0], time=t[0], **parameters)
+    found = instance.run(t, theta, derivative=slope)
     for values, truth in zip(found, expected):
         assert_close(values, truth, 1e-11)
-    assert not slave.complaints()
+    assert not instance.complaints()
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_random_parameters_paths_and_steps(slave, seed):
+def test_random_parameters_paths_and_steps(instance, seed):
     # Further from Table 1 the oracle's own doubles wear thin; the next test goes there.
     parameters, t, theta, slope = random_case(seed, points=200, decades=0.3)
     model = linear_model({name: float(value) for name, value in parameters.items()})
-    check(slave, parameters, t, theta, slope, follow(model, t, theta, slope))
+    check(instance, parameters, t, theta, slope, follow(model, t, theta, slope))
 
 
 @pytest.mark.parametrize("seed", range(100, 112))
-def test_against_many_digits(slave, seed):
+def test_against_many_digits(instance, seed):
     case = random_case(seed, points=16, decades=1.5)
-    check(slave, *case, exact(*case))
+    check(instance, *case, exact(*case))
 
 
 @pytest.mark.parametrize(
@@ -68,62 +68,62 @@ def test_against_many_digits(slave, seed):
         {"M": 1, "N": 50},
     ],
 )
-def test_hard_parameters(slave, change):
+def test_hard_parameters(instance, change):
     _, t, theta, slope = random_case(7, points=10, decades=0)
     case = {**table_1(), **change}
     case.update(M=int(case["M"]), N=int(case["N"]))
-    check(slave, case, t, theta, slope, exact(case, t, theta, slope))
+    check(instance, case, t, theta, slope, exact(case, t, theta, slope))
 
 
 @pytest.mark.parametrize("h", [1e-9, 1e-6, 1e-3, 1.0, 30.0])
-def test_any_step_size(slave, h):
+def test_any_step_size(instance, h):
     t = h * np.arange(6)
     theta = np.cumsum(
         np.array([[0.2, -0.1], [0.05, 0.1], [0.1, 0.0], [-0.2, 0.1], [0.0, 0.3], [0.1, 0.1]]) * min(h, 1), axis=0
     )
     slope = np.vstack([np.diff(theta, axis=0) / np.diff(t)[:, None], [[0.0, 0.0]]])
     parameters = {**table_1(), "M": 4, "N": 7}
-    check(slave, parameters, t, theta, slope, exact(parameters, t, theta, slope))
+    check(instance, parameters, t, theta, slope, exact(parameters, t, theta, slope))
 
 
-def test_zero_order_hold(slave, model):
+def test_zero_order_hold(instance, model):
     """use_omega with omega = 0 holds the angles; each change passes as an impulse through the dampers."""
     rng = np.random.default_rng(5)
     t = np.cumsum(10 ** rng.uniform(-3, -1, 100))
     theta = np.cumsum(rng.normal(0, 0.1, (100, 2)), axis=0)
     still = np.zeros_like(theta)
-    slave.start(theta[0], rate=still[0], time=t[0])
-    for values, truth in zip(slave.run(t, theta, rate=still), follow(model, t, theta, still)):
+    instance.start(theta[0], rate=still[0], time=t[0])
+    for values, truth in zip(instance.run(t, theta, rate=still), follow(model, t, theta, still)):
         assert_close(values, truth, 1e-11)
 
 
-def test_rates_from_omega(slave, model):
+def test_rates_from_omega(instance, model):
     """With use_omega the path follows the given rates, whatever the angles do next."""
     rng = np.random.default_rng(6)
     t = np.cumsum(10 ** rng.uniform(-3, -1, 100))
     theta, omega = rng.normal(0, 0.1, (100, 2)), rng.normal(0, 1, (100, 2))
-    slave.start(theta[0], rate=omega[0], time=t[0])
-    for values, truth in zip(slave.run(t, theta, rate=omega), follow(model, t, theta, omega)):
+    instance.start(theta[0], rate=omega[0], time=t[0])
+    for values, truth in zip(instance.run(t, theta, rate=omega), follow(model, t, theta, omega)):
         assert_close(values, truth, 1e-11)
 
 
-def test_rates_from_angles(slave, model):
+def test_rates_from_angles(instance, model):
     """By default the slope is that of the parabola through the last three samples, uneven or not."""
     rng = np.random.default_rng(4)
     t = np.cumsum(rng.uniform(0.002, 0.02, 100))
     theta = np.cumsum(rng.normal(0, 0.02, (100, 2)), axis=0)
-    slave.start(theta[0], time=t[0])
-    at, after = slave.run(t, theta)
+    instance.start(theta[0], time=t[0])
+    at, after = instance.run(t, theta)
     expected_at, expected_after = follow(model, t, theta, backward_slope(t, theta))
     assert_close(at, expected_at, 1e-11)
     # Right after a step the torques use the rate the parabola predicts; test_order.py judges them.
     assert_close({**after, "tau1": expected_after["tau1"], "tau2": expected_after["tau2"]}, expected_after, 1e-11)
 
 
-def test_omega_is_not_heard_without_use_omega(make_slave):
+def test_omega_is_not_heard_without_use_omega(make_instance):
     rng = np.random.default_rng(8)
     t, theta = 0.01 * np.arange(50), rng.normal(0, 0.1, (50, 2))
-    plain, disturbed = make_slave(), make_slave()
+    plain, disturbed = make_instance(), make_instance()
     plain.start(theta[0])
     disturbed.start(theta[0])
     at, after = plain.run(t, theta)
@@ -133,20 +133,20 @@ def test_omega_is_not_heard_without_use_omega(make_slave):
         np.testing.assert_array_equal(after[name], after_disturbed[name])
 
 
-def test_input_derivatives_go_before_omega(slave, model):
+def test_input_derivatives_go_before_omega(instance, model):
     rng = np.random.default_rng(9)
     t, theta = 0.01 * np.arange(50), rng.normal(0, 0.1, (50, 2))
     omega, derivative = rng.normal(0, 1, (50, 2)), rng.normal(0, 1, (50, 2))
-    slave.start(theta[0], rate=omega[0])
-    found = slave.run(t, theta, rate=omega, derivative=derivative)
+    instance.start(theta[0], rate=omega[0])
+    found = instance.run(t, theta, rate=omega, derivative=derivative)
     for values, truth in zip(found, follow(model, t, theta, derivative)):
         assert_close(values, truth, 1e-11)
 
 
-def test_starts_at_rest_at_forty_degrees(slave):
+def test_starts_at_rest_at_forty_degrees(instance):
     theta = np.full((200, 2), np.deg2rad(40.0))
-    slave.start(theta[0])
-    for values in slave.run(0.01 * np.arange(200), theta):
+    instance.start(theta[0])
+    for values in instance.run(0.01 * np.arange(200), theta):
         for name, expected in (
             ("theta3", theta[0, 0]),
             ("pitch", theta[0, 0]),

@@ -66,27 +66,27 @@ class Exact:
         return np.concatenate([end, [outputs[n] for n in OUTPUTS]]), np.concatenate([size, [sizes[n] for n in OUTPUTS]])
 
 
-def check(slave, parameters, h, seed, steps=3):
+def check(instance, parameters, h, seed, steps=3):
     """The largest error of any state or output after any of some steps with jumps of the motor angles between."""
     rng = np.random.default_rng(seed)
-    slave.fmi.setupExperiment(startTime=0.0)
-    slave.set(**{name: int(value) if name in "MN" else float(value) for name, value in parameters.items()})
-    slave.set(start_at_rest=False, **dict(zip((f"{name}_start" for name in STATES), rng.uniform(-1, 1, 6))))
-    slave.fmi.enterInitializationMode()
-    slave.fmi.exitInitializationMode()
-    angles = [slave.variables[name].valueReference for name in ("theta1", "theta2")]
+    instance.fmi.setupExperiment(startTime=0.0)
+    instance.set(**{name: int(value) if name in "MN" else float(value) for name, value in parameters.items()})
+    instance.set(start_at_rest=False, **dict(zip((f"{name}_start" for name in STATES), rng.uniform(-1, 1, 6))))
+    instance.fmi.enterInitializationMode()
+    instance.fmi.exitInitializationMode()
+    angles = [instance.variables[name].valueReference for name in ("theta1", "theta2")]
     worst, path, exact = 0.0, None, Exact(parameters, h)
     for k in range(steps):
-        x, theta, slope = slave.get(*STATES), rng.uniform(-1, 1, 2), rng.uniform(-5, 5, 2)
-        slave.fmi.setReal(angles, theta)
-        slave.fmi.setRealInputDerivatives(angles, [1, 1], slope)
-        slave.step(k * h, h)
+        x, theta, slope = instance.get(*STATES), rng.uniform(-1, 1, 2), rng.uniform(-5, 5, 2)
+        instance.fmi.setReal(angles, theta)
+        instance.fmi.setRealInputDerivatives(angles, [1, 1], slope)
+        instance.step(k * h, h)
         truth, size = exact.step(x, theta, slope, None if path is None else many(theta) - path)
         path = many(theta) + many(slope) * exact.h
-        found = slave.get(*STATES, *OUTPUTS)
+        found = instance.get(*STATES, *OUTPUTS)
         assert np.all(np.isfinite(found))
         worst = max(worst, float(max(abs(many(found) - truth) / size)))
-    assert not slave.complaints()
+    assert not instance.complaints()
     return worst
 
 
@@ -100,11 +100,11 @@ def random_parameters(rng):
 
 
 @pytest.mark.parametrize("seed", range(CASES))
-def test_far_from_table_1(slave, seed):
+def test_far_from_table_1(instance, seed):
     rng = np.random.default_rng(seed)
     parameters, h = random_parameters(rng), float(10 ** rng.uniform(-9, 4))
     with mpmath.workdps(DIGITS):
-        error = check(slave, parameters, h, seed)
+        error = check(instance, parameters, h, seed)
     print(f"{error:.1e}, step {h:.1e} s, {parameters}")
     assert error < 1e-13
 
@@ -118,23 +118,23 @@ def test_far_from_table_1(slave, seed):
         {"c1": 1e-9, "c2": 1e-9, "c3": 1e-9},
     ],
 )
-def test_a_million_steps(slave, factors):
+def test_a_million_steps(instance, factors):
     # A straight path whose points are exact in binary is, to the testbed, one long step.
     steps, h, slope = 1_000_000, 2.0**-10, np.array([0.75, -0.5])
     parameters = {name: value * factors.get(name, 1) for name, value in table_1().items()}
     parameters.update(M=4, N=7)
-    slave.start((0.0, 0.0), rate=slope, **parameters)
+    instance.start((0.0, 0.0), rate=slope, **parameters)
     names = ("theta1", "theta2")
-    references = (ctypes.c_uint * 2)(*(slave.variables[name].valueReference for name in names))
-    theta, component = (ctypes.c_double * 2)(), slave.fmi.component
-    set_real, do_step = slave.fmi.fmi2SetReal, slave.fmi.fmi2DoStep
+    references = (ctypes.c_uint * 2)(*(instance.variables[name].valueReference for name in names))
+    theta, component = (ctypes.c_double * 2)(), instance.fmi.component
+    set_real, do_step = instance.fmi.fmi2SetReal, instance.fmi.fmi2DoStep
     for k in range(steps):
         t = k * h
         theta[0], theta[1] = t * slope[0], t * slope[1]
         set_real(component, references, 2, theta)
         do_step(component, t, h, 1)
-    found = slave.get(*STATES, *OUTPUTS)
-    assert not slave.complaints()
+    found = instance.get(*STATES, *OUTPUTS)
+    assert not instance.complaints()
     with mpmath.workdps(DIGITS):
         exact = Exact(parameters, steps * h)
         truth, size = exact.step(np.zeros(6), np.zeros(2), slope)

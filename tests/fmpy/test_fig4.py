@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import fmpy
 import numpy as np
+from instance import assert_close
 from lagrange import OUTPUTS
 from reference import follow, integrate
-from slave import assert_close
 
 from prw.motion import FIG4_FREQUENCY, fig4
 
 
-def run(slave, motion):
-    slave.start(motion.theta[0], motion.omega[0])
-    return slave.run(motion.time, motion.theta, rate=motion.omega)
+def run(instance, motion):
+    instance.start(motion.theta[0], motion.omega[0])
+    return instance.run(motion.time, motion.theta, rate=motion.omega)
 
 
 def without_pitch(values):
     return {name: np.zeros_like(v) if name in ("pitch", "pitch_rate") else v for name, v in values.items()}
 
 
-def test_exact_between_communication_points(slave, model):
+def test_exact_between_communication_points(instance, model):
     motion = fig4()
     expected_at, expected_after = follow(model, motion.time, motion.theta, motion.omega)
-    at, after = run(slave, motion)
+    at, after = run(instance, motion)
     assert_close(without_pitch(at), without_pitch(expected_at), 1e-11)
     assert_close(without_pitch(after), without_pitch(expected_after), 1e-11)
     for values in (at, after):
@@ -31,10 +31,10 @@ def test_exact_between_communication_points(slave, model):
         assert np.max(np.abs(values["pitch_rate"])) <= 1e-14
 
 
-def test_true_response(slave, model):
+def test_true_response(instance, model):
     """A millisecond is fine enough for the curves of Fig. 4: within 6e-4 of the response to the unsampled motion."""
     motion, sign = fig4(), np.array([1, -1])
-    at, _ = run(slave, motion)
+    at, _ = run(instance, motion)
     some = slice(None, None, 40)
     true = integrate(
         model,
@@ -46,10 +46,10 @@ def test_true_response(slave, model):
     assert_close(without_pitch(found), without_pitch(true), 6e-4)
 
 
-def test_simulate_fmu(fmu, slave):
+def test_simulate_fmu(fmu, instance):
     """FMPy's own master, with its defaults, finds what the bare calls find; it reads after each step."""
     motion = fig4()
-    _, after = run(slave, motion)
+    _, after = run(instance, motion)
     table = np.rec.fromarrays([motion.time, *motion.theta.T, *motion.omega.T], names="time,theta1,theta2,omega1,omega2")
     result = fmpy.simulate_fmu(
         str(fmu),

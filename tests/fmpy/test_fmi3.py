@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from zipfile import ZipFile
 
 import fmpy
 import numpy as np
 import pytest
+from built import built
 from fmpy import simulate_fmu
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
@@ -28,30 +28,25 @@ MOTORS = np.array(
 
 
 @pytest.fixture(scope="module")
-def fmu3(fmu):
+def fmu3():
     """The packed FMU for FMI 3.0."""
-    path = fmu.parent / "fmi3" / fmu.name
-    if not path.is_file():
-        pytest.exit(f"{path} is missing; build it with `make fmu`", returncode=1)
-    return path
+    return built("fmi3/prw_testbed.fmu", "fmu")
 
 
 @pytest.fixture
-def testbed3(fmu3):
+def testbed3(fmu3, unpack):
     """An instance for Co-Simulation of FMI 3.0, in initialization mode, and its value references by name."""
     description = fmpy.read_model_description(str(fmu3))
-    folder = fmpy.extract(str(fmu3))
     instance = FMU3Slave(
         guid=description.guid,
         modelIdentifier=description.coSimulation.modelIdentifier,
-        unzipDirectory=folder,
+        unzipDirectory=unpack(fmu3),
         instanceName="testbed",
     )
     instance.instantiate(loggingOn=True)
     instance.enterInitializationMode(startTime=0.0)
     yield instance, {v.name: v.valueReference for v in description.modelVariables}
     instance.freeInstance()
-    shutil.rmtree(folder, ignore_errors=True)
 
 
 def test_fmpy_finds_no_problem(fmu3):
@@ -133,15 +128,15 @@ def test_results_are_the_same_bits(fmu, fmu3, options):
             np.testing.assert_allclose(three[name], two[name], rtol=0, atol=1e-11, err_msg=name)
 
 
-def test_the_same_partial_derivatives_both_ways(testbed3, make_slave):
+def test_the_same_partial_derivatives_both_ways(testbed3, make_instance):
     """Of all outputs by all inputs: as in FMI 2.0, and the adjoint ones are the transpose."""
     instance, references = testbed3
-    slave = make_slave()
-    slave.start()
+    other = make_instance()
+    other.start()
     instance.exitInitializationMode()
     inputs = ("theta1", "theta2", "omega1", "omega2")
-    outputs, knowns = ([slave.variables[name].valueReference for name in names] for names in (OUTPUTS, inputs))
-    two = [slave.fmi.getDirectionalDerivative(outputs, [known], [1.0]) for known in knowns]
+    outputs, knowns = ([other.variables[name].valueReference for name in names] for names in (OUTPUTS, inputs))
+    two = [other.fmi.getDirectionalDerivative(outputs, [known], [1.0]) for known in knowns]
     outputs, knowns = ([references[name] for name in names] for names in (OUTPUTS, inputs))
     forward = [instance.getDirectionalDerivative(outputs, [known], [1.0], len(outputs)) for known in knowns]
     adjoint = [instance.getAdjointDerivative([output], knowns, [1.0], len(knowns)) for output in outputs]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-
 import fmpy
 import numpy as np
 import pytest
@@ -17,13 +15,10 @@ VALUES = {
 WIDTH = 1e-4
 
 
-@pytest.fixture(scope="module", params=["2.0", "3.0"])
-def unzipped(request, fmu):
+@pytest.fixture(scope="module")
+def unzipped(testbed, unpack):
     """The description and the folder of an FMU."""
-    path = fmu if request.param == "2.0" else fmu.parent / "fmi3" / fmu.name
-    folder = fmpy.extract(str(path))
-    yield fmpy.read_model_description(str(path)), folder
-    shutil.rmtree(folder, ignore_errors=True)
+    return fmpy.read_model_description(str(testbed)), unpack(testbed)
 
 
 class Initializing:

@@ -6,9 +6,9 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
+from instance import assert_close
 from lagrange import OUTPUTS, linear_model, table_1
 from reference import follow
-from slave import assert_close
 
 
 def path(seed: int, points: int = 60):
@@ -22,60 +22,60 @@ def assert_same(one, other):
             np.testing.assert_array_equal(a[name], b[name], err_msg=name)
 
 
-def test_reset_and_reuse_are_bit_identical(slave):
+def test_reset_and_reuse_are_bit_identical(instance):
     t, theta = path(1)
     runs = []
     for _ in range(3):
-        slave.start(theta[0], time=t[0])
-        runs.append(slave.run(t, theta))
-        slave.fmi.terminate()
-        slave.fmi.reset()
+        instance.start(theta[0], time=t[0])
+        runs.append(instance.run(t, theta))
+        instance.fmi.terminate()
+        instance.fmi.reset()
     assert_same(runs[0], runs[1])
     assert_same(runs[0], runs[2])
 
 
-def test_reset_restores_the_start_values(slave):
+def test_reset_restores_the_start_values(instance):
     t, theta = path(2)
-    slave.start(theta[0], rate=(0.0, 0.0), time=t[0], k1=77.0)
-    slave.run(t, theta)
-    slave.fmi.reset()
-    slave.fmi.setupExperiment()
-    slave.fmi.enterInitializationMode()
-    for name, variable in slave.variables.items():
+    instance.start(theta[0], rate=(0.0, 0.0), time=t[0], k1=77.0)
+    instance.run(t, theta)
+    instance.fmi.reset()
+    instance.fmi.setupExperiment()
+    instance.fmi.enterInitializationMode()
+    for name, variable in instance.variables.items():
         if variable.type == "Real" and variable.start is not None:
-            assert slave.get(name)[0] == float(variable.start), name
-    assert slave.fmi.getInteger([slave.variables["N"].valueReference]) == [7]
-    assert not any(slave.fmi.getBoolean([slave.variables["use_omega"].valueReference]))
+            assert instance.get(name)[0] == float(variable.start), name
+    assert instance.fmi.getInteger([instance.variables["N"].valueReference]) == [7]
+    assert not any(instance.fmi.getBoolean([instance.variables["use_omega"].valueReference]))
 
 
-def test_a_fresh_instance_repeats_the_run(make_slave):
+def test_a_fresh_instance_repeats_the_run(make_instance):
     t, theta = path(3)
     runs = []
     for name in ("first", "second"):
-        slave = make_slave(name)
-        slave.start(theta[0], time=t[0])
-        runs.append(slave.run(t, theta))
+        instance = make_instance(name)
+        instance.start(theta[0], time=t[0])
+        runs.append(instance.run(t, theta))
     assert_same(*runs)
 
 
-def test_ten_interleaved_instances_do_not_meet(make_slave):
+def test_ten_interleaved_instances_do_not_meet(make_instance):
     t, _ = path(4)
     motors = [path(10 + i)[1] for i in range(10)]
     stiffness = [50.0 + 20 * i for i in range(10)]
 
     def start(i):
-        slave = make_slave(f"instance {i}")
-        slave.start(motors[i][0], time=t[0], k1=stiffness[i])
-        return slave
+        instance = make_instance(f"instance {i}")
+        instance.start(motors[i][0], time=t[0], k1=stiffness[i])
+        return instance
 
     alone = [start(i).run(t, motors[i])[1] for i in range(10)]
     together = [start(i) for i in range(10)]
     after = [[] for _ in together]
     for k in range(len(t) - 1):
-        for i, slave in enumerate(together):
-            slave.set(theta1=motors[i][k, 0], theta2=motors[i][k, 1])
-            slave.step(t[k], t[k + 1] - t[k])
-            after[i].append(slave.get(*OUTPUTS))
+        for i, instance in enumerate(together):
+            instance.set(theta1=motors[i][k, 0], theta2=motors[i][k, 1])
+            instance.step(t[k], t[k + 1] - t[k])
+            after[i].append(instance.get(*OUTPUTS))
     for i in range(10):
         np.testing.assert_array_equal(np.array(after[i]), np.array([alone[i][name] for name in OUTPUTS]).T)
 
@@ -95,12 +95,12 @@ def test_ten_interleaved_instances_do_not_meet(make_slave):
         {"N": 11},
     ],
 )
-def test_each_parameter_counts(slave, model, change):
+def test_each_parameter_counts(instance, model, change):
     t, theta = path(5)
     slope = np.vstack([np.diff(theta, axis=0) / np.diff(t)[:, None], [[0.0, 0.0]]])
     changed = linear_model({**table_1(), **change})
-    slave.start(theta[0], time=t[0], **change)
-    after = slave.run(t, theta, derivative=slope)[1]
+    instance.start(theta[0], time=t[0], **change)
+    after = instance.run(t, theta, derivative=slope)[1]
     assert_close(after, follow(changed, t, theta, slope)[1], 1e-11)
     with pytest.raises(AssertionError):
         assert_close(after, follow(model, t, theta, slope)[1], 1e-4)
@@ -123,14 +123,14 @@ def test_each_parameter_counts(slave, model, change):
         ("theta3_start", float("nan")),
     ],
 )
-def test_bad_values_are_refused_by_name(slave, name, value):
-    slave.fmi.setupExperiment()
-    slave.fmi.enterInitializationMode()
-    before = {n: slave.get(n)[0] for n, v in slave.variables.items() if v.type == "Real" and v.start is not None}
+def test_bad_values_are_refused_by_name(instance, name, value):
+    instance.fmi.setupExperiment()
+    instance.fmi.enterInitializationMode()
+    before = {n: instance.get(n)[0] for n, v in instance.variables.items() if v.type == "Real" and v.start is not None}
     with pytest.raises(FMICallException):
-        slave.set(**{name: value})
-    assert any(status == 3 and name in text for status, _, text in slave.messages)
-    assert before == {n: slave.get(n)[0] for n in before}
+        instance.set(**{name: value})
+    assert any(status == 3 and name in text for status, _, text in instance.messages)
+    assert before == {n: instance.get(n)[0] for n in before}
 
 
 def test_set_input_derivatives_of_simulate_fmu(fmu, model):
@@ -162,34 +162,34 @@ def test_set_input_derivatives_of_simulate_fmu(fmu, model):
     assert np.ptp(after["roll"]) > 0.1
 
 
-def test_state_can_be_kept_and_replayed(slave):
+def test_state_can_be_kept_and_replayed(instance):
     t, theta = path(7)
-    slave.start(theta[0], time=t[0])
+    instance.start(theta[0], time=t[0])
     half = len(t) // 2
-    slave.run(t[: half + 1], theta)
-    kept = slave.fmi.getFMUstate()
-    bytes_kept = slave.fmi.serializeFMUstate(kept)
-    first = slave.run(t[half:], theta[half:])
-    slave.fmi.setFMUstate(kept)
-    second = slave.run(t[half:], theta[half:])
-    restored = slave.fmi.deSerializeFMUstate(bytes_kept)
-    slave.fmi.setFMUstate(restored)
-    third = slave.run(t[half:], theta[half:])
-    slave.fmi.freeFMUstate(kept)
-    slave.fmi.freeFMUstate(restored)
+    instance.run(t[: half + 1], theta)
+    kept = instance.fmi.getFMUstate()
+    bytes_kept = instance.fmi.serializeFMUstate(kept)
+    first = instance.run(t[half:], theta[half:])
+    instance.fmi.setFMUstate(kept)
+    second = instance.run(t[half:], theta[half:])
+    restored = instance.fmi.deSerializeFMUstate(bytes_kept)
+    instance.fmi.setFMUstate(restored)
+    third = instance.run(t[half:], theta[half:])
+    instance.fmi.freeFMUstate(kept)
+    instance.fmi.freeFMUstate(restored)
     assert_same(first, second)
     assert_same(first, third)
 
 
-def test_directional_derivatives_are_the_matrices(slave, model):
+def test_directional_derivatives_are_the_matrices(instance, model):
     states, inputs = (
         ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6"),
         ("theta1", "theta2", "omega1", "omega2"),
     )
     expected = np.block([[model.a, model.b_angle, model.b_rate], [model.c, model.d_angle, model.d_rate]])
-    slave.start()
-    references = {name: v.valueReference for name, v in slave.variables.items()}
+    instance.start()
+    references = {name: v.valueReference for name, v in instance.variables.items()}
     unknowns = [references[f"der({name})"] for name in states] + [references["tau1"], references["tau2"]]
     for column, name in enumerate((*states, *inputs)):
-        found = slave.fmi.getDirectionalDerivative(unknowns, [references[name]], [2.0])
+        found = instance.fmi.getDirectionalDerivative(unknowns, [references[name]], [2.0])
         np.testing.assert_allclose(found, 2 * expected[:, column], rtol=1e-11, atol=1e-10, err_msg=name)

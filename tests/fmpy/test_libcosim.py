@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from instance import assert_close
 from lagrange import OUTPUTS
 from reference import follow
-from slave import assert_close
 
 from prw.motion import fig4
 

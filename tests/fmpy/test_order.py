@@ -23,12 +23,12 @@ def rate(t):
     return AMPLITUDE * FREQUENCY * np.cos(FREQUENCY * t + PHASE)
 
 
-def error(make_slave, model, spacing, steps, reading):
+def error(make_instance, model, spacing, steps, reading):
     t = np.concatenate([[0], np.cumsum(np.tile(spacing, steps // 4))]) * END / steps
     theta = np.array([angle(s) for s in t])
-    slave = make_slave()
-    slave.start(theta[0])
-    at, after = slave.run(t, theta)
+    instance = make_instance()
+    instance.start(theta[0])
+    at, after = instance.run(t, theta)
     found = {"at": at, "after": {name: np.concatenate([[0], after[name]]) for name in OUTPUTS}}[reading]
     true = integrate(model, t, angle, rate)
     late = t >= FROM
@@ -37,9 +37,9 @@ def error(make_slave, model, spacing, steps, reading):
 
 @pytest.mark.parametrize("spacing", SPACING)
 @pytest.mark.parametrize("reading", ["at", "after"])
-def test_second_order_from_angles_alone(make_slave, model, spacing, reading):
+def test_second_order_from_angles_alone(make_instance, model, spacing, reading):
     """Outputs read with the new angles set ("at") and right after the step, as most importers do ("after")."""
-    errors = [error(make_slave, model, SPACING[spacing], steps, reading) for steps in (200, 400, 800)]
+    errors = [error(make_instance, model, SPACING[spacing], steps, reading) for steps in (200, 400, 800)]
     orders = {
         name: [float(np.log2(coarse[name] / fine[name])) for coarse, fine in zip(errors, errors[1:])]
         for name in OUTPUTS
@@ -48,13 +48,13 @@ def test_second_order_from_angles_alone(make_slave, model, spacing, reading):
 
 
 @pytest.mark.parametrize("spacing", SPACING)
-def test_second_order_with_true_rates(make_slave, model, spacing):
+def test_second_order_with_true_rates(make_instance, model, spacing):
     def with_rates(steps):
         t = np.concatenate([[0], np.cumsum(np.tile(SPACING[spacing], steps // 4))]) * END / steps
         theta, omega = np.array([angle(s) for s in t]), np.array([rate(s) for s in t])
-        slave = make_slave()
-        slave.start(theta[0], rate=omega[0])
-        at, _ = slave.run(t, theta, rate=omega)
+        instance = make_instance()
+        instance.start(theta[0], rate=omega[0])
+        at, _ = instance.run(t, theta, rate=omega)
         true = integrate(model, t, angle, rate)
         return {name: np.max(np.abs(at[name] - true[name])) for name in OUTPUTS}
 

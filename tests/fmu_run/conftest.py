@@ -1,4 +1,4 @@
-"""Fixtures: the packed FMUs, and one in C that does what FMUs should not."""
+"""Fixtures: FMUs in C that do what FMUs should not."""
 
 from __future__ import annotations
 
@@ -7,34 +7,6 @@ from pathlib import Path
 
 import pytest
 from unruly import build
-
-ROOT = Path(__file__).resolve().parents[2]
-FMUS = ROOT / "target" / "fmu"
-
-
-def built(name: str, target: str) -> Path:
-    path = FMUS / name
-    if not path.is_file():
-        pytest.exit(f"{path} is missing; build it with `make {target}`", returncode=1)
-    return path
-
-
-@pytest.fixture(scope="session", params=["", "fmi3/"], ids=["fmi2", "fmi3"])
-def testbed(request) -> Path:
-    """The testbed for FMI 2.0 and for FMI 3.0."""
-    return built(f"{request.param}prw_testbed.fmu", "fmu")
-
-
-@pytest.fixture(scope="session")
-def testbed2() -> Path:
-    """The testbed for FMI 2.0."""
-    return built("prw_testbed.fmu", "fmu")
-
-
-@pytest.fixture(scope="session", params=["", "fmi3/"], ids=["fmi2", "fmi3"])
-def controller(request) -> Path:
-    """The controller for FMI 2.0 and for FMI 3.0."""
-    return built(f"{request.param}prw_controller.fmu", "closed-loop-fmus")
 
 
 @pytest.fixture(scope="session")

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+from built import ROOT
 
 
-def test_the_program_runs(testbed2, monkeypatch):
+def test_the_program_runs(fmu, monkeypatch):
     page = "crates/fmu-run/README.md"
     programs = re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), flags=re.S | re.M)
     (text,) = (program for program in programs if "fmu_run" in program)

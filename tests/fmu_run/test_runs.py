@@ -89,12 +89,12 @@ def test_the_controller(controller):
         same(fmu.run(time, inputs=inputs, start={"Kp": 0.5}, outputs=outputs), expected)
 
 
-def test_input_derivatives(testbed2):
+def test_input_derivatives(fmu):
     time, inputs = motion()
     slopes = {"theta1": inputs.pop("omega1"), "theta2": inputs.pop("omega2")}
-    expected = by_fmpy(testbed2, time, inputs, {}, OUTPUTS, slopes)
-    with fmu_run.Fmu(testbed2) as fmu:
-        same(fmu.run(time, inputs=inputs, input_derivatives=slopes, outputs=OUTPUTS), expected)
+    expected = by_fmpy(fmu, time, inputs, {}, OUTPUTS, slopes)
+    with fmu_run.Fmu(fmu) as loaded:
+        same(loaded.run(time, inputs=inputs, input_derivatives=slopes, outputs=OUTPUTS), expected)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 7])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import needed
+from built import needed
 from lagrange import OUTPUTS, REAL, linear_model, table_1
 from reference import follow
 
@@ -30,8 +30,8 @@ def share(found, expected) -> float:
     return float(off / (np.abs(expected).max() or 1.0))
 
 
-def test_values_and_jacobians(testbed, folder, unpacked, model, saw):
-    dae = casadi.DaeBuilder("testbed", unpacked(testbed))
+def test_values_and_jacobians(testbed, version, unpack, model, saw):
+    dae = casadi.DaeBuilder("testbed", unpack(testbed))
     assert dae.y() == list(OUTPUTS) and dae.u() == ["theta1", "theta2", "omega1", "omega2"]
     f = dae.create("f", ["x", "u"], ["ode", "y"])
     jacobians = f.factory("j", ["x", "u"], [f"jac:{of}:{by}" for of in ("ode", "y") for by in ("x", "u")])
@@ -47,13 +47,13 @@ def test_values_and_jacobians(testbed, folder, unpacked, model, saw):
         worst = max(worst, share(np.hstack(found[:2]), whole[0]), share(np.hstack(found[2:]), whole[1]))
     assert worst < 1e-13
     seen = f"agree with the equations to {worst:.0e} of the largest value"
-    of = f"testbed for FMI {'3.0' if folder else '2.0'}, ME"
+    of = f"testbed for FMI {'3.0' if version else '2.0'}, ME"
     saw("CasADi, `DaeBuilder`", "casadi", of, "right-hand side, outputs and their four Jacobians", seen)
 
 
-def test_cvodes(testbed, folder, unpacked, model, saw):
+def test_cvodes(testbed, version, unpack, model, saw):
     """The testbed let go with its couplings wound up, the motors held."""
-    dae = casadi.DaeBuilder("testbed", unpacked(testbed))
+    dae = casadi.DaeBuilder("testbed", unpack(testbed))
     x, u = casadi.MX.sym("x", 6), casadi.MX.sym("u", 4)
     equations = {"x": x, "u": u, "ode": dae.create("f", ["x", "u"], ["ode"])(x, u)}
     t = np.arange(21) * 0.1
@@ -64,14 +64,14 @@ def test_cvodes(testbed, folder, unpacked, model, saw):
     at, _ = follow(model, t, np.tile(held, (21, 1)), np.zeros((21, 2)), x0=start)
     worst = max(share(found[row], at[name][1:]) for row, name in ((0, "theta3"), (1, "theta4")))
     assert worst < 1e-7
-    of = f"testbed for FMI {'3.0' if folder else '2.0'}, ME"
+    of = f"testbed for FMI {'3.0' if version else '2.0'}, ME"
     seen = f"2 s from a wound-up start agree with the matrix exponential to {worst:.0e} of the largest angle"
     saw("CasADi, `cvodes`", "casadi", of, "integration with relative tolerance 1e-10", seen)
 
 
-def test_derivatives_by_parameters(tunable, folder, unpacked, saw):
+def test_derivatives_by_parameters(tunable, version, unpack, saw):
     """`fixed` parameters are constants to CasADi; those of the variant made with `--tunable` are its `p`."""
-    dae = casadi.DaeBuilder("testbed", unpacked(tunable))
+    dae = casadi.DaeBuilder("testbed", unpack(tunable))
     physical = [name in REAL for name in dae.p()]
     assert {name for name, real in zip(dae.p(), physical) if real} == set(REAL)
     assert all(name.endswith("_start") for name, real in zip(dae.p(), physical) if not real)
@@ -98,7 +98,7 @@ def test_derivatives_by_parameters(tunable, folder, unpacked, saw):
             worst = max(worst, *(share(found[:, k], expected[:, k]) for k in np.flatnonzero(physical)))
             assert not found[:, np.logical_not(physical)].any()
     assert worst < 1e-9
-    of = f"testbed for FMI {'3.0' if folder else '2.0'} made with `--tunable`, ME"
+    of = f"testbed for FMI {'3.0' if version else '2.0'} made with `--tunable`, ME"
     saw(
         "CasADi, `DaeBuilder`",
         "casadi",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
-from conftest import built, needed
+from built import built, needed
 
 needed("fmu_manipulation_toolbox", "fmu-manipulation-toolbox")
 
@@ -30,11 +30,11 @@ def toolbox(command: str, *arguments: str, folder: Path) -> str:
     return said
 
 
-def test_fmutool_has_nothing_to_say(testbed, folder, saw):
+def test_fmutool_has_nothing_to_say(testbed, version, saw):
     said = toolbox("fmutool", "-input", str(testbed), "-check", folder=testbed.parent)
-    verdict = f"No semantic error against the FMI-{'3' if folder else '2'} standard."
+    verdict = f"No semantic error against the FMI-{'3' if version else '2'} standard."
     assert verdict in said and "ERROR" not in said.replace("semantic error", "")
-    of = f"testbed for FMI {'3.0' if folder else '2.0'}"
+    of = f"testbed for FMI {'3.0' if version else '2.0'}"
     saw("fmutool", TOOLBOX, of, "`-check`", f"“{verdict}”")
 
 

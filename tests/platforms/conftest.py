@@ -13,16 +13,15 @@ from pathlib import Path
 
 import fmpy
 import pytest
+import toolchain
+from built import ROOT
+from targets import FOLDERS, MODEL, MODELS, Target
 
-ROOT = Path(__file__).resolve().parents[2]
 DIST = Path(os.environ.get("DIST", ROOT / "dist"))
-sys.path.insert(0, str(ROOT / "platforms"))
 
 # It asserts for the tests.
 pytest.register_assert_rewrite("headers")
 
-import toolchain  # noqa: E402
-from targets import FOLDERS, MODEL, MODELS, Target  # noqa: E402
 
 #: The FMU for FMI 3.0.
 FMI3 = f"{MODEL}-fmi3.fmu"

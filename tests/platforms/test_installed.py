@@ -31,8 +31,8 @@ from conftest import (
 )
 from targets import LINUX, LINUX_ARM, MODEL, WINDOWS, Target
 
-PINS = ROOT / "analysis" / "requirements-study.txt"
-PINS_ELSEWHERE = HERE / "windows" / "requirements.txt"
+PINS = ROOT / "requirements" / "study.txt"
+PINS_ELSEWHERE = ROOT / "requirements" / "other-pythons.txt"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
 
 
@@ -90,7 +90,7 @@ def student(installed) -> Installed:
     return installed
 
 
-@pytest.mark.parametrize("page", ["README.md", "analysis/README.md"])
+@pytest.mark.parametrize("page", ["README.md", "python/prw/README.md"])
 def test_the_programs_in_the_readmes(student, page):
     programs = [text for language, text in BLOCK.findall((ROOT / page).read_text()) if language == "python"]
     assert programs
@@ -101,7 +101,7 @@ def test_the_programs_in_the_readmes(student, page):
 def test_the_tutorial(student):
     """All but what needs the sources: make, and an FMU of one's own by cargo, in whose place is that in the wheel."""
     done = []
-    for language, block in BLOCK.findall((ROOT / "analysis" / "tutorial.md").read_text()):
+    for language, block in BLOCK.findall((ROOT / "python" / "prw" / "tutorial.md").read_text()):
         if language == "python":
             student.run("python", "-c", block)
             continue
@@ -120,8 +120,8 @@ def test_the_tutorial(student):
 
 
 def unpacked_for(target: Target, numpy: Path, folder: Path) -> Path:
-    """The wheels for another platform and NumPy, unpacked where there is no pip."""
-    for path in (numpy, wheel(target), prw_wheel()):
+    """The wheels for another platform, NumPy and lazy-loader, unpacked where there is no pip."""
+    for path in (numpy, downloaded("lazy-loader", PINS, "any"), wheel(target), prw_wheel()):
         with zipfile.ZipFile(path) as archive:
             archive.extractall(folder)
     return folder

@@ -67,9 +67,9 @@ def test_fmpys_server_for_windows(kind, simulate, served, fmu, capsys):
     assert np.abs(here["roll"]).max() > 0.05
 
 
-def wheel(package: str, platform: str, requirements: str = "requirements.txt") -> zipfile.ZipFile:
+def wheel(package: str, platform: str, requirements: str = "tests.txt") -> zipfile.ZipFile:
     """The wheel of a package for a platform, of the version that the other tests use."""
-    return zipfile.ZipFile(downloaded(package, ROOT / "tests" / requirements, platform))
+    return zipfile.ZipFile(downloaded(package, ROOT / "requirements" / requirements, platform))
 
 
 @pytest.fixture
@@ -97,7 +97,7 @@ def test_libcosim_for_windows(libcosim, run_c, fmu, capsys):
 @pytest.fixture
 def ecos(tmp_path):
     """The libraries of Ecos for Linux and for Windows, after those that they need; and the program that it unpacks with."""
-    both, tbb = (wheel(name, LINUX, "closed_loop/requirements.txt") for name in ("ecospy", "tbb"))
+    both, tbb = (wheel(name, LINUX, "importers.txt") for name in ("ecospy", "tbb"))
     (needed,) = [name for name in tbb.namelist() if name.endswith("/libtbb.so.12")]
     subprocess.run([*RUNNERS[1].compiler, "-o", tmp_path / "unzip.exe", HERE / "windows" / "unzip.c"], check=True)
     return {

@@ -1,4 +1,4 @@
-"""Fixtures: the packed FMUs, and a pendulum in C of either version of FMI."""
+"""Fixtures: an FMU without derivatives, and a pendulum in C of either version of FMI."""
 
 from __future__ import annotations
 
@@ -10,37 +10,15 @@ from pathlib import Path
 
 import fmpy
 import pytest
+from built import built
 
 HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-FMUS = ROOT / "target" / "fmu"
-sys.path.insert(0, str(ROOT / "tests" / "oracle"))
 
 
-def built(name: str, target: str) -> Path:
-    """The FMU that `make target` leaves under that name."""
-    path = FMUS / name
-    if not path.is_file():
-        pytest.exit(f"{path} is missing; build it with `make {target}`", returncode=1)
-    return path
-
-
-@pytest.fixture(scope="session", params=["", "fmi3/"], ids=["fmi2", "fmi3"])
-def testbed(request: pytest.FixtureRequest) -> Path:
-    """The testbed for FMI 2.0 and for FMI 3.0."""
-    return built(f"{request.param}prw_testbed.fmu", "fmu")
-
-
-@pytest.fixture(scope="session", params=["", "fmi3/"], ids=["fmi2", "fmi3"])
-def controller(request: pytest.FixtureRequest) -> Path:
-    """The controller for FMI 2.0 and for FMI 3.0."""
-    return built(f"{request.param}prw_controller.fmu", "closed-loop-fmus")
-
-
-@pytest.fixture(scope="session", params=["", "fmi3/"], ids=["fmi2", "fmi3"])
-def lag(request: pytest.FixtureRequest) -> Path:
+@pytest.fixture(scope="session")
+def lag(version: str) -> Path:
     """An FMU without directional derivatives."""
-    return built(f"{request.param}lag.fmu", "closed-loop-fmus")
+    return Path(built(f"{version}lag.fmu"))
 
 
 @pytest.fixture(scope="session", params=["2", "3"], ids=["fmi2", "fmi3"])

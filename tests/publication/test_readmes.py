@@ -8,10 +8,10 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from built import ROOT
 
 from tools.documentation.sources import read_table
 
-ROOT = Path(__file__).resolve().parents[2]
 LISTED = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
 FILES = [name for name in LISTED.split("\0") if name]
 PAGES = [name for name in FILES if name.endswith(".md") or name in ("CITATION.cff",)]
@@ -45,7 +45,9 @@ def test_links_are_found() -> None:
 
 def test_the_published_crates() -> None:
     names = {folder.name for folder in published()}
-    assert names == {"fmi-abi", "fmu-export", "fmu-package", "fmu-run", "fmu-system"}, "a package without `publish = false`"
+    assert names == {"fmi-abi", "fmu-export", "fmu-package", "fmu-run", "fmu-system"}, (
+        "a package without `publish = false`"
+    )
 
 
 @pytest.mark.parametrize("home", published(), ids=lambda folder: folder.name)

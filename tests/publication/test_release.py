@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
+import prw_wheel
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "platforms"))
-
-import prw_wheel  # noqa: E402
-import release  # noqa: E402
-import wheels  # noqa: E402
-from targets import TARGETS  # noqa: E402
+import release
+import wheels
+from targets import TARGETS
 
 
 def test_nothing_is_left_of_an_earlier_release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -41,5 +37,5 @@ def test_a_wheel_for_each_platform(tmp_path: Path) -> None:
 
 
 def test_prw_has_the_version_of_the_rest() -> None:
-    with pytest.raises(SystemExit, match=r"in analysis/pyproject.toml is [\d.]+, in Cargo.toml it is 9.9.9"):
+    with pytest.raises(SystemExit, match=r"in python/prw/pyproject.toml is [\d.]+, in Cargo.toml it is 9.9.9"):
         prw_wheel.check_version("9.9.9")

@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "platforms"))
-
-from release_notes import check_tag, notes  # noqa: E402
+from release_notes import check_tag, notes
 
 TEXT = """# Changelog
 

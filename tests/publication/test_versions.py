@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
+from built import ROOT
 
 
 def tracked(pattern: str) -> list[Path]:
@@ -63,7 +63,7 @@ def test_lock_files_are_of_this_version() -> None:
 
 
 def test_the_python_packages_have_this_version() -> None:
-    prw = read(ROOT / "analysis/pyproject.toml")["project"]
+    prw = read(ROOT / "python/prw/pyproject.toml")["project"]
     assert prw["version"] == VERSION
     assert f"fmu-run~={VERSION}" in prw["dependencies"]
     # It takes that of python/Cargo.toml.

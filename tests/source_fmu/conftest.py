@@ -12,15 +12,13 @@ from pathlib import Path
 
 import fmpy
 import pytest
+import toolchain
+from built import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 FMU = ROOT / "target" / "fmu" / "prw_testbed.fmu"
 SOURCE_FMU = ROOT / "target" / "fmu" / "source" / "prw_testbed.fmu"
 CONTROLLER = SOURCE_FMU.with_name("prw_controller.fmu")
 HEADERS = Path(fmpy.__file__).parent / "c-code"
-sys.path.insert(0, str(ROOT / "platforms"))
-
-import toolchain  # noqa: E402
 
 #: Debian's package wine64 alone has it only there.
 WINE = "/usr/lib/wine/wine64"

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import fmpy
 import numpy as np
 
-from prw.slave import Slave
+from prw.instance import Instance
 from tools.closed_loop.system import System
 
 #: Communication steps (s) and the one that stands for the exact solution; all are whole multiples of it.
@@ -72,23 +72,23 @@ def couple(
         with zipfile.ZipFile(system.ssp) as archive:
             archive.extractall(folder)
         values = {**system.start, **dict(system.inputs.values())}
-        slaves = {}
+        instances = {}
         for name, fmu in system.fmus.items():
             start = {key.split(".")[1]: value for key, value in values.items() if key.split(".")[0] == name}
-            slaves[name] = stack.enter_context(Slave(Path(folder, "resources", fmu), start))
-        wires = [_Wire(slaves, [w for w in system.connections if _ends(w) == ends]) for ends in _pairs(system)]
-        watched = [(slaves[name.split(".")[0]], name.split(".")[1]) for name in outputs]
+            instances[name] = stack.enter_context(Instance(Path(folder, "resources", fmu), start))
+        wires = [_Wire(instances, [w for w in system.connections if _ends(w) == ends]) for ends in _pairs(system)]
+        watched = [(instances[name.split(".")[0]], name.split(".")[1]) for name in outputs]
         rows = np.empty((n + 1, len(outputs)))
         for k, row in enumerate(rows):
-            row[:] = [slave.get(variable)[0] for slave, variable in watched]
+            row[:] = [instance.get(variable)[0] for instance, variable in watched]
             if k < n:
                 # All outputs before any input: setting one must not change what another reads.
                 for wire in wires:
                     wire.read(derivatives)
                 for wire in wires:
                     wire.write(derivatives)
-                for slave in slaves.values():
-                    slave.step(step)
+                for instance in instances.values():
+                    instance.step(step)
     return rows
 
 
@@ -107,8 +107,8 @@ def _pairs(system: System) -> list[list[str]]:
 class _Wire:
     """All connections from one FMU to another, with arrays that are made once: a study has a hundred thousand steps."""
 
-    def __init__(self, slaves: dict[str, Slave], wires: list[tuple[str, str]]):
-        (self._from, self._to), n = (slaves[end] for end in _ends(wires[0])), len(wires)
+    def __init__(self, instances: dict[str, Instance], wires: list[tuple[str, str]]):
+        (self._from, self._to), n = (instances[end] for end in _ends(wires[0])), len(wires)
         self._sources = (c_uint32 * n)(*(self._from.reference(start.split(".")[1]) for start, _ in wires))
         self._targets = (c_uint32 * n)(*(self._to.reference(end.split(".")[1]) for _, end in wires))
         self._values, self._slopes, self._orders, self._n = (c_double * n)(), (c_double * n)(), (c_int * n)(*[1] * n), n

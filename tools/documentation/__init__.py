@@ -16,7 +16,7 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "docs",
         help="write the FMUs' documentation anew",
-        description="Writes the documentation of both FMUs from the text in analysis/documentation, the tables of the model "
+        description="Writes the documentation of both FMUs from the text in docs/fmu-page, the tables of the model "
         "descriptions, docs/compatibility.md and the figures that `make figures` has made.",
     )
     parser.add_argument(

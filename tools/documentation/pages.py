@@ -1,4 +1,4 @@
-"""The pages: text from analysis/documentation/text, tables from the model descriptions, figures from runs of the FMU."""
+"""The pages: text from docs/fmu-page/text, tables from the model descriptions, figures from runs of the FMU."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from prw.errors import UserError
 
 #: Within the project.
-SOURCES = Path("analysis/documentation")
+SOURCES = Path("docs/fmu-page")
 ERRATA = SOURCES / "errata.md"
 PROGRAMS = SOURCES / "programs"
 

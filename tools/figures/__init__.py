@@ -9,7 +9,7 @@ from typing import Any
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 
 #: The copies that are kept with the sources, for the documentation and the README.
-COMMITTED = Path("analysis/documentation/figures")
+COMMITTED = Path("docs/fmu-page/figures")
 #: README's first picture, and a still for the page in the FMU, which the film would double in size.
 FILM = Path("docs/wrist.gif")
 STILL = Path("wrist.png")

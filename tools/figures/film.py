@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from prw.animation import MEASURED
+from prw.instance import Instance
 from prw.motion import Array, Motion
 from prw.simulation import Run
-from prw.slave import Slave
 
 #: Communication step, s.
 STEP = 1e-3
@@ -30,7 +30,7 @@ def story(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[floa
     """Run the testbed, first with motors that are led, then with the controller: it begins and ends at rest at zero.
     Returns the run and its captions, each with the time (s) from which it is shown."""
     led = _there_and_back()
-    with Slave(testbed_fmu, {"use_omega": True}) as testbed, Slave(controller_fmu) as controller:
+    with Instance(testbed_fmu, {"use_omega": True}) as testbed, Instance(controller_fmu) as controller:
         rows, captions = [], []
 
         def motors(theta: Sequence[float], omega: Sequence[float]) -> None:
@@ -49,8 +49,8 @@ def story(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[floa
                 theta1, theta2, omega1, omega2 = controller.get(*MOTORS)
                 motors((theta1, theta2), (omega1, omega2))
                 controller.set(dict(zip(CONTROLLED, testbed.get(*CONTROLLED))))
-                for slave in (testbed, controller):
-                    slave.step(STEP)
+                for instance in (testbed, controller):
+                    instance.step(STEP)
         counts = {name: int(testbed.variables[name].start) for name in ("M", "N")}
     found = np.array(rows)
     time: Array = STEP * np.arange(len(rows), dtype=np.float64)

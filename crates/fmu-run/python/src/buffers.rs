@@ -1,0 +1,100 @@
+//! Arrays of float64 that live in Python.
+
+use pyo3::buffer::PyBuffer;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyFloat;
+
+/// Numbers that are read: those of an array as it lies there, or one.
+pub enum Numbers {
+    One(f64),
+    Array(PyBuffer<f64>),
+}
+
+impl Numbers {
+    /// A number, an array, or what NumPy makes an array of.
+    pub fn of(values: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if let Ok(number) = values.cast::<PyFloat>() {
+            return Ok(Self::One(number.value()));
+        }
+        let array = match PyBuffer::get(values) {
+            Ok(buffer) if buffer.is_c_contiguous() => buffer,
+            _ => {
+                let numpy = values.py().import("numpy")?;
+                let made = numpy.call_method1("ascontiguousarray", (values, "float64"))?;
+                // It makes one dimension of none.
+                PyBuffer::get(&made.call_method1("reshape", (numpy.call_method1("shape", (values,))?,))?)?
+            }
+        };
+        Ok(if array.dimensions() == 0 { Self::One(array.to_vec(values.py())?[0]) } else { Self::Array(array) })
+    }
+
+    pub fn shape(&self) -> &[usize] {
+        match self {
+            Self::One(_) => &[],
+            Self::Array(buffer) => buffer.shape(),
+        }
+    }
+
+    pub fn values(&self) -> &[f64] {
+        match self {
+            Self::One(value) => std::slice::from_ref(value),
+            Self::Array(buffer) => read(buffer),
+        }
+    }
+}
+
+/// The numbers of an array. Who writes them from another thread meanwhile has nobody else to blame, as with NumPy's own
+/// functions.
+fn read(buffer: &PyBuffer<f64>) -> &[f64] {
+    match buffer.item_count() {
+        0 => &[],
+        // SAFETY: PyO3 has checked type, alignment and size; the memory is contiguous (`Numbers::of`), and stays where it is
+        // for as long as the buffer is held.
+        #[allow(unsafe_code)]
+        count => unsafe { std::slice::from_raw_parts(buffer.buf_ptr().cast(), count) },
+    }
+}
+
+/// An array that is written.
+pub struct Room(PyBuffer<f64>);
+
+impl Room {
+    /// An array of NumPy's with this shape, made anew or given by the caller.
+    pub fn of<'py>(
+        py: Python<'py>,
+        given: Option<Bound<'py, PyAny>>,
+        shape: &[usize],
+    ) -> PyResult<(Bound<'py, PyAny>, Self)> {
+        let array = match given {
+            Some(array) => array,
+            // NumPy asks the kernel for large pages.
+            None => py.import("numpy")?.call_method1("zeros", (shape.to_vec(),))?,
+        };
+        let wrong = || {
+            PyValueError::new_err(format!("out must be a writable, contiguous array of float64 of the shape {shape:?}"))
+        };
+        let buffer = PyBuffer::<f64>::get(&array).map_err(|_| wrong())?;
+        if buffer.readonly() || !buffer.is_c_contiguous() || buffer.shape() != shape {
+            return Err(wrong());
+        }
+        Ok((array, Self(buffer)))
+    }
+
+    /// Fails if it shares memory with what is read at the same time.
+    pub fn apart_from(&self, read: &Numbers) -> PyResult<()> {
+        let (own, other) = (self.0.buf_ptr().addr(), read.values().as_ptr_range());
+        let apart = own + 8 * self.0.item_count() <= other.start.addr() || other.end.addr() <= own;
+        let why = "out shares memory with the values that are set";
+        if apart { Ok(()) } else { Err(PyValueError::new_err(why)) }
+    }
+
+    pub fn values(&mut self) -> &mut [f64] {
+        match self.0.item_count() {
+            0 => &mut [],
+            // SAFETY: as in `read`, and it may be written (`Room::of`).
+            #[allow(unsafe_code)]
+            count => unsafe { std::slice::from_raw_parts_mut(self.0.buf_ptr().cast(), count) },
+        }
+    }
+}

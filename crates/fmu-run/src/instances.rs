@@ -1,0 +1,600 @@
+//! Instances of an FMU in the hand: set, stepped, read, put back, side by side.
+
+use crate::error::Error;
+use crate::fmu::Fmu;
+use crate::instance::{Continuous, Event, Instance, Refusal, Saved, reason};
+use crate::selection::{Selection, find, fits, number, request};
+use fmi_abi::{BaseType, Interface};
+use rayon::prelude::*;
+use std::ffi::CString;
+use std::sync::Arc;
+
+/// How instances are made.
+#[derive(Clone, Debug)]
+pub struct Setup<'a> {
+    /// Who integrates.
+    pub interface: Interface,
+    /// How many.
+    pub count: usize,
+    /// Start values: one for all, or one for each instance.
+    pub start: Vec<(&'a str, &'a [f64])>,
+    /// Start values that are texts, the same for all.
+    pub texts: Vec<(&'a str, &'a str)>,
+    /// When they begin, s.
+    pub start_time: f64,
+    /// When they will end, s, if that is known; the FMU may refuse to go further.
+    pub stop_time: Option<f64>,
+    /// How many threads; `None` takes as many as the machine has processors.
+    pub threads: Option<usize>,
+}
+
+impl Default for Setup<'_> {
+    /// One instance for Co-Simulation, from 0 s.
+    fn default() -> Self {
+        Self {
+            interface: Interface::CoSimulation,
+            count: 1,
+            start: Vec::new(),
+            texts: Vec::new(),
+            start_time: 0.0,
+            stop_time: None,
+            threads: Some(1),
+        }
+    }
+}
+
+/// Instances of one FMU, each with its time. Every method does the same with all of them, in their threads; rows of values are
+/// one after the other: instances times variables, the last fastest.
+///
+/// An instance that is refused something drops out: [`errors`](Self::errors) tells why, what is read of it is not a number,
+/// the others go on. [`reset`](Self::reset) and [`restore`](Self::restore) bring it back.
+#[derive(Debug)]
+pub struct Instances {
+    fmu: Arc<Fmu>,
+    interface: Interface,
+    all: Vec<One>,
+    start: Start,
+    pool: Option<rayon::ThreadPool>,
+}
+
+#[derive(Debug)]
+struct Start {
+    numbers: Vec<(BaseType, u32, Vec<f64>)>,
+    texts: Vec<(u32, CString)>,
+    time: f64,
+    stop_time: Option<f64>,
+}
+
+#[derive(Debug)]
+struct One {
+    /// None after it was lost for good.
+    instance: Option<Instance>,
+    time: f64,
+    /// Why it dropped out.
+    error: Option<String>,
+    event: Event,
+    buffer: Vec<f64>,
+}
+
+/// States that [`Instances`] have saved, one for each that had not dropped out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct States(Vec<Option<(Saved, f64)>>);
+
+/// Which of the instances a call is for: all, or those that are true.
+pub type Mask<'a> = Option<&'a [bool]>;
+
+impl Fmu {
+    /// Makes instances, sets their start values and initializes them. Those for Model Exchange have been through the events at
+    /// the begin and are in Continuous-Time Mode.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when what is asked for does not fit the FMU, [`Error::Fmu`] when it does not have this type of
+    /// interface, or makes no instances.
+    pub fn instances(self: &Arc<Self>, setup: &Setup) -> Result<Instances, Error> {
+        self.library(setup.interface)?;
+        let offer = self.description().offer(setup.interface);
+        if setup.count > 1 && offer.is_some_and(|offer| offer.once_per_process) {
+            return request(format!(
+                "{} can be there only once in a process (canBeInstantiatedOnlyOncePerProcess)",
+                self.description().model_name
+            ));
+        }
+        let start = Start {
+            numbers: Vec::new(),
+            texts: Vec::new(),
+            time: setup.start_time,
+            stop_time: setup.stop_time,
+        };
+        let one = || One {
+            instance: None,
+            time: setup.start_time,
+            error: None,
+            event: Event::default(),
+            buffer: Vec::new(),
+        };
+        let threads = match setup.threads {
+            Some(0) => return request("threads must be at least 1".to_owned()),
+            Some(threads) => threads,
+            None => std::thread::available_parallelism().map_or(1, usize::from),
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.min(setup.count));
+        let pool = (threads.min(setup.count) > 1).then(|| pool.build()).transpose();
+        let mut instances = Instances {
+            fmu: Arc::clone(self),
+            interface: setup.interface,
+            all: std::iter::repeat_with(one).take(setup.count).collect(),
+            start,
+            pool: pool.map_err(|error| Error::Fmu(format!("no threads can be made: {error}")))?,
+        };
+        instances.start_from(&setup.start, &setup.texts)?;
+        instances.reset(None);
+        match instances.all.iter().find_map(|one| one.error.as_ref()) {
+            Some(why) if instances.errors().count() == setup.count => Err(Error::Fmu(why.clone())),
+            _ => Ok(instances),
+        }
+    }
+}
+
+impl Instances {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// The FMU.
+    pub fn fmu(&self) -> &Fmu {
+        &self.fmu
+    }
+
+    /// The time of each, s.
+    pub fn times(&self) -> impl Iterator<Item = f64> {
+        self.all.iter().map(|one| one.time)
+    }
+
+    /// Those that have dropped out, and why.
+    pub fn errors(&self) -> impl Iterator<Item = (usize, &str)> {
+        self.all.iter().enumerate().filter_map(|(place, one)| Some((place, one.error.as_deref()?)))
+    }
+
+    /// What the last event of each did.
+    pub fn events(&self) -> impl Iterator<Item = Event> {
+        self.all.iter().map(|one| one.event)
+    }
+
+    /// New start values, for the next [`reset`](Self::reset), in place of those of the same variables.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when a variable is not there, or the values do not fit it or the number of instances.
+    pub fn start_from(&mut self, numbers: &[(&str, &[f64])], texts: &[(&str, &str)]) -> Result<(), Error> {
+        let mut found = Vec::new();
+        for (name, values) in numbers {
+            let of = number(&self.fmu, name)?;
+            if values.len() != 1 && values.len() != self.len() {
+                return request(format!(
+                    "{name} has {} start values for {} instances",
+                    values.len(),
+                    self.len()
+                ));
+            }
+            fits(name, of.base, values)?;
+            found.push((of.base, of.reference, values.to_vec()));
+        }
+        for (name, text) in texts {
+            let of = find(&self.fmu, name)?;
+            if of.base != BaseType::String {
+                return request(format!("{name} is a number, its start value cannot be {text:?}"));
+            }
+            let Ok(text) = CString::new(*text) else {
+                return request(format!("the start value of {name} must not contain a character NUL"));
+            };
+            self.start.texts.retain(|(known, _)| *known != of.reference);
+            self.start.texts.push((of.reference, text));
+        }
+        for one in found {
+            self.start.numbers.retain(|(base, known, _)| (*base, *known) != (one.0, one.1));
+            self.start.numbers.push(one);
+        }
+        Ok(())
+    }
+
+    /// Back to the start values, initialized.
+    pub fn reset(&mut self, mask: Mask) {
+        let (fmu, start, interface) = (Arc::clone(&self.fmu), &self.start, self.interface);
+        let reset = |place: usize, one: &mut One| {
+            one.error = None;
+            one.time = start.time;
+            one.event = Event::default();
+            let used = one.instance.take().filter(Instance::is_alive);
+            let used = used.and_then(|mut used| used.reset().ok().map(|()| used));
+            // Some FMUs cannot be reset. The old instance is gone by now: there may be one at a time only.
+            let made = used.map_or_else(|| Instance::new(&fmu, interface, false), Ok);
+            match made {
+                Ok(instance) => {
+                    let instance = one.instance.insert(instance);
+                    match initialize(instance, start, place, interface) {
+                        Ok(event) => one.event = event,
+                        Err(refusal) => one.error = Some(refusal.to_string()),
+                    }
+                }
+                Err(log) => {
+                    let mute =
+                        || format!("{} makes no instance, and logs no message", fmu.description().model_name);
+                    one.error = Some(reason(&log).map_or_else(mute, |m| m.text.trim().to_owned()));
+                }
+            }
+        };
+        each(self.pool.as_ref(), &mut self.all, mask, reset);
+    }
+
+    /// Sets variables, from a row for each instance or from one row for all.
+    ///
+    /// # Panics
+    /// When there are other than so many values.
+    pub fn set(&mut self, variables: &Selection, values: &[f64], mask: Mask) {
+        let rows = rows(variables.len(), values.len(), self.len());
+        self.alive(mask, |place, one, instance| {
+            variables.set(instance, &mut one.buffer, rows.of(values, place))
+        });
+    }
+
+    /// Reads variables into a row for each instance.
+    ///
+    /// # Panics
+    /// When there is room for another number of values.
+    pub fn get(&mut self, variables: &Selection, values: &mut [f64]) {
+        self.fill(variables.len(), values, |one, instance, row| {
+            variables.get(instance, &mut one.buffer, row)
+        });
+    }
+
+    /// Steps of Co-Simulation of this size, s.
+    pub fn step(&mut self, size: f64, mask: Mask) {
+        self.alive(mask, |_, one, instance| {
+            instance.step(one.time, size)?;
+            one.time += size;
+            Ok(())
+        });
+    }
+
+    /// Steps of Co-Simulation to this time, s.
+    pub fn step_to(&mut self, time: f64, mask: Mask) {
+        self.alive(mask, |_, one, instance| {
+            instance.step(one.time, time - one.time)?;
+            one.time = time;
+            Ok(())
+        });
+    }
+
+    /// Sets variables, steps and reads others: [`set`](Self::set), [`step`](Self::step) and [`get`](Self::get) in one go of the
+    /// threads.
+    ///
+    /// # Panics
+    /// As they do.
+    pub fn advance(
+        &mut self,
+        (set, values): (&Selection, &[f64]),
+        size: f64,
+        (get, read): (&Selection, &mut [f64]),
+    ) {
+        let rows = rows(set.len(), values.len(), self.len());
+        self.fill_by_place(get.len(), read, |place, one, instance, row| {
+            set.set(instance, &mut one.buffer, rows.of(values, place))?;
+            instance.step(one.time, size)?;
+            one.time += size;
+            get.get(instance, &mut one.buffer, row)
+        });
+    }
+
+    /// Saves the state of each.
+    pub fn save(&mut self) -> States {
+        let mut states = vec![None; self.len()];
+        let places = std::sync::Mutex::new(&mut states);
+        self.alive(None, |place, one, instance| {
+            let saved = (instance.save()?, one.time);
+            places.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[place] = Some(saved);
+            Ok(())
+        });
+        States(states)
+    }
+
+    /// Back to states that they have saved.
+    ///
+    /// # Panics
+    /// When the states are of another number of instances.
+    pub fn restore(&mut self, states: &States, mask: Mask) {
+        assert_eq!(states.0.len(), self.len(), "states of other instances");
+        let back = |place: usize, one: &mut One| {
+            let (Some((saved, time)), Some(instance)) = (states.0[place], &mut one.instance) else { return };
+            match instance.restore(saved) {
+                Ok(()) => (one.time, one.error) = (time, None),
+                Err(refusal) => one.error = Some(refusal.to_string()),
+            }
+        };
+        each(self.pool.as_ref(), &mut self.all, mask, back);
+    }
+
+    /// Frees states.
+    pub fn forget(&mut self, states: States) {
+        for (one, saved) in self.all.iter_mut().zip(states.0) {
+            if let (Some((saved, _)), Some(instance)) = (saved, &mut one.instance) {
+                _ = instance.forget(saved);
+            }
+        }
+    }
+
+    /// A saved state as bytes, which another process can read; `None` if that instance had none, or its FMU refuses.
+    pub fn serialize(&mut self, states: &States, place: usize) -> Option<Vec<u8>> {
+        let (saved, time) = (*states.0.get(place)?)?;
+        let one = self.all.get_mut(place)?;
+        match one.instance.as_mut()?.serialize(saved) {
+            Ok(bytes) => Some([&time.to_le_bytes()[..], &bytes].concat()),
+            Err(refusal) => {
+                one.error = Some(refusal.to_string());
+                None
+            }
+        }
+    }
+
+    /// States that were [serialized](Self::serialize), one for each instance.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there are other than so many, [`Error::Fmu`] when an instance refuses one.
+    pub fn deserialize(&mut self, bytes: &[impl AsRef<[u8]>]) -> Result<States, Error> {
+        if bytes.len() != self.len() {
+            return request(format!("there are {} states for {} instances", bytes.len(), self.len()));
+        }
+        let mut states = Vec::new();
+        for (place, (one, bytes)) in self.all.iter_mut().zip(bytes).enumerate() {
+            let Some((time, bytes)) = bytes.as_ref().split_first_chunk() else {
+                return request(format!("the state of instance {place} is cut short"));
+            };
+            let instance = one.instance.as_mut();
+            let read = instance.map(|instance| instance.deserialize(bytes)).transpose();
+            let saved = read.map_err(|refusal| Error::Fmu(format!("instance {place}: {refusal}")))?;
+            states.push(saved.map(|saved| (saved, f64::from_le_bytes(*time))));
+        }
+        Ok(States(states))
+    }
+
+    /// The derivatives of unknowns in the direction of a seed: a row of the knowns for each instance, or one for all.
+    ///
+    /// # Errors
+    /// [`Error::Request`] unless all variables are Real.
+    ///
+    /// # Panics
+    /// As [`set`](Self::set) and [`get`](Self::get).
+    pub fn directional_derivative(
+        &mut self,
+        unknowns: &Selection,
+        (knowns, seed): (&Selection, &[f64]),
+        values: &mut [f64],
+    ) -> Result<(), Error> {
+        let (Some(unknown), Some(known)) = (unknowns.references(), knowns.references()) else {
+            return request("only Real variables have derivatives".to_owned());
+        };
+        let rows = rows(knowns.len(), seed.len(), self.len());
+        self.fill_by_place(unknowns.len(), values, |place, _, instance, row| {
+            instance.directional_derivative(unknown, known, rows.of(seed, place), row)
+        });
+        Ok(())
+    }
+
+    /// In Model Exchange: the time, s, one for each or for all.
+    ///
+    /// # Panics
+    /// When there are other than so many values.
+    pub fn set_time(&mut self, times: &[f64], mask: Mask) {
+        let rows = rows(1, times.len(), self.len());
+        self.alive(mask, |place, one, instance| {
+            one.time = rows.of(times, place)[0];
+            instance.set_time(one.time)
+        });
+    }
+
+    /// In Model Exchange: the continuous states, a row for each or for all.
+    ///
+    /// # Panics
+    /// When there are other than so many values.
+    pub fn set_continuous_states(&mut self, values: &[f64], mask: Mask) {
+        let rows = rows(self.fmu.description().states, values.len(), self.len());
+        self.alive(mask, |place, _, instance| instance.set_continuous_states(rows.of(values, place)));
+    }
+
+    /// In Model Exchange: states, their derivatives or nominal values, or event indicators, a row for each.
+    ///
+    /// # Panics
+    /// When there is room for another number of values.
+    pub fn get_continuous(&mut self, what: Continuous, values: &mut [f64]) {
+        self.fill(self.continuous(what), values, |_, instance, row| instance.get_continuous(what, row));
+    }
+
+    /// How many there are of these.
+    pub fn continuous(&self, what: Continuous) -> usize {
+        let description = self.fmu.description();
+        match what {
+            Continuous::EventIndicators => description.event_indicators,
+            _ => description.states,
+        }
+    }
+
+    /// In Model Exchange: an event, with all its rounds, and back to Continuous-Time Mode. [`events`](Self::events) tells what
+    /// it did. In Event Mode, before its rounds, variables are set from a row for each or for all.
+    ///
+    /// # Panics
+    /// As [`set`](Self::set).
+    pub fn handle_events(&mut self, (set, values): (&Selection, &[f64]), mask: Mask) {
+        let rows = rows(set.len(), values.len(), self.len());
+        self.alive(mask, |place, one, instance| {
+            instance.enter_event_mode()?;
+            set.set(instance, &mut one.buffer, rows.of(values, place))?;
+            one.event = instance.event()?;
+            instance.enter_continuous_time_mode()
+        });
+    }
+
+    /// In Model Exchange: a step of the integrator is complete. Whether each wants an event and the end, one after the other,
+    /// into `wanted`.
+    ///
+    /// # Panics
+    /// When there is no room for two values of each.
+    pub fn completed_integrator_step(&mut self, wanted: &mut [f64]) {
+        self.fill(2, wanted, |_, instance, row| {
+            row.copy_from_slice(
+                &instance.completed_integrator_step()?.map(|wanted| f64::from(u8::from(wanted))),
+            );
+            Ok(())
+        });
+    }
+
+    /// With those that have not dropped out; a refusal is why one does.
+    fn alive(
+        &mut self,
+        mask: Mask,
+        body: impl Fn(usize, &mut One, &mut Instance) -> Result<(), Refusal> + Sync,
+    ) {
+        each(self.pool.as_ref(), &mut self.all, mask, |place, one| {
+            one.with(|one, instance| body(place, one, instance));
+        });
+    }
+
+    fn fill(
+        &mut self,
+        length: usize,
+        values: &mut [f64],
+        body: impl Fn(&mut One, &mut Instance, &mut [f64]) -> Result<(), Refusal> + Sync,
+    ) {
+        self.fill_by_place(length, values, |_, one, instance, row| body(one, instance, row));
+    }
+
+    /// A row of values of each; not a number of those that have dropped out.
+    fn fill_by_place(
+        &mut self,
+        length: usize,
+        values: &mut [f64],
+        body: impl Fn(usize, &mut One, &mut Instance, &mut [f64]) -> Result<(), Refusal> + Sync,
+    ) {
+        assert_eq!(values.len(), length * self.all.len(), "a row of {length} values for each instance");
+        let body = |place: usize, one: &mut One, row: &mut [f64]| {
+            if !one.with(|one, instance| body(place, one, instance, row)) {
+                row.fill(f64::NAN);
+            }
+        };
+        let (Some(pool), 1..) = (&self.pool, length) else {
+            let mut rows = values.chunks_exact_mut(length.max(1));
+            for (place, one) in self.all.iter_mut().enumerate() {
+                body(place, one, rows.next().unwrap_or_default());
+            }
+            return;
+        };
+        let part = self.all.len().div_ceil(pool.current_num_threads());
+        pool.install(|| {
+            let parts = self.all.par_chunks_mut(part).zip(values.par_chunks_mut(part * length));
+            parts.enumerate().for_each(|(number, (all, values))| {
+                for (k, (one, row)) in all.iter_mut().zip(values.chunks_exact_mut(length)).enumerate() {
+                    body(number * part + k, one, row);
+                }
+            });
+        });
+    }
+}
+
+impl One {
+    /// Whether it has not dropped out, and does not by this.
+    #[inline]
+    fn with(&mut self, body: impl FnOnce(&mut Self, &mut Instance) -> Result<(), Refusal>) -> bool {
+        if self.error.is_some() {
+            return false;
+        }
+        let Some(mut instance) = self.instance.take() else { return false };
+        let done = body(self, &mut instance);
+        self.instance = Some(instance);
+        if let Err(refusal) = done {
+            self.error = Some(format!("at {} s: {refusal}", self.time));
+            return false;
+        }
+        true
+    }
+}
+
+/// Start values before the initialization, and as the standard has it also in it: those of outputs and states.
+fn initialize(
+    instance: &mut Instance,
+    start: &Start,
+    place: usize,
+    interface: Interface,
+) -> Result<Event, Refusal> {
+    let stop_time = start.stop_time;
+    instance.set_up(start.time, stop_time)?;
+    for (reference, text) in &start.texts {
+        instance.set_text(*reference, text)?;
+    }
+    for (base, reference, values) in &start.numbers {
+        let value = values.get(place).or(values.first()).copied().unwrap_or_default();
+        instance.set_number(*base, *reference, value)?;
+    }
+    instance.enter_initialization_mode(start.time, stop_time)?;
+    instance.exit_initialization_mode()?;
+    let mut event = Event::default();
+    if interface == Interface::ModelExchange {
+        event = instance.event()?;
+        instance.enter_continuous_time_mode()?;
+    }
+    Ok(event)
+}
+
+/// Each of those that the mask has, in parts as there are threads.
+fn each(
+    pool: Option<&rayon::ThreadPool>,
+    all: &mut [One],
+    mask: Mask,
+    body: impl Fn(usize, &mut One) + Sync,
+) {
+    if let Some(mask) = mask {
+        assert_eq!(mask.len(), all.len(), "a truth value for each instance");
+    }
+    let is_meant = |place: usize| mask.is_none_or(|mask| mask[place]);
+    let one = |(place, one): (usize, &mut One)| {
+        if is_meant(place) {
+            body(place, one);
+        }
+    };
+    match pool {
+        None => all.iter_mut().enumerate().for_each(one),
+        Some(pool) => {
+            let part = all.len().div_ceil(pool.current_num_threads());
+            pool.install(|| {
+                all.par_chunks_mut(part).enumerate().for_each(|(number, all)| {
+                    all.iter_mut().enumerate().for_each(|(k, each)| one((number * part + k, each)));
+                });
+            });
+        }
+    }
+}
+
+/// A row for each instance, or one for all.
+#[derive(Clone, Copy)]
+struct Rows {
+    length: usize,
+    step: usize,
+}
+
+fn rows(length: usize, values: usize, instances: usize) -> Rows {
+    let each = values == length * instances;
+    assert!(
+        each || values == length,
+        "{values} values are no row of {length} for one or {instances} instances"
+    );
+    Rows { length, step: if each { length } else { 0 } }
+}
+
+impl Rows {
+    #[inline]
+    fn of(self, values: &[f64], place: usize) -> &[f64] {
+        &values[place * self.step..place * self.step + self.length]
+    }
+}

@@ -1,0 +1,183 @@
+"""Tables of results as other tools write them: CSV, OpenModelica's .mat, MATLAB's .mat."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prw.channels import QUANTITIES, factor, si_unit
+from prw.columns import NAMES, column, shown
+from prw.errors import UserError
+from prw.extras import need
+from prw.motion import Array
+from prw.table import read_table
+
+#: What stands before a name: components, separated by dots in Modelica and SSP, by slashes in Simulink.
+PREFIXED = re.compile(rf"^(.*[./:|])?((?:{NAMES}|tout).*)$", re.IGNORECASE)
+#: The component that is meant where several have columns of one name.
+TESTBED = "testbed"
+
+
+@dataclass(frozen=True)
+class Result:
+    """What another tool wrote, in SI. time: (n,) s, increasing. values: (n,) by name in `prw.channels.QUANTITIES`."""
+
+    source: Path
+    time: Array
+    values: Mapping[str, Array]
+
+
+def read_result(path: Path, units: Mapping[str, str] = {}, component: str | None = None) -> Result:
+    """Read what there is of time, motors and outputs; see `prw.check`. Of several rows at one time the last counts,
+    where inputs and outputs belong together. Raises UserError naming the file, and what is wrong with it."""
+    for name in units:
+        if name not in QUANTITIES:
+            raise UserError(f"units: {name} is not known; there are {', '.join(QUANTITIES)}")
+    if not path.is_file():
+        raise UserError(f"{path}: no such file")
+    columns = _mat(path) if path.suffix.lower() == ".mat" else _csv(path)
+    chosen = _choose(path, columns, units, component)
+    if "time" not in chosen:
+        raise UserError(f"{path}: there is no column time; it has {shown(list(columns))}")
+    time = chosen.pop("time")
+    if not chosen:
+        raise UserError(f"{path}: there is none of {', '.join(QUANTITIES)}; it has {shown(list(columns))}")
+    table = np.column_stack([time, *chosen.values()])
+    if not np.isfinite(table).all():
+        row = int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0])
+        raise UserError(f"{path}: row {row + 1} of the numbers has one that is not finite")
+    if (np.diff(time) < 0).any():
+        raise UserError(f"{path}: time runs backwards after {time[np.argmax(np.diff(time) < 0)]:g} s")
+    last = np.append(np.diff(time) > 0, True)
+    return Result(path, time[last], {name: values[last] for name, values in chosen.items()})
+
+
+def _choose(
+    path: Path, columns: Mapping[str, Array], units: Mapping[str, str], component: str | None
+) -> dict[str, Array]:
+    """The columns that are known, in SI, by what they are."""
+    candidates: dict[str, list[tuple[str, str, Array]]] = {}
+    for title, values in columns.items():
+        owner, name, unit = _known(title)
+        if name:
+            candidates.setdefault(name, []).append((owner, unit, values))
+    found = {}
+    for name, same in candidates.items():
+        wanted = [c for c in same if re.split(r"[./:|]", c[0])[-1].lower() == (component or TESTBED).lower()]
+        if component is not None and name != "time":
+            same = wanted
+        elif len(same) > 1:
+            same = wanted or same
+        if not same:
+            continue
+        if any(not np.array_equal(other[2], same[0][2]) for other in same[1:]):
+            owners = ", ".join(owner or "none" for owner, _, _ in same)
+            raise UserError(f"{path}: there are several {name}, of the components {owners}; say which with --component")
+        _, unit, values = same[0]
+        try:
+            found[name] = values * factor(name, unit or units.get(name, "") or si_unit(name))
+        except UserError as error:
+            raise UserError(f"{path}, column {name}: {error}") from None
+    if component is not None and not set(found) - {"time"}:
+        raise UserError(f"{path}: the component {component} has no known column; there are {shown(list(columns))}")
+    return found
+
+
+def _known(title: str) -> tuple[str, str, str]:
+    """The component, what it is of QUANTITIES, and the unit in the title of a column; "" for the last two otherwise."""
+    match = PREFIXED.match(title.strip())
+    owner, name = (match[1] or "", match[2]) if match else ("", "")
+    return owner[:-1], *column(re.sub(r"^tout\b", "time", name, flags=re.IGNORECASE))
+
+
+def _csv(path: Path) -> dict[str, Array]:
+    """The columns of a CSV file by title; of those that are not known the title alone."""
+    titles: list[str] = []
+    taken: list[tuple[str, int]] = []
+
+    def choose(header: Sequence[str], line: int) -> Sequence[tuple[str, int]]:
+        titles.extend(header)
+        taken.extend((title, index) for index, title in enumerate(header) if _known(title)[1])
+        if not taken:
+            raise UserError(f"{path}: there is no column time; it has {shown(header)}")
+        return taken
+
+    values = read_table(path, choose)
+    return dict.fromkeys(titles, np.empty(0)) | {title: values[:, i] for i, (title, _) in enumerate(taken)}
+
+
+def _mat(path: Path) -> dict[str, Array]:
+    """The columns of a .mat file by title."""
+    need("check", "scipy")
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        content = loadmat(path, squeeze_me=True, struct_as_record=False, chars_as_strings=True)
+        if "dataInfo" in content:
+            return _modelica(path, loadmat(path, chars_as_strings=False))
+    except NotImplementedError:
+        raise UserError(f"{path}: is of MATLAB's format 7.3; save it with: save('{path.name}', ..., '-v7')") from None
+    except (OSError, ValueError, TypeError, MatReadError) as error:
+        raise UserError(f"{path}: is no .mat file that can be read ({error})") from None
+    columns: dict[str, Array] = {}
+    for name, value in content.items():
+        if not name.startswith("__"):
+            columns.update(_of_variable(name, value))
+    lengths = [len(values) for name, values in columns.items() if _is_time(name)]
+    if not lengths:
+        hint = "; save time and signals as vectors: save('run.mat', 'time', 'roll', ..., '-v7')"
+        raise UserError(f"{path}: there is no vector time or tout; it has {shown(list(content))}{hint}")
+    return {name: values for name, values in columns.items() if len(values) == lengths[0]}
+
+
+def _is_time(title: str) -> bool:
+    return title.rpartition(".")[2].lower() in ("time", "tout", "t")
+
+
+def _of_variable(name: str, value: Any) -> dict[str, Array]:
+    """What a variable of MATLAB holds: a vector, or a structure with time as Simulink logs it (`time` and `signals`, each
+    with a label and values), or one with vectors as fields."""
+    if hasattr(value, "_fieldnames"):
+        found: dict[str, Array] = {}
+        for field in value._fieldnames:
+            inner = getattr(value, field)
+            if field == "signals":
+                for signal in np.atleast_1d(inner):
+                    title = str(signal.label) if np.size(signal.label) else str(getattr(signal, "blockName", ""))
+                    found.update(_of_variable(title, signal.values))
+            else:
+                found.update(_of_variable(f"{name}.{field}", inner))
+        return found
+    array = np.asarray(value)
+    if array.ndim == 1 and len(array) > 1 and array.dtype.kind in "fiub":
+        return {name: array.astype(np.float64)}
+    return {}
+
+
+def _modelica(path: Path, content: Mapping[str, Any]) -> dict[str, Array]:
+    """OpenModelica's and Dymola's trajectories: in dataInfo, for each name, which data_N it is in (0: any, the time), and
+    in which column, negative where the sign is to be changed."""
+    across = "".join(content["Aclass"][3]).strip().rstrip("\0") == "binTrans"
+
+    def upright(name: str) -> Any:
+        return content[name].T if across else content[name]
+
+    titles = ["".join(row).rstrip("\0 ") for row in upright("name")]
+    about = ["".join(row).rstrip("\0 ") for row in upright("description")]
+    columns = {}
+    for title, text, (table, index, *_) in zip(titles, about, upright("dataInfo")):
+        data = upright(f"data_{table or 2}")
+        if table == 1:  # does not change
+            continue
+        unit = re.search(r"\[([^\]|:#]+)[^\]]*\]\s*$", text)
+        values = np.sign(index) * data[:, abs(int(index)) - 1].astype(np.float64)
+        columns[f"{title} [{unit[1]}]" if unit else title] = values
+    if not columns:
+        raise UserError(f"{path}: there are no trajectories in it")
+    return columns

@@ -1,0 +1,123 @@
+"""`prw sweep`: parameter studies and Monte Carlo over thousands of runs of the FMU."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prw.commands.assignments import FORMATTER, pairs, said_of_options, spreads
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+from prw.errors import UserError
+from prw.extras import need
+from prw.motion import Array, fig4
+from prw.recording import read_motion
+from prw.sweeps import Swept, carry_out, layout
+from prw.sweeps.study import Study
+from prw.testbed import Testbed
+
+DESCRIPTION = """\
+Runs the FMU over and over with other parameters, on all cores of this machine or on a Dask cluster, and writes one row
+for each run into runs.parquet: its parameters and each output's peak, rms and value at the end (SI).
+
+--grid parameters make all combinations; --random ones are drawn for each of --runs runs (per combination). What is
+done is kept: the same command goes on after an interruption. A run that fails is recorded with its message.
+"""
+
+EXAMPLES = """\
+examples:
+  prw sweep --grid k1=60:240:13 --grid c3=0.1:0.8:8           104 combinations, in the experiment of Fig. 4
+  prw sweep --random k1=10% --random k2=10% --runs 5000       Monte Carlo, 10 % (one sigma) about the start values
+  prw sweep --random J3=5% --runs 2000 --input motors.csv     in your recorded motion
+  prw sweep --random k1=10% --runs 100000 --scheduler tcp://head:8786      on a Dask cluster (prw installed there)
+then:
+  python -c "import pyarrow.parquet as pq; print(pq.read_table('out/sweep/runs.parquet').column_names)"
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add `sweep` to prw's subcommands."""
+    parser = subparsers.add_parser(
+        "sweep",
+        help="run the FMU with many sets of parameters",
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+        formatter_class=FORMATTER,
+    )
+    parser.add_argument(
+        "--grid", action="append", default=[], metavar="NAME=LOW:HIGH:N", help="N even steps, in SI. May be repeated"
+    )
+    parser.add_argument(
+        "--random",
+        action="append",
+        default=[],
+        metavar="NAME=[VALUE:]PERCENT%",
+        help="log-normal about VALUE in SI (default: the start value). May be repeated",
+    )
+    parser.add_argument("--runs", type=int, default=1000, metavar="N", help="draws of --random (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
+    parser.add_argument(
+        "--input", type=Path, metavar="FILE", help="motor recording, as for `prw simulate` (default: that of Fig. 4)"
+    )
+    parser.add_argument("--degrees", action="store_true", help="the recording is in degrees and degrees per second")
+    parser.add_argument("--threads", type=int, metavar="N", help="on this machine (default: one per core)")
+    parser.add_argument("--workers", type=int, dest="threads", help=argparse.SUPPRESS)  # its name in 0.2.0
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, like tcp://head:8786")
+    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
+    parser.add_argument(
+        "--out", type=Path, default=DEFAULT_OUT / "sweep", metavar="DIR", help="where to write (default: %(default)s)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Carry out `prw sweep`. Raises UserError with one line on what is wrong."""
+    need("sweep", "pyarrow", *(["distributed"] if arguments.scheduler else []))
+    motion = fig4() if arguments.input is None else read_motion(arguments.input, degrees=arguments.degrees)
+    threads = arguments.threads if arguments.threads is not None else os.cpu_count() or 1
+    for option, number in (("--threads", threads), ("--runs", arguments.runs)):
+        if number < 1:
+            raise UserError(f"{option} {number}: at least 1 is needed")
+    grid = {name: _steps(name, text) for name, text in pairs(arguments.grid, "--grid").items()}
+    random = spreads(arguments.random, "--random")
+    for name in random:
+        if name in grid:
+            raise UserError(f"{name} is in --grid and in --random; choose one")
+    if not grid and not random:
+        raise UserError("nothing varies; add --grid NAME=LOW:HIGH:N or --random NAME=PERCENT% (see --help)")
+    with Testbed(arguments.fmu) as testbed:
+        with said_of_options(grid="grid", random="random"):
+            values = layout(grid, random, arguments.runs, arguments.seed, testbed.starts)
+        study = Study(arguments.fmu.read_bytes(), motion, tuple(values), np.column_stack(list(values.values())))
+        swept = carry_out(study, testbed, arguments.out, threads, arguments.scheduler)
+    print("\n".join(_summary(arguments, swept, threads)))
+
+
+def _summary(arguments: argparse.Namespace, swept: Swept, threads: int) -> list[str]:
+    """What was done, one line each."""
+    where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
+    total = swept.table.num_rows
+    lines = [f"ran         nothing: all {total} runs were there already"]
+    if swept.runs:
+        again = f", {total - swept.runs} were there already" if swept.runs < total else ""
+        pace = f"{swept.seconds:.1f} s ({swept.runs / swept.seconds:.0f} a second)"
+        lines = [f"ran         {swept.runs} runs on {where} in {pace}{again}"]
+    status = swept.table.column("status").to_pylist()
+    if failed := status.count("failed"):
+        first = status.index("failed")
+        lines.append(f"failed      {failed} runs; run {first}: {swept.table.column('message')[first]}")
+    return [*lines, f"wrote       {arguments.out / 'runs.parquet'}"]
+
+
+def _steps(name: str, text: str) -> Array:
+    parts = text.split(":")
+    try:
+        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
+        if len(parts) != 3 or count < 1 or not np.isfinite([low, high]).all():
+            raise ValueError
+    except (ValueError, IndexError):
+        raise UserError(f"--grid {name}={text}: write {name}=LOW:HIGH:N with a whole number N of at least 1") from None
+    return np.linspace(low, high, count)

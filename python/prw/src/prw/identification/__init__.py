@@ -1,0 +1,164 @@
+"""Parameters of the testbed from measurements: those with which the FMU comes closest to what was measured.
+
+In the order in which the files build on each other: path (where the motors really
+were), experiment (spectra of both, and of their errors), model (the FMU's equations), response (what they answer),
+fit (least squares), statistics and profile (how sure that is), design and advice (what would tell more), results and
+report. `identify` below puts them together.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from prw.errors import UserError
+from prw.extras import need
+
+if TYPE_CHECKING:
+    from prw.identification.fit import Task
+    from prw.identification.model import Parameters
+    from prw.identification.results import Identification
+    from prw.recording import Recording
+
+#: What is estimated if nothing is said.
+DEFAULT_ESTIMATE = ("k1", "k2", "c1", "c2", "c3")
+#: Default bounds: this factor about the start value.
+REACH = 100.0
+
+
+def identify(
+    files: str | os.PathLike[str] | Recording | Sequence[str | os.PathLike[str] | Recording],
+    *,
+    estimate: Sequence[str] = DEFAULT_ESTIMATE,
+    priors: Mapping[str, float | tuple[float, float]] = {},
+    fixed: Mapping[str, float] = {},
+    bounds: Mapping[str, tuple[float, float]] = {},
+    noise: Mapping[str, float] = {},
+    units: Mapping[str, str] = {},
+    degrees: bool = False,
+    quantum: float = 0.0,
+    offsets: bool = True,
+    starts: int = 6,
+    seed: int = 0,
+    fmu: str | os.PathLike[str] | None = None,
+) -> Identification:
+    """Estimate parameters of the testbed from one experiment or several.
+
+    Sensor offsets and the state at the first sample are unknown, too, and estimated along. All values are in SI.
+
+    Parameters
+    ----------
+    files
+        CSV tables as `prw.read` reads them, or what it returned.
+    estimate
+        Names of the parameters.
+    priors
+        What is known beforehand of a parameter, by name: the standard deviation as a fraction of its start value,
+        or (value, fraction). It is then estimated along.
+    fixed
+        Other start values, or values of what is not estimated.
+    bounds
+        (least, greatest) by parameter.
+    noise
+        Standard deviations of channels, where they are known.
+    units, degrees
+        As for `prw.read`.
+    quantum
+        Resolution of the motors' encoders, rad (default: found in the data).
+    offsets
+        Whether sensors may have any.
+    starts
+        Places to search from, at random with `seed`.
+    fmu
+        The testbed FMU (default: as for `prw.simulate`).
+
+    Returns
+    -------
+    Identification
+        Estimates, standard errors and doubts. Parameters that the data leave open are no error: see its
+        `undetermined`.
+
+    Raises
+    ------
+    UserError
+        A file cannot be read, a name is not known, or the FMU refuses a value.
+    """
+    need("identify", "scipy", "threadpoolctl", "lxml")
+    # They take a while to load.
+    from threadpoolctl import threadpool_limits
+
+    from prw.identification.experiment import prepare
+    from prw.identification.fit import fit
+    from prw.identification.model import Model
+    from prw.identification.results import Identification
+    from prw.identification.statistics import certainty
+    from prw.recording import Recording, read
+
+    if starts < 1:
+        raise UserError(f"starts {starts}: at least 1 is needed")
+    several = [files] if isinstance(files, (str, os.PathLike, Recording)) else list(files)
+    # Many small matrices: more threads only get into each other's way.
+    with Model(fmu) as model, threadpool_limits(1):
+        task = task_of(model.known, estimate, priors, fixed, bounds, noise, offsets)
+        measured = [each if isinstance(each, Recording) else read(each, units, degrees) for each in several]
+        _check("noise", noise, dict.fromkeys(name for m in measured for name in m.measured))
+        experiments = [prepare(each, quantum) for each in measured]
+        solution = fit(model, experiments, task, starts, seed)
+        sure = certainty(solution)
+        hints = []
+        if sure.undetermined:
+            from prw.identification.advice import advice
+
+            hints = advice(model, experiments, solution)
+        sources = tuple(str(each.source) for each in measured)
+        return Identification(model.fmu, model.known, sources, tuple(experiments), solution, sure, tuple(hints))
+
+
+def task_of(
+    known: Parameters,
+    estimate: Sequence[str],
+    priors: Mapping[str, float | tuple[float, float]] = {},
+    fixed: Mapping[str, float] = {},
+    bounds: Mapping[str, tuple[float, float]] = {},
+    noise: Mapping[str, float] = {},
+    offsets: bool = True,
+) -> Task:
+    """The task that these arguments of `identify` describe, for an FMU with the parameters `known`."""
+    from prw.channels import MEASURED
+    from prw.identification.fit import Prior, Task
+
+    counted = f"; {', '.join(known.counts)} are counted, not estimated" if known.counts else ""
+    for what, names in (("estimate", estimate), ("priors", priors), ("fixed", fixed), ("bounds", bounds)):
+        _check(what, names, known.real, counted)
+    _check("noise", noise, MEASURED)
+    start = {**known.starts, **fixed}
+    if not estimate and not priors:
+        raise UserError(f"estimate: nothing is named; there are {', '.join(known.real)}")
+    beliefs = {name: Prior(*p) if isinstance(p, tuple) else Prior(start[name], p) for name, p in priors.items()}
+    chosen = tuple(name for name in known.real if name in estimate or name in beliefs)
+    for what, values in (
+        ("fixed", fixed),
+        ("noise", noise),
+        *((f"priors {name}", prior._asdict()) for name, prior in beliefs.items()),
+    ):
+        for name, value in values.items():
+            if not 0 < value < float("inf"):
+                raise UserError(f"{what}: {name} {value!r} is not a positive number")
+    for name in chosen:
+        if start[name] <= 0:
+            raise UserError(f"{name} starts at {start[name]:g} and cannot be estimated from there; fix another value")
+    spans = {**{name: (value / REACH, value * REACH) for name, value in start.items()}, **bounds}
+    for name, (low, high) in bounds.items():
+        if not 0 < low < high < float("inf"):
+            raise UserError(
+                f"bounds: {name} from {low:g} to {high:g}; both must be positive and the first below the second"
+            )
+    return Task(chosen, start, spans, beliefs, dict(noise), offsets)
+
+
+def _check(what: str, names: Iterable[str], known: Collection[str], others: str = "") -> None:
+    """Raise UserError for a name that is not known."""
+    for name in names:
+        if name not in known:
+            raise UserError(f"{what}: {name} is not known; there are {', '.join(known)}{others}")

@@ -1,0 +1,203 @@
+"""Motor motions that tell about the parameters, and how much each of them tells.
+
+The information about the logarithms of the parameters is that of the fit, F of `statistics`, with offsets and initial
+state unknown, for an experiment that is yet to be made. Multisines have harmonics of 1/duration with Schroeder's
+phases (IEEE Trans. Inf. Theory 16 (1970) 85), which keep their peaks low. All motions start and end at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from prw.channels import MEASURED
+from prw.identification.experiment import Experiment
+from prw.identification.fit import Fitter, Task
+from prw.identification.model import Model
+from prw.identification.statistics import condition, information_of, noise_corrected
+from prw.motion import Array, Motion
+from prw.testbed import ANGLE_OF, OUTPUTS
+
+#: Seconds in which a motion fades in and out.
+FADE = 0.5
+#: At most so many frequencies in a multisine.
+MOST_LINES = 60
+#: Frequencies in Hz: of the slow multisine, up to; and of the widest motions, up to.
+SLOW, WIDEST = 4.0, 40.0
+#: From this condition on, what an information matrix says of its weakest combination is rounding.
+SINGULAR = 1e12
+#: Rounds of the multiplicative algorithm for the D-optimal spectrum.
+ROUNDS = 300
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the motors can do: angle from the middle in rad, rate in rad/s, acceleration in rad/s2."""
+
+    angle: float = 0.7
+    rate: float = 8.0
+    acceleration: float = 400.0
+
+
+def motions(
+    model: Model, task: Task, limits: Limits, duration: float, rate: float, noise: Mapping[str, float]
+) -> list[Motion]:
+    """All candidates within `limits`: each kind with equal, opposite, single and independent motors.
+
+    duration: s. rate: samples per second. noise: by channel in SI; the optimal multisine is made for these channels.
+    """
+    time = np.arange(int(round(duration * rate)) + 1) / rate
+    top = min(WIDEST, rate / 5)
+    spans = {"multisine_slow": _lines(duration, min(SLOW, top)), "multisine_wide": _lines(duration, top)}
+    found = []
+    for kind, frequency in spans.items():
+        size = _natural(frequency, limits)
+        waves = [_multisine(time, frequency, size, k) for k in (0, 1)]
+        found += [_assemble(f"{kind}_{pattern}", time, waves, pattern, limits) for pattern in PATTERNS]
+    sweeps = [_chirp(time, f, limits) for f in ((0.2, top), (top, 0.2))]
+    found += [_assemble(f"chirp_{pattern}", time, sweeps, pattern, limits) for pattern in PATTERNS]
+    found.append(_optimal(model, task, time, _lines(duration, top), limits, noise))
+    return found
+
+
+#: What motors 1 and 2 do with two different waves.
+PATTERNS = {
+    "equal": ((1, 0), (1, 0)),
+    "opposite": ((1, 0), (-1, 0)),
+    "single": ((1, 0), (0, 0)),
+    "independent": ((1, 0), (0, 1)),
+}
+
+
+def information(
+    model: Model, experiments: Sequence[Experiment], task: Task, logarithms: Array, noise: Mapping[str, float]
+) -> Array:
+    """What experiments, made or yet to be made, would tell about the logarithms of task.names: (p, p), without
+    priors."""
+    unmeasured = [replace(experiment, values=None) for experiment in experiments]
+    channels = {name for experiment in experiments for name in experiment.channels}
+    fitter = Fitter(model, unmeasured, task, {name: noise[name] for name in channels})
+    jacobians, of_noise = fitter.jacobians(np.asarray(logarithms, dtype=float))
+    return noise_corrected(information_of(jacobians), of_noise)
+
+
+def default_noise() -> dict[str, float]:
+    """The noise that is assumed where nothing is known, by channel in SI."""
+    return {name: channel.noise for name, channel in MEASURED.items()}
+
+
+def _lines(duration: float, top: float) -> Array:
+    """Harmonics of 1/duration up to `top` Hz, thinned out evenly in the logarithm."""
+    harmonics = np.arange(1, int(top * duration) + 1)
+    if len(harmonics) > MOST_LINES:
+        harmonics = np.unique(np.rint(np.geomspace(1, harmonics[-1], 2 * MOST_LINES)).astype(int))[-MOST_LINES * 2 :]
+    return harmonics / duration
+
+
+def _natural(frequency: Array, limits: Limits) -> Array:
+    """Amplitudes that use the limits alike: of angle at low, of rate at middle, of acceleration at high
+    frequencies."""
+    w = 2 * np.pi * frequency
+    return np.minimum(np.minimum(limits.angle, limits.rate / w), limits.acceleration / w**2)
+
+
+def _multisine(time: Array, frequency: Array, size: Array, shift: int = 0) -> Array:
+    """Angle, rate and acceleration, (3, n), of a sum of sines. shift: another one gives other phases."""
+    k = np.arange(len(frequency))
+    power = size**2 / max(np.sum(size**2), np.finfo(float).tiny)
+    phase = -2 * np.pi * np.concatenate([[0], np.cumsum(np.cumsum(power))[:-1]]) + 2.4 * shift * (k**2 + 1)
+    w = 2 * np.pi * frequency
+    total = np.zeros((3, len(time)))
+    for wk, ak, pk in zip(w, size, phase):
+        sine, cosine = ak * np.sin(wk * time + pk), ak * np.cos(wk * time + pk)
+        total += np.stack([sine, wk * cosine, -(wk**2) * sine])
+    return total
+
+
+def _chirp(time: Array, span: tuple[float, float], limits: Limits) -> Array:
+    """Angle, rate and acceleration, (3, n), of a sine whose frequency goes from one end of the span to the other
+    exponentially, with the amplitude that the limits allow."""
+    duration = time[-1] - time[0]
+    growth = np.log(span[1] / span[0]) / duration
+    frequency = span[0] * np.exp(growth * (time - time[0]))
+    phase = 2 * np.pi * (frequency - span[0]) / growth
+    size = _natural(frequency, limits)
+    angle = size * np.sin(phase)
+    rate = np.gradient(angle, time, edge_order=2)
+    return np.stack([angle, rate, np.gradient(rate, time, edge_order=2)])
+
+
+def _faded(time: Array, wave: Array) -> Array:
+    """The wave (3, n) between a fade-in and a fade-out, at rest at angle 0 before and after."""
+    since, left = time - time[0], time[-1] - time
+    x = np.clip(np.minimum(since, left) / FADE, 0, 1)
+    sign = np.where(since < left, 1.0, -1.0)
+    inside = (x > 0) & (x < 1)
+    # smoothstep of fifth order: no jump of acceleration
+    gain = x**3 * (10 - 15 * x + 6 * x**2)
+    slope = np.where(inside, 30 * x**2 * (1 - x) ** 2 / FADE, 0.0) * sign
+    bend = np.where(inside, 60 * x * (1 - x) * (1 - 2 * x) / FADE**2, 0.0)
+    angle, rate, acceleration = wave
+    return np.stack([gain * angle, gain * rate + slope * angle, gain * acceleration + 2 * slope * rate + bend * angle])
+
+
+def _assemble(name: str, time: Array, waves: Sequence[Array], pattern: str, limits: Limits) -> Motion:
+    """The waves (3, n) mixed for the two motors and scaled up to the limits."""
+    motors = [shares[0] * waves[0] + shares[1] * waves[1] for shares in PATTERNS[pattern]]
+    return _within(name, time, motors, limits)
+
+
+def _within(name: str, time: Array, motors: Sequence[Array], limits: Limits) -> Motion:
+    """The motors' waves (3, n), faded and scaled up to the limits."""
+    motors = [_faded(time, wave) for wave in motors]
+    peaks = np.max([np.abs(wave).max(axis=1) for wave in motors], axis=0)
+    scale = min(limit / peak for limit, peak in zip((limits.angle, limits.rate, limits.acceleration), peaks))
+    theta, omega = (np.column_stack([scale * wave[i] for wave in motors]) for i in (0, 1))
+    return Motion(time, theta, omega, name)
+
+
+def _optimal(
+    model: Model, task: Task, time: Array, frequency: Array, limits: Limits, noise: Mapping[str, float]
+) -> Motion:
+    """The multisine whose power is spread over frequencies, equal and opposite motors such that the determinant of the
+    information is largest for what it costs of the limits (D-optimal; multiplicative algorithm, Silvey, Titterington
+    and Torsney, Comm. Stat. A 7 (1978) 1379)."""
+    share = 1e-4
+    logarithms = task.first()
+    steps = share * np.vstack([np.eye(len(logarithms)), -np.eye(len(logarithms))])
+    response = np.array([model.at(task.values(logarithms + s)).frequency_response(frequency, ANGLE_OF) for s in steps])
+    slopes = (response[: len(logarithms)] - response[len(logarithms) :]) / (2 * share)
+    rows = [OUTPUTS.index(name) for name in noise]
+    weighted = slopes[:, :, rows] / np.array(list(noise.values()))[:, None]
+    directions = np.array([[1.0, 1.0], [1.0, -1.0]])
+    seen = np.einsum("pfcm,dm->dfcp", weighted, directions).reshape(2 * len(frequency), len(rows), -1)
+    each = np.einsum("kcp,kcq->kpq", seen.conj(), seen).real
+    w = 2 * np.pi * frequency
+    cost = 1 / limits.angle**2 + (w / limits.rate) ** 2 + (w**2 / limits.acceleration) ** 2
+    each /= np.tile(cost, 2)[:, None, None]
+    # A direction that nothing tells about must not stop the search.
+    floor = 1e-9 * np.trace(each.sum(axis=0)) * np.eye(len(logarithms))
+    power = np.full(len(each), 1 / len(each))
+    for _ in range(ROUNDS):
+        inverse = np.linalg.inv(np.einsum("k,kpq->pq", power, each) + floor)
+        power *= np.einsum("kpq,qp->k", each, inverse) / len(logarithms)
+        power /= power.sum()
+    size = np.sqrt(power.reshape(2, -1) / cost)
+    # The sides' mean and half difference get frequencies of their own phases.
+    mean, half = (_multisine(time, frequency, s, k) for k, s in enumerate(size))
+    return _within("multisine_optimal", time, [mean + half, mean - half], limits)
+
+
+def typical_error(information: Array) -> float:
+    """The standard error, as a fraction, that is the same for all parameters in an equally good experiment:
+    det(F)^(-1/2p)."""
+    if condition(information) > SINGULAR:
+        return np.inf
+    return float(np.exp(-np.linalg.slogdet(information)[1] / (2 * len(information))))
+
+
+def with_priors(information: Array, task: Task) -> Array:
+    """Information (p, p) with what the priors add."""
+    return information + task.prior_information()

@@ -1,0 +1,106 @@
+"""Motor motions to identify parameters with, ranked by what they tell: `prw.excite`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from prw.channels import MEASURED
+from prw.errors import UserError
+from prw.extras import need
+from prw.identification import DEFAULT_ESTIMATE, task_of
+from prw.motion import Motion
+
+#: Samples and samples per second that make sense.
+MOST_SAMPLES, SLOWEST = 2_000_000, 50.0
+
+
+class Excitation(NamedTuple):
+    """A motion, and what one experiment with it would tell. typical_error: the standard error, as a fraction, that is
+    the same for all parameters in an equally good experiment; infinite where some stay open. expected_errors: of each
+    parameter. undetermined: combinations that stay open. noise: assumed of the channels, SI."""
+
+    motion: Motion
+    typical_error: float
+    expected_errors: dict[str, float]
+    undetermined: list[str]
+    noise: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        """The motion's name: its kind and what the two motors do."""
+        return self.motion.name
+
+
+def excite(
+    measure: Sequence[str] | None = None,
+    *,
+    angle: float = np.deg2rad(40.0),
+    speed: float = np.deg2rad(450.0),
+    acceleration: float = np.deg2rad(20000.0),
+    duration: float = 10.0,
+    rate: float = 1000.0,
+    estimate: Sequence[str] = DEFAULT_ESTIMATE,
+    fixed: Mapping[str, float] = {},
+    noise: Mapping[str, float] = {},
+    fmu: str | os.PathLike[str] | None = None,
+) -> list[Excitation]:
+    """Motions within the motors' limits, those first that tell most about the parameters.
+
+    Kinds: multisines (slow, wide, and one whose spectrum is optimal for the parameters) and chirps, with equal,
+    opposite, single and independent motors.
+
+    Parameters
+    ----------
+    measure
+        Channels that will be measured (default: all).
+    angle, speed, acceleration
+        Limits of the motors, rad, rad/s, rad/s2.
+    duration
+        Of a motion, s.
+    rate
+        Samples per second.
+    estimate, fixed, noise, fmu
+        As for `prw.identify`.
+
+    Raises
+    ------
+    UserError
+        A name is not known, or a number makes no sense.
+    """
+    need("identify", "scipy", "threadpoolctl")
+    from threadpoolctl import threadpool_limits
+
+    from prw.identification import design
+    from prw.identification.experiment import planned
+    from prw.identification.model import Model
+    from prw.identification.statistics import covariance_of, undetermined
+
+    channels = tuple(MEASURED if measure is None else measure)
+    for name in channels:
+        if name not in MEASURED:
+            raise UserError(f"measure: {name} is not known; there are {', '.join(MEASURED)}")
+    if not channels:
+        raise UserError(f"measure: nothing is named; there are {', '.join(MEASURED)}")
+    if not 4 * design.FADE <= duration <= MOST_SAMPLES / rate:
+        raise UserError(
+            f"duration {duration:g}: it must be {4 * design.FADE:g} s or more, and at most 2 million samples"
+        )
+    if rate < SLOWEST:
+        raise UserError(f"rate {rate:g}: the testbed moves at up to 30 Hz; sample with 50 Hz or more")
+    ranking = []
+    with Model(fmu) as model, threadpool_limits(1):
+        task = task_of(model.known, estimate, fixed=fixed, noise=noise)
+        known = {**design.default_noise(), **noise}
+        assumed = {name: known[name] for name in channels}
+        limits = design.Limits(float(angle), float(speed), float(acceleration))
+        for motion in design.motions(model, task, limits, duration, rate, assumed):
+            told = design.information(model, [planned(motion, channels)], task, task.first(), assumed)
+            errors = dict(zip(task.names, np.sqrt(np.diag(covariance_of(told))).tolist()))
+            left = [str(combination) for combination in undetermined(task.names, told)]
+            ranking.append(Excitation(motion, design.typical_error(told), errors, left, assumed))
+    # Where a combination stays open in all of them, what is known of the others decides.
+    return sorted(ranking, key=lambda e: (e.typical_error, float(np.mean(np.log(list(e.expected_errors.values()))))))

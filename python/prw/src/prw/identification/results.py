@@ -1,0 +1,301 @@
+"""What `prw.identify` returns: the estimates, how sure they are, and the doubts that a careful reader would have."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from prw.channels import MOTORS, si_unit
+from prw.extras import need
+from prw.files import write_text
+from prw.identification.experiment import Experiment
+from prw.identification.fit import Prior, Solution
+from prw.identification.model import Parameters
+from prw.identification.statistics import Certainty
+from prw.motion import Array
+
+#: Residuals this much stronger than the noise that was given, or weaker by as much, are worth a word.
+UNLIKE = 1.5
+#: A channel of which less than this share is explained (1 - |residual| / |motion|) does not fit.
+POOR_FIT = 0.5
+#: An estimate that is off its prior by this many standard deviations contradicts it.
+CONTRADICTION = 3.0
+#: From this standard error on, a number is no estimate.
+HOPELESS = 1.0
+
+
+class Estimate(NamedTuple):
+    """A parameter that was estimated. value, standard_error: in `unit` (SI), as are both ends of the 95 % `interval`.
+    relative: standard error as a fraction. shown, factor: the unit that the FMU shows it in, and what a value in that
+    unit is multiplied with to be in SI. prior: what was known of it."""
+
+    value: float
+    standard_error: float
+    interval: tuple[float, float]
+    relative: float
+    unit: str
+    shown: str
+    factor: float
+    prior: Prior | None
+
+    @property
+    def hopeless(self) -> bool:
+        """Whether the data say next to nothing of it."""
+        return self.relative > HOPELESS
+
+
+class ChannelFit(NamedTuple):
+    """How one channel of one experiment came out. samples: how many have a value. noise: strength in the band beyond what encoders
+    explain, residual: rms over all frequencies, offset: of the sensor, all SI. explained: share of its motion."""
+
+    experiment: str
+    channel: str
+    unit: str
+    samples: int
+    noise: float
+    residual: float
+    offset: float
+    explained: float
+
+
+@dataclass(frozen=True, repr=False)
+class Identification:
+    """What came of identifying the parameters of the FMU `fmu` from `files`.
+
+    known: the FMU's parameters. advice: what would settle open combinations, if there are any. measured: what was
+    worth a word when the files were read. solution, sure: the fit itself and its statistics."""
+
+    fmu: Path
+    known: Parameters
+    files: tuple[str, ...]
+    experiments: tuple[Experiment, ...]
+    solution: Solution
+    sure: Certainty
+    advice: tuple[str, ...]
+
+    @property
+    def parameters(self) -> dict[str, Estimate]:
+        """What was estimated, by name."""
+        task, sure, found = self.solution.task, self.sure, {}
+        for i, name in enumerate(task.names):
+            parameter, value, relative = self.known.real[name], self.values[name], float(sure.relative[i])
+            interval = float(sure.low[i]), float(sure.high[i])
+            unit = parameter.unit, parameter.shown, parameter.factor
+            found[name] = Estimate(value, value * relative, interval, relative, *unit, task.priors.get(name))
+        return found
+
+    @property
+    def values(self) -> dict[str, float]:
+        """All Real parameters of the FMU in SI by name, those that were held included."""
+        return self.solution.values
+
+    @property
+    def correlation(self) -> Array:
+        """Of the estimates, (p, p), in the order of `parameters`."""
+        return self.sure.correlation
+
+    @property
+    def undetermined(self) -> list[str]:
+        """Combinations of parameters that the data leave open; empty where all are determined."""
+        return [str(combination) for combination in self.sure.undetermined]
+
+    def residual(self, i: int) -> Array:
+        """Measured minus modelled of experiment i, (n, c), SI, NaN where nothing was measured."""
+        values = self.experiments[i].values
+        assert values is not None
+        return values - self.solution.modelled[i]
+
+    @property
+    def channels(self) -> list[ChannelFit]:
+        """How every channel of every experiment came out."""
+        found = []
+        for i, experiment in enumerate(self.experiments):
+            residual = self.residual(i)
+            measured = residual + self.solution.modelled[i]
+            for j, name in enumerate(experiment.channels):
+                spread, rms = np.nanstd(measured[:, j]), float(np.sqrt(np.nanmean(residual[:, j] ** 2)))
+                count = int(np.isfinite(residual[:, j]).sum())
+                offset = float(self.solution.comparisons[i].offsets[j])
+                explained = float(1 - rms / spread) if spread > 0 else 0.0
+                noise = self.solution.noise[name]
+                found.append(ChannelFit(experiment.name, name, si_unit(name), count, noise, rms, offset, explained))
+        return found
+
+    @property
+    def notes(self) -> list[str]:
+        """What the user should know or doubt, one line each."""
+        solution, sure = self.solution, self.sure
+        lines = [f"{file}: {note}" for file, e in zip(self.files, self.experiments) for note in e.notes]
+        for name in solution.task.names:
+            low, high = solution.task.bounds[name]
+            if min(self.values[name] / low, high / self.values[name]) < 1.001:
+                lines.append(f"{name} ended at its bound; widen it with --bounds, or doubt the data")
+        for point, _ in solution.rivals:
+            values = ", ".join(
+                f"{name} {value / self.known.real[name].factor:.4g}"
+                for name, value in zip(solution.task.names, np.exp(point))
+            )
+            swapped = " (the couplings exchanged)" if self._exchanged(point) else ""
+            lines.append(
+                f"the data fit as well with {values}{swapped}; given is what is nearest to the start values. "
+                "theta3 and theta4 would tell"
+            )
+        for channel in self.channels:
+            if channel.explained < POOR_FIT and channel.channel not in solution.task.noise:
+                lines.append(
+                    f"{channel.experiment}: {channel.channel} fits badly ({channel.explained:.0%} of its motion is "
+                    "explained); check its unit and sign, and whether the motors move it at all"
+                )
+        for name in solution.task.noise:
+            times = self._times_its_noise(name)
+            if not 1 / UNLIKE < times < UNLIKE:
+                lines.append(f"{name}: its residuals are {times:.2g} times the noise that was given")
+        for name, estimate in self.parameters.items():
+            if estimate.prior is not None:
+                off = abs(np.log(estimate.value / estimate.prior.value)) / estimate.prior.relative
+                if off > CONTRADICTION:
+                    lines.append(
+                        f"{name} came out {off:.1f} standard deviations off its prior; data and prior disagree"
+                    )
+        if (sure.whiteness > UNLIKE).any() and not sure.undetermined:
+            lines.append("the noise is not white (quantised angles do that); the standard errors take it into account")
+        return list(dict.fromkeys(lines))
+
+    def summary(self) -> str:
+        """What was found, in a few lines of text."""
+        channels = ", ".join(dict.fromkeys(name for e in self.experiments for name in e.channels))
+        seconds = sum(e.sampled[-1] - e.sampled[0] for e in self.experiments)
+        lines = [f"identified  from {', '.join(self.files)}: {seconds:.4g} s with {channels}"]
+        for name, found in self.parameters.items():
+            value, low, high = (v / found.factor for v in (found.value, *found.interval))
+            sureness = f"+- {found.relative:.2%}   95 % interval {low:.5g} to {high:.5g}"
+            sureness = "not determined" if found.hopeless else sureness
+            lines.append(f"  {name:<9} {value:.5g} {found.shown}  {sureness}{', prior' if found.prior else ''}")
+        noise = (f"{name} {value:.2g} {si_unit(name)}" for name, value in self.solution.noise.items())
+        lines.append("noise       " + ", ".join(noise))
+        return "\n".join([*lines, *(f"note        {note}" for note in self.notes)])
+
+    def report(self, path: str | os.PathLike[str]) -> None:
+        """Write the report, one HTML page that needs nothing beside it: estimates, doubts, residuals. Raises UserError
+        without jinja2 and matplotlib, or where it cannot be written."""
+        need("identify", "jinja2", "matplotlib")
+        from prw.identification.report import page
+
+        residuals = [self.residual(i) for i in range(len(self.experiments))]
+        channels = [channel._asdict() for channel in self.channels]
+        fitted = (self.known, self.experiments, self.solution, residuals, channels, self.parameters)
+        write_text(Path(path), page(*fitted, found=self, sure=self.sure))
+
+    def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
+        """Everything in numbers, as JSON; written to `path`, too, where that is given."""
+        return _written(path, json.dumps(self._numbers(), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+    def to_parameters(self, path: str | os.PathLike[str] | None = None) -> str:
+        """All parameters as `build_fmu --parameters` reads them, in the units that the FMU shows."""
+        return _written(path, self.known.for_building(self.values))
+
+    def to_ssv(self, path: str | os.PathLike[str] | None = None, name: str = "identified") -> str:
+        """All parameters as a parameter set of SSP 1.0, in SI, that other tools read. name: of the set."""
+        return _written(path, self.known.ssv(self.values, name))
+
+    def __repr__(self) -> str:
+        return self.summary()
+
+    def _repr_html_(self) -> str:
+        rows = []
+        for name, found in self.parameters.items():
+            value, error, low, high = (
+                f"{v / found.factor:.5g}" for v in (found.value, found.standard_error, *found.interval)
+            )
+            cells = [name, value, f"± {error}", f"{low} to {high}", found.shown]
+            cells = [name, "not determined", "", "", found.shown] if found.hopeless else cells
+            rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+        head = "".join(f"<th>{h}</th>" for h in ("parameter", "estimate", "standard error", "95 % interval", "unit"))
+        notes = "".join(f"<p>{escape(text)}</p>" for text in [*self.undetermined, *self.notes])
+        return f"<table><tr>{head}</tr>{''.join(rows)}</table>{notes}"
+
+    def _times_its_noise(self, name: str) -> float:
+        """Strength of a channel's residuals in the band in terms of what noise and encoders explain."""
+        columns = [
+            comparison.residual[..., experiment.channels.index(name)].ravel()
+            for experiment, comparison in zip(self.experiments, self.solution.comparisons)
+            if name in experiment.channels
+        ]
+        return float(np.sqrt(np.mean(np.concatenate(columns) ** 2)))
+
+    def _exchanged(self, point: Array) -> bool:
+        place = {name: i for i, name in enumerate(self.solution.task.names)}
+        return all(
+            abs(point[place[a]] - self.solution.logarithms[place[b]]) < 0.05
+            for a, b in (("k1", "k2"), ("k2", "k1"), ("c1", "c2"), ("c2", "c1"))
+            if a in place and b in place
+        )
+
+    def _numbers(self) -> dict[str, Any]:
+        solution, sure, estimates = self.solution, self.sure, self.parameters
+        parameters = {}
+        for name, parameter in self.known.real.items():
+            value = self.values[name]
+            entry: dict[str, Any] = {
+                "value": value,
+                "unit": parameter.unit,
+                "shown": {"value": value / parameter.factor, "unit": parameter.shown},
+                "start": solution.task.start[name],
+                "estimated": name in estimates,
+            }
+            if name in estimates:
+                found = estimates[name]
+                entry["standard_error"], entry["relative_standard_error"] = found.standard_error, found.relative
+                entry["interval_95"], entry["bounds"] = found.interval, solution.task.bounds[name]
+                if found.prior:
+                    entry["prior"] = found.prior._asdict()
+            parameters[name] = entry
+        return {
+            "fmu": {"file": str(self.fmu), "guid": self.known.guid},
+            "files": list(self.files),
+            "identified": not sure.undetermined,
+            "parameters": parameters,
+            "correlation": {"names": list(sure.names), "matrix": sure.correlation.tolist()},
+            "information": {
+                "matrix_of_logarithms": sure.information.tolist(),
+                "condition": sure.condition,
+                "undetermined": [
+                    {"shares": dict(c.shares), "error_of_logarithm": min(c.error, 1e6), "text": str(c)}
+                    for c in sure.undetermined
+                ],
+                "advice": list(self.advice),
+            },
+            "channels": [channel._asdict() for channel in self.channels],
+            "motors": [
+                {
+                    "experiment": experiment.name,
+                    "motor": motor,
+                    "quantum": path.quantum,
+                    "noise": path.noise,
+                    "rate_noise": path.rate_noise,
+                    "compared_to_hz": experiment.band,
+                }
+                for experiment in self.experiments
+                for motor, path in zip(MOTORS, experiment.paths or ())
+            ],
+            "rivals": [
+                {"values": dict(zip(sure.names, np.exp(x).tolist())), "misfit_above_best": chi - solution.misfit}
+                for x, chi in solution.rivals
+            ],
+            "misfit": solution.misfit,
+            "starts": solution.tried,
+            "evaluations": solution.evaluations,
+            "notes": self.notes,
+        }
+
+
+def _written(path: str | os.PathLike[str] | None, text: str) -> str:
+    if path is not None:
+        write_text(Path(path), text)
+    return text

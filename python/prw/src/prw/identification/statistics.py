@@ -1,0 +1,166 @@
+"""How sure the estimates are, and which combination of parameters the data do not determine.
+
+The covariance of the estimates is H^-1 S H^-1: H is the information that the data have, S the variance of the score
+J'r of residuals r. What encoders do to the score is drawn (parametric bootstrap; Efron and Tibshirani 1993, Sec. 6.5),
+and sensors are white: that is one S. The other is the sum over frequencies of each one's own score, squared, as the
+residuals have it, which holds for noise of any colour (White, Econometrica 48 (1980) 817, in the form HC3 of
+MacKinnon and White, J. Econometrics 29 (1985) 305). The larger of the two errors counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ndtri
+
+from prw.identification.fit import Comparison, Solution
+from prw.identification.profile import ends
+from prw.motion import Array
+
+#: Beyond this, condition numbers are rounding.
+WORST_CONDITION = 1e15
+#: Exponents of intervals end here: a double can hold them.
+WIDEST = 600.0
+#: A residual that the parameters can make vanish is not blown up beyond this.
+LEAST_FREEDOM = 0.1
+#: A combination of parameters that is uncertain by more than this fraction (one sigma) counts as not determined.
+UNDETERMINED = 0.3
+#: Information counts as far as it exceeds this many times what encoders' errors add to it.
+MARGIN = 3.0
+#: Parameters that take less than this share in a combination are not named.
+SHARE = 0.15
+
+
+class Combination(NamedTuple):
+    """A direction that the data leave open. shares: exponent by parameter, the largest 1: the parameters can change
+    together like p -> p * x^share. error: standard deviation of log x."""
+
+    shares: Mapping[str, float]
+    error: float
+
+    def __str__(self) -> str:
+        moves = ", ".join(f"{name} {(1.1**share - 1) * 100:+.0f} %" for name, share in self.shares.items())
+        if len(self.shares) == 1:
+            return f"{next(iter(self.shares))} has hardly any effect on what was measured"
+        names = list(self.shares)
+        return f"{', '.join(names[:-1])} and {names[-1]} cannot be told apart: {moves} together change next to nothing"
+
+
+class Certainty(NamedTuple):
+    """names: of the parameters (p). relative: (p,) standard errors as fractions. low, high: (p,) ends of the 95 %
+    intervals, SI. covariance, correlation: (p, p). information: (p, p), of the logarithms, priors included, without
+    what encoders' errors add. condition: of its unit-diagonal form. whiteness: by how much the noise's correlation
+    widens the errors beyond what sensors explain, (p,). undetermined: combinations that the data leave open."""
+
+    names: Sequence[str]
+    relative: Array
+    low: Array
+    high: Array
+    covariance: Array
+    correlation: Array
+    information: Array
+    condition: float
+    whiteness: Array
+    undetermined: list[Combination]
+
+
+def certainty(solution: Solution, level: float = 0.95) -> Certainty:
+    """Standard errors, correlation, intervals and open combinations of a fit."""
+    names, prior = solution.task.names, solution.task.prior_information()
+    squares = prior + information_of(solution.jacobians)
+    inverse = covariance_of(_positive(squares - solution.noise_information))
+    expected, shown = prior.copy(), prior.copy()
+    for comparison, jacobian in zip(solution.comparisons, solution.jacobians):
+        expected += comparison.score_variance(jacobian)
+        shown += scores(comparison, jacobian, inverse)
+    expected, shown = inverse @ expected @ inverse, inverse @ shown @ inverse
+    # Where a combination is open, rounding makes some of these negative.
+    scale = np.sqrt(np.maximum(np.diag(expected), np.finfo(float).tiny))
+    errors = np.maximum(np.sqrt(np.maximum(np.diag(shown), 0.0)), scale)
+    whiteness = errors / scale
+    covariance = expected * np.outer(whiteness, whiteness)
+    corrected = noise_corrected(squares, solution.noise_information)
+    open_ones = undetermined(names, corrected)
+    if open_ones:
+        errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(corrected))))
+    low, high = ends(solution, inverse, errors, float(ndtri(0.5 + level / 2)))
+    unit = np.outer(scale, scale)
+    return Certainty(
+        names,
+        errors,
+        np.exp(np.maximum(low, solution.logarithms - WIDEST)),
+        np.exp(np.minimum(high, solution.logarithms + WIDEST)),
+        covariance,
+        np.clip(np.divide(expected, unit, out=np.eye(len(names)), where=unit > 0), -1, 1),
+        corrected,
+        condition(corrected),
+        whiteness,
+        open_ones,
+    )
+
+
+def information_of(jacobians: Sequence[Array]) -> Array:
+    """J'J (p, p) of Jacobians (2, bins, c, p)."""
+    flat = np.vstack([jacobian.reshape(-1, jacobian.shape[-1]) for jacobian in jacobians])
+    information: Array = flat.T @ flat
+    return information
+
+
+def scores(comparison: Comparison, jacobian: Array, inverse: Array) -> Array:
+    """Sum over frequencies of the square of each one's score J'r: (p, p). inverse: of the information, (p, p)."""
+    # What the parameters have taken of a residual is given back, as a jackknife would.
+    leverage = np.einsum("rfcp,pq,rfcq->rfc", jacobian, inverse, jacobian, optimize=True)
+    residual = comparison.residual / np.maximum(1 - leverage, LEAST_FREEDOM)
+    each = np.einsum("rfcp,rfc->fp", jacobian, residual)
+    total: Array = each.T @ each
+    return total
+
+
+def noise_corrected(information: Array, noise: Array) -> Array:
+    """Information (p, p) without what encoders' errors add to it, `noise` (p, p) times a margin."""
+    return _positive(information - MARGIN * noise)
+
+
+def _positive(matrix: Array) -> Array:
+    """A symmetric matrix (p, p) without the directions in which it is negative."""
+    values, vectors = np.linalg.eigh(matrix)
+    positive: Array = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    return positive
+
+
+def covariance_of(information: Array) -> Array:
+    """The inverse of an information matrix; directions without any information get a huge variance, not an error."""
+    scale = _scale(information)
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    values = np.maximum(values, 1 / WORST_CONDITION)
+    inverse: Array = (vectors / values) @ vectors.T / np.outer(scale, scale)
+    return inverse
+
+
+def condition(information: Array) -> float:
+    """Condition of the information matrix scaled to a unit diagonal, at most WORST_CONDITION."""
+    scale = _scale(information)
+    values = np.linalg.eigvalsh(information / np.outer(scale, scale))
+    return float(values[-1] / values[0]) if values[0] * WORST_CONDITION > values[-1] else WORST_CONDITION
+
+
+def _scale(information: Array) -> Array:
+    diagonal = np.diag(information)
+    return np.sqrt(np.maximum(diagonal, max(1e-24 * diagonal.max(), 1e-30)))
+
+
+def undetermined(names: Sequence[str], information: Array) -> list[Combination]:
+    """The combinations of parameters whose logarithms the information leaves open, the most uncertain first."""
+    values, vectors = np.linalg.eigh(information)
+    found = []
+    for value, vector in zip(values, vectors.T):
+        largest = np.abs(vector).max()
+        # The error of the largest parameter when all move along.
+        error = largest / np.sqrt(max(value, 1e-30))
+        if error > UNDETERMINED:
+            vector = vector / vector[np.argmax(np.abs(vector))]
+            shares = {name: float(v) for name, v in zip(names, vector) if abs(v) > SHARE}
+            found.append(Combination(shares, float(error)))
+    return found

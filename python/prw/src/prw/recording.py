@@ -1,0 +1,174 @@
+"""Reading a recorded experiment, and saying what looks like a slip in it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from prw.channels import MEASURED, QUANTITIES, factor
+from prw.columns import ANGLES, RATES, Columns, columns
+from prw.errors import UserError
+from prw.motion import Array, Motion
+from prw.output import inputs_of
+from prw.table import read_table
+
+#: Faster than the testbed's motors will turn on any wrist move, in rad/s; degrees taken for radians are beyond it.
+PLAUSIBLE_SPEED = 30.0
+#: More turns than a wrist move takes, in rad.
+PLAUSIBLE_ANGLE = 4 * np.pi
+#: A motor that moves less than this, in rad, says nothing about its rate.
+SMALL_MOVE = 0.02
+#: A motor this slow, in rad/s, is taken to stand still.
+SLOW = 0.1
+#: Longer between two samples, in s, than anyone lets a motor run unobserved; milliseconds taken for seconds are beyond.
+SLOW_SAMPLING = 0.5
+#: A motor does not turn this far, in rad, from sample to sample; angles that jump by a turn do.
+JUMP = 0.9 * np.pi
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recorded experiment, in SI. recording["tau1"]: (n,), and so for time, motors and whatever was measured.
+
+    motion: what the motors did, (n,) times. measured: (n,) by name, of `prw.channels.MEASURED`; NaN where a cell is
+    empty. units: the unit in the file, by column. source: the file.
+    """
+
+    source: Path
+    motion: Motion
+    measured: Mapping[str, Array]
+    units: Mapping[str, str]
+
+    @property
+    def name(self) -> str:
+        """The file's name, without what follows the dot."""
+        return self.motion.name
+
+    @property
+    def time(self) -> Array:
+        """(n,) s."""
+        return self.motion.time
+
+    @property
+    def theta(self) -> Array:
+        """(n, 2) rad: theta1, theta2."""
+        return self.motion.theta
+
+    @property
+    def omega(self) -> Array | None:
+        """(n, 2) rad/s: omega1, omega2; None if they were not recorded."""
+        return self.motion.omega
+
+    @property
+    def notes(self) -> list[str]:
+        """Lines the user should read, on what looks like a slip."""
+        return self.motion.notes
+
+    def __getitem__(self, column: str) -> Array:
+        columns = {**inputs_of(self.motion), **self.measured}
+        if column not in columns:
+            raise KeyError(f"{column}: was not recorded; there are {', '.join(columns)}")
+        return columns[column]
+
+    def __repr__(self) -> str:
+        span = f"{self.time[0]:g} to {self.time[-1]:g} s"
+        return f"<Recording {self.name}: {', '.join(self.units)}; {len(self.time)} times, {span}>"
+
+
+def read(path: str | os.PathLike[str], units: Mapping[str, str] | None = None, degrees: bool = False) -> Recording:
+    """Read a recorded experiment from a CSV file.
+
+    Its columns: time (s), theta1, theta2 (rad) and, where present, omega1, omega2 (rad/s) and any of tau1, tau2
+    (N.m), theta3, theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s), in any order; others are ignored. It is
+    UTF-8 text with a header line, perhaps below comments after `#`, separated by commas, semicolons or tabs (with
+    semicolons, a decimal comma is understood). Time may be uneven but must increase. A measured column may have
+    empty cells.
+
+    Parameters
+    ----------
+    units
+        Unit by column, where the header has none (`pitch [deg]` has one). Default: SI.
+    degrees
+        Columns without a unit are in degrees and degrees per second.
+
+    Raises
+    ------
+    UserError
+        Something cannot be read; file, row and column are named.
+    """
+    return _read(Path(path), units, degrees, tuple(MEASURED))
+
+
+def read_motion(path: str | os.PathLike[str], units: Mapping[str, str] | None = None, degrees: bool = False) -> Motion:
+    """The motors' motion alone, as `read` reads it: what was measured is ignored, and may be anything."""
+    return _read(Path(path), units, degrees, ()).motion
+
+
+def _read(path: Path, units: Mapping[str, str] | None, degrees: bool, measured: tuple[str, ...]) -> Recording:
+    for name in units or {}:
+        if name not in QUANTITIES:
+            raise UserError(f"units: {name} is not known; there are {', '.join(QUANTITIES)}")
+
+    found = Columns([], {}, [])
+
+    def choose(header: Sequence[str], line: int) -> Sequence[tuple[str, int]]:
+        nonlocal found
+        found = columns(path, header, line, measured, units, degrees)
+        return found.taken
+
+    values = read_table(path, choose, may_be_empty=measured, increasing=True)
+    table = {name: values[:, i] * factor(name, found.units[name]) for i, (name, _) in enumerate(found.taken)}
+    time = table.pop("time")
+    theta = np.column_stack([table.pop(name) for name in ANGLES])
+    omega = np.column_stack([table.pop(name) for name in RATES]) if RATES[0] in table else None
+    with np.errstate(all="ignore"):  # angles near the largest number are the FMU's to refuse
+        notes = found.notes + doubts(time, theta, omega, found.units)
+    return Recording(path, Motion(time, theta, omega, path.stem, notes), table, found.units)
+
+
+def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, str]) -> list[str]:
+    """Notes on values that are legal and yet look like a slip. units: of the columns in the file."""
+    notes = []
+    if len(time) > 1 and (step := (time[-1] - time[0]) / (len(time) - 1)) > SLOW_SAMPLING:
+        notes.append(f"a sample every {step:.3g} s; if time is in ms, call its column time [ms]")
+    for side, name in enumerate(ANGLES):
+        # A percentile, for a single step of a coarse encoder is no speed.
+        speed = np.percentile(np.abs(np.diff(theta[:, side]) / np.diff(time)), 99)
+        reach = np.abs(theta[:, side]).max()
+        hint = "if the angles are in degrees, add --degrees" if units[name] == "rad" else "are these the right units?"
+        steps = np.abs(np.diff(theta[:, side]))
+        if len(steps) and (jump := steps.max()) > JUMP:
+            notes.append(
+                f"{name} jumps by {jump:.3g} rad after {time[steps.argmax()]:.6g} s; angles must run on past a full turn "
+                "(numpy.unwrap makes them)"
+            )
+        if speed > PLAUSIBLE_SPEED:
+            notes.append(f"{name} turns at {speed:.0f} rad/s ({speed * 30 / np.pi:.0f} rpm); {hint}")
+        elif reach > PLAUSIBLE_ANGLE:
+            notes.append(f"{name} reaches {reach:.0f} rad ({reach / (2 * np.pi):.1f} turns); {hint}")
+    if omega is None:
+        notes.append(
+            "no omega1, omega2: the rates come from the angles, and where these are quantised or noisy so are the "
+            "torques; record omega1 and omega2 too if you can"
+        )
+        return notes
+    if np.abs(omega[0]).max() > SLOW:
+        notes.append("the motors turn already in the first row; the testbed starts at rest and has to catch up")
+    notes += [note for side in (0, 1) if (note := _mismatch(time, theta[:, side], omega[:, side], side))]
+    return notes
+
+
+def _mismatch(time: Array, theta: Array, omega: Array, side: int) -> str:
+    """A note when the integral of the rate omega (n,) is not the angle theta (n,), else nothing."""
+    turned = theta - theta.mean()
+    if np.ptp(theta) < SMALL_MOVE:
+        return ""
+    by_rate = np.concatenate([[0], np.cumsum(np.diff(time) * (omega[1:] + omega[:-1]) / 2)])
+    ratio = turned @ by_rate / (turned @ turned)
+    if 0.8 < ratio < 1.25:
+        return ""
+    return f"{RATES[side]} adds up to {ratio:.3g} times the motion of {ANGLES[side]}; check units and sign"

@@ -1,0 +1,151 @@
+"""One simulation of the testbed: `simulate`, and the `Run` that it returns."""
+
+from __future__ import annotations
+
+import html
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from prw.channels import QUANTITIES, si_unit
+from prw.errors import UserError
+from prw.extras import need
+from prw.motion import Array, Motion, fig4
+from prw.recording import Recording, read_motion
+from prw.testbed import OUTPUTS, Testbed
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+    from prw.testbed import Value
+
+
+class Run(Mapping[str, Array]):
+    """What the testbed did. run["roll"]: (n,), in SI, at the times `time`; so for each of its outputs.
+
+    time: (n,) s. motion: what the motors did. parameters: the value of every parameter of the FMU in this run, in SI.
+    """
+
+    def __init__(self, motion: Motion, outputs: Mapping[str, Array], parameters: Mapping[str, Value]):
+        self.motion, self.parameters = motion, dict(parameters)
+        self._outputs = dict(outputs)
+
+    @property
+    def time(self) -> Array:
+        """(n,) s."""
+        return self.motion.time
+
+    def __getitem__(self, output: str) -> Array:
+        if output not in self._outputs:
+            raise KeyError(f"{output}: was not asked for; there are {', '.join(self)}, and `outputs=` chooses others")
+        return self._outputs[output]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._outputs)
+
+    def __len__(self) -> int:
+        return len(self._outputs)
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write time (s), the motors' angles (rad) and, where given, rates (rad/s), and the outputs (SI) to `path`, a
+        row each time. Time and motors keep all their digits; outputs have twelve. Raises UserError where that is
+        impossible."""
+        from prw.output import write_table
+
+        write_table(Path(path), self.motion, self._outputs, tuple(self))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The columns of `to_csv` as a DataFrame, with the time as index. Raises UserError without pandas."""
+        need("pandas", "pandas")
+        import pandas
+
+        from prw.output import inputs_of
+
+        columns = {**inputs_of(self.motion), **self._outputs}
+        return pandas.DataFrame(columns, index=pandas.Index(columns.pop("time"), name="time"))
+
+    def plot(self, title: str | None = None, *, angles: bool = True) -> Figure:
+        """Motors, pitch and roll, and torques over time, as far as the run has them; save it with `.savefig(path)`.
+
+        angles: show angles, in degrees, of motors and wrist. Otherwise velocities only, as in Fig. 4. Raises UserError
+        without matplotlib.
+        """
+        need("plot", "matplotlib")
+        from prw.plots import draw_response
+
+        title = f"Response to {self.motion.name}" if title is None else title
+        return draw_response(title, self.motion, self, angles)
+
+    def __repr__(self) -> str:
+        return f"<Run of {self.motion.name}: {', '.join(self)} at {len(self.time)} times>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            f"<tr><td>{html.escape(name)}</td><td>{_unit(name)}</td>"
+            f"<td>{np.abs(values).max():.4g}</td><td>{values[-1]:.4g}</td></tr>"
+            for name, values in self.items()
+        ]
+        heads = "<tr><th>output</th><th>unit</th><th>largest magnitude</th><th>at the end</th></tr>"
+        span = f"{len(self.time)} times, {self.time[0]:g} to {self.time[-1]:g} s"
+        return f"<p>{html.escape(self.motion.name)}: {span}</p><table>{heads}{''.join(rows)}</table>"
+
+
+def simulate(
+    motion: Motion | Recording | str | os.PathLike[str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    *,
+    fmu: str | os.PathLike[str] | None = None,
+    outputs: Sequence[str] = OUTPUTS,
+) -> Run:
+    """Let the testbed follow the motors, from rest at their first angles.
+
+    Parameters
+    ----------
+    motion
+        What the motors do, or a recording of it (a CSV file as `prw.read` takes it; only its motors matter here).
+        Default: the paper's experiment of Fig. 4.
+    parameters
+        Values in SI by name; others keep the FMU's start values.
+    fmu
+        The testbed FMU, of FMI 2.0 or 3.0 (default: the one built in this checkout, or installed with this
+        package).
+    outputs
+        Names of any Real variables.
+
+    Returns
+    -------
+    Run
+        The run. Row k of its outputs is read at time[k], with the motors where they are then.
+
+    Raises
+    ------
+    UserError
+        The FMU is missing or refuses a value, a name is unknown or a file unreadable.
+    """
+    course = motion_of(motion)
+    names = [outputs] if isinstance(outputs, str) else list(outputs)
+    with Testbed(None if fmu is None else Path(fmu)) as testbed:
+        values = testbed.with_starts(parameters or {})
+        for name in names:
+            if name not in testbed.loaded.variables:
+                raise UserError(f"outputs: {name} is not known; there are {', '.join(testbed.loaded.variables)}")
+        found = testbed.respond(course, names, parameters or {})
+    return Run(course, found, values)
+
+
+def motion_of(source: Motion | Recording | str | os.PathLike[str] | None) -> Motion:
+    """The motion itself, that of a recording or of a file, or that of Fig. 4. Raises UserError for an unreadable
+    file."""
+    if source is None:
+        return fig4()
+    if isinstance(source, Recording):
+        return source.motion
+    return source if isinstance(source, Motion) else read_motion(Path(source))
+
+
+def _unit(name: str) -> str:
+    return si_unit(name) if name in QUANTITIES else ""

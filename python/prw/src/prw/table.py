@@ -1,0 +1,138 @@
+"""Reading numbers from a CSV file. Every complaint names the file, the line and the column."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import re
+from array import array
+from collections.abc import Callable, Container, Sequence
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from prw.errors import UserError
+from prw.motion import Array
+from prw.progress import Progress
+
+DELIMITERS = (",", ";", "\t")
+#: Rows between two progress reports.
+REPORT_ROWS = 4096
+
+#: The columns to read, (name, index), of a header in the line with this number.
+Choice = Callable[[Sequence[str], int], Sequence[tuple[str, int]]]
+
+
+def read_table(path: Path, choose: Choice, may_be_empty: Container[str] = (), increasing: bool = False) -> Array:
+    """The columns that `choose` takes of the header, (rows, columns), from UTF-8 text as `prw.read` describes it.
+
+    An empty cell in a column of `may_be_empty` becomes NaN. increasing: whether the first column, the time, must
+    increase. Raises UserError naming file, line and column.
+    """
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            return _parse(path, file, choose, may_be_empty, increasing)
+    except UnicodeDecodeError:
+        raise UserError(
+            f"{_where(path, _undecodable_line(path))}: not UTF-8 text; save the file as UTF-8 CSV"
+        ) from None
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def _parse(path: Path, file: IO[str], choose: Choice, may_be_empty: Container[str], increasing: bool) -> Array:
+    begin, first = _top(file)
+    if not first:
+        raise UserError(f"{path}: the file is empty; a header and at least two rows are needed")
+    delimiter = next((d for d in DELIMITERS if d in first), ",")
+    file.seek(0)
+    table = csv.reader(file, delimiter=delimiter, skipinitialspace=True)
+    try:
+        header = [name.strip() for name in next(row for row in table if row and table.line_num > begin)]
+        header[0] = header[0].lstrip("# ")
+        columns = choose(header, table.line_num)
+        size = os.fstat(file.fileno()).st_size
+        values = _rows(path, table, len(header), columns, delimiter == ";", size, may_be_empty, increasing)
+    except csv.Error as error:
+        raise UserError(f"{_where(path, table.line_num)}: not a readable CSV row ({error})") from None
+    if len(values) < 2:
+        rows = "only one row below the header" if len(values) else "no rows below the header"
+        raise UserError(f"{_where(path, table.line_num)}: {rows}; at least two are needed")
+    return values
+
+
+def _top(file: IO[str]) -> tuple[int, str]:
+    """How many lines stand above the header, blank or comments after `#`, and the header, "" if there is none. numpy
+    writes a `#` before the header as well: it is the last comment then, with numbers right below."""
+    count, comment, line = 0, "", file.readline()
+    while line and (not line.strip() or line.lstrip().startswith("#")):
+        count, comment, line = count + 1, line.strip() and line, file.readline()
+    if comment and line.strip() and re.match(r"[-+.\d]", line.lstrip()):
+        return count - 1, comment
+    return count, line
+
+
+def _rows(
+    path: Path,
+    table: Any,
+    width: int,
+    columns: Sequence[tuple[str, int]],
+    decimal_comma: bool,
+    size: int,
+    may_be_empty: Container[str],
+    increasing: bool,
+) -> Array:
+    """All rows below the header, (rows, columns), checked cell by cell."""
+    cells, previous, bytes_read = array("d"), -math.inf, 0
+    with Progress(f"reading {path}", size) as progress:
+        for count, row in enumerate(table):
+            # Some tools end each row, but not the header, with a separator.
+            if len(row) != width and not (len(row) == width + 1 and not row[-1].strip()):
+                if not row or row[0].startswith("#"):
+                    continue
+                number = "1 cell" if len(row) == 1 else f"{len(row)} cells"
+                raise UserError(f"{_where(path, table.line_num)}: {number}, but the header has {width}")
+            for name, index in columns:
+                text = row[index]
+                try:
+                    value = float(text.replace(",", ".") if decimal_comma else text)
+                except ValueError:
+                    value = None
+                # float() would take 1_000 for a thousand
+                if name in may_be_empty and text.strip().lower() in ("", "nan"):
+                    value = math.nan
+                elif value is None or "_" in text:
+                    shown = f"{text.strip()[:40]!r} is not a number" if text.strip() else "empty cell"
+                    raise UserError(f"{_where(path, table.line_num)}, column {name}: {shown}")
+                elif not math.isfinite(value):
+                    raise UserError(f"{_where(path, table.line_num)}, column {name}: {text.strip()} is not finite")
+                cells.append(value)
+            if increasing:
+                time = cells[-len(columns)]
+                if time <= previous:
+                    complaint = "is the time of the row before again" if time == previous else "runs backwards"
+                    raise UserError(
+                        f"{_where(path, table.line_num)}, column time: {row[columns[0][1]].strip()} {complaint}"
+                        f" (after {previous!r}); time must increase from row to row"
+                    )
+                previous = time
+            if count % REPORT_ROWS == 0:
+                progress(bytes_read)
+            bytes_read += sum(map(len, row)) + width
+    return np.array(cells).reshape(-1, len(columns))
+
+
+def _undecodable_line(path: Path) -> int:
+    with open(path, "rb") as file:
+        for number, line in enumerate(file, start=1):
+            try:
+                line.decode("utf-8-sig" if number == 1 else "utf-8")
+            except UnicodeDecodeError:
+                return number
+    return 1
+
+
+def _where(path: Path, line: int) -> str:
+    return f"{path}, row {line}"

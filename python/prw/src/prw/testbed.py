@@ -1,0 +1,135 @@
+"""The testbed FMU as an instance for Co-Simulation."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from pathlib import Path
+from typing import Any, Self
+
+import fmu_run
+import numpy as np
+
+from prw.columns import ANGLES, RATES
+from prw.errors import UserError
+from prw.motion import Array, Motion
+
+OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
+#: The angle that each rate belongs to: they move together, see `StateSpace.transfer`.
+ANGLE_OF = dict(zip(RATES, ANGLES))
+
+Value = float | int | bool
+#: What a continuous variable is called in FMI 2.0 and in 3.0.
+REAL = ("Real", "Float64")
+#: Where `make fmu` leaves the FMU, within a checkout.
+BUILT = Path("target/fmu/prw_testbed.fmu")
+_PACKAGE = Path(__file__).parent
+
+
+def default_fmu() -> Path:
+    """The testbed FMU that is used if none is named: that built in the working directory, in the checkout this package
+    belongs to, or the one that was installed with it. Where there is none, the path at which `make fmu` would leave it.
+    """
+    places = (BUILT, *(folder / BUILT for folder in _PACKAGE.parents[3:4]), _PACKAGE / "fmu" / BUILT.name)
+    return next((path for path in places if path.is_file()), BUILT)
+
+
+def existing_fmu(fmu: str | os.PathLike[str] | None) -> Path:
+    """The FMU file `fmu`, or the default one. Raises UserError where there is none."""
+    path = default_fmu() if fmu is None else Path(fmu)
+    if not path.is_file():
+        raise UserError(f"{path}: no such FMU; `make fmu` builds it")
+    return path
+
+
+class Testbed:
+    """The testbed FMU, loaded once for any number of runs. A context manager: leaving it unloads the library and
+    removes the unpacked files.
+
+    Raises UserError where the FMU is missing, is not the testbed, or refuses a call (with what it logged).
+    """
+
+    # pytest takes a class for tests by its name.
+    __test__ = False
+
+    def __init__(self, fmu: Path | None = None):
+        """Unpack and load the FMU file `fmu` (default: see `default_fmu`)."""
+        fmu = existing_fmu(fmu)
+        try:
+            self.loaded = fmu_run.Fmu(fmu)
+        except fmu_run.FmuError as error:
+            raise UserError(f"{fmu}: cannot be loaded ({str(error).removeprefix(f'{fmu}: ')})") from None
+        missing = [name for name in (*ANGLES, "use_omega", *OUTPUTS) if name not in self.loaded.variables]
+        if missing:
+            self.close()
+            raise UserError(f"{fmu}: not the testbed FMU for Co-Simulation (it lacks {', '.join(missing)})")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Unload the library and remove the unpacked files. Harmless when called again."""
+        self.loaded.close()
+
+    @property
+    def starts(self) -> dict[str, float]:
+        """The start values of the Real parameters in SI, by name."""
+        parameters = (v for v in self.loaded.variables.values() if v.causality == "parameter" and v.type in REAL)
+        return {v.name: float(v.start or 0) for v in parameters}
+
+    def with_starts(self, parameters: Mapping[str, Value]) -> dict[str, Value]:
+        """The value of every numeric parameter, in the FMU's units: `parameters`, and the start values of the others.
+        Raises UserError for a name that is no parameter, or a value that is no number."""
+        known = {
+            v.name: _value(v.type, v.start or "0")
+            for v in self.loaded.variables.values()
+            if v.causality == "parameter" and v.type != "String" and v.name != "use_omega"
+        }
+        for name, value in parameters.items():
+            if name not in known:
+                raise UserError(f"parameters: {name} is not known; there are {', '.join(known)}")
+            if not isinstance(value, (Real, np.bool_)):
+                raise UserError(f"parameters: {name} is {value!r}, not a number; prw.sweep takes many values")
+        return {**known, **parameters}
+
+    def respond(
+        self, motion: Motion, outputs: Sequence[str] = OUTPUTS, start: Mapping[str, float] = {}
+    ) -> dict[str, Array]:
+        """Response to `motion` from rest at its first angles, or from the start values `start` (parameters by name, in
+        the FMU's units); each sample is one communication point.
+
+        Returns `outputs` (any Real variables) by name, each (n,), in the FMU's units (N.m, rad, rad/s). Sample k is
+        read at time[k] with the motors' angles (and rates, where the motion has them) of sample k set, so a row
+        belongs together.
+        """
+        try:
+            runs = self.loaded.run(motion.time, outputs=outputs, **driven_by(motion, start))
+        except ValueError as error:
+            raise UserError(str(error)) from None
+        if runs.errors:
+            raise UserError(stopped(runs.errors[0]))
+        return {name: course[0] for name, course in runs.items()}
+
+
+def stopped(why: str) -> str:
+    """What is told of a run that the FMU has refused."""
+    return f"the FMU stopped {why}" if why.startswith("at ") else f"the FMU stopped: {why}"
+
+
+def driven_by(motion: Motion, start: Mapping[str, Any] = {}) -> dict[str, Any]:
+    """What `fmu_run.Fmu.run` is given for motors that follow `motion` from rest at its first angles, or from `start`."""
+    inputs = dict(zip(ANGLES, motion.theta.T))
+    if motion.omega is not None:
+        inputs.update(zip(RATES, motion.omega.T))
+    return {"inputs": inputs, "start": {"use_omega": motion.omega is not None, **start}}
+
+
+def _value(kind: str, text: str) -> Value:
+    """A start value as the model description writes it."""
+    if kind == "Boolean":
+        return text in ("true", "1")
+    return float(text) if kind in REAL else int(text)

@@ -1,0 +1,92 @@
+"""The closed loop as the documentation says it: its programs run as printed."""
+
+from __future__ import annotations
+
+import html
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from unittest.mock import Mock, call, patch
+
+import pytest
+from built import ROOT
+
+from tools.documentation.pages import CONTROLLER, TESTBED
+from tools.documentation.sources import read_description
+from tools.figures import ICON, ICON_SVG
+
+
+@pytest.mark.parametrize("master, package", [("fmpy", "fmpy"), ("libcosim", "libcosimpy")])
+def test_the_programs(closed_loop, tmp_path, master, package):
+    pytest.importorskip(package)
+    page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
+    (program,) = re.findall(rf'<pre data-run="closed_loop_in_{master}"><code>(.*?)</code></pre>', page, flags=re.S)
+    shutil.copy(closed_loop.ssp, tmp_path)
+    shutil.copytree(closed_loop.osp, tmp_path / closed_loop.osp.name)
+    run = subprocess.run(
+        [sys.executable, "-c", html.unescape(program)], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
+    assert run.returncode == 0, run.stderr
+    pitch, roll = map(float, run.stdout.splitlines()[-1].split())
+    assert pitch == pytest.approx(30, abs=0.1) and roll == pytest.approx(60, abs=0.1)
+
+
+def test_the_script_for_omsimulator(closed_loop):
+    """Where it is not installed, a stand-in writes down what the script asks of it: what the SSP says."""
+    page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
+    (script,) = re.findall(r'<pre data-wires="oms"><code>(.*?)</code></pre>', page, flags=re.S)
+    library = Mock(CRef=lambda system, *names: ".".join(names))
+    with patch.dict(sys.modules, {"OMSimulator": library}):
+        exec(html.unescape(script), {})
+    loop, wrist = library.SSP(), library.SSP().instantiate()
+    files = {f"resources/{fmu}": call(fmu, new_name=f"resources/{fmu}") for fmu in closed_loop.fmus.values()}
+    assert sorted(loop.addResource.mock_calls) == sorted(files.values())
+    assert dict(added.args for added in loop.addComponent.mock_calls) == {
+        component: f"resources/{fmu}" for component, fmu in closed_loop.fmus.items()
+    }
+    assert sorted(wire.args for wire in loop.addConnection.mock_calls) == sorted(closed_loop.connections)
+    values = {**closed_loop.start, **dict(closed_loop.inputs.values())}
+    assert dict(value.args for value in wrist.setValue.mock_calls) == pytest.approx(values)
+    wrist.setFixedStepSize.assert_called_once_with(closed_loop.step)
+
+
+def test_the_page_and_the_icons_travel_in_the_controller(controller_fmu):
+    with zipfile.ZipFile(controller_fmu) as archive:
+        assert archive.read("documentation/index.html") == (ROOT / CONTROLLER.path).read_bytes()
+        for icon in (ICON, ICON_SVG):
+            assert archive.read(icon.as_posix()) == (ROOT / CONTROLLER.content / icon).read_bytes()
+
+
+def test_the_model_for_openmodelica_has_the_wires_of_the_ssp(closed_loop):
+    """Nothing here can read Modelica; the names and values at least are those of what is run elsewhere."""
+    model = (ROOT / "examples/openmodelica/ClosedLoop.mo").read_text(encoding="utf-8")
+    wires = re.findall(r"^  connect\(([\w.]+), ([\w.]+)\);$", model, flags=re.M)
+    # Not connected, but sampled: without `pre` it is an algebraic loop to omc.
+    (sampled,) = re.findall(
+        r"^  when sample\(0, controller\.sample_time\) then\n    y = \{(.*?)\};\n  end when;$", model, flags=re.M
+    )
+    (inputs,) = re.findall(r"^  \{(.*?)\} = y;$", model, flags=re.M)
+    outputs = [re.fullmatch(r"pre\((testbed\.\w+)\)", value)[1] for value in sampled.split(", ")]
+    assert f"  discrete Real y[{len(outputs)}] " in model
+    wires += zip(outputs, inputs.split(", "), strict=True)
+    assert sorted(wires) == sorted(tuple(wire) for wire in closed_loop.connections)
+    for name, (end, value) in closed_loop.inputs.items():
+        assert f"  parameter Real {name} = {value} " in model and f"  {end} = {name};" in model
+    for component, page in (("testbed", TESTBED), ("controller", CONTROLLER)):
+        known = {variable.name for variable in read_description(ROOT / page.description).modelVariables}
+        assert set(re.findall(rf"\b{component}\.(\w+)", model)) <= known
+
+
+def test_the_script_for_openmodelica_gives_each_fmu_a_folder(closed_loop):
+    """In one folder the second FMU's modelDescription.xml replaces the first one's; a relative one ends omc."""
+    script = (ROOT / "examples/openmodelica/closed_loop.mos").read_text(encoding="utf-8")
+    model = (ROOT / "examples/openmodelica/ClosedLoop.mo").read_text(encoding="utf-8")
+    imports = dict(
+        re.findall(r'importFMU\("../../target/fmu/([\w.]+)", workdir = cd\(\) \+ "/(\w+)", fullPath = true\)', script)
+    )
+    assert imports == {fmu: component for component, fmu in closed_loop.fmus.items()}
+    for component, fmu in closed_loop.fmus.items():
+        assert script.index(f'mkdir("{component}")') < script.index(f'cd() + "/{component}"')
+        assert f"  {fmu.removesuffix('.fmu')}_me_FMU {component};" in model

@@ -1,0 +1,62 @@
+"""Fixtures that several folders of tests share: the packed FMUs. pyproject.toml says where tests find modules."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import fmpy
+import pytest
+from built import built
+
+
+@pytest.fixture(scope="session")
+def fmu() -> Path:
+    """The testbed for FMI 2.0."""
+    return built("prw_testbed.fmu", "fmu")
+
+
+@pytest.fixture(scope="session", params=["", "fmi3/"], ids=["fmi2", "fmi3"])
+def version(request: pytest.FixtureRequest) -> str:
+    """The folder of the FMUs for FMI 2.0, and that of those for FMI 3.0."""
+    return str(request.param)
+
+
+@pytest.fixture(scope="session")
+def testbed(version: str) -> Path:
+    """The testbed for FMI 2.0 and for FMI 3.0."""
+    return built(f"{version}prw_testbed.fmu", "fmu")
+
+
+@pytest.fixture(scope="session")
+def controller(version: str) -> Path:
+    """The controller for FMI 2.0 and for FMI 3.0."""
+    return built(f"{version}prw_controller.fmu")
+
+
+@pytest.fixture(scope="session")
+def unpack() -> Iterator[Callable[[Path], str]]:
+    """Unpacks an FMU into a folder that is removed in the end."""
+    folders: list[str] = []
+
+    def unpack(fmu: Path) -> str:
+        folders.append(str(fmpy.extract(str(fmu))))
+        return folders[-1]
+
+    yield unpack
+    for folder in folders:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture
+def prw(tmp_path: Path, fmu: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Runs `prw` with arguments in a folder of its own."""
+
+    def run(*arguments: object, with_fmu: bool = True) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "prw", *map(str, arguments), *(["--fmu", str(fmu)] if with_fmu else [])]
+        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=300)
+
+    return run

@@ -1,0 +1,100 @@
+"""An instance of the testbed FMU with variables by name, through FMPy's FMI 2.0 calls."""
+
+from __future__ import annotations
+
+import numpy as np
+from fmpy import calloc, free
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+from lagrange import OUTPUTS
+
+
+class Instance:
+    """A Co-Simulation instance. `messages` holds what it logged as (status, category, text)."""
+
+    def __init__(self, unpacked, description, name: str = "testbed"):
+        self.variables = {v.name: v for v in description.modelVariables}
+        self.messages = []
+        callbacks = fmi2CallbackFunctions()
+        callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
+        callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+        callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        self.fmi = FMU2Slave(
+            guid=description.guid,
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            unzipDirectory=unpacked,
+            instanceName=name,
+        )
+        self.fmi.instantiate(callbacks=callbacks, loggingOn=True)
+        self._references = {}
+
+    def free(self) -> None:
+        """Free the instance and unload the library."""
+        self.fmi.freeInstance()
+
+    def complaints(self) -> list:
+        """What it logged other than the course of events."""
+        return [message for message in self.messages if message[0] > 0 or message[1] != "logEvents"]
+
+    def set(self, **values) -> None:
+        """Set variables by name, each with the setter of its type."""
+        for name, value in values.items():
+            variable = self.variables[name]
+            setter = {"Real": self.fmi.setReal, "Integer": self.fmi.setInteger, "Boolean": self.fmi.setBoolean}
+            setter[variable.type]([variable.valueReference], [value])
+
+    def get(self, *names) -> np.ndarray:
+        """Values of Real variables by name."""
+        return np.array(self.fmi.getReal([self.variables[name].valueReference for name in names]))
+
+    def start(self, theta=(0.0, 0.0), rate=None, time=0.0, **parameters) -> None:
+        """Initialize at rest at the motor angles theta (2,) rad; with `rate` (2,) rad/s use_omega is on.
+
+        `parameters` are set by name before initialization.
+        """
+        self.fmi.setupExperiment(startTime=time)
+        self.set(use_omega=rate is not None, **parameters)
+        self.fmi.enterInitializationMode()
+        self.set(theta1=theta[0], theta2=theta[1])
+        if rate is not None:
+            self.set(omega1=rate[0], omega2=rate[1])
+        self.fmi.exitInitializationMode()
+
+    def step(self, t: float, h: float) -> None:
+        """fmi2DoStep from t over h."""
+        self.fmi.doStep(currentCommunicationPoint=t, communicationStepSize=h)
+
+    def run(self, t, theta, rate=None, derivative=None):
+        """Step through the times t (n,) with theta (n, 2) set at each; rate (n, 2) sets omega, derivative (n, 2) the
+        input derivatives. Call start() first. Returns (at, after) as the oracle's follow() does."""
+        angles = [self.variables[name].valueReference for name in ("theta1", "theta2")]
+        rates = [self.variables[name].valueReference for name in ("omega1", "omega2")]
+        t = [float(s) for s in t]
+        at, after = [], []
+        for k, s in enumerate(t):
+            self.fmi.setReal(angles, theta[k])
+            if rate is not None:
+                self.fmi.setReal(rates, rate[k])
+            if derivative is not None:
+                self.fmi.setRealInputDerivatives(angles, [1, 1], derivative[k])
+            at.append(self.get(*OUTPUTS))
+            if k < len(t) - 1:
+                self.step(s, t[k + 1] - s)
+                after.append(self.get(*OUTPUTS))
+        return dict(zip(OUTPUTS, np.array(at).T)), dict(zip(OUTPUTS, np.array(after).T))
+
+    def _log(self, _environment, _instance, status, category, message) -> None:
+        self.messages.append((status, (category or b"").decode(), (message or b"").decode()))
+
+
+def assert_close(found, expected, tolerance: float) -> None:
+    """Every output within `tolerance` of the expected one, relative to the largest value that one takes."""
+    for name in OUTPUTS:
+        scale = max(np.max(np.abs(expected[name])), 1e-300)
+        error = np.max(np.abs(found[name] - expected[name])) / scale
+        assert error <= tolerance, f"{name}: off by {error:.2e} of its largest value {scale:.3g}"
