@@ -93,8 +93,8 @@ def test_refused_runs_leave_the_others_alone(fmu):
         ({"modelDescription.xml": "<a"}, "is no XML"),
         ({"modelDescription.xml": '<fmiModelDescription fmiVersion="1.0"/>'}, 'its fmiVersion is "1.0"'),
         (
-            {"modelDescription.xml": '<fmiModelDescription fmiVersion="2.0"><ModelExchange/></fmiModelDescription>'},
-            "no Co-Simulation",
+            {"modelDescription.xml": '<fmiModelDescription fmiVersion="2.0"/>'},
+            "neither Co-Simulation nor Model Exchange",
         ),
         ({"../outside": "x"}, "cannot be unpacked|no readable modelDescription.xml"),
         ("text", "is no FMU, which is a zip file"),
@@ -256,3 +256,17 @@ def test_progress(testbed):
             fmu.run(time, start=start, outputs=["roll"], measures=["peak"], progress=stop)
         # It can go on.
         assert fmu.run(TIME, outputs=["roll"]).count == 1
+
+
+def test_runs_need_co_simulation(tmp_path, unruly):
+    path = tmp_path / "model_exchange.fmu"
+    with zipfile.ZipFile(unruly) as old, zipfile.ZipFile(path, "w") as new:
+        for entry in old.infolist():
+            content = old.read(entry)
+            if entry.filename == "modelDescription.xml":
+                content = content.replace(b"CoSimulation", b"ModelExchange")
+            new.writestr(entry, content)
+    with fmu_run.Fmu(path) as fmu:
+        for call in (lambda: fmu.run([0.0, 1.0], outputs=["y"]), fmu.instances):
+            with pytest.raises(fmu_run.FmuError, match="no Co-Simulation, only Model Exchange, which needs a solver"):
+                call()

@@ -57,6 +57,10 @@ pub struct Description {
     pub co_simulation: Option<Offer>,
     /// What it offers in Model Exchange, if it has that.
     pub model_exchange: Option<Offer>,
+    /// The number of continuous states.
+    pub states: usize,
+    /// The number of event indicators.
+    pub event_indicators: usize,
     /// In the order of the model description.
     pub variables: Vec<Variable>,
     /// The units by their names, each with the exponents of SI's base units, factor and offset as they are written.
@@ -83,6 +87,9 @@ impl Description {
         };
         let offer = |name: &str| child(root, name).map(|node| offer(standard, node)).transpose();
         let (co_simulation, model_exchange) = (offer("CoSimulation")?, offer("ModelExchange")?);
+        if co_simulation.is_none() && model_exchange.is_none() {
+            return Err("it has neither Co-Simulation nor Model Exchange".to_owned());
+        }
         let (token, variables) = match standard {
             Standard::Fmi2 => ("guid", variables_of_fmi2(root)),
             Standard::Fmi3 => ("instantiationToken", variables_of_fmi3(root)),
@@ -94,6 +101,8 @@ impl Description {
             token: needed(root, token)?,
             co_simulation,
             model_exchange,
+            states: states(root),
+            event_indicators: event_indicators(root)?,
             places: variables.iter().enumerate().map(|(place, of)| (of.name.clone(), place)).collect(),
             variables,
             units: elements(root, "UnitDefinitions").map(unit).collect(),
@@ -129,6 +138,27 @@ fn offer(standard: Standard, node: Node) -> Result<Offer, String> {
         needs_execution_tool: is_true("needsExecutionTool"),
         input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
     })
+}
+
+/// A derivative for each (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
+fn states(root: Node) -> usize {
+    let of_fmi3 =
+        elements(root, "ModelStructure").filter(|node| node.has_tag_name("ContinuousStateDerivative"));
+    let structure = child(root, "ModelStructure");
+    let of_fmi2 = structure.map_or(0, |structure| elements(structure, "Derivatives").count());
+    of_fmi2 + of_fmi3.count()
+}
+
+/// A number in FMI 2.0, in FMI 3.0 they are variables.
+fn event_indicators(root: Node) -> Result<usize, String> {
+    let of_fmi3 = elements(root, "ModelStructure").filter(|node| node.has_tag_name("EventIndicator"));
+    let of_fmi2 = match root.attribute("numberOfEventIndicators") {
+        Some(text) => text.parse().map_err(|_| {
+            format!("modelDescription.xml: numberOfEventIndicators is {text:?}, which is no number")
+        })?,
+        None => 0,
+    };
+    Ok(of_fmi2 + of_fmi3.count())
 }
 
 fn attributes(node: Node) -> Vec<(String, String)> {

@@ -4,7 +4,7 @@ use crate::description::{Description, Offer};
 use crate::error::Error;
 use crate::library::Library;
 use crate::machine;
-use fmi_abi::Standard;
+use fmi_abi::{Interface, Standard};
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::error::Error as _;
 use std::ffi::{CString, OsStr};
@@ -13,14 +13,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
 
-/// An FMU for Co-Simulation, unpacked and loaded once, for any number of runs.
+/// An FMU, unpacked and loaded once, for any number of runs and instances. Instances keep it loaded.
 #[derive(Debug)]
 pub struct Fmu {
     description: Description,
-    // Unloaded before its folder goes.
-    pub(crate) library: Arc<Library>,
-    pub(crate) resources: CString,
-    _folder: TempDir,
+    co_simulation: Option<Arc<Library>>,
+    /// Or why it cannot be loaded, where it has Co-Simulation, too.
+    model_exchange: Result<Option<Arc<Library>>, String>,
 }
 
 impl Fmu {
@@ -30,7 +29,7 @@ impl Fmu {
     /// The library's functions have the types of the standard, and what it does when it is loaded and called is sound.
     ///
     /// # Errors
-    /// [`Error::Fmu`], when the file is no FMU for Co-Simulation, has no library for this platform, or needs another
+    /// [`Error::Fmu`], when the file is no FMU, has no library for this platform, or needs another
     /// program.
     pub unsafe fn open(path: &Path) -> Result<Self, Error> {
         // SAFETY: the caller's promise.
@@ -59,38 +58,73 @@ impl Fmu {
         let text = std::fs::read_to_string(&file)
             .map_err(|_| fail("there is no readable modelDescription.xml in it; it is no FMU".to_owned()))?;
         let description = Description::parse(&text).map_err(fail)?;
-        let offer = description.co_simulation.as_ref().ok_or_else(|| {
-            fail("it has no Co-Simulation, only Model Exchange, which needs a solver".to_owned())
-        })?;
-        if offer.needs_execution_tool && !execution_tool {
-            let why = "it starts another program, which must be installed (needsExecutionTool); to run it all the same, \
-                open it with execution_tool=True, in Rust with open_with_execution_tool";
-            return Err(fail(why.to_owned()));
-        }
-        let file = library_of(folder.path(), description.standard, offer).map_err(fail)?;
+        let folder = Arc::new(folder);
         // SAFETY: the caller's promise.
-        let loaded = unsafe { Library::load(&file, description.standard) };
-        let library = loaded.map_err(|error| {
-            // The loader's error says which call failed, its source why.
-            let why = machine::mismatch(&file).unwrap_or_else(|| match error.source() {
-                Some(source) => format!("{error}: {source}"),
-                None => error.to_string(),
-            });
-            fail(format!("its library cannot be loaded: {why}"))
-        })?;
-        let resources = folder.path().join("resources");
-        Ok(Self {
-            resources: location(&resources, description.standard),
-            description,
-            library: library.into(),
-            _folder: folder,
-        })
+        let load = |offer: &Offer| unsafe { load(&folder, description.standard, offer, execution_tool) };
+        let co_simulation = description.co_simulation.as_ref().map(load).transpose().map_err(fail)?;
+        let same = |offer: &&Offer| {
+            description.co_simulation.as_ref().is_some_and(|own| own.identifier == offer.identifier)
+        };
+        let mut model_exchange = match &description.model_exchange {
+            Some(offer) if same(&offer) => Ok(co_simulation.clone()),
+            Some(offer) => load(offer).map(Some),
+            None => Ok(None),
+        };
+        if co_simulation.is_none() {
+            model_exchange = Ok(model_exchange.map_err(fail)?);
+        }
+        Ok(Self { description, co_simulation, model_exchange })
+    }
+
+    /// The library for this type of interface.
+    pub(crate) fn library(&self, interface: Interface) -> Result<&Arc<Library>, Error> {
+        let name = &self.description.model_name;
+        match interface {
+            Interface::CoSimulation => self.co_simulation.as_ref().ok_or_else(|| {
+                Error::Fmu(format!("{name} has no Co-Simulation, only Model Exchange, which needs a solver"))
+            }),
+            Interface::ModelExchange => match &self.model_exchange {
+                Ok(library) => {
+                    library.as_ref().ok_or_else(|| Error::Fmu(format!("{name} has no Model Exchange")))
+                }
+                Err(why) => Err(Error::Fmu(format!("{name}: {why}"))),
+            },
+        }
     }
 
     /// What the model description says.
     pub fn description(&self) -> &Description {
         &self.description
     }
+}
+
+/// The library for a type of interface.
+///
+/// # Safety
+/// As of [`Fmu::open`].
+unsafe fn load(
+    folder: &Arc<TempDir>,
+    standard: Standard,
+    offer: &Offer,
+    execution_tool: bool,
+) -> Result<Arc<Library>, String> {
+    if offer.needs_execution_tool && !execution_tool {
+        let why = "it starts another program, which must be installed (needsExecutionTool); to run it all the same, \
+            open it with execution_tool=True, in Rust with open_with_execution_tool";
+        return Err(why.to_owned());
+    }
+    let file = library_of(folder.path(), standard, offer)?;
+    let resources = location(&folder.path().join("resources"), standard);
+    // SAFETY: the caller's promise.
+    let loaded = unsafe { Library::load(&file, standard, resources, Arc::clone(folder)) };
+    loaded.map(Arc::new).map_err(|error| {
+        // The loader's error says which call failed, its source why.
+        let why = machine::mismatch(&file).unwrap_or_else(|| match error.source() {
+            Some(source) => format!("{error}: {source}"),
+            None => error.to_string(),
+        });
+        format!("its library cannot be loaded: {why}")
+    })
 }
 
 fn unpacked(path: &Path) -> Result<TempDir, String> {

@@ -145,7 +145,42 @@ pub struct Instance {
     /// The structure must live as long as the instance (section 2.1.5 of FMI 2.0).
     _callbacks: Rc<fmi2CallbackFunctions>,
     library: Arc<Library>,
+    /// The states that it has saved; NULL where there is room for another.
+    saved: Vec<*mut c_void>,
 }
+
+/// The place of a state that an instance has saved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Saved(usize);
+
+/// What an event did (section 3.2.2 of FMI 2.0, 2.3.5 of FMI 3.0).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Event {
+    /// The FMU wants to end the simulation.
+    pub terminate: bool,
+    /// The nominal values of the states have changed.
+    pub nominals_changed: bool,
+    /// The states have changed.
+    pub states_changed: bool,
+    /// When the next event is due, s.
+    pub next: Option<f64>,
+}
+
+/// What an instance for Model Exchange can be asked for, one value for each state or event indicator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Continuous {
+    /// The states.
+    States,
+    /// Their derivatives.
+    Derivatives,
+    /// The event indicators.
+    EventIndicators,
+    /// The nominal values of the states.
+    Nominals,
+}
+
+/// Rounds of an event that are waited for.
+const MOST_ROUNDS: usize = 10_000;
 
 // SAFETY: an instance may be used from any one thread at a time (masters have thread pools).
 unsafe impl Send for Instance {}
@@ -154,6 +189,9 @@ impl Drop for Instance {
     fn drop(&mut self) {
         if self.handle.is_null() {
             return;
+        }
+        for place in 0..self.saved.len() {
+            _ = self.forget(Saved(place));
         }
         // SAFETY: made by the library and freed only here.
         unsafe {
@@ -238,13 +276,14 @@ macro_rules! get {
 }
 
 impl Instance {
-    /// A new instance for Co-Simulation, or what was logged instead.
-    pub(crate) fn new(fmu: &Fmu, name: &CStr, logging_on: bool) -> Result<Self, Vec<Message>> {
+    /// A new instance of an FMU that has this type of interface, or what was logged instead.
+    pub(crate) fn new(fmu: &Fmu, interface: Interface, logging_on: bool) -> Result<Self, Vec<Message>> {
+        let Ok(library) = fmu.library(interface) else { return Err(Vec::new()) };
         let log = Arc::<Log>::default();
         let environment = Arc::as_ptr(&log).cast_mut().cast();
         let token = CString::new(fmu.description().token.as_str()).unwrap_or_default();
-        let (name, token, resources) = (name.as_ptr(), token.as_ptr(), fmu.resources.as_ptr());
-        let library = Arc::clone(&fmu.library);
+        let (name, token, resources) = (c"instance".as_ptr(), token.as_ptr(), library.resources.as_ptr());
+        let library = Arc::clone(library);
 
         let callbacks = Rc::new(fmi2CallbackFunctions {
             // SAFETY: see `log_of_fmi2`.
@@ -259,12 +298,22 @@ impl Instance {
             match &library.functions {
                 Functions::Fmi2(functions) => (functions.fmi2Instantiate)(
                     name,
-                    Interface::CoSimulation as fmi2Type,
+                    interface as fmi2Type,
                     token,
                     resources,
                     Rc::as_ptr(&callbacks),
                     fmi2False,
                     logging_on.into(),
+                ),
+                Functions::Fmi3(functions) if interface == Interface::ModelExchange => (functions
+                    .fmi3InstantiateModelExchange)(
+                    name,
+                    token,
+                    resources,
+                    fmi3False,
+                    logging_on.into(),
+                    environment,
+                    Some(log_of_fmi3),
                 ),
                 Functions::Fmi3(functions) => (functions.fmi3InstantiateCoSimulation)(
                     name,
@@ -284,7 +333,7 @@ impl Instance {
         };
         match handle.is_null() {
             true => Err(log.take()),
-            false => Ok(Self { handle, log, _callbacks: callbacks, library }),
+            false => Ok(Self { handle, log, _callbacks: callbacks, library, saved: Vec::new() }),
         }
     }
 
@@ -321,12 +370,13 @@ impl Instance {
     }
 
     /// Before the start values are set, in FMI 2.0.
-    pub(crate) fn set_up(&mut self, start_time: f64, stop_time: f64) -> Result<(), Refusal> {
+    pub(crate) fn set_up(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
         match &self.library.functions {
             // It says this when it begins to initialize.
             Functions::Fmi3(_) => Ok(()),
             Functions::Fmi2(_) => {
-                call!(self, fmi2SetupExperiment(fmi2False, 0.0, start_time, fmi2True, stop_time))
+                let stop = stop_time.unwrap_or(start_time);
+                call!(self, fmi2SetupExperiment(fmi2False, 0.0, start_time, stop_time.is_some().into(), stop))
             }
         }
     }
@@ -334,12 +384,13 @@ impl Instance {
     pub(crate) fn enter_initialization_mode(
         &mut self,
         start_time: f64,
-        stop_time: f64,
+        stop_time: Option<f64>,
     ) -> Result<(), Refusal> {
+        let (defined, stop) = (stop_time.is_some().into(), stop_time.unwrap_or(start_time));
         call!(
             self,
             fmi2EnterInitializationMode(),
-            fmi3EnterInitializationMode(fmi3False, 0.0, start_time, fmi3True, stop_time)
+            fmi3EnterInitializationMode(fmi3False, 0.0, start_time, defined, stop)
         )
     }
 
@@ -441,6 +492,166 @@ impl Instance {
         let mut refusal = Refusal::new(function, status, log);
         refusal.0.ended = wanted.then_some(reached);
         refusal
+    }
+
+    /// Saves the state, in a place of its own.
+    pub(crate) fn save(&mut self) -> Result<Saved, Refusal> {
+        let mut state = null_mut();
+        call!(self, fmi2GetFMUstate(&mut state), fmi3GetFMUState(&mut state))?;
+        Ok(self.keep(state))
+    }
+
+    fn keep(&mut self, state: *mut c_void) -> Saved {
+        let free = self.saved.iter().position(|known| known.is_null());
+        let place = free.unwrap_or(self.saved.len());
+        self.saved.resize(self.saved.len().max(place + 1), null_mut());
+        self.saved[place] = state;
+        Saved(place)
+    }
+
+    /// What is saved in a place.
+    fn state(&self, saved: Saved, function: &'static str) -> Result<*mut c_void, Refusal> {
+        let state = self.saved.get(saved.0).copied().filter(|state| !state.is_null());
+        state.ok_or_else(|| Refusal::new(function, Status::Error, Vec::new()))
+    }
+
+    pub(crate) fn restore(&mut self, saved: Saved) -> Result<(), Refusal> {
+        let state = self.state(saved, "restore")?;
+        call!(self, fmi2SetFMUstate(state), fmi3SetFMUState(state))
+    }
+
+    pub(crate) fn forget(&mut self, saved: Saved) -> Result<(), Refusal> {
+        let Ok(mut state) = self.state(saved, "forget") else { return Ok(()) };
+        self.saved[saved.0] = null_mut();
+        call!(self, fmi2FreeFMUstate(&mut state), fmi3FreeFMUState(&mut state))
+    }
+
+    pub(crate) fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Refusal> {
+        let (state, mut size) = (self.state(saved, "serialize")?, 0);
+        call!(
+            self,
+            fmi2SerializedFMUstateSize(state, &mut size),
+            fmi3SerializedFMUStateSize(state, &mut size)
+        )?;
+        let mut bytes = vec![0_u8; size];
+        let to = bytes.as_mut_ptr();
+        call!(self, fmi2SerializeFMUstate(state, to.cast(), size), fmi3SerializeFMUState(state, to, size))?;
+        Ok(bytes)
+    }
+
+    pub(crate) fn deserialize(&mut self, bytes: &[u8]) -> Result<Saved, Refusal> {
+        let (from, size, mut state) = (bytes.as_ptr(), bytes.len(), null_mut());
+        call!(
+            self,
+            fmi2DeSerializeFMUstate(from.cast(), size, &mut state),
+            fmi3DeserializeFMUState(from, size, &mut state)
+        )?;
+        Ok(self.keep(state))
+    }
+
+    /// The derivatives of unknowns in the direction of a seed (section 2.1.9 of FMI 2.0, 2.2.11 of FMI 3.0).
+    pub(crate) fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        result: &mut [f64],
+    ) -> Result<(), Refusal> {
+        assert!(knowns.len() == seed.len() && unknowns.len() == result.len());
+        let (unknown, m) = (unknowns.as_ptr(), unknowns.len());
+        let (known, n) = (knowns.as_ptr(), knowns.len());
+        let (seed, result) = (seed.as_ptr(), result.as_mut_ptr());
+        call!(
+            self,
+            fmi2GetDirectionalDerivative(unknown, m, known, n, seed, result),
+            fmi3GetDirectionalDerivative(unknown, m, known, n, seed, n, result, m)
+        )
+    }
+
+    pub(crate) fn enter_event_mode(&mut self) -> Result<(), Refusal> {
+        call!(self, fmi2EnterEventMode(), fmi3EnterEventMode())
+    }
+
+    pub(crate) fn enter_continuous_time_mode(&mut self) -> Result<(), Refusal> {
+        call!(self, fmi2EnterContinuousTimeMode(), fmi3EnterContinuousTimeMode())
+    }
+
+    /// All rounds of an event, in Event Mode.
+    pub(crate) fn event(&mut self) -> Result<Event, Refusal> {
+        let mut all = Event::default();
+        for _ in 0..MOST_ROUNDS {
+            let mut of_fmi2 = fmi2EventInfo::default();
+            let [mut again, mut terminate, mut nominals, mut states, mut is_next] = [fmi3False; 5];
+            let mut next = 0.0;
+            call!(
+                self,
+                fmi2NewDiscreteStates(&mut of_fmi2),
+                fmi3UpdateDiscreteStates(
+                    &mut again,
+                    &mut terminate,
+                    &mut nominals,
+                    &mut states,
+                    &mut is_next,
+                    &mut next
+                )
+            )?;
+            if self.is_of_fmi2() {
+                let truth = |value: fmi2Boolean| fmi3Boolean::from(value != fmi2False);
+                again = truth(of_fmi2.new_discrete_states_needed);
+                terminate = truth(of_fmi2.terminate_simulation);
+                nominals = truth(of_fmi2.nominals_of_continuous_states_changed);
+                states = truth(of_fmi2.values_of_continuous_states_changed);
+                is_next = truth(of_fmi2.next_event_time_defined);
+                next = of_fmi2.next_event_time;
+            }
+            all.terminate |= terminate != fmi3False;
+            all.nominals_changed |= nominals != fmi3False;
+            all.states_changed |= states != fmi3False;
+            all.next = (is_next != fmi3False).then_some(next);
+            if again == fmi3False || all.terminate {
+                return Ok(all);
+            }
+        }
+        let text = format!("the event does not come to an end in {MOST_ROUNDS} rounds");
+        let message = Message { status: Status::Error, category: String::new(), text };
+        Err(Refusal::new("event", Status::Error, vec![message]))
+    }
+
+    /// Whether the FMU wants an event, and the end, after a step of the integrator.
+    pub(crate) fn completed_integrator_step(&mut self) -> Result<[bool; 2], Refusal> {
+        let [mut event2, mut end2] = [fmi2False; 2];
+        let [mut event3, mut end3] = [fmi3False; 2];
+        call!(
+            self,
+            fmi2CompletedIntegratorStep(fmi2True, &mut event2, &mut end2),
+            fmi3CompletedIntegratorStep(fmi3True, &mut event3, &mut end3)
+        )?;
+        Ok([event2 != fmi2False || event3 != fmi3False, end2 != fmi2False || end3 != fmi3False])
+    }
+
+    pub(crate) fn set_time(&mut self, time: f64) -> Result<(), Refusal> {
+        call!(self, fmi2SetTime(time), fmi3SetTime(time))
+    }
+
+    pub(crate) fn set_continuous_states(&mut self, x: &[f64]) -> Result<(), Refusal> {
+        let (x, n) = (x.as_ptr(), x.len());
+        call!(self, fmi2SetContinuousStates(x, n), fmi3SetContinuousStates(x, n))
+    }
+
+    pub(crate) fn get_continuous(&mut self, what: Continuous, values: &mut [f64]) -> Result<(), Refusal> {
+        let (x, n) = (values.as_mut_ptr(), values.len());
+        match what {
+            Continuous::States => call!(self, fmi2GetContinuousStates(x, n), fmi3GetContinuousStates(x, n)),
+            Continuous::Derivatives => {
+                call!(self, fmi2GetDerivatives(x, n), fmi3GetContinuousStateDerivatives(x, n))
+            }
+            Continuous::EventIndicators => {
+                call!(self, fmi2GetEventIndicators(x, n), fmi3GetEventIndicators(x, n))
+            }
+            Continuous::Nominals => {
+                call!(self, fmi2GetNominalsOfContinuousStates(x, n), fmi3GetNominalsOfContinuousStates(x, n))
+            }
+        }
     }
 
     pub(crate) fn terminate(&mut self) -> Result<(), Refusal> {

@@ -69,9 +69,15 @@ struct Start {
 struct One {
     /// None after it was lost for good.
     instance: Option<Instance>,
-    time: f64,
     /// Why it dropped out.
     error: Option<String>,
+    own: Own,
+}
+
+/// What is known of an instance.
+#[derive(Debug, Default)]
+struct Own {
+    time: f64,
     event: Event,
     buffer: Vec<f64>,
 }
@@ -92,6 +98,9 @@ impl Fmu {
     /// interface, or makes no instances.
     pub fn instances(self: &Arc<Self>, setup: &Setup) -> Result<Instances, Error> {
         self.library(setup.interface)?;
+        if setup.count == 0 {
+            return request("there must be one instance at least".to_owned());
+        }
         let offer = self.description().offer(setup.interface);
         if setup.count > 1 && offer.is_some_and(|offer| offer.once_per_process) {
             return request(format!(
@@ -105,13 +114,7 @@ impl Fmu {
             time: setup.start_time,
             stop_time: setup.stop_time,
         };
-        let one = || One {
-            instance: None,
-            time: setup.start_time,
-            error: None,
-            event: Event::default(),
-            buffer: Vec::new(),
-        };
+        let one = || One { instance: None, error: None, own: Own::default() };
         let threads = match setup.threads {
             Some(0) => return request("threads must be at least 1".to_owned()),
             Some(threads) => threads,
@@ -128,9 +131,9 @@ impl Fmu {
         };
         instances.start_from(&setup.start, &setup.texts)?;
         instances.reset(None);
-        match instances.all.iter().find_map(|one| one.error.as_ref()) {
-            Some(why) if instances.errors().count() == setup.count => Err(Error::Fmu(why.clone())),
-            _ => Ok(instances),
+        match instances.none_left() {
+            Some(why) => Err(Error::Fmu(why.to_owned())),
+            None => Ok(instances),
         }
     }
 }
@@ -153,7 +156,7 @@ impl Instances {
 
     /// The time of each, s.
     pub fn times(&self) -> impl Iterator<Item = f64> {
-        self.all.iter().map(|one| one.time)
+        self.all.iter().map(|one| one.own.time)
     }
 
     /// Those that have dropped out, and why.
@@ -161,9 +164,15 @@ impl Instances {
         self.all.iter().enumerate().filter_map(|(place, one)| Some((place, one.error.as_deref()?)))
     }
 
+    /// Why there is none left, if all have dropped out.
+    pub fn none_left(&self) -> Option<&str> {
+        let all = self.all.iter().all(|one| one.error.is_some());
+        self.all.first().filter(|_| all).and_then(|one| one.error.as_deref())
+    }
+
     /// What the last event of each did.
     pub fn events(&self) -> impl Iterator<Item = Event> {
-        self.all.iter().map(|one| one.event)
+        self.all.iter().map(|one| one.own.event)
     }
 
     /// New start values, for the next [`reset`](Self::reset), in place of those of the same variables.
@@ -207,8 +216,7 @@ impl Instances {
         let (fmu, start, interface) = (Arc::clone(&self.fmu), &self.start, self.interface);
         let reset = |place: usize, one: &mut One| {
             one.error = None;
-            one.time = start.time;
-            one.event = Event::default();
+            (one.own.time, one.own.event) = (start.time, Event::default());
             let used = one.instance.take().filter(Instance::is_alive);
             let used = used.and_then(|mut used| used.reset().ok().map(|()| used));
             // Some FMUs cannot be reset. The old instance is gone by now: there may be one at a time only.
@@ -217,7 +225,7 @@ impl Instances {
                 Ok(instance) => {
                     let instance = one.instance.insert(instance);
                     match initialize(instance, start, place, interface) {
-                        Ok(event) => one.event = event,
+                        Ok(event) => one.own.event = event,
                         Err(refusal) => one.error = Some(refusal.to_string()),
                     }
                 }
@@ -237,8 +245,8 @@ impl Instances {
     /// When there are other than so many values.
     pub fn set(&mut self, variables: &Selection, values: &[f64], mask: Mask) {
         let rows = rows(variables.len(), values.len(), self.len());
-        self.alive(mask, |place, one, instance| {
-            variables.set(instance, &mut one.buffer, rows.of(values, place))
+        self.alive(mask, |place, own, instance| {
+            variables.set(instance, &mut own.buffer, rows.of(values, place))
         });
     }
 
@@ -247,25 +255,25 @@ impl Instances {
     /// # Panics
     /// When there is room for another number of values.
     pub fn get(&mut self, variables: &Selection, values: &mut [f64]) {
-        self.fill(variables.len(), values, |one, instance, row| {
-            variables.get(instance, &mut one.buffer, row)
+        self.fill(variables.len(), values, |own, instance, row| {
+            variables.get(instance, &mut own.buffer, row)
         });
     }
 
     /// Steps of Co-Simulation of this size, s.
     pub fn step(&mut self, size: f64, mask: Mask) {
-        self.alive(mask, |_, one, instance| {
-            instance.step(one.time, size)?;
-            one.time += size;
+        self.alive(mask, |_, own, instance| {
+            instance.step(own.time, size)?;
+            own.time += size;
             Ok(())
         });
     }
 
     /// Steps of Co-Simulation to this time, s.
     pub fn step_to(&mut self, time: f64, mask: Mask) {
-        self.alive(mask, |_, one, instance| {
-            instance.step(one.time, time - one.time)?;
-            one.time = time;
+        self.alive(mask, |_, own, instance| {
+            instance.step(own.time, time - own.time)?;
+            own.time = time;
             Ok(())
         });
     }
@@ -282,11 +290,11 @@ impl Instances {
         (get, read): (&Selection, &mut [f64]),
     ) {
         let rows = rows(set.len(), values.len(), self.len());
-        self.fill_by_place(get.len(), read, |place, one, instance, row| {
-            set.set(instance, &mut one.buffer, rows.of(values, place))?;
-            instance.step(one.time, size)?;
-            one.time += size;
-            get.get(instance, &mut one.buffer, row)
+        self.fill_by_place(get.len(), read, |place, own, instance, row| {
+            set.set(instance, &mut own.buffer, rows.of(values, place))?;
+            instance.step(own.time, size)?;
+            own.time += size;
+            get.get(instance, &mut own.buffer, row)
         });
     }
 
@@ -294,8 +302,8 @@ impl Instances {
     pub fn save(&mut self) -> States {
         let mut states = vec![None; self.len()];
         let places = std::sync::Mutex::new(&mut states);
-        self.alive(None, |place, one, instance| {
-            let saved = (instance.save()?, one.time);
+        self.alive(None, |place, own, instance| {
+            let saved = (instance.save()?, own.time);
             places.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[place] = Some(saved);
             Ok(())
         });
@@ -311,7 +319,7 @@ impl Instances {
         let back = |place: usize, one: &mut One| {
             let (Some((saved, time)), Some(instance)) = (states.0[place], &mut one.instance) else { return };
             match instance.restore(saved) {
-                Ok(()) => (one.time, one.error) = (time, None),
+                Ok(()) => (one.own.time, one.error) = (time, None),
                 Err(refusal) => one.error = Some(refusal.to_string()),
             }
         };
@@ -390,9 +398,9 @@ impl Instances {
     /// When there are other than so many values.
     pub fn set_time(&mut self, times: &[f64], mask: Mask) {
         let rows = rows(1, times.len(), self.len());
-        self.alive(mask, |place, one, instance| {
-            one.time = rows.of(times, place)[0];
-            instance.set_time(one.time)
+        self.alive(mask, |place, own, instance| {
+            own.time = rows.of(times, place)[0];
+            instance.set_time(own.time)
         });
     }
 
@@ -429,10 +437,10 @@ impl Instances {
     /// As [`set`](Self::set).
     pub fn handle_events(&mut self, (set, values): (&Selection, &[f64]), mask: Mask) {
         let rows = rows(set.len(), values.len(), self.len());
-        self.alive(mask, |place, one, instance| {
+        self.alive(mask, |place, own, instance| {
             instance.enter_event_mode()?;
-            set.set(instance, &mut one.buffer, rows.of(values, place))?;
-            one.event = instance.event()?;
+            set.set(instance, &mut own.buffer, rows.of(values, place))?;
+            own.event = instance.event()?;
             instance.enter_continuous_time_mode()
         });
     }
@@ -455,10 +463,10 @@ impl Instances {
     fn alive(
         &mut self,
         mask: Mask,
-        body: impl Fn(usize, &mut One, &mut Instance) -> Result<(), Refusal> + Sync,
+        body: impl Fn(usize, &mut Own, &mut Instance) -> Result<(), Refusal> + Sync,
     ) {
         each(self.pool.as_ref(), &mut self.all, mask, |place, one| {
-            one.with(|one, instance| body(place, one, instance));
+            one.with(|own, instance| body(place, own, instance));
         });
     }
 
@@ -466,9 +474,9 @@ impl Instances {
         &mut self,
         length: usize,
         values: &mut [f64],
-        body: impl Fn(&mut One, &mut Instance, &mut [f64]) -> Result<(), Refusal> + Sync,
+        body: impl Fn(&mut Own, &mut Instance, &mut [f64]) -> Result<(), Refusal> + Sync,
     ) {
-        self.fill_by_place(length, values, |_, one, instance, row| body(one, instance, row));
+        self.fill_by_place(length, values, |_, own, instance, row| body(own, instance, row));
     }
 
     /// A row of values of each; not a number of those that have dropped out.
@@ -476,11 +484,11 @@ impl Instances {
         &mut self,
         length: usize,
         values: &mut [f64],
-        body: impl Fn(usize, &mut One, &mut Instance, &mut [f64]) -> Result<(), Refusal> + Sync,
+        body: impl Fn(usize, &mut Own, &mut Instance, &mut [f64]) -> Result<(), Refusal> + Sync,
     ) {
         assert_eq!(values.len(), length * self.all.len(), "a row of {length} values for each instance");
         let body = |place: usize, one: &mut One, row: &mut [f64]| {
-            if !one.with(|one, instance| body(place, one, instance, row)) {
+            if !one.with(|own, instance| body(place, own, instance, row)) {
                 row.fill(f64::NAN);
             }
         };
@@ -506,22 +514,17 @@ impl Instances {
 impl One {
     /// Whether it has not dropped out, and does not by this.
     #[inline]
-    fn with(&mut self, body: impl FnOnce(&mut Self, &mut Instance) -> Result<(), Refusal>) -> bool {
-        if self.error.is_some() {
-            return false;
-        }
-        let Some(mut instance) = self.instance.take() else { return false };
-        let done = body(self, &mut instance);
-        self.instance = Some(instance);
-        if let Err(refusal) = done {
-            self.error = Some(format!("at {} s: {refusal}", self.time));
+    fn with(&mut self, body: impl FnOnce(&mut Own, &mut Instance) -> Result<(), Refusal>) -> bool {
+        let Self { instance: Some(instance), error: error @ None, own } = self else { return false };
+        if let Err(refusal) = body(own, instance) {
+            *error = Some(format!("at {} s: {refusal}", own.time));
             return false;
         }
         true
     }
 }
 
-/// Start values before the initialization, and as the standard has it also in it: those of outputs and states.
+/// From the start values to the first step.
 fn initialize(
     instance: &mut Instance,
     start: &Start,

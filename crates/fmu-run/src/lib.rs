@@ -2,8 +2,8 @@
 //!
 //! ## Inside
 //!
-//! [`Fmu`] is an FMU for Co-Simulation, of FMI 2.0 or 3.0, unpacked and loaded, and runs it as often as a [`Batch`] says, on
-//! all processors. Below it: `description` reads `modelDescription.xml`, `library` loads the functions, `instance` calls
+//! [`Fmu`] is an FMU, of FMI 2.0 or 3.0, unpacked and loaded. It runs as often as a [`Batch`] says, on all processors; or its
+//! [`Instances`] are in your hands. Below it: `description` reads `modelDescription.xml`, `library` loads the functions, `instance` calls
 //! them. `unsafe` is in these two alone, and for the caller where an FMU is [opened](Fmu::open).
 
 mod batch;
@@ -11,11 +11,16 @@ mod description;
 mod error;
 mod fmu;
 mod instance;
+mod instances;
 mod library;
 mod machine;
+mod selection;
 
 pub use batch::{Batch, Course, Measure, Planned, Runs, Size, Start, Watch};
 pub use description::{Description, Offer, Variable};
 pub use error::Error;
 pub use fmi_abi::{BaseType, Interface, Standard};
 pub use fmu::Fmu;
+pub use instance::{Continuous, Event};
+pub use instances::{Instances, Mask, Setup, States};
+pub use selection::Selection;

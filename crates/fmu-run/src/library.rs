@@ -2,14 +2,21 @@
 
 use fmi_abi::Standard;
 use fmi_abi::c_types::{c_char, c_int, c_void};
+use std::ffi::CString;
 use std::path::Path;
 use std::ptr::{null, null_mut};
+use std::sync::Arc;
+use tempfile::TempDir;
 
-/// A loaded library.
+/// A loaded library, with the files of its FMU.
 #[derive(Debug)]
 pub(crate) struct Library {
     pub functions: Functions,
+    /// Where its resources are, as importers write it.
+    pub resources: CString,
     _loaded: libloading::Library,
+    // Removed after the library is unloaded.
+    _folder: Arc<TempDir>,
 }
 
 /// Its functions, of the one standard or the other.
@@ -29,7 +36,12 @@ impl Library {
     ///
     /// # Errors
     /// When it cannot be loaded, or lacks the function that frees instances.
-    pub unsafe fn load(path: &Path, standard: Standard) -> Result<Self, libloading::Error> {
+    pub unsafe fn load(
+        path: &Path,
+        standard: Standard,
+        resources: CString,
+        folder: Arc<TempDir>,
+    ) -> Result<Self, libloading::Error> {
         // SAFETY: the caller's promise, here and below.
         let loaded = unsafe { libloading::Library::new(path) }?;
         // SAFETY: see above.
@@ -45,7 +57,7 @@ impl Library {
                 }
             }
         };
-        Ok(Self { functions, _loaded: loaded })
+        Ok(Self { functions, resources, _loaded: loaded, _folder: folder })
     }
 }
 

@@ -1,8 +1,13 @@
-"""Runs Co-Simulation FMUs at their own speed: one run or a million, on all processors.
+"""Runs FMUs at their own speed: one run or a million, one instance in the hand or thousands.
 
     with fmu_run.Fmu("model.fmu") as fmu:
         runs = fmu.run(time, inputs={"u": u}, start={"k": k_of_each_run}, outputs=["y"])
     runs["y"]  # (runs, times)
+
+    model = fmu.instances(start={"k": 2.0})
+    model.set("u", 1.0)
+    model.step(1e-3)
+    model.get("y")  # (instances,)
 
 Values are in the FMU's units, which `Fmu.variables` tells. FMI 2.0 and 3.0.
 """
@@ -19,9 +24,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fmu_run._native import Fmu as _Loaded
-from fmu_run._native import FmuError
+from fmu_run._native import FmuError, Instances, States
 
-__all__ = ["Fmu", "FmuError", "Measure", "Runs", "Variable"]
+__all__ = ["Fmu", "FmuError", "Instances", "Measure", "Runs", "States", "Variable"]
 
 Measure = Literal["min", "max", "peak", "time_of_peak", "mean", "rms", "end"]
 _Array = NDArray[np.float64]
@@ -116,7 +121,7 @@ class Runs(Mapping[str, _Array]):
 
 
 class Fmu:
-    """An FMU for Co-Simulation, unpacked and loaded once. A context manager: leaving it unloads the FMU.
+    """An FMU, unpacked and loaded once. A context manager: leaving it unloads the FMU, once its instances are gone, too.
 
     Its library runs in this process: where it crashes, the process is gone. Raises FmuError where the file is no FMU, or has
     no library for this platform.
@@ -203,6 +208,40 @@ class Fmu:
         )
         kept_times = times[:: kept or len(times)][: courses.shape[2]]
         return Runs(kept_times, names, courses, wanted, measured, dict(errors), dict(notes))
+
+    def instances(
+        self,
+        count: int = 1,
+        *,
+        interface: Literal["co-simulation", "model-exchange"] = "co-simulation",
+        start: Mapping[str, ArrayLike | str] | None = None,
+        start_time: float = 0.0,
+        stop_time: float | None = None,
+        threads: int | None = None,
+    ) -> Instances:
+        """Make instances, set their start values and initialize them.
+
+        Parameters
+        ----------
+        count
+            How many.
+        interface
+            Who integrates. Those for Model Exchange have been through the events at the begin and are in Continuous-Time Mode.
+        start
+            Start values of parameters, states, inputs and so on by name: one for all, (count,) for each its own, or a text.
+        start_time, stop_time
+            When they begin, s, and when they will end, if that is known.
+        threads
+            Default one for each processor.
+
+        Raises
+        ------
+        ValueError
+            For what does not fit the FMU or itself.
+        FmuError
+            If the FMU has no such interface, or refuses all of them.
+        """
+        return Instances(self._loaded, count, interface, dict(start or {}), start_time, stop_time, threads)
 
 
 def _array(name: str, values: ArrayLike) -> _Array:

@@ -3,11 +3,13 @@
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyFloat;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyFloat, PyTuple};
 
 /// Numbers that are read: those of an array as it lies there, or one.
 pub enum Numbers {
     One(f64),
+    Row(Vec<f64>),
     Array(PyBuffer<f64>),
 }
 
@@ -26,12 +28,16 @@ impl Numbers {
                 PyBuffer::get(&made.call_method1("reshape", (numpy.call_method1("shape", (values,))?,))?)?
             }
         };
-        Ok(if array.dimensions() == 0 { Self::One(array.to_vec(values.py())?[0]) } else { Self::Array(array) })
+        Ok(if array.dimensions() == 0 {
+            Self::One(array.to_vec(values.py())?[0])
+        } else {
+            Self::Array(array)
+        })
     }
 
     pub fn shape(&self) -> &[usize] {
         match self {
-            Self::One(_) => &[],
+            Self::One(_) | Self::Row(_) => &[],
             Self::Array(buffer) => buffer.shape(),
         }
     }
@@ -39,6 +45,7 @@ impl Numbers {
     pub fn values(&self) -> &[f64] {
         match self {
             Self::One(value) => std::slice::from_ref(value),
+            Self::Row(values) => values,
             Self::Array(buffer) => read(buffer),
         }
     }
@@ -69,10 +76,15 @@ impl Room {
         let array = match given {
             Some(array) => array,
             // NumPy asks the kernel for large pages.
-            None => py.import("numpy")?.call_method1("zeros", (shape.to_vec(),))?,
+            None => {
+                static ZEROS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+                ZEROS.import(py, "numpy", "zeros")?.call1((PyTuple::new(py, shape)?,))?
+            }
         };
         let wrong = || {
-            PyValueError::new_err(format!("out must be a writable, contiguous array of float64 of the shape {shape:?}"))
+            PyValueError::new_err(format!(
+                "out must be a writable, contiguous array of float64 of the shape {shape:?}"
+            ))
         };
         let buffer = PyBuffer::<f64>::get(&array).map_err(|_| wrong())?;
         if buffer.readonly() || !buffer.is_c_contiguous() || buffer.shape() != shape {

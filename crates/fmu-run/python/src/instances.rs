@@ -5,7 +5,7 @@ use crate::{FmuError, python};
 use fmu_run::{Continuous, Fmu, Interface, Selection, Setup};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyString};
+use pyo3::types::{PyBytes, PyDict, PyString, PyTuple};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Instances of one FMU, side by side; made by `Fmu.instances`.
@@ -26,6 +26,7 @@ pub struct Instances {
 }
 
 /// The variables that a call names, and whether by one text.
+#[derive(Default)]
 struct Named {
     selection: Selection,
     one: bool,
@@ -162,7 +163,7 @@ impl Instances {
     /// Parameters
     /// ----------
     /// variables : str or sequence of str
-    /// values : number, (n,) for a str; (variables,) or (n, variables) for a sequence
+    /// values : number, (n,) for a str; number, (variables,) or (n, variables) for a sequence
     /// mask : (n,) of bool, optional
     ///     Which instances; all if it is not given.
     #[pyo3(signature = (variables, values, mask=None))]
@@ -174,7 +175,7 @@ impl Instances {
         mask: Given,
     ) -> PyResult<()> {
         let (named, mask) = (self.named(variables)?, self.mask(mask)?);
-        let values = self.fitting(&named, Numbers::of(values)?)?;
+        let values = self.fitting(named.columns(), Numbers::of(values)?)?;
         self.with(py, |all| all.set(&named.selection, values.values(), mask.as_deref()))
     }
 
@@ -184,11 +185,311 @@ impl Instances {
         &self,
         py: Python<'py>,
         variables: &Bound<'py, PyAny>,
-        out: Option<Bound<'py, PyAny>>,
+        out: Given<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let named = self.named(variables)?;
-        let (array, mut room) = self.room(py, &named, out)?;
-        self.with(py, || (), |all| all.get(&named.selection, room.values()))?;
+        self.read(py, named.columns(), out, |all, values| all.get(&named.selection, values))
+    }
+
+    /// A step of Co-Simulation: by `size`, or to the time `to`, s.
+    #[pyo3(signature = (size=None, *, to=None, mask=None))]
+    fn step(&self, py: Python, size: Option<f64>, to: Option<f64>, mask: Given) -> PyResult<()> {
+        let mask = self.mask(mask)?;
+        match (size, to) {
+            (Some(size), None) => self.with(py, |all| all.step(size, mask.as_deref())),
+            (None, Some(to)) => self.with(py, |all| all.step_to(to, mask.as_deref())),
+            _ => Err(PyValueError::new_err("give either the size of the step or the time to step to")),
+        }
+    }
+
+    /// Set variables, step and read others, in one go: `set`, `step` and `get`.
+    #[pyo3(signature = (set, values, size, get, out=None))]
+    fn advance<'py>(
+        &self,
+        py: Python<'py>,
+        set: &Bound<'py, PyAny>,
+        values: &Bound<'py, PyAny>,
+        size: f64,
+        get: &Bound<'py, PyAny>,
+        out: Given<'py>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (set, get) = (self.named(set)?, self.named(get)?);
+        let values = self.fitting(set.columns(), Numbers::of(values)?)?;
+        let (array, mut room) = Room::of(py, out, &self.shape(get.columns()))?;
+        room.apart_from(&values)?;
+        self.with(py, |all| {
+            all.advance((&set.selection, values.values()), size, (&get.selection, room.values()));
+        })?;
         Ok(array)
+    }
+
+    /// Back to the start values, initialized.
+    ///
+    /// Parameters
+    /// ----------
+    /// mask : (n,) of bool, optional
+    ///     Which instances; all if it is not given.
+    /// start : dict, optional
+    ///     New start values by name, in place of those given before: numbers, (n,), or texts.
+    #[pyo3(signature = (mask=None, *, start=None))]
+    fn reset(&self, py: Python, mask: Given, start: Option<Bound<'_, PyDict>>) -> PyResult<()> {
+        let (mask, start) = (self.mask(mask)?, Start::of(start.as_ref())?);
+        lock(&self.held).start_from(&start.numbers(), &start.texts()).map_err(python)?;
+        self.with(py, |all| all.reset(mask.as_deref()))
+    }
+
+    /// Save the state of each, with its time.
+    fn save(&self, py: Python) -> PyResult<States> {
+        let mut states = None;
+        self.with(py, |all| states = Some(all.save()))?;
+        Ok(States { held: Arc::clone(&self.held), states: Mutex::new(states) })
+    }
+
+    /// Go back to states that these instances have saved.
+    #[pyo3(signature = (states, mask=None))]
+    fn restore(&self, py: Python, states: &States, mask: Given) -> PyResult<()> {
+        let (mask, states) = (self.mask(mask)?, self.own(states)?);
+        self.with(py, |all| all.restore(&states, mask.as_deref()))
+    }
+
+    /// Saved states as bytes, for another process: one for each instance, None for those that had dropped out.
+    fn serialize<'py>(&self, py: Python<'py>, states: &States) -> PyResult<Vec<Option<Bound<'py, PyBytes>>>> {
+        let states = self.own(states)?;
+        let mut all = lock(&self.held);
+        let bytes = (0..self.count).map(|place| all.serialize(&states, place));
+        Ok(bytes.map(|bytes| bytes.map(|bytes| PyBytes::new(py, &bytes))).collect())
+    }
+
+    /// States of bytes that `serialize` has made, here or in another process: one for each instance.
+    fn deserialize(&self, states: Vec<Vec<u8>>) -> PyResult<States> {
+        let read = lock(&self.held).deserialize(&states).map_err(python)?;
+        Ok(States { held: Arc::clone(&self.held), states: Mutex::new(Some(read)) })
+    }
+
+    /// The derivatives of unknowns in the direction of a seed.
+    ///
+    /// Parameters
+    /// ----------
+    /// unknowns, knowns : str or sequence of str
+    /// seed : number, (n,) for a str; number, (knowns,) or (n, knowns) for a sequence
+    /// out : array, optional
+    ///
+    /// Returns
+    /// -------
+    /// (n,) for a str, (n, unknowns) for a sequence
+    #[pyo3(signature = (unknowns, knowns, seed, out=None))]
+    fn directional_derivative<'py>(
+        &self,
+        py: Python<'py>,
+        unknowns: &Bound<'py, PyAny>,
+        knowns: &Bound<'py, PyAny>,
+        seed: &Bound<'py, PyAny>,
+        out: Given<'py>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (unknowns, knowns) = (self.named(unknowns)?, self.named(knowns)?);
+        let seed = self.fitting(knowns.columns(), Numbers::of(seed)?)?;
+        let (array, mut room) = Room::of(py, out, &self.shape(unknowns.columns()))?;
+        room.apart_from(&seed)?;
+        let mut told = Ok(());
+        self.with(py, |all| {
+            let seed = (&knowns.selection, seed.values());
+            told = all.directional_derivative(&unknowns.selection, seed, room.values());
+        })?;
+        told.map_err(python)?;
+        Ok(array)
+    }
+
+    /// Model Exchange: the time of each, s: a number or (n,).
+    #[pyo3(signature = (time, mask=None))]
+    fn set_time(&self, py: Python, time: &Bound<'_, PyAny>, mask: Given) -> PyResult<()> {
+        let (mask, time) = (self.mask(mask)?, self.fitting(None, Numbers::of(time)?)?);
+        self.with(py, |all| all.set_time(time.values(), mask.as_deref()))
+    }
+
+    /// Model Exchange: the continuous states, (states,) for all or (n, states).
+    #[pyo3(signature = (states, mask=None))]
+    fn set_continuous_states(&self, py: Python, states: &Bound<'_, PyAny>, mask: Given) -> PyResult<()> {
+        let columns = Some(self.fmu.description().states);
+        let (mask, states) = (self.mask(mask)?, self.fitting(columns, Numbers::of(states)?)?);
+        self.with(py, |all| all.set_continuous_states(states.values(), mask.as_deref()))
+    }
+
+    /// Model Exchange: the continuous states, (n, states).
+    #[pyo3(signature = (out=None))]
+    fn get_continuous_states<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.continuous(py, Continuous::States, out)
+    }
+
+    /// Model Exchange: the derivatives of the continuous states, (n, states).
+    #[pyo3(signature = (out=None))]
+    fn get_derivatives<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.continuous(py, Continuous::Derivatives, out)
+    }
+
+    /// Model Exchange: the nominal values of the continuous states, (n, states).
+    #[pyo3(signature = (out=None))]
+    fn get_nominals<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.continuous(py, Continuous::Nominals, out)
+    }
+
+    /// Model Exchange: the event indicators, (n, indicators).
+    #[pyo3(signature = (out=None))]
+    fn get_event_indicators<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.continuous(py, Continuous::EventIndicators, out)
+    }
+
+    /// Model Exchange: an event with all its rounds, and back to Continuous-Time Mode. What it did is told by
+    /// `next_event_time`, `states_changed` and `wants_to_end`.
+    ///
+    /// Parameters
+    /// ----------
+    /// variables, values : optional
+    ///     What is set in Event Mode before the event, as by `set`: what is discrete can be set only there.
+    /// mask : (n,) of bool, optional
+    ///     Which instances; all if it is not given.
+    #[pyo3(signature = (variables=None, values=None, *, mask=None))]
+    fn handle_events(&self, py: Python, variables: Given, values: Given, mask: Given) -> PyResult<()> {
+        let mask = self.mask(mask)?;
+        let (named, values) = match (&variables, &values) {
+            (Some(variables), Some(values)) => {
+                let named = self.named(variables)?;
+                let values = self.fitting(named.columns(), Numbers::of(values)?)?;
+                (named, Some(values))
+            }
+            (None, None) => (Arc::default(), None),
+            _ => return Err(PyValueError::new_err("give variables and values, or neither")),
+        };
+        let values = values.as_ref().map_or(&[][..], Numbers::values);
+        self.with(py, |all| all.handle_events((&named.selection, values), mask.as_deref()))
+    }
+
+    /// Model Exchange: a step of the integrator is complete.
+    ///
+    /// Returns
+    /// -------
+    /// (n, 2): 1 where an instance wants an event, and where it wants the end, else 0
+    fn completed_integrator_step<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.read(py, Some(2), None, |all, values| all.completed_integrator_step(values))
+    }
+}
+
+impl Instances {
+    /// What the names stand for; those that were given before as the same object are not looked up again.
+    fn named(&self, variables: &Bound<'_, PyAny>) -> PyResult<Arc<Named>> {
+        /// Objects that are remembered.
+        const MOST: usize = 64;
+        let mut known = lock(&self.known);
+        if let Some((_, named)) = known.iter().find(|(object, _)| object.is(variables)) {
+            return Ok(Arc::clone(named));
+        }
+        let text = variables.cast::<PyString>();
+        let names = match text {
+            Ok(name) => vec![name.extract()?],
+            Err(_) => variables.extract::<Vec<String>>()?,
+        };
+        let selection = self.fmu.select(&names).map_err(python)?;
+        let named = Arc::new(Named { selection, one: text.is_ok() });
+        // A list may be another one next time.
+        if text.is_ok() || variables.is_instance_of::<PyTuple>() {
+            known.truncate(MOST - 1);
+            known.insert(0, (variables.clone().unbind(), Arc::clone(&named)));
+        }
+        Ok(named)
+    }
+
+    fn mask(&self, given: Given) -> PyResult<Option<Vec<bool>>> {
+        let Some(given) = given else { return Ok(None) };
+        let mask: Vec<bool> = match given.call_method0("tolist") {
+            Ok(list) => list.extract()?,
+            Err(_) => given.extract()?,
+        };
+        if mask.len() == self.count {
+            return Ok(Some(mask));
+        }
+        let why = format!("the mask has {} truth values for {} instances", mask.len(), self.count);
+        Err(PyValueError::new_err(why))
+    }
+
+    /// The shape of an array with so many columns for each instance, or with none.
+    fn shape(&self, columns: Option<usize>) -> Vec<usize> {
+        std::iter::once(self.count).chain(columns).collect()
+    }
+
+    /// Values that fit: one for all, a row for all, or a row for each.
+    fn fitting(&self, columns: Option<usize>, values: Numbers) -> PyResult<Numbers> {
+        let (whole, length) = (self.shape(columns), columns.unwrap_or(1));
+        match &values {
+            Numbers::One(value) if length != 1 => Ok(Numbers::Row(vec![*value; length])),
+            Numbers::One(_) => Ok(values),
+            _ if values.shape() == whole => Ok(values),
+            _ if columns.is_some() && values.shape() == [length] => Ok(values),
+            _ => {
+                let row = columns.map_or(String::new(), |columns| format!(", [{columns}]"));
+                let why = format!(
+                    "the values have the shape {:?}; it must be {whole:?}{row} or a number",
+                    values.shape()
+                );
+                Err(PyValueError::new_err(why))
+            }
+        }
+    }
+
+    /// The states, if they are of these instances.
+    fn own(&self, states: &States) -> PyResult<fmu_run::States> {
+        let own = Arc::ptr_eq(&self.held, &states.held).then(|| lock(&states.states).clone()).flatten();
+        own.ok_or_else(|| {
+            PyValueError::new_err(
+                "these states are of other instances; serialize them there and deserialize them here",
+            )
+        })
+    }
+
+    /// A call without the GIL; raises if no instance is left.
+    fn with(&self, py: Python, body: impl FnOnce(&mut fmu_run::Instances) + Send) -> PyResult<()> {
+        let left = py.detach(|| {
+            let mut all = lock(&self.held);
+            body(&mut all);
+            all.none_left().map(str::to_owned)
+        });
+        left.map_or(Ok(()), |why| Err(FmuError::new_err(why)))
+    }
+
+    fn read<'py>(
+        &self,
+        py: Python<'py>,
+        columns: Option<usize>,
+        out: Given<'py>,
+        body: impl FnOnce(&mut fmu_run::Instances, &mut [f64]) + Send,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (array, mut room) = Room::of(py, out, &self.shape(columns))?;
+        self.with(py, |all| body(all, room.values()))?;
+        Ok(array)
+    }
+
+    fn continuous<'py>(
+        &self,
+        py: Python<'py>,
+        what: Continuous,
+        out: Given<'py>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let columns = lock(&self.held).continuous(what);
+        self.read(py, Some(columns), out, |all, values| all.get_continuous(what, values))
+    }
+
+    fn of_events<'py>(
+        &self,
+        py: Python<'py>,
+        what: impl Fn(fmu_run::Event) -> f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (array, mut room) = Room::of(py, None, &[self.count])?;
+        room.values().iter_mut().zip(lock(&self.held).events()).for_each(|(to, event)| *to = what(event));
+        Ok(array)
+    }
+}
+
+impl Named {
+    /// The columns of an array; a text stands for none.
+    fn columns(&self) -> Option<usize> {
+        (!self.one).then(|| self.selection.len())
     }
 }

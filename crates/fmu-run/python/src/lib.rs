@@ -1,8 +1,11 @@
 //! The part of the Python package `fmu_run` that is written in Rust: `fmu_run._native`. What users see is in
 //! `fmu_run/__init__.py`.
 
+mod buffers;
+mod instances;
+
+use buffers::{Numbers, Room};
 use fmu_run::{Batch, Course, Error, Fmu, Planned, Start, Watch};
-use numpy::{PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -20,28 +23,12 @@ const LOOK: Duration = Duration::from_millis(100);
 #[pyclass(frozen, name = "Fmu", module = "fmu_run._native")]
 struct Loaded(Mutex<Option<Arc<Fmu>>>);
 
-/// A number that is always the same, a course that all runs share, or one for each run.
-#[derive(FromPyObject)]
-enum Values<'py> {
-    One(f64),
-    Shared(PyReadonlyArray1<'py, f64>),
-    EachRun(PyReadonlyArray2<'py, f64>),
-}
-
-/// A number, a text, or a number for each run.
-#[derive(FromPyObject)]
-enum StartValue<'py> {
-    One(f64),
-    Text(String),
-    EachRun(PyReadonlyArray1<'py, f64>),
-}
-
 /// Name, type, causality, variability, start value, unit, description.
 type Described = (String, String, String, Option<String>, Option<String>, Option<String>, String);
 /// Texts by run.
 type Told = Vec<(usize, String)>;
 /// Courses and measures, (runs, outputs, times or measures) each, errors and notes.
-type Result4<'py> = (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray3<f64>>, Told, Told);
+type Result4<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Told, Told);
 
 fn python(error: Error) -> PyErr {
     match error {
@@ -93,10 +80,10 @@ impl Loaded {
     fn run<'py>(
         &self,
         py: Python<'py>,
-        time: PyReadonlyArray1<'py, f64>,
-        inputs: Vec<(String, Values<'py>)>,
-        input_derivatives: Vec<(String, Values<'py>)>,
-        start: Vec<(String, StartValue<'py>)>,
+        time: Bound<'py, PyAny>,
+        inputs: Vec<(String, Bound<'py, PyAny>)>,
+        input_derivatives: Vec<(String, Bound<'py, PyAny>)>,
+        start: Vec<(String, Bound<'py, PyAny>)>,
         outputs: Vec<String>,
         every: Option<usize>,
         measures: Vec<String>,
@@ -106,11 +93,14 @@ impl Loaded {
     ) -> PyResult<Result4<'py>> {
         let fmu = self.fmu()?;
         let measures = measures.iter().map(|name| name.parse()).collect::<Result<Vec<_>, String>>();
+        let time = Numbers::of(&time)?;
+        let [inputs, input_derivatives] = [numbers(&inputs)?, numbers(&input_derivatives)?];
+        let start = start_values(&start)?;
         let batch = Batch {
-            time: time.as_slice()?,
-            inputs: courses(&inputs)?,
-            input_derivatives: courses(&input_derivatives)?,
-            start: starts(&start)?,
+            time: time.values(),
+            inputs: courses(&inputs),
+            input_derivatives: courses(&input_derivatives),
+            start: starts(&start),
             outputs: outputs.iter().map(String::as_str).collect(),
             every,
             measures: measures.map_err(PyValueError::new_err)?,
@@ -122,17 +112,10 @@ impl Loaded {
         if size.courses().is_none() || size.measures().is_none() {
             return Err(python(Error::too_much()));
         }
-        // NumPy's memory, for which it asks the kernel for large pages.
-        let numpy = py.import("numpy")?;
-        let array = |each: usize| -> PyResult<Bound<'py, PyArray3<f64>>> {
-            Ok(numpy.call_method1("zeros", ((size.runs, size.outputs, each),))?.cast_into()?)
-        };
-        let (courses, measures) = (array(size.kept)?, array(size.measures)?);
-        let [errors, notes] = {
-            let (mut courses, mut measures) = (courses.readwrite(), measures.readwrite());
-            let room = [courses.as_slice_mut()?, measures.as_slice_mut()?];
-            carry_out(py, &planned, room, progress.as_ref())?
-        };
+        let array = |each: usize| Room::of(py, None, &[size.runs, size.outputs, each]);
+        let ((courses, mut kept), (measures, mut measured)) = (array(size.kept)?, array(size.measures)?);
+        let room = [kept.values(), measured.values()];
+        let [errors, notes] = carry_out(py, &planned, room, progress.as_ref())?;
         Ok((courses, measures, errors, notes))
     }
 }
@@ -144,32 +127,48 @@ impl Loaded {
     }
 }
 
-fn courses<'a>(given: &'a [(String, Values)]) -> PyResult<Vec<(&'a str, Course<'a>)>> {
+fn numbers(given: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<(String, Numbers)>> {
+    given.iter().map(|(name, values)| Ok((name.clone(), Numbers::of(values)?))).collect()
+}
+
+/// Numbers that are always the same, courses that all runs share, or one for each run.
+fn courses(given: &[(String, Numbers)]) -> Vec<(&str, Course<'_>)> {
+    let course = given.iter().map(|(name, values)| match values.shape() {
+        [] => (name.as_str(), Course::Constant(values.values()[0])),
+        [_] => (name.as_str(), Course::Shared(values.values())),
+        _ => (name.as_str(), Course::EachRun(values.values())),
+    });
+    course.collect()
+}
+
+/// A text or numbers.
+enum StartValue {
+    Text(String),
+    Numbers(Numbers),
+}
+
+fn start_values(given: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<(String, StartValue)>> {
     given
         .iter()
-        .map(|(name, values)| {
-            let course = match values {
-                Values::One(value) => Course::Constant(*value),
-                Values::Shared(values) => Course::Shared(values.as_slice()?),
-                Values::EachRun(values) => Course::EachRun(values.as_slice()?),
+        .map(|(name, value)| {
+            let value = match value.extract() {
+                Ok(text) => StartValue::Text(text),
+                Err(_) => StartValue::Numbers(Numbers::of(value)?),
             };
-            Ok((name.as_str(), course))
+            Ok((name.clone(), value))
         })
         .collect()
 }
 
-fn starts<'a>(given: &'a [(String, StartValue)]) -> PyResult<Vec<(&'a str, Start<'a>)>> {
-    given
-        .iter()
-        .map(|(name, value)| {
-            let start = match value {
-                StartValue::One(value) => Start::Same(*value),
-                StartValue::Text(text) => Start::Text(text),
-                StartValue::EachRun(values) => Start::EachRun(values.as_slice()?),
-            };
-            Ok((name.as_str(), start))
-        })
-        .collect()
+fn starts(given: &[(String, StartValue)]) -> Vec<(&str, Start<'_>)> {
+    let start = given.iter().map(|(name, value)| match value {
+        StartValue::Text(text) => (name.as_str(), Start::Text(text)),
+        StartValue::Numbers(values) if values.shape().is_empty() => {
+            (name.as_str(), Start::Same(values.values()[0]))
+        }
+        StartValue::Numbers(values) => (name.as_str(), Start::EachRun(values.values())),
+    });
+    start.collect()
 }
 
 /// The runs, in other threads; this one listens to Python.
@@ -212,6 +211,8 @@ fn carry_out(
 /// `fmu_run._native`.
 #[pymodule]
 mod _native {
+    #[pymodule_export]
+    use super::instances::{Instances, States};
     #[pymodule_export]
     use super::{FmuError, Loaded};
 }

@@ -142,7 +142,12 @@ impl Planned<'_> {
     /// How much comes of it.
     pub fn size(&self) -> Size {
         let plan = &self.plan;
-        Size { runs: plan.runs, outputs: plan.outputs, kept: plan.kept(), measures: plan.measures.len() }
+        Size {
+            runs: plan.runs,
+            outputs: plan.outputs.len(),
+            kept: plan.kept(),
+            measures: plan.measures.len(),
+        }
     }
 
     /// Carries out the runs, into memory of the caller, as [`Runs`] has it; returns [`Runs::errors`] and [`Runs::notes`].

@@ -1,10 +1,10 @@
 //! From names to value references: a batch that fits the FMU.
 
 use super::{Batch, Course, Measure, Start};
-use crate::description::Variable;
 use crate::error::Error;
 use crate::fmu::Fmu;
-use fmi_abi::BaseType;
+use crate::selection::{Selection, find, fits, number, request};
+use fmi_abi::{BaseType, Interface};
 use std::ffi::CString;
 
 /// A batch after all checks.
@@ -16,10 +16,7 @@ pub(super) struct Plan<'a> {
     pub derivatives: Inputs<'a>,
     pub start: Vec<(BaseType, u32, Values<'a>)>,
     pub texts: Vec<(u32, CString)>,
-    pub outputs: usize,
-    /// The value references of the outputs that are Real, read by one call, and the place of each among all.
-    pub real_outputs: (Vec<u32>, Vec<usize>),
-    pub other_outputs: Vec<(BaseType, u32, usize)>,
+    pub outputs: Selection,
     pub every: Option<usize>,
     pub measures: &'a [Measure],
     pub threads: usize,
@@ -69,12 +66,9 @@ impl ByTime<'_> {
     }
 }
 
-fn request<T>(message: String) -> Result<T, Error> {
-    Err(Error::Request(message))
-}
-
 impl<'a> Plan<'a> {
     pub fn of(fmu: &Fmu, batch: &'a Batch) -> Result<Self, Error> {
+        fmu.library(Interface::CoSimulation)?;
         let time = checked_time(batch.time)?;
         let runs = runs(batch)?;
         let mut plan = Self {
@@ -85,9 +79,7 @@ impl<'a> Plan<'a> {
             derivatives: Inputs::default(),
             start: Vec::new(),
             texts: Vec::new(),
-            outputs: batch.outputs.len(),
-            real_outputs: Default::default(),
-            other_outputs: Vec::new(),
+            outputs: Selection::default(),
             every: batch.every,
             measures: &batch.measures,
             threads: threads(fmu, batch.threads)?.min(runs.max(1)),
@@ -98,16 +90,7 @@ impl<'a> Plan<'a> {
         }
         plan.find_inputs(fmu, batch)?;
         plan.find_start(fmu, batch)?;
-        for (place, name) in batch.outputs.iter().enumerate() {
-            let of = number(fmu, name)?;
-            match of.base {
-                BaseType::Real => {
-                    plan.real_outputs.0.push(of.reference);
-                    plan.real_outputs.1.push(place);
-                }
-                base => plan.other_outputs.push((base, of.reference, place)),
-            }
-        }
+        plan.outputs = fmu.select(&batch.outputs)?;
         Ok(plan)
     }
 
@@ -269,26 +252,6 @@ fn threads(fmu: &Fmu, asked: Option<usize>) -> Result<usize, Error> {
     Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)))
 }
 
-fn find<'f>(fmu: &'f Fmu, name: &str) -> Result<&'f Variable, Error> {
-    let description = fmu.description();
-    if let Some(found) = description.variable(name) {
-        return Ok(found);
-    }
-    let names = description.variables.iter().map(|variable| variable.name.as_str());
-    let near = names.min_by_key(|known| strsim::levenshtein(&known.to_lowercase(), &name.to_lowercase()));
-    let hint = near.map_or(String::new(), |near| format!("; did you mean {near:?}?"));
-    request(format!("{} has no variable {name:?}{hint}", description.model_name))
-}
-
-/// The variable of this name, if it is a number.
-fn number<'f>(fmu: &'f Fmu, name: &str) -> Result<&'f Variable, Error> {
-    let of = find(fmu, name)?;
-    if matches!(of.base, BaseType::String | BaseType::Binary) {
-        return request(format!("{name} is no number"));
-    }
-    Ok(of)
-}
-
 fn once<'a>(seen: &mut Vec<&'a str>, name: &'a str, where_: &str) -> Result<(), Error> {
     if seen.contains(&name) {
         return request(format!("{name} is twice among the {where_}"));
@@ -300,25 +263,4 @@ fn once<'a>(seen: &mut Vec<&'a str>, name: &'a str, where_: &str) -> Result<(), 
 fn article(word: &str) -> String {
     let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
     format!("{} {word}", if vowel { "an" } else { "a" })
-}
-
-/// Whole numbers and Booleans take no other values. What a Real takes is the FMU's to say.
-fn fits(name: &str, base: BaseType, values: &[f64]) -> Result<(), Error> {
-    let (low, high) = match base {
-        BaseType::Boolean => (0.0, 1.0),
-        BaseType::Enumeration => (f64::from(i32::MIN), f64::from(i32::MAX)),
-        base => match base.range() {
-            Some((low, high)) => (low as f64, high as f64),
-            None => return Ok(()),
-        },
-    };
-    match values.iter().find(|value| value.fract() != 0.0 || !(low..=high).contains(*value)) {
-        None => Ok(()),
-        Some(value) if base == BaseType::Boolean => {
-            request(format!("{name} is a Boolean and cannot be {value}"))
-        }
-        Some(value) => {
-            request(format!("{name} is a whole number from {low} to {high} and cannot be {value}"))
-        }
-    }
 }

@@ -5,7 +5,7 @@ use super::plan::{ByTime, Plan, Values};
 use crate::error::Error;
 use crate::fmu::Fmu;
 use crate::instance::{Instance, Message, Refusal, reason};
-use fmi_abi::BaseType;
+use fmi_abi::{BaseType, Interface};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{self, Duration};
@@ -54,7 +54,7 @@ pub(super) fn run(
     [courses, measures]: [&mut [f64]; 2],
 ) -> Result<[Told; 2], Error> {
     let begin = time::Instant::now();
-    let (course, measured) = (plan.outputs * plan.kept(), plan.outputs * plan.measures.len());
+    let (course, measured) = (plan.outputs.len() * plan.kept(), plan.outputs.len() * plan.measures.len());
     let room = courses.len() >= plan.runs * course && measures.len() >= plan.runs * measured;
     assert!(room, "there is too little room for {} runs", plan.runs);
     let pool = rayon::ThreadPoolBuilder::new()
@@ -105,8 +105,8 @@ fn ask(fmu: &Fmu, plan: &Plan, watch: &Watch, until: time::Instant, failures: &m
     let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
     rayon::broadcast(|_| {
         let mut worker = Worker::new(fmu, plan, Some(until));
-        let mut courses = vec![0.0; plan.outputs * plan.kept()];
-        let mut measures = vec![0.0; plan.outputs * plan.measures.len()];
+        let mut courses = vec![0.0; plan.outputs.len() * plan.kept()];
+        let mut measures = vec![0.0; plan.outputs.len() * plan.measures.len()];
         while !watch.is_cancelled()
             && time::Instant::now() < until
             && let Some((run, failure)) = next()
@@ -122,7 +122,7 @@ fn ask(fmu: &Fmu, plan: &Plan, watch: &Watch, until: time::Instant, failures: &m
     });
 }
 
-/// Parts of the same length, of which there are enough also when that is 0.
+/// Parts of the same length, as many as are asked for; empty ones after the values have come to an end.
 fn split(values: &mut [f64], length: usize) -> impl Iterator<Item = &mut [f64]> {
     let mut rest = values;
     std::iter::repeat_with(move || {
@@ -177,10 +177,10 @@ impl<'a> Room<'a> {
             set: vec![0.0; plan.real_inputs.references.len()],
             slopes: vec![0.0; plan.derivatives.references.len()],
             orders: vec![1; plan.derivatives.references.len()],
-            got: vec![0.0; plan.real_outputs.0.len()],
-            row: vec![0.0; plan.outputs],
+            got: Vec::with_capacity(plan.outputs.len()),
+            row: vec![0.0; plan.outputs.len()],
             rows: 0,
-            measured: Measured::new(plan.measures, plan.outputs),
+            measured: Measured::new(plan.measures, plan.outputs.len()),
         }
     }
 
@@ -253,8 +253,8 @@ impl<'a> Worker<'a> {
     fn instance(&mut self) -> Result<Instance, Vec<Message>> {
         let used = self.instance.take().and_then(|mut used| used.reset().ok().map(|()| used));
         // Some FMUs cannot be reset. The old instance is gone by now: there may be one at a time only.
-        let instance =
-            used.map_or_else(|| Instance::new(self.fmu, c"instance", self.logging.is_some()), Ok)?;
+        let instance = used
+            .map_or_else(|| Instance::new(self.fmu, Interface::CoSimulation, self.logging.is_some()), Ok)?;
         instance.forget_log();
         Ok(instance)
     }
@@ -293,7 +293,7 @@ fn follow(
         }
         let keep = wait == 0 && place < kept;
         if (keep || measures)
-            && let Err(refusal) = read(plan, instance, room)
+            && let Err(refusal) = plan.outputs.get(instance, &mut room.got, &mut room.row)
         {
             return Err(at(ended.unwrap_or(refusal)));
         }
@@ -334,7 +334,7 @@ fn follow(
 
 /// Start values before the initialization, inputs in it: so both editions of the standard allow it.
 fn start(plan: &Plan, instance: &mut Instance, room: &mut Room, run: usize) -> Result<(), Refusal> {
-    let (first, last) = (plan.time[0], plan.time[plan.time.len() - 1]);
+    let (first, last) = (plan.time[0], plan.time.last().copied());
     instance.set_up(first, last)?;
     for (reference, text) in &plan.texts {
         instance.set_text(*reference, text)?;
@@ -374,23 +374,4 @@ fn fill(buffer: &mut [f64], values: &[ByTime], time: usize) {
     for (slot, values) in buffer.iter_mut().zip(values) {
         *slot = values.at(time);
     }
-}
-
-/// The outputs into their row.
-#[inline]
-fn read(plan: &Plan, instance: &mut Instance, room: &mut Room) -> Result<(), Refusal> {
-    let (references, places) = &plan.real_outputs;
-    if plan.other_outputs.is_empty() {
-        return if references.is_empty() { Ok(()) } else { instance.get_reals(references, &mut room.row) };
-    }
-    if !references.is_empty() {
-        instance.get_reals(references, &mut room.got)?;
-    }
-    for (place, value) in places.iter().zip(&room.got) {
-        room.row[*place] = *value;
-    }
-    for (base, reference, place) in &plan.other_outputs {
-        room.row[*place] = instance.get_number(*base, *reference)?;
-    }
-    Ok(())
 }

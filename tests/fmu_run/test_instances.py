@@ -1,0 +1,226 @@
+"""Instances in the hand, against `Fmu.run`, FMPy's bare calls and each other; to the bit."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+
+import fmpy
+import fmu_run
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Model
+from fmpy.fmi3 import FMU3Model
+from fmpy.simulation import instantiate_fmu
+from test_runs import motion
+
+MOTORS = ("theta1", "theta2")
+OUTPUTS = ("tau1", "tau2", "pitch", "M")
+STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
+
+
+def angles(time: np.ndarray, count: int) -> np.ndarray:
+    """(times, count, 2) rad: other motions for each instance."""
+    _, moves = motion(len(time))
+    scale = np.linspace(0.5, 1.5, count)
+    return np.stack([np.multiply.outer(moves[name], scale) for name in MOTORS], axis=2)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_they_do_what_runs_do(testbed, threads) -> None:
+    time, _ = motion(60)
+    count, stiffness = 7, np.linspace(60.0, 130.0, 7)
+    moves = angles(time, count)
+    with fmu_run.Fmu(testbed) as fmu:
+        inputs = {name: np.ascontiguousarray(moves[:, :, k].T) for k, name in enumerate(MOTORS)}
+        runs = fmu.run(time, inputs=inputs, start={"k1": stiffness}, outputs=OUTPUTS)
+        start = {"k1": stiffness} | {name: moves[0, :, k] for k, name in enumerate(MOTORS)}
+        wrists = fmu.instances(count, start=start, start_time=time[0], stop_time=time[-1], threads=threads)
+        read = np.empty((count, len(OUTPUTS)))
+        for k, now in enumerate(time):
+            wrists.set(MOTORS, moves[k])
+            assert wrists.get(OUTPUTS, out=read) is read
+            assert np.array_equal(read.T, [runs[name][:, k] for name in OUTPUTS])
+            if k + 1 < len(time):
+                wrists.step(to=time[k + 1])
+        assert np.array_equal(wrists.time, np.full(count, time[-1]))
+        assert np.array_equal(wrists.get("tau1"), read[:, 0]) and wrists.errors == {}
+
+
+def test_one_go_is_three_calls(testbed) -> None:
+    with fmu_run.Fmu(testbed) as fmu:
+        one, three = fmu.instances(5, threads=2), fmu.instances(5)
+        moves = angles(np.arange(40) * 1e-3, 5)
+        for move in moves:
+            read = one.advance(MOTORS, move, 1e-3, OUTPUTS)
+            three.set(MOTORS, move)
+            three.step(1e-3)
+            assert np.array_equal(read, three.get(OUTPUTS))
+
+
+def test_masks_reset_and_restore(testbed) -> None:
+    with fmu_run.Fmu(testbed) as fmu:
+        wrists = fmu.instances(4, start={"k1": [50.0, 60.0, 70.0, 80.0], "theta1": 0.1})
+        fresh = wrists.get(OUTPUTS)
+        wrists.set("theta1", 0.2)
+        wrists.step(1e-3)
+        saved, then = wrists.save(), wrists.get(OUTPUTS)
+        wrists.set("theta1", [0.3, 0.4, 0.5, 0.6], mask=[True, False, True, False])
+        wrists.step(1e-3)
+        later = wrists.get(OUTPUTS)
+        wrists.restore(saved, mask=np.array([False, True, True, False]))
+        wrists.reset(mask=[True, False, False, False])
+        now = wrists.get(OUTPUTS)
+        assert np.array_equal(now, [fresh[0], then[1], then[2], later[3]])
+        assert np.array_equal(wrists.time, [0.0, 1e-3, 1e-3, 2e-3])
+        wrists.reset(start={"k1": 90.0})
+        assert np.array_equal(wrists.get("k1"), np.full(4, 90.0)) and np.array_equal(
+            wrists.get("theta1"), np.full(4, 0.1)
+        )
+
+
+def test_states_as_bytes_in_another_process(testbed) -> None:
+    program = f"""
+import sys, numpy as np, fmu_run
+fmu = fmu_run.Fmu({str(testbed)!r})
+one = fmu.instances(2)
+one.restore(one.deserialize([bytes.fromhex(line) for line in sys.stdin.read().split()]))
+one.step(1e-3)
+sys.stdout.write(one.get({OUTPUTS!r}).tobytes().hex() + " " + one.time.tobytes().hex())
+"""
+    with fmu_run.Fmu(testbed) as fmu:
+        wrists = fmu.instances(2)
+        wrists.set(MOTORS, [[0.1, 0.2], [0.3, -0.1]])
+        wrists.step(1e-3)
+        texts = "\n".join(state.hex() for state in wrists.serialize(wrists.save()) if state is not None)
+        other = subprocess.run([sys.executable, "-c", program], input=texts, capture_output=True, text=True, check=True)
+        wrists.step(1e-3)
+        assert other.stdout.split() == [wrists.get(OUTPUTS).tobytes().hex(), wrists.time.tobytes().hex()]
+        with pytest.raises(fmu_run.FmuError, match=r"instance 1: .*damaged"):
+            wrists.deserialize([bytes.fromhex(texts.split()[0]), bytes.fromhex(texts.split()[1])[:-1] + b"?"])
+
+
+def test_one_drops_out_and_the_others_go_on(testbed) -> None:
+    with fmu_run.Fmu(testbed) as fmu:
+        wrists, alone = fmu.instances(3), fmu.instances()
+        saved = wrists.save()
+        wrists.set(MOTORS, [[0.1, 0.0], [np.inf, 0.0], [0.3, 0.0]])
+        wrists.step(1e-3)
+        read = wrists.get("tau1")
+        assert list(wrists.errors) == [1] and "theta1 must be a finite number" in wrists.errors[1]
+        assert np.array_equal(np.isnan(read), [False, True, False])
+        wrists.restore(saved)
+        assert wrists.errors == {} and np.array_equal(wrists.get("tau1"), np.zeros(3))
+        with pytest.raises(fmu_run.FmuError, match="theta1 must be a finite number"):
+            alone.set("theta1", np.nan)
+        with pytest.raises(fmu_run.FmuError, match="k1 must not be below"):
+            fmu.instances(2, start={"k1": -1.0})
+
+
+def test_model_exchange_by_fmpys_calls(testbed) -> None:
+    """Euler's rule, call by call."""
+    description = fmpy.read_model_description(str(testbed))
+    of = {variable.name: variable for variable in description.modelVariables}
+    folder = fmpy.extract(str(testbed))
+    theirs = instantiate_fmu(folder, description, fmi_type="ModelExchange")
+    real = "Float64" if isinstance(theirs, FMU3Model) else "Real"
+    if isinstance(theirs, FMU2Model):
+        theirs.setupExperiment(startTime=0.0)
+    theirs.enterInitializationMode()
+    theirs.exitInitializationMode()
+    if isinstance(theirs, FMU2Model):
+        theirs.newDiscreteStates()
+    else:
+        theirs.updateDiscreteStates()
+    theirs.enterContinuousTimeMode()
+
+    x, derivatives = np.zeros(6), np.zeros(6)
+    pointer = np.ctypeslib.as_ctypes
+    with fmu_run.Fmu(testbed) as fmu:
+        ours = fmu.instances(2, interface="model-exchange", threads=1)
+        assert ours.get_event_indicators().shape == (2, 0) and np.array_equal(ours.get_nominals(), np.ones((2, 6)))
+        for k in range(20):
+            move = [0.1 * k, -0.05 * k]
+            getattr(theirs, f"set{real}")([of[name].valueReference for name in MOTORS], move)
+            theirs.getContinuousStates(pointer(x), 6)
+            get = theirs.getDerivatives if isinstance(theirs, FMU2Model) else theirs.getContinuousStateDerivatives
+            get(pointer(derivatives), 6)
+            ours.set(MOTORS, move)
+            assert np.array_equal(ours.get_continuous_states(), [x, x])
+            assert np.array_equal(ours.get_derivatives(), [derivatives, derivatives])
+            x += 1e-4 * derivatives
+            for one in (theirs.setTime, ours.set_time):
+                one(1e-4 * (k + 1))
+            theirs.setContinuousStates(pointer(x), 6)
+            ours.set_continuous_states(x)
+            theirs.completedIntegratorStep()
+            assert np.array_equal(ours.completed_integrator_step(), np.zeros((2, 2)))
+        torque = getattr(theirs, f"get{real}")([of["tau1"].valueReference])[0]
+        assert np.array_equal(ours.get("tau1"), [torque, torque])
+        seed = np.eye(6)
+        found = np.transpose([ours.directional_derivative("tau1", STATES, row)[0] for row in seed])
+        by_fmpy = [
+            theirs.getDirectionalDerivative([of["tau1"].valueReference], [of[name].valueReference], [1.0])[0]
+            for name in STATES
+        ]
+        assert np.array_equal(found, by_fmpy)
+    theirs.terminate()
+    theirs.freeInstance()
+
+
+def test_events_of_the_controller(controller) -> None:
+    """Its samples are time events; in Event Mode it takes what is set there."""
+    with fmu_run.Fmu(controller) as fmu:
+        law = fmu.instances(3, interface="model-exchange")
+        due = law.next_event_time.copy()
+        assert np.all(due > 0.0)
+        law.set_time(due)
+        law.handle_events("pitch_ref", 0.2, mask=[True, True, False])
+        assert np.array_equal(law.next_event_time > due, [True, True, False])
+        assert np.array_equal(law.wants_to_end, np.zeros(3))
+
+
+def test_what_does_not_fit_is_named(testbed) -> None:
+    with fmu_run.Fmu(testbed) as fmu:
+        wrists = fmu.instances(3)
+        for call, words in [
+            (lambda: wrists.set("theta", 0.0), r"no variable \"theta\"; did you mean \"theta1\""),
+            (lambda: wrists.set(MOTORS, np.zeros((2, 2))), r"shape \[2, 2\]; it must be \[3, 2\], \[2\] or a number"),
+            (lambda: wrists.set("theta1", [0.0, 1.0]), r"shape \[2\]; it must be \[3\] or a number"),
+            (lambda: wrists.get(MOTORS, out=np.zeros((3, 3))), r"shape \[3, 2\]"),
+            (lambda: wrists.get(MOTORS, out=np.zeros((2, 3)).T), "contiguous"),
+            (lambda: wrists.get("theta1", out=np.zeros(3, dtype=np.float32)), "float64"),
+            (lambda: wrists.step(), "either the size of the step or the time"),
+            (lambda: wrists.step(1e-3, mask=[True]), "1 truth values for 3 instances"),
+            (lambda: wrists.restore(fmu.instances(3).save()), "states are of other instances"),
+            (lambda: fmu.instances(0), "one instance at least"),
+            (lambda: fmu.instances(2, start={"k1": [1.0, 2.0, 3.0]}), "k1 has 3 start values for 2 instances"),
+            (lambda: fmu.instances(interface="both"), "co-simulation"),
+            (lambda: wrists.deserialize([b""]), "1 states for 3 instances"),
+        ]:
+            with pytest.raises(ValueError, match=words):
+                call()
+        shared = np.zeros((3, 2))
+        with pytest.raises(ValueError, match="shares memory"):
+            wrists.advance(MOTORS, shared, 1e-3, MOTORS, out=shared)
+        assert wrists.errors == {}
+
+
+def test_several_threads_of_python_share_them(testbed) -> None:
+    """Calls wait for each other; nothing hangs, and instances outlive their FMU object."""
+    fmu = fmu_run.Fmu(testbed)
+    wrists = fmu.instances(64, threads=2)
+    fmu.close()
+
+    def work() -> None:
+        for _ in range(200):
+            wrists.step(1e-3)
+            wrists.save()
+
+    workers = [threading.Thread(target=work) for _ in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert np.allclose(wrists.time, 0.8) and wrists.errors == {}
