@@ -23,7 +23,11 @@ pub struct Fmu {
 }
 
 impl Fmu {
-    /// Unpacks an FMU and loads its library.
+    /// Unpacks an FMU and loads its library: the one thing here that is `unsafe`, for it runs code that comes with the FMU.
+    ///
+    /// ```compile_fail,E0133
+    /// let fmu = fmu_run::Fmu::open("model.fmu".as_ref());
+    /// ```
     ///
     /// # Safety
     /// The library's functions have the types of the standard, and what it does when it is loaded and called is sound.

@@ -82,8 +82,17 @@ struct Own {
     buffer: Vec<f64>,
 }
 
-/// States that [`Instances`] have saved, one for each that had not dropped out.
-#[derive(Clone, Debug, PartialEq)]
+/// States that [`Instances`] have saved, one for each that had not dropped out. They are places, not pointers: freed ones and those
+/// of other instances are refused, and what is freed is given away.
+///
+/// ```compile_fail,E0382
+/// fn restore_what_is_freed(instances: &mut fmu_run::Instances) {
+///     let states = instances.save();
+///     instances.forget(states);
+///     instances.restore(&states, None);
+/// }
+/// ```
+#[derive(Debug, PartialEq)]
 pub struct States(Vec<Option<(Saved, f64)>>);
 
 /// Which of the instances a call is for: all, or those that are true.

@@ -36,12 +36,12 @@ struct Named {
 #[pyclass(frozen, module = "fmu_run")]
 pub struct States {
     held: Arc<Mutex<fmu_run::Instances>>,
-    states: Mutex<Option<fmu_run::States>>,
+    states: Option<Arc<fmu_run::States>>,
 }
 
 impl Drop for States {
     fn drop(&mut self) {
-        if let Some(states) = lock(&self.states).take() {
+        if let Some(states) = self.states.take().and_then(Arc::into_inner) {
             lock(&self.held).forget(states);
         }
     }
@@ -126,7 +126,9 @@ impl Instances {
     #[getter]
     fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let errors = PyDict::new(py);
-        for (place, why) in lock(&self.held).errors() {
+        // Nothing of Python's while it is locked: a States that is collected wants the lock, too.
+        let found: Vec<_> = lock(&self.held).errors().map(|(place, why)| (place, why.to_owned())).collect();
+        for (place, why) in found {
             errors.set_item(place, why)?;
         }
         Ok(errors)
@@ -242,7 +244,7 @@ impl Instances {
     fn save(&self, py: Python) -> PyResult<States> {
         let mut states = None;
         self.with(py, |all| states = Some(all.save()))?;
-        Ok(States { held: Arc::clone(&self.held), states: Mutex::new(states) })
+        Ok(States { held: Arc::clone(&self.held), states: states.map(Arc::new) })
     }
 
     /// Go back to states that these instances have saved.
@@ -255,15 +257,15 @@ impl Instances {
     /// Saved states as bytes, for another process: one for each instance, None for those that had dropped out.
     fn serialize<'py>(&self, py: Python<'py>, states: &States) -> PyResult<Vec<Option<Bound<'py, PyBytes>>>> {
         let states = self.own(states)?;
-        let mut all = lock(&self.held);
-        let bytes = (0..self.count).map(|place| all.serialize(&states, place));
-        Ok(bytes.map(|bytes| bytes.map(|bytes| PyBytes::new(py, &bytes))).collect())
+        let mut found = Vec::new();
+        self.with(py, |all| found.extend((0..self.count).map(|place| all.serialize(&states, place))))?;
+        Ok(found.into_iter().map(|bytes| bytes.map(|bytes| PyBytes::new(py, &bytes))).collect())
     }
 
     /// States of bytes that `serialize` has made, here or in another process: one for each instance.
     fn deserialize(&self, states: Vec<Vec<u8>>) -> PyResult<States> {
         let read = lock(&self.held).deserialize(&states).map_err(python)?;
-        Ok(States { held: Arc::clone(&self.held), states: Mutex::new(Some(read)) })
+        Ok(States { held: Arc::clone(&self.held), states: Some(Arc::new(read)) })
     }
 
     /// The derivatives of unknowns in the direction of a seed.
@@ -435,8 +437,8 @@ impl Instances {
     }
 
     /// The states, if they are of these instances.
-    fn own(&self, states: &States) -> PyResult<fmu_run::States> {
-        let own = Arc::ptr_eq(&self.held, &states.held).then(|| lock(&states.states).clone()).flatten();
+    fn own(&self, states: &States) -> PyResult<Arc<fmu_run::States>> {
+        let own = states.states.clone().filter(|_| Arc::ptr_eq(&self.held, &states.held));
         own.ok_or_else(|| {
             PyValueError::new_err(
                 "these states are of other instances; serialize them there and deserialize them here",

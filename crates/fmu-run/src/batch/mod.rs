@@ -132,7 +132,15 @@ impl Fmu {
     }
 }
 
-/// A [`Batch`] that fits its FMU.
+/// A [`Batch`] that fits its FMU, which stays loaded for it.
+///
+/// ```compile_fail,E0505
+/// fn close_too_early(fmu: fmu_run::Fmu, batch: fmu_run::Batch) {
+///     let planned = fmu.plan(&batch).unwrap();
+///     drop(fmu);
+///     planned.size();
+/// }
+/// ```
 pub struct Planned<'a> {
     fmu: &'a Fmu,
     plan: plan::Plan<'a>,
