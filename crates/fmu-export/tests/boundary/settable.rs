@@ -51,7 +51,6 @@ fn check_by_hand<M: Exported>(rows: &[(&str, &str, &str)]) {
             let found: String = Importer::modes_of(interface)
                 .iter()
                 .copied()
-                .into_iter()
                 .zip(if interface == CoSimulation { "INCFTE".chars() } else { "INMKTE".chars() })
                 .filter_map(|(mode, letter)| accepted(variable, interface, mode).then_some(letter))
                 .collect();
