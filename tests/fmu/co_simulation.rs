@@ -1,9 +1,10 @@
 //! How the motors move between communication points in Co-Simulation, as far as an importer can tell.
 
-use crate::exact::{Random, STATES, advanced, distance, jumped, parameters, set_parameters, start_at};
-use crate::{new, vr};
+use crate::exact::{STATES, advanced, distance, jumped, parameters, set_parameters, start_at};
+use crate::{in_mode, new, vr};
 use fmu_export::Interface::CoSimulation;
-use fmu_test_kit::Importer as Fmu;
+use fmu_export::Mode::*;
+use fmu_test_kit::{Either, Importer as Fmu, Random};
 use prw_testbed::variables::Name;
 use prw_testbed::{Parameters, state_space::state_space};
 
@@ -221,4 +222,32 @@ fn higher_orders_are_harmless() {
             "step {i}"
         );
     }
+}
+
+/// Derivatives given while initializing are those of the first step.
+#[test]
+fn derivatives_of_the_initialization_are_used() {
+    let [with, without] = [true, false].map(|given| {
+        let fmu = in_mode(CoSimulation, Initialization);
+        if given {
+            fmu.set_rates(THETA, [2.0, 0.0]);
+        }
+        fmu.ok(fmu.fmi2ExitInitializationMode());
+        fmu.step(0.0, 0.01);
+        fmu.get([vr(Name::theta3)])
+    });
+    assert!(with[0] > 0.0 && without[0] == 0.0);
+}
+
+/// An input that is held between points at rest keeps everything at rest, to the last bit, whatever the step sizes: nothing
+/// drifts while a master waits.
+#[test]
+fn waiting_at_rest() {
+    let fmu = in_mode(CoSimulation, StepComplete);
+    let mut time = 0.0;
+    for i in 1..100 {
+        fmu.step(time, 1e-3 * f64::from(i));
+        time += 1e-3 * f64::from(i);
+    }
+    assert_eq!(fmu.get(STATES), [0.0; 6]);
 }

@@ -5,7 +5,7 @@
 
 use crate::{TABLE, vr};
 use fmu_export::{BaseType, Causality, Variable};
-use fmu_test_kit::Importer as Fmu;
+use fmu_test_kit::{Either, Importer as Fmu, Random};
 use nalgebra::SMatrix;
 use prw_testbed::Parameters;
 use prw_testbed::TestbedFmu;
@@ -131,19 +131,4 @@ pub fn parameters(seed: u64) -> Parameters {
     let [M, N] = [8.0, 14.0].map(|end| random.between(1.0, end) as i32);
     let near = Parameters::BUILT_IN.map_reals(|value| value * random.between(-1.5, 1.5).exp());
     Parameters { M, N, ..near }
-}
-
-/// A sequence of numbers, the same in every run.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn bits(&mut self) -> u64 {
-        // Knuth's multiplier; the high bits are the good ones.
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        self.0 ^ (self.0 >> 33)
-    }
-
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * ((self.bits() >> 11) as f64 / (1_u64 << 53) as f64)
-    }
 }

@@ -6,18 +6,15 @@
 mod co_simulation;
 mod derivatives;
 mod exact;
-mod importers;
 mod model_exchange;
-mod modes;
 mod parameters;
 mod robustness;
 mod saved_states;
-mod serialized;
 mod start;
 mod steps;
 
-use fmu_export::{Interface, Variable, Variables};
-use fmu_test_kit::Importer;
+use fmu_export::{Interface, Mode, Variable, Variables};
+use fmu_test_kit::{Either, Importer};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 
@@ -32,4 +29,16 @@ const fn vr(name: Name) -> u32 {
 /// A new instance.
 fn new(interface: Interface) -> Importer {
     Importer::of::<TestbedFmu>(interface)
+}
+
+const INTERFACES: [Interface; 2] = [Interface::CoSimulation, Interface::ModelExchange];
+
+/// A new instance in this mode.
+fn in_mode(interface: Interface, mode: Mode) -> Importer {
+    Importer::in_mode::<TestbedFmu>(interface, mode)
+}
+
+/// What every FMU does.
+mod every {
+    fmu_test_kit::every_check!(prw_testbed::TestbedFmu);
 }

@@ -1,32 +1,14 @@
 //! Model Exchange (section 3.2): eq. (11) for an importer's integrator.
 
-use crate::exact::{
-    INPUTS, Random, STATES, UNKNOWNS, distance, jacobian, parameters, set_parameters, start_at,
-};
-use crate::modes::{enter_continuous_time, in_mode};
+use crate::exact::{INPUTS, STATES, UNKNOWNS, distance, jacobian, parameters, set_parameters, start_at};
+use crate::in_mode;
 use crate::{new, vr};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
-use fmu_test_kit::Importer as Fmu;
+use fmu_test_kit::{Either, Random};
 use nalgebra::SVector;
 use prw_testbed::Parameters;
 use prw_testbed::variables::Name;
-
-fn states(fmu: &Fmu) -> [f64; 6] {
-    let mut x = [f64::NAN; 6];
-    fmu.ok(fmu.fmi2GetContinuousStates(x.as_mut_ptr(), 6));
-    x
-}
-
-fn derivatives(fmu: &Fmu) -> [f64; 6] {
-    let mut rates = [f64::NAN; 6];
-    fmu.ok(fmu.fmi2GetDerivatives(rates.as_mut_ptr(), 6));
-    rates
-}
-
-fn set_states(fmu: &Fmu, x: [f64; 6]) {
-    fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), 6));
-}
 
 /// Derivatives and outputs at random points with random parameters, whatever use_omega says.
 #[test]
@@ -38,10 +20,10 @@ fn equations() {
         set_parameters(&fmu, &p);
         fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &i32::from(seed % 2 == 0)));
         fmu.initialize(0.0);
-        enter_continuous_time(&fmu);
+        fmu.enter_continuous_time();
         for _ in 0..5 {
             let point = SVector::<f64, 10>::from_fn(|_, _| random.between(-1.0, 1.0));
-            set_states(&fmu, std::array::from_fn(|i| point[i]));
+            fmu.ok(fmu.set_states(point.as_ptr(), 6));
             fmu.set(&INPUTS, &point.as_slice()[6..]);
             let jacobian = jacobian(&p);
             let expected = jacobian * point;
@@ -50,8 +32,8 @@ fn equations() {
                 let tolerance = 1e-13 * jacobian.row(row).abs().sum();
                 assert!((found[row] - expected[row]).abs() < tolerance, "row {row}: {found:?} {expected:?}");
             }
-            assert_eq!(derivatives(&fmu), found[..6]);
-            assert_eq!(states(&fmu), fmu.get(STATES));
+            assert_eq!(fmu.derivatives::<6>(), found[..6]);
+            assert_eq!(fmu.states::<6>(), fmu.get(STATES));
         }
     }
 }
@@ -62,45 +44,20 @@ fn start_values_are_the_first_states() {
     let fmu = in_mode(ModelExchange, Instantiated);
     start_at(&fmu, start);
     fmu.initialize(0.0);
-    assert_eq!(states(&fmu), start);
-    enter_continuous_time(&fmu);
-    assert_eq!(states(&fmu), start);
-}
-
-#[test]
-fn nominals_are_positive_from_the_beginning() {
-    let fmu = in_mode(ModelExchange, Instantiated);
-    let mut nominals = [0.0; 6];
-    fmu.ok(fmu.fmi2GetNominalsOfContinuousStates(nominals.as_mut_ptr(), 6));
-    assert!(nominals.iter().all(|nominal| *nominal > 0.0), "{nominals:?}");
+    assert_eq!(fmu.states::<6>(), start);
+    fmu.enter_continuous_time();
+    assert_eq!(fmu.states::<6>(), start);
 }
 
 /// A state can be set as variable or among all, with the same effect.
 #[test]
 fn both_ways_to_set_a_state() {
     let fmu = in_mode(ModelExchange, ContinuousTime);
-    set_states(&fmu, [0.0, 0.0, 0.25, 0.0, 0.0, 0.0]);
-    let by_array = (states(&fmu), derivatives(&fmu));
-    set_states(&fmu, [0.0; 6]);
+    fmu.ok(fmu.set_states([0.0, 0.0, 0.25, 0.0, 0.0, 0.0].as_ptr(), 6));
+    let by_array = (fmu.states::<6>(), fmu.derivatives::<6>());
+    fmu.ok(fmu.set_states([0.0; 6].as_ptr(), 6));
     fmu.set(&[vr(Name::theta5)], &[0.25]);
-    assert_eq!((states(&fmu), derivatives(&fmu)), by_array);
-}
-
-#[test]
-fn steps_end_without_events() {
-    let fmu = in_mode(ModelExchange, ContinuousTime);
-    let (mut enter_event_mode, mut terminate) = (7, 7);
-    for no_set_state_prior in [0, 1] {
-        fmu.ok(fmu.fmi2CompletedIntegratorStep(no_set_state_prior, &mut enter_event_mode, &mut terminate));
-        assert_eq!((enter_event_mode, terminate), (0, 0));
-    }
-    // An importer's own events, one after the other, and settling more than once.
-    for _ in 0..3 {
-        fmu.ok(fmu.fmi2EnterEventMode());
-        fmu.ok(fmu.fmi2EnterEventMode());
-        fmu.ok(fmu.fmi2NewDiscreteStates(&mut Default::default()));
-        enter_continuous_time(&fmu);
-    }
+    assert_eq!((fmu.states::<6>(), fmu.derivatives::<6>()), by_array);
 }
 
 /// Motors that start smoothly from rest: angle and rate.
@@ -115,18 +72,18 @@ fn integrated(p: &Parameters, steps: i32) -> [f64; 14] {
     let fmu = new(ModelExchange);
     set_parameters(&fmu, p);
     fmu.initialize(0.0);
-    enter_continuous_time(&fmu);
+    fmu.enter_continuous_time();
     let h = END / f64::from(steps);
     let slope = |t: f64, x: [f64; 6]| {
         let (theta, omega) = motors(t);
         fmu.ok(fmu.fmi2SetTime(t));
         fmu.set(&INPUTS, &[theta, omega].concat());
-        set_states(&fmu, x);
-        derivatives(&fmu)
+        fmu.ok(fmu.set_states(x.as_ptr(), 6));
+        fmu.derivatives::<6>()
     };
     let add = |x: [f64; 6], h: f64, k: [f64; 6]| std::array::from_fn(|i| x[i] + h * k[i]);
     for step in 0..steps {
-        let (t, x) = (f64::from(step) * h, states(&fmu));
+        let (t, x) = (f64::from(step) * h, fmu.states::<6>());
         let k1 = slope(t, x);
         let k2 = slope(t + 0.5 * h, add(x, 0.5 * h, k1));
         let k3 = slope(t + 0.5 * h, add(x, 0.5 * h, k2));

@@ -2,12 +2,14 @@
 //! in crates/fmu-export, on toy models.)
 
 use fmu_test_kit::careless::{run, run_seeds};
+use fmu_test_kit::{Importer, fmi3};
 use prw_testbed::TestbedFmu;
 
 #[test]
 fn no_sequence_of_calls_breaks_a_promise() {
-    let tally = run_seeds(4, &[("prw_testbed", run::<TestbedFmu>)]);
+    let tally = run_seeds(4, &[("prw_testbed", run::<Importer, TestbedFmu>)]);
     assert_eq!(tally.len(), 44, "every function is called");
+    run_seeds(4, &[("prw_testbed in FMI 3.0", run::<fmi3::Importer, TestbedFmu>)]);
 }
 
 #[cfg(target_os = "linux")]

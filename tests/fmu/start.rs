@@ -2,13 +2,13 @@
 //! that is given.
 
 use crate::exact::{INPUTS, STARTS, STATES, distance, start_at};
-use crate::modes::{INTERFACES, enter_continuous_time, in_mode};
+use crate::{INTERFACES, in_mode};
 use crate::{new, vr};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Status;
 use fmu_export::fmi3::reference;
-use fmu_test_kit::{Importer as Fmu, fmi3};
+use fmu_test_kit::{Either, Importer as Fmu, fmi3};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 
@@ -111,7 +111,7 @@ fn rest_in_model_exchange() {
             }
         });
         rests(&fmu);
-        enter_continuous_time(&fmu);
+        fmu.enter_continuous_time();
         rests(&fmu);
         let mut rates = [f64::NAN; 6];
         fmu.ok(fmu.fmi2GetDerivatives(rates.as_mut_ptr(), 6));
@@ -145,7 +145,7 @@ fn late_parameters_and_states_in_event_mode() {
         fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), 6));
         fmu.set(&THETA, &[5.0; 2]);
         assert_eq!(fmu.get(STATES), x, "states that are set are the importer's");
-        enter_continuous_time(&fmu);
+        fmu.enter_continuous_time();
         assert_eq!(fmu.get(STATES), x);
     }
 }
@@ -181,7 +181,7 @@ fn saved_and_reset() {
         let (state, bytes) = (fmu.save(), fmu.bytes());
         let go = || match interface {
             CoSimulation => fmu.step(0.0, 0.01),
-            ModelExchange => enter_continuous_time(&fmu),
+            ModelExchange => _ = fmu.enter_continuous_time(),
         };
         go();
         let gone = fmu.bytes();

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from conftest import HERE, RUNNERS, disagreement, library, parse
+from conftest import HERE, ROOT, RUNNERS, disagreement, library, parse
 
 REFERENCE = RUNNERS[0]
 
@@ -22,7 +22,8 @@ def run(run_c, unpacked, unpacked_fmi3, description):
         if program == "scenario":
             return run_c(runner, HERE / "scenario.c", path)
         # Layout of the types, Model Exchange, a hundred times loading and unloading.
-        return run_c(runner, HERE / "drive.c", path, description.guid)
+        drive = ROOT / "crates/fmu-export/tests/c/drive.c"
+        return run_c(runner, drive, path, description.guid, options=("-DTESTBED",))
 
     return run
 

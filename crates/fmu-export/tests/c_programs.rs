@@ -1,5 +1,5 @@
 //! C programs that load shared libraries as importers do, compiled with the standards' own headers; and the types of the
-//! functions of FMI 2.0, compared with those headers by the C compiler (of FMI 3.0: `tests/fmi3/headers.rs`).
+//! functions, compared with those headers by the C compiler.
 #![cfg(unix)]
 #![allow(missing_docs)]
 
@@ -9,8 +9,7 @@ use fmu_export::Interface::ModelExchange;
 use fmu_export::Model;
 use fmu_export::fmi2::types::*;
 use fmu_test_kit::c_programs::{check_syntax, command, compile, headers, library, output, reload};
-use fmu_test_kit::either::Either;
-use fmu_test_kit::{FUNCTIONS, Importer, fmi3};
+use fmu_test_kit::{Either, FUNCTIONS, Importer, fmi3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::mem::offset_of;
@@ -73,7 +72,7 @@ fn drive() {
     same_runs::<Importer>(values);
 }
 
-/// The same of FMI 3.0, whose types `tests/fmi3/headers.rs` compares.
+/// The same of FMI 3.0.
 #[test]
 fn drive3() {
     same_runs::<fmi3::Importer>(values(&run("drive3")));
@@ -92,16 +91,15 @@ fn same_runs<F: Either>(mut values: BTreeMap<&str, f64>) {
 
 /// The Co-Simulation run of the programs.
 fn co_simulation<F: Either>() -> [f64; 4] {
-    let (fmu, mut values) = (F::initialized::<Oscillator>(), [f64::NAN; 4]);
+    let fmu = F::initialized_at::<Oscillator>(0.0);
     for i in (0..64).map(f64::from) {
-        fmu.write(&[Name::force as u32], &[i / 64.0]);
-        fmu.advance(i / 64.0, 1.0 / 64.0);
+        fmu.set(&[Name::force as u32], &[i / 64.0]);
+        fmu.step(i / 64.0, 1.0 / 64.0);
     }
-    fmu.read(&OUTPUTS.map(|name| name as u32), &mut values);
-    values
+    fmu.get(OUTPUTS.map(|name| name as u32))
 }
 
-/// The Model Exchange run of the programs; FMI 3.0 has the same bits (`tests/fmi3/same.rs`).
+/// The Model Exchange run of the programs; FMI 3.0 has the same bits (`boundary/fmi3/same.rs`).
 fn model_exchange() -> [f64; 4] {
     let fmu = Importer::of::<Oscillator>(ModelExchange);
     fmu.initialize(0.0);
@@ -165,11 +163,13 @@ fn c_type(rust: &str) -> String {
     let rust: String = rust.chars().filter(|c| *c != ' ').collect();
     match rust.strip_prefix("*mut").or_else(|| rust.strip_prefix("*const")) {
         Some(to) => format!("{} {}*", c_type(to), if rust.starts_with("*const") { "const" } else { "" }),
-        None => match rust.as_str() {
-            "usize" => "size_t".into(),
-            "Status" => "fmi2Status".into(),
-            name => name.into(),
-        },
+        None => {
+            if rust == "usize" {
+                "size_t".into()
+            } else {
+                rust
+            }
+        }
     }
 }
 
@@ -182,27 +182,64 @@ macro_rules! declarations {
             $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
         }
     ) => {
-        fn declarations() -> Vec<(&'static str, Vec<String>)> {
-            vec![$((stringify!($function), vec![$(c_type(stringify!($type))),*])),+]
+        pub const HANDLE: &str = stringify!($handle);
+        pub fn declarations() -> Vec<(&'static str, Vec<String>)> {
+            vec![$((stringify!($function), vec![$(super::c_type(stringify!($type))),*])),+]
         }
     };
 }
 
-fmu_export::fmi2_functions!(declarations);
+mod of_fmi2 {
+    fmu_export::fmi2_functions!(declarations);
+}
+
+mod of_fmi3 {
+    fmu_export::fmi3_functions!(declarations);
+}
 
 /// The C compiler compares: each function, declared with the types that Rust has, is assigned to a pointer of the type in
-/// the standard's header.
+/// the standard's header; and the types have the same sizes.
 #[test]
 fn signatures() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let source = folder.join("signatures.c");
-    let mut text = String::from("#include <stddef.h>\n#include \"fmi2FunctionTypes.h\"\n");
-    let mut all = declarations();
-    assert_eq!(all.len(), 40);
-    all.iter_mut().for_each(|(_, arguments)| arguments.insert(0, "fmi2Component".into()));
+    use fmu_export::fmi3::types::*;
+    #[allow(non_camel_case_types, reason = "as in C")]
+    type fmi3Status = Status;
+    macro_rules! sizes {
+        ($($name:ident)+) => { [$((stringify!($name), size_of::<$name>())),+] };
+    }
+    // `bool` and bytes are one type to C in all but name.
+    let sizes = sizes! {
+        fmi3Status fmi3Boolean fmi3Clock fmi3DependencyKind fmi3IntervalQualifier
+        fmi3Instance fmi3InstanceEnvironment fmi3FMUState fmi3ValueReference
+        fmi3Float32 fmi3Float64 fmi3Int8 fmi3UInt8 fmi3Int16 fmi3UInt16 fmi3Int32 fmi3UInt32 fmi3Int64 fmi3UInt64
+        fmi3Char fmi3String fmi3Byte fmi3Binary
+        fmi3LogMessageCallback fmi3ClockUpdateCallback fmi3IntermediateUpdateCallback
+        fmi3LockPreemptionCallback fmi3UnlockPreemptionCallback
+    };
+    let mut of_fmi3 =
+        String::from("_Static_assert(fmi3Fatal == 4 && fmi3Dependent == 5, \"enumerations\");\n");
+    for (name, size) in sizes {
+        writeln!(of_fmi3, "_Static_assert(sizeof({name}) == {size}, \"{name}\");").unwrap();
+    }
+    check_signatures("fmi2", of_fmi2::HANDLE, of_fmi2::declarations(), 40, "");
+    check_signatures("fmi3", of_fmi3::HANDLE, of_fmi3::declarations(), 70, &of_fmi3);
+}
+
+fn check_signatures(
+    standard: &str,
+    handle: &str,
+    mut all: Vec<(&'static str, Vec<String>)>,
+    count: usize,
+    more: &str,
+) {
+    let source = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("signatures_{standard}.c"));
+    let mut text = format!("#include <stddef.h>\n#include \"{standard}FunctionTypes.h\"\n{more}");
+    assert_eq!(all.len(), count);
+    all.iter_mut().for_each(|(_, arguments)| arguments.insert(0, handle.into()));
     for (name, arguments) in all {
         let arguments = arguments.join(", ");
-        writeln!(text, "fmi2Status rust_{name}({arguments});\n{name}TYPE *{name} = rust_{name};").unwrap();
+        writeln!(text, "{standard}Status rust_{name}({arguments});\n{name}TYPE *{name} = rust_{name};")
+            .unwrap();
     }
     text += "int main(void) { return 0; }\n";
     let headers = headers(Path::new(env!("CARGO_MANIFEST_DIR")));
@@ -212,8 +249,8 @@ fn signatures() {
     };
     assert_eq!(compile(&text), Ok(()));
     // A type that differs is seen.
-    let [right, wrong] =
-        ["rust_fmi2SetTime(fmi2Component, fmi2Real)", "rust_fmi2SetTime(fmi2Component, float)"];
-    assert!(text.contains(right));
-    assert!(compile(&text.replace(right, wrong)).is_err_and(|error| error.contains("fmi2SetTime")));
+    let right = text.lines().find(|line| line.contains("SetTime(")).unwrap();
+    let wrong = format!("{standard}Status rust_{standard}SetTime({handle}, float);");
+    let error = compile(&text.replace(right, &wrong)).unwrap_err();
+    assert!(error.contains(&format!("{standard}SetTime")), "{error}");
 }

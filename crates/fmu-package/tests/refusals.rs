@@ -70,10 +70,22 @@ const VALUES: Values = Values {
     drive: Gear::Drive,
 };
 
+/// The variables of a case: any, one that is told by its type and value, or an input that is all right.
+macro_rules! table {
+    ({}) => { table! { { u = input(&NUMBER) in v.half; } } };
+    ({ $name:ident = $kind:ident(&$of:ident) in v.$field:ident; }) => {
+        variables! { for Toy;
+            /// The only one
+            $name = $kind(&$of) in v.$field;
+        }
+    };
+    ({ $($table:tt)+ }) => { variables! { for Toy; $($table)+ } };
+}
+
 /// Each case: what is said of it, which facts are not as usual, its variables.
 macro_rules! cases {
     ($(
-        $case:ident $message:literal $([ $($fact:ident: $value:expr),+ ])? { $($table:tt)+ }
+        $case:ident $message:literal [ $($fact:ident: $value:expr),* ] $table:tt
     )+) => {
         $(
             mod $case {
@@ -84,10 +96,10 @@ macro_rules! cases {
                     v: Values,
                 }
 
-                variables! { for Toy; $($table)+ }
+                table! { $table }
 
                 impl Model for Toy {
-                    const INFO: Info = Info { $($( $fact: $value, )+)? ..Info::new("Toy", "toy", "{toy}") };
+                    const INFO: Info = Info { $( $fact: $value, )* ..Info::new("Toy", "toy", "{toy}") };
 
                     fn new(_: &Setup) -> Result<Self, Error> {
                         Ok(Self { v: VALUES })
@@ -124,169 +136,95 @@ const USUAL: DefaultExperiment = Info::new("", "", "").default_experiment;
 
 cases! {
     // Start values
-    above_max "the start value of u must be <= 1, it is 1.5" {
-        /// U
-        u = input(&SHARE) in v.much;
-    }
-    below_min "the start value of u must be >= 0, it is -0.5" {
-        /// U
-        u = input(&SHARE) in v.below;
-    }
-    not_finite "the start value of u must be a finite number, it is NaN" {
-        /// U
-        u = input(&NUMBER) in v.nan;
-    }
-    constant "the start value of y must be <= 1, it is 1.5" {
+    above_max "the start value of u must be <= 1, it is 1.5" [] { u = input(&SHARE) in v.much; }
+    below_min "the start value of u must be >= 0, it is -0.5" [] { u = input(&SHARE) in v.below; }
+    not_finite "the start value of u must be a finite number, it is NaN" [] { u = input(&NUMBER) in v.nan; }
+    constant "the start value of y must be <= 1, it is 1.5" [] {
         /// Y
         y = output(&SHARE).constant() by |toy| toy.v.much;
     }
-    integer "the start value of n must be between 1 and 3, it is 4" {
-        /// N
-        n = parameter(&COUNT) in v.four;
-    }
-    unknown_item "the start value of gear must be one of 0 (Neutral), it is 1" {
-        /// Gear
-        gear = parameter(&HALF) in v.drive;
-    }
+    integer "the start value of n must be between 1 and 3, it is 4" [] { n = parameter(&COUNT) in v.four; }
+    unknown_item "the start value of gear must be one of 0 (Neutral), it is 1"
+        [] { gear = parameter(&HALF) in v.drive; }
 
     // Types and units
-    empty "u cannot have the type Empty: its range is empty: min 2 is above max 1" {
-        /// U
-        u = input(&EMPTY) in v.half;
-    }
-    no_number "u cannot have the type NoNumber: max must be a finite number" {
-        /// U
-        u = input(&NO_NUMBER) in v.half;
-    }
-    no_size "u cannot have the type NoSize: the nominal value must be > 0, it is 0" {
-        /// U
-        u = input(&NO_SIZE) in v.half;
-    }
-    two_lines "u cannot have the type Two\\nLines: its name is more than one line" {
-        /// U
-        u = input(&TWO_LINES) in v.half;
-    }
-    no_count "n cannot have the type NoCount: its range is empty: min 2 is above max 1" {
-        /// N
-        n = parameter(&NO_COUNT) in v.one;
-    }
-    invisible "u cannot have the type Length: the factor of the display unit km must be finite and not 0, it is 0" {
-        /// U
-        u = input(&OF_INVISIBLE) in v.half;
-    }
-    of_nothing "u cannot have the type Length: the factor of the unit m must be finite and not 0, it is 0" {
-        /// U
-        u = input(&OF_NOTHING) in v.half;
-    }
-    far "u cannot have the type Length: the offset of the unit m must be finite, it is inf" {
-        /// U
-        u = input(&OF_FAR) in v.half;
-    }
-    nameless "u cannot have the type Length: the name '' of its unit is empty or more than one line" {
-        /// U
-        u = input(&OF_NAMELESS) in v.half;
-    }
-    unnamed "gear cannot have its type: an Enumeration needs a name (section 2.2.7)" {
-        /// Gear
-        gear = parameter(&UNNAMED) in v.drive;
-    }
-    no_items "gear cannot have the type Gear: it has no items" {
-        /// Gear
-        gear = parameter(&NO_ITEMS) in v.drive;
-    }
-    twice "gear cannot have the type Gear: it has two items with the name Drive" {
-        /// Gear
-        gear = parameter(&TWICE) in v.drive;
-    }
-    same "gear cannot have the type Gear: it has two items with the value 1" {
-        /// Gear
-        gear = parameter(&SAME) in v.drive;
-    }
+    empty "u cannot have the type Empty: its range is empty: min 2 is above max 1"
+        [] { u = input(&EMPTY) in v.half; }
+    no_number "u cannot have the type NoNumber: max must be a finite number"
+        [] { u = input(&NO_NUMBER) in v.half; }
+    no_size "u cannot have the type NoSize: the nominal value must be > 0, it is 0"
+        [] { u = input(&NO_SIZE) in v.half; }
+    two_lines "u cannot have the type Two\\nLines: its name is more than one line"
+        [] { u = input(&TWO_LINES) in v.half; }
+    no_count "n cannot have the type NoCount: its range is empty: min 2 is above max 1"
+        [] { n = parameter(&NO_COUNT) in v.one; }
+    invisible "u cannot have the type Length: the factor of the display unit km must be finite and not 0, it is 0"
+        [] { u = input(&OF_INVISIBLE) in v.half; }
+    of_nothing "u cannot have the type Length: the factor of the unit m must be finite and not 0, it is 0"
+        [] { u = input(&OF_NOTHING) in v.half; }
+    far "u cannot have the type Length: the offset of the unit m must be finite, it is inf"
+        [] { u = input(&OF_FAR) in v.half; }
+    nameless "u cannot have the type Length: the name '' of its unit is empty or more than one line"
+        [] { u = input(&OF_NAMELESS) in v.half; }
+    unnamed "gear cannot have its type: an Enumeration needs a name (section 2.2.7)"
+        [] { gear = parameter(&UNNAMED) in v.drive; }
+    no_items "gear cannot have the type Gear: it has no items" [] { gear = parameter(&NO_ITEMS) in v.drive; }
+    twice "gear cannot have the type Gear: it has two items with the name Drive"
+        [] { gear = parameter(&TWICE) in v.drive; }
+    same "gear cannot have the type Gear: it has two items with the value 1"
+        [] { gear = parameter(&SAME) in v.drive; }
 
     // Names and facts
     no_identifier "the identifier '' must be one of C: letters, digits and underscores, no digit first"
-        [identifier: ""] {
-        /// U
-        u = input(&NUMBER) in v.half;
-    }
+        [identifier: ""] {}
     digit_first "the identifier '7up' must be one of C: letters, digits and underscores, no digit first"
-        [identifier: "7up"] {
-        /// U
-        u = input(&NUMBER) in v.half;
-    }
+        [identifier: "7up"] {}
     space "the identifier 'my model' must be one of C: letters, digits and underscores, no digit first"
-        [identifier: "my model"] {
-        /// U
-        u = input(&NUMBER) in v.half;
-    }
+        [identifier: "my model"] {}
     slash "the identifier 'a/b' must be one of C: letters, digits and underscores, no digit first"
-        [identifier: "a/b"] {
-        /// U
-        u = input(&NUMBER) in v.half;
-    }
+        [identifier: "a/b"] {}
     accent "the identifier 'naïve' must be one of C: letters, digits and underscores, no digit first"
-        [identifier: "naïve"] {
-        /// U
-        u = input(&NUMBER) in v.half;
-    }
-    no_name "the model's name '' is empty or more than one line" [name: ""] {
-        /// U
-        u = input(&NUMBER) in v.half;
-    }
-    no_guid "Toy has no guid" [guid: ""] {
-        /// U
-        u = input(&NUMBER) in v.half;
-    }
-    long_author "the author of Toy is more than one line" [author: "A\nB"] {
-        /// U
-        u = input(&NUMBER) in v.half;
-    }
+        [identifier: "naïve"] {}
+    no_name "the model's name '' is empty or more than one line" [name: ""] {}
+    no_guid "Toy has no guid" [guid: ""] {}
+    long_author "the author of Toy is more than one line" [author: "A\nB"] {}
     no_step "the step size of the default experiment must be > 0, it is 0"
-        [default_experiment: DefaultExperiment { step_size: 0.0, ..USUAL }] {
-        /// U
-        u = input(&NUMBER) in v.half;
-    }
+        [default_experiment: DefaultExperiment { step_size: 0.0, ..USUAL }] {}
     no_end "the stop time of the default experiment must be finite, it is inf"
-        [default_experiment: DefaultExperiment { stop_time: f64::INFINITY, ..USUAL }] {
-        /// U
-        u = input(&NUMBER) in v.half;
-    }
+        [default_experiment: DefaultExperiment { stop_time: f64::INFINITY, ..USUAL }] {}
     backwards "the default experiment ends at 1, before its start at 2"
-        [default_experiment: DefaultExperiment { start_time: 2.0, ..USUAL }] {
-        /// U
-        u = input(&NUMBER) in v.half;
-    }
-    empty_name "the variable name '' is empty or more than one line" {
+        [default_experiment: DefaultExperiment { start_time: 2.0, ..USUAL }] {}
+    empty_name "the variable name '' is empty or more than one line" [] {
         /// U
         u as "" = input(&NUMBER) in v.half;
     }
-    long_name "the variable name 'a\\nb' is empty or more than one line" {
+    long_name "the variable name 'a\\nb' is empty or more than one line" [] {
         /// U
         u as "a\nb" = input(&NUMBER) in v.half;
     }
-    long_description "the description of u is more than one line" {
+    long_description "the description of u is more than one line" [] {
         #[doc = "a\nb"]
         u = input(&NUMBER) in v.half;
     }
-    two_types "there are two different types with the name Number" {
+    two_types "there are two different types with the name Number" [] {
         /// U
         u = input(&NUMBER) in v.half;
         /// W
         w = input(&OTHER_NUMBER) in v.half;
     }
-    two_units "there are two different units with the name 1" {
+    two_units "there are two different units with the name 1" [] {
         /// U
         u = input(&NUMBER) in v.half;
         /// W
         w = input(&OF_OTHER_ONE) in v.half;
     }
-    type_and_variable "Number is a variable and a type; rename one of them (section 2.2.3)" {
+    type_and_variable "Number is a variable and a type; rename one of them (section 2.2.3)" [] {
         /// U
         u as "Number" = input(&NUMBER) in v.half;
     }
 
     // References
-    two_times "there are two independent variables (section 2.2.7)" {
+    two_times "there are two independent variables (section 2.2.7)" [] {
         /// Time
         t = independent(&TIME);
         /// Time again
@@ -294,7 +232,7 @@ cases! {
         /// U
         u = input(&NUMBER) in v.half;
     }
-    two_derivatives "the state x has 2 derivatives among the variables" {
+    two_derivatives "the state x has 2 derivatives among the variables" [] {
         /// X
         x = output(&NUMBER).state() in v.half;
         /// A
@@ -302,24 +240,24 @@ cases! {
         /// B
         b = output(&NUMBER).derivative_of(x) by |toy| toy.v.half;
     }
-    own_derivative "y cannot be the derivative of y" {
+    own_derivative "y cannot be the derivative of y" [] {
         /// Y
         y = output(&NUMBER).derivative_of(y) by |toy| toy.v.half;
     }
-    of_a_count "y cannot be the derivative of n" {
+    of_a_count "y cannot be the derivative of n" [] {
         /// N
         n = parameter(&COUNT) in v.one;
         /// Y
         y = output(&NUMBER).derivative_of(n) by |toy| toy.v.half;
     }
     calculated_known "z depends on y, which is calculated or constant; name the inputs, states and parameters that it \
-                      follows from" {
+                      follows from" [] {
         /// Y
         y = output(&NUMBER) by |toy| toy.v.half;
         /// Z
         z = output(&NUMBER).depends_on(&[y]) by |toy| toy.v.half;
     }
-    named_twice "y names u twice among what it depends on" {
+    named_twice "y names u twice among what it depends on" [] {
         /// U
         u = input(&NUMBER) in v.half;
         /// Y

@@ -1,180 +1,352 @@
-//! Co-Simulation in either standard, for tests that run in both.
+//! What importers of either standard do with an instance, and what tests ask of it.
 
-use crate::Importer;
-use crate::fmi3::{self, references};
-use fmu_export::fmi3::reference;
-use fmu_export::fmi3::types::{fmi3False, fmi3True};
-use fmu_export::{Exported, Interface};
-use std::ffi::c_void;
+use crate::{Arguments, Message};
+use fmu_export::Mode::{self, *};
+use fmu_export::{Exported, Interface, Status};
+use std::ffi::{c_char, c_void};
+use std::ptr::null_mut;
 
-/// An instance as an importer of FMI 2.0 or FMI 3.0 holds it. All calls must succeed; variables are named by their
-/// places in the table.
-#[allow(clippy::missing_panics_doc, reason = "that is what they are for")]
+/// What an event has done: `fmi2EventInfo`, or what `fmi3UpdateDiscreteStates` says.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[allow(missing_docs, reason = "as in the standards: section 3.2.2 of FMI 2.0, 2.3.5 of FMI 3.0")]
+pub struct Updated {
+    pub again: bool,
+    pub terminate: bool,
+    pub nominals_changed: bool,
+    pub states_changed: bool,
+    pub next: Option<f64>,
+}
+
+/// The functions that differ in their names alone.
+macro_rules! same {
+    ($($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+) => {
+        $(#[allow(missing_docs, reason = "named like the functions")] fn $name(&self $(, $argument: $type)*) -> Status;)+
+    };
+}
+/// Hands the list of them on to another macro.
+macro_rules! same_functions {
+    ($with:ident) => {
+        $with! {
+            exit_initialization_mode fmi2ExitInitializationMode fmi3ExitInitializationMode ();
+            terminate fmi2Terminate fmi3Terminate ();
+            reset fmi2Reset fmi3Reset ();
+            get_state fmi2GetFMUstate fmi3GetFMUState (state: *mut *mut c_void);
+            set_state fmi2SetFMUstate fmi3SetFMUState (state: *mut c_void);
+            free_state fmi2FreeFMUstate fmi3FreeFMUState (state: *mut *mut c_void);
+            state_size fmi2SerializedFMUstateSize fmi3SerializedFMUStateSize (state: *mut c_void, size: *mut usize);
+            enter_event_mode fmi2EnterEventMode fmi3EnterEventMode ();
+            enter_continuous_time_mode fmi2EnterContinuousTimeMode fmi3EnterContinuousTimeMode ();
+            set_time fmi2SetTime fmi3SetTime (time: f64);
+            set_states fmi2SetContinuousStates fmi3SetContinuousStates (x: *const f64, count: usize);
+            get_states fmi2GetContinuousStates fmi3GetContinuousStates (x: *mut f64, count: usize);
+            get_derivatives fmi2GetDerivatives fmi3GetContinuousStateDerivatives (rates: *mut f64, count: usize);
+        }
+    };
+}
+pub(crate) use same_functions;
+
+/// An instance as an importer of FMI 2.0 or FMI 3.0 holds it. Variables are named by their places in the table.
+#[allow(clippy::missing_panics_doc, reason = "that is what the asserting ones are for")]
 pub trait Either: Send {
-    /// A new instance, initialized at time 0.
-    fn initialized<M: Exported>() -> Self
+    same_functions!(same);
+
+    /// Instantiates, with what a model in this program exports.
+    ///
+    /// # Errors
+    /// What was logged, if there is no instance.
+    fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>>
     where
-        Self: Sized,
-    {
-        Self::initialized_at::<M>(0.0)
-    }
+        Self: Sized;
+
+    /// No instance.
+    fn nothing<M: Exported>() -> Self
+    where
+        Self: Sized;
+
+    /// The names of the functions that work on an instance.
+    fn functions() -> &'static [&'static str]
+    where
+        Self: Sized;
+
+    /// The modes of an interface type but fatal, which needs a model that panics.
+    fn modes_of(interface: Interface) -> &'static [Mode]
+    where
+        Self: Sized;
+
+    /// Calls the function of this name, with zeros and NULL for arguments.
+    fn call_zeros(&self, name: &str) -> Status;
+
+    /// The messages since the last call of this.
+    fn take_log(&self) -> Vec<Message>;
+
+    /// Initialization mode.
+    fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status;
+
+    /// Reads Reals.
+    fn try_get(&self, places: &[u32], values: &mut [f64]) -> Status;
+
+    /// Sets up to 16 Reals.
+    fn try_set(&self, places: &[u32], values: &[f64]) -> Status;
+
+    /// Sets an Integer.
+    fn set_integer(&self, place: u32, value: i32) -> Status;
+
+    /// Sets a Boolean.
+    fn set_boolean(&self, place: u32, value: u8) -> Status;
+
+    /// Sets a String.
+    fn set_text(&self, place: u32, value: *const c_char) -> Status;
+
+    /// A step.
+    fn try_step(&self, point: f64, step_size: f64) -> Status;
+
+    /// A step to its end, which is the time of the FMU then, to the last bit; allocates nothing.
+    fn step(&self, point: f64, step_size: f64);
+
+    /// Sets the time derivatives of up to 8 inputs; FMI 3.0 has no function for it.
+    fn give_rates(&self, _places: &[u32], _values: &[f64]) {}
+
+    /// Reads the time derivative of a variable.
+    fn rate(&self, place: u32) -> f64;
+
+    /// Reads a partial derivative.
+    fn partial(&self, unknown: u32, known: u32) -> f64;
+
+    /// One round of the event iteration.
+    fn update(&self) -> Updated;
+
+    /// The end of a step of an integrator: whether there is an event, and whether the simulation ends.
+    fn completed_step(&self) -> [bool; 2];
+
+    /// Writes a saved state.
+    fn serialize_into(&self, state: *mut c_void, bytes: *mut u8, size: usize) -> Status;
+
+    /// Reads one.
+    fn deserialize(&self, bytes: *const u8, size: usize, state: *mut *mut c_void) -> Status;
 
     /// A new instance, initialized at this time.
     fn initialized_at<M: Exported>(start_time: f64) -> Self
     where
-        Self: Sized;
+        Self: Sized,
+    {
+        let fmu = Self::make::<M>(&Arguments::of::<M>(Interface::CoSimulation)).expect("an instance");
+        fmu.initialize(start_time);
+        fmu
+    }
 
-    /// Reads Reals.
-    fn read(&self, vr: &[u32], values: &mut [f64]);
+    /// A new instance, with event mode if it can, in this mode. Nothing that an importer does leads to "error", for refusals
+    /// leave the mode as it is; a saved state does.
+    fn in_mode<M: Exported>(interface: Interface, mode: Mode) -> Self
+    where
+        Self: Sized,
+    {
+        let fmu = Self::make::<M>(&Arguments::with_events::<M>(interface)).expect("an instance");
+        if mode == Instantiated {
+            return fmu;
+        }
+        fmu.enter_initialization(0.0, None);
+        if mode == Initialization {
+            return fmu;
+        }
+        fmu.ok(fmu.exit_initialization_mode());
+        match mode {
+            ContinuousTime => _ = fmu.enter_continuous_time(),
+            Terminated => fmu.ok(fmu.terminate()),
+            StepFailed | Error => fmu.restore(&crate::serialized::with_mode(fmu.bytes(), mode)),
+            StepComplete => fmu.leave_event_mode(),
+            _ => {}
+        }
+        fmu
+    }
 
-    /// Sets Reals.
-    fn write(&self, vr: &[u32], values: &[f64]);
+    /// To the first step, where an importer handles the events.
+    fn leave_event_mode(&self) {}
 
-    /// Sets a Boolean.
-    fn decide(&self, vr: u32, value: bool);
+    /// Calls each function, with zeros and NULL for arguments.
+    fn call_all(&self) -> Vec<(&'static str, Status)>
+    where
+        Self: Sized,
+    {
+        Self::functions().iter().map(|name| (*name, self.call_zeros(name))).collect()
+    }
 
-    /// A step to its end, which is the time of the FMU then, to the last bit.
-    fn advance(&self, point: f64, step_size: f64);
+    /// Asserts OK.
+    #[track_caller]
+    fn ok(&self, status: Status) {
+        assert_eq!(status, Status::Ok, "log: {:#?}", self.take_log());
+    }
 
-    /// Sets the time derivatives of up to 8 inputs; FMI 3.0 has no function for it.
-    fn write_rates(&self, _vr: &[u32], _values: &[f64]) {}
+    /// The promises about a refused call: an error, one clean message that names the function, and an instance that is as it
+    /// was. Returns the message.
+    #[track_caller]
+    fn refused(&self, label: &str, call: impl FnOnce(&Self) -> Status) -> String
+    where
+        Self: Sized,
+    {
+        let before = self.serialized();
+        self.take_log();
+        let status = call(self);
+        let log = self.take_log();
+        assert_eq!(status, Status::Error, "{label} is not refused");
+        let [message] = log.as_slice() else { panic!("{label}: one message expected, not {log:#?}") };
+        let said = (message.status, message.category.as_str());
+        assert_eq!(said, (Status::Error, "logStatusError"), "{label}");
+        message.assert_clean();
+        let prefix = &Self::functions()[0][..4];
+        assert!(message.text.starts_with(prefix), "{label}: which function? {}", message.text);
+        assert_eq!(before, self.serialized(), "{label} changed the instance");
+        self.take_log();
+        message.text.clone()
+    }
 
-    /// Reads the time derivative of a variable.
-    fn read_rate(&self, vr: u32) -> f64;
+    /// Refused, in these words.
+    #[track_caller]
+    fn refused_with(&self, words: &[&str], call: impl FnOnce(&Self) -> Status)
+    where
+        Self: Sized,
+    {
+        let message = self.refused(&words.join(", "), call);
+        words.iter().for_each(|word| assert!(message.contains(word), "'{word}' is not in: {message}"));
+    }
 
-    /// Reads a partial derivative.
-    fn read_partial(&self, unknown: u32, known: u32) -> f64;
-
-    /// Saves the state, into one that is there already unless the handle is NULL.
-    fn save_into(&self, state: &mut *mut c_void);
-
-    /// Goes back to a saved state.
-    fn go_back(&self, state: *mut c_void);
-
-    /// Frees a saved state.
-    fn free(&self, state: *mut c_void);
+    /// The state as bytes; `None` if the FMU does not serialize.
+    fn serialized(&self) -> Option<Vec<u8>> {
+        let mut state = null_mut();
+        if self.get_state(&mut state) != Status::Ok {
+            return None;
+        }
+        let (mut size, mut bytes) = (0, Vec::new());
+        let mut status = self.state_size(state, &mut size);
+        if status == Status::Ok {
+            bytes.resize(size, 0);
+            status = self.serialize_into(state, bytes.as_mut_ptr(), size);
+        }
+        self.forget(state);
+        (status == Status::Ok).then_some(bytes)
+    }
 
     /// The state as bytes.
-    fn to_bytes(&self) -> Vec<u8>;
-}
-
-impl Either for Importer {
-    fn initialized_at<M: Exported>(start_time: f64) -> Self {
-        let fmu = Self::of::<M>(Interface::CoSimulation);
-        fmu.initialize(start_time);
-        fmu
+    #[track_caller]
+    fn bytes(&self) -> Vec<u8> {
+        self.serialized().expect("the FMU serializes its state")
     }
 
-    fn read(&self, vr: &[u32], values: &mut [f64]) {
-        assert_eq!(vr.len(), values.len());
-        self.ok(self.fmi2GetReal(vr.as_ptr(), vr.len(), values.as_mut_ptr()));
+    /// De-serializing these bytes is refused, and the handle stays as it is; returns the message.
+    #[track_caller]
+    fn refused_bytes(&self, bytes: &[u8]) -> String
+    where
+        Self: Sized,
+    {
+        let mut state = null_mut();
+        let message =
+            self.refused("hostile bytes", |fmu| fmu.deserialize(bytes.as_ptr(), bytes.len(), &mut state));
+        assert!(state.is_null());
+        assert!(message[4..].to_lowercase().starts_with("deserializefmustate: "), "{message}");
+        message
     }
 
-    fn write(&self, vr: &[u32], values: &[f64]) {
-        self.set(vr, values);
-    }
-
-    fn decide(&self, vr: u32, value: bool) {
-        self.ok(self.fmi2SetBoolean(&vr, 1, &value.into()));
-    }
-
-    fn advance(&self, point: f64, step_size: f64) {
-        const LAST_SUCCESSFUL_TIME: i32 = 2;
-        self.step(point, step_size);
-        let mut time = f64::NAN;
-        self.ok(self.fmi2GetRealStatus(LAST_SUCCESSFUL_TIME, &mut time));
-        assert_eq!(time, point + step_size);
-    }
-
-    fn write_rates(&self, vr: &[u32], values: &[f64]) {
-        let orders = [1; 8];
-        assert!(vr.len() == values.len() && vr.len() <= orders.len());
-        let (vr, count) = (vr.as_ptr(), vr.len());
-        self.ok(self.fmi2SetRealInputDerivatives(vr, count, orders.as_ptr(), values.as_ptr()));
-    }
-
-    fn read_rate(&self, vr: u32) -> f64 {
-        let [rate] = self.rates([vr]);
-        rate
-    }
-
-    fn read_partial(&self, unknown: u32, known: u32) -> f64 {
-        let mut partial = f64::NAN;
-        self.ok(self.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, &mut partial));
-        partial
-    }
-
-    fn save_into(&self, state: &mut *mut c_void) {
-        self.ok(self.fmi2GetFMUstate(state));
-    }
-
-    fn go_back(&self, state: *mut c_void) {
-        self.ok(self.fmi2SetFMUstate(state));
-    }
-
-    fn free(&self, state: *mut c_void) {
+    /// Continues from a serialized state.
+    #[track_caller]
+    fn restore(&self, bytes: &[u8]) {
+        let mut state = null_mut();
+        self.ok(self.deserialize(bytes.as_ptr(), bytes.len(), &mut state));
+        self.ok(self.set_state(state));
         self.forget(state);
     }
 
-    fn to_bytes(&self) -> Vec<u8> {
-        self.bytes()
-    }
-}
-
-impl Either for fmi3::Importer {
-    fn initialized_at<M: Exported>(start_time: f64) -> Self {
-        let fmu = Self::of::<M>(Interface::CoSimulation);
-        fmu.initialize(start_time);
-        fmu
+    /// A new saved state.
+    #[track_caller]
+    fn save(&self) -> *mut c_void {
+        let mut state = null_mut();
+        self.ok(self.get_state(&mut state));
+        state
     }
 
-    fn read(&self, places: &[u32], values: &mut [f64]) {
-        let vr = references(places);
-        self.ok(self.fmi3GetFloat64(vr.as_ptr(), places.len(), values.as_mut_ptr(), values.len()));
+    /// Frees a saved state.
+    #[track_caller]
+    fn forget(&self, mut state: *mut c_void) {
+        self.ok(self.free_state(&mut state));
+        assert!(state.is_null(), "the handle is cleared");
     }
 
-    fn write(&self, places: &[u32], values: &[f64]) {
-        self.set(places, values);
+    /// From instantiated to initialization mode.
+    #[track_caller]
+    fn enter_initialization(&self, start_time: f64, stop_time: Option<f64>) {
+        self.ok(self.enter_initialization_mode(start_time, stop_time));
     }
 
-    fn decide(&self, place: u32, value: bool) {
-        let vr = reference(place);
-        self.ok(self.fmi3SetBoolean(&vr, 1, &if value { fmi3True } else { fmi3False }, 1));
+    /// From instantiated to the first communication point or to event mode.
+    #[track_caller]
+    fn initialize(&self, start_time: f64) {
+        self.enter_initialization(start_time, None);
+        self.ok(self.exit_initialization_mode());
     }
 
-    fn advance(&self, point: f64, step_size: f64) {
-        self.step(point, step_size);
+    /// From event mode on, with the event iteration; what the rounds have said, together.
+    #[track_caller]
+    fn enter_continuous_time(&self) -> Updated {
+        let mut all = Updated::default();
+        loop {
+            let now = self.update();
+            all = Updated {
+                again: false,
+                terminate: all.terminate | now.terminate,
+                nominals_changed: all.nominals_changed | now.nominals_changed,
+                states_changed: all.states_changed | now.states_changed,
+                next: now.next,
+            };
+            if !now.again {
+                self.ok(self.enter_continuous_time_mode());
+                return all;
+            }
+        }
     }
 
-    fn read_rate(&self, place: u32) -> f64 {
-        let mut rate = f64::NAN;
-        self.ok(self.fmi3GetOutputDerivatives(&reference(place), 1, &1, &mut rate, 1));
-        rate
+    /// Values of Reals.
+    #[track_caller]
+    fn read(&self, places: &[u32]) -> Vec<f64> {
+        let mut values = vec![f64::NAN; places.len()];
+        self.ok(self.try_get(places, &mut values));
+        values
     }
 
-    /// Backward and forward: of one with respect to one it is the same number.
-    fn read_partial(&self, unknown: u32, known: u32) -> f64 {
-        let [unknown, known] = [unknown, known].map(reference);
-        let (mut forward, mut adjoint) = (f64::NAN, f64::NAN);
-        self.ok(self.fmi3GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut forward, 1));
-        self.ok(self.fmi3GetAdjointDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut adjoint, 1));
-        assert_eq!(forward.to_bits(), adjoint.to_bits());
-        forward
+    /// Values of Reals.
+    #[track_caller]
+    fn get<const COUNT: usize>(&self, places: [u32; COUNT]) -> [f64; COUNT]
+    where
+        Self: Sized,
+    {
+        let mut values = [f64::NAN; COUNT];
+        self.ok(self.try_get(&places, &mut values));
+        values
     }
 
-    fn save_into(&self, state: &mut *mut c_void) {
-        self.ok(self.fmi3GetFMUState(state));
+    /// Sets Reals.
+    #[track_caller]
+    fn set(&self, places: &[u32], values: &[f64]) {
+        assert_eq!(places.len(), values.len());
+        self.ok(self.try_set(places, values));
     }
 
-    fn go_back(&self, state: *mut c_void) {
-        self.ok(self.fmi3SetFMUState(state));
+    /// All continuous states.
+    #[track_caller]
+    fn states<const COUNT: usize>(&self) -> [f64; COUNT]
+    where
+        Self: Sized,
+    {
+        let mut x = [f64::NAN; COUNT];
+        self.ok(self.get_states(x.as_mut_ptr(), COUNT));
+        x
     }
 
-    fn free(&self, state: *mut c_void) {
-        self.forget(state);
-    }
-
-    fn to_bytes(&self) -> Vec<u8> {
-        self.bytes()
+    /// The derivatives of all continuous states.
+    #[track_caller]
+    fn derivatives<const COUNT: usize>(&self) -> [f64; COUNT]
+    where
+        Self: Sized,
+    {
+        let mut rates = [f64::NAN; COUNT];
+        self.ok(self.get_derivatives(rates.as_mut_ptr(), COUNT));
+        rates
     }
 }

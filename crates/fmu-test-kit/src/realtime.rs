@@ -7,9 +7,14 @@
 //!   instruction, which no run shows, nor any sanitizer.
 //! * Built with `--cfg rtsan` and the RealtimeSanitizer, [`sanitizer`] marks where nothing may be called that can block.
 
+use crate::checks::{inputs, outputs, parameters, start_of};
+use crate::{Either, Importer, fmi3};
+use fmu_export::{BaseType, Exported};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::ffi::c_void;
 use std::path::Path;
+use std::ptr::null_mut;
 
 thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
@@ -56,6 +61,130 @@ pub fn allocations(work: impl FnOnce()) -> u64 {
     assert_eq!(start - before, 2, "allocations are counted");
     work();
     ALLOCATIONS.with(Cell::get) - start
+}
+
+/// The tests of a model whose sources are in this package: what runs in a control loop neither allocates nor enters the kernel nor
+/// locks. `make sanitize` runs the same loop under the RealtimeSanitizer.
+#[macro_export]
+macro_rules! control_loop {
+    ($model:ty) => {
+        #[global_allocator]
+        static COUNTING: $crate::realtime::Counting = $crate::realtime::Counting;
+
+        #[test]
+        fn the_loop_does_not_allocate() {
+            $crate::realtime::assert_no_allocation::<$model>();
+        }
+
+        /// Code that only sees its instance needs neither locks nor anything else that instances would share.
+        #[test]
+        fn the_library_has_nothing_to_lock() {
+            let sources = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+            let files = $crate::realtime::assert_nothing_to_lock(&sources);
+            assert!(files > 10, "{files} files");
+        }
+
+        /// The kernel ends the process at the first system call, so the loop runs in a copy of it.
+        #[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
+        #[test]
+        fn the_loop_makes_no_system_call() {
+            $crate::realtime::assert_no_system_call::<$model>();
+        }
+    };
+}
+
+/// A controller's turn: what masters call between two samples.
+struct Loop<F: Either> {
+    fmu: F,
+    state: *mut c_void,
+    time: f64,
+    inputs: Vec<u32>,
+    outputs: Vec<u32>,
+    /// What is set or was read.
+    values: [Vec<f64>; 2],
+    parameter: (u32, f64),
+    truths: Vec<u32>,
+}
+
+impl<F: Either> Loop<F> {
+    fn new<M: Exported>() -> Self {
+        let (fmu, inputs, outputs) = (F::initialized_at::<M>(0.0), inputs::<M>(), outputs::<M>());
+        let parameter = (0..).zip(M::TABLE).find_map(|(place, of)| Some((place, start_of(of)?)));
+        Self {
+            state: fmu.save(),
+            fmu,
+            time: 0.0,
+            values: [vec![0.0; inputs.len()], vec![0.0; outputs.len()]],
+            inputs,
+            outputs,
+            parameter: parameter.expect("a parameter"),
+            truths: parameters::<M>(BaseType::Boolean),
+        }
+    }
+
+    /// One step of size `h`, with a fresh state saved into an old one.
+    fn turn(&mut self, h: f64) {
+        let Self { fmu, state, time, values: [set, read], inputs, outputs, .. } = self;
+        set.iter_mut().zip(1_u8..).for_each(|(value, i)| *value = (*time * f64::from(i)).sin());
+        fmu.set(inputs, set);
+        fmu.give_rates(inputs, set);
+        fmu.step(*time, h);
+        fmu.ok(fmu.try_get(outputs, read));
+        fmu.ok(fmu.get_state(state));
+        *time += h;
+    }
+
+    /// What a master does less often: another parameter, another mode of working, back to a saved state, derivatives.
+    fn change(&self, factor: f64) {
+        let Self { fmu, parameter: (parameter, start), .. } = self;
+        fmu.set(&[*parameter], &[start * factor]);
+        self.truths.iter().for_each(|truth| fmu.ok(fmu.set_boolean(*truth, 1)));
+        fmu.ok(fmu.set_state(self.state));
+        self.outputs.iter().for_each(|output| _ = fmu.rate(*output));
+        fmu.partial(self.outputs[0], self.inputs[0]);
+    }
+
+    /// A thousand turns with one step size, a thousand with a new one each, changes in between. The largest step sizes
+    /// need what stiff models have for them.
+    fn run(&mut self) {
+        let _context = sanitizer::enter();
+        for i in 0..1000 {
+            self.turn(1e-3);
+            self.turn(1e-4 * f64::from(1 + i));
+            if i % 100 == 99 {
+                self.change(1.0 + 1e-4 * f64::from(i));
+            }
+        }
+    }
+}
+
+impl<F: Either> Drop for Loop<F> {
+    fn drop(&mut self) {
+        self.fmu.forget(std::mem::replace(&mut self.state, null_mut()));
+    }
+}
+
+/// Runs the loop of a model in both standards.
+///
+/// # Panics
+/// When it allocates.
+pub fn assert_no_allocation<M: Exported>() {
+    let (mut old, mut new) = (Loop::<Importer>::new::<M>(), Loop::<fmi3::Importer>::new::<M>());
+    assert_eq!([allocations(|| old.run()), allocations(|| new.run())], [0; 2]);
+}
+
+/// Runs the loop of a model in both standards.
+///
+/// # Panics
+/// When it makes a system call, or nobody would notice.
+#[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
+pub fn assert_no_system_call<M: Exported>() {
+    assert_eq!(without_kernel(&mut || ()), Ended::Exited(0));
+    let caught = without_kernel(&mut || drop(std::fs::metadata("/")));
+    assert_eq!(caught, Ended::Killed(libc::SIGSYS), "they are caught");
+    let (mut old, mut new) = (Loop::<Importer>::new::<M>(), Loop::<fmi3::Importer>::new::<M>());
+    assert_eq!(without_kernel(&mut || old.run()), Ended::Exited(0));
+    assert_eq!(without_kernel(&mut || new.run()), Ended::Exited(0));
 }
 
 /// Looks for locks and for anything else that instances would share in all files of a folder; returns their number.

@@ -1,10 +1,9 @@
 //! The samples as events: whoever handles them, the motors take the same path, bit for bit.
 
 use fmu_export::Interface::{CoSimulation, ModelExchange};
-use fmu_export::fmi2::types::{fmi2EventInfo, fmi2False, fmi2True};
-use fmu_export::fmi3::reference;
 use fmu_export::fmi3::types::{Status, fmi3Boolean, fmi3False, fmi3True};
-use fmu_test_kit::fmi3::{Arguments, Stepped, Updated};
+use fmu_test_kit::fmi3::Stepped;
+use fmu_test_kit::{Arguments, Either, Updated};
 use prw_controller::Controller;
 use prw_controller::variables::Name;
 
@@ -108,7 +107,7 @@ fn in_event_mode() {
                 early_return: samples_a_step > 1,
                 last_successful_time: next,
             };
-            assert_eq!(fmu.try_step(time, time_of(sample + samples_a_step) - time), Ok(stepped));
+            assert_eq!(fmu.do_step(time, time_of(sample + samples_a_step) - time), Ok(stepped));
             assert_eq!(bits(fmu.get(OUTPUTS)), bits(expected), "at {next}");
             fmu.ok(fmu.fmi3EnterEventMode());
         }
@@ -126,7 +125,7 @@ fn in_event_mode_with_samples_within_a_step() {
         unaware.set(&INPUTS, &inputs(time));
         fmu.update();
         fmu.ok(fmu.fmi3EnterStepMode());
-        assert!(fmu.try_step(time, next - time).unwrap().event_handling_needed);
+        assert!(fmu.do_step(time, next - time).unwrap().event_handling_needed);
         unaware.step(time, next - time);
         assert_eq!(bits(fmu.get(OUTPUTS)), bits(unaware.get(OUTPUTS)), "at {next}");
         fmu.ok(fmu.fmi3EnterEventMode());
@@ -141,11 +140,11 @@ fn too_many_samples_within_a_step() {
     fmu.update();
     fmu.ok(fmu.fmi3EnterStepMode());
     let before = (fmu.bytes(), bits(fmu.get(OUTPUTS)));
-    assert_eq!(fmu.try_step(START, 1000.0), Err(Status::Discard));
+    assert_eq!(fmu.do_step(START, 1000.0), Err(Status::Discard));
     let log = fmu.take_log();
     assert!(log[0].text.contains("more than 10000 events; make shorter steps"), "{log:?}");
     assert_eq!((fmu.bytes(), bits(fmu.get(OUTPUTS))), before);
-    assert!(fmu.try_step(START, 70.0).unwrap().event_handling_needed);
+    assert!(fmu.do_step(START, 70.0).unwrap().event_handling_needed);
 }
 
 /// Whoever does not handle the event that a step ended with has it handled by the next step.
@@ -158,60 +157,36 @@ fn an_event_that_nobody_handles() {
         let (time, next) = (time_of(sample), time_of(sample + 1));
         fmu.set(&INPUTS, &inputs(time));
         unaware.set(&INPUTS, &inputs(time));
-        assert!(fmu.try_step(time, next - time).unwrap().event_handling_needed);
+        assert!(fmu.do_step(time, next - time).unwrap().event_handling_needed);
         unaware.step(time, next - time);
         assert_eq!(bits(fmu.get(OUTPUTS)), bits(unaware.get(OUTPUTS)), "at {next}");
     }
 }
 
-const NOTHING_SAID: fmi2EventInfo = fmi2EventInfo {
-    new_discrete_states_needed: 9,
-    terminate_simulation: 9,
-    nominals_of_continuous_states_changed: 9,
-    values_of_continuous_states_changed: 9,
-    next_event_time_defined: 9,
-    next_event_time: f64::NAN,
-};
-
 #[test]
-fn in_model_exchange_of_fmi2() {
-    let fmu = fmu_test_kit::Importer::of::<Controller>(ModelExchange);
-    fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
-    fmu.initialize(START);
-    for (sample, expected) in (0..).zip(steps_of_fmi2()) {
-        let (time, next) = (time_of(sample), time_of(sample + 1));
-        fmu.set(&INPUTS, &inputs(time));
-        let mut said = NOTHING_SAID;
-        fmu.ok(fmu.fmi2NewDiscreteStates(&mut said));
-        assert_eq!((said.next_event_time_defined, said.next_event_time), (fmi2True, next));
-        assert_eq!((said.new_discrete_states_needed, said.terminate_simulation), (fmi2False, fmi2False));
-        fmu.ok(fmu.fmi2EnterContinuousTimeMode());
-        // A solver may look ahead and come back.
-        for share in [0.5, 1.0, 0.25, 1.0] {
-            fmu.ok(fmu.fmi2SetTime(time + share * PERIOD));
-            fmu.set(&INPUTS, &inputs(time + share * PERIOD));
-            if share == 1.0 {
-                assert_eq!(bits(fmu.get(OUTPUTS)), bits(expected), "at {next}");
+fn in_model_exchange() {
+    fn check<F: Either>() {
+        let fmu = F::make::<Controller>(&Arguments::of::<Controller>(ModelExchange)).unwrap();
+        fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
+        fmu.initialize(START);
+        for (sample, expected) in (0..).zip(steps_of_fmi2()) {
+            let (time, next) = (time_of(sample), time_of(sample + 1));
+            fmu.set(&INPUTS, &inputs(time));
+            assert_eq!(fmu.update(), Updated { next: Some(next), ..Updated::default() });
+            fmu.ok(fmu.enter_continuous_time_mode());
+            // A solver may look ahead and come back.
+            for share in [0.5, 1.0, 0.25, 1.0] {
+                fmu.ok(fmu.set_time(time + share * PERIOD));
+                fmu.set(&INPUTS, &inputs(time + share * PERIOD));
+                if share == 1.0 {
+                    assert_eq!(bits(fmu.get(OUTPUTS)), bits(expected), "at {next}");
+                }
             }
+            fmu.ok(fmu.enter_event_mode());
         }
-        fmu.ok(fmu.fmi2EnterEventMode());
     }
-}
-
-#[test]
-fn in_model_exchange_of_fmi3() {
-    let fmu = fmu_test_kit::fmi3::Importer::of::<Controller>(ModelExchange);
-    fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
-    fmu.initialize(START);
-    for (sample, expected) in (0..).zip(steps_of_fmi2()) {
-        let (time, next) = (time_of(sample), time_of(sample + 1));
-        fmu.set(&INPUTS, &inputs(time));
-        assert_eq!(fmu.update(), Updated { next: Some(next), ..Updated::default() });
-        fmu.ok(fmu.fmi3EnterContinuousTimeMode());
-        fmu.ok(fmu.fmi3SetTime(next));
-        assert_eq!(bits(fmu.get(OUTPUTS)), bits(expected), "at {next}");
-        fmu.ok(fmu.fmi3EnterEventMode());
-    }
+    check::<fmu_test_kit::Importer>();
+    check::<fmu_test_kit::fmi3::Importer>();
 }
 
 /// An importer that forgets the time events for hours is told so.
@@ -220,9 +195,7 @@ fn too_many_samples_at_once() {
     let fmu = fmu_test_kit::Importer::of::<Controller>(ModelExchange);
     fmu.initialize(0.0);
     fmu.ok(fmu.fmi2SetTime(1e6));
-    let mut said = NOTHING_SAID;
-    let message = fmu.refused("an hour of samples", |fmu| fmu.fmi2NewDiscreteStates(&mut said));
-    assert!(message.contains("sample_time"), "{message}");
+    fmu.refused_with(&["sample_time"], |fmu| fmu.fmi2NewDiscreteStates(&mut Default::default()));
 }
 
 /// Between samples the motors' motion is a function of the time, which FMI 3.0 counts among the knowns: its partial
@@ -248,17 +221,12 @@ fn partial_derivatives_by_the_time() {
         let (before, after) = (at(middle - WIDTH), at(middle + WIDTH));
         at(middle);
         for (place, unknown) in OUTPUTS.into_iter().enumerate() {
-            let unknown = reference(unknown);
-            let time = reference(fmu_export::fmi3::independent::<Controller>().0);
-            let (mut forward, mut adjoint) = (0.0, 0.0);
-            fmu.ok(fmu.fmi3GetDirectionalDerivative(&unknown, 1, &time, 1, &1.0, 1, &mut forward, 1));
-            fmu.ok(fmu.fmi3GetAdjointDerivative(&unknown, 1, &time, 1, &1.0, 1, &mut adjoint, 1));
+            let forward = fmu.partial(unknown, fmu_export::fmi3::independent::<Controller>().0);
             let difference = (after[place] - before[place]) / (2.0 * WIDTH);
             assert!(
                 (forward - difference).abs() <= 1e-9 * (1.0 + difference.abs()),
                 "{forward} {difference}"
             );
-            assert_eq!(forward, adjoint);
             moves[place] |= forward != 0.0;
         }
         fmu.ok(fmu.fmi3EnterEventMode());

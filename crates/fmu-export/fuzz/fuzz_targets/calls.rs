@@ -5,29 +5,30 @@
 #[path = "../../tests/toys/mod.rs"]
 mod toys;
 
-use fmu_test_kit::careless::{RunBytes, Tally, fmi3, run};
+use fmu_test_kit::careless::{RunBytes, Tally, run};
+use fmu_test_kit::{Importer, fmi3};
 use libfuzzer_sys::fuzz_target;
 use std::sync::atomic::{AtomicU64, Ordering};
 use toys::*;
 
 /// The toys in FMI 2.0, then in FMI 3.0. What is new goes to the end: the committed bytes count on the places.
 ///
-/// Any exported model can stand here: `run::<prw_testbed::TestbedFmu>` with that crate among the dependencies.
+/// Any exported model can stand here: `run::<Importer, prw_testbed::TestbedFmu>` with that crate among the dependencies.
 const MODELS: [RunBytes; 14] = [
-    run::<Oscillator>,
-    run::<Ball>,
-    run::<Counter>,
-    run::<Talker>,
-    run::<Sum>,
-    run::<Fuse>,
-    fmi3::run::<Oscillator>,
-    fmi3::run::<Ball>,
-    fmi3::run::<Counter>,
-    fmi3::run::<Talker>,
-    fmi3::run::<Sum>,
-    fmi3::run::<Fuse>,
-    fmi3::run::<Ticker>,
-    fmi3::run::<Palette>,
+    run::<Importer, Oscillator>,
+    run::<Importer, Ball>,
+    run::<Importer, Counter>,
+    run::<Importer, Talker>,
+    run::<Importer, Sum>,
+    run::<Importer, Fuse>,
+    run::<fmi3::Importer, Oscillator>,
+    run::<fmi3::Importer, Ball>,
+    run::<fmi3::Importer, Counter>,
+    run::<fmi3::Importer, Talker>,
+    run::<fmi3::Importer, Sum>,
+    run::<fmi3::Importer, Fuse>,
+    run::<fmi3::Importer, Ticker>,
+    run::<fmi3::Importer, Palette>,
 ];
 
 static CALLS: AtomicU64 = AtomicU64::new(0);

@@ -4,7 +4,7 @@
 use crate::toys::{Lazy, lazy::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::Status;
-use fmu_test_kit::Importer;
+use fmu_test_kit::{Either, Importer};
 
 const SUM: u32 = Name::sum as u32;
 const REAL: u32 = Name::real as u32;

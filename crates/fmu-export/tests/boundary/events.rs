@@ -1,13 +1,12 @@
 //! Model Exchange with events, called as a master with an integrator does it (section 3.2.2, and the pseudocode of
 //! section 3.2.4).
 
-use crate::modes::{enter_continuous_time, in_mode};
 use crate::toys::{Ball, Counter, Oscillator, ball, counter};
 use fmu_export::Exported;
 use fmu_export::Interface::ModelExchange;
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::*;
-use fmu_test_kit::Importer;
+use fmu_test_kit::{Either, Importer, Updated};
 
 /// A master of this size: Euler steps, halved as often as it takes to find a state event.
 struct Master {
@@ -16,7 +15,7 @@ struct Master {
     indicators: usize,
     time: f64,
     /// What the last events have said, together.
-    said: fmi2EventInfo,
+    said: Updated,
     /// When there were events, and which.
     events: Vec<(f64, &'static str)>,
 }
@@ -26,7 +25,7 @@ impl Master {
         let fmu = Importer::of::<M>(ModelExchange);
         prepare(&fmu);
         fmu.initialize(0.0);
-        let said = enter_continuous_time(&fmu);
+        let said = fmu.enter_continuous_time();
         let indicators = M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators);
         Self { fmu, states: M::STATES.len(), indicators, time: 0.0, said, events: Vec::new() }
     }
@@ -55,9 +54,7 @@ impl Master {
         let (start, x) = (self.time, self.states());
         let rates = self.vector(self.states, |rates, count| self.fmu.fmi2GetDerivatives(rates, count));
         let before = self.indicators();
-        let time_event = (self.said.next_event_time_defined == fmi2True
-            && self.said.next_event_time <= start + h)
-            .then_some(self.said.next_event_time);
+        let time_event = self.said.next.filter(|next| *next <= start + h);
         let end = time_event.unwrap_or(start + h);
         // Exact for the ball's velocity; its height gets the middle of both velocities.
         let at = |time: f64| -> Vec<f64> {
@@ -86,23 +83,22 @@ impl Master {
             self.go_to(reached, &at(reached));
         }
         self.time = reached;
-        let (mut asked, mut terminate) = (-1, -1);
-        self.fmu.ok(self.fmu.fmi2CompletedIntegratorStep(fmi2True, &mut asked, &mut terminate));
-        if terminate == fmi2True {
+        let [asked, terminate] = self.fmu.completed_step();
+        if terminate {
             return false;
         }
         let time_event = time_event == Some(reached);
-        if !state_event && !time_event && asked == fmi2False {
+        if !state_event && !time_event && !asked {
             return true;
         }
         self.fmu.ok(self.fmu.fmi2EnterEventMode());
-        self.said = enter_continuous_time(&self.fmu);
+        self.said = self.fmu.enter_continuous_time();
         // A ball that rises through the floor is no bounce: the sign changes, and nothing happens.
-        let happened = time_event || self.said.values_of_continuous_states_changed == fmi2True;
+        let happened = time_event || self.said.states_changed;
         if happened {
             self.events.push((reached, if time_event { "time" } else { "state" }));
         }
-        self.said.terminate_simulation == fmi2False
+        !self.said.terminate
     }
 }
 
@@ -113,12 +109,12 @@ fn state_events() {
     let mut master = Master::new::<Ball>(|_| ());
     let mut nominals = [0.0; 2];
     while master.step(0.05) {
-        if master.said.nominals_of_continuous_states_changed == fmi2True {
-            assert_eq!(master.said.values_of_continuous_states_changed, fmi2True);
+        if master.said.nominals_changed {
+            assert!(master.said.states_changed);
             let before = nominals[0];
             master.fmu.ok(master.fmu.fmi2GetNominalsOfContinuousStates(nominals.as_mut_ptr(), 2));
             assert!(nominals[0] > 0.0 && (before == 0.0 || nominals[0] <= before), "{nominals:?}");
-            master.said.nominals_of_continuous_states_changed = fmi2False;
+            master.said.nominals_changed = false;
         }
     }
     assert_eq!(master.events.len(), 5);
@@ -141,7 +137,7 @@ fn state_events() {
 /// After each step of the integrator the model is asked; it notices an event that was missed, and a ball that is lost.
 #[test]
 fn completed_steps() {
-    let fmu = in_mode::<Ball>(ModelExchange, ContinuousTime);
+    let fmu = Importer::in_mode::<Ball>(ModelExchange, ContinuousTime);
     for (x, expected) in
         [([1.0, -1.0], [0, 0]), ([-0.5, -1.0], [1, 0]), ([-0.5, 1.0], [0, 0]), ([-200.0, -1.0], [1, 1])]
     {
@@ -154,7 +150,7 @@ fn completed_steps() {
         }
     }
     // A model that does not want to know is not asked.
-    let fmu = in_mode::<Oscillator>(ModelExchange, ContinuousTime);
+    let fmu = Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime);
     let mut found = [-1; 2];
     let [event, terminate] = &mut found;
     fmu.ok(fmu.fmi2CompletedIntegratorStep(1, event, terminate));
@@ -180,7 +176,7 @@ fn time_events() {
     use counter::Name::*;
     for h in [0.01, 0.1, 1.0] {
         let mut master = Master::new::<Counter>(prepare_counter);
-        assert_eq!((master.said.next_event_time_defined, master.said.next_event_time), (1, 0.25));
+        assert_eq!(master.said.next, Some(0.25));
         while master.events.len() < 4 {
             assert!(master.step(h));
         }
@@ -200,10 +196,9 @@ fn event_iteration() {
     let fmu = Importer::of::<Counter>(ModelExchange);
     prepare_counter(&fmu);
     fmu.initialize(0.0);
-    let round = || {
-        let mut info = fmi2EventInfo::default();
-        fmu.ok(fmu.fmi2NewDiscreteStates(&mut info));
-        (info.new_discrete_states_needed, info.next_event_time, integers(&fmu, [counter::Name::count])[0])
+    let round = || -> (u8, f64, i32) {
+        let Updated { again, next, .. } = fmu.update();
+        (again.into(), next.unwrap(), integers(&fmu, [counter::Name::count])[0])
     };
     assert_eq!(round(), (0, 0.25, 0), "nothing is due at the begin");
     // Two periods later, both counts are due, the second one fills the count.
@@ -214,18 +209,6 @@ fn event_iteration() {
     assert_eq!(round(), (1, 0.75, 14));
     assert_eq!(round(), (0, 0.75, 4));
     assert_eq!(round(), (0, 0.75, 4), "an importer may ask once more");
-}
-
-/// An importer's own events, one after the other, and settling more than once.
-#[test]
-fn events_of_the_importer() {
-    let fmu = in_mode::<Oscillator>(ModelExchange, ContinuousTime);
-    for _ in 0..3 {
-        fmu.ok(fmu.fmi2EnterEventMode());
-        fmu.ok(fmu.fmi2EnterEventMode());
-        fmu.ok(fmu.fmi2NewDiscreteStates(&mut Default::default()));
-        assert_eq!(enter_continuous_time(&fmu), fmi2EventInfo::default(), "nothing happens at events");
-    }
 }
 
 /// A step that fails has counted nothing: the model tries on a copy, and an event that fails is undone by the crate.

@@ -3,7 +3,7 @@
 use crate::toys::{Talker, talker::Name};
 use crate::variables::texts;
 use fmu_export::Interface::CoSimulation;
-use fmu_test_kit::{Arguments, Importer};
+use fmu_test_kit::{Arguments, Either, Importer};
 use std::ffi::{CStr, CString};
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ fn talker(instance_name: &'static CStr, resource_location: Option<&CStr>) -> Imp
         resource_location,
         ..Arguments::of::<Talker>(CoSimulation)
     };
-    Importer::instantiate(fmu_export::fmi2::functions::<Talker>(), &arguments).unwrap()
+    Importer::try_with::<Talker>(&arguments).unwrap()
 }
 
 #[test]
@@ -112,8 +112,7 @@ fn resource_locations() {
 fn bad_resources() {
     let location = CString::new(resources("mute", "\n").to_str().unwrap()).unwrap();
     let arguments = Arguments { resource_location: Some(&location), ..Arguments::of::<Talker>(CoSimulation) };
-    let log = Importer::instantiate(fmu_export::fmi2::functions::<Talker>(), &arguments)
-        .expect_err("there is nothing to say");
+    let log = Importer::try_with::<Talker>(&arguments).expect_err("there is nothing to say");
     assert_eq!(log.len(), 1);
     assert_eq!(log[0].text, "fmi2Instantiate: resources/words.txt is empty");
 }
@@ -124,6 +123,6 @@ fn odd_instance_names() {
     for name in [c"wr\xffst", c"%d #r1#"] {
         let arguments =
             Arguments { instance_name: Some(name), logger: false, ..Arguments::of::<Talker>(CoSimulation) };
-        assert!(Importer::instantiate(fmu_export::fmi2::functions::<Talker>(), &arguments).is_ok());
+        assert!(Importer::try_with::<Talker>(&arguments).is_ok());
     }
 }

@@ -3,7 +3,7 @@
 use crate::toys::{Ball, Sum, sum::Name};
 use fmu_export::Exported;
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
-use fmu_test_kit::{Arguments, Importer};
+use fmu_test_kit::{Arguments, Either, Importer};
 
 const U: u32 = Name::u as u32;
 const Y: u32 = Name::y as u32;
@@ -31,7 +31,7 @@ fn what_it_has_works() {
 }
 
 fn refused_interface<M: Exported>(interface: Interface) -> String {
-    let log = Importer::instantiate(fmu_export::fmi2::functions::<M>(), &Arguments::of::<M>(interface));
+    let log = Importer::try_with::<M>(&Arguments::of::<M>(interface));
     let [message] = &log.expect_err("it has no such interface")[..] else { panic!("one message expected") };
     message.text.clone()
 }

@@ -7,14 +7,13 @@ use fmu_export::Exported;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::Status;
 use fmu_test_kit::serialized::{VALUES, with};
-use fmu_test_kit::testing::assert_clean;
-use fmu_test_kit::{Arguments, Importer, Message};
+use fmu_test_kit::{Arguments, Either, Importer, Message};
 use std::ffi::CStr;
 use std::ptr::{null, null_mut};
 
 fn logging<M: Exported>(logging_on: bool) -> Importer {
-    let arguments = Arguments { logging_on, ..Arguments::of::<M>(CoSimulation) };
-    Importer::instantiate(fmu_export::fmi2::functions::<M>(), &arguments).unwrap()
+    let arguments = Arguments { logging_on: logging_on.into(), ..Arguments::of::<M>(CoSimulation) };
+    Importer::try_with::<M>(&arguments).unwrap()
 }
 
 /// What is logged of an event, a warning, a discarded question and an error: O, W, D, E for their statuses.
@@ -29,7 +28,7 @@ fn shown(fmu: &Importer) -> String {
     assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);
     let log = fmu.take_log();
     log.iter().for_each(|message| {
-        assert_clean(message);
+        message.assert_clean();
         assert_eq!(message.instance_name, "instance");
         let category = match message.status {
             Status::Ok => "logEvents",
@@ -168,7 +167,7 @@ fn messages_of_a_model_that_fails() {
 fn instances_do_not_mix() {
     let fmus = [c"left", c"right"].map(|name| {
         let arguments = Arguments { instance_name: Some(name), ..Arguments::of::<Talker>(CoSimulation) };
-        Importer::instantiate(fmu_export::fmi2::functions::<Talker>(), &arguments).unwrap()
+        Importer::try_with::<Talker>(&arguments).unwrap()
     });
     for (fmu, name) in fmus.iter().zip(["left", "right"]) {
         assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);
@@ -181,8 +180,8 @@ fn instances_do_not_mix() {
 /// NULL as logger silences the FMU, nothing more. (NULL as memory callbacks is what all tests pass.)
 #[test]
 fn no_logger() {
-    let arguments = Arguments { logger: false, logging_on: true, ..Arguments::of::<Talker>(ModelExchange) };
-    let fmu = Importer::instantiate(fmu_export::fmi2::functions::<Talker>(), &arguments).unwrap();
+    let arguments = Arguments { logger: false, logging_on: 1, ..Arguments::of::<Talker>(ModelExchange) };
+    let fmu = Importer::try_with::<Talker>(&arguments).unwrap();
     fmu.initialize(0.0);
     assert_eq!(fmu.try_set(&[99], &[0.0]), Status::Error);
     assert_eq!(fmu.take_log(), []);

@@ -5,6 +5,8 @@
 #[path = "../toys/mod.rs"]
 mod toys;
 
+use fmu_export::{Exported, Interface};
+
 /// Runs a function for every toy.
 macro_rules! for_every_toy {
     ($function:ident($($argument:expr),*)) => {{
@@ -25,15 +27,28 @@ mod derivatives;
 mod early_steps;
 mod events;
 mod experiment;
-mod importers;
+mod fmi3;
 mod less;
 mod logging;
-mod modes;
 mod oscillation;
-mod random;
 mod refusals;
 mod saved_states;
 mod settable;
 mod start_values;
 mod tolerances;
 mod variables;
+
+const INTERFACES: [Interface; 2] = [Interface::CoSimulation, Interface::ModelExchange];
+
+/// Whether the model has an interface type.
+fn offers<M: Exported>(interface: Interface) -> bool {
+    match interface {
+        Interface::CoSimulation => M::CO_SIMULATION.is_some(),
+        Interface::ModelExchange => M::MODEL_EXCHANGE.is_some(),
+    }
+}
+
+/// Tests that every FMU with all capabilities passes.
+mod every {
+    fmu_test_kit::every_check!(crate::toys::Oscillator);
+}

@@ -1,10 +1,10 @@
 //! The same motion through both interface types, and against its formula.
 
-use crate::modes::{INTERFACES, enter_continuous_time, in_mode};
+use crate::INTERFACES;
 use crate::toys::{Oscillator, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
-use fmu_test_kit::Importer;
+use fmu_test_kit::{Either, Importer};
 
 const FORCE: u32 = Name::force as u32;
 const STATES: [u32; 2] = [Name::position as u32, Name::velocity as u32];
@@ -51,7 +51,7 @@ fn co_simulation_is_model_exchange_integrated() {
     let force = |t: f64| 3.0 - 2.0 * t;
     let model = Importer::of::<Oscillator>(ModelExchange);
     model.initialize(0.0);
-    enter_continuous_time(&model);
+    model.enter_continuous_time();
     let slope = |t: f64, x: [f64; 2]| {
         model.ok(model.fmi2SetTime(t));
         model.set(&[FORCE], &[force(t)]);
@@ -86,7 +86,7 @@ fn co_simulation_is_model_exchange_integrated() {
 /// A slope counts for the next step, and for that one only; orders that the model has no use for change nothing.
 #[test]
 fn input_derivatives() {
-    let [once, never, rich] = [(); 3].map(|()| in_mode::<Oscillator>(CoSimulation, StepComplete));
+    let [once, never, rich] = [(); 3].map(|()| Importer::in_mode::<Oscillator>(CoSimulation, StepComplete));
     once.set_rates([FORCE], [5.0]);
     rich.set_rates([FORCE], [5.0]);
     let orders = [2, 7, i32::MAX];
@@ -107,7 +107,7 @@ fn input_derivatives() {
 #[test]
 fn derivatives_of_the_initialization_are_used() {
     let [with, without] = [true, false].map(|given| {
-        let fmu = in_mode::<Oscillator>(CoSimulation, Initialization);
+        let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Initialization);
         if given {
             fmu.set_rates([FORCE], [2.0]);
         }
@@ -121,7 +121,7 @@ fn derivatives_of_the_initialization_are_used() {
 /// An input that is held between points at rest keeps everything at rest, to the last bit.
 #[test]
 fn waiting_at_rest() {
-    let fmu = in_mode::<Oscillator>(CoSimulation, StepComplete);
+    let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
     let mut time = 0.0;
     for i in 1..100 {
         fmu.step(time, 1e-3 * f64::from(i));
@@ -133,12 +133,12 @@ fn waiting_at_rest() {
 #[test]
 fn start_values_are_the_first_states() {
     for interface in INTERFACES {
-        let fmu = in_mode::<Oscillator>(interface, Instantiated);
+        let fmu = Importer::in_mode::<Oscillator>(interface, Instantiated);
         fmu.set(&STATES, &[0.1, 0.2]);
         fmu.initialize(0.0);
         assert_eq!(fmu.get(STATES), [0.1, 0.2]);
         if interface == ModelExchange {
-            enter_continuous_time(&fmu);
+            fmu.enter_continuous_time();
             assert_eq!(states(&fmu), [0.1, 0.2]);
         }
     }
@@ -147,7 +147,7 @@ fn start_values_are_the_first_states() {
 /// From the types, before anything else is known.
 #[test]
 fn nominals() {
-    let fmu = in_mode::<Oscillator>(ModelExchange, Instantiated);
+    let fmu = Importer::in_mode::<Oscillator>(ModelExchange, Instantiated);
     let mut nominals = [f64::NAN; 2];
     fmu.ok(fmu.fmi2GetNominalsOfContinuousStates(nominals.as_mut_ptr(), 2));
     assert_eq!(nominals, [0.1, 0.5]);
@@ -156,7 +156,7 @@ fn nominals() {
 /// A state can be set as variable or among all, with the same effect.
 #[test]
 fn both_ways_to_set_a_state() {
-    let fmu = in_mode::<Oscillator>(ModelExchange, ContinuousTime);
+    let fmu = Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime);
     set_states(&fmu, [0.0, 0.25]);
     let by_array = (states(&fmu), rates(&fmu));
     set_states(&fmu, [0.0; 2]);

@@ -1,13 +1,14 @@
 //! Which variable can be set when (footnotes 1, 3, 4, 5 and 6 of sections 3.2.3 and 4.2.4), for every variable in every
 //! state.
 
-use crate::modes::{in_mode, modes_of_model, offers};
 use crate::toys::*;
+use crate::{INTERFACES, offers};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
 use fmu_export::fmi2::types::Status;
 use fmu_export::{BaseType, Causality, Exported, Initial, Variability, Variable};
-use fmu_test_kit::Importer;
+use fmu_test_kit::checks::modes_of_model;
+use fmu_test_kit::{Either, Importer};
 use std::ffi::CStr;
 use std::ptr::null;
 
@@ -47,8 +48,9 @@ fn check_by_hand<M: Exported>(rows: &[(&str, &str, &str)]) {
         let mut variables = M::TABLE.iter();
         let variable = variables.find(|variable| variable.name() == *name).expect(name);
         for (interface, letters) in [(CoSimulation, co_simulation), (ModelExchange, model_exchange)] {
-            let found: String = crate::modes::modes_of(interface)
-                .into_iter()
+            let found: String = Importer::modes_of(interface)
+                .iter()
+                .copied()
                 .zip(if interface == CoSimulation { "INCFTE".chars() } else { "INMKTE".chars() })
                 .filter_map(|(mode, letter)| accepted(variable, interface, mode).then_some(letter))
                 .collect();
@@ -116,8 +118,8 @@ fn every_variable_in_every_state() {
 }
 
 fn check_every_variable<M: Exported>() {
-    for (interface, mode) in modes_of_model::<M>() {
-        let fmu = in_mode::<M>(interface, mode);
+    for (interface, mode) in modes_of_model::<Importer, M>() {
+        let fmu = Importer::in_mode::<M>(interface, mode);
         for (vr, variable) in (0..).zip(M::TABLE) {
             let base = variable.base();
             let label = format!("{} in state '{mode}' of {interface}", variable.name());
@@ -141,8 +143,8 @@ fn values_are_read_back() {
 }
 
 fn check_values<M: Exported>() {
-    for interface in crate::modes::INTERFACES.into_iter().filter(|interface| offers::<M>(*interface)) {
-        let fmu = in_mode::<M>(interface, Initialization);
+    for interface in INTERFACES.into_iter().filter(|interface| offers::<M>(*interface)) {
+        let fmu = Importer::in_mode::<M>(interface, Initialization);
         let settable =
             || (0..).zip(M::TABLE).filter(|(_, variable)| accepted(variable, interface, Initialization));
         for (vr, variable) in settable() {

@@ -1,91 +1,73 @@
 //! Start values: those that are refused are not forgotten, because some importers (fmi-sim, OMSimulator) go on after a
 //! refusal; those of states may be the model's to calculate.
 
-use crate::modes::{INTERFACES, enter_continuous_time, in_mode};
+use crate::INTERFACES;
 use crate::toys::{Balance, Oscillator, Talker, balance, oscillator::Name, talker};
-use fmu_export::Interface::{self, CoSimulation, ModelExchange};
-use fmu_export::Mode::*;
+use fmu_export::Interface::{CoSimulation, ModelExchange};
+use fmu_export::Mode::{self, *};
 use fmu_export::fmi2::types::Status;
-use fmu_test_kit::Importer;
+use fmu_test_kit::{Either, Importer, fmi3};
 use std::ptr::null;
 
 const MASS: u32 = Name::mass as u32;
 const STIFFNESS: u32 = Name::stiffness as u32;
 
 /// The end of the mode that an instance is in.
-fn go_on(fmu: &Importer, instantiated: bool) -> Status {
-    if instantiated { fmu.fmi2EnterInitializationMode() } else { fmu.fmi2ExitInitializationMode() }
-}
-
-/// Refuses a start value by `wrong`, then the end of the mode with the same words until `right` is done.
-#[track_caller]
-fn is_remembered(fmu: &Importer, wrong: impl Fn(&Importer) -> Status, right: impl Fn(&Importer)) {
-    let instantiated = fmu.fmi2GetReal(&MASS, 1, &mut 0.0) != Status::Ok;
-    fmu.take_log();
-    let first = fmu.refused("a start value", &wrong);
-    for _ in 0..2 {
-        let again = fmu.refused("the end of the mode", |fmu| go_on(fmu, instantiated));
-        assert_eq!(again.split_once(": ").unwrap().1, first.split_once(": ").unwrap().1);
+fn go_on<F: Either>(fmu: &F, mode: Mode) -> Status {
+    if mode == Instantiated {
+        fmu.enter_initialization_mode(0.0, None)
+    } else {
+        fmu.exit_initialization_mode()
     }
-    right(fmu);
-    fmu.ok(go_on(fmu, instantiated));
 }
 
-/// An instance in one of the modes in which start values are set.
-fn starting(interface: Interface) -> impl Iterator<Item = Importer> {
-    [Instantiated, Initialization].into_iter().map(move |mode| in_mode::<Oscillator>(interface, mode))
+/// In each mode in which start values are set: refuses a start value by `wrong`, then the end of the mode with the same words
+/// until `right` is done.
+#[track_caller]
+fn is_remembered<F: Either>(wrong: impl Fn(&F) -> Status, right: impl Fn(&F) -> Status) {
+    for (interface, mode) in INTERFACES.into_iter().flat_map(|i| [(i, Instantiated), (i, Initialization)]) {
+        let fmu = F::in_mode::<Oscillator>(interface, mode);
+        let first = fmu.refused("a start value", &wrong);
+        for _ in 0..2 {
+            let again = fmu.refused("the end of the mode", |fmu| go_on(fmu, mode));
+            assert_eq!(again.split_once(": ").unwrap().1, first.split_once(": ").unwrap().1);
+        }
+        fmu.ok(right(&fmu));
+        fmu.ok(go_on(&fmu, mode));
+    }
 }
 
 #[test]
 fn a_refused_start_value_is_remembered() {
-    for interface in INTERFACES {
-        for fmu in starting(interface) {
-            is_remembered(&fmu, |fmu| fmu.try_set(&[MASS], &[-1.0]), |fmu| fmu.set(&[MASS], &[3.0]));
-        }
-        for fmu in starting(interface) {
-            is_remembered(
-                &fmu,
-                |fmu| fmu.try_set(&[Name::force as u32], &[f64::NAN]),
-                |fmu| {
-                    fmu.set(&[Name::force as u32], &[0.0]);
-                },
-            );
-        }
-        for fmu in starting(interface) {
-            let springs =
-                |number: i32| move |fmu: &Importer| fmu.fmi2SetInteger(&(Name::springs as u32), 1, &number);
-            is_remembered(&fmu, springs(10), |fmu| fmu.ok(springs(9)(fmu)));
-        }
-        for fmu in starting(interface) {
-            let damped =
-                |value: i32| move |fmu: &Importer| fmu.fmi2SetBoolean(&(Name::damped as u32), 1, &value);
-            is_remembered(&fmu, damped(2), |fmu| fmu.ok(damped(1)(fmu)));
-        }
+    fn check<F: Either>() {
+        let [force, springs, damped, damping] =
+            [Name::force, Name::springs, Name::damped, Name::damping].map(|name| name as u32);
+        is_remembered::<F>(|fmu| fmu.try_set(&[MASS], &[-1.0]), |fmu| fmu.try_set(&[MASS], &[3.0]));
+        is_remembered::<F>(|fmu| fmu.try_set(&[force], &[f64::NAN]), |fmu| fmu.try_set(&[force], &[0.0]));
+        is_remembered::<F>(|fmu| fmu.set_integer(springs, 10), |fmu| fmu.set_integer(springs, 9));
+        is_remembered::<F>(|fmu| fmu.set_boolean(damped, 2), |fmu| fmu.set_boolean(damped, 1));
         // What the model itself refuses.
-        for fmu in starting(interface) {
-            let damping = Name::damping as u32;
-            is_remembered(&fmu, |fmu| fmu.try_set(&[damping], &[1e6]), |fmu| fmu.set(&[damping], &[0.0]));
+        is_remembered::<F>(|fmu| fmu.try_set(&[damping], &[1e6]), |fmu| fmu.try_set(&[damping], &[0.0]));
+        for mode in [Instantiated, Initialization] {
+            let fmu = F::in_mode::<Talker>(CoSimulation, mode);
+            let greet = |text| fmu.set_text(talker::Name::greeting as u32, text);
+            for text in [null(), c"\xff".as_ptr()] {
+                assert_eq!(greet(text), Status::Error);
+            }
+            fmu.take_log();
+            fmu.refused_with(&["the text for greeting"], |fmu| go_on(fmu, mode));
+            fmu.ok(greet(c"Good morning".as_ptr()));
+            fmu.ok(go_on(&fmu, mode));
         }
     }
-    for mode in [Instantiated, Initialization] {
-        let fmu = in_mode::<Talker>(CoSimulation, mode);
-        let greet =
-            |text: *const std::ffi::c_char| fmu.fmi2SetString(&(talker::Name::greeting as u32), 1, &text);
-        for text in [null(), c"\xff".as_ptr()] {
-            assert_eq!(greet(text), Status::Error);
-        }
-        fmu.take_log();
-        let message = fmu.refused("the end of the mode", |fmu| go_on(fmu, mode == Instantiated));
-        assert!(message.contains("the text for greeting"), "{message}");
-        fmu.ok(greet(c"Good morning".as_ptr()));
-        fmu.ok(go_on(&fmu, mode == Instantiated));
-    }
+    check::<Importer>();
+    check::<fmi3::Importer>();
 }
 
 /// Nothing of a call that is refused has been set, so each of its variables is to be set again.
 #[test]
 fn every_variable_of_a_refused_call() {
-    let fmu = in_mode::<Oscillator>(CoSimulation, Instantiated);
+    let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
     let enter = |fmu: &Importer| fmu.refused("the start", |fmu| fmu.fmi2EnterInitializationMode());
     let of_mass = "mass must not be below 0.001, it is -1";
     let of_stiffness = "stiffness was not set, because mass in the same call was refused: set it again";
@@ -100,7 +82,7 @@ fn every_variable_of_a_refused_call() {
 /// What several values are to blame for together is said once.
 #[test]
 fn values_that_do_not_fit_together() {
-    let fmu = in_mode::<Oscillator>(CoSimulation, Instantiated);
+    let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
     assert_eq!(fmu.try_set(&[MASS, Name::damping as u32], &[1.0, 1e6]), Status::Error);
     let message = fmu.refused("the start", |fmu| fmu.fmi2EnterInitializationMode());
     assert_eq!(message.matches("nothing oscillates").count(), 1, "{message}");
@@ -108,7 +90,7 @@ fn values_that_do_not_fit_together() {
 
 #[test]
 fn reset_and_restored_states_begin_anew() {
-    let fmu = in_mode::<Oscillator>(CoSimulation, Initialization);
+    let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Initialization);
     let (state, bytes) = (fmu.save(), fmu.bytes());
     let ways: [&dyn Fn(); 3] = [&|| fmu.ok(fmu.fmi2SetFMUstate(state)), &|| fmu.restore(&bytes), &|| {
         fmu.ok(fmu.fmi2Reset());
@@ -128,7 +110,7 @@ fn reset_and_restored_states_begin_anew() {
 #[test]
 fn probing_has_no_consequences() {
     for interface in INTERFACES {
-        let fmu = in_mode::<Oscillator>(interface, Instantiated);
+        let fmu = Importer::in_mode::<Oscillator>(interface, Instantiated);
         for status in [
             fmu.fmi2GetReal(&MASS, 1, &mut 0.0),
             fmu.try_set(&[Name::energy as u32], &[1.0]),
@@ -172,13 +154,13 @@ fn calculated_start() {
         assert_eq!(fmu.get([STRETCH]), [4.0]);
         match interface {
             CoSimulation => fmu.step(0.0, 0.1),
-            ModelExchange => _ = enter_continuous_time(&fmu),
+            ModelExchange => _ = fmu.enter_continuous_time(),
         }
         fmu.set(&[LOAD], &[0.0]);
         assert_eq!(fmu.get([STRETCH]), [4.0], "{interface}");
     }
     // OpenModelica sets states while still in event mode.
-    let fmu = in_mode::<Balance>(ModelExchange, Event);
+    let fmu = Importer::in_mode::<Balance>(ModelExchange, Event);
     fmu.ok(fmu.fmi2SetContinuousStates(&7.0, 1));
     fmu.set(&[LOAD], &[8.0]);
     assert_eq!(fmu.get([STRETCH]), [7.0]);

@@ -1,13 +1,12 @@
 //! What real masters do outside the standard, or at its edges, and what works all the same.
 
-use crate::modes::{INTERFACES, in_mode};
+use crate::INTERFACES;
 use crate::toys::{Oscillator, Sum, oscillator::Name};
 use fmu_export::Exported;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::{Status, fmi2False};
-use fmu_test_kit::either::Either;
-use fmu_test_kit::{Importer, fmi3};
+use fmu_test_kit::{Either, Importer, fmi3};
 use std::ops::Range;
 
 const FORCE: u32 = Name::force as u32;
@@ -18,7 +17,7 @@ const ACCELERATION: u32 = Name::der_velocity as u32;
 #[test]
 fn inputs_before_the_initialization() {
     for interface in INTERFACES {
-        let fmu = in_mode::<Oscillator>(interface, Instantiated);
+        let fmu = Importer::in_mode::<Oscillator>(interface, Instantiated);
         fmu.set(&[FORCE], &[0.1]);
         fmu.initialize(0.0);
         assert_eq!(fmu.get([FORCE, ACCELERATION]), [0.1, 0.05]);
@@ -29,7 +28,7 @@ fn inputs_before_the_initialization() {
 /// what depends on the input directly follows it at once.
 #[test]
 fn get_after_set_without_a_step() {
-    let fmu = in_mode::<Oscillator>(CoSimulation, StepComplete);
+    let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
     fmu.step(0.0, 0.01);
     let [position, acceleration] = fmu.get([POSITION, ACCELERATION]);
     fmu.set(&[FORCE], &[0.1]);
@@ -42,8 +41,8 @@ fn get_after_set_without_a_step() {
 #[test]
 fn parameters_after_the_initialization() {
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, Event)] {
-        let early = in_mode::<Oscillator>(interface, Initialization);
-        let late = in_mode::<Oscillator>(interface, mode);
+        let early = Importer::in_mode::<Oscillator>(interface, Initialization);
+        let late = Importer::in_mode::<Oscillator>(interface, mode);
         for fmu in [&early, &late] {
             fmu.set(&[Name::mass as u32, FORCE], &[4.0, 0.1]);
             fmu.ok(fmu.fmi2SetInteger(&(Name::springs as u32), 1, &2));
@@ -59,7 +58,7 @@ fn parameters_after_the_initialization() {
 #[test]
 fn terminate_after_an_error() {
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, ContinuousTime)] {
-        let fmu = in_mode::<Oscillator>(interface, mode);
+        let fmu = Importer::in_mode::<Oscillator>(interface, mode);
         fmu.refused("an unknown variable", |fmu| fmu.try_set(&[99], &[0.0]));
         fmu.ok(fmu.fmi2Terminate());
         fmu.get([POSITION]);
@@ -71,7 +70,7 @@ fn terminate_after_an_error() {
 /// A rejected step can be repeated with better arguments.
 #[test]
 fn a_step_after_a_refused_one() {
-    let fmu = in_mode::<Oscillator>(CoSimulation, StepComplete);
+    let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
     fmu.refused("a step backwards", |fmu| fmu.try_step(0.0, -0.1));
     fmu.step(0.0, 0.1);
     fmu.step(0.1, 0.1);
@@ -169,8 +168,8 @@ fn run<F: Either>(range: Range<u64>, mut sum: f64) -> f64 {
     let multiplying = F::initialized_at::<Sum>(range.start as f64 * H);
     let adding = F::initialized_at::<Sum>(sum);
     for step in range {
-        multiplying.advance(step as f64 * H, H);
-        adding.advance(sum, H);
+        multiplying.step(step as f64 * H, H);
+        adding.step(sum, H);
         sum += H;
     }
     sum

@@ -1,12 +1,5 @@
 //! A capability that is named is implemented.
-use fmu_export::*;
-
-#[derive(Clone)]
-pub struct Toy {
-    u: f64,
-    x: f64,
-    n: i32,
-}
+include!("toy/fields.rs");
 
 variables! { for Toy;
     /// In
@@ -22,5 +15,3 @@ impl Model for Toy {
 }
 
 offer!(Toy: CoSimulation);
-
-fn main() {}

@@ -1,32 +1,4 @@
 //! There are five capabilities.
-use fmu_export::*;
-
-#[derive(Clone)]
-pub struct Toy {
-    u: f64,
-    x: f64,
-    n: i32,
-}
-
-variables! { for Toy;
-    /// In
-    u = input(&NUMBER) in u;
-}
-
-impl Model for Toy {
-    const INFO: Info = info!("Toy", "toy");
-
-    fn new(_: &Setup) -> Result<Self, Error> {
-        Ok(Self { u: 0.0, x: 0.0, n: 0 })
-    }
-}
-
-impl CoSimulation for Toy {
-    fn step(&mut self, _: Step) -> Result<Stepped, Error> {
-        Ok(Stepped::Done)
-    }
-}
+include!("toy/model.rs");
 
 offer!(Toy: CoSimulation + Magic);
-
-fn main() {}

@@ -1,15 +1,6 @@
 //! Users read what a variable is.
-use fmu_export::*;
-
-#[derive(Clone)]
-pub struct Toy {
-    u: f64,
-    x: f64,
-    n: i32,
-}
+include!("toy/fields.rs");
 
 variables! { for Toy;
     u = input(&NUMBER) in u;
 }
-
-fn main() {}

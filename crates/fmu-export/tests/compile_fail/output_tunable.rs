@@ -1,16 +1,7 @@
 //! An output is no parameter (section 2.2.7).
-use fmu_export::*;
-
-#[derive(Clone)]
-pub struct Toy {
-    u: f64,
-    x: f64,
-    n: i32,
-}
+include!("toy/fields.rs");
 
 variables! { for Toy;
     /// An output
     y = output(&NUMBER).tunable() in x;
 }
-
-fn main() {}

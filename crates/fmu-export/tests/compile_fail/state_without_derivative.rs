@@ -1,12 +1,5 @@
 //! Every state has a derivative.
-use fmu_export::*;
-
-#[derive(Clone)]
-pub struct Toy {
-    u: f64,
-    x: f64,
-    n: i32,
-}
+include!("toy/fields.rs");
 
 variables! { for Toy;
     /// A state with one
@@ -16,5 +9,3 @@ variables! { for Toy;
     /// A state without
     x = output(&NUMBER).state() in x;
 }
-
-fn main() {}

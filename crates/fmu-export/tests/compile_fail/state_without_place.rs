@@ -1,12 +1,5 @@
 //! A state lives somewhere.
-use fmu_export::*;
-
-#[derive(Clone)]
-pub struct Toy {
-    u: f64,
-    x: f64,
-    n: i32,
-}
+include!("toy/fields.rs");
 
 variables! { for Toy;
     /// A state
@@ -14,5 +7,3 @@ variables! { for Toy;
     /// Its rate
     dx = local(&NUMBER).derivative_of(x) by |toy| toy.u;
 }
-
-fn main() {}

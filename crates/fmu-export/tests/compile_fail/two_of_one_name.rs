@@ -1,12 +1,5 @@
 //! Names are unique.
-use fmu_export::*;
-
-#[derive(Clone)]
-pub struct Toy {
-    u: f64,
-    x: f64,
-    n: i32,
-}
+include!("toy/fields.rs");
 
 variables! { for Toy;
     /// An input
@@ -14,5 +7,3 @@ variables! { for Toy;
     /// Another
     u = input(&NUMBER) in x;
 }
-
-fn main() {}

@@ -1,16 +1,7 @@
 //! An Integer lives in an i32.
-use fmu_export::*;
-
-#[derive(Clone)]
-pub struct Toy {
-    u: f64,
-    x: f64,
-    n: i32,
-}
+include!("toy/fields.rs");
 
 variables! { for Toy;
     /// An output
     y = output(&INTEGER) in x;
 }
-
-fn main() {}

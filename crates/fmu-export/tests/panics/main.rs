@@ -5,16 +5,12 @@
 #[path = "../toys/mod.rs"]
 mod toys;
 
-mod fmi2;
-mod fmi3;
+mod calls;
 
+use calls::{Case, Special, of_both, set_fault};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Status;
-use fmu_export::fmi3::reference;
-use fmu_test_kit::Message;
-use fmu_test_kit::testing::assert_clean;
-use fmu_test_kit::{self as old, fmi3 as new};
-use std::ffi::c_void;
+use fmu_test_kit::{Arguments, Either, Importer, fmi3};
 use toys::Faulty;
 use toys::faulty::{Fault, Name, while_all_break};
 
@@ -25,114 +21,27 @@ const TRUTH: u32 = Name::truth as u32;
 const TEXT: u32 = Name::text as u32;
 const FAULT: u32 = Name::fault as u32;
 
-/// A call that breaks an instance of this interface type with this fault, and its name.
-type Case<F> = (Interface, &'static str, Fault, fn(&F) -> Status);
-
-/// What both standards have under different names.
-trait Standard: Sized + 'static {
-    /// Every function that runs a model's code.
-    const CALLS: &'static [Case<Self>];
-    /// How many functions work on an instance.
-    const FUNCTIONS: usize;
-    const PREFIX: &'static str;
-
-    fn try_new(interface: Interface) -> Result<Self, Vec<Message>>;
-    fn set_fault(&self, fault: Fault) -> Status;
-    fn enter_initialization_mode(&self) -> Status;
-    fn enter_continuous_time_mode(&self) -> Status;
-    fn start(&self);
-    fn go_on(&self);
-    fn reset(&self) -> Status;
-    fn y(&self) -> f64;
-    fn messages(&self) -> Vec<Message>;
-    fn with_zeros(&self) -> Vec<(&'static str, Status)>;
-    fn saved(&self) -> *mut c_void;
-
-    fn new(interface: Interface) -> Self {
-        Self::try_new(interface).expect("an instance")
-    }
+fn new<F: Either>(interface: Interface) -> F {
+    F::make::<Faulty>(&Arguments::of::<Faulty>(interface)).expect("an instance")
 }
 
-macro_rules! standard {
-    (
-        $importer:ident of $module:ident, $standard:ident, $calls:path, $functions:literal, $prefix:literal, |$fmu:ident, $fault:ident|
-        $set_fault:expr, $initialize:expr, $continuous:ident, $reset:ident
-    ) => {
-        impl Standard for $module::$importer {
-            const CALLS: &'static [Case<Self>] = $calls;
-            const FUNCTIONS: usize = $functions;
-            const PREFIX: &'static str = $prefix;
-
-            fn try_new(interface: Interface) -> Result<Self, Vec<Message>> {
-                Self::instantiate(
-                    fmu_export::$standard::functions::<Faulty>(),
-                    &$module::Arguments::of::<Faulty>(interface),
-                )
-            }
-            fn set_fault(&self, $fault: Fault) -> Status {
-                let $fmu = self;
-                $set_fault
-            }
-            fn enter_initialization_mode(&self) -> Status {
-                let $fmu = self;
-                $initialize
-            }
-            fn enter_continuous_time_mode(&self) -> Status {
-                self.$continuous()
-            }
-            fn start(&self) {
-                self.initialize(0.0);
-            }
-            fn go_on(&self) {
-                self.step(0.0, 0.1);
-            }
-            fn reset(&self) -> Status {
-                self.$reset()
-            }
-            fn y(&self) -> f64 {
-                let [y] = self.get([Y]);
-                y
-            }
-            fn messages(&self) -> Vec<Message> {
-                self.take_log()
-            }
-            fn with_zeros(&self) -> Vec<(&'static str, Status)> {
-                self.call_all()
-            }
-            fn saved(&self) -> *mut c_void {
-                self.save()
-            }
-        }
-    };
-}
-
-standard! {
-    Importer of old, fmi2, fmi2::CALLS, 40, "fmi2", |fmu, fault|
-    fmu.fmi2SetInteger(&FAULT, 1, &(fault as i32)),
-    fmu.fmi2EnterInitializationMode(), fmi2EnterContinuousTimeMode, fmi2Reset
-}
-standard! {
-    Importer of new, fmi3, fmi3::CALLS, 70, "fmi3", |fmu, fault|
-    fmu.fmi3SetInt32(&reference(FAULT), 1, &(fault as i32), 1),
-    fmu.fmi3EnterInitializationMode(0, 0.0, 0.0, 0, 0.0), fmi3EnterContinuousTimeMode, fmi3Reset
+fn initialized<F: Either>(interface: Interface) -> F {
+    let fmu: F = new(interface);
+    fmu.initialize(0.0);
+    fmu
 }
 
 /// Runs the call, which must be fatal, with one message about it.
 #[track_caller]
-fn fatal<F: Standard>(fmu: &F, label: &str, call: impl FnOnce(&F) -> Status) -> String {
-    fmu.messages();
+fn fatal<F: Either>(fmu: &F, label: &str, call: impl FnOnce(&F) -> Status) -> String {
+    fmu.take_log();
     let status = without_output(|| call(fmu));
-    let log = fmu.messages();
+    let log = fmu.take_log();
     assert_eq!(status, Status::Fatal, "{label}: {log:?}");
     assert_eq!(log.len(), 1, "{label}: {log:?}");
-    assert_clean(&log[0]);
+    log[0].assert_clean();
     assert_eq!((log[0].status, log[0].category.as_str()), (Status::Fatal, "logStatusFatal"), "{label}");
     log[0].text.clone()
-}
-
-/// Runs the function on a saved state of the instance.
-fn with_state<F: Standard>(fmu: &F, function: impl FnOnce(&mut *mut c_void) -> Status) -> Status {
-    function(&mut fmu.saved())
 }
 
 /// Faults that show as soon as the parameter says so: it is set by the call itself.
@@ -143,80 +52,77 @@ fn shows_at_once(fault: Fault) -> bool {
 /// One test for both standards, because what Rust prints about panics is switched off for the whole process.
 #[test]
 fn every_panic_is_contained() {
-    contained::<old::Importer>();
-    contained::<new::Importer>();
+    contained::<Importer>();
+    contained::<fmi3::Importer>();
 }
 
-fn contained<F: Standard>() {
-    let named = |name: &str| format!("{}{name}", F::PREFIX);
-    let bystanders = [CoSimulation, ModelExchange].map(F::new);
-    bystanders.iter().for_each(F::start);
-    each_call_is_contained(F::new, F::CALLS, &bystanders);
+/// The name of a function in the standard.
+fn named<F: Either>(name: &str) -> String {
+    format!("{}{name}", &F::functions()[0][..4])
+}
 
-    let fmu = F::new(CoSimulation);
-    assert_eq!(fmu.set_fault(Fault::Initialize), Status::Ok);
-    let message = fatal(&fmu, "initialization", F::enter_initialization_mode);
-    assert!(message.starts_with(&named("EnterInitializationMode")), "{message}");
+fn contained<F: Special>() {
+    let bystanders: [F; 2] = [CoSimulation, ModelExchange].map(initialized);
+    let all = of_both::<F>().into_iter().chain(F::CALLS.iter().copied());
+    all.for_each(|case| is_contained(case, &bystanders));
+
+    let fmu: F = new(CoSimulation);
+    fmu.ok(set_fault(&fmu, Fault::Initialize));
+    let message = fatal(&fmu, "initialization", |fmu| fmu.enter_initialization_mode(0.0, None));
+    assert!(message.starts_with(&named::<F>("EnterInitializationMode")), "{message}");
     check_that_all_is_over(&fmu);
 
-    let fmu = F::new(ModelExchange);
-    fmu.start();
-    assert_eq!(fmu.set_fault(Fault::ContinuousTimeEntered), Status::Ok);
+    let fmu: F = initialized(ModelExchange);
+    fmu.ok(set_fault(&fmu, Fault::ContinuousTimeEntered));
     let message = fatal(&fmu, "continuous time", F::enter_continuous_time_mode);
-    assert!(message.starts_with(&named("EnterContinuousTimeMode")), "{message}");
+    assert!(message.starts_with(&named::<F>("EnterContinuousTimeMode")), "{message}");
     check_that_all_is_over(&fmu);
 
     // A panic while an instance is freed ends with it; so do those of its states.
-    let fmu = F::new(CoSimulation);
-    assert_eq!(fmu.set_fault(Fault::Drop), Status::Ok);
-    (0..3).for_each(|_| _ = fmu.saved());
+    let fmu: F = new(CoSimulation);
+    fmu.ok(set_fault(&fmu, Fault::Drop));
+    (0..3).for_each(|_| _ = fmu.save());
     without_output(|| drop(fmu));
 
     // A panic while one is made, for the first time and by a reset.
-    let fmu = F::new(CoSimulation);
+    let fmu: F = new(CoSimulation);
     fatal(&fmu, "reset", |fmu| while_all_break(Fault::New, || fmu.reset()));
     check_that_all_is_over(&fmu);
-    let none = || F::try_new(CoSimulation).map(drop);
+    let none = || F::make::<Faulty>(&Arguments::of::<Faulty>(CoSimulation)).map(drop);
     let log = without_output(|| while_all_break(Fault::New, none)).expect_err("no instance comes of a panic");
     let [message] = log.as_slice() else {
         panic!("a message about a panic while an instance is made: {log:?}")
     };
-    assert!(message.text.starts_with(&named("Instantiate")), "{message:?}");
+    assert!(message.text.starts_with(&named::<F>("Instantiate")), "{message:?}");
     assert!(message.text.contains("fault _New at 100_s"), "{message:?}");
 
     let [co_simulation, model_exchange] = &bystanders;
-    co_simulation.go_on();
-    assert_eq!(model_exchange.enter_continuous_time_mode(), Status::Ok);
-    assert_eq!([co_simulation.messages(), model_exchange.messages()], [vec![], vec![]]);
+    co_simulation.step(0.0, 0.1);
+    model_exchange.ok(model_exchange.enter_continuous_time_mode());
+    assert_eq!([co_simulation.take_log(), model_exchange.take_log()], [vec![], vec![]]);
 }
 
-/// Breaks an instance with each of the calls; `bystanders` do not notice.
-fn each_call_is_contained<'a, F: Standard>(
-    new: fn(Interface) -> F,
-    calls: impl IntoIterator<Item = &'a Case<F>>,
-    bystanders: &[F; 2],
-) {
-    for (interface, name, fault, call) in calls {
-        let fmu = new(*interface);
-        fmu.start();
-        if !shows_at_once(*fault) {
-            assert_eq!(fmu.set_fault(*fault), Status::Ok);
-        }
-        if *interface == ModelExchange {
-            assert_eq!(fmu.enter_continuous_time_mode(), Status::Ok);
-        }
-        let message = fatal(&fmu, name, call);
-        let reason = match *fault {
-            Fault::NoMessage | Fault::Bomb => "no message".into(),
-            Fault::None => "fault _Clone at 100_s".into(),
-            fault => format!("fault _{fault:?} at 100_s"),
-        };
-        assert!(message.starts_with(name) && message.contains(&reason), "{message}");
-        check_that_all_is_over(&fmu);
-        without_output(|| drop(fmu));
-        for bystander in bystanders {
-            assert_eq!(bystander.y(), 0.5, "{name}");
-        }
+/// Breaks an instance with the call; `bystanders` do not notice.
+fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders: &[F; 2]) {
+    let name = named::<F>(names[usize::from(named::<F>("") == "fmi3")]);
+    let fmu: F = initialized(interface);
+    if !shows_at_once(fault) {
+        fmu.ok(set_fault(&fmu, fault));
+    }
+    if interface == ModelExchange {
+        fmu.ok(fmu.enter_continuous_time_mode());
+    }
+    let message = fatal(&fmu, &name, call);
+    let reason = match fault {
+        Fault::NoMessage | Fault::Bomb => "no message".into(),
+        Fault::None => "fault _Clone at 100_s".into(),
+        fault => format!("fault _{fault:?} at 100_s"),
+    };
+    assert!(message.starts_with(&name) && message.contains(&reason), "{message}");
+    check_that_all_is_over(&fmu);
+    without_output(|| drop(fmu));
+    for bystander in bystanders {
+        assert_eq!(bystander.get([Y]), [0.5], "{name}");
     }
 }
 
@@ -227,13 +133,13 @@ fn each_call_is_contained<'a, F: Standard>(
 fn every_panic_of_c_sources_is_contained() {
     assert!(std::env::var_os("FMU_LIBRARY").is_some(), "FMU_LIBRARY must name the compiled sources");
     let on_a_thread = || {
-        let bystanders = [CoSimulation, ModelExchange].map(old::Importer::of::<Faulty>);
-        bystanders.iter().for_each(Standard::start);
-        let possible = |(_, _, fault, _): &&Case<_>| ![Fault::None, Fault::Drop].contains(fault);
-        let calls: Vec<_> = old::Importer::CALLS.iter().filter(possible).collect();
+        let bystanders: [Importer; 2] = [CoSimulation, ModelExchange].map(initialized);
+        let all = of_both::<Importer>().into_iter().chain(Importer::CALLS.iter().copied());
+        let possible = |(_, _, fault, _): &Case<_>| ![Fault::None, Fault::Drop].contains(fault);
+        let calls: Vec<_> = all.filter(possible).collect();
         assert!(calls.len() > 20);
-        each_call_is_contained(old::Importer::of::<Faulty>, calls, &bystanders);
-        bystanders[0].go_on();
+        calls.into_iter().for_each(|case| is_contained(case, &bystanders));
+        bystanders[0].step(0.0, 0.1);
     };
     std::thread::scope(|scope| (0..4).for_each(|_| _ = scope.spawn(on_a_thread)));
 }
@@ -247,10 +153,10 @@ fn without_output<T>(work: impl FnOnce() -> T) -> T {
 }
 
 /// After a panic every function is fatal and says so; only freeing is left, which the end of the test does.
-fn check_that_all_is_over<F: Standard>(fmu: &F) {
-    let answers = fmu.with_zeros();
-    let log = fmu.messages();
-    assert_eq!((answers.len(), log.len()), (F::FUNCTIONS, F::FUNCTIONS));
+fn check_that_all_is_over<F: Either>(fmu: &F) {
+    let answers = fmu.call_all();
+    let log = fmu.take_log();
+    assert_eq!(answers.len(), log.len());
     for ((name, status), message) in answers.iter().zip(&log) {
         assert_eq!((*status, message.status), (Status::Fatal, Status::Fatal), "{name}");
         assert!(message.text.starts_with(name) && message.text.contains("fatal"), "{message:?}");

@@ -4,6 +4,5 @@
 #[path = "../toys/mod.rs"]
 mod toys;
 
-mod fmi3;
 mod sequences;
 mod threads;

@@ -2,8 +2,7 @@
 
 use crate::toys::{Oscillator, oscillator::Name};
 use fmu_export::Interface::ModelExchange;
-use fmu_test_kit::either::Either;
-use fmu_test_kit::{Importer, fmi3};
+use fmu_test_kit::{Either, Importer, fmi3};
 use std::sync::Mutex;
 
 const THREADS: usize = 4;
@@ -20,16 +19,16 @@ struct Job {
 impl Job {
     fn new(number: usize) -> Self {
         let fmu: Box<dyn Either> = match number % 2 {
-            0 => Box::new(Importer::initialized::<Oscillator>()),
-            _ => Box::new(fmi3::Importer::initialized::<Oscillator>()),
+            0 => Box::new(Importer::initialized_at::<Oscillator>(0.0)),
+            _ => Box::new(fmi3::Importer::initialized_at::<Oscillator>(0.0)),
         };
         Self { fmu, number, steps: 0 }
     }
 
     fn step(&mut self) {
         let time = self.steps as f64 / 256.0;
-        self.fmu.write(&[Name::force as u32], &[(time * self.number as f64).sin() + time]);
-        self.fmu.advance(time, 1.0 / 256.0);
+        self.fmu.set(&[Name::force as u32], &[(time * self.number as f64).sin() + time]);
+        self.fmu.step(time, 1.0 / 256.0);
         self.steps += 1;
     }
 
@@ -37,7 +36,7 @@ impl Job {
     fn bytes(number: usize, steps: usize) -> Vec<u8> {
         let mut job = Self::new(number);
         (0..steps).for_each(|_| job.step());
-        job.fmu.to_bytes()
+        job.fmu.bytes()
     }
 }
 
@@ -69,6 +68,6 @@ fn instances_go_from_thread_to_thread() {
     // In both standards.
     assert!((0..2).all(|odd| jobs.iter().any(|job| job.number % 2 == odd && job.steps > 0)));
     for Job { fmu, number, steps } in jobs {
-        assert_eq!(fmu.to_bytes(), Job::bytes(number, steps), "instance {number} after {steps} steps");
+        assert_eq!(fmu.bytes(), Job::bytes(number, steps), "instance {number} after {steps} steps");
     }
 }

@@ -1,14 +1,14 @@
 //! The same in FMI 3.0.
 
 use crate::toys::{Ball, Oscillator, Palette, Talker, oscillator::Name, palette, talker};
-use crate::{unwritten, written};
+use crate::{serialized_into_memory_that_was_never_written, unwritten, writes, written};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Model;
 use fmu_export::fmi3::{indicator, reference, types::*};
+use fmu_test_kit::Either;
 use fmu_test_kit::fmi3::Importer;
 use std::cell::{Cell, RefCell};
 use std::ffi::CString;
-use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 
 /// What the log callback works with.
@@ -93,24 +93,14 @@ fn the_log_callback_calls_back() {
     unsafe { (functions.fmi3FreeInstance)(instance) };
 }
 
-/// What the FMU is told.
-fn start<T, const N: usize>(values: &mut [MaybeUninit<T>; N]) -> *mut T {
-    values.as_mut_ptr().cast()
-}
-
 /// Values of every type, into memory that was never written.
 #[test]
 fn values_into_memory_that_was_never_written() {
-    let fmu = Importer::of::<Palette>(CoSimulation);
-    fmu.initialize(0.0);
+    let fmu = &Importer::initialized_at::<Palette>(0.0);
     macro_rules! read {
-        ($($get:ident $name:ident $expected:expr;)+) => {
-            $(
-                let mut value = unwritten();
-                fmu.ok(fmu.$get(&reference(palette::Name::$name as u32), 1, start(&mut value), 1));
-                assert_eq!(written(value), [$expected], stringify!($name));
-            )+
-        };
+        ($($get:ident $name:ident $expected:expr;)+) => { $(
+            writes(fmu, [$expected], |value| fmu.$get(&reference(palette::Name::$name as u32), 1, value, 1));
+        )+ };
     }
     read! {
         fmi3GetFloat64 float64 0.0_f64;
@@ -126,79 +116,59 @@ fn values_into_memory_that_was_never_written() {
         fmi3GetUInt64 uint64 0_u64;
         fmi3GetBoolean boolean fmi3False;
     }
-    let (mut size, mut bytes) = (unwritten(), unwritten::<fmi3Binary, 1>());
-    let binary = reference(palette::Name::binary as u32);
-    fmu.ok(fmu.fmi3GetBinary(&binary, 1, start(&mut size), start(&mut bytes), 1));
-    assert_eq!(written(size), [0]);
+    let mut bytes = unwritten::<fmi3Binary, 1>();
+    let (binary, to_bytes) = (reference(palette::Name::binary as u32), bytes.as_mut_ptr().cast());
+    writes(fmu, [0], |size| fmu.fmi3GetBinary(&binary, 1, size, to_bytes, 1));
     written(bytes);
 
-    let talker = Importer::of::<Talker>(CoSimulation);
-    talker.initialize(0.0);
+    let talker = Importer::initialized_at::<Talker>(0.0);
     let mut texts = unwritten::<fmi3String, 2>();
     let vr = [reference(talker::Name::who as u32), reference(talker::Name::said as u32)];
-    talker.ok(talker.fmi3GetString(vr.as_ptr(), 2, start(&mut texts), 2));
+    talker.ok(talker.fmi3GetString(vr.as_ptr(), 2, texts.as_mut_ptr().cast(), 2));
     assert!(written(texts).iter().all(|text| !text.is_null()));
 }
 
 /// Steps, derivatives, dependencies, sizes and states.
 #[test]
 fn memory_that_was_never_written() {
-    let fmu = Importer::of::<Oscillator>(CoSimulation);
-    fmu.initialize(0.0);
-    let (mut flags, mut time) = (unwritten::<fmi3Boolean, 3>(), unwritten());
-    let [event, terminate, early] = flags.each_mut().map(|flag| flag.as_mut_ptr());
-    fmu.ok(fmu.fmi3DoStep(0.0, 0.5, fmi3True, event, terminate, early, start(&mut time)));
-    assert_eq!((written(flags), written(time)), ([fmi3False; 3], [0.5]));
-    let mut one = unwritten();
-    fmu.ok(fmu.fmi3GetOutputDerivatives(&reference(Name::position as u32), 1, &1, start(&mut one), 1));
-    assert_eq!(written(one), [0.0]);
+    let fmu = &Importer::initialized_at::<Oscillator>(0.0);
+    let mut time = unwritten::<f64, 1>();
+    let end = time.as_mut_ptr().cast();
+    writes(fmu, [fmi3False; 3], |flags| {
+        let [terminate, early] = [1, 2].map(|place| flags.wrapping_add(place));
+        fmu.fmi3DoStep(0.0, 0.5, fmi3True, flags, terminate, early, end)
+    });
+    assert_eq!(written(time), [0.5]);
+    let position = reference(Name::position as u32);
+    writes(fmu, [0.0], |one| fmu.fmi3GetOutputDerivatives(&position, 1, &1, one, 1));
     let (unknown, known) = (reference(Name::der_velocity as u32), reference(Name::force as u32));
     for derivative in [Importer::fmi3GetDirectionalDerivative, Importer::fmi3GetAdjointDerivative] {
-        let mut one = unwritten();
-        fmu.ok(derivative(&fmu, &unknown, 1, &known, 1, &1.0, 1, start(&mut one), 1));
-        assert_eq!(written(one), [0.5]);
+        writes(fmu, [0.5], |one| derivative(fmu, &unknown, 1, &known, 1, &1.0, 1, one, 1));
     }
-    let (state, mut size) = (fmu.save(), unwritten());
-    fmu.ok(fmu.fmi3SerializedFMUStateSize(state, start(&mut size)));
-    let [size] = written(size);
-    let mut bytes = Box::<[u8]>::new_uninit_slice(size);
-    fmu.ok(fmu.fmi3SerializeFMUState(state, bytes.as_mut_ptr().cast(), size));
-    // SAFETY: the FMU answered fmi3OK, so that all are written; valgrind sees if not.
-    fmu.restore(&unsafe { bytes.assume_init() });
-    fmu.forget(state);
+    serialized_into_memory_that_was_never_written(fmu);
 }
 
 #[test]
 fn memory_that_was_never_written_in_model_exchange() {
-    let fmu = Importer::of::<Ball>(ModelExchange);
+    let fmu = &Importer::of::<Ball>(ModelExchange);
     fmu.initialize(0.0);
-    let (mut flags, mut next) = (unwritten::<fmi3Boolean, 5>(), unwritten());
-    let [again, terminate, nominals, states, defined] = flags.each_mut().map(|flag| flag.as_mut_ptr());
-    let next_time = start(&mut next);
-    fmu.ok(fmu.fmi3UpdateDiscreteStates(again, terminate, nominals, states, defined, next_time));
-    assert_eq!((written(flags), written(next)), ([fmi3False; 5], [0.0]));
-    let (mut states, mut indicators) = (unwritten(), unwritten());
-    fmu.ok(fmu.fmi3GetNumberOfContinuousStates(start(&mut states)));
-    fmu.ok(fmu.fmi3GetNumberOfEventIndicators(start(&mut indicators)));
-    assert_eq!((written(states), written(indicators)), ([2], [1]));
+    let mut next = unwritten::<f64, 1>();
+    let next_time = next.as_mut_ptr().cast();
+    writes(fmu, [fmi3False; 5], |flags| {
+        let [terminate, nominals, states, defined] = [1, 2, 3, 4].map(|place| flags.wrapping_add(place));
+        fmu.fmi3UpdateDiscreteStates(flags, terminate, nominals, states, defined, next_time)
+    });
+    assert_eq!(written(next), [0.0]);
+    writes(fmu, [2], |states| fmu.fmi3GetNumberOfContinuousStates(states));
+    writes(fmu, [1], |indicators| fmu.fmi3GetNumberOfEventIndicators(indicators));
     fmu.ok(fmu.fmi3EnterContinuousTimeMode());
-    type Get = fn(&Importer, *mut f64, usize) -> Status;
-    let calls: [(Get, [f64; 2]); 3] = [
-        (Importer::fmi3GetContinuousStates, [1.0, 0.0]),
-        (Importer::fmi3GetContinuousStateDerivatives, [0.0, -9.81]),
-        (Importer::fmi3GetNominalsOfContinuousStates, [1.0, 1.0]),
-    ];
-    for (get, expected) in calls {
-        let mut values = unwritten();
-        fmu.ok(get(&fmu, start(&mut values), 2));
-        assert_eq!(written(values), expected);
-    }
-    let mut values = unwritten();
-    fmu.ok(fmu.fmi3GetEventIndicators(start(&mut values), 1));
+    writes(fmu, [1.0, 0.0], |x| fmu.fmi3GetContinuousStates(x, 2));
+    writes(fmu, [0.0, -9.81], |rates| fmu.fmi3GetContinuousStateDerivatives(rates, 2));
+    writes(fmu, [1.0, 1.0], |nominals| fmu.fmi3GetNominalsOfContinuousStates(nominals, 2));
+    writes(fmu, [1.0], |indicators| fmu.fmi3GetEventIndicators(indicators, 1));
     // Once more as the variable that stands for it.
-    fmu.ok(fmu.fmi3GetFloat64(&reference(indicator::<Ball>(0)), 1, start(&mut values).wrapping_add(1), 1));
-    assert_eq!(written(values), [1.0, 1.0]);
-    let (mut event, mut terminate) = (unwritten(), unwritten());
-    fmu.ok(fmu.fmi3CompletedIntegratorStep(fmi3True, start(&mut event), start(&mut terminate)));
-    assert_eq!((written(event), written(terminate)), ([fmi3False], [fmi3False]));
+    writes(fmu, [1.0], |one| fmu.fmi3GetFloat64(&reference(indicator::<Ball>(0)), 1, one, 1));
+    writes(fmu, [fmi3False; 2], |flags| {
+        fmu.fmi3CompletedIntegratorStep(fmi3True, flags, flags.wrapping_add(1))
+    });
 }

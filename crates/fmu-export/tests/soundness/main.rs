@@ -10,8 +10,7 @@ mod fmi3;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::*;
 use fmu_export::{Exported, Model};
-use fmu_test_kit::Importer;
-use fmu_test_kit::either::Either;
+use fmu_test_kit::{Either, Importer};
 use std::cell::{Cell, RefCell};
 use std::ffi::CString;
 use std::mem::MaybeUninit;
@@ -118,100 +117,83 @@ fn unwritten<T, const N: usize>() -> [MaybeUninit<T>; N] {
 
 /// All of an array that the FMU has written.
 fn written<T: Copy, const N: usize>(values: [MaybeUninit<T>; N]) -> [T; N] {
-    // SAFETY: the FMU answered fmi2OK, so that all are written; valgrind sees if not.
+    // SAFETY: the FMU answered OK, so that all are written; valgrind sees if not.
     values.map(|value| unsafe { value.assume_init() })
+}
+
+/// The call must write these values into memory that was never written.
+#[track_caller]
+fn writes<T: Copy + PartialEq + std::fmt::Debug, const N: usize>(
+    fmu: &dyn Either,
+    expected: [T; N],
+    call: impl FnOnce(*mut T) -> Status,
+) {
+    let mut values = unwritten::<T, N>();
+    fmu.ok(call(values.as_mut_ptr().cast()));
+    assert_eq!(written(values), expected);
 }
 
 /// Every function that writes, into memory that was never written: values, states, sizes, bytes, flags, event information.
 #[test]
 fn memory_that_was_never_written() {
-    let fmu = Importer::of::<Oscillator>(CoSimulation);
-    fmu.initialize(0.0);
-    let reals = [Name::position as u32, Name::mass as u32];
-    let mut two = unwritten();
-    fmu.ok(fmu.fmi2GetReal(reals.as_ptr(), 2, two.as_mut_ptr().cast()));
-    assert_eq!(written::<f64, 2>(two), [0.0, 2.0]);
-    let mut one = unwritten();
-    fmu.ok(fmu.fmi2GetInteger(&(Name::springs as u32), 1, one.as_mut_ptr().cast()));
-    assert_eq!(written::<i32, 1>(one), [1]);
-    let mut one = unwritten();
-    fmu.ok(fmu.fmi2GetBoolean(&(Name::damped as u32), 1, one.as_mut_ptr().cast()));
-    assert_eq!(written::<i32, 1>(one), [1]);
-    let mut two = unwritten();
-    fmu.ok(fmu.fmi2GetRealOutputDerivatives(reals.as_ptr(), 2, [1, 1].as_ptr(), two.as_mut_ptr().cast()));
-    assert_eq!(written::<f64, 2>(two), [0.0, 0.0]);
-    let mut one = unwritten();
+    let fmu = &Importer::initialized_at::<Oscillator>(0.0);
+    let vr = [Name::position as u32, Name::mass as u32];
     let (unknown, known) = (Name::der_velocity as u32, Name::force as u32);
-    fmu.ok(fmu.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, one.as_mut_ptr().cast()));
-    assert_eq!(written::<f64, 1>(one), [0.5]);
-    let (mut time, mut terminated) = (unwritten(), unwritten());
-    fmu.ok(fmu.fmi2GetRealStatus(2, time.as_mut_ptr().cast()));
-    fmu.ok(fmu.fmi2GetBooleanStatus(3, terminated.as_mut_ptr().cast()));
-    assert_eq!((written::<f64, 1>(time), written::<i32, 1>(terminated)), ([0.0], [0]));
+    writes(fmu, [0.0, 2.0], |two| fmu.fmi2GetReal(vr.as_ptr(), 2, two));
+    writes(fmu, [1], |one| fmu.fmi2GetInteger(&(Name::springs as u32), 1, one));
+    writes(fmu, [1], |one| fmu.fmi2GetBoolean(&(Name::damped as u32), 1, one));
+    writes(fmu, [0.0; 2], |two| fmu.fmi2GetRealOutputDerivatives(vr.as_ptr(), 2, [1, 1].as_ptr(), two));
+    writes(fmu, [0.5], |one| fmu.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, one));
+    writes(fmu, [0.0], |time| fmu.fmi2GetRealStatus(2, time));
+    writes(fmu, [0], |terminated| fmu.fmi2GetBooleanStatus(3, terminated));
     // What has nothing to tell writes nothing.
     let mut nothing = unwritten::<f64, 1>();
     assert_eq!(fmu.fmi2GetRealStatus(3, nothing.as_mut_ptr().cast()), Status::Discard);
+    serialized_into_memory_that_was_never_written(fmu);
 
-    let (state, mut size) = (fmu.save(), unwritten());
-    fmu.ok(fmu.fmi2SerializedFMUstateSize(state, size.as_mut_ptr().cast()));
-    let [size] = written::<usize, 1>(size);
-    let mut bytes = Box::<[u8]>::new_uninit_slice(size);
-    fmu.ok(fmu.fmi2SerializeFMUstate(state, bytes.as_mut_ptr().cast(), size));
-    // SAFETY: as above.
-    fmu.restore(&unsafe { bytes.assume_init() });
-    fmu.forget(state);
-
-    let talker = Importer::of::<Talker>(CoSimulation);
-    talker.initialize(0.0);
+    let talker = Importer::initialized_at::<Talker>(0.0);
     let mut texts = unwritten::<fmi2String, 2>();
     let vr = [talker::Name::who as u32, talker::Name::said as u32];
     talker.ok(talker.fmi2GetString(vr.as_ptr(), 2, texts.as_mut_ptr().cast()));
     assert!(written(texts).iter().all(|text| !text.is_null()));
 }
 
+fn serialized_into_memory_that_was_never_written(fmu: &dyn Either) {
+    let (state, mut size) = (fmu.save(), unwritten());
+    fmu.ok(fmu.state_size(state, size.as_mut_ptr().cast()));
+    let [size] = written::<usize, 1>(size);
+    let mut bytes = Box::<[u8]>::new_uninit_slice(size);
+    fmu.ok(fmu.serialize_into(state, bytes.as_mut_ptr().cast(), size));
+    // SAFETY: as above.
+    fmu.restore(&unsafe { bytes.assume_init() });
+    fmu.forget(state);
+}
+
 #[test]
 fn memory_that_was_never_written_in_model_exchange() {
-    let fmu = Importer::of::<Ball>(ModelExchange);
+    let fmu = &Importer::of::<Ball>(ModelExchange);
     fmu.initialize(0.0);
-    let mut info = unwritten::<fmi2EventInfo, 1>();
-    fmu.ok(fmu.fmi2NewDiscreteStates(info.as_mut_ptr().cast()));
-    assert_eq!(written(info), [fmi2EventInfo::default()]);
+    writes(fmu, [fmi2EventInfo::default()], |info| fmu.fmi2NewDiscreteStates(info));
     fmu.ok(fmu.fmi2EnterContinuousTimeMode());
-    type Get = unsafe extern "C" fn(fmi2Component, *mut f64, usize) -> fmi2Status;
-    let functions = fmu.functions();
-    let calls: [(Get, [f64; 2]); 3] = [
-        (functions.fmi2GetContinuousStates, [1.0, 0.0]),
-        (functions.fmi2GetDerivatives, [0.0, -9.81]),
-        (functions.fmi2GetNominalsOfContinuousStates, [1.0, 1.0]),
-    ];
-    for (get, expected) in calls {
-        let mut values = unwritten();
-        // SAFETY: a living instance and an array of this length.
-        fmu.ok(Status::from_c(unsafe { get(fmu.component(), values.as_mut_ptr().cast(), 2) }));
-        assert_eq!(written::<f64, 2>(values), expected);
-    }
-    let mut indicator = unwritten();
-    fmu.ok(fmu.fmi2GetEventIndicators(indicator.as_mut_ptr().cast(), 1));
-    assert_eq!(written::<f64, 1>(indicator), [1.0]);
-    let (mut event, mut terminate) = (unwritten(), unwritten());
-    fmu.ok(fmu.fmi2CompletedIntegratorStep(1, event.as_mut_ptr().cast(), terminate.as_mut_ptr().cast()));
-    assert_eq!((written::<i32, 1>(event), written::<i32, 1>(terminate)), ([0], [0]));
+    writes(fmu, [1.0, 0.0], |x| fmu.fmi2GetContinuousStates(x, 2));
+    writes(fmu, [0.0, -9.81], |rates| fmu.fmi2GetDerivatives(rates, 2));
+    writes(fmu, [1.0, 1.0], |nominals| fmu.fmi2GetNominalsOfContinuousStates(nominals, 2));
+    writes(fmu, [1.0], |indicator| fmu.fmi2GetEventIndicators(indicator, 1));
+    writes(fmu, [0; 2], |flags| fmu.fmi2CompletedIntegratorStep(1, flags, flags.wrapping_add(1)));
 }
 
 /// Instances and saved states of models with memory on the heap, freed in any order, also one inside of the other's life.
 #[test]
 fn freed_in_any_order() {
     fn check<F: Either, M: Exported>() {
-        let [one, other] = [(); 2].map(|()| F::initialized::<M>());
-        let (mut first, mut second) = (null_mut(), null_mut());
-        one.save_into(&mut first);
-        other.save_into(&mut second);
-        one.go_back(first);
+        let [one, other] = [(); 2].map(|()| F::initialized_at::<M>(0.0));
+        let (first, second) = (one.save(), other.save());
+        one.ok(one.set_state(first));
         drop(one);
-        other.go_back(second);
-        other.free(second);
-        other.save_into(&mut null_mut());
-        other.advance(0.0, 0.1);
+        other.ok(other.set_state(second));
+        other.forget(second);
+        other.save();
+        other.step(0.0, 0.1);
     }
     fn check_both<M: Exported>() {
         check::<Importer, M>();

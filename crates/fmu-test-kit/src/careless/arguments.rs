@@ -3,7 +3,7 @@
 
 use arbitrary::{Result, Unstructured};
 use fmu_export::fmi2::types::*;
-use fmu_export::{BaseType, Causality, Exported};
+use fmu_export::{BaseType, Causality, Exported, Standard};
 use std::ffi::CStr;
 use std::ptr::{null, null_mut};
 
@@ -24,8 +24,9 @@ pub struct Variables {
 }
 
 impl Variables {
-    /// Those of a standard, by the place in the table.
-    pub fn of<M: Exported>(reference: fn(u32) -> u32) -> Self {
+    /// Those of a standard.
+    pub fn of<M: Exported>(standard: Standard) -> Self {
+        let reference = |place| standard.reference(place);
         let those = |wanted: &dyn Fn(&fmu_export::Variable<M>) -> bool| {
             let places = (0..).zip(M::TABLE).filter(|(_, variable)| wanted(variable));
             places.map(|(place, _)| reference(place)).collect::<Vec<u32>>()
@@ -112,27 +113,10 @@ pub struct CallArguments {
 }
 
 /// Real numbers to try at least.
+#[rustfmt::skip]
 const SPECIAL: [f64; 20] = [
-    0.0,
-    -0.0,
-    1.0,
-    -1.0,
-    1e-9,
-    1e9,
-    1e150,
-    -1e150,
-    1e308,
-    -1e308,
-    f64::MAX,
-    f64::MIN,
-    f64::EPSILON,
-    f64::MIN_POSITIVE,
-    5e-324,
-    -5e-324,
-    f64::NAN,
-    f64::INFINITY,
-    f64::NEG_INFINITY,
-    1e-300,
+    0.0, -0.0, 1.0, -1.0, 1e-9, 1e9, 1e150, -1e150, 1e308, -1e308, f64::MAX, f64::MIN, f64::EPSILON,
+    f64::MIN_POSITIVE, 5e-324, -5e-324, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-300,
 ];
 
 const TEXTS: [Option<&CStr>; 8] = [
@@ -146,15 +130,10 @@ const TEXTS: [Option<&CStr>; 8] = [
     None,
 ];
 
+#[rustfmt::skip]
 const CATEGORIES: [Option<&CStr>; 8] = [
-    Some(c"logEvents"),
-    Some(c"logStatusDiscard"),
-    Some(c"logStatusError"),
-    Some(c"logStatusFatal"),
-    Some(c"logAll"),
-    Some(c"%s%n"),
-    Some(c""),
-    None,
+    Some(c"logEvents"), Some(c"logStatusDiscard"), Some(c"logStatusError"), Some(c"logStatusFatal"),
+    Some(c"logAll"), Some(c"%s%n"), Some(c""), None,
 ];
 
 const STEP_SIZES: [f64; 8] = [1e-3, 1e-3, 1e-2, 1.0 / 60.0, 0.1, 2.0, 1e-9, 1e4];
@@ -184,9 +163,24 @@ fn texts(u: &mut Unstructured, count: usize, known: &[Option<&CStr>]) -> Result<
     array(count, || Ok(u.choose(known)?.map_or(null(), CStr::as_ptr)))
 }
 
+/// The function of FMI 2.0 with arguments like these.
+fn like(function: &str) -> &str {
+    match function {
+        "fmi3GetFloat64" => "fmi2GetReal",
+        "fmi3SetFloat64" => "fmi2SetReal",
+        "fmi3DoStep" => "fmi2DoStep",
+        "fmi3GetOutputDerivatives" => "fmi2GetRealOutputDerivatives",
+        "fmi3GetDirectionalDerivative" | "fmi3GetAdjointDerivative" => "fmi2GetDirectionalDerivative",
+        "fmi3GetContinuousStateDerivatives" => "fmi2GetDerivatives",
+        "fmi3GetEventIndicators" => "fmi2GetEventIndicators",
+        name => name,
+    }
+}
+
 impl CallArguments {
     /// Decodes the arguments of a call at this time of the instance.
     pub fn decode(u: &mut Unstructured, function: &str, time: f64, variables: &Variables) -> Result<Self> {
+        let function = like(function);
         let count = match u.int_in_range(0..=63_u8)? {
             0 => 5000,
             n @ 1..=50 => usize::from(n % 5),

@@ -1,10 +1,10 @@
-//! One call of a function that works on an instance.
+//! One call of a function that works on an instance, and what a standard says of its functions.
 
 use super::arguments::CallArguments;
+use crate::Either;
 use crate::serialized::fnv1a;
-use crate::{FUNCTIONS, Importer};
-use fmu_export::fmi2::types::*;
-use std::ffi::CStr;
+use fmu_export::{Standard, Status};
+use std::ffi::{CStr, c_char};
 
 /// A function with its arguments.
 #[derive(Clone, Debug)]
@@ -20,173 +20,111 @@ pub struct Answer {
     pub values: Vec<u64>,
 }
 
-/// What lies behind the last element of an array that the FMU writes, and in it before.
-const UNTOUCHED: u64 = 0x7ff8_dead_beef_0000;
-const UNTOUCHED_INTEGER: i32 = i32::MIN + 77;
-static UNTOUCHED_TEXT: &CStr = c"untouched";
+/// A standard as the careless importer speaks it.
+#[allow(missing_docs, reason = "names of functions")]
+pub trait Caller: Either + Sized {
+    const STANDARD: Standard;
+    /// What importers call most in Co-Simulation.
+    const STEPS: &'static [&'static str];
+    /// What they call most in Model Exchange.
+    const INTEGRATION: &'static [&'static str];
+    /// From a reset to the end of the initialization.
+    const BEGINNING: &'static [&'static str];
+    /// For Co-Simulation and for Model Exchange.
+    const INSTANTIATE: [&'static str; 2];
+    const FREE: &'static str;
+    /// Of saved states: get, set, free, size, serialize, de-serialize.
+    const HANDLES: [&'static str; 6];
+
+    /// Checks what needs no instance; the names of the functions.
+    fn check_version(&self) -> &'static [&'static str];
+
+    /// Calls the function with these arguments.
+    fn call(&self, function: &'static str, out: &mut Outputs) -> Status;
+}
 
 /// The functions of saved states have handles besides arguments: the session calls them.
-fn has_handles(function: &str) -> bool {
-    function.contains("FMUstate")
-}
-
-/// All functions that are called here: those of components without those of saved states.
-pub fn functions() -> impl Iterator<Item = &'static str> {
-    FUNCTIONS.iter().copied().filter(|name| !has_handles(name))
-}
-
-/// What a function wrote.
-struct Written {
-    reals: usize,
-    integers: usize,
-    texts: usize,
+pub fn has_handles(function: &str) -> bool {
+    function.contains("FMUstate") || function.contains("FMUState")
 }
 
 impl Call {
-    /// Whether the state must be the same after an answer with this status. A step that ends early has got somewhere.
+    /// Whether the state must be the same after an answer with this status. A step that ends early in FMI 2.0 has got
+    /// somewhere.
     pub fn must_not_change(&self, status: Status) -> bool {
         let early = self.function == "fmi2DoStep" && status == Status::Discard;
-        status != Status::Ok && !early || self.function.starts_with("fmi2Get")
+        status != Status::Ok && !early || self.function[4..].starts_with("Get")
     }
 
     /// Calls the function. Panics if it answers what it must not: a status that no function here has, a value that is no
     /// finite number, more values than were asked for.
-    pub fn run(&self, fmu: &Importer) -> Answer {
-        let a = &self.arguments;
-        let (vr, count) = (a.pointer(0, &a.vr), a.count(a.vr.len()));
-        let room = a.vr.len().max(1) + 1;
-        let mut reals = vec![f64::from_bits(UNTOUCHED); room];
-        let mut integers = vec![UNTOUCHED_INTEGER; room];
-        let mut texts = vec![UNTOUCHED_TEXT.as_ptr(); room];
-        let mut info = [fmi2EventInfo { next_event_time: f64::NAN, ..Default::default() }];
-        let mut flags = [[-1], [-1]];
-        let mut no_status = [Status::Warning as i32];
-        let [first, second, third] = a.numbers;
-        let [flag, other_flag] = a.flags;
-        let status = match self.function {
-            "fmi2SetDebugLogging" => fmu.fmi2SetDebugLogging(flag, count, a.pointer(1, &a.categories)),
-            "fmi2SetupExperiment" => fmu.fmi2SetupExperiment(flag, first, second, other_flag, third),
-            "fmi2EnterInitializationMode" => fmu.fmi2EnterInitializationMode(),
-            "fmi2ExitInitializationMode" => fmu.fmi2ExitInitializationMode(),
-            "fmi2Terminate" => fmu.fmi2Terminate(),
-            "fmi2Reset" => fmu.fmi2Reset(),
-            "fmi2GetReal" => fmu.fmi2GetReal(vr, count, a.output(1, &mut reals)),
-            "fmi2GetInteger" => fmu.fmi2GetInteger(vr, count, a.output(1, &mut integers)),
-            "fmi2GetBoolean" => fmu.fmi2GetBoolean(vr, count, a.output(1, &mut integers)),
-            "fmi2GetString" => fmu.fmi2GetString(vr, count, a.output(1, &mut texts)),
-            "fmi2SetReal" => fmu.fmi2SetReal(vr, count, a.pointer(1, &a.reals)),
-            "fmi2SetInteger" => fmu.fmi2SetInteger(vr, count, a.pointer(1, &a.integers)),
-            "fmi2SetBoolean" => fmu.fmi2SetBoolean(vr, count, a.pointer(1, &a.integers)),
-            "fmi2SetString" => fmu.fmi2SetString(vr, count, a.pointer(1, &a.texts)),
-            "fmi2GetDirectionalDerivative" => {
-                let (known, seed) = (a.pointer(1, &a.known), a.pointer(2, &a.reals));
-                let result = a.output(3, &mut reals);
-                fmu.fmi2GetDirectionalDerivative(vr, count, known, a.known.len(), seed, result)
-            }
-            "fmi2EnterEventMode" => fmu.fmi2EnterEventMode(),
-            "fmi2NewDiscreteStates" => fmu.fmi2NewDiscreteStates(a.output(0, &mut info)),
-            "fmi2EnterContinuousTimeMode" => fmu.fmi2EnterContinuousTimeMode(),
-            "fmi2CompletedIntegratorStep" => {
-                let [enter, terminate] = &mut flags;
-                fmu.fmi2CompletedIntegratorStep(flag, a.output(0, enter), a.output(1, terminate))
-            }
-            "fmi2SetTime" => fmu.fmi2SetTime(first),
-            "fmi2SetContinuousStates" => fmu.fmi2SetContinuousStates(a.pointer(1, &a.reals), count),
-            "fmi2GetDerivatives" => fmu.fmi2GetDerivatives(a.output(1, &mut reals), count),
-            "fmi2GetEventIndicators" => fmu.fmi2GetEventIndicators(a.output(1, &mut reals), count),
-            "fmi2GetContinuousStates" => fmu.fmi2GetContinuousStates(a.output(1, &mut reals), count),
-            "fmi2GetNominalsOfContinuousStates" => {
-                fmu.fmi2GetNominalsOfContinuousStates(a.output(1, &mut reals), count)
-            }
-            "fmi2SetRealInputDerivatives" => {
-                let orders = a.pointer(1, &a.orders);
-                fmu.fmi2SetRealInputDerivatives(vr, count, orders, a.pointer(2, &a.reals))
-            }
-            "fmi2GetRealOutputDerivatives" => {
-                let orders = a.pointer(1, &a.orders);
-                fmu.fmi2GetRealOutputDerivatives(vr, count, orders, a.output(2, &mut reals))
-            }
-            "fmi2DoStep" => fmu.fmi2DoStep(first, second, flag),
-            "fmi2CancelStep" => fmu.fmi2CancelStep(),
-            "fmi2GetStatus" => fmu.fmi2GetStatus(a.kind, a.output(0, &mut no_status)),
-            "fmi2GetRealStatus" => fmu.fmi2GetRealStatus(a.kind, a.output(0, &mut reals)),
-            "fmi2GetIntegerStatus" => fmu.fmi2GetIntegerStatus(a.kind, a.output(0, &mut integers)),
-            "fmi2GetBooleanStatus" => fmu.fmi2GetBooleanStatus(a.kind, a.output(0, &mut integers)),
-            "fmi2GetStringStatus" => fmu.fmi2GetStringStatus(a.kind, a.output(0, &mut texts)),
-            other => unreachable!("{other} is not called here"),
-        };
-        let name = self.function;
-        let discards = (name.ends_with("Status") || name == "fmi2DoStep") && status == Status::Discard;
+    pub fn run<F: Caller>(&self, fmu: &F) -> Answer {
+        let mut out = Outputs { arguments: &self.arguments, values: Vec::new() };
+        let (name, status) = (self.function, fmu.call(self.function, &mut out));
+        let discards = (name.ends_with("Status") || name.ends_with("DoStep")) && status == Status::Discard;
         assert!(discards || [Status::Ok, Status::Error].contains(&status), "{name} answers {status:?}");
-        assert_eq!(no_status, [Status::Warning as i32], "{name} has no status to give");
+        if name.ends_with("DoStep") && status == Status::Ok {
+            let [point, size, _] = self.arguments.numbers;
+            assert!(size > 0.0 && (point + size).is_finite(), "time does not pass: {self:?}");
+        }
+        Answer { status, values: out.values }
+    }
+}
 
-        let written = self.written();
-        assert_eq!(reals[written.reals].to_bits(), UNTOUCHED, "{name} writes too much: {self:?}");
-        assert_eq!(integers[written.integers], UNTOUCHED_INTEGER, "{name} writes too much: {self:?}");
-        assert_eq!(texts[written.texts], UNTOUCHED_TEXT.as_ptr(), "{name} writes too much: {self:?}");
-        let mut values = Vec::new();
+/// What a call wrote.
+pub struct Outputs<'a> {
+    pub arguments: &'a CallArguments,
+    pub values: Vec<u64>,
+}
+
+impl<'a> Outputs<'a> {
+    /// Calls with an array of `count` values to write: nothing is written behind it. `fault` is the place of what may be
+    /// wrong with the pointer.
+    pub fn array<T: Clone + PartialEq>(
+        &mut self,
+        (fault, count): (usize, usize),
+        untouched: T,
+        call: impl FnOnce(*mut T) -> Status,
+        bits: impl Fn(&T) -> u64,
+    ) -> Status {
+        let mut array = vec![untouched.clone(); count.max(1) + 1];
+        let status = call(self.arguments.output(fault, &mut array));
+        assert!(array[count..].iter().all(|value| *value == untouched), "too much: {:?}", self.arguments);
         if status == Status::Ok {
-            for value in &reals[..written.reals] {
-                assert!(value.is_finite(), "{name} gives {value}: {self:?}");
-                values.push(value.to_bits());
-            }
-            for value in &integers[..written.integers] {
-                let truth = name.contains("Boolean");
-                assert!(!truth || [0, 1].contains(value), "{name} gives {value}: {self:?}");
-                assert_ne!(*value, UNTOUCHED_INTEGER, "{name} gives no value: {self:?}");
-                values.push(*value as u64);
-            }
-            for text in &texts[..written.texts] {
-                assert!(
-                    !text.is_null() && *text != UNTOUCHED_TEXT.as_ptr(),
-                    "{name} gives no text: {self:?}"
-                );
-                // SAFETY: a string of the FMU's (section 2.1.7), valid until the next call.
-                let bytes = unsafe { CStr::from_ptr(*text) }.to_bytes();
-                assert!(std::str::from_utf8(bytes).is_ok(), "{name} gives no UTF-8: {self:?}");
-                values.push(u64::from_le_bytes(fnv1a(bytes)));
-            }
-            match name {
-                "fmi2NewDiscreteStates" => values.extend(self.check_event(info[0])),
-                "fmi2CompletedIntegratorStep" => {
-                    assert!(flags.iter().flatten().all(|flag| [0, 1].contains(flag)), "{flags:?}");
-                    values.extend(flags.as_flattened().iter().map(|flag| *flag as u64));
-                }
-                "fmi2DoStep" => {
-                    assert!(second > 0.0 && (first + second).is_finite(), "time does not pass: {self:?}");
-                }
-                _ => {}
-            }
+            self.values.extend(array[..count].iter().map(bits));
         }
-        Answer { status, values }
+        status
     }
 
-    /// How many values the function writes if it succeeds.
-    fn written(&self) -> Written {
-        let count = self.arguments.vr.len();
-        let none = Written { reals: 0, integers: 0, texts: 0 };
-        match self.function {
-            "fmi2GetInteger" | "fmi2GetBoolean" => Written { integers: count, ..none },
-            "fmi2GetString" => Written { texts: count, ..none },
-            "fmi2GetRealStatus" => Written { reals: 1, ..none },
-            "fmi2GetBooleanStatus" => Written { integers: 1, ..none },
-            "fmi2GetStatus" | "fmi2GetIntegerStatus" | "fmi2GetStringStatus" => none,
-            name if name.starts_with("fmi2Get") => Written { reals: count, ..none },
-            _ => none,
-        }
+    /// The same with real numbers.
+    pub fn reals(&mut self, places: (usize, usize), call: impl FnOnce(*mut f64) -> Status) -> Status {
+        self.array(places, f64::INFINITY, call, |value| finite(*value))
     }
 
-    fn check_event(&self, info: fmi2EventInfo) -> [u64; 6] {
-        let flags = [
-            info.new_discrete_states_needed,
-            info.terminate_simulation,
-            info.nominals_of_continuous_states_changed,
-            info.values_of_continuous_states_changed,
-            info.next_event_time_defined,
-        ];
-        assert!(flags.iter().all(|flag| [0, 1].contains(flag)), "{info:?}");
-        assert!(info.next_event_time.is_finite(), "{info:?}");
-        let [again, terminate, nominals, states, defined] = flags.map(|flag| flag as u64);
-        [again, terminate, nominals, states, defined, info.next_event_time.to_bits()]
+    /// The same with one text for each value reference.
+    pub fn texts(&mut self, call: impl FnOnce(*mut *const c_char) -> Status) -> Status {
+        let places = (1, self.arguments.vr.len());
+        self.array(places, UNTOUCHED_TEXT.as_ptr(), call, |text| {
+            assert!(!text.is_null() && *text != UNTOUCHED_TEXT.as_ptr(), "no text");
+            // SAFETY: a string of the FMU's, valid until the next call.
+            let bytes = unsafe { CStr::from_ptr(*text) }.to_bytes();
+            assert!(std::str::from_utf8(bytes).is_ok(), "no UTF-8: {bytes:?}");
+            u64::from_le_bytes(fnv1a(bytes))
+        })
     }
+}
+
+static UNTOUCHED_TEXT: &CStr = c"untouched";
+
+/// The bits of a number, which is one.
+pub fn finite(value: f64) -> u64 {
+    assert!(value.is_finite(), "{value} is no number to answer");
+    value.to_bits()
+}
+
+/// The bits of a truth value, which is one.
+pub fn truth(flag: impl Into<i64>) -> u64 {
+    let flag = flag.into();
+    assert!([0, 1].contains(&flag), "{flag} is no truth value");
+    flag as u64
 }

@@ -7,7 +7,9 @@ use fmu_export::Mode::{self, *};
 use fmu_export::fmi3::ALLOWED;
 use fmu_export::fmi3::types::*;
 use fmu_export::{Exported, Standard};
-use fmu_test_kit::fmi3::{Arguments, FUNCTIONS, Importer};
+use fmu_test_kit::Either;
+use fmu_test_kit::checks::modes_of_model;
+use fmu_test_kit::fmi3::{FUNCTIONS, Importer};
 
 /// Section 2.3.1, super state FMU State Settable.
 const EVERYWHERE: &str = "SetDebugLogging Reset GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize \
@@ -101,61 +103,22 @@ fn tolerated(function: &str, interface: Interface, mode: Mode) -> bool {
         && TOLERATED.into_iter().any(|(tolerated, modes)| tolerated == name && modes.contains(&mode))
 }
 
-pub fn modes_of(interface: Interface) -> [Mode; 5] {
-    match interface {
-        CoSimulation => [Instantiated, Initialization, Event, StepComplete, Terminated],
-        ModelExchange => [Instantiated, Initialization, Event, ContinuousTime, Terminated],
-    }
-}
-
-/// A new instance in this mode, with event mode if it can.
-pub fn in_mode<M: Exported>(interface: Interface, mode: Mode) -> Importer {
-    let event_mode = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
-    let fmu = Importer::with::<M>(&Arguments {
-        event_mode_used: event_mode.into(),
-        early_return_allowed: fmi3True,
-        ..Arguments::of::<M>(interface)
-    });
-    if mode == Instantiated {
-        return fmu;
-    }
-    fmu.enter_initialization(0.0, None);
-    if mode == Initialization {
-        return fmu;
-    }
-    fmu.ok(fmu.fmi3ExitInitializationMode());
-    match mode {
-        Terminated => fmu.ok(fmu.fmi3Terminate()),
-        StepComplete if event_mode => fmu.ok(fmu.fmi3EnterStepMode()),
-        ContinuousTime => fmu.ok(fmu.fmi3EnterContinuousTimeMode()),
-        _ => {}
-    }
-    fmu
-}
-
 fn every_function_in_every_state<M: Exported>() {
-    for interface in [CoSimulation, ModelExchange] {
-        for mode in modes_of(interface) {
-            let has_event_mode = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
-            if (interface, mode) == (CoSimulation, Event) && !has_event_mode {
-                continue;
-            }
-            for function in FUNCTIONS {
-                let label = format!("{function} in {mode} of {interface}");
-                let fmu = in_mode::<M>(interface, mode);
-                let before = fmu.bytes();
-                fmu.take_log();
-                let status = fmu.call_with_zeros(function);
-                let log = fmu.take_log();
-                let is_refused_by_state =
-                    log.iter().any(|message| message.text.contains("not allowed in state"));
-                let accepted = standard(function, interface, mode) || tolerated(function, interface, mode);
-                assert_eq!(is_refused_by_state, !accepted, "{label}: {log:?}");
-                if status != Status::Ok {
-                    assert_eq!((status, log.len()), (Status::Error, 1), "{label}: {log:?}");
-                    assert!(log[0].text.starts_with(&format!("{function}: ")), "{label}: {log:?}");
-                    assert_eq!(before, fmu.bytes(), "{label} changed the instance");
-                }
+    for (interface, mode) in modes_of_model::<Importer, M>() {
+        for function in FUNCTIONS {
+            let label = format!("{function} in {mode} of {interface}");
+            let fmu = Importer::in_mode::<M>(interface, mode);
+            let before = fmu.bytes();
+            fmu.take_log();
+            let status = fmu.call_with_zeros(function);
+            let log = fmu.take_log();
+            let is_refused_by_state = log.iter().any(|message| message.text.contains("not allowed in state"));
+            let accepted = standard(function, interface, mode) || tolerated(function, interface, mode);
+            assert_eq!(is_refused_by_state, !accepted, "{label}: {log:?}");
+            if status != Status::Ok {
+                assert_eq!((status, log.len()), (Status::Error, 1), "{label}: {log:?}");
+                assert!(log[0].text.starts_with(&format!("{function}: ")), "{label}: {log:?}");
+                assert_eq!(before, fmu.bytes(), "{label} changed the instance");
             }
         }
     }
@@ -172,7 +135,7 @@ fn table() {
     assert_eq!(ALLOWED.len(), FUNCTIONS.len());
     for rule in ALLOWED {
         for interface in [CoSimulation, ModelExchange] {
-            for mode in modes_of(interface) {
+            for mode in Importer::modes_of(interface).iter().copied() {
                 let label = format!("{} in {mode} of {interface}", rule.name);
                 let contain = |set: fmu_export::Situations| set.contain(Standard::Fmi3, interface, mode);
                 assert_eq!(contain(rule.standard), standard(rule.name, interface, mode), "{label}");

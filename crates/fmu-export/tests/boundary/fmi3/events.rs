@@ -5,7 +5,8 @@ use crate::toys::ticker::Name;
 use crate::toys::*;
 use fmu_export::Interface::*;
 use fmu_export::fmi3::{indicator, reference, types::*};
-use fmu_test_kit::fmi3::{Arguments, Importer, Stepped, Updated};
+use fmu_test_kit::fmi3::{Importer, Stepped};
+use fmu_test_kit::{Arguments, Either, Updated};
 
 const SUM: u32 = Name::sum as u32;
 const AMOUNT: u32 = Name::amount as u32;
@@ -66,7 +67,7 @@ fn states_in_event_mode() {
 #[test]
 fn the_importer_handles_them() {
     let fmu = ticker(fmi3True, fmi3True);
-    fmu.refused("no step in event mode", |fmu| fmu.try_step(0.0, 1.0).unwrap_err());
+    fmu.refused("no step in event mode", |fmu| fmu.do_step(0.0, 1.0).unwrap_err());
     assert_eq!(fmu.update(), Updated { next: Some(0.25), ..Updated::default() });
     fmu.ok(fmu.fmi3EnterStepMode());
     let at = |time: f64, early_return: bool| {
@@ -77,7 +78,7 @@ fn the_importer_handles_them() {
             last_successful_time: time,
         })
     };
-    assert_eq!(fmu.try_step(0.0, 1.0), at(0.25, true));
+    assert_eq!(fmu.do_step(0.0, 1.0), at(0.25, true));
     assert_eq!(fmu.get([SUM]), [1.0], "nothing has happened yet");
     fmu.ok(fmu.fmi3EnterEventMode());
     fmu.set(&[AMOUNT], &[10.0]);
@@ -85,7 +86,7 @@ fn the_importer_handles_them() {
     assert_eq!(fmu.get([SUM]), [11.0]);
     fmu.ok(fmu.fmi3EnterStepMode());
     // An event at the end of a step is not early.
-    assert_eq!(fmu.try_step(0.25, 0.25), at(0.5, false));
+    assert_eq!(fmu.do_step(0.25, 0.25), at(0.5, false));
 }
 
 /// Where it does not, they are handled within the step; FMI 2.0 has the same values.
@@ -108,7 +109,7 @@ fn the_library_handles_them() {
     fmu.ok(fmu.fmi3EnterStepMode());
     fmu.step(0.0, 0.6);
     assert_eq!(fmu.get([SUM]), [3.0]);
-    assert!(fmu.try_step(0.6, 0.15).unwrap().event_handling_needed);
+    assert!(fmu.do_step(0.6, 0.15).unwrap().event_handling_needed);
 }
 
 #[test]
@@ -116,10 +117,10 @@ fn an_event_ends_the_simulation() {
     let fmu = Importer::of::<Ticker>(CoSimulation);
     fmu.ok(fmu.fmi3SetInt32(&reference(Name::last as u32), 1, &3, 1));
     fmu.initialize(0.0);
-    let stepped = fmu.try_step(0.0, 1.0).unwrap();
+    let stepped = fmu.do_step(0.0, 1.0).unwrap();
     assert_eq!((stepped.terminate, stepped.last_successful_time), (true, 0.5));
     // Who has not listened hears it again.
-    assert_eq!(fmu.try_step(0.5, 1.0), Ok(stepped));
+    assert_eq!(fmu.do_step(0.5, 1.0), Ok(stepped));
     fmu.ok(fmu.fmi3Terminate());
 }
 
@@ -140,9 +141,9 @@ fn the_initial_event_ends_the_simulation() {
             early_return,
             last_successful_time: 0.0,
         };
-        assert_eq!(fmu.try_step(0.0, 1.0), Ok(ended));
+        assert_eq!(fmu.do_step(0.0, 1.0), Ok(ended));
         assert_eq!(fmu.bytes(), before);
-        fmu.refused("a wrong point", |fmu| fmu.try_step(1.0, 1.0).unwrap_err());
+        fmu.refused("a wrong point", |fmu| fmu.do_step(1.0, 1.0).unwrap_err());
         fmu.ok(fmu.fmi3Terminate());
     }
 }
@@ -161,7 +162,7 @@ fn grumbler(trouble: Trouble, event_mode_used: fmi3Boolean, early_return_allowed
 fn undone(fmu: &Importer, expected: Status, point: f64, step_size: f64) -> String {
     let before = fmu.bytes();
     fmu.take_log();
-    assert_eq!(fmu.try_step(point, step_size), Err(expected));
+    assert_eq!(fmu.do_step(point, step_size), Err(expected));
     let said = fmu.take_log().pop().unwrap();
     assert_eq!((said.status, fmu.bytes()), (expected, before), "{said:?}");
     said.text
@@ -215,7 +216,7 @@ fn fuse(early_return_allowed: fmi3Boolean) -> Importer {
 #[test]
 fn early_return() {
     let fmu = fuse(fmi3True);
-    let stepped = fmu.try_step(0.0, 10.0).unwrap();
+    let stepped = fmu.do_step(0.0, 10.0).unwrap();
     let early = Stepped {
         event_handling_needed: false,
         terminate: false,
@@ -224,9 +225,9 @@ fn early_return() {
     };
     assert_eq!(stepped, early);
     // It goes on from there, until it melts.
-    let stepped = fmu.try_step(8.0, 20.0).unwrap();
+    let stepped = fmu.do_step(8.0, 20.0).unwrap();
     assert_eq!(stepped, Stepped { terminate: true, last_successful_time: 18.0, ..early });
-    assert_eq!(fmu.try_step(18.0, 1.0), Ok(stepped));
+    assert_eq!(fmu.do_step(18.0, 1.0), Ok(stepped));
     fmu.ok(fmu.fmi3Reset());
     fmu.initialize(0.0);
     fmu.step(0.0, 1.0);
@@ -240,7 +241,7 @@ fn early_return_that_is_not_allowed() {
     assert!(text.contains("ends early, at 8: the model stops there, and earlyReturnAllowed has"), "{text}");
     fmu.step(0.0, 8.0);
     // The end of the simulation is said without.
-    let stepped = fmu.try_step(8.0, 20.0).unwrap();
+    let stepped = fmu.do_step(8.0, 20.0).unwrap();
     assert_eq!((stepped.terminate, stepped.early_return), (true, false));
     assert_eq!(stepped.last_successful_time, 18.0);
 }
@@ -248,6 +249,6 @@ fn early_return_that_is_not_allowed() {
 #[test]
 fn event_mode_must_be_offered() {
     let arguments = Arguments { event_mode_used: fmi3True, ..Arguments::of::<Fuse>(CoSimulation) };
-    let log = Importer::instantiate(fmu_export::fmi3::functions::<Fuse>(), &arguments).unwrap_err();
+    let log = Importer::try_with::<Fuse>(&arguments).unwrap_err();
     assert!(log[0].text.contains("hasEventMode is false"), "{log:?}");
 }

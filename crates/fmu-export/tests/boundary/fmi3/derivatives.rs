@@ -5,6 +5,7 @@ use crate::toys::{Oscillator, Sum};
 use fmu_export::Interface::*;
 use fmu_export::Variables;
 use fmu_export::fmi3::reference;
+use fmu_test_kit::Either;
 use fmu_test_kit::fmi3::Importer;
 
 const UNKNOWNS: [Name; 5] = [position, der_position, der_velocity, spring_force, energy];
@@ -53,9 +54,9 @@ fn lengths_and_kinds() {
     fmu.refused("no seed", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 1, &f64::NAN, 1, &mut out, 1));
     let sum = Importer::of::<Sum>(CoSimulation);
     sum.initialize(0.0);
-    let text =
-        sum.refused("no partials", |fmu| fmu.fmi3GetAdjointDerivative(&1, 1, &0, 1, &1.0, 1, &mut out, 1));
-    assert!(text.contains("providesAdjointDerivatives is false"), "{text}");
+    sum.refused_with(&["providesAdjointDerivatives is false"], |fmu| {
+        fmu.fmi3GetAdjointDerivative(&1, 1, &0, 1, &1.0, 1, &mut out, 1)
+    });
 }
 
 /// Which may be set at any time.
@@ -83,10 +84,9 @@ fn of_outputs() {
     fmu.refused("order 0", |fmu| fmu.fmi3GetOutputDerivatives(&time, 1, &0, &mut 0.0, 1));
     // Section 4.4.1 allows orders up to maxOutputDerivativeOrder.
     for orders in [[1, 2], [2, 1], [1, i32::MAX]] {
-        let text = fmu.refused("an order above 1", |fmu| {
+        fmu.refused_with(&["must be at most 1 (maxOutputDerivativeOrder)"], |fmu| {
             fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 2, orders.as_ptr(), values.as_mut_ptr(), 2)
         });
-        assert!(text.contains("must be at most 1 (maxOutputDerivativeOrder)"), "{text}");
     }
 }
 
@@ -95,6 +95,7 @@ fn of_outputs() {
 fn dependencies_are_in_the_description_alone() {
     let fmu = moving();
     let mut count = 0;
-    let text = fmu.refused("dependencies", |fmu| fmu.fmi3GetNumberOfVariableDependencies(0, &mut count));
-    assert!(text.contains("providesPerElementDependencies is false"), "{text}");
+    fmu.refused_with(&["providesPerElementDependencies is false"], |fmu| {
+        fmu.fmi3GetNumberOfVariableDependencies(0, &mut count)
+    });
 }

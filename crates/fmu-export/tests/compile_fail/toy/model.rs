@@ -1,0 +1,21 @@
+// The same with one variable, as a model that steps.
+include!("fields.rs");
+
+variables! { for Toy;
+    /// In
+    u = input(&NUMBER) in u;
+}
+
+impl Model for Toy {
+    const INFO: Info = info!("Toy", "toy");
+
+    fn new(_: &Setup) -> Result<Self, Error> {
+        Ok(Self { u: 0.0, x: 0.0, n: 0 })
+    }
+}
+
+impl CoSimulation for Toy {
+    fn step(&mut self, _: Step) -> Result<Stepped, Error> {
+        Ok(Stepped::Done)
+    }
+}

@@ -1,0 +1,160 @@
+//! Every function that runs a model's code, with what breaks it.
+
+use crate::toys::Faulty;
+use crate::toys::faulty::{Fault, Name, while_all_break};
+use crate::{FAULT, TEXT, TRUTH, U, X, Y};
+use fmu_export::Interface::{self, CoSimulation, ModelExchange};
+use fmu_export::Status;
+use fmu_export::fmi3::{indicator, reference};
+use fmu_test_kit::{Either, Importer, fmi3};
+use std::ffi::c_void;
+use std::ptr::{null, null_mut};
+
+/// A call that breaks an instance of this interface type with this fault, and its names without `fmi2` and `fmi3`.
+pub type Case<F> = (Interface, [&'static str; 2], Fault, fn(&F) -> Status);
+
+/// What both standards have.
+pub fn of_both<F: Either>() -> Vec<Case<F>> {
+    const REALS: [&str; 2] = ["GetReal", "GetFloat64"];
+    const INTEGERS: [&str; 2] = ["SetInteger", "SetInt32"];
+    vec![
+        (CoSimulation, REALS, Fault::Read, |fmu| fmu.try_get(&[Y], &mut [0.0])),
+        (CoSimulation, REALS, Fault::NoMessage, |fmu| fmu.try_get(&[Y], &mut [0.0])),
+        (CoSimulation, REALS, Fault::Bomb, |fmu| fmu.try_get(&[Y], &mut [0.0])),
+        (CoSimulation, REALS, Fault::Calculate, |fmu| fmu.try_get(&[Y], &mut [0.0])),
+        (CoSimulation, ["SetReal", "SetFloat64"], Fault::Then, |fmu| fmu.try_set(&[U], &[1.0])),
+        (ModelExchange, ["SetReal", "SetFloat64"], Fault::Then, |fmu| fmu.try_set(&[X], &[1.0])),
+        (CoSimulation, INTEGERS, Fault::Update, |fmu| set_fault(fmu, Fault::Update)),
+        (CoSimulation, INTEGERS, Fault::None, |fmu| {
+            while_all_break(Fault::Clone, || set_fault(fmu, Fault::None))
+        }),
+        (CoSimulation, INTEGERS, Fault::Drop, |fmu| set_fault(fmu, Fault::None)),
+        (CoSimulation, INTEGERS, Fault::Log, |fmu| set_fault(fmu, Fault::Log)),
+        (CoSimulation, ["SetBoolean"; 2], Fault::Then, |fmu| fmu.set_boolean(TRUTH, 1)),
+        (CoSimulation, ["SetString"; 2], Fault::Then, |fmu| fmu.set_text(TEXT, c"a".as_ptr())),
+        (CoSimulation, ["DoStep"; 2], Fault::Step, |fmu| fmu.try_step(0.0, 0.1)),
+        (ModelExchange, ["GetDerivatives", "GetContinuousStateDerivatives"], Fault::Read, |fmu| {
+            fmu.get_derivatives(&mut 0.0, 1)
+        }),
+        (ModelExchange, ["GetContinuousStates"; 2], Fault::Calculate, |fmu| fmu.get_states(&mut 0.0, 1)),
+        (ModelExchange, ["SetContinuousStates"; 2], Fault::Then, |fmu| fmu.set_states(&0.0, 1)),
+        (CoSimulation, ["GetFMUstate", "GetFMUState"], Fault::None, |fmu| {
+            let mut state = null_mut();
+            let status = while_all_break(Fault::Clone, || fmu.get_state(&mut state));
+            assert!(state.is_null());
+            status
+        }),
+        (CoSimulation, ["GetFMUstate", "GetFMUState"], Fault::None, |fmu| {
+            with_state(fmu, |state| while_all_break(Fault::Clone, || fmu.get_state(state)))
+        }),
+        (CoSimulation, ["SetFMUstate", "SetFMUState"], Fault::None, |fmu| {
+            with_state(fmu, |state| while_all_break(Fault::Clone, || fmu.set_state(*state)))
+        }),
+        (CoSimulation, ["FreeFMUstate", "FreeFMUState"], Fault::Drop, |fmu| {
+            with_state(fmu, |state| {
+                let status = fmu.free_state(state);
+                assert!(state.is_null());
+                status
+            })
+        }),
+        (CoSimulation, ["SerializedFMUstateSize", "SerializedFMUStateSize"], Fault::Memory, |fmu| {
+            with_state(fmu, |state| fmu.state_size(*state, &mut 0))
+        }),
+        (CoSimulation, ["SerializeFMUstate", "SerializeFMUState"], Fault::Memory, |fmu| {
+            with_state(fmu, |state| fmu.serialize_into(*state, [0; 100].as_mut_ptr(), 100))
+        }),
+        (CoSimulation, ["DeSerializeFMUstate", "DeserializeFMUState"], Fault::Memory, |fmu| {
+            let bytes = F::in_mode::<Faulty>(CoSimulation, fmu_export::Mode::Instantiated).bytes();
+            let mut state = null_mut();
+            let status = fmu.deserialize(bytes.as_ptr(), bytes.len(), &mut state);
+            assert!(state.is_null());
+            status
+        }),
+    ]
+}
+
+/// What a standard alone has, or calls in another way.
+pub trait Special: Either + Sized + 'static {
+    const CALLS: &'static [Case<Self>];
+}
+
+const N: u32 = Name::n as u32;
+
+impl Special for Importer {
+    const CALLS: &'static [Case<Self>] = &[
+        (CoSimulation, ["GetInteger", ""], Fault::Read, |fmu| fmu.fmi2GetInteger(&N, 1, &mut 0)),
+        (CoSimulation, ["GetBoolean", ""], Fault::Read, |fmu| fmu.fmi2GetBoolean(&TRUTH, 1, &mut 0)),
+        (CoSimulation, ["GetString", ""], Fault::ReadText, |fmu| fmu.fmi2GetString(&TEXT, 1, &mut null())),
+        (CoSimulation, ["SetRealInputDerivatives", ""], Fault::InputDerivative, |fmu| {
+            fmu.fmi2SetRealInputDerivatives(&U, 1, &1, &1.0)
+        }),
+        (CoSimulation, ["GetRealOutputDerivatives", ""], Fault::OutputDerivative, |fmu| {
+            fmu.fmi2GetRealOutputDerivatives(&Y, 1, &1, &mut 0.0)
+        }),
+        (CoSimulation, ["GetDirectionalDerivative", ""], Fault::Partial, |fmu| {
+            fmu.fmi2GetDirectionalDerivative(&Y, 1, &U, 1, &1.0, &mut 0.0)
+        }),
+        (ModelExchange, ["NewDiscreteStates", ""], Fault::Event, |fmu| {
+            fmu.ok(fmu.fmi2EnterEventMode());
+            fmu.fmi2NewDiscreteStates(&mut Default::default())
+        }),
+        (ModelExchange, ["CompletedIntegratorStep", ""], Fault::StepCompleted, |fmu| {
+            fmu.fmi2CompletedIntegratorStep(1, &mut 0, &mut 0)
+        }),
+        (ModelExchange, ["GetEventIndicators", ""], Fault::Indicators, |fmu| {
+            fmu.fmi2GetEventIndicators(&mut 0.0, 1)
+        }),
+        (ModelExchange, ["GetNominalsOfContinuousStates", ""], Fault::Nominals, |fmu| {
+            fmu.fmi2GetNominalsOfContinuousStates(&mut 0.0, 1)
+        }),
+    ];
+}
+
+impl Special for fmi3::Importer {
+    const CALLS: &'static [Case<Self>] = &[
+        (CoSimulation, ["", "GetInt32"], Fault::Read, |fmu| fmu.fmi3GetInt32(&reference(N), 1, &mut 0, 1)),
+        (CoSimulation, ["", "GetBoolean"], Fault::Read, |fmu| {
+            fmu.fmi3GetBoolean(&reference(TRUTH), 1, &mut 0, 1)
+        }),
+        (CoSimulation, ["", "GetString"], Fault::ReadText, |fmu| {
+            fmu.fmi3GetString(&reference(TEXT), 1, &mut null(), 1)
+        }),
+        (CoSimulation, ["", "GetOutputDerivatives"], Fault::OutputDerivative, |fmu| {
+            fmu.fmi3GetOutputDerivatives(&reference(Y), 1, &1, &mut 0.0, 1)
+        }),
+        (CoSimulation, ["", "GetDirectionalDerivative"], Fault::Partial, |fmu| {
+            fmu.fmi3GetDirectionalDerivative(&reference(Y), 1, &reference(U), 1, &1.0, 1, &mut 0.0, 1)
+        }),
+        (CoSimulation, ["", "GetAdjointDerivative"], Fault::Partial, |fmu| {
+            fmu.fmi3GetAdjointDerivative(&reference(Y), 1, &reference(U), 1, &1.0, 1, &mut 0.0, 1)
+        }),
+        // A variable stands for the indicator.
+        (ModelExchange, ["", "GetFloat64"], Fault::Indicators, |fmu| {
+            fmu.try_get(&[indicator::<Faulty>(0)], &mut [0.0])
+        }),
+        (ModelExchange, ["", "UpdateDiscreteStates"], Fault::Event, |fmu| {
+            fmu.ok(fmu.fmi3EnterEventMode());
+            let (mut flags, mut next) = ([0; 5], 0.0);
+            let [again, terminate, nominals, states, defined] = &mut flags;
+            fmu.fmi3UpdateDiscreteStates(again, terminate, nominals, states, defined, &mut next)
+        }),
+        (ModelExchange, ["", "CompletedIntegratorStep"], Fault::StepCompleted, |fmu| {
+            fmu.fmi3CompletedIntegratorStep(1, &mut 0, &mut 0)
+        }),
+        (ModelExchange, ["", "GetEventIndicators"], Fault::Indicators, |fmu| {
+            fmu.fmi3GetEventIndicators(&mut 0.0, 1)
+        }),
+        (ModelExchange, ["", "GetNominalsOfContinuousStates"], Fault::Nominals, |fmu| {
+            fmu.fmi3GetNominalsOfContinuousStates(&mut 0.0, 1)
+        }),
+    ];
+}
+
+pub fn set_fault(fmu: &impl Either, fault: Fault) -> Status {
+    fmu.set_integer(FAULT, fault as i32)
+}
+
+/// Runs the function on a saved state of the instance.
+fn with_state(fmu: &impl Either, function: impl FnOnce(&mut *mut c_void) -> Status) -> Status {
+    function(&mut fmu.save())
+}

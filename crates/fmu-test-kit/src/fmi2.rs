@@ -1,0 +1,254 @@
+//! FMI 2.0: an instance as an importer holds it.
+
+use crate::importer::{Log, importer, remember};
+use crate::{Arguments, Borrowed, Either, Message, Updated, either, library::functions_of};
+pub use fmi_abi::fmi2::Functions;
+use fmi_abi::fmi2::types::*;
+use fmu_export::Mode::{self, *};
+use fmu_export::{Exported, Interface};
+use std::ffi::{CStr, c_char, c_int, c_void};
+use std::ptr::{null, null_mut};
+
+fmi_abi::fmi2_functions!(importer, fmi2FreeInstance;);
+
+/// The logger without its `...`, which stable Rust cannot define. The FMU may pass variadic arguments, which are not
+/// looked at; named ones travel the same way in variadic and plain calls on every platform of this project.
+unsafe extern "C" fn log_message(
+    environment: fmi2ComponentEnvironment,
+    instance_name: fmi2String,
+    status: c_int,
+    category: fmi2String,
+    message: fmi2String,
+) {
+    // SAFETY: section 2.1.5: NULL or zero-terminated strings, and NULL or the log.
+    unsafe { remember(environment, instance_name, status, category, message) }
+}
+
+/// `fmi2Instantiate`. The callbacks structure and the instance name are overwritten afterwards: the FMU must have copied
+/// them.
+fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi2Component {
+    let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
+    let mut name = arguments.instance_name.map(|name| name.to_bytes_with_nul().to_vec());
+    let logger: unsafe extern "C" fn(_, _, _, _, _) = log_message;
+    let mut callbacks = fmi2CallbackFunctions {
+        // SAFETY: see `log_message`.
+        logger: arguments.logger.then(|| unsafe { std::mem::transmute::<_, fmi2CallbackLogger>(logger) }),
+        allocate_memory: None,
+        free_memory: None,
+        step_finished: None,
+        component_environment: match arguments.environment {
+            true => (&raw const *log).cast_mut().cast(),
+            false => null_mut(),
+        },
+    };
+    // SAFETY: NULL or living values, all of them.
+    let component = unsafe {
+        (functions.fmi2Instantiate)(
+            name.as_ref().map_or(null(), |name| name.as_ptr().cast()),
+            arguments.fmu_type,
+            pointer(arguments.guid.as_deref()),
+            pointer(arguments.resource_location),
+            if arguments.callbacks { &raw const callbacks } else { null() },
+            arguments.visible.into(),
+            arguments.logging_on.into(),
+        )
+    };
+    callbacks.logger = None;
+    callbacks.component_environment = null_mut();
+    if let Some(name) = &mut name {
+        name.fill(b'X');
+    }
+    std::hint::black_box((&callbacks, &name));
+    component
+}
+
+/// What FMI 2.0 alone has.
+#[allow(clippy::missing_panics_doc, reason = "that is what they are for")]
+impl Importer {
+    /// What needs no instance: version and platform (section 2.1.4).
+    pub fn version_and_platform(&self) -> [&CStr; 2] {
+        let Functions { fmi2GetVersion, fmi2GetTypesPlatform, .. } = self.functions;
+        // SAFETY: both give strings that the library keeps.
+        [fmi2GetVersion, fmi2GetTypesPlatform].map(|text| unsafe { CStr::from_ptr(text()) })
+    }
+
+    /// Output derivatives of order 1.
+    #[track_caller]
+    pub fn rates<const COUNT: usize>(&self, vr: [u32; COUNT]) -> [f64; COUNT] {
+        let mut values = [f64::NAN; COUNT];
+        let orders = [1; COUNT];
+        self.ok(self.fmi2GetRealOutputDerivatives(vr.as_ptr(), COUNT, orders.as_ptr(), values.as_mut_ptr()));
+        values
+    }
+
+    /// Input derivatives of order 1.
+    #[track_caller]
+    pub fn set_rates<const COUNT: usize>(&self, vr: [u32; COUNT], values: [f64; COUNT]) {
+        self.give_rates(&vr, &values);
+    }
+
+    /// Directional derivatives.
+    #[track_caller]
+    pub fn directional(&self, unknown: &[u32], known: &[u32], seed: &[f64]) -> Vec<f64> {
+        let mut result = vec![f64::NAN; unknown.len()];
+        let (unknowns, knowns) = (unknown.as_ptr(), known.as_ptr());
+        assert_eq!(seed.len(), known.len());
+        let (seed, wanted) = (seed.as_ptr(), result.as_mut_ptr());
+        self.ok(self.fmi2GetDirectionalDerivative(
+            unknowns,
+            unknown.len(),
+            knowns,
+            known.len(),
+            seed,
+            wanted,
+        ));
+        result
+    }
+
+    /// `fmi2SetDebugLogging` with these categories.
+    pub fn set_debug_logging(&self, on: bool, categories: &[&CStr]) -> Status {
+        let pointers: Vec<_> = categories.iter().map(|category| category.as_ptr()).collect();
+        self.fmi2SetDebugLogging(on.into(), pointers.len(), pointers.as_ptr())
+    }
+}
+
+macro_rules! same {
+    ($($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+) => {
+        $(fn $name(&self $(, $argument: $type)*) -> Status { self.$fmi2($($argument),*) })+
+    };
+}
+
+impl Either for Importer {
+    either::same_functions!(same);
+
+    fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
+        Self::try_with::<M>(arguments)
+    }
+
+    fn nothing<M: Exported>() -> Self {
+        Self::null::<M>()
+    }
+
+    fn functions() -> &'static [&'static str] {
+        FUNCTIONS
+    }
+
+    fn modes_of(interface: Interface) -> &'static [Mode] {
+        match interface {
+            Interface::CoSimulation => {
+                &[Instantiated, Initialization, StepComplete, StepFailed, Terminated, Error]
+            }
+            Interface::ModelExchange => {
+                &[Instantiated, Initialization, Event, ContinuousTime, Terminated, Error]
+            }
+        }
+    }
+
+    fn call_zeros(&self, name: &str) -> Status {
+        self.call_with_zeros(name)
+    }
+
+    fn take_log(&self) -> Vec<Message> {
+        self.log.take()
+    }
+
+    fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status {
+        let (defined, stop_time) = (stop_time.is_some().into(), stop_time.unwrap_or(f64::NAN));
+        match self.fmi2SetupExperiment(fmi2False, f64::NAN, start_time, defined, stop_time) {
+            Status::Ok => self.fmi2EnterInitializationMode(),
+            refused => refused,
+        }
+    }
+
+    fn try_get(&self, vr: &[u32], values: &mut [f64]) -> Status {
+        assert_eq!(vr.len(), values.len());
+        self.fmi2GetReal(vr.as_ptr(), vr.len(), values.as_mut_ptr())
+    }
+
+    fn try_set(&self, vr: &[u32], values: &[f64]) -> Status {
+        assert_eq!(vr.len(), values.len());
+        self.fmi2SetReal(vr.as_ptr(), vr.len(), values.as_ptr())
+    }
+
+    fn set_integer(&self, vr: u32, value: i32) -> Status {
+        self.fmi2SetInteger(&vr, 1, &value)
+    }
+
+    fn set_boolean(&self, vr: u32, value: u8) -> Status {
+        self.fmi2SetBoolean(&vr, 1, &value.into())
+    }
+
+    fn set_text(&self, vr: u32, value: *const c_char) -> Status {
+        self.fmi2SetString(&vr, 1, &value)
+    }
+
+    fn try_step(&self, point: f64, step_size: f64) -> Status {
+        self.fmi2DoStep(point, step_size, fmi2True)
+    }
+
+    #[track_caller]
+    fn step(&self, point: f64, step_size: f64) {
+        const LAST_SUCCESSFUL_TIME: i32 = 2;
+        self.ok(self.try_step(point, step_size));
+        let mut time = f64::NAN;
+        self.ok(self.fmi2GetRealStatus(LAST_SUCCESSFUL_TIME, &mut time));
+        assert_eq!(time, point + step_size);
+    }
+
+    #[track_caller]
+    fn give_rates(&self, vr: &[u32], values: &[f64]) {
+        let orders = [1; 8];
+        assert!(vr.len() == values.len() && vr.len() <= orders.len());
+        let (vr, count) = (vr.as_ptr(), vr.len());
+        self.ok(self.fmi2SetRealInputDerivatives(vr, count, orders.as_ptr(), values.as_ptr()));
+    }
+
+    #[track_caller]
+    fn rate(&self, vr: u32) -> f64 {
+        let [rate] = self.rates([vr]);
+        rate
+    }
+
+    #[track_caller]
+    fn partial(&self, unknown: u32, known: u32) -> f64 {
+        let mut partial = f64::NAN;
+        self.ok(self.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, &mut partial));
+        partial
+    }
+
+    #[track_caller]
+    fn update(&self) -> Updated {
+        let mut info = fmi2EventInfo {
+            new_discrete_states_needed: 2,
+            terminate_simulation: 2,
+            nominals_of_continuous_states_changed: 2,
+            values_of_continuous_states_changed: 2,
+            next_event_time_defined: 2,
+            next_event_time: f64::NAN,
+        };
+        self.ok(self.fmi2NewDiscreteStates(&mut info));
+        let truth = |flag| [fmi2False, fmi2True].iter().position(|of| *of == flag).expect("0 or 1") == 1;
+        Updated {
+            again: truth(info.new_discrete_states_needed),
+            terminate: truth(info.terminate_simulation),
+            nominals_changed: truth(info.nominals_of_continuous_states_changed),
+            states_changed: truth(info.values_of_continuous_states_changed),
+            next: truth(info.next_event_time_defined).then_some(info.next_event_time),
+        }
+    }
+
+    #[track_caller]
+    fn completed_step(&self) -> [bool; 2] {
+        let [mut event, mut terminate] = [2; 2];
+        self.ok(self.fmi2CompletedIntegratorStep(fmi2True, &mut event, &mut terminate));
+        [event, terminate].map(|flag| [fmi2False, fmi2True].iter().position(|of| *of == flag) == Some(1))
+    }
+
+    fn serialize_into(&self, state: *mut c_void, bytes: *mut u8, size: usize) -> Status {
+        self.fmi2SerializeFMUstate(state, bytes.cast(), size)
+    }
+
+    fn deserialize(&self, bytes: *const u8, size: usize, state: *mut *mut c_void) -> Status {
+        self.fmi2DeSerializeFMUstate(bytes.cast(), size, state)
+    }
+}

@@ -1,0 +1,242 @@
+//! FMI 3.0: an instance as an importer holds it.
+
+use crate::importer::{Log, importer, remember};
+use crate::{Arguments, Borrowed, Either, Message, Updated, either};
+pub use fmi_abi::fmi3::Functions;
+use fmi_abi::fmi3::types::*;
+use fmu_export::Mode::{self, *};
+use fmu_export::fmi3::{functions as functions_of, reference};
+use fmu_export::{Exported, Interface};
+use std::ffi::{CStr, c_char, c_int, c_void};
+use std::ptr::{null, null_mut};
+
+fmi_abi::fmi3_functions!(importer, fmi3FreeInstance;);
+
+unsafe extern "C" fn log_message(
+    environment: fmi3InstanceEnvironment,
+    status: c_int,
+    category: fmi3String,
+    message: fmi3String,
+) {
+    // SAFETY: section 2.3.1: strings, and NULL or the log. No instance name comes with them.
+    unsafe { remember(environment, null(), status, category, message) }
+}
+
+/// `fmi3InstantiateModelExchange` or `fmi3InstantiateCoSimulation`.
+fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance {
+    let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
+    let name = pointer(arguments.instance_name);
+    let token = pointer(arguments.guid.as_deref());
+    // A path, not a URI.
+    let path = arguments.resource_location.map(|location| {
+        let bytes = location.to_bytes_with_nul();
+        CStr::from_bytes_with_nul(bytes.strip_prefix(b"file://").unwrap_or(bytes)).expect("its end is left")
+    });
+    let resources = pointer(path);
+    let environment = match arguments.environment {
+        true => (&raw const *log).cast_mut().cast(),
+        false => null_mut(),
+    };
+    let callback = arguments.logger.then_some(log_message as fmi3LogMessageCallback);
+    let (visible, logging_on) = (arguments.visible.into(), arguments.logging_on);
+    let required = arguments.required_intermediate_variables;
+    // SAFETY: NULL or living values, all of them.
+    unsafe {
+        match arguments.fmu_type {
+            0 => (functions.fmi3InstantiateModelExchange)(
+                name,
+                token,
+                resources,
+                visible,
+                logging_on,
+                environment,
+                callback,
+            ),
+            _ => (functions.fmi3InstantiateCoSimulation)(
+                name,
+                token,
+                resources,
+                visible,
+                logging_on,
+                arguments.event_mode_used,
+                arguments.early_return_allowed,
+                required.as_ptr(),
+                required.len(),
+                environment,
+                callback,
+                None,
+            ),
+        }
+    }
+}
+
+/// What `fmi3DoStep` says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs, reason = "as in the standard, section 4.2.1")]
+pub struct Stepped {
+    pub event_handling_needed: bool,
+    pub terminate: bool,
+    pub early_return: bool,
+    pub last_successful_time: f64,
+}
+
+/// What FMI 3.0 alone has.
+impl Importer {
+    /// A step, or not.
+    ///
+    /// # Errors
+    /// What is answered instead of OK.
+    pub fn do_step(&self, point: f64, step_size: f64) -> Result<Stepped, Status> {
+        let (mut event, mut terminate, mut early, mut time) = (2, 2, 2, f64::NAN);
+        let status =
+            self.fmi3DoStep(point, step_size, fmi3True, &mut event, &mut terminate, &mut early, &mut time);
+        if status != Status::Ok {
+            return Err(status);
+        }
+        let [event_handling_needed, terminate, early_return] = [event, terminate, early].map(truth);
+        Ok(Stepped { event_handling_needed, terminate, early_return, last_successful_time: time })
+    }
+}
+
+#[track_caller]
+fn truth(flag: fmi3Boolean) -> bool {
+    assert!(flag <= 1, "{flag} is no truth value");
+    flag == 1
+}
+
+/// The value references of variables at these places, up to 16; without an allocation, which tests of control loops
+/// would count.
+fn references(places: &[u32]) -> [u32; 16] {
+    let mut references = [0; 16];
+    references[..places.len()].copy_from_slice(places);
+    references.map(reference)
+}
+
+macro_rules! same {
+    ($($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+) => {
+        $(fn $name(&self $(, $argument: $type)*) -> Status { self.$fmi3($($argument),*) })+
+    };
+}
+
+impl Either for Importer {
+    either::same_functions!(same);
+
+    fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
+        Self::try_with::<M>(arguments)
+    }
+
+    fn nothing<M: Exported>() -> Self {
+        Self::null::<M>()
+    }
+
+    fn functions() -> &'static [&'static str] {
+        FUNCTIONS
+    }
+
+    fn modes_of(interface: Interface) -> &'static [Mode] {
+        match interface {
+            Interface::CoSimulation => &[Instantiated, Initialization, Event, StepComplete, Terminated],
+            Interface::ModelExchange => &[Instantiated, Initialization, Event, ContinuousTime, Terminated],
+        }
+    }
+
+    fn call_zeros(&self, name: &str) -> Status {
+        self.call_with_zeros(name)
+    }
+
+    fn take_log(&self) -> Vec<Message> {
+        self.log.take()
+    }
+
+    fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status {
+        let (defined, stop_time) = (stop_time.is_some().into(), stop_time.unwrap_or(f64::NAN));
+        self.fmi3EnterInitializationMode(fmi3False, f64::NAN, start_time, defined, stop_time)
+    }
+
+    fn try_get(&self, places: &[u32], values: &mut [f64]) -> Status {
+        if places.len() <= 16 {
+            let vr = references(places);
+            return self.fmi3GetFloat64(vr.as_ptr(), places.len(), values.as_mut_ptr(), values.len());
+        }
+        let vr: Vec<_> = places.iter().map(|place| reference(*place)).collect();
+        self.fmi3GetFloat64(vr.as_ptr(), vr.len(), values.as_mut_ptr(), values.len())
+    }
+
+    fn try_set(&self, places: &[u32], values: &[f64]) -> Status {
+        let vr = references(places);
+        self.fmi3SetFloat64(vr.as_ptr(), places.len(), values.as_ptr(), values.len())
+    }
+
+    fn set_integer(&self, place: u32, value: i32) -> Status {
+        self.fmi3SetInt32(&reference(place), 1, &value, 1)
+    }
+
+    fn set_boolean(&self, place: u32, value: u8) -> Status {
+        self.fmi3SetBoolean(&reference(place), 1, &value, 1)
+    }
+
+    fn set_text(&self, place: u32, value: *const c_char) -> Status {
+        self.fmi3SetString(&reference(place), 1, &value, 1)
+    }
+
+    fn try_step(&self, point: f64, step_size: f64) -> Status {
+        self.do_step(point, step_size).err().unwrap_or(Status::Ok)
+    }
+
+    #[track_caller]
+    fn step(&self, point: f64, step_size: f64) {
+        let last_successful_time = point + step_size;
+        let [event_handling_needed, terminate, early_return] = [false; 3];
+        let whole = Stepped { event_handling_needed, terminate, early_return, last_successful_time };
+        assert_eq!(self.do_step(point, step_size), Ok(whole), "log: {:#?}", self.take_log());
+    }
+
+    #[track_caller]
+    fn rate(&self, place: u32) -> f64 {
+        let mut rate = f64::NAN;
+        self.ok(self.fmi3GetOutputDerivatives(&reference(place), 1, &1, &mut rate, 1));
+        rate
+    }
+
+    /// Backward and forward: of one with respect to one it is the same number.
+    #[track_caller]
+    fn partial(&self, unknown: u32, known: u32) -> f64 {
+        let [unknown, known] = [unknown, known].map(reference);
+        let (mut forward, mut adjoint) = (f64::NAN, f64::NAN);
+        self.ok(self.fmi3GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut forward, 1));
+        self.ok(self.fmi3GetAdjointDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut adjoint, 1));
+        assert_eq!(forward.to_bits(), adjoint.to_bits());
+        forward
+    }
+
+    #[track_caller]
+    fn update(&self) -> Updated {
+        let (mut flags, mut next) = ([2; 5], f64::NAN);
+        let [again, terminate, nominals, states, defined] = &mut flags;
+        self.ok(self.fmi3UpdateDiscreteStates(again, terminate, nominals, states, defined, &mut next));
+        let [again, terminate, nominals_changed, states_changed, defined] = flags.map(truth);
+        Updated { again, terminate, nominals_changed, states_changed, next: defined.then_some(next) }
+    }
+
+    #[track_caller]
+    fn completed_step(&self) -> [bool; 2] {
+        let [mut event, mut terminate] = [2; 2];
+        self.ok(self.fmi3CompletedIntegratorStep(fmi3True, &mut event, &mut terminate));
+        [event, terminate].map(truth)
+    }
+
+    fn serialize_into(&self, state: *mut c_void, bytes: *mut u8, size: usize) -> Status {
+        self.fmi3SerializeFMUState(state, bytes, size)
+    }
+
+    fn deserialize(&self, bytes: *const u8, size: usize, state: *mut *mut c_void) -> Status {
+        self.fmi3DeserializeFMUState(bytes, size, state)
+    }
+
+    fn leave_event_mode(&self) {
+        let has_events = self.fmi3EnterStepMode() == Status::Ok;
+        if !has_events {
+            self.take_log();
+        }
+    }
+}
