@@ -14,7 +14,7 @@ const MORE_THAN_0: f64 = 1e-300;
 const INERTIA: Type = Type::real("MomentOfInertia", &KG_M2).min(MORE_THAN_0).nominal(0.01);
 const STIFFNESS: Type = Type::real("RotationalSpringConstant", &N_M_PER_RAD).min(MORE_THAN_0).nominal(100.0);
 const DAMPING: Type = Type::real("RotationalDampingConstant", &N_M_S_PER_RAD).min(0.0).nominal(1.0);
-const COUNT: Type = Type::integer("Integer_from_1").from(1);
+const COUNT: Type = Type::integer("Integer_from_1").min_integer(1);
 
 variables! {
     for TestbedFmu, memory in

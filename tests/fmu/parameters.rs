@@ -69,7 +69,7 @@ fn declared_limits_are_those() {
     let mut found = 0;
     for (place, variable) in (0..).zip(TABLE).filter(|(_, of)| of.causality() == Causality::Parameter) {
         let fmu = in_mode(CoSimulation, Instantiated);
-        match variable.of().of {
+        match variable.variable_type().attributes {
             Attributes::Real { min: Some(min), .. } => {
                 let below = if min == 0.0 { -1e-300 } else { 0.999 * min };
                 fmu.refused(variable.name(), |fmu| fmu.try_set(&[place], &[below]));

@@ -29,14 +29,14 @@ pub trait CoSimulation: Model {
 /// end. In FMI 2.0 the step ends early then; in FMI 3.0 it is undone, and the importer told to make shorter ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Events {
-    /// There are none.
+    /// No step stops at an event.
     None,
-    /// They do. For importers that handle no events, those of FMI 2.0 among them, this crate does: at the begin of the
-    /// simulation and wherever a step stops, at once.
+    /// Every step stops at events. Importers of FMI 3.0 may handle them; for all others, those of FMI 2.0 among them,
+    /// this crate calls [`ModelExchange::event`] at the begin of the simulation and wherever a step stops.
     Stop,
-    /// They do where [`Step::stop_at_events`] says so. For importers that handle no events, the model goes through them
-    /// in its step; `event` is not called. For models that wait for the inputs of the next step, as a sampled
-    /// controller.
+    /// A step stops at events only where [`Step::stop_at_events`] is set, which it is for importers that handle events.
+    /// For all others the model handles them itself within its step, and `event` is not called. This suits models that
+    /// wait for the inputs of the next step, such as a sampled controller.
     StopIfHandled,
 }
 

@@ -28,14 +28,14 @@ pub struct Item {
 /// use fmu_export::{Type, units};
 ///
 /// const STIFFNESS: Type = Type::real("Stiffness", &units::N_M_PER_RAD).min(0.0).nominal(100.0);
-/// const COUNT: Type = Type::integer("Count").from(1).to(9);
+/// const COUNT: Type = Type::integer("Count").min_integer(1).max_integer(9);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Type {
     /// Name, unlike any variable's; empty for a type that needs no definition.
     pub name: &'static str,
     /// What it says of its values.
-    pub of: Attributes,
+    pub attributes: Attributes,
     /// What kind of value.
     pub base: BaseType,
 }
@@ -86,17 +86,17 @@ pub const TIME: Type = Type::real("Time", &units::S);
 /// A whole number of any size.
 pub const INTEGER: Type = Type::integer("");
 /// A truth value.
-pub const BOOLEAN: Type = Type { name: "", of: Attributes::Boolean, base: BaseType::Boolean };
+pub const BOOLEAN: Type = Type { name: "", attributes: Attributes::Boolean, base: BaseType::Boolean };
 /// A text.
-pub const STRING: Type = Type { name: "", of: Attributes::String, base: BaseType::String };
+pub const STRING: Type = Type { name: "", attributes: Attributes::String, base: BaseType::String };
 /// Bytes of any meaning.
 pub const BINARY: Type = Type::binary("", "application/octet-stream");
 
 impl Type {
     /// A physical quantity of this name in this unit, without range and nominal value.
     pub const fn real(name: &'static str, unit: &'static Unit) -> Self {
-        let of = Attributes::Real { quantity: name, unit, min: None, max: None, nominal: None };
-        Self { name, of, base: BaseType::Real }
+        let attributes = Attributes::Real { quantity: name, unit, min: None, max: None, nominal: None };
+        Self { name, attributes, base: BaseType::Real }
     }
 
     /// The same in single precision.
@@ -112,25 +112,25 @@ impl Type {
     /// A whole number of a kind, such as [`BaseType::UInt16`].
     pub const fn whole(name: &'static str, base: BaseType) -> Self {
         let Some((min, max)) = base.range() else { panic!("this kind of value is no whole number") };
-        Self { name, of: Attributes::Integer { min, max }, base }
+        Self { name, attributes: Attributes::Integer { min, max }, base }
     }
 
     /// Bytes of a MIME type, at most a mebibyte of them.
     pub const fn binary(name: &'static str, mime_type: &'static str) -> Self {
-        let of = Attributes::Binary { mime_type, max_size: 1 << 20 };
-        Self { name, of, base: BaseType::Binary }
+        let attributes = Attributes::Binary { mime_type, max_size: 1 << 20 };
+        Self { name, attributes, base: BaseType::Binary }
     }
 
     /// One of a list of names. [`enumeration!`](crate::enumeration) makes the list.
     pub const fn enumeration(name: &'static str, items: &'static [Item]) -> Self {
-        Self { name, of: Attributes::Enumeration(items), base: BaseType::Enumeration }
+        Self { name, attributes: Attributes::Enumeration(items), base: BaseType::Enumeration }
     }
 
     /// With a smallest value, for a Real.
     #[must_use]
     pub const fn min(mut self, smallest: f64) -> Self {
-        let Attributes::Real { min, .. } = &mut self.of else {
-            panic!("min is for Reals; an Integer has from")
+        let Attributes::Real { min, .. } = &mut self.attributes else {
+            panic!("min is for Reals; whole numbers have min_integer")
         };
         *min = Some(smallest);
         self
@@ -139,8 +139,8 @@ impl Type {
     /// With a largest value, for a Real.
     #[must_use]
     pub const fn max(mut self, largest: f64) -> Self {
-        let Attributes::Real { max, .. } = &mut self.of else {
-            panic!("max is for Reals; an Integer has to")
+        let Attributes::Real { max, .. } = &mut self.attributes else {
+            panic!("max is for Reals; whole numbers have max_integer")
         };
         *max = Some(largest);
         self
@@ -149,25 +149,29 @@ impl Type {
     /// With an order of magnitude, for a Real.
     #[must_use]
     pub const fn nominal(mut self, magnitude: f64) -> Self {
-        let Attributes::Real { nominal, .. } = &mut self.of else { panic!("nominal is for Reals") };
+        let Attributes::Real { nominal, .. } = &mut self.attributes else { panic!("nominal is for Reals") };
         *nominal = Some(magnitude);
         self
     }
 
     /// With a smallest value, for a whole number.
     #[must_use]
-    pub const fn from(mut self, smallest: i128) -> Self {
+    pub const fn min_integer(mut self, smallest: i128) -> Self {
         let base = self.base;
-        let Attributes::Integer { min, .. } = &mut self.of else { panic!("from is for whole numbers") };
+        let Attributes::Integer { min, .. } = &mut self.attributes else {
+            panic!("min_integer is for whole numbers")
+        };
         *min = has(base, smallest);
         self
     }
 
     /// With a largest value, for a whole number.
     #[must_use]
-    pub const fn to(mut self, largest: i128) -> Self {
+    pub const fn max_integer(mut self, largest: i128) -> Self {
         let base = self.base;
-        let Attributes::Integer { max, .. } = &mut self.of else { panic!("to is for whole numbers") };
+        let Attributes::Integer { max, .. } = &mut self.attributes else {
+            panic!("max_integer is for whole numbers")
+        };
         *max = has(base, largest);
         self
     }
@@ -175,7 +179,9 @@ impl Type {
     /// With a largest number of bytes, at most a mebibyte.
     #[must_use]
     pub const fn max_size(mut self, largest: usize) -> Self {
-        let Attributes::Binary { max_size, .. } = &mut self.of else { panic!("max_size is for Binary") };
+        let Attributes::Binary { max_size, .. } = &mut self.attributes else {
+            panic!("max_size is for Binary")
+        };
         assert!(largest <= *max_size, "max_size: a mebibyte is the largest");
         *max_size = largest;
         self
@@ -188,7 +194,7 @@ impl Type {
 
     /// The nominal value of a Real, 1 if nothing else is said.
     pub const fn nominal_or_one(&self) -> f64 {
-        match self.of {
+        match self.attributes {
             Attributes::Real { nominal: Some(nominal), .. } => nominal,
             _ => 1.0,
         }
@@ -202,7 +208,7 @@ mod tests {
     #[test]
     fn builders_set_what_they_say() {
         let length = Type::real("Length", &units::ONE).min(-1.0).max(2.0).nominal(3.0);
-        let Attributes::Real { quantity, unit, min, max, nominal } = length.of else {
+        let Attributes::Real { quantity, unit, min, max, nominal } = length.attributes else {
             panic!("it is a Real")
         };
         assert_eq!(
@@ -213,8 +219,11 @@ mod tests {
             (length.nominal_or_one(), NUMBER.nominal_or_one(), STRING.nominal_or_one()),
             (3.0, 1.0, 1.0)
         );
-        assert_eq!(Type::integer("Count").from(-1).to(9).of, Attributes::Integer { min: -1, max: 9 });
-        assert_eq!(INTEGER.of, Attributes::Integer { min: i32::MIN.into(), max: i32::MAX.into() });
+        assert_eq!(
+            Type::integer("Count").min_integer(-1).max_integer(9).attributes,
+            Attributes::Integer { min: -1, max: 9 }
+        );
+        assert_eq!(INTEGER.attributes, Attributes::Integer { min: i32::MIN.into(), max: i32::MAX.into() });
     }
 
     #[test]

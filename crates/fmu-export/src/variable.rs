@@ -372,7 +372,7 @@ impl<M> Variable<M> {
     }
 
     /// Unit, range and so on.
-    pub const fn of(&self) -> &'static Type {
+    pub const fn variable_type(&self) -> &'static Type {
         self.of
     }
 

@@ -25,7 +25,7 @@ pub(crate) fn check<M: Exported>(changes: &Changes) -> Result<Starts> {
         let name = variable.name();
         ensure!(is_text(name), "the variable name '{}' is empty or more than one line", name.escape_debug());
         ensure!(is_line(variable.description()), "the description of {name} is more than one line");
-        let of = variable.of();
+        let of = variable.variable_type();
         let named = if of.name.is_empty() {
             "its type".to_owned()
         } else {
@@ -121,7 +121,7 @@ fn check_info(info: &Info) -> Result<()> {
 
 fn check_type(of: &Type) -> Result<()> {
     ensure!(is_line(of.name), "its name is more than one line");
-    match of.of {
+    match of.attributes {
         Attributes::Real { quantity, unit, min, max, nominal } => {
             ensure!(is_line(quantity), "its quantity '{}' is more than one line", quantity.escape_debug());
             for (what, limit) in [("min", min), ("max", max)] {
@@ -245,7 +245,11 @@ fn check_starts<M: Exported>() -> Result<Starts> {
     for (_, starts) in &all {
         for (variable, start) in M::TABLE.iter().zip(starts) {
             if let Some(start) = start {
-                check_value(&format!("the start value of {}", variable.name()), variable.of(), start)?;
+                check_value(
+                    &format!("the start value of {}", variable.name()),
+                    variable.variable_type(),
+                    start,
+                )?;
             }
         }
     }
@@ -287,7 +291,7 @@ fn new_model<M: Exported>(interface: Interface) -> Result<M> {
 
 /// Whether the type has the value.
 fn check_value(what: &str, of: &Type, value: &Value) -> Result<()> {
-    match (of.of, value) {
+    match (of.attributes, value) {
         (Attributes::Real { min, max, .. }, Value::Real(real)) => {
             ensure!(real.is_finite(), "{what} must be a finite number, it is {value}");
             if let Some(min) = min {
@@ -335,7 +339,7 @@ fn check_changes<M: Exported>(changes: &Changes, starts: &mut Starts) -> Result<
         );
         let value = read_value(variable.base(), text)
             .with_context(|| format!("the start value of {name} cannot be"))?;
-        check_value(name, variable.of(), &value)?;
+        check_value(name, variable.variable_type(), &value)?;
         starts[place] = Some(value);
     }
     for interface in interfaces::<M>() {

@@ -10,7 +10,7 @@ use fmu_export::{Attributes, Type, Unit, Value};
 pub(crate) fn unit_definitions(types: &[&Type]) -> Result<Option<Element>> {
     let mut units: Vec<&Unit> = Vec::new();
     for of in types {
-        let Attributes::Real { unit, .. } = of.of else { continue };
+        let Attributes::Real { unit, .. } = of.attributes else { continue };
         match units.iter().find(|known| known.name == unit.name) {
             Some(known) => {
                 ensure!(*known == unit, "there are two different units with the name {}", unit.name)
@@ -75,7 +75,7 @@ pub(crate) fn type_definitions(
 
 /// The items of an Enumeration.
 pub(crate) fn items(of: &Type) -> impl Iterator<Item = Element> {
-    let items = if let Attributes::Enumeration(items) = of.of { items } else { &[] };
+    let items = if let Attributes::Enumeration(items) = of.attributes { items } else { &[] };
     items.iter().map(|item| {
         Element::new("Item")
             .with("name", item.name)
@@ -86,7 +86,9 @@ pub(crate) fn items(of: &Type) -> impl Iterator<Item = Element> {
 
 /// The element with what its type says: quantity, unit, range, nominal value, kind of bytes.
 pub(crate) fn with_attributes(element: Element, of: &Type) -> Element {
-    let Attributes::Real { quantity, unit, nominal, .. } = of.of else { return with_range(element, of) };
+    let Attributes::Real { quantity, unit, nominal, .. } = of.attributes else {
+        return with_range(element, of);
+    };
     let element = element
         .with_some("quantity", filled(quantity))
         .with("unit", unit.name)
@@ -96,7 +98,7 @@ pub(crate) fn with_attributes(element: Element, of: &Type) -> Element {
 
 /// The element with the values that its type has: their range, or the kind of bytes.
 pub(crate) fn with_range(element: Element, of: &Type) -> Element {
-    match of.of {
+    match of.attributes {
         Attributes::Real { min, max, .. } => {
             element.with_some("min", min.map(Value::Real)).with_some("max", max.map(Value::Real))
         }

@@ -45,7 +45,7 @@ pub(crate) fn check<M: Exported>(
 fn check_pair<M: Exported>(points: &[(M, f64)], running: bool, unknown: u32, known: u32) -> Result<()> {
     let (time, of_time) = independent::<M>();
     let of = &M::TABLE[unknown as usize];
-    let nominal = match of.of().of {
+    let nominal = match of.variable_type().attributes {
         Attributes::Real { nominal, .. } => nominal.unwrap_or_default(),
         _ => 0.0,
     };
@@ -58,8 +58,11 @@ fn check_pair<M: Exported>(points: &[(M, f64)], running: bool, unknown: u32, kno
         };
         let variable = M::TABLE.get(known as usize).filter(|_| known != time);
         let Some(at) = variable.map_or(Some(*now), |known| real(known, model)) else { continue };
-        let scale =
-            if at == 0.0 { variable.map_or(1.0, |known| known.of().nominal_or_one()) } else { at.abs() };
+        let scale = if at == 0.0 {
+            variable.map_or(1.0, |known| known.variable_type().nominal_or_one())
+        } else {
+            at.abs()
+        };
         let value = |offset: f64| {
             let mut model = model.clone();
             let time = match variable {

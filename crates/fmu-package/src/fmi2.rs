@@ -28,7 +28,7 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
     let starts = check::<M>(changes)?;
     memory::check::<M>(&starts)?;
     let structure = ModelStructure::of::<M>(changes.tunable_parameters)?;
-    let types: Vec<_> = M::TABLE.iter().map(Variable::of).collect();
+    let types: Vec<_> = M::TABLE.iter().map(Variable::variable_type).collect();
     let names: Vec<_> = M::TABLE.iter().map(Variable::name).collect();
     let variables = M::TABLE.iter().zip(starts).zip(0..);
     let variables = variables.map(|((variable, start), vr)| scalar_variable(variable, vr, start, changes));
@@ -90,7 +90,7 @@ fn scalar_variable<M: Exported>(
     start: Option<Value>,
     changes: &Changes,
 ) -> Element {
-    let of = variable.of();
+    let of = variable.variable_type();
     let value = Element::new(of.base().to_string())
         .with_some("declaredType", filled(of.name))
         .with_some("start", start)

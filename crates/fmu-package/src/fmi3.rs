@@ -22,7 +22,7 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
     let starts = check::<M>(changes)?;
     memory::check::<M>(&starts)?;
     let structure = ModelStructure::of_fmi3::<M>(changes.tunable_parameters)?;
-    let types: Vec<_> = M::TABLE.iter().map(Variable::of).collect();
+    let types: Vec<_> = M::TABLE.iter().map(Variable::variable_type).collect();
     let names: Vec<_> = M::TABLE.iter().map(Variable::name).collect();
     let generated = generated::<M>();
     for name in generated.iter().filter_map(|variable| variable.attribute("name")) {
@@ -127,7 +127,7 @@ fn type_definition(of: &Type) -> Element {
 /// Of what the type says, only the range is repeated: fmi-sim 0.7 reads no FMU whose variables have a quantity, a unit or a
 /// nominal value themselves, although they may (section 2.4.7.3).
 fn variable<M: Exported>(of: &Variable<M>, vr: u32, start: Option<Value>, changes: &Changes) -> Element {
-    let variable_type = of.of();
+    let variable_type = of.variable_type();
     let start = start.map(|start| match start {
         // As short as single precision allows.
         Value::Real(value) if of.base() == BaseType::Float32 => (value as f32).to_string(),

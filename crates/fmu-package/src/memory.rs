@@ -49,7 +49,8 @@ fn inputs<M: Exported>(starts: &Starts) -> Inputs {
     let mut draw = || {
         let inputs = M::TABLE.iter().enumerate().filter(|(_, of)| of.causality() == Causality::Input);
         let drawn = inputs.filter_map(|(place, of)| {
-            let value = draw_value(&mut random, of.of(), starts[place].as_ref()?, now[place].as_ref())?;
+            let value =
+                draw_value(&mut random, of.variable_type(), starts[place].as_ref()?, now[place].as_ref())?;
             now[place] = Some(value.clone());
             Some((place as u32, value))
         });

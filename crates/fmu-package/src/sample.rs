@@ -88,7 +88,7 @@ impl<M: Exported> Sampler<M> {
                     && variable.variability() != Variability::Constant
                 {
                     let value = &mut point.values[place];
-                    *value = draw_value(&mut self.random, variable.of(), start, value.as_ref());
+                    *value = draw_value(&mut self.random, variable.variable_type(), start, value.as_ref());
                 }
             }
             match model_at(&point, self.running) {
@@ -142,7 +142,7 @@ pub(crate) fn draw_value(
     start: &Value,
     before: Option<&Value>,
 ) -> Option<Value> {
-    Some(match (of.of, start) {
+    Some(match (of.attributes, start) {
         (Attributes::Real { min, max, nominal, .. }, &Value::Real(start)) => {
             let reach = if start == 0.0 { nominal.unwrap_or(1.0) } else { 0.5 * start.abs() };
             let value = start + reach * (2.0 * random.f64() - 1.0);

@@ -9,7 +9,7 @@ use fmu_package::structure::{ModelStructure, Unknown};
 use fmu_package::{Changes, NO_GUID};
 
 const SHARE: Type = Type::real("Share", &units::ONE).min(0.0).max(1.0);
-const COUNT: Type = Type::integer("Count").from(-9).to(3);
+const COUNT: Type = Type::integer("Count").min_integer(-9).max_integer(3);
 
 /// The same model with other capabilities, each in a module of its own.
 macro_rules! toys {

@@ -22,13 +22,13 @@ const HEATER: Type = Type::enumeration("Heater", <Heater as Enumeration>::ITEMS)
 const CELSIUS: Unit = Unit::new("degC").K(1).offset(273.15).display("degF", 1.8, 32.0);
 const TEMPERATURE: Type = Type::real("Temperature", &CELSIUS).nominal(20.0).min(-273.15);
 const SINGLE: Type = Type::float32("Single", &units::ONE).max(0.1);
-const BYTE: Type = Type::whole("Byte", BaseType::UInt8).to(200);
+const BYTE: Type = Type::whole("Byte", BaseType::UInt8).max_integer(200);
 const SMALL: Type = Type::whole("", BaseType::Int8);
 const SHORT: Type = Type::whole("", BaseType::Int16);
 const PORT: Type = Type::whole("", BaseType::UInt16);
 const COUNT: Type = Type::whole("", BaseType::UInt32);
 const LONG: Type = Type::whole("", BaseType::Int64);
-const HUGE: Type = Type::whole("Huge", BaseType::UInt64).from(1);
+const HUGE: Type = Type::whole("Huge", BaseType::UInt64).min_integer(1);
 const PICTURE: Type = Type::binary("Picture", "image/png").max_size(4);
 
 #[derive(Clone)]

@@ -23,8 +23,8 @@ const CELSIUS: Unit = Unit::new("degC").K(1).offset(273.15).display("degF", 1.8,
 const TEMPERATURE: Type = Type::real("ThermodynamicTemperature", &CELSIUS).nominal(20.0);
 const BASES: Unit = Unit::new("all").kg(1).m(-2).s(3).A(-4).K(5).mol(-6).cd(7).rad(-8).factor(0.001);
 const STRANGE: Type = Type { name: "", ..Type::real("Strange", &BASES) };
-const SHARE: Type = Type::integer("Share").to(100);
-const ALARMS: Type = Type::integer("Alarms").from(0);
+const SHARE: Type = Type::integer("Share").max_integer(100);
+const ALARMS: Type = Type::integer("Alarms").min_integer(0);
 
 #[derive(Clone)]
 struct Room {

@@ -12,8 +12,8 @@ const NO_NUMBER: Type = Type::real("NoNumber", &units::ONE).max(f64::NAN);
 const NO_SIZE: Type = Type::real("NoSize", &units::ONE).nominal(0.0);
 const TWO_LINES: Type = Type::real("Two\nLines", &units::ONE);
 const OTHER_NUMBER: Type = Type::real("Number", &units::ONE).min(0.0);
-const COUNT: Type = Type::integer("Count").from(1).to(3);
-const NO_COUNT: Type = Type::integer("NoCount").from(2).to(1);
+const COUNT: Type = Type::integer("Count").min_integer(1).max_integer(3);
+const NO_COUNT: Type = Type::integer("NoCount").min_integer(2).max_integer(1);
 
 const INVISIBLE: Unit = Unit::new("m").m(1).display("km", 0.0, 0.0);
 const NOTHING: Unit = Unit::new("m").m(1).factor(0.0);

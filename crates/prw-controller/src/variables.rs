@@ -25,7 +25,7 @@ const GAIN: Type = not_negative("Gain", &units::ONE);
 const INTEGRAL_GAIN: Type = not_negative("IntegralGain", &units::PER_S);
 const RATE_GAIN: Type = not_negative("RateGain", &units::S);
 const ANGLE_LIMIT: Type = not_negative("AngleLimit", &units::RAD);
-const COUNT: Type = Type::integer("Integer_from_1").from(1);
+const COUNT: Type = Type::integer("Integer_from_1").min_integer(1);
 
 variables! {
     for Controller, memory in slopes, motors, integral, damping, correction, on_goal, schedule, sampled_at;

@@ -92,7 +92,8 @@ impl<M: Exported> Instance<M> {
 
     pub fn get_nominals(&mut self, nominals: &mut [MaybeUninit<f64>]) -> Outcome {
         check_count::<M>(nominals.len())?;
-        let of_types = M::STATES.iter().map(|state| M::TABLE[state.state as usize].of().nominal_or_one());
+        let of_types =
+            M::STATES.iter().map(|state| M::TABLE[state.state as usize].variable_type().nominal_or_one());
         let mut now: Vec<f64> = of_types.collect();
         self.calculated().exported_nominals(&mut now);
         if let Some(place) = now.iter().position(|nominal| !(nominal.is_finite() && *nominal > 0.0)) {

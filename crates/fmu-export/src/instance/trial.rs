@@ -89,7 +89,7 @@ impl<M: Exported> Trial<M> {
         if interface == Interface::ModelExchange {
             let mut more = vec![0.0; Instance::<M>::INDICATORS];
             model.exported_indicators(&mut more);
-            let of_type = |place: u32| M::TABLE[place as usize].of().nominal_or_one();
+            let of_type = |place: u32| M::TABLE[place as usize].variable_type().nominal_or_one();
             let mut nominals: Vec<f64> = M::STATES.iter().map(|of| of_type(of.state)).collect();
             model.exported_nominals(&mut nominals);
             values.extend(more.into_iter().chain(nominals).map(|value| Some(Value::Real(value))));

@@ -232,7 +232,7 @@ impl<M: Exported> Instance<M> {
 pub(super) fn check_value<M>(variable: &Variable<M>, value: &Value) -> Outcome {
     let name = variable.name();
     let enforced = variable.causality() == Causality::Parameter;
-    match (&variable.of().of, value) {
+    match (&variable.variable_type().attributes, value) {
         (_, Value::Real(value)) if !value.is_finite() => {
             refuse(format!("{name} must be a finite number, it is {value}"))
         }

@@ -20,7 +20,7 @@ const VELOCITY: Type = Type::real("Velocity", &Unit::new("m/s").m(1).s(-1));
 const ACCELERATION: Type = Type::real("Acceleration", &Unit::new("m/s2").m(1).s(-2)).min(1e-3).max(1e3);
 const RATE: Type = Type::real("Rate", &Unit::new("m/s2").m(1).s(-2));
 const RATIO: Type = Type::real("Ratio", &units::ONE).min(0.0).max(1.0);
-const COUNT: Type = Type::integer("Count").from(0);
+const COUNT: Type = Type::integer("Count").min_integer(0);
 
 variables! { for Ball, memory in apex;
     /// Above the floor

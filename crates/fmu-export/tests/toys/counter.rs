@@ -18,7 +18,7 @@ pub struct Counter {
 }
 
 const PERIOD: Type = Type::real("Period", &units::S).min(1e-3).max(1e3);
-const DIGITS: Type = Type::integer("Digits").from(2);
+const DIGITS: Type = Type::integer("Digits").min_integer(2);
 
 variables! { for Counter, memory in next;
     /// Whether it counts

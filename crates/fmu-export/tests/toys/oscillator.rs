@@ -25,7 +25,7 @@ const ENERGY: Type = Type::real("Energy", &Unit::new("J").kg(1).m(2).s(-2));
 const MASS: Type = Type::real("Mass", &Unit::new("kg").kg(1)).min(1e-3).max(1e6);
 const STIFFNESS: Type = Type::real("Stiffness", &Unit::new("N/m").kg(1).s(-2)).min(1e-3).max(1e6);
 const DAMPING: Type = Type::real("Damping", &Unit::new("N.s/m").kg(1).s(-1)).min(0.0);
-const SPRINGS: Type = Type::integer("Springs").from(1).to(9);
+const SPRINGS: Type = Type::integer("Springs").min_integer(1).max_integer(9);
 
 variables! { for Oscillator, memory in slope;
     /// Force on the mass
