@@ -12,13 +12,15 @@ use std::ptr::{null, null_mut};
 fmi_abi::fmi2_functions!(importer, fmi2FreeInstance;);
 
 /// The logger without its `...`, which stable Rust cannot define. The FMU may pass variadic arguments, which are not
-/// looked at; named ones travel the same way in variadic and plain calls on every platform of this project.
+/// looked at; named ones travel the same way in variadic and plain calls on every platform of this project. Miri checks
+/// that, so it gets one as it should be.
 unsafe extern "C" fn log_message(
     environment: fmi2ComponentEnvironment,
     instance_name: fmi2String,
     status: c_int,
     category: fmi2String,
     message: fmi2String,
+    #[cfg(miri)] _: ...
 ) {
     // SAFETY: section 2.1.5: NULL or zero-terminated strings, and NULL or the log.
     unsafe { remember(environment, instance_name, status, category, message) }
@@ -29,7 +31,10 @@ unsafe extern "C" fn log_message(
 fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi2Component {
     let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
     let mut name = arguments.instance_name.map(|name| name.to_bytes_with_nul().to_vec());
+    #[cfg(not(miri))]
     let logger: unsafe extern "C" fn(_, _, _, _, _) = log_message;
+    #[cfg(miri)]
+    let logger: fmi2CallbackLogger = log_message;
     let mut callbacks = fmi2CallbackFunctions {
         // SAFETY: see `log_message`.
         logger: arguments.logger.then(|| unsafe { std::mem::transmute::<_, fmi2CallbackLogger>(logger) }),

@@ -170,7 +170,8 @@ macro_rules! importer {
         pub struct Importer {
             functions: Functions,
             instance: $handle,
-            log: Box<Log>,
+            // Shared: the FMU has a pointer to it.
+            log: std::sync::Arc<Log>,
         }
 
         // SAFETY: an instance may be used from any one thread at a time (masters have thread pools).
@@ -189,7 +190,7 @@ macro_rules! importer {
             /// # Errors
             /// What was logged, if there is no instance.
             pub fn instantiate(functions: Functions, arguments: &Arguments) -> Result<Self, Vec<Message>> {
-                let log = Box::<Log>::default();
+                let log = std::sync::Arc::<Log>::default();
                 let instance = make(&functions, arguments, &log);
                 if instance.is_null() { Err(log.take()) } else { Ok(Self { functions, instance, log }) }
             }
@@ -220,7 +221,7 @@ macro_rules! importer {
 
             /// What an importer has that ignored a NULL.
             pub fn null<M: Exported>() -> Self {
-                Self { functions: functions_of::<M>(), instance: null_mut(), log: Box::default() }
+                Self { functions: functions_of::<M>(), instance: null_mut(), log: std::sync::Arc::default() }
             }
 
             /// An instance that somebody else has, to call and not to free: as a log callback knows it.
@@ -228,7 +229,7 @@ macro_rules! importer {
             /// # Safety
             /// The instance is NULL or from these functions, and alive for as long as this is used.
             pub unsafe fn borrowed(functions: Functions, instance: $handle) -> Borrowed<Self> {
-                let importer = Self { functions, instance, log: Box::default() };
+                let importer = Self { functions, instance, log: std::sync::Arc::default() };
                 Borrowed { importer, forget: |importer| importer.instance = null_mut() }
             }
 

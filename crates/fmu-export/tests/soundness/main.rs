@@ -17,6 +17,9 @@ use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 use toys::{Ball, Counter, Oscillator, Talker, oscillator::Name, talker};
 
+#[cfg(miri)]
+type CallBack = fmi2CallbackLogger;
+#[cfg(not(miri))]
 type CallBack =
     unsafe extern "C" fn(fmi2ComponentEnvironment, fmi2String, fmi2Status, fmi2String, fmi2String);
 
@@ -37,6 +40,7 @@ unsafe extern "C" fn call_back(
     _: fmi2Status,
     _: fmi2String,
     _: fmi2String,
+    #[cfg(miri)] _: ...
 ) {
     // SAFETY: the environment that was handed to fmi2Instantiate, alive until the instance is freed.
     let environment = unsafe { &*environment.cast::<Environment>() };
