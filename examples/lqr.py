@@ -10,10 +10,10 @@ from typing import Any
 
 import control
 import numpy as np
+from fmu_run import Fmu, Instances
 from matplotlib.figure import Figure
 
 import prw
-from prw.instance import Instance
 
 STEP, STEPS = 1e-3, 3000  # s
 NOISE = np.deg2rad(0.02)  # standard deviation of the encoders of pitch and roll, rad
@@ -43,10 +43,11 @@ def follow(controller: Any, noise: np.ndarray) -> np.ndarray:
     """Pitch and roll (n, 2) in rad of the FMU with a controller that turns what is measured into the motors' motion."""
     rows = []
     next(controller)  # up to where it waits for what is measured
-    with Instance(start={"use_omega": True}) as testbed:
+    with Fmu(prw.default_fmu()) as fmu:
+        testbed = fmu.instances(start={"use_omega": True})
         for k in range(STEPS):
-            rows.append(testbed.get("pitch", "roll"))
-            testbed.set(dict(zip(MOTORS, controller.send((k, rows[-1] + noise[k])))))
+            rows.append(testbed.get(("pitch", "roll"))[0])
+            testbed.set(MOTORS, controller.send((k, rows[-1] + noise[k])))
             testbed.step(STEP)
     return np.array(rows)
 
@@ -65,13 +66,13 @@ def lqr(angle: np.ndarray) -> Any:
         motion, motor, turning = (*motor, *asked), motor + STEP * asked, asked
 
 
-def pi(controller: Instance, angle: np.ndarray) -> Any:
+def pi(controller: Instances, angle: np.ndarray) -> Any:
     """The controller FMU, which goes to the reference as it is at each sample."""
     motion = None
     while True:
         k, measured = yield motion
-        motion = controller.get(*MOTORS)
-        controller.set(dict(zip(("pitch", "roll", "pitch_ref", "roll_ref"), (*measured, *angle[k]))))
+        motion = controller.get(MOTORS)[0]
+        controller.set(("pitch", "roll", "pitch_ref", "roll_ref"), (*measured, *angle[k]))
         controller.step(STEP)
 
 
@@ -80,8 +81,8 @@ def main() -> tuple[Figure, dict[str, np.ndarray]]:
     time = STEP * np.arange(STEPS)
     angle = np.deg2rad([30, 50]) * np.sin(np.pi * np.outer(time, [0.9, 0.6])) ** 2
     noise = np.random.default_rng(1).normal(0, NOISE, (STEPS, 2))
-    with Instance("target/fmu/prw_controller.fmu") as fmu:
-        errors = {"PI": follow(pi(fmu, angle), noise) - angle, "LQR": follow(lqr(angle), noise) - angle}
+    with Fmu("target/fmu/prw_controller.fmu") as fmu:
+        errors = {"PI": follow(pi(fmu.instances(), angle), noise) - angle, "LQR": follow(lqr(angle), noise) - angle}
     picture = Figure(figsize=(8, 3.2), layout="constrained")
     axes = picture.subplots(1, 2, sharex=True)
     for (name, error), colour in zip(errors.items(), ("#D55E00", "#0072B2")):

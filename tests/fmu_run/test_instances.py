@@ -59,6 +59,32 @@ def test_one_go_is_three_calls(testbed) -> None:
             assert np.array_equal(read, three.get(OUTPUTS))
 
 
+def test_derivatives_of_inputs_and_outputs(fmu) -> None:
+    """The slopes of straight lines, as runs take them; those of outputs by differences of tiny steps."""
+    time = np.arange(30) * 1e-3
+    with fmu_run.Fmu(fmu) as loaded:
+        slopes = {"theta1": 3.0, "theta2": -2.0}
+        runs = loaded.run(
+            time,
+            inputs={name: slope * time for name, slope in slopes.items()},
+            input_derivatives={name: np.full(30, slope) for name, slope in slopes.items()},
+            outputs=["tau1"],
+        )
+        wrist = loaded.instances(stop_time=time[-1] + 1.0)
+        for k, now in enumerate(time):
+            wrist.set(MOTORS, [slope * now for slope in slopes.values()])
+            wrist.set_input_derivatives(MOTORS, list(slopes.values()))
+            assert wrist.get("tau1") == runs["tau1"][0, k]
+            if k + 1 < len(time):
+                wrist.step(to=time[k + 1])
+        told, before = wrist.get_output_derivatives(("pitch", "roll"))[0], wrist.get(("pitch", "roll"))[0]
+        wrist.step(1e-7)
+        found = (wrist.get(("pitch", "roll"))[0] - before) / 1e-7
+        assert np.allclose(told, found, rtol=1e-4)
+        with pytest.raises(ValueError, match="only Real"):
+            wrist.get_output_derivatives("M")
+
+
 def test_masks_reset_and_restore(testbed) -> None:
     with fmu_run.Fmu(testbed) as fmu:
         wrists = fmu.instances(4, start={"k1": [50.0, 60.0, 70.0, 80.0], "theta1": 0.1})

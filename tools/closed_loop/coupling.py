@@ -3,18 +3,14 @@ size."""
 
 from __future__ import annotations
 
-import tempfile
-import zipfile
 from collections.abc import Sequence
 from contextlib import ExitStack
-from ctypes import c_double, c_int, c_uint32
-from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import fmpy
 import numpy as np
+from fmu_run import Fmu, Instances
 
-from prw.instance import Instance
 from tools.closed_loop.system import System
 
 #: Communication steps (s) and the one that stands for the exact solution; all are whole multiples of it.
@@ -68,25 +64,26 @@ def couple(
     """
     n = round(duration / step)
     with ExitStack() as stack:
-        folder = stack.enter_context(tempfile.TemporaryDirectory())
-        with zipfile.ZipFile(system.ssp) as archive:
-            archive.extractall(folder)
         values = {**system.start, **dict(system.inputs.values())}
-        instances = {}
+        instances: dict[str, Instances] = {}
         for name, fmu in system.fmus.items():
             start = {key.split(".")[1]: value for key, value in values.items() if key.split(".")[0] == name}
-            instances[name] = stack.enter_context(Instance(Path(folder, "resources", fmu), start))
-        wires = [_Wire(instances, [w for w in system.connections if _ends(w) == ends]) for ends in _pairs(system)]
+            instances[name] = stack.enter_context(Fmu(system.osp / fmu)).instances(start=start)
+        wires = [_wire(instances, [w for w in system.connections if _ends(w) == ends]) for ends in _pairs(system)]
         watched = [(instances[name.split(".")[0]], name.split(".")[1]) for name in outputs]
         rows = np.empty((n + 1, len(outputs)))
         for k, row in enumerate(rows):
             row[:] = [instance.get(variable)[0] for instance, variable in watched]
             if k < n:
                 # All outputs before any input: setting one must not change what another reads.
-                for wire in wires:
-                    wire.read(derivatives)
-                for wire in wires:
-                    wire.write(derivatives)
+                for source, variables, _, _, read, slopes in wires:
+                    source.get(variables, read)
+                    if derivatives:
+                        source.get_output_derivatives(variables, slopes)
+                for _, _, target, inputs, read, slopes in wires:
+                    target.set(inputs, read)
+                    if derivatives:
+                        target.set_input_derivatives(inputs, slopes)
                 for instance in instances.values():
                     instance.step(step)
     return rows
@@ -104,23 +101,8 @@ def _pairs(system: System) -> list[list[str]]:
     return pairs
 
 
-class _Wire:
-    """All connections from one FMU to another, with arrays that are made once: a study has a hundred thousand steps."""
-
-    def __init__(self, instances: dict[str, Instance], wires: list[tuple[str, str]]):
-        (self._from, self._to), n = (instances[end] for end in _ends(wires[0])), len(wires)
-        self._sources = (c_uint32 * n)(*(self._from.reference(start.split(".")[1]) for start, _ in wires))
-        self._targets = (c_uint32 * n)(*(self._to.reference(end.split(".")[1]) for _, end in wires))
-        self._values, self._slopes, self._orders, self._n = (c_double * n)(), (c_double * n)(), (c_int * n)(*[1] * n), n
-
-    def read(self, derivatives: bool) -> None:
-        fmu, n = self._from.fmu, self._n
-        fmu.fmi2GetReal(fmu.component, self._sources, n, self._values)
-        if derivatives:
-            fmu.fmi2GetRealOutputDerivatives(fmu.component, self._sources, n, self._orders, self._slopes)
-
-    def write(self, derivatives: bool) -> None:
-        fmu, n = self._to.fmu, self._n
-        fmu.fmi2SetReal(fmu.component, self._targets, n, self._values)
-        if derivatives:
-            fmu.fmi2SetRealInputDerivatives(fmu.component, self._targets, n, self._orders, self._slopes)
+def _wire(instances: dict[str, Instances], wires: list[tuple[str, str]]) -> Any:
+    """All connections from one FMU to another: the source and its outputs, the target and its inputs, and two rows."""
+    source, target = (instances[end] for end in _ends(wires[0]))
+    outputs, inputs = (tuple(wire[end].split(".")[1] for wire in wires) for end in (0, 1))
+    return source, outputs, target, inputs, np.empty((1, len(wires))), np.empty((1, len(wires)))

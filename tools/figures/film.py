@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from fmu_run import Fmu
 
 from prw.animation import MEASURED
-from prw.instance import Instance
 from prw.motion import Array, Motion
 from prw.simulation import Run
 
@@ -30,28 +30,29 @@ def story(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[floa
     """Run the testbed, first with motors that are led, then with the controller: it begins and ends at rest at zero.
     Returns the run and its captions, each with the time (s) from which it is shown."""
     led = _there_and_back()
-    with Instance(testbed_fmu, {"use_omega": True}) as testbed, Instance(controller_fmu) as controller:
+    with Fmu(testbed_fmu) as of_testbed, Fmu(controller_fmu) as of_controller:
+        testbed, controller = of_testbed.instances(start={"use_omega": True}), of_controller.instances()
         rows, captions = [], []
 
         def motors(theta: Sequence[float], omega: Sequence[float]) -> None:
-            testbed.set(dict(zip(MOTORS, (*theta, *omega))))
-            rows.append(testbed.get(*MOTORS, *MEASURED))
+            testbed.set(MOTORS, (*theta, *omega))
+            rows.append(testbed.get((*MOTORS, *MEASURED))[0])
 
         for words, second in (("Equal motors: the wrist pitches", 1), ("Opposite motors: the wrist rolls", -1)):
-            captions.append((testbed.time, words))
+            captions.append((testbed.time[0], words))
             for theta, omega in led:
                 motors((theta, second * theta), (omega, second * omega))
                 testbed.step(STEP)
-        captions.append((testbed.time, "With a controller: both at once"))
+        captions.append((testbed.time[0], "With a controller: both at once"))
         for pitch, roll in GOALS:
-            controller.set({"pitch_ref": pitch, "roll_ref": roll})
+            controller.set(("pitch_ref", "roll_ref"), (pitch, roll))
             for _ in range(round(STAY / STEP)):
-                theta1, theta2, omega1, omega2 = controller.get(*MOTORS)
+                theta1, theta2, omega1, omega2 = controller.get(MOTORS)[0]
                 motors((theta1, theta2), (omega1, omega2))
-                controller.set(dict(zip(CONTROLLED, testbed.get(*CONTROLLED))))
+                controller.set(CONTROLLED, testbed.get(CONTROLLED)[0])
                 for instance in (testbed, controller):
                     instance.step(STEP)
-        counts = {name: int(testbed.variables[name].start) for name in ("M", "N")}
+        counts = {name: int(testbed.get(name)[0]) for name in ("M", "N")}
     found = np.array(rows)
     time: Array = STEP * np.arange(len(rows), dtype=np.float64)
     motion = Motion(time, found[:, :2], found[:, 2:4], "film")

@@ -439,6 +439,22 @@ impl Instance {
         call!(self, fmi2SetRealInputDerivatives(vr, n, orders, values))
     }
 
+    /// Time derivatives of outputs, of order 1.
+    pub(crate) fn get_output_derivatives(
+        &mut self,
+        vr: &[u32],
+        orders: &[i32],
+        values: &mut [f64],
+    ) -> Result<(), Refusal> {
+        assert!(vr.len() == values.len() && vr.len() == orders.len());
+        let (vr, n, orders, values) = (vr.as_ptr(), vr.len(), orders.as_ptr(), values.as_mut_ptr());
+        call!(
+            self,
+            fmi2GetRealOutputDerivatives(vr, n, orders, values),
+            fmi3GetOutputDerivatives(vr, n, orders, values, n)
+        )
+    }
+
     /// Refused also where the FMU ends the simulation.
     #[inline]
     pub(crate) fn step(&mut self, time: f64, size: f64) -> Result<(), Refusal> {

@@ -391,12 +391,46 @@ impl Instances {
         (knowns, seed): (&Selection, &[f64]),
         values: &mut [f64],
     ) -> Result<(), Error> {
-        let (Some(unknown), Some(known)) = (unknowns.references(), knowns.references()) else {
-            return request("only Real variables have derivatives".to_owned());
-        };
+        let (unknown, known) = (real(unknowns)?, real(knowns)?);
         let rows = rows(knowns.len(), seed.len(), self.len());
         self.fill_by_place(unknowns.len(), values, |place, _, instance, row| {
             instance.directional_derivative(unknown, known, rows.of(seed, place), row)
+        });
+        Ok(())
+    }
+
+    /// In Co-Simulation: time derivatives of inputs, of order 1, which only FMI 2.0 has.
+    ///
+    /// # Errors
+    /// [`Error::Request`] unless all variables are Real.
+    ///
+    /// # Panics
+    /// As [`set`](Self::set).
+    pub fn set_input_derivatives(
+        &mut self,
+        inputs: &Selection,
+        values: &[f64],
+        mask: Mask,
+    ) -> Result<(), Error> {
+        let (references, orders) = (real(inputs)?, vec![1; inputs.len()]);
+        let rows = rows(inputs.len(), values.len(), self.len());
+        self.alive(mask, |place, _, instance| {
+            instance.set_input_derivatives(references, &orders, rows.of(values, place))
+        });
+        Ok(())
+    }
+
+    /// In Co-Simulation: time derivatives of outputs, of order 1, into a row for each instance.
+    ///
+    /// # Errors
+    /// [`Error::Request`] unless all variables are Real.
+    ///
+    /// # Panics
+    /// As [`get`](Self::get).
+    pub fn get_output_derivatives(&mut self, outputs: &Selection, values: &mut [f64]) -> Result<(), Error> {
+        let (references, orders) = (real(outputs)?, vec![1; outputs.len()]);
+        self.fill(outputs.len(), values, |_, instance, row| {
+            instance.get_output_derivatives(references, &orders, row)
         });
         Ok(())
     }
@@ -586,6 +620,10 @@ fn each(
             });
         }
     }
+}
+
+fn real(variables: &Selection) -> Result<&[u32], Error> {
+    variables.references().map_or_else(|| request("only Real variables have derivatives".to_owned()), Ok)
 }
 
 /// A row for each instance, or one for all.

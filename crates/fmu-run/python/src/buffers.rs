@@ -19,20 +19,17 @@ impl Numbers {
         if let Ok(number) = values.cast::<PyFloat>() {
             return Ok(Self::One(number.value()));
         }
-        let array = match PyBuffer::get(values) {
-            Ok(buffer) if buffer.is_c_contiguous() => buffer,
-            _ => {
-                let numpy = values.py().import("numpy")?;
-                let made = numpy.call_method1("ascontiguousarray", (values, "float64"))?;
-                // It makes one dimension of none.
-                PyBuffer::get(&made.call_method1("reshape", (numpy.call_method1("shape", (values,))?,))?)?
-            }
-        };
-        Ok(if array.dimensions() == 0 {
-            Self::One(array.to_vec(values.py())?[0])
-        } else {
-            Self::Array(array)
-        })
+        if let Ok(buffer) = PyBuffer::get(values)
+            && buffer.is_c_contiguous()
+        {
+            return Ok(Self::Array(buffer));
+        }
+        let numpy = values.py().import("numpy")?;
+        let array = numpy.call_method1("asarray", (values, "float64"))?;
+        if array.getattr("ndim")?.extract::<usize>()? == 0 {
+            return Ok(Self::One(array.extract()?));
+        }
+        Ok(Self::Array(PyBuffer::get(&numpy.call_method1("ascontiguousarray", (array,))?)?))
     }
 
     pub fn shape(&self) -> &[usize] {

@@ -301,6 +301,41 @@ impl Instances {
         Ok(array)
     }
 
+    /// Co-Simulation, FMI 2.0: time derivatives of inputs, of order 1, in the shapes of `set`.
+    #[pyo3(signature = (variables, values, mask=None))]
+    fn set_input_derivatives(
+        &self,
+        py: Python,
+        variables: &Bound<'_, PyAny>,
+        values: &Bound<'_, PyAny>,
+        mask: Given,
+    ) -> PyResult<()> {
+        let (named, mask) = (self.named(variables)?, self.mask(mask)?);
+        let values = self.fitting(named.columns(), Numbers::of(values)?)?;
+        let mut told = Ok(());
+        self.with(py, |all| {
+            told = all.set_input_derivatives(&named.selection, values.values(), mask.as_deref());
+        })?;
+        told.map_err(python)
+    }
+
+    /// Co-Simulation: time derivatives of outputs, of order 1, in the shapes of `get`.
+    #[pyo3(signature = (variables, out=None))]
+    fn get_output_derivatives<'py>(
+        &self,
+        py: Python<'py>,
+        variables: &Bound<'py, PyAny>,
+        out: Given<'py>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let named = self.named(variables)?;
+        let mut told = Ok(());
+        let array = self.read(py, named.columns(), out, |all, values| {
+            told = all.get_output_derivatives(&named.selection, values);
+        })?;
+        told.map_err(python)?;
+        Ok(array)
+    }
+
     /// Model Exchange: the time of each, s: a number or (n,).
     #[pyo3(signature = (time, mask=None))]
     fn set_time(&self, py: Python, time: &Bound<'_, PyAny>, mask: Given) -> PyResult<()> {

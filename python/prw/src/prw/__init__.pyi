@@ -16,3 +16,4 @@ from .simulation import Run as Run
 from .simulation import simulate as simulate
 from .state_space import StateSpace as StateSpace
 from .sweeps import sweep as sweep
+from .testbed import default_fmu as default_fmu
