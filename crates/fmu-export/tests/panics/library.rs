@@ -4,4 +4,4 @@
 #[allow(dead_code, reason = "some of it is for tests in the same program")]
 mod faulty;
 
-fmu_export::fmi2_symbols!(faulty::Faulty);
+fmu_export::symbols!(faulty::Faulty);

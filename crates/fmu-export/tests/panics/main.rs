@@ -11,6 +11,7 @@ use calls::{Case, Special, of_both, set_fault};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Status;
 use fmu_test_kit::{Arguments, Either, Importer, fmi3};
+use std::ptr::null_mut;
 use toys::Faulty;
 use toys::faulty::{Fault, Name, while_all_break};
 
@@ -127,7 +128,8 @@ fn is_contained<F: Either>((interface, names, fault, call): Case<F>, bystanders:
 }
 
 /// The model made into C sources, whose compiled library `FMU_LIBRARY` names: `make test-source-fmu`. What breaks every
-/// instance at once does so in this program only, and a saved state belongs to its instance.
+/// instance at once does so in this program only, a saved state belongs to its instance, and it is asked for its size when it
+/// is saved.
 #[test]
 #[ignore = "needs compiled C sources"]
 fn every_panic_of_c_sources_is_contained() {
@@ -135,8 +137,11 @@ fn every_panic_of_c_sources_is_contained() {
     let on_a_thread = || {
         let bystanders: [Importer; 2] = [CoSimulation, ModelExchange].map(initialized);
         let all = of_both::<Importer>().into_iter().chain(Importer::CALLS.iter().copied());
-        let possible = |(_, _, fault, _): &Case<_>| ![Fault::None, Fault::Drop].contains(fault);
-        let calls: Vec<_> = all.filter(possible).collect();
+        let possible =
+            |(_, _, fault, _): &Case<_>| ![Fault::None, Fault::Drop, Fault::Memory].contains(fault);
+        let saving: Case<Importer> =
+            (CoSimulation, ["GetFMUstate", ""], Fault::Memory, |fmu| fmu.get_state(&mut null_mut()));
+        let calls: Vec<_> = all.filter(possible).chain([saving]).collect();
         assert!(calls.len() > 20);
         calls.into_iter().for_each(|case| is_contained(case, &bystanders));
         bystanders[0].step(0.0, 0.1);
