@@ -3,138 +3,16 @@
 
 use crate::fmu::Fmu;
 use crate::library::{Functions, Library};
-use fmi_abi::c_types::{c_char, c_int, c_void};
+use crate::log::{Log, log_of_fmi3, logger_of_fmi2};
+use crate::refusal::{Message, Refusal};
+use fmi_abi::c_types::{c_int, c_void};
 use fmi_abi::fmi2::types::*;
 use fmi_abi::fmi3::types::*;
 use fmi_abi::{BaseType, Interface, Status};
 use std::ffi::{CStr, CString};
 use std::ptr::null_mut;
 use std::rc::Rc;
-use std::sync::{Arc, Mutex, PoisonError};
-
-/// What an FMU has logged.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Message {
-    /// The status that goes with it.
-    pub status: Status,
-    /// One of the log categories.
-    pub category: String,
-    /// The text.
-    pub text: String,
-}
-
-/// What an instance answered instead of OK or Warning: the function, and what it logged. In a box, as it is seldom made and
-/// each call may answer with it.
-#[derive(Debug)]
-pub struct Refusal(Box<Refused>);
-
-#[derive(Debug)]
-struct Refused {
-    function: &'static str,
-    status: Status,
-    log: Vec<Message>,
-    ended: Option<f64>,
-}
-
-impl Refusal {
-    #[cold]
-    fn new(function: &'static str, status: Status, log: Vec<Message>) -> Self {
-        Self(Box::new(Refused { function, status, log, ended: None }))
-    }
-
-    /// When the FMU has ended the simulation, if that is what it wants.
-    pub(crate) fn ended(&self) -> Option<f64> {
-        self.0.ended
-    }
-
-    /// Whether it comes without a reason.
-    pub(crate) fn is_silent(&self) -> bool {
-        self.0.log.is_empty() && self.0.ended.is_none()
-    }
-}
-
-impl std::fmt::Display for Refusal {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Refused { function, status, log, ended } = &*self.0;
-        let message = reason(log);
-        if let Some(time) = ended {
-            write!(f, "ended by the FMU at t = {time} s")?;
-            return message.map_or(Ok(()), |message| write!(f, ": {}", message.text.trim()));
-        }
-        match message {
-            // Some FMUs name the function, some do not.
-            Some(message) if message.text.contains(function) => f.write_str(message.text.trim()),
-            Some(message) => write!(f, "{}: {}", function, message.text.trim()),
-            None => write!(f, "{} was answered with {:?}, without a message", function, status),
-        }
-    }
-}
-
-impl std::error::Error for Refusal {}
-
-/// What of a log tells why something was refused.
-pub(crate) fn reason(log: &[Message]) -> Option<&Message> {
-    let grave = log.iter().rev().find(|message| message.status as i32 >= Status::Discard as i32);
-    grave.or(log.last())
-}
-
-/// What the FMU logs; its address is the instance's environment.
-#[derive(Debug, Default)]
-struct Log(Mutex<Vec<Message>>);
-
-impl Log {
-    fn take(&self) -> Vec<Message> {
-        std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-
-    /// # Safety
-    /// The environment is NULL or a `Log` that lives, the texts are NULL or strings.
-    unsafe fn remember(
-        environment: *mut c_void,
-        status: c_int,
-        category: *const c_char,
-        text: *const c_char,
-    ) {
-        let text_of = |pointer: *const c_char| match pointer.is_null() {
-            true => String::new(),
-            // SAFETY: the caller's promise.
-            false => unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned(),
-        };
-        let [category, text] = [category, text].map(text_of);
-        // SAFETY: the caller's promise.
-        if let Some(log) = unsafe { environment.cast::<Self>().as_ref() } {
-            let message = Message { status: Status::from_c(status), category, text };
-            log.0.lock().unwrap_or_else(PoisonError::into_inner).push(message);
-        }
-    }
-}
-
-type PlainLogger =
-    unsafe extern "C" fn(fmi2ComponentEnvironment, fmi2String, fmi2Status, fmi2String, fmi2String);
-
-/// The logger of FMI 2.0 without its `...`, which stable Rust cannot define. The FMU may pass variadic arguments, which
-/// are not looked at; named ones travel the same way in variadic and plain calls on every platform of this project.
-unsafe extern "C" fn log_of_fmi2(
-    environment: fmi2ComponentEnvironment,
-    _instance_name: fmi2String,
-    status: fmi2Status,
-    category: fmi2String,
-    message: fmi2String,
-) {
-    // SAFETY: section 2.1.5: NULL or zero-terminated strings, and the log that was handed over, which lives as long as the
-    // instance.
-    unsafe { Log::remember(environment, status, category, message) }
-}
-
-unsafe extern "C" fn log_of_fmi3(
-    environment: fmi3InstanceEnvironment,
-    status: fmi3Status,
-    category: fmi3String,
-    message: fmi3String,
-) {
-    // SAFETY: section 2.3.1 says the same.
-    unsafe { Log::remember(environment, status, category, message) }
-}
+use std::sync::Arc;
 
 /// An instance; freed when dropped. It keeps its library loaded.
 #[derive(Debug)]
@@ -286,8 +164,7 @@ impl Instance {
         let library = Arc::clone(library);
 
         let callbacks = Rc::new(fmi2CallbackFunctions {
-            // SAFETY: see `log_of_fmi2`.
-            logger: Some(unsafe { std::mem::transmute::<PlainLogger, fmi2CallbackLogger>(log_of_fmi2) }),
+            logger: Some(logger_of_fmi2()),
             allocate_memory: None,
             free_memory: None,
             step_finished: None,
@@ -473,12 +350,12 @@ impl Instance {
 
     /// A step that was discarded may be the end that the FMU wants (section 4.2.3 of FMI 2.0).
     #[cold]
-    fn ended(&self, mut refusal: Refusal, time: f64) -> Refusal {
+    fn ended(&self, refusal: Refusal, time: f64) -> Refusal {
         let (mut wanted, mut reached) = (fmi2False, time);
         let kinds =
             [StatusKind::Terminated, StatusKind::LastSuccessfulTime].map(|kind| kind as fmi2StatusKind);
         let Functions::Fmi2(functions) = &self.library.functions else { return refusal };
-        if refusal.0.status != Status::Discard {
+        if refusal.status() != Status::Discard {
             return refusal;
         }
         // SAFETY: the instance is alive after fmi2Discard, the places live.
@@ -492,8 +369,7 @@ impl Instance {
             return refusal;
         }
         let told = told == Status::Ok as c_int && reached.is_finite();
-        refusal.0.ended = Some(if told { reached } else { time });
-        refusal
+        refusal.at_end(if told { reached } else { time })
     }
 
     /// The end that the FMU wants, or an early return, which it has not been allowed (section 4.2.1 of FMI 3.0).
@@ -505,9 +381,8 @@ impl Instance {
             let text = format!("the step ended early, at {reached} s");
             log.push(Message { status, category: String::new(), text });
         }
-        let mut refusal = Refusal::new(function, status, log);
-        refusal.0.ended = wanted.then_some(reached);
-        refusal
+        let refusal = Refusal::new(function, status, log);
+        if wanted { refusal.at_end(reached) } else { refusal }
     }
 
     /// Saves the state, in a place of its own.

@@ -2,7 +2,8 @@
 
 use crate::error::Error;
 use crate::fmu::Fmu;
-use crate::instance::{Continuous, Event, Instance, Refusal, Saved, reason};
+use crate::instance::{Continuous, Event, Instance, Saved};
+use crate::refusal::{Refusal, reason};
 use crate::selection::{Selection, find, fits, number, request};
 use fmi_abi::{BaseType, Interface};
 use rayon::prelude::*;

@@ -2,9 +2,10 @@
 //!
 //! ## Inside
 //!
-//! [`Fmu`] is an FMU, of FMI 2.0 or 3.0, unpacked and loaded. It runs as often as a [`Batch`] says, on all processors; or its
-//! [`Instances`] are in your hands. Below it: `description` reads `modelDescription.xml`, `library` loads the functions, `instance` calls
-//! them. `unsafe` is in these two alone, and for the caller where an FMU is [opened](Fmu::open).
+//! [`Fmu`] is an FMU, of FMI 2.0 or 3.0, unpacked and loaded. It runs as often as a [`Batch`] says, on all processors; or
+//! its [`Instances`] are in your hands. Below them: `description` reads `modelDescription.xml`, `library` loads the
+//! functions, `instance` calls them, `log` hears what they say. `unsafe` is in these last three alone, and for the caller
+//! where an FMU is [opened](Fmu::open).
 
 mod batch;
 mod description;
@@ -13,7 +14,9 @@ mod fmu;
 mod instance;
 mod instances;
 mod library;
+mod log;
 mod machine;
+mod refusal;
 mod selection;
 
 pub use batch::{Batch, Course, Measure, Planned, Runs, Size, Start, Watch};

@@ -3,7 +3,8 @@
 use crate::description::Variable;
 use crate::error::Error;
 use crate::fmu::Fmu;
-use crate::instance::{Instance, Refusal};
+use crate::instance::Instance;
+use crate::refusal::Refusal;
 use fmi_abi::BaseType;
 
 /// Variables of an FMU that are numbers, found once by their names. A row of values has one for each, in this order; 0 and 1

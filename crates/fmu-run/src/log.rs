@@ -1,0 +1,70 @@
+//! What an FMU logs: the callbacks that it is given.
+
+use crate::refusal::Message;
+use fmi_abi::Status;
+use fmi_abi::c_types::{c_char, c_int, c_void};
+use fmi_abi::fmi2::types::*;
+use fmi_abi::fmi3::types::*;
+use std::ffi::CStr;
+use std::sync::{Mutex, PoisonError};
+
+/// What the FMU logs; its address is the instance's environment.
+#[derive(Debug, Default)]
+pub(crate) struct Log(Mutex<Vec<Message>>);
+
+impl Log {
+    pub(crate) fn take(&self) -> Vec<Message> {
+        std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// # Safety
+    /// The environment is NULL or a `Log` that lives, the texts are NULL or strings.
+    unsafe fn remember(
+        environment: *mut c_void,
+        status: c_int,
+        category: *const c_char,
+        text: *const c_char,
+    ) {
+        let text_of = |pointer: *const c_char| match pointer.is_null() {
+            true => String::new(),
+            // SAFETY: the caller's promise.
+            false => unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned(),
+        };
+        let [category, text] = [category, text].map(text_of);
+        // SAFETY: the caller's promise.
+        if let Some(log) = unsafe { environment.cast::<Self>().as_ref() } {
+            let message = Message { status: Status::from_c(status), category, text };
+            log.0.lock().unwrap_or_else(PoisonError::into_inner).push(message);
+        }
+    }
+}
+
+pub(crate) fn logger_of_fmi2() -> fmi2CallbackLogger {
+    let plain: unsafe extern "C" fn(_, _, _, _, _) = log_of_fmi2;
+    // SAFETY: see `log_of_fmi2`.
+    unsafe { std::mem::transmute::<_, fmi2CallbackLogger>(plain) }
+}
+
+/// The logger of FMI 2.0 without its `...`, which stable Rust cannot define. The FMU may pass variadic arguments, which
+/// are not looked at; named ones travel the same way in variadic and plain calls on every platform of this project.
+unsafe extern "C" fn log_of_fmi2(
+    environment: fmi2ComponentEnvironment,
+    _instance_name: fmi2String,
+    status: fmi2Status,
+    category: fmi2String,
+    message: fmi2String,
+) {
+    // SAFETY: section 2.1.5: NULL or zero-terminated strings, and the log that was handed over, which lives as long as the
+    // instance.
+    unsafe { Log::remember(environment, status, category, message) }
+}
+
+pub(crate) unsafe extern "C" fn log_of_fmi3(
+    environment: fmi3InstanceEnvironment,
+    status: fmi3Status,
+    category: fmi3String,
+    message: fmi3String,
+) {
+    // SAFETY: section 2.3.1 says the same.
+    unsafe { Log::remember(environment, status, category, message) }
+}
