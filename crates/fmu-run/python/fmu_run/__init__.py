@@ -217,7 +217,7 @@ class Fmu:
         start: Mapping[str, ArrayLike | str] | None = None,
         start_time: float = 0.0,
         stop_time: float | None = None,
-        threads: int | None = None,
+        threads: int | None = 1,
     ) -> Instances:
         """Make instances, set their start values and initialize them.
 
@@ -232,7 +232,8 @@ class Fmu:
         start_time, stop_time
             When they begin, s, and when they will end, if that is known.
         threads
-            Default one for each processor.
+            More than one pays where a call takes much longer than threads to wake, about 0.1 ms: for slow models or very
+            many instances. None takes one for each processor.
 
         Raises
         ------
