@@ -96,6 +96,17 @@ impl Fmu {
         }
     }
 
+    /// How many threads instances may be in: those asked for, or one for each processor.
+    pub(crate) fn threads(&self, interface: Interface, asked: Option<usize>) -> Result<usize, Error> {
+        if asked == Some(0) {
+            return Err(Error::Request("threads must be at least 1".to_owned()));
+        }
+        if self.description.offer(interface).is_some_and(|offer| offer.once_per_process) {
+            return Ok(1);
+        }
+        Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)))
+    }
+
     /// What the model description says.
     pub fn description(&self) -> &Description {
         &self.description

@@ -4,7 +4,7 @@
 use crate::fmu::Fmu;
 use crate::library::{Functions, Library};
 use crate::log::{Log, log_of_fmi3, logger_of_fmi2};
-use crate::refusal::{Message, Refusal};
+use crate::refusal::{Message, Refusal, reason};
 use fmi_abi::c_types::{c_int, c_void};
 use fmi_abi::fmi2::types::*;
 use fmi_abi::fmi3::types::*;
@@ -155,7 +155,7 @@ macro_rules! get {
 
 impl Instance {
     /// A new instance of an FMU that has this type of interface, or what was logged instead.
-    pub(crate) fn new(fmu: &Fmu, interface: Interface, logging_on: bool) -> Result<Self, Vec<Message>> {
+    fn new(fmu: &Fmu, interface: Interface, logging_on: bool) -> Result<Self, Vec<Message>> {
         let Ok(library) = fmu.library(interface) else { return Err(Vec::new()) };
         let log = Arc::<Log>::default();
         let environment = Arc::as_ptr(&log).cast_mut().cast();
@@ -214,6 +214,39 @@ impl Instance {
         }
     }
 
+    /// A used instance as new, or another one in its place; or why there is none, and whether the FMU said so.
+    pub(crate) fn renewed(
+        used: Option<Self>,
+        fmu: &Fmu,
+        interface: Interface,
+        logging_on: bool,
+    ) -> Result<Self, (String, bool)> {
+        let used = used.filter(Self::is_alive).and_then(|mut used| used.reset().ok().map(|()| used));
+        // Some FMUs cannot be reset. The old instance is gone by now: there may be one at a time only.
+        used.map_or_else(|| Self::new(fmu, interface, logging_on), Ok).map_err(|log| {
+            let mute = || format!("{} makes no instance, and logs no message", fmu.description().model_name);
+            (reason(&log).map_or_else(mute, |message| message.text.trim().to_owned()), log.is_empty())
+        })
+    }
+
+    /// Start values, and into the initialization: so both editions of the standard allow it.
+    pub(crate) fn begin(
+        &mut self,
+        start_time: f64,
+        stop_time: Option<f64>,
+        texts: &[(u32, CString)],
+        numbers: impl Iterator<Item = (BaseType, u32, f64)>,
+    ) -> Result<(), Refusal> {
+        self.set_up(start_time, stop_time)?;
+        for (reference, text) in texts {
+            self.set_text(*reference, text)?;
+        }
+        for (base, reference, value) in numbers {
+            self.set_number(base, reference, value)?;
+        }
+        self.enter_initialization_mode(start_time, stop_time)
+    }
+
     /// What became of a call.
     #[inline]
     fn check(&mut self, function: &'static str, code: c_int) -> Result<(), Refusal> {
@@ -247,7 +280,7 @@ impl Instance {
     }
 
     /// Before the start values are set, in FMI 2.0.
-    pub(crate) fn set_up(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
+    fn set_up(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
         match &self.library.functions {
             // It says this when it begins to initialize.
             Functions::Fmi3(_) => Ok(()),
@@ -258,11 +291,7 @@ impl Instance {
         }
     }
 
-    pub(crate) fn enter_initialization_mode(
-        &mut self,
-        start_time: f64,
-        stop_time: Option<f64>,
-    ) -> Result<(), Refusal> {
+    fn enter_initialization_mode(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
         let (defined, stop) = (stop_time.is_some().into(), stop_time.unwrap_or(start_time));
         call!(
             self,
@@ -298,7 +327,7 @@ impl Instance {
         numbers!(get: self base vr)
     }
 
-    pub(crate) fn set_text(&mut self, vr: u32, value: &CStr) -> Result<(), Refusal> {
+    fn set_text(&mut self, vr: u32, value: &CStr) -> Result<(), Refusal> {
         let text = value.as_ptr();
         call!(self, fmi2SetString(&vr, 1, &text), fmi3SetString(&vr, 1, &text, 1))
     }
@@ -549,7 +578,7 @@ impl Instance {
         call!(self, fmi2Terminate(), fmi3Terminate())
     }
 
-    pub(crate) fn reset(&mut self) -> Result<(), Refusal> {
+    fn reset(&mut self) -> Result<(), Refusal> {
         call!(self, fmi2Reset(), fmi3Reset())
     }
 }

@@ -3,8 +3,8 @@
 use crate::error::Error;
 use crate::fmu::Fmu;
 use crate::instance::{Continuous, Event, Instance, Saved};
-use crate::refusal::{Refusal, reason};
-use crate::selection::{Selection, find, fits, number, request};
+use crate::refusal::Refusal;
+use crate::selection::{Selection, fits, number, request, text_of_start};
 use fmi_abi::{BaseType, Interface};
 use rayon::prelude::*;
 use std::ffi::CString;
@@ -83,8 +83,8 @@ struct Own {
     buffer: Vec<f64>,
 }
 
-/// States that [`Instances`] have saved, one for each that had not dropped out. They are places, not pointers: freed ones and those
-/// of other instances are refused, and what is freed is given away.
+/// States that [`Instances`] have saved, one for each that had not dropped out. They are places among
+/// their own, not pointers: what is freed is given away, and those of others lead to none or to another state of one's own.
 ///
 /// ```compile_fail,E0382
 /// fn restore_what_is_freed(instances: &mut fmu_run::Instances) {
@@ -125,13 +125,9 @@ impl Fmu {
             stop_time: setup.stop_time,
         };
         let one = || One { instance: None, error: None, own: Own::default() };
-        let threads = match setup.threads {
-            Some(0) => return request("threads must be at least 1".to_owned()),
-            Some(threads) => threads,
-            None => std::thread::available_parallelism().map_or(1, usize::from),
-        };
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.min(setup.count));
-        let pool = (threads.min(setup.count) > 1).then(|| pool.build()).transpose();
+        let threads = self.threads(setup.interface, setup.threads)?.min(setup.count);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let pool = (threads > 1).then(|| pool.build()).transpose();
         let mut instances = Instances {
             fmu: Arc::clone(self),
             interface: setup.interface,
@@ -203,16 +199,10 @@ impl Instances {
             fits(name, of.base, values)?;
             found.push((of.base, of.reference, values.to_vec()));
         }
-        for (name, text) in texts {
-            let of = find(&self.fmu, name)?;
-            if of.base != BaseType::String {
-                return request(format!("{name} is a number, its start value cannot be {text:?}"));
-            }
-            let Ok(text) = CString::new(*text) else {
-                return request(format!("the start value of {name} must not contain a character NUL"));
-            };
-            self.start.texts.retain(|(known, _)| *known != of.reference);
-            self.start.texts.push((of.reference, text));
+        let texts = texts.iter().map(|(name, text)| text_of_start(&self.fmu, name, text));
+        for text in texts.collect::<Result<Vec<_>, _>>()? {
+            self.start.texts.retain(|(known, _)| *known != text.0);
+            self.start.texts.push(text);
         }
         for one in found {
             self.start.numbers.retain(|(base, known, _)| (*base, *known) != (one.0, one.1));
@@ -227,11 +217,7 @@ impl Instances {
         let reset = |place: usize, one: &mut One| {
             one.error = None;
             (one.own.time, one.own.event) = (start.time, Event::default());
-            let used = one.instance.take().filter(Instance::is_alive);
-            let used = used.and_then(|mut used| used.reset().ok().map(|()| used));
-            // Some FMUs cannot be reset. The old instance is gone by now: there may be one at a time only.
-            let made = used.map_or_else(|| Instance::new(&fmu, interface, false), Ok);
-            match made {
+            match Instance::renewed(one.instance.take(), &fmu, interface, false) {
                 Ok(instance) => {
                     let instance = one.instance.insert(instance);
                     match initialize(instance, start, place, interface) {
@@ -239,11 +225,7 @@ impl Instances {
                         Err(refusal) => one.error = Some(refusal.to_string()),
                     }
                 }
-                Err(log) => {
-                    let mute =
-                        || format!("{} makes no instance, and logs no message", fmu.description().model_name);
-                    one.error = Some(reason(&log).map_or_else(mute, |m| m.text.trim().to_owned()));
-                }
+                Err((text, _)) => one.error = Some(text),
             }
         };
         each(self.pool.as_ref(), &mut self.all, mask, reset);
@@ -575,16 +557,10 @@ fn initialize(
     place: usize,
     interface: Interface,
 ) -> Result<Event, Refusal> {
-    let stop_time = start.stop_time;
-    instance.set_up(start.time, stop_time)?;
-    for (reference, text) in &start.texts {
-        instance.set_text(*reference, text)?;
-    }
-    for (base, reference, values) in &start.numbers {
-        let value = values.get(place).or(values.first()).copied().unwrap_or_default();
-        instance.set_number(*base, *reference, value)?;
-    }
-    instance.enter_initialization_mode(start.time, stop_time)?;
+    let numbers = start.numbers.iter().map(|(base, reference, values)| {
+        (*base, *reference, values.get(place).or(values.first()).copied().unwrap_or_default())
+    });
+    instance.begin(start.time, start.stop_time, &start.texts, numbers)?;
     instance.exit_initialization_mode()?;
     let mut event = Event::default();
     if interface == Interface::ModelExchange {

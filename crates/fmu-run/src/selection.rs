@@ -6,6 +6,7 @@ use crate::fmu::Fmu;
 use crate::instance::Instance;
 use crate::refusal::Refusal;
 use fmi_abi::BaseType;
+use std::ffi::CString;
 
 /// Variables of an FMU that are numbers, found once by their names. A row of values has one for each, in this order; 0 and 1
 /// stand for Booleans.
@@ -110,7 +111,7 @@ pub(crate) fn request<T>(message: String) -> Result<T, Error> {
 }
 
 /// The variable of this name; one of a similar name is told where there is none.
-pub(crate) fn find<'f>(fmu: &'f Fmu, name: &str) -> Result<&'f Variable, Error> {
+fn find<'f>(fmu: &'f Fmu, name: &str) -> Result<&'f Variable, Error> {
     let description = fmu.description();
     if let Some(found) = description.variable(name) {
         return Ok(found);
@@ -128,6 +129,18 @@ pub(crate) fn number<'f>(fmu: &'f Fmu, name: &str) -> Result<&'f Variable, Error
         return request(format!("{name} is no number"));
     }
     Ok(of)
+}
+
+/// The value reference and the text of a start value.
+pub(crate) fn text_of_start(fmu: &Fmu, name: &str, text: &str) -> Result<(u32, CString), Error> {
+    let of = find(fmu, name)?;
+    if of.base != BaseType::String {
+        return request(format!("{name} is a number, its start value cannot be {text:?}"));
+    }
+    match CString::new(text) {
+        Ok(text) => Ok((of.reference, text)),
+        Err(_) => request(format!("the start value of {name} must not contain a character NUL")),
+    }
 }
 
 /// Whole numbers and Booleans take no other values. What a Real takes is the FMU's to say.

@@ -3,7 +3,7 @@
 use super::{Batch, Course, Measure, Start};
 use crate::error::Error;
 use crate::fmu::Fmu;
-use crate::selection::{Selection, find, fits, number, request};
+use crate::selection::{Selection, fits, number, request, text_of_start};
 use fmi_abi::{BaseType, Interface};
 use std::ffi::CString;
 
@@ -82,7 +82,7 @@ impl<'a> Plan<'a> {
             outputs: Selection::default(),
             every: batch.every,
             measures: &batch.measures,
-            threads: threads(fmu, batch.threads)?.min(runs.max(1)),
+            threads: fmu.threads(Interface::CoSimulation, batch.threads)?.min(runs.max(1)),
             read_before_set: batch.read_before_set,
         };
         if batch.every == Some(0) {
@@ -146,19 +146,10 @@ impl<'a> Plan<'a> {
     fn find_start(&mut self, fmu: &Fmu, batch: &'a Batch) -> Result<(), Error> {
         let mut seen = Vec::new();
         for (name, start) in &batch.start {
-            let of = find(fmu, name)?;
             once(&mut seen, name, "start values")?;
             let values = match *start {
                 Start::Text(text) => {
-                    if of.base != BaseType::String {
-                        return request(format!("{name} is a number, its start value cannot be {text:?}"));
-                    }
-                    let Ok(text) = CString::new(text) else {
-                        return request(format!(
-                            "the start value of {name} must not contain a character NUL"
-                        ));
-                    };
-                    self.texts.push((of.reference, text));
+                    self.texts.push(text_of_start(fmu, name, text)?);
                     continue;
                 }
                 Start::Same(value) => Values { values: &[], constant: value, of_run: 0, of_time: 0 },
@@ -240,16 +231,6 @@ fn runs(batch: &Batch) -> Result<usize, Error> {
         }
     }
     Ok(found.map_or(1, |(_, runs)| runs))
-}
-
-fn threads(fmu: &Fmu, asked: Option<usize>) -> Result<usize, Error> {
-    if asked == Some(0) {
-        return request("threads must be at least 1".to_owned());
-    }
-    if fmu.description().co_simulation.as_ref().is_some_and(|offer| offer.once_per_process) {
-        return Ok(1);
-    }
-    Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)))
 }
 
 fn once<'a>(seen: &mut Vec<&'a str>, name: &'a str, where_: &str) -> Result<(), Error> {

@@ -5,7 +5,7 @@ use super::plan::{ByTime, Plan, Values};
 use crate::error::Error;
 use crate::fmu::Fmu;
 use crate::instance::Instance;
-use crate::refusal::{Message, Refusal, reason};
+use crate::refusal::Refusal;
 use fmi_abi::{BaseType, Interface};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -213,14 +213,10 @@ impl<'a> Worker<'a> {
         let plan = self.plan;
         let mut instance = match self.instance() {
             Ok(instance) => instance,
-            Err(log) => {
+            Err((text, is_silent)) => {
                 courses.fill(f64::NAN);
                 measures.fill(f64::NAN);
-                let mute = || {
-                    format!("{} makes no instance, and logs no message", self.fmu.description().model_name)
-                };
-                let text = reason(&log).map_or_else(mute, |message| message.text.trim().to_owned());
-                return Err(Failure { at: None, text, is_silent: log.is_empty() });
+                return Err(Failure { at: None, text, is_silent });
             }
         };
         self.room.begin(plan, run);
@@ -250,12 +246,10 @@ impl<'a> Worker<'a> {
         Err(Failure { at, text, is_silent: refusal.is_silent() })
     }
 
-    /// An instance as new, or what was logged instead.
-    fn instance(&mut self) -> Result<Instance, Vec<Message>> {
-        let used = self.instance.take().and_then(|mut used| used.reset().ok().map(|()| used));
-        // Some FMUs cannot be reset. The old instance is gone by now: there may be one at a time only.
-        let instance = used
-            .map_or_else(|| Instance::new(self.fmu, Interface::CoSimulation, self.logging.is_some()), Ok)?;
+    /// An instance as new, or why there is none, and whether that comes without a reason.
+    fn instance(&mut self) -> Result<Instance, (String, bool)> {
+        let used = self.instance.take();
+        let instance = Instance::renewed(used, self.fmu, Interface::CoSimulation, self.logging.is_some())?;
         instance.forget_log();
         Ok(instance)
     }
@@ -333,17 +327,11 @@ fn follow(
     Ok(())
 }
 
-/// Start values before the initialization, inputs in it: so both editions of the standard allow it.
+/// Start values before the initialization, inputs in it.
 fn start(plan: &Plan, instance: &mut Instance, room: &mut Room, run: usize) -> Result<(), Refusal> {
-    let (first, last) = (plan.time[0], plan.time.last().copied());
-    instance.set_up(first, last)?;
-    for (reference, text) in &plan.texts {
-        instance.set_text(*reference, text)?;
-    }
-    for (base, reference, values) in &plan.start {
-        instance.set_number(*base, *reference, values.of_run(run).at(0))?;
-    }
-    instance.enter_initialization_mode(first, last)?;
+    let numbers = plan.start.iter();
+    let numbers = numbers.map(|(base, reference, values)| (*base, *reference, values.of_run(run).at(0)));
+    instance.begin(plan.time[0], plan.time.last().copied(), &plan.texts, numbers)?;
     set_values(plan, instance, room, 0)?;
     instance.exit_initialization_mode()
 }
