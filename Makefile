@@ -203,7 +203,7 @@ $(VENV)/made.stamp $(DIST_VENV)/made.stamp: | need-python
 	@touch $@
 
 FMU_RUN := $(wildcard crates/fmu-run/*.toml crates/fmu-run/python/*.toml $(addprefix crates/fmu-run/,\
-  src/*.rs src/batch/*.rs python/src/*.rs python/fmu_run/*)\
+  src/*.rs src/*/*.rs python/src/*.rs python/fmu_run/*)\
   crates/fmi-abi/*.toml crates/fmi-abi/src/*.rs crates/fmi-abi/src/*/*.rs)
 
 $(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | need-rust

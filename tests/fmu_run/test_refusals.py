@@ -35,7 +35,10 @@ def fmu(testbed):
         ({"inputs": {"theta1": ["a"] * 11}}, "theta1: these are no numbers"),
         ({"inputs": {"k1": TIME}}, "k1 is no input but a fixed parameter; give it a start value"),
         ({"inputs": {"roll": TIME}}, "roll is no input but a continuous output"),
-        ({"start": {"k1": [[1.0]]}}, "the start value of k1 has the shape (1, 1); it must be (runs,) or a number"),
+        (
+            {"start": {"k1": [[1.0]]}},
+            "the start value of k1 has the shape [1, 1]; it must be a number, or an array with one for each",
+        ),
         ({"start": {"k1": "stiff"}}, 'k1 is a number, its start value cannot be "stiff"'),
         ({"start": {"M": 2.5}}, "M is a whole number from -2147483648 to 2147483647 and cannot be 2.5"),
         ({"start": {"use_omega": 2}}, "use_omega is a Boolean and cannot be 2"),
@@ -192,6 +195,34 @@ def test_units_of_declared_types(unruly, unruly3):
             assert {name: fmu.variables[name].unit for name in units} == units
 
 
+def test_start_values_with_units(fmu):
+    time, outputs = TIME, ["tau1", "theta3"]
+    own = fmu.run(
+        time,
+        start={"k1": np.array([1.5, 2.0]) * 180 / np.pi, "theta3_start": np.pi / 6, "start_at_rest": 0},
+        outputs=outputs,
+    )
+    other = fmu.run(
+        time, start={"k1": ([1.5, 2.0], "N.m/deg"), "theta3_start": (30.0, "deg"), "start_at_rest": 0}, outputs=outputs
+    )
+    for name in outputs:
+        np.testing.assert_allclose(other[name], own[name], rtol=1e-12)
+    held = fmu.instances(2, start={"theta3_start": (30.0, "deg"), "start_at_rest": "false"})
+    np.testing.assert_allclose(held.get("theta3"), np.pi / 6, rtol=1e-15)
+    for start, words in [
+        ({"k1": (1.9, "N/m")}, 'k1 can be given in N.m/rad or N.m/deg, not in "N/m"'),
+        ({"M": (3, "kg")}, "M has no unit, its values cannot be in kg"),
+    ]:
+        with pytest.raises(ValueError, match=re.escape(words)):
+            fmu.run(time, start=start, outputs=outputs)
+
+
+def test_hints_prefer_the_name(tmp_path, fmu):
+    for wrong, right in [("theta", "theta1"), ("rolls", "roll"), ("TAU2", "tau2"), ("pitch_angle", "pitch")]:
+        with pytest.raises(ValueError, match=f'did you mean "{right}"'):
+            fmu.run(TIME, outputs=[wrong])
+
+
 def test_other_types(unruly):
     with fmu_run.Fmu(unruly) as fmu:
         assert fmu.variables["label"].type == "String" and fmu.variables["count"].start == "3"
@@ -202,8 +233,29 @@ def test_other_types(unruly):
             start={"label": "seven77", "slope": 2},
             outputs=["y", "count", "flag"],
         ).check()
-        with pytest.raises(ValueError, match="label is no number"):
-            fmu.run(TIME, outputs=["label"])
+        labels = fmu.run(TIME, start={"label": ["one", "three"], "mood": ["Good", "SilentError"]}, outputs=["y"])
+        assert list(labels["y"][:, 0]) == [3.0, 5.0] and list(labels.errors) == [1]
+        one = fmu.instances(start={"label": "held", "mood": "Good", "flag": "true"})
+        assert one.texts("label") == ["held"] and list(one.get(("mood", "flag"))[0]) == [0.0, 1.0]
+        for call, words in [
+            (lambda: fmu.run(TIME, outputs=["label"]), "label is no number"),
+            (lambda: one.texts("y"), "y is a number, no text"),
+            (
+                lambda: fmu.run(TIME, outputs=["y"], start={"mood": "Glad"}),
+                "mood is one of Good, SilentError, its start",
+            ),
+            (
+                lambda: fmu.run(TIME, outputs=["y"], start={"flag": "on"}),
+                "flag is a Boolean, its start value cannot be",
+            ),
+            (lambda: one.set("count", 2.5), "count is a whole number from .* and cannot be 2.5"),
+            (lambda: one.set(["slope", "flag"], [1.0, 2.0]), "flag is a Boolean and cannot be 2"),
+            (lambda: one.set("slope", None), "None is no number"),
+            (lambda: fmu.run(TIME, outputs=["y"], inputs={"slope": None}), "slope: None is no number"),
+            (lambda: fmu.run(TIME, outputs=["y"], start={"slope": None}), "slope: None is no number"),
+        ]:
+            with pytest.raises(ValueError, match=words):
+                call()
     np.testing.assert_array_equal(runs["count"][0], counts)
     np.testing.assert_array_equal(runs["flag"][0], counts > 0)
     np.testing.assert_allclose(runs["y"][0], 7 + 2 * TIME, atol=1e-15)

@@ -103,6 +103,12 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     return fmi2OK;
 }
 
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String value[]) {
+    (void)vr;
+    for (size_t k = 0; k < n; k++) value[k] = ((Instance *)c)->label;
+    return fmi2OK;
+}
+
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
     Instance *i = c;
     for (size_t k = 0; k < n; k++) value[k] = vr[k] == Y ? i->y + (double)strlen(i->label) : i->slope;
@@ -171,7 +177,6 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Rea
     fmi2Status function(__VA_ARGS__) { return fmi2Error; }
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 REFUSED(fmi2SetDebugLogging, fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[])
-REFUSED(fmi2GetString, fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String value[])
 REFUSED(fmi2GetFMUstate, fmi2Component c, fmi2FMUstate *state)
 REFUSED(fmi2SetFMUstate, fmi2Component c, fmi2FMUstate state)
 REFUSED(fmi2FreeFMUstate, fmi2Component c, fmi2FMUstate *state)

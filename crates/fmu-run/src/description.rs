@@ -27,6 +27,9 @@ pub struct Variable {
     pub max: Option<f64>,
     /// The name of its declared type, if it has one.
     pub declared_type: Option<String>,
+    /// Of an output: the value references of what it depends on without a step; `None` if nothing is said, for then it may be
+    /// all inputs (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
+    pub depends_on: Option<Vec<u32>>,
     /// What it means.
     pub description: String,
 }
@@ -65,6 +68,8 @@ pub struct Description {
     pub variables: Vec<Variable>,
     /// The units by their names, each with the exponents of SI's base units, factor and offset as they are written.
     pub units: BTreeMap<String, Vec<(String, String)>>,
+    /// By units, what else values in them may be given in: its name, factor and offset.
+    pub display_units: BTreeMap<String, Vec<(String, f64, f64)>>,
     /// The enumerations by their names, each with the names and numbers of its items.
     pub enumerations: BTreeMap<String, Vec<(String, String)>>,
     places: HashMap<String, usize>,
@@ -94,7 +99,8 @@ impl Description {
             Standard::Fmi2 => ("guid", variables_of_fmi2(root)),
             Standard::Fmi3 => ("instantiationToken", variables_of_fmi3(root)),
         };
-        let variables = variables?;
+        let mut variables = variables?;
+        depend(root, standard, &mut variables);
         Ok(Self {
             standard,
             model_name: needed(root, "modelName")?,
@@ -106,6 +112,7 @@ impl Description {
             places: variables.iter().enumerate().map(|(place, of)| (of.name.clone(), place)).collect(),
             variables,
             units: elements(root, "UnitDefinitions").map(unit).collect(),
+            display_units: elements(root, "UnitDefinitions").map(display_units).collect(),
             enumerations: elements(root, "TypeDefinitions").filter_map(enumeration).collect(),
         })
     }
@@ -121,6 +128,56 @@ impl Description {
     /// The variable of this name.
     pub fn variable(&self, name: &str) -> Option<&Variable> {
         self.places.get(name).map(|place| &self.variables[*place])
+    }
+
+    /// The names and numbers of the items of a variable's enumeration, if it is of one.
+    pub fn items(&self, of: &Variable) -> Option<&[(String, String)]> {
+        self.enumerations.get(of.declared_type.as_ref()?).map(Vec::as_slice)
+    }
+
+    /// Whether an output may feed an input of another FMU or the same: both of the same type, unit and items.
+    ///
+    /// # Errors
+    /// What differs, in a few words.
+    pub fn connects(&self, output: &Variable, to: &Self, input: &Variable) -> Result<(), String> {
+        let [one, other] = [output, input].map(Variable::kind);
+        if one != other {
+            return Err(format!("the one is {one}, the other {other}"));
+        }
+        if let (Some(one), Some(other)) = (&output.unit, &input.unit)
+            && one != other
+        {
+            return Err(format!("the one is in {one}, the other in {other}"));
+        }
+        match (self.items(output), to.items(input)) {
+            (Some(one), Some(other)) if one != other => Err("they have different items".to_owned()),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Variable {
+    /// What its values are, in a sentence.
+    pub(crate) fn what(&self) -> &'static str {
+        match self.kind() {
+            "Boolean" => "a Boolean",
+            "String" => "a text",
+            "Binary" => "binary",
+            "Enumeration" => "an enumeration",
+            _ => "a number",
+        }
+    }
+
+    /// Its type as those have it who tell numbers of FMI 3.0 apart as little as FMI 2.0.
+    pub fn kind(&self) -> &'static str {
+        match self.base {
+            BaseType::Real | BaseType::Float32 => "Real",
+            BaseType::Boolean => "Boolean",
+            BaseType::String => "String",
+            BaseType::Binary => "Binary",
+            BaseType::Enumeration => "Enumeration",
+            _ => "Integer",
+        }
     }
 }
 
@@ -169,6 +226,53 @@ fn attributes(node: Node) -> Vec<(String, String)> {
 fn unit(node: Node) -> (String, Vec<(String, String)>) {
     let base = child(node, "BaseUnit").map(attributes).unwrap_or_default();
     (node.attribute("name").unwrap_or_default().to_owned(), base)
+}
+
+/// Value in the display unit = factor * value in the unit + offset; in FMI 3.0 it may be inverse.
+fn display_units(node: Node) -> (String, Vec<(String, f64, f64)>) {
+    let number =
+        |of: Node, name, default| of.attribute(name).and_then(|text| text.parse().ok()).unwrap_or(default);
+    let others = node.children().filter(|of| {
+        of.has_tag_name("DisplayUnit") && !matches!(of.attribute("inverse"), Some("true" | "1"))
+    });
+    let others = others.filter_map(|of| {
+        Some((of.attribute("name")?.to_owned(), number(of, "factor", 1.0), number(of, "offset", 0.0)))
+    });
+    (node.attribute("name").unwrap_or_default().to_owned(), others.collect())
+}
+
+/// Which outputs depend on what: by places in FMI 2.0, counted from 1, by value references in FMI 3.0.
+fn depend(root: Node, standard: Standard, variables: &mut [Variable]) {
+    let list = |node: Node, name: &str| -> Option<Vec<u32>> {
+        let list = node.attribute(name)?.split_whitespace();
+        Some(list.filter_map(|number| number.parse().ok()).collect())
+    };
+    match standard {
+        Standard::Fmi2 => {
+            let place = |number: u32| (number as usize).wrapping_sub(1);
+            let outputs = child(root, "ModelStructure").map(|structure| elements(structure, "Outputs"));
+            for node in outputs.into_iter().flatten() {
+                let known = list(node, "dependencies").map(|places| {
+                    places
+                        .iter()
+                        .filter_map(|number| Some(variables.get(place(*number))?.reference))
+                        .collect()
+                });
+                let output = list(node, "index").and_then(|index| index.first().copied());
+                if let Some(output) = output.and_then(|number| variables.get_mut(place(number))) {
+                    output.depends_on = known;
+                }
+            }
+        }
+        Standard::Fmi3 => {
+            let outputs = elements(root, "ModelStructure").filter(|node| node.has_tag_name("Output"));
+            for node in outputs {
+                let reference = list(node, "valueReference").and_then(|index| index.first().copied());
+                let outputs = variables.iter_mut().filter(|of| Some(of.reference) == reference);
+                outputs.for_each(|output| output.depends_on = list(node, "dependencies"));
+            }
+        }
+    }
 }
 
 /// A type's element in FMI 2.0 holds one for its kind (section 2.2.3); in FMI 3.0 it is that itself (2.4.4).
@@ -255,6 +359,7 @@ fn variable(node: Node, of_type: Node, base: BaseType, types: &Types) -> Result<
         min: number("min"),
         max: number("max"),
         declared_type: declared_type.map(str::to_owned),
+        depends_on: None,
         description: text("description").unwrap_or_default(),
     })
 }

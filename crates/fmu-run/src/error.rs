@@ -23,6 +23,10 @@ impl Error {
     }
 }
 
+pub(crate) fn request<T>(message: String) -> Result<T, Error> {
+    Err(Error::Request(message))
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

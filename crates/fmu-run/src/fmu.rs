@@ -4,26 +4,23 @@ use crate::description::{Description, Offer};
 use crate::error::Error;
 use crate::library::Library;
 use crate::machine;
+use crate::system::System;
 use fmi_abi::{Interface, Standard};
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::error::Error as _;
 use std::ffi::{CString, OsStr};
 use std::fs::File;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
 
-/// An FMU, unpacked and loaded once, for any number of runs and instances. Instances keep it loaded.
-#[derive(Debug)]
-pub struct Fmu {
-    description: Description,
-    co_simulation: Option<Arc<Library>>,
-    /// Or why it cannot be loaded, where it has Co-Simulation, too.
-    model_exchange: Result<Option<Arc<Library>>, String>,
-}
+/// An FMU, unpacked and loaded once, for any number of runs and instances, which keep it loaded: a [`System`] of one.
+#[derive(Clone, Debug)]
+pub struct Fmu(System);
 
 impl Fmu {
-    /// Unpacks an FMU and loads its library: the one thing here that is `unsafe`, for it runs code that comes with the FMU.
+    /// Unpacks an FMU and loads its library: `unsafe`, for it runs code that comes with the FMU.
     ///
     /// ```compile_fail,E0133
     /// let fmu = fmu_run::Fmu::open("model.fmu".as_ref());
@@ -37,7 +34,7 @@ impl Fmu {
     /// program.
     pub unsafe fn open(path: &Path) -> Result<Self, Error> {
         // SAFETY: the caller's promise.
-        unsafe { Self::open_checked(path, false) }
+        unsafe { Loaded::open(path, false) }.map(|loaded| Self(System::of_one(loaded)))
     }
 
     /// The same, also if the FMU's library starts another program (`needsExecutionTool`), which must be installed. What
@@ -50,12 +47,41 @@ impl Fmu {
     /// As [`open`](Self::open).
     pub unsafe fn open_with_execution_tool(path: &Path) -> Result<Self, Error> {
         // SAFETY: the caller's promise.
-        unsafe { Self::open_checked(path, true) }
+        unsafe { Loaded::open(path, true) }.map(|loaded| Self(System::of_one(loaded)))
     }
 
+    /// What the model description says.
+    pub fn description(&self) -> &Description {
+        &self.loaded().description
+    }
+
+    pub(crate) fn loaded(&self) -> &Arc<Loaded> {
+        &self.0.parts()[0].fmu
+    }
+}
+
+/// What a [`System`] can do, its one FMU can do alone: variables, runs, instances.
+impl Deref for Fmu {
+    type Target = System;
+
+    fn deref(&self) -> &System {
+        &self.0
+    }
+}
+
+/// What an FMU is when it is unpacked and loaded.
+#[derive(Debug)]
+pub(crate) struct Loaded {
+    pub description: Description,
+    co_simulation: Option<Arc<Library>>,
+    /// Or why it cannot be loaded, where it has Co-Simulation, too.
+    model_exchange: Result<Option<Arc<Library>>, String>,
+}
+
+impl Loaded {
     /// # Safety
-    /// As of [`open`](Self::open), and the program may be started if there is to be an execution tool.
-    unsafe fn open_checked(path: &Path, execution_tool: bool) -> Result<Self, Error> {
+    /// As of [`Fmu::open`], and the program may be started if there is to be an execution tool.
+    pub unsafe fn open(path: &Path, execution_tool: bool) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let folder = unpacked(path).map_err(fail)?;
         let file = folder.path().join("modelDescription.xml");
@@ -80,8 +106,13 @@ impl Fmu {
         Ok(Self { description, co_simulation, model_exchange })
     }
 
+    /// There may be one instance only.
+    pub fn once_per_process(&self, interface: Interface) -> bool {
+        self.description.offer(interface).is_some_and(|offer| offer.once_per_process)
+    }
+
     /// The library for this type of interface.
-    pub(crate) fn library(&self, interface: Interface) -> Result<&Arc<Library>, Error> {
+    pub fn library(&self, interface: Interface) -> Result<&Arc<Library>, Error> {
         let name = &self.description.model_name;
         match interface {
             Interface::CoSimulation => self.co_simulation.as_ref().ok_or_else(|| {
@@ -94,22 +125,6 @@ impl Fmu {
                 Err(why) => Err(Error::Fmu(format!("{name}: {why}"))),
             },
         }
-    }
-
-    /// How many threads instances may be in: those asked for, or one for each processor.
-    pub(crate) fn threads(&self, interface: Interface, asked: Option<usize>) -> Result<usize, Error> {
-        if asked == Some(0) {
-            return Err(Error::Request("threads must be at least 1".to_owned()));
-        }
-        if self.description.offer(interface).is_some_and(|offer| offer.once_per_process) {
-            return Ok(1);
-        }
-        Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)))
-    }
-
-    /// What the model description says.
-    pub fn description(&self) -> &Description {
-        &self.description
     }
 }
 
@@ -142,7 +157,7 @@ unsafe fn load(
     })
 }
 
-fn unpacked(path: &Path) -> Result<TempDir, String> {
+pub(crate) fn unpacked(path: &Path) -> Result<TempDir, String> {
     let file = File::open(path).map_err(|error| format!("cannot be opened ({error})"))?;
     let mut archive =
         zip::ZipArchive::new(file).map_err(|error| format!("is no FMU, which is a zip file ({error})"))?;

@@ -1,7 +1,7 @@
 //! An instance of an FMU, whichever the standard: safe to call, because lengths are checked, the library stays, and nothing
 //! is called any more after fmi2Fatal.
 
-use crate::fmu::Fmu;
+use crate::fmu::Loaded;
 use crate::library::{Functions, Library};
 use crate::log::{Log, log_of_fmi3, logger_of_fmi2};
 use crate::refusal::{Message, Refusal, reason};
@@ -10,7 +10,7 @@ use fmi_abi::fmi2::types::*;
 use fmi_abi::fmi3::types::*;
 use fmi_abi::{BaseType, Interface, Status};
 use std::ffi::{CStr, CString};
-use std::ptr::null_mut;
+use std::ptr::{null, null_mut};
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -25,11 +25,19 @@ pub struct Instance {
     library: Arc<Library>,
     /// The states that it has saved; NULL where there is room for another.
     saved: Vec<*mut c_void>,
+    /// Of its component; empty where there is only one.
+    name: String,
 }
 
 /// The place of a state that an instance has saved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Saved(usize);
+
+impl Saved {
+    pub fn place(self) -> usize {
+        self.0
+    }
+}
 
 /// What an event did (section 3.2.2 of FMI 2.0, 2.3.5 of FMI 3.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -86,7 +94,7 @@ macro_rules! call {
     ($self:ident, $fmi2:ident ( $($of_fmi2:expr),* ) $(, $fmi3:ident ( $($of_fmi3:expr),* ))?) => {{
         let handle = $self.handle;
         if handle.is_null() {
-            return Err(Refusal::new(stringify!($fmi2), Status::Fatal, Vec::new()));
+            return Err($self.refusal(stringify!($fmi2), Status::Fatal, Vec::new()));
         }
         // SAFETY: the instance is alive; arrays are slices of the lengths that are passed, single values live.
         let (function, code) = unsafe {
@@ -154,13 +162,21 @@ macro_rules! get {
 }
 
 impl Instance {
-    /// A new instance of an FMU that has this type of interface, or what was logged instead.
-    fn new(fmu: &Fmu, interface: Interface, logging_on: bool) -> Result<Self, Vec<Message>> {
-        let Ok(library) = fmu.library(interface) else { return Err(Vec::new()) };
+    /// A new instance of an FMU that has this type of interface; or why there is none, and whether the FMU said so. Its name
+    /// is that of its component.
+    pub(crate) fn new(
+        fmu: &Loaded,
+        component: &str,
+        interface: Interface,
+        logging_on: bool,
+    ) -> Result<Self, (String, bool)> {
+        let library = fmu.library(interface).map_err(|error| (error.to_string(), false))?;
         let log = Arc::<Log>::default();
         let environment = Arc::as_ptr(&log).cast_mut().cast();
-        let token = CString::new(fmu.description().token.as_str()).unwrap_or_default();
-        let (name, token, resources) = (c"instance".as_ptr(), token.as_ptr(), library.resources.as_ptr());
+        let token = CString::new(fmu.description.token.as_str()).unwrap_or_default();
+        let own_name = if component.is_empty() { "instance" } else { component };
+        let own_name = CString::new(own_name).unwrap_or_default();
+        let (name, token, resources) = (own_name.as_ptr(), token.as_ptr(), library.resources.as_ptr());
         let library = Arc::clone(library);
 
         let callbacks = Rc::new(fmi2CallbackFunctions {
@@ -208,43 +224,20 @@ impl Instance {
                 ),
             }
         };
-        match handle.is_null() {
-            true => Err(log.take()),
-            false => Ok(Self { handle, log, _callbacks: callbacks, library, saved: Vec::new() }),
+        if handle.is_null() {
+            let log = log.take();
+            let mute = || format!("{} makes no instance, and logs no message", fmu.description.model_name);
+            let why = reason(&log).map_or_else(mute, |message| message.text.trim().to_owned());
+            let of = if component.is_empty() { String::new() } else { format!("{component}: ") };
+            return Err((of + &why, log.is_empty()));
         }
+        let (saved, name) = (Vec::new(), component.to_owned());
+        Ok(Self { handle, log, _callbacks: callbacks, library, saved, name })
     }
 
-    /// A used instance as new, or another one in its place; or why there is none, and whether the FMU said so.
-    pub(crate) fn renewed(
-        used: Option<Self>,
-        fmu: &Fmu,
-        interface: Interface,
-        logging_on: bool,
-    ) -> Result<Self, (String, bool)> {
-        let used = used.filter(Self::is_alive).and_then(|mut used| used.reset().ok().map(|()| used));
-        // Some FMUs cannot be reset. The old instance is gone by now: there may be one at a time only.
-        used.map_or_else(|| Self::new(fmu, interface, logging_on), Ok).map_err(|log| {
-            let mute = || format!("{} makes no instance, and logs no message", fmu.description().model_name);
-            (reason(&log).map_or_else(mute, |message| message.text.trim().to_owned()), log.is_empty())
-        })
-    }
-
-    /// Start values, and into the initialization: so both editions of the standard allow it.
-    pub(crate) fn begin(
-        &mut self,
-        start_time: f64,
-        stop_time: Option<f64>,
-        texts: &[(u32, CString)],
-        numbers: impl Iterator<Item = (BaseType, u32, f64)>,
-    ) -> Result<(), Refusal> {
-        self.set_up(start_time, stop_time)?;
-        for (reference, text) in texts {
-            self.set_text(*reference, text)?;
-        }
-        for (base, reference, value) in numbers {
-            self.set_number(base, reference, value)?;
-        }
-        self.enter_initialization_mode(start_time, stop_time)
+    #[cold]
+    fn refusal(&self, function: &'static str, status: Status, log: Vec<Message>) -> Refusal {
+        Refusal::new(&self.name, function, status, log)
     }
 
     /// What became of a call.
@@ -263,7 +256,7 @@ impl Instance {
         if status == Status::Fatal {
             self.handle = null_mut();
         }
-        Err(Refusal::new(function, status, log))
+        Err(self.refusal(function, status, log))
     }
 
     fn is_of_fmi2(&self) -> bool {
@@ -280,7 +273,7 @@ impl Instance {
     }
 
     /// Before the start values are set, in FMI 2.0.
-    fn set_up(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
+    pub(crate) fn set_up(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
         match &self.library.functions {
             // It says this when it begins to initialize.
             Functions::Fmi3(_) => Ok(()),
@@ -291,7 +284,11 @@ impl Instance {
         }
     }
 
-    fn enter_initialization_mode(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
+    pub(crate) fn enter_initialization_mode(
+        &mut self,
+        start_time: f64,
+        stop_time: Option<f64>,
+    ) -> Result<(), Refusal> {
         let (defined, stop) = (stop_time.is_some().into(), stop_time.unwrap_or(start_time));
         call!(
             self,
@@ -327,9 +324,19 @@ impl Instance {
         numbers!(get: self base vr)
     }
 
-    fn set_text(&mut self, vr: u32, value: &CStr) -> Result<(), Refusal> {
+    pub(crate) fn set_text(&mut self, vr: u32, value: &CStr) -> Result<(), Refusal> {
         let text = value.as_ptr();
         call!(self, fmi2SetString(&vr, 1, &text), fmi3SetString(&vr, 1, &text, 1))
+    }
+
+    pub(crate) fn get_text(&mut self, vr: u32) -> Result<String, Refusal> {
+        let mut text = null();
+        call!(self, fmi2GetString(&vr, 1, &mut text), fmi3GetString(&vr, 1, &mut text, 1))?;
+        if text.is_null() {
+            return Ok(String::new());
+        }
+        // SAFETY: a text of the FMU's, which stays until the next call of it.
+        Ok(unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned())
     }
 
     /// Time derivatives of order 1, which FMI 3.0 has no function for.
@@ -410,7 +417,7 @@ impl Instance {
             let text = format!("the step ended early, at {reached} s");
             log.push(Message { status, category: String::new(), text });
         }
-        let refusal = Refusal::new(function, status, log);
+        let refusal = self.refusal(function, status, log);
         if wanted { refusal.at_end(reached) } else { refusal }
     }
 
@@ -432,7 +439,7 @@ impl Instance {
     /// What is saved in a place.
     fn state(&self, saved: Saved, function: &'static str) -> Result<*mut c_void, Refusal> {
         let state = self.saved.get(saved.0).copied().filter(|state| !state.is_null());
-        state.ok_or_else(|| Refusal::new(function, Status::Error, Vec::new()))
+        state.ok_or_else(|| self.refusal(function, Status::Error, Vec::new()))
     }
 
     pub(crate) fn restore(&mut self, saved: Saved) -> Result<(), Refusal> {
@@ -534,7 +541,7 @@ impl Instance {
         }
         let text = format!("the event does not come to an end in {MOST_ROUNDS} rounds");
         let message = Message { status: Status::Error, category: String::new(), text };
-        Err(Refusal::new("event", Status::Error, vec![message]))
+        Err(self.refusal("event", Status::Error, vec![message]))
     }
 
     /// Whether the FMU wants an event, and the end, after a step of the integrator.
@@ -578,7 +585,7 @@ impl Instance {
         call!(self, fmi2Terminate(), fmi3Terminate())
     }
 
-    fn reset(&mut self) -> Result<(), Refusal> {
+    pub(crate) fn reset(&mut self) -> Result<(), Refusal> {
         call!(self, fmi2Reset(), fmi3Reset())
     }
 }

@@ -1,14 +1,15 @@
 //! Instances of an FMU in the hand: set, stepped, read, put back, side by side.
 
-use crate::error::Error;
-use crate::fmu::Fmu;
-use crate::instance::{Continuous, Event, Instance, Saved};
+use crate::description::Description;
+use crate::error::{Error, request};
+use crate::instance::{Continuous, Event, Saved};
 use crate::refusal::Refusal;
-use crate::selection::{Selection, fits, number, request, text_of_start};
+use crate::running::Running;
+use crate::selection::{Place, Selection};
+use crate::start::{Start, StartValues};
+use crate::system::System;
 use fmi_abi::{BaseType, Interface};
 use rayon::prelude::*;
-use std::ffi::CString;
-use std::sync::Arc;
 
 /// How instances are made.
 #[derive(Clone, Debug)]
@@ -17,10 +18,8 @@ pub struct Setup<'a> {
     pub interface: Interface,
     /// How many.
     pub count: usize,
-    /// Start values: one for all, or one for each instance.
-    pub start: Vec<(&'a str, &'a [f64])>,
-    /// Start values that are texts, the same for all.
-    pub texts: Vec<(&'a str, &'a str)>,
+    /// Start values.
+    pub start: Vec<(&'a str, Start<'a>)>,
     /// When they begin, s.
     pub start_time: f64,
     /// When they will end, s, if that is known; the FMU may refuse to go further.
@@ -36,7 +35,6 @@ impl Default for Setup<'_> {
             interface: Interface::CoSimulation,
             count: 1,
             start: Vec::new(),
-            texts: Vec::new(),
             start_time: 0.0,
             stop_time: None,
             threads: Some(1),
@@ -51,17 +49,16 @@ impl Default for Setup<'_> {
 /// the others go on. [`reset`](Self::reset) and [`restore`](Self::restore) bring it back.
 #[derive(Debug)]
 pub struct Instances {
-    fmu: Arc<Fmu>,
+    system: System,
     interface: Interface,
     all: Vec<One>,
-    start: Start,
+    begin: Begin,
     pool: Option<rayon::ThreadPool>,
 }
 
 #[derive(Debug)]
-struct Start {
-    numbers: Vec<(BaseType, u32, Vec<f64>)>,
-    texts: Vec<(u32, CString)>,
+struct Begin {
+    start: StartValues<'static>,
     time: f64,
     stop_time: Option<f64>,
 }
@@ -69,7 +66,7 @@ struct Start {
 #[derive(Debug)]
 struct One {
     /// None after it was lost for good.
-    instance: Option<Instance>,
+    instance: Option<Running>,
     /// Why it dropped out.
     error: Option<String>,
     own: Own,
@@ -99,43 +96,37 @@ pub struct States(Vec<Option<(Saved, f64)>>);
 /// Which of the instances a call is for: all, or those that are true.
 pub type Mask<'a> = Option<&'a [bool]>;
 
-impl Fmu {
+impl System {
     /// Makes instances, sets their start values and initializes them. Those for Model Exchange have been through the events at
     /// the begin and are in Continuous-Time Mode.
     ///
     /// # Errors
     /// [`Error::Request`] when what is asked for does not fit the FMU, [`Error::Fmu`] when it does not have this type of
     /// interface, or makes no instances.
-    pub fn instances(self: &Arc<Self>, setup: &Setup) -> Result<Instances, Error> {
-        self.library(setup.interface)?;
+    pub fn instances(&self, setup: &Setup) -> Result<Instances, Error> {
+        self.check_interface(setup.interface)?;
         if setup.count == 0 {
             return request("there must be one instance at least".to_owned());
         }
-        let offer = self.description().offer(setup.interface);
-        if setup.count > 1 && offer.is_some_and(|offer| offer.once_per_process) {
+        if setup.count > 1 && self.once_per_process(setup.interface) {
             return request(format!(
                 "{} can be there only once in a process (canBeInstantiatedOnlyOncePerProcess)",
-                self.description().model_name
+                self.name()
             ));
         }
-        let start = Start {
-            numbers: Vec::new(),
-            texts: Vec::new(),
-            time: setup.start_time,
-            stop_time: setup.stop_time,
-        };
+        let start = StartValues::of(self, &[])?;
         let one = || One { instance: None, error: None, own: Own::default() };
         let threads = self.threads(setup.interface, setup.threads)?.min(setup.count);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         let pool = (threads > 1).then(|| pool.build()).transpose();
         let mut instances = Instances {
-            fmu: Arc::clone(self),
+            system: self.clone(),
             interface: setup.interface,
             all: std::iter::repeat_with(one).take(setup.count).collect(),
-            start,
+            begin: Begin { start, time: setup.start_time, stop_time: setup.stop_time },
             pool: pool.map_err(|error| Error::Fmu(format!("no threads can be made: {error}")))?,
         };
-        instances.start_from(&setup.start, &setup.texts)?;
+        instances.start_from(&setup.start)?;
         instances.reset(None);
         match instances.none_left() {
             Some(why) => Err(Error::Fmu(why.to_owned())),
@@ -155,9 +146,9 @@ impl Instances {
         self.all.is_empty()
     }
 
-    /// The FMU.
-    pub fn fmu(&self) -> &Fmu {
-        &self.fmu
+    /// What they are instances of.
+    pub fn system(&self) -> &System {
+        &self.system
     }
 
     /// The time of each, s.
@@ -185,42 +176,29 @@ impl Instances {
     ///
     /// # Errors
     /// [`Error::Request`] when a variable is not there, or the values do not fit it or the number of instances.
-    pub fn start_from(&mut self, numbers: &[(&str, &[f64])], texts: &[(&str, &str)]) -> Result<(), Error> {
-        let mut found = Vec::new();
-        for (name, values) in numbers {
-            let of = number(&self.fmu, name)?;
-            if values.len() != 1 && values.len() != self.len() {
-                return request(format!(
-                    "{name} has {} start values for {} instances",
-                    values.len(),
-                    self.len()
-                ));
+    pub fn start_from(&mut self, start: &[(&str, Start)]) -> Result<(), Error> {
+        for (name, values) in start {
+            if let Some(count) = values.count()
+                && count != 1
+                && count != self.len()
+            {
+                return request(format!("{name} has {count} start values for {} instances", self.len()));
             }
-            fits(name, of.base, values)?;
-            found.push((of.base, of.reference, values.to_vec()));
         }
-        let texts = texts.iter().map(|(name, text)| text_of_start(&self.fmu, name, text));
-        for text in texts.collect::<Result<Vec<_>, _>>()? {
-            self.start.texts.retain(|(known, _)| *known != text.0);
-            self.start.texts.push(text);
-        }
-        for one in found {
-            self.start.numbers.retain(|(base, known, _)| (*base, *known) != (one.0, one.1));
-            self.start.numbers.push(one);
-        }
+        self.begin.start.put(StartValues::given(&self.system, start)?.into_owned());
         Ok(())
     }
 
     /// Back to the start values, initialized.
     pub fn reset(&mut self, mask: Mask) {
-        let (fmu, start, interface) = (Arc::clone(&self.fmu), &self.start, self.interface);
+        let (system, interface, begin) = (&self.system, self.interface, &self.begin);
         let reset = |place: usize, one: &mut One| {
             one.error = None;
-            (one.own.time, one.own.event) = (start.time, Event::default());
-            match Instance::renewed(one.instance.take(), &fmu, interface, false) {
+            (one.own.time, one.own.event) = (begin.time, Event::default());
+            match Running::renewed(one.instance.take(), system, interface, false) {
                 Ok(instance) => {
                     let instance = one.instance.insert(instance);
-                    match initialize(instance, start, place, interface) {
+                    match initialize(instance, begin, place, interface) {
                         Ok(event) => one.own.event = event,
                         Err(refusal) => one.error = Some(refusal.to_string()),
                     }
@@ -233,13 +211,18 @@ impl Instances {
 
     /// Sets variables, from a row for each instance or from one row for all.
     ///
+    /// # Errors
+    /// [`Error::Request`] when a whole number or a Boolean cannot have its value, or an output feeds one of them.
+    ///
     /// # Panics
     /// When there are other than so many values.
-    pub fn set(&mut self, variables: &Selection, values: &[f64], mask: Mask) {
+    pub fn set(&mut self, variables: &Selection, values: &[f64], mask: Mask) -> Result<(), Error> {
+        variables.check(values)?;
         let rows = rows(variables.len(), values.len(), self.len());
         self.alive(mask, |place, own, instance| {
-            variables.set(instance, &mut own.buffer, rows.of(values, place))
+            instance.set(variables, &mut own.buffer, rows.of(values, place))
         });
+        Ok(())
     }
 
     /// Reads variables into a row for each instance.
@@ -248,7 +231,7 @@ impl Instances {
     /// When there is room for another number of values.
     pub fn get(&mut self, variables: &Selection, values: &mut [f64]) {
         self.fill(variables.len(), values, |own, instance, row| {
-            variables.get(instance, &mut own.buffer, row)
+            instance.get(variables, &mut own.buffer, row)
         });
     }
 
@@ -273,6 +256,9 @@ impl Instances {
     /// Sets variables, steps and reads others: [`set`](Self::set), [`step`](Self::step) and [`get`](Self::get) in one go of the
     /// threads.
     ///
+    /// # Errors
+    /// As [`set`](Self::set).
+    ///
     /// # Panics
     /// As they do.
     pub fn advance(
@@ -280,14 +266,16 @@ impl Instances {
         (set, values): (&Selection, &[f64]),
         size: f64,
         (get, read): (&Selection, &mut [f64]),
-    ) {
+    ) -> Result<(), Error> {
+        set.check(values)?;
         let rows = rows(set.len(), values.len(), self.len());
         self.fill_by_place(get.len(), read, |place, own, instance, row| {
-            set.set(instance, &mut own.buffer, rows.of(values, place))?;
+            instance.set(set, &mut own.buffer, rows.of(values, place))?;
             instance.step(own.time, size)?;
             own.time += size;
-            get.get(instance, &mut own.buffer, row)
+            instance.get(get, &mut own.buffer, row)
         });
+        Ok(())
     }
 
     /// Saves the state of each.
@@ -374,10 +362,10 @@ impl Instances {
         (knowns, seed): (&Selection, &[f64]),
         values: &mut [f64],
     ) -> Result<(), Error> {
-        let (unknown, known) = (real(unknowns)?, real(knowns)?);
+        let (unknown, known) = (self.real(unknowns)?, self.real(knowns)?);
         let rows = rows(knowns.len(), seed.len(), self.len());
         self.fill_by_place(unknowns.len(), values, |place, _, instance, row| {
-            instance.directional_derivative(unknown, known, rows.of(seed, place), row)
+            instance.sole().directional_derivative(unknown, known, rows.of(seed, place), row)
         });
         Ok(())
     }
@@ -395,10 +383,10 @@ impl Instances {
         values: &[f64],
         mask: Mask,
     ) -> Result<(), Error> {
-        let (references, orders) = (real(inputs)?, vec![1; inputs.len()]);
+        let (references, orders) = (self.real(inputs)?, vec![1; inputs.len()]);
         let rows = rows(inputs.len(), values.len(), self.len());
         self.alive(mask, |place, _, instance| {
-            instance.set_input_derivatives(references, &orders, rows.of(values, place))
+            instance.sole().set_input_derivatives(references, &orders, rows.of(values, place))
         });
         Ok(())
     }
@@ -411,9 +399,9 @@ impl Instances {
     /// # Panics
     /// As [`get`](Self::get).
     pub fn get_output_derivatives(&mut self, outputs: &Selection, values: &mut [f64]) -> Result<(), Error> {
-        let (references, orders) = (real(outputs)?, vec![1; outputs.len()]);
+        let (references, orders) = (self.real(outputs)?, vec![1; outputs.len()]);
         self.fill(outputs.len(), values, |_, instance, row| {
-            instance.get_output_derivatives(references, &orders, row)
+            instance.sole().get_output_derivatives(references, &orders, row)
         });
         Ok(())
     }
@@ -426,7 +414,7 @@ impl Instances {
         let rows = rows(1, times.len(), self.len());
         self.alive(mask, |place, own, instance| {
             own.time = rows.of(times, place)[0];
-            instance.set_time(own.time)
+            instance.sole().set_time(own.time)
         });
     }
 
@@ -435,8 +423,9 @@ impl Instances {
     /// # Panics
     /// When there are other than so many values.
     pub fn set_continuous_states(&mut self, values: &[f64], mask: Mask) {
-        let rows = rows(self.fmu.description().states, values.len(), self.len());
-        self.alive(mask, |place, _, instance| instance.set_continuous_states(rows.of(values, place)));
+        let rows =
+            rows(self.description().map_or(0, |description| description.states), values.len(), self.len());
+        self.alive(mask, |place, _, instance| instance.sole().set_continuous_states(rows.of(values, place)));
     }
 
     /// In Model Exchange: states, their derivatives or nominal values, or event indicators, a row for each.
@@ -444,31 +433,37 @@ impl Instances {
     /// # Panics
     /// When there is room for another number of values.
     pub fn get_continuous(&mut self, what: Continuous, values: &mut [f64]) {
-        self.fill(self.continuous(what), values, |_, instance, row| instance.get_continuous(what, row));
+        self.fill(self.continuous(what), values, |_, instance, row| {
+            instance.sole().get_continuous(what, row)
+        });
     }
 
     /// How many there are of these.
     pub fn continuous(&self, what: Continuous) -> usize {
-        let description = self.fmu.description();
-        match what {
+        self.description().map_or(0, |description| match what {
             Continuous::EventIndicators => description.event_indicators,
             _ => description.states,
-        }
+        })
     }
 
     /// In Model Exchange: an event, with all its rounds, and back to Continuous-Time Mode. [`events`](Self::events) tells what
     /// it did. In Event Mode, before its rounds, variables are set from a row for each or for all.
     ///
+    /// # Errors
+    /// As [`set`](Self::set).
+    ///
     /// # Panics
     /// As [`set`](Self::set).
-    pub fn handle_events(&mut self, (set, values): (&Selection, &[f64]), mask: Mask) {
+    pub fn handle_events(&mut self, (set, values): (&Selection, &[f64]), mask: Mask) -> Result<(), Error> {
+        set.check(values)?;
         let rows = rows(set.len(), values.len(), self.len());
         self.alive(mask, |place, own, instance| {
-            instance.enter_event_mode()?;
-            set.set(instance, &mut own.buffer, rows.of(values, place))?;
-            own.event = instance.event()?;
-            instance.enter_continuous_time_mode()
+            instance.sole().enter_event_mode()?;
+            instance.set(set, &mut own.buffer, rows.of(values, place))?;
+            own.event = instance.sole().event()?;
+            instance.sole().enter_continuous_time_mode()
         });
+        Ok(())
     }
 
     /// In Model Exchange: a step of the integrator is complete. Whether each wants an event and the end, one after the other,
@@ -479,17 +474,46 @@ impl Instances {
     pub fn completed_integrator_step(&mut self, wanted: &mut [f64]) {
         self.fill(2, wanted, |_, instance, row| {
             row.copy_from_slice(
-                &instance.completed_integrator_step()?.map(|wanted| f64::from(u8::from(wanted))),
+                &instance.sole().completed_integrator_step()?.map(|wanted| f64::from(u8::from(wanted))),
             );
             Ok(())
         });
+    }
+
+    /// Of the one FMU.
+    fn description(&self) -> Option<&Description> {
+        self.system.sole().map(|fmu| &fmu.description)
+    }
+
+    /// The value references of Real variables of the one FMU.
+    fn real<'s>(&self, variables: &'s Selection) -> Result<&'s [u32], Error> {
+        let why = "only Real variables have derivatives, of one FMU and not of a system";
+        let references = self.system.sole().and_then(|_| variables.references());
+        references.ok_or_else(|| Error::Request(why.to_owned()))
+    }
+
+    /// The text of a variable in each; none of those that have dropped out.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when the variable is not there or no text.
+    pub fn texts(&mut self, name: &str) -> Result<Vec<Option<String>>, Error> {
+        let found = self.system.find_first(name)?;
+        if found.of.base != BaseType::String {
+            return request(format!("{name} is {}, no text", found.of.what()));
+        }
+        let place = Place::of(found);
+        let mut texts = vec![None; self.len()];
+        for (one, text) in self.all.iter_mut().zip(&mut texts) {
+            one.with(|_, instance| instance.get_text(place).map(|found| *text = Some(found)));
+        }
+        Ok(texts)
     }
 
     /// With those that have not dropped out; a refusal is why one does.
     fn alive(
         &mut self,
         mask: Mask,
-        body: impl Fn(usize, &mut Own, &mut Instance) -> Result<(), Refusal> + Sync,
+        body: impl Fn(usize, &mut Own, &mut Running) -> Result<(), Refusal> + Sync,
     ) {
         each(self.pool.as_ref(), &mut self.all, mask, |place, one| {
             one.with(|own, instance| body(place, own, instance));
@@ -500,7 +524,7 @@ impl Instances {
         &mut self,
         length: usize,
         values: &mut [f64],
-        body: impl Fn(&mut Own, &mut Instance, &mut [f64]) -> Result<(), Refusal> + Sync,
+        body: impl Fn(&mut Own, &mut Running, &mut [f64]) -> Result<(), Refusal> + Sync,
     ) {
         self.fill_by_place(length, values, |_, own, instance, row| body(own, instance, row));
     }
@@ -510,7 +534,7 @@ impl Instances {
         &mut self,
         length: usize,
         values: &mut [f64],
-        body: impl Fn(usize, &mut Own, &mut Instance, &mut [f64]) -> Result<(), Refusal> + Sync,
+        body: impl Fn(usize, &mut Own, &mut Running, &mut [f64]) -> Result<(), Refusal> + Sync,
     ) {
         assert_eq!(values.len(), length * self.all.len(), "a row of {length} values for each instance");
         let body = |place: usize, one: &mut One, row: &mut [f64]| {
@@ -540,7 +564,7 @@ impl Instances {
 impl One {
     /// Whether it has not dropped out, and does not by this.
     #[inline]
-    fn with(&mut self, body: impl FnOnce(&mut Own, &mut Instance) -> Result<(), Refusal>) -> bool {
+    fn with(&mut self, body: impl FnOnce(&mut Own, &mut Running) -> Result<(), Refusal>) -> bool {
         let Self { instance: Some(instance), error: error @ None, own } = self else { return false };
         if let Err(refusal) = body(own, instance) {
             *error = Some(format!("at {} s: {refusal}", own.time));
@@ -552,20 +576,17 @@ impl One {
 
 /// From the start values to the first step.
 fn initialize(
-    instance: &mut Instance,
-    start: &Start,
+    instance: &mut Running,
+    begin: &Begin,
     place: usize,
     interface: Interface,
 ) -> Result<Event, Refusal> {
-    let numbers = start.numbers.iter().map(|(base, reference, values)| {
-        (*base, *reference, values.get(place).or(values.first()).copied().unwrap_or_default())
-    });
-    instance.begin(start.time, start.stop_time, &start.texts, numbers)?;
+    instance.begin(begin.time, begin.stop_time, &begin.start, place)?;
     instance.exit_initialization_mode()?;
     let mut event = Event::default();
     if interface == Interface::ModelExchange {
-        event = instance.event()?;
-        instance.enter_continuous_time_mode()?;
+        event = instance.sole().event()?;
+        instance.sole().enter_continuous_time_mode()?;
     }
     Ok(event)
 }
@@ -597,10 +618,6 @@ fn each(
             });
         }
     }
-}
-
-fn real(variables: &Selection) -> Result<&[u32], Error> {
-    variables.references().map_or_else(|| request("only Real variables have derivatives".to_owned()), Ok)
 }
 
 /// A row for each instance, or one for all.

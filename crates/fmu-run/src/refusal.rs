@@ -20,6 +20,8 @@ pub struct Refusal(Box<Refused>);
 
 #[derive(Debug)]
 struct Refused {
+    /// The component; empty where there is only one.
+    component: String,
     function: &'static str,
     status: Status,
     log: Vec<Message>,
@@ -28,8 +30,15 @@ struct Refused {
 
 impl Refusal {
     #[cold]
-    pub(crate) fn new(function: &'static str, status: Status, log: Vec<Message>) -> Self {
-        Self(Box::new(Refused { function, status, log, ended: None }))
+    pub(crate) fn new(component: &str, function: &'static str, status: Status, log: Vec<Message>) -> Self {
+        Self(Box::new(Refused { component: component.to_owned(), function, status, log, ended: None }))
+    }
+
+    /// What no FMU has refused.
+    #[cold]
+    pub(crate) fn of_ours(what: &'static str, why: &str) -> Self {
+        let message = Message { status: Status::Error, category: String::new(), text: why.to_owned() };
+        Self::new("", what, Status::Error, vec![message])
     }
 
     pub(crate) fn status(&self) -> Status {
@@ -55,8 +64,11 @@ impl Refusal {
 
 impl std::fmt::Display for Refusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Refused { function, status, log, ended } = &*self.0;
+        let Refused { component, function, status, log, ended } = &*self.0;
         let message = reason(log);
+        if !component.is_empty() {
+            write!(f, "{component}: ")?;
+        }
         if let Some(time) = ended {
             write!(f, "ended by the FMU at t = {time} s")?;
             return message.map_or(Ok(()), |message| write!(f, ": {}", message.text.trim()));

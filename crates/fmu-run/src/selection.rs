@@ -1,70 +1,137 @@
 //! Variables that are set or read together.
 
-use crate::description::Variable;
-use crate::error::Error;
-use crate::fmu::Fmu;
+use crate::error::{Error, request};
 use crate::instance::Instance;
 use crate::refusal::Refusal;
+use crate::system::{Found, System};
 use fmi_abi::BaseType;
-use std::ffi::CString;
 
-/// Variables of an FMU that are numbers, found once by their names. A row of values has one for each, in this order; 0 and 1
-/// stand for Booleans.
+/// Variables that are numbers, found once by their names. A row of values has one for each, in this order; 0 and 1 stand for
+/// Booleans.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
+    names: Vec<String>,
+    groups: Vec<Group>,
+    /// All are Real variables of one component, so that a row goes over as it is.
+    is_direct: bool,
+    /// One that is fed by an output, and which.
+    fed: Option<(String, String)>,
+}
+
+/// Those of one component.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Group {
+    part: usize,
     /// The value references of those that are Real, set and read by one call, and their places in a row.
     reals: Vec<u32>,
     places: Vec<usize>,
     others: Vec<(BaseType, u32, usize)>,
 }
 
+/// Where a value goes: component, type and value reference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    pub part: usize,
+    pub base: BaseType,
+    pub reference: u32,
+}
+
+impl Place {
+    pub fn of(found: Found) -> Self {
+        Self { part: found.part, base: found.of.base, reference: found.of.reference }
+    }
+}
+
 impl Selection {
     /// The number of variables.
     pub fn len(&self) -> usize {
-        self.reals.len() + self.others.len()
+        self.names.len()
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.names.is_empty()
     }
 
-    pub(crate) fn push(&mut self, of: &Variable) {
-        let place = self.len();
-        match of.base {
-            BaseType::Real => {
-                self.reals.push(of.reference);
-                self.places.push(place);
+    /// Their names.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// One more: all that its name stands for.
+    pub(crate) fn push(&mut self, name: &str, found: &[Found]) {
+        let row = self.names.len();
+        self.names.push(name.to_owned());
+        let fed = found.iter().find_map(|found| Some((name.to_owned(), found.fed_by?.to_owned())));
+        self.fed = self.fed.take().or(fed);
+        for Place { part, base, reference } in found.iter().copied().map(Place::of) {
+            let place = self.groups.iter().position(|group| group.part == part);
+            let place = place.unwrap_or_else(|| {
+                self.groups.push(Group { part, ..Group::default() });
+                self.groups.len() - 1
+            });
+            let group = &mut self.groups[place];
+            match base {
+                BaseType::Real => {
+                    group.reals.push(reference);
+                    group.places.push(row);
+                }
+                base => group.others.push((base, reference, row)),
             }
-            base => self.others.push((base, of.reference, place)),
+        }
+        self.is_direct = self.groups.len() == 1 && self.groups[0].places.len() == self.names.len();
+    }
+
+    /// The value references, if all are Real variables of one component.
+    pub(crate) fn references(&self) -> Option<&[u32]> {
+        match self.groups.first() {
+            None => Some(&[]),
+            Some(group) => self.is_direct.then_some(&group.reals),
         }
     }
 
-    /// The value references, if all are Real.
-    pub(crate) fn references(&self) -> Option<&[u32]> {
-        self.others.is_empty().then_some(&self.reals)
+    /// Fails unless a caller may set them to the values of these rows.
+    #[inline]
+    pub(crate) fn check(&self, values: &[f64]) -> Result<(), Error> {
+        if self.is_direct && self.fed.is_none() { Ok(()) } else { self.check_each(values) }
+    }
+
+    fn check_each(&self, values: &[f64]) -> Result<(), Error> {
+        if let Some((input, output)) = &self.fed {
+            return request(format!("{input} is fed by {output}, it cannot be set"));
+        }
+        for (base, _, place) in self.groups.iter().flat_map(|group| &group.others) {
+            for row in values.chunks_exact(self.len()) {
+                fits(&self.names[*place], *base, &row[*place..=*place])?;
+            }
+        }
+        Ok(())
     }
 
     /// The values into a row, over a buffer.
     #[inline]
     pub(crate) fn get(
         &self,
-        instance: &mut Instance,
+        parts: &mut [Instance],
         buffer: &mut Vec<f64>,
         row: &mut [f64],
     ) -> Result<(), Refusal> {
-        if self.others.is_empty() {
-            return if self.reals.is_empty() { Ok(()) } else { instance.get_reals(&self.reals, row) };
+        if self.is_direct {
+            let group = &self.groups[0];
+            return parts[group.part].get_reals(&group.reals, row);
         }
-        if !self.reals.is_empty() {
-            buffer.resize(self.reals.len(), 0.0);
-            instance.get_reals(&self.reals, buffer)?;
-            for (place, value) in self.places.iter().zip(&*buffer) {
-                row[*place] = *value;
+        for Group { part, reals, places, others } in &self.groups {
+            let instance = &mut parts[*part];
+            if !reals.is_empty() {
+                buffer.resize(reals.len(), 0.0);
+                instance.get_reals(reals, buffer)?;
+                for (place, value) in places.iter().zip(&*buffer) {
+                    row[*place] = *value;
+                }
             }
-        }
-        for (base, reference, place) in &self.others {
-            row[*place] = instance.get_number(*base, *reference)?;
+            for (base, reference, place) in others {
+                row[*place] = instance.get_number(*base, *reference)?;
+            }
         }
         Ok(())
     }
@@ -73,73 +140,40 @@ impl Selection {
     #[inline]
     pub(crate) fn set(
         &self,
-        instance: &mut Instance,
+        parts: &mut [Instance],
         buffer: &mut Vec<f64>,
         row: &[f64],
     ) -> Result<(), Refusal> {
-        if self.others.is_empty() {
-            return if self.reals.is_empty() { Ok(()) } else { instance.set_reals(&self.reals, row) };
+        if self.is_direct {
+            let group = &self.groups[0];
+            return parts[group.part].set_reals(&group.reals, row);
         }
-        if !self.reals.is_empty() {
-            buffer.clear();
-            buffer.extend(self.places.iter().map(|place| row[*place]));
-            instance.set_reals(&self.reals, buffer)?;
-        }
-        for (base, reference, place) in &self.others {
-            instance.set_number(*base, *reference, row[*place])?;
+        for Group { part, reals, places, others } in &self.groups {
+            let instance = &mut parts[*part];
+            if !reals.is_empty() {
+                buffer.clear();
+                buffer.extend(places.iter().map(|place| row[*place]));
+                instance.set_reals(reals, buffer)?;
+            }
+            for (base, reference, place) in others {
+                instance.set_number(*base, *reference, row[*place])?;
+            }
         }
         Ok(())
     }
 }
 
-impl Fmu {
+impl System {
     /// Finds variables by their names.
     ///
     /// # Errors
     /// [`Error::Request`], when there is none of a name, or it is no number.
     pub fn select(&self, names: &[impl AsRef<str>]) -> Result<Selection, Error> {
         let mut selection = Selection::default();
-        for name in names {
-            selection.push(number(self, name.as_ref())?);
+        for name in names.iter().map(AsRef::as_ref) {
+            selection.push(name, &self.find_numbers(name)?);
         }
         Ok(selection)
-    }
-}
-
-pub(crate) fn request<T>(message: String) -> Result<T, Error> {
-    Err(Error::Request(message))
-}
-
-/// The variable of this name; one of a similar name is told where there is none.
-fn find<'f>(fmu: &'f Fmu, name: &str) -> Result<&'f Variable, Error> {
-    let description = fmu.description();
-    if let Some(found) = description.variable(name) {
-        return Ok(found);
-    }
-    let names = description.variables.iter().map(|variable| variable.name.as_str());
-    let near = names.min_by_key(|known| strsim::levenshtein(&known.to_lowercase(), &name.to_lowercase()));
-    let hint = near.map_or(String::new(), |near| format!("; did you mean {near:?}?"));
-    request(format!("{} has no variable {name:?}{hint}", description.model_name))
-}
-
-/// The variable of this name, if it is a number.
-pub(crate) fn number<'f>(fmu: &'f Fmu, name: &str) -> Result<&'f Variable, Error> {
-    let of = find(fmu, name)?;
-    if matches!(of.base, BaseType::String | BaseType::Binary) {
-        return request(format!("{name} is no number"));
-    }
-    Ok(of)
-}
-
-/// The value reference and the text of a start value.
-pub(crate) fn text_of_start(fmu: &Fmu, name: &str, text: &str) -> Result<(u32, CString), Error> {
-    let of = find(fmu, name)?;
-    if of.base != BaseType::String {
-        return request(format!("{name} is a number, its start value cannot be {text:?}"));
-    }
-    match CString::new(text) {
-        Ok(text) => Ok((of.reference, text)),
-        Err(_) => request(format!("the start value of {name} must not contain a character NUL")),
     }
 }
 

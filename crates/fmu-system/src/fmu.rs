@@ -2,7 +2,7 @@
 
 use anyhow::{Result, anyhow, bail, ensure};
 use fmu_package::files::unzip;
-use fmu_run::{BaseType, Description, Variable};
+use fmu_run::{Description, Variable};
 
 /// An FMU that has been read.
 pub struct Fmu {
@@ -34,16 +34,14 @@ pub struct Own<'a> {
 }
 
 impl<'a> Own<'a> {
-    /// Its type as SSP 1.0 and OSP have them, which tell numbers of FMI 3.0 apart as little as FMI 2.0.
+    /// Its type as SSP 1.0 and OSP have them.
     pub fn kind(self) -> &'static str {
-        match self.variable.base {
-            BaseType::Real | BaseType::Float32 => "Real",
-            BaseType::Boolean => "Boolean",
-            BaseType::String => "String",
-            BaseType::Binary => "Binary",
-            BaseType::Enumeration => "Enumeration",
-            _ => "Integer",
-        }
+        self.variable.kind()
+    }
+
+    /// Fails unless it may feed this input.
+    pub fn check_feeds(self, input: Self) -> Result<(), String> {
+        self.fmu.description.connects(self.variable, &input.fmu.description, input.variable)
     }
 
     /// Name and items of its enumeration, if it is of one.

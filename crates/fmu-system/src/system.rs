@@ -1,7 +1,7 @@
 //! A system, and whether it fits together.
 
 use crate::fmu::{Fmu, Own};
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -75,13 +75,7 @@ impl<'a> System<'a> {
         }
         for (from, to) in &self.connections {
             let (a, b) = (checked.find(from, "output")?, checked.find(to, "input")?);
-            ensure!(a.kind() == b.kind(), "{from} is {}, {to} is {}", a.kind(), b.kind());
-            if let (Some(one), Some(other)) = (&a.variable.unit, &b.variable.unit) {
-                ensure!(one == other, "{from} is in {one}, {to} in {other}");
-            }
-            if let (Some((_, one)), Some((_, other))) = (a.items(), b.items()) {
-                ensure!(one == other, "{from} and {to} have different items");
-            }
+            a.check_feeds(b).map_err(|why| anyhow!("{from} cannot feed {to}: {why}"))?;
             fed.push(*to);
         }
         fed.sort_unstable();

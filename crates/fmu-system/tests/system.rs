@@ -81,8 +81,8 @@ fn what_does_not_fit_is_named() {
     for (change, message) in [
         ((|s| s.connections.push(("plant.y", "law.x"))) as fn(&mut System), "no FMU has a variable law.x"),
         (|s| s.connections.push(("plant.u", "law.y")), "plant.u is input, not output"),
-        (|s| s.connections.push(("plant.delay", "law.r")), "plant.delay is in s, law.r in rad"),
-        (|s| s.connections.push(("plant.y", "law.n")), "plant.y is Real, law.n is Integer"),
+        (|s| s.connections.push(("plant.delay", "law.r")), "plant.delay cannot feed law.r: the one is in s, the other in rad"),
+        (|s| s.connections.push(("plant.y", "law.n")), "plant.y cannot feed law.n: the one is Real, the other Integer"),
         (|s| s.connections.push(("plant.y", "law.r")), "law.r is fed twice"),
         (|s| s.outputs.push(("x", "plant.on")), "plant.on is parameter, not output"),
         (|s| s.start.push(("plant.y", "0".into())), "plant.y is output and takes no start value"),
@@ -102,7 +102,7 @@ fn what_does_not_fit_is_named() {
         ),
         (
             |s| s.connections.push(("plant.gear_now", "law.other_gear")),
-            "plant.gear_now and law.other_gear have different items",
+            "plant.gear_now cannot feed law.other_gear: they have different items",
         ),
         (|s| s.components[0].1 = "none.fmu".into(), "none.fmu is no usable FMU: it cannot be read"),
         (|s| s.inputs[0].2 = "NaN".into(), "the start value of law.r must be a finite number, it is NaN"),

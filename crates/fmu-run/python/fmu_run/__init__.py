@@ -9,6 +9,9 @@
     model.step(1e-3)
     model.get("y")  # (instances,)
 
+    loop = fmu_run.System({"law": law, "plant": fmu}, {"law.u": "plant.u", "plant.y": "law.y"})
+    loop.run(time, start={"law.gain": gains}, outputs=["plant.y"])
+
 Values are in the FMU's units, which `Fmu.variables` tells. FMI 2.0 and 3.0.
 """
 
@@ -23,13 +26,17 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fmu_run._native import Fmu as _Loaded
 from fmu_run._native import FmuError, Instances, States
+from fmu_run._native import Loaded as _Loaded
 
-__all__ = ["Fmu", "FmuError", "Instances", "Measure", "Runs", "States", "Variable"]
+__all__ = ["Fmu", "FmuError", "Instances", "Measure", "Runs", "Start", "States", "System", "Variable"]
 
 Measure = Literal["min", "max", "peak", "time_of_peak", "mean", "rms", "end"]
 _Array = NDArray[np.float64]
+
+#: A start value: one for all runs or instances, or one for each. Texts are for texts, and name the items of enumerations; a
+#: number or array with a unit is in that unit, which the FMU must have among its display units.
+Start = ArrayLike | str | Sequence[str] | tuple[ArrayLike, str]
 
 
 @dataclass(frozen=True)
@@ -37,7 +44,8 @@ class Variable:
     """A variable as the model description has it.
 
     type: Real, Integer, Boolean, String, Enumeration, or one of FMI 3.0's other types. causality: input, output, parameter,
-    local and so on. variability, start, unit: None where nothing is said; start as it is written, unit also from the declared type.
+    local and so on. variability, start, unit, min, max: None where nothing is said; start as it is written, unit,
+    min and max also from the declared type.
     """
 
     name: str
@@ -47,6 +55,8 @@ class Variable:
     start: str | None
     unit: str | None
     description: str
+    min: float | None
+    max: float | None
 
 
 class Runs(Mapping[str, _Array]):
@@ -120,21 +130,14 @@ class Runs(Mapping[str, _Array]):
         return f"<Runs: {self.count} of {', '.join(self._outputs)}, {len(self.time)} times{measures}{failed}>"
 
 
-class Fmu:
-    """An FMU, unpacked and loaded once. A context manager: leaving it unloads the FMU, once its instances are gone, too.
+class _Model:
+    """What FMUs and systems of FMUs have in common."""
 
-    Its library runs in this process: where it crashes, the process is gone. Raises FmuError where the file is no FMU, or has
-    no library for this platform.
-
-    execution_tool: run it also if its library starts another program (needsExecutionTool), which must be installed.
-    """
-
-    def __init__(self, path: str | os.PathLike[str], *, execution_tool: bool = False):
-        self._loaded = _Loaded(os.fspath(path), execution_tool)
-        #: "2.0" or "3.0"; the name of the model; guid or instantiation token.
-        self.fmi_version, self.model_name, self.token, self._once = self._loaded.about()
-        #: The variables by name, in the order of the model description. Arrays and clocks of FMI 3.0 are left out.
-        self.variables = {fields[0]: Variable(*fields) for fields in self._loaded.variables()}
+    def __init__(self, loaded: _Loaded):
+        self._loaded = loaded
+        #: dict[str, Variable]: the variables by name, in the order of the model description. Arrays and clocks of FMI 3.0 are
+        #: left out.
+        self.variables = {fields[0]: Variable(*fields) for fields in loaded.variables()}
 
     def __enter__(self) -> Self:
         return self
@@ -145,11 +148,8 @@ class Fmu:
         self.close()
 
     def close(self) -> None:
-        """Unload the FMU and remove its unpacked files. Harmless when called again."""
+        """Unload it and remove its unpacked files, once its instances are gone, too. Harmless when called again."""
         self._loaded.close()
-
-    def __repr__(self) -> str:
-        return f"<Fmu {self.model_name}, FMI {self.fmi_version}, {len(self.variables)} variables>"
 
     def run(
         self,
@@ -158,7 +158,7 @@ class Fmu:
         outputs: Sequence[str],
         inputs: Mapping[str, ArrayLike] | None = None,
         input_derivatives: Mapping[str, ArrayLike] | None = None,
-        start: Mapping[str, ArrayLike | str] | None = None,
+        start: Mapping[str, Start] | None = None,
         every: int | None = None,
         measures: Sequence[Measure] = (),
         threads: int | None = None,
@@ -173,7 +173,8 @@ class Fmu:
         inputs: by name; (times,) for all runs, (runs, times) for each its own, or a number that stays. Inputs that are not
         named keep their start values.
         input_derivatives: d/dt of inputs, in the same shapes, for FMUs of FMI 2.0 that can interpolate inputs.
-        start: start values of parameters, states and so on by name: one for all runs, (runs,) for each its own, or a text.
+        start: start values of parameters, states and so on by name: one for all runs or (runs,) for each its own; numbers,
+        texts, items of enumerations, or numbers with a unit, {"k1": (1.9, "N.m/deg")}.
         every: keep the outputs at the first time and each `every` times after it. Default: all, or none if there are
         measures.
         measures: what to calculate of each output on the way, over all times: min, max, peak (of the magnitude),
@@ -198,7 +199,7 @@ class Fmu:
             times,
             [(name, _course(name, values, len(times))) for name, values in (inputs or {}).items()],
             [(name, _course(name, values, len(times))) for name, values in (input_derivatives or {}).items()],
-            [(name, _start(name, value)) for name, value in (start or {}).items()],
+            dict(start or {}),
             names,
             kept,
             wanted,
@@ -214,7 +215,7 @@ class Fmu:
         count: int = 1,
         *,
         interface: Literal["co-simulation", "model-exchange"] = "co-simulation",
-        start: Mapping[str, ArrayLike | str] | None = None,
+        start: Mapping[str, Start] | None = None,
         start_time: float = 0.0,
         stop_time: float | None = None,
         threads: int | None = 1,
@@ -228,7 +229,7 @@ class Fmu:
         interface
             Who integrates. Those for Model Exchange have been through the events at the begin and are in Continuous-Time Mode.
         start
-            Start values of parameters, states, inputs and so on by name: one for all, (count,) for each its own, or a text.
+            Start values of parameters, states, inputs and so on by name: one for all or (count,) for each its own, as in `run`.
         start_time, stop_time
             When they begin, s, and when they will end, if that is known.
         threads
@@ -245,11 +246,85 @@ class Fmu:
         return Instances(self._loaded, count, interface, dict(start or {}), start_time, stop_time, threads)
 
 
+class Fmu(_Model):
+    """An FMU, unpacked and loaded once. A context manager: leaving it unloads the FMU, once its instances are gone, too.
+
+    Its library runs in this process: where it crashes, the process is gone. Raises FmuError where the file is no FMU, or has
+    no library for this platform.
+
+    execution_tool: run it also if its library starts another program (needsExecutionTool), which must be installed.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], *, execution_tool: bool = False):
+        super().__init__(_Loaded(os.fspath(path), execution_tool))
+        #: "2.0" or "3.0"; the name of the model; guid or instantiation token.
+        self.fmi_version, self.model_name, self.token, self._once = self._loaded.about()
+
+    def __repr__(self) -> str:
+        return f"<Fmu {self.model_name}, FMI {self.fmi_version}, {len(self.variables)} variables>"
+
+
+class System(_Model):
+    """FMUs whose outputs feed each other's inputs, which run as one FMU does.
+
+    Variables are named `component.variable`; connectors of an SSP's own system have their names. From one communication point
+    to the next all components step from the values they were given there.
+
+    Parameters
+    ----------
+    source
+        An SSP file, or the components by name: FMUs that are open, of FMI 2.0 or 3.0, with Co-Simulation. One may be there more
+        than once.
+    connections
+        Outputs and the inputs they feed, `{"law.u": "plant.u"}`; several inputs of one output as a list. Not with an SSP, which
+        has its own.
+    order
+        When values are passed on. "dependencies": at each communication point until all agree, an output read after the inputs
+        on which it depends without a step; where these go in a circle, an algebraic loop, ValueError names it. "jacobi": all
+        outputs are read when a step is done and all inputs set when the next begins, as FMPy and libcosim do; what depends on
+        inputs without a step is late by one.
+
+    Raises
+    ------
+    ValueError
+        For connections that do not fit the FMUs or each other.
+    FmuError
+        Where the file is no SSP or one of its FMUs cannot be loaded.
+    """
+
+    def __init__(
+        self,
+        source: str | os.PathLike[str] | Mapping[str, Fmu],
+        connections: Mapping[str, str | Sequence[str]] | None = None,
+        *,
+        order: Literal["dependencies", "jacobi"] = "dependencies",
+    ):
+        if isinstance(source, Mapping):
+            ends = {output: [to] if isinstance(to, str) else list(to) for output, to in (connections or {}).items()}
+            wires = [(output, to) for output, inputs in ends.items() for to in inputs]
+            fmus = [(name, fmu._loaded) for name, fmu in source.items()]
+            super().__init__(_Loaded.wired("system", fmus, wires, order))
+        elif connections is not None:
+            raise ValueError("an SSP has its own connections; give connections with FMUs only")
+        else:
+            super().__init__(_Loaded.ssp(os.fspath(source), order))
+        #: Its name. In which order values are passed on: stages of (output, input). When the SSP's experiment ends, s, or None.
+        self.name, self.stages, self.stop_time = self._loaded.about_system()
+
+    def __repr__(self) -> str:
+        connections = sum(map(len, self.stages))
+        return f"<System {self.name}, {connections} connections, {len(self.variables)} variables>"
+
+
 def _array(name: str, values: ArrayLike) -> _Array:
     try:
-        return np.ascontiguousarray(values, dtype=np.float64).reshape(np.shape(values))
-    except (TypeError, ValueError) as error:
+        array = np.asarray(values)
+    except ValueError as error:
         raise ValueError(f"{name}: these are no numbers ({error})") from None
+    # Else None were not a number, and texts were numbers.
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"{name}: {values} is no number" if array.ndim == 0 else f"{name}: these are no numbers")
+    return np.ascontiguousarray(array, dtype=np.float64).reshape(array.shape)
 
 
 def _course(name: str, values: ArrayLike, times: int) -> float | _Array:
@@ -259,12 +334,3 @@ def _course(name: str, values: ArrayLike, times: int) -> float | _Array:
     if array.ndim > 2 or array.shape[-1] != times:
         raise ValueError(f"{name} has the shape {array.shape}; it must be ({times},), (runs, {times}) or a number")
     return array
-
-
-def _start(name: str, value: ArrayLike | str) -> float | str | _Array:
-    if isinstance(value, str):
-        return value
-    array = _array(name, value)
-    if array.ndim > 1:
-        raise ValueError(f"the start value of {name} has the shape {array.shape}; it must be (runs,) or a number")
-    return float(array) if array.ndim == 0 else array

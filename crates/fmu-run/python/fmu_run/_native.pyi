@@ -10,17 +10,26 @@ _Names = str | Sequence[str]
 class FmuError(Exception):
     """An FMU that cannot be loaded or run, or refuses a run."""
 
-class Fmu:
+class Loaded:
     def __init__(self, path: str, execution_tool: bool) -> None: ...
+    @staticmethod
+    def ssp(path: str, order: str) -> Loaded: ...
+    @staticmethod
+    def wired(
+        name: str, components: list[tuple[str, Loaded]], connections: list[tuple[str, str]], order: str
+    ) -> Loaded: ...
     def close(self) -> None: ...
     def about(self) -> tuple[str, str, str, bool]: ...
-    def variables(self) -> list[tuple[str, str, str, str | None, str | None, str | None, str]]: ...
+    def about_system(self) -> tuple[str, list[list[tuple[str, str]]], float | None]: ...
+    def variables(
+        self,
+    ) -> list[tuple[str, str, str, str | None, str | None, str | None, str, float | None, float | None]]: ...
     def run(
         self,
         time: _Array,
         inputs: list[tuple[str, float | _Array]],
         input_derivatives: list[tuple[str, float | _Array]],
-        start: list[tuple[str, float | str | _Array]],
+        start: dict[str, Any],
         outputs: list[str],
         every: int | None,
         measures: list[Any],
@@ -34,7 +43,7 @@ class States: ...
 class Instances:
     def __init__(
         self,
-        fmu: Fmu,
+        loaded: Loaded,
         count: int,
         interface: str,
         start: dict[str, Any],
@@ -55,6 +64,7 @@ class Instances:
     def wants_to_end(self) -> _Array: ...
     def set(self, variables: _Names, values: ArrayLike, mask: ArrayLike | None = None) -> None: ...
     def get(self, variables: _Names, out: _Array | None = None) -> _Array: ...
+    def texts(self, variable: str) -> list[str | None]: ...
     def step(self, size: float | None = None, *, to: float | None = None, mask: ArrayLike | None = None) -> None: ...
     def advance(
         self, set: _Names, values: ArrayLike, size: float, get: _Names, out: _Array | None = None

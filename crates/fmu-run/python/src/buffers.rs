@@ -25,7 +25,15 @@ impl Numbers {
             return Ok(Self::Array(buffer));
         }
         let numpy = values.py().import("numpy")?;
-        let array = numpy.call_method1("asarray", (values, "float64"))?;
+        let array = numpy.call_method1("asarray", (values,))?;
+        // Else None were not a number, and texts were numbers.
+        if !"biuf".contains(&array.getattr("dtype")?.getattr("kind")?.extract::<String>()?) {
+            return Err(PyValueError::new_err(format!(
+                "{} is no number, nor an array of such",
+                values.repr()?
+            )));
+        }
+        let array = array.call_method1("astype", ("float64",))?;
         if array.getattr("ndim")?.extract::<usize>()? == 0 {
             return Ok(Self::One(array.extract()?));
         }

@@ -1,8 +1,9 @@
 //! `fmu_run.Instances`.
 
 use crate::buffers::{Numbers, Room};
+use crate::start::Start;
 use crate::{FmuError, python};
-use fmu_run::{Continuous, Fmu, Interface, Selection, Setup};
+use fmu_run::{Continuous, Error, Interface, Selection, Setup, System};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyString, PyTuple};
@@ -18,7 +19,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// on; `reset` and `restore` bring it back. Where the last one drops out, FmuError is raised.
 #[pyclass(frozen, module = "fmu_run")]
 pub struct Instances {
-    fmu: Arc<Fmu>,
+    system: System,
     count: usize,
     held: Arc<Mutex<fmu_run::Instances>>,
     /// What names stand for that were given before, by the objects they were given as.
@@ -51,35 +52,6 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Start values by name: numbers, arrays (n,), texts.
-#[derive(Default)]
-struct Start {
-    numbers: Vec<(String, Numbers)>,
-    texts: Vec<(String, String)>,
-}
-
-impl Start {
-    fn of(given: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let mut start = Self::default();
-        for (name, value) in given.into_iter().flatten() {
-            let name = name.extract()?;
-            match value.extract() {
-                Ok(text) => start.texts.push((name, text)),
-                Err(_) => start.numbers.push((name, Numbers::of(&value)?)),
-            }
-        }
-        Ok(start)
-    }
-
-    fn numbers(&self) -> Vec<(&str, &[f64])> {
-        self.numbers.iter().map(|(name, values)| (name.as_str(), values.values())).collect()
-    }
-
-    fn texts(&self) -> Vec<(&str, &str)> {
-        self.texts.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect()
-    }
-}
-
 /// Which instances: true in a sequence of n truth values.
 type Given<'py> = Option<Bound<'py, PyAny>>;
 
@@ -105,11 +77,11 @@ impl Instances {
                 return Err(PyValueError::new_err(why));
             }
         };
-        let (fmu, given) = (loaded.fmu()?, Start::of(start.as_ref())?);
-        let (start, texts) = (given.numbers(), given.texts());
-        let setup = Setup { interface, count, start, texts, start_time, stop_time, threads };
-        let made = py.detach(|| fmu.instances(&setup)).map_err(python)?;
-        Ok(Self { fmu, count, held: Arc::new(Mutex::new(made)), known: Mutex::default() })
+        let system = System::clone(&*loaded.model()?);
+        let start = Start::of(&system, start.as_ref())?;
+        let setup = Setup { interface, count, start: start.values(), start_time, stop_time, threads };
+        let made = py.detach(|| system.instances(&setup)).map_err(python)?;
+        Ok(Self { system, count, held: Arc::new(Mutex::new(made)), known: Mutex::default() })
     }
 
     fn __len__(&self) -> usize {
@@ -119,7 +91,7 @@ impl Instances {
     fn __repr__(&self) -> String {
         let failed = lock(&self.held).errors().count();
         let failed = if failed == 0 { String::new() } else { format!(", {failed} dropped out") };
-        format!("<Instances: {} of {}{failed}>", self.count, self.fmu.description().model_name)
+        format!("<Instances: {} of {}{failed}>", self.count, self.system.name())
     }
 
     /// dict[int, str]: those that have dropped out, and why, in the words of the FMU.
@@ -178,7 +150,7 @@ impl Instances {
     ) -> PyResult<()> {
         let (named, mask) = (self.named(variables)?, self.mask(mask)?);
         let values = self.fitting(named.columns(), Numbers::of(values)?)?;
-        self.with(py, |all| all.set(&named.selection, values.values(), mask.as_deref()))
+        self.attempt(py, |all| all.set(&named.selection, values.values(), mask.as_deref()))
     }
 
     /// Read variables: (n,) for a str, (n, variables) for a sequence; into `out` if it is given.
@@ -190,7 +162,20 @@ impl Instances {
         out: Given<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let named = self.named(variables)?;
-        self.read(py, named.columns(), out, |all, values| all.get(&named.selection, values))
+        self.read(py, named.columns(), out, |all, values| {
+            all.get(&named.selection, values);
+            Ok(())
+        })
+    }
+
+    /// list[str | None]: the text of a variable in each; None of those that have dropped out.
+    fn texts(&self, py: Python, variable: &str) -> PyResult<Vec<Option<String>>> {
+        let mut texts = Vec::new();
+        self.attempt(py, |all| {
+            texts = all.texts(variable)?;
+            Ok(())
+        })?;
+        Ok(texts)
     }
 
     /// A step of Co-Simulation: by `size`, or to the time `to`, s.
@@ -219,8 +204,8 @@ impl Instances {
         let values = self.fitting(set.columns(), Numbers::of(values)?)?;
         let (array, mut room) = Room::of(py, out, &self.shape(get.columns()))?;
         room.apart_from(&values)?;
-        self.with(py, |all| {
-            all.advance((&set.selection, values.values()), size, (&get.selection, room.values()));
+        self.attempt(py, |all| {
+            all.advance((&set.selection, values.values()), size, (&get.selection, room.values()))
         })?;
         Ok(array)
     }
@@ -235,9 +220,12 @@ impl Instances {
     ///     New start values by name, in place of those given before: numbers, (n,), or texts.
     #[pyo3(signature = (mask=None, *, start=None))]
     fn reset(&self, py: Python, mask: Given, start: Option<Bound<'_, PyDict>>) -> PyResult<()> {
-        let (mask, start) = (self.mask(mask)?, Start::of(start.as_ref())?);
-        lock(&self.held).start_from(&start.numbers(), &start.texts()).map_err(python)?;
-        self.with(py, |all| all.reset(mask.as_deref()))
+        let (mask, start) = (self.mask(mask)?, Start::of(&self.system, start.as_ref())?);
+        self.attempt(py, |all| {
+            all.start_from(&start.values())?;
+            all.reset(mask.as_deref());
+            Ok(())
+        })
     }
 
     /// Save the state of each, with its time.
@@ -292,12 +280,10 @@ impl Instances {
         let seed = self.fitting(knowns.columns(), Numbers::of(seed)?)?;
         let (array, mut room) = Room::of(py, out, &self.shape(unknowns.columns()))?;
         room.apart_from(&seed)?;
-        let mut told = Ok(());
-        self.with(py, |all| {
+        self.attempt(py, |all| {
             let seed = (&knowns.selection, seed.values());
-            told = all.directional_derivative(&unknowns.selection, seed, room.values());
+            all.directional_derivative(&unknowns.selection, seed, room.values())
         })?;
-        told.map_err(python)?;
         Ok(array)
     }
 
@@ -312,11 +298,7 @@ impl Instances {
     ) -> PyResult<()> {
         let (named, mask) = (self.named(variables)?, self.mask(mask)?);
         let values = self.fitting(named.columns(), Numbers::of(values)?)?;
-        let mut told = Ok(());
-        self.with(py, |all| {
-            told = all.set_input_derivatives(&named.selection, values.values(), mask.as_deref());
-        })?;
-        told.map_err(python)
+        self.attempt(py, |all| all.set_input_derivatives(&named.selection, values.values(), mask.as_deref()))
     }
 
     /// Co-Simulation: time derivatives of outputs, of order 1, in the shapes of `get`.
@@ -328,12 +310,9 @@ impl Instances {
         out: Given<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let named = self.named(variables)?;
-        let mut told = Ok(());
-        let array = self.read(py, named.columns(), out, |all, values| {
-            told = all.get_output_derivatives(&named.selection, values);
-        })?;
-        told.map_err(python)?;
-        Ok(array)
+        self.read(py, named.columns(), out, |all, values| {
+            all.get_output_derivatives(&named.selection, values)
+        })
     }
 
     /// Model Exchange: the time of each, s: a number or (n,).
@@ -346,7 +325,7 @@ impl Instances {
     /// Model Exchange: the continuous states, (states,) for all or (n, states).
     #[pyo3(signature = (states, mask=None))]
     fn set_continuous_states(&self, py: Python, states: &Bound<'_, PyAny>, mask: Given) -> PyResult<()> {
-        let columns = Some(self.fmu.description().states);
+        let columns = Some(lock(&self.held).continuous(Continuous::States));
         let (mask, states) = (self.mask(mask)?, self.fitting(columns, Numbers::of(states)?)?);
         self.with(py, |all| all.set_continuous_states(states.values(), mask.as_deref()))
     }
@@ -397,7 +376,7 @@ impl Instances {
             _ => return Err(PyValueError::new_err("give variables and values, or neither")),
         };
         let values = values.as_ref().map_or(&[][..], Numbers::values);
-        self.with(py, |all| all.handle_events((&named.selection, values), mask.as_deref()))
+        self.attempt(py, |all| all.handle_events((&named.selection, values), mask.as_deref()))
     }
 
     /// Model Exchange: a step of the integrator is complete.
@@ -406,7 +385,10 @@ impl Instances {
     /// -------
     /// (n, 2): 1 where an instance wants an event, and where it wants the end, else 0
     fn completed_integrator_step<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.read(py, Some(2), None, |all, values| all.completed_integrator_step(values))
+        self.read(py, Some(2), None, |all, values| {
+            all.completed_integrator_step(values);
+            Ok(())
+        })
     }
 }
 
@@ -424,7 +406,7 @@ impl Instances {
             Ok(name) => vec![name.extract()?],
             Err(_) => variables.extract::<Vec<String>>()?,
         };
-        let selection = self.fmu.select(&names).map_err(python)?;
+        let selection = self.system.select(&names).map_err(python)?;
         let named = Arc::new(Named { selection, one: text.is_ok() });
         // A list may be another one next time.
         if text.is_ok() || variables.is_instance_of::<PyTuple>() {
@@ -483,12 +465,24 @@ impl Instances {
 
     /// A call without the GIL; raises if no instance is left.
     fn with(&self, py: Python, body: impl FnOnce(&mut fmu_run::Instances) + Send) -> PyResult<()> {
+        self.attempt(py, |all| {
+            body(all);
+            Ok(())
+        })
+    }
+
+    /// The same, of what may not fit the FMU.
+    fn attempt(
+        &self,
+        py: Python,
+        body: impl FnOnce(&mut fmu_run::Instances) -> Result<(), Error> + Send,
+    ) -> PyResult<()> {
         let left = py.detach(|| {
             let mut all = lock(&self.held);
-            body(&mut all);
-            all.none_left().map(str::to_owned)
+            body(&mut all)?;
+            Ok(all.none_left().map(str::to_owned))
         });
-        left.map_or(Ok(()), |why| Err(FmuError::new_err(why)))
+        left.map_err(python)?.map_or(Ok(()), |why| Err(FmuError::new_err(why)))
     }
 
     fn read<'py>(
@@ -496,10 +490,10 @@ impl Instances {
         py: Python<'py>,
         columns: Option<usize>,
         out: Given<'py>,
-        body: impl FnOnce(&mut fmu_run::Instances, &mut [f64]) + Send,
+        body: impl FnOnce(&mut fmu_run::Instances, &mut [f64]) -> Result<(), Error> + Send,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (array, mut room) = Room::of(py, out, &self.shape(columns))?;
-        self.with(py, |all| body(all, room.values()))?;
+        self.attempt(py, |all| body(all, room.values()))?;
         Ok(array)
     }
 
@@ -510,7 +504,10 @@ impl Instances {
         out: Given<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let columns = lock(&self.held).continuous(what);
-        self.read(py, Some(columns), out, |all, values| all.get_continuous(what, values))
+        self.read(py, Some(columns), out, |all, values| {
+            all.get_continuous(what, values);
+            Ok(())
+        })
     }
 
     fn of_events<'py>(

@@ -3,15 +3,19 @@
 
 mod buffers;
 mod instances;
+mod start;
 
 use buffers::{Numbers, Room};
-use fmu_run::{Batch, Course, Error, Fmu, Planned, Start, Watch};
+use fmu_run::{Batch, Course, Error, Fmu, Order, Planned, System, Watch, Wiring};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use start::Start;
+use std::ops::Deref;
 use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 create_exception!(fmu_run, FmuError, PyException, "An FMU that cannot be loaded or run, or refuses a run.");
@@ -19,12 +23,41 @@ create_exception!(fmu_run, FmuError, PyException, "An FMU that cannot be loaded 
 /// How often Ctrl-C is looked for and progress is told.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// An FMU that is unpacked and loaded, until it is closed.
-#[pyclass(frozen, name = "Fmu", module = "fmu_run._native")]
-struct Loaded(Mutex<Option<Arc<Fmu>>>);
+/// An FMU or a system that is unpacked and loaded, until it is closed.
+#[pyclass(frozen, module = "fmu_run._native")]
+struct Loaded(Mutex<Option<Model>>);
 
-/// Name, type, causality, variability, start value, unit, description.
-type Described = (String, String, String, Option<String>, Option<String>, Option<String>, String);
+#[derive(Clone)]
+enum Model {
+    Fmu(Fmu),
+    System(System),
+}
+
+impl Deref for Model {
+    type Target = System;
+
+    fn deref(&self) -> &System {
+        match self {
+            Self::Fmu(fmu) => fmu,
+            Self::System(system) => system,
+        }
+    }
+}
+
+/// Name, type, causality, variability, start value, unit, description, smallest and largest value.
+type Described = (
+    String,
+    String,
+    String,
+    Option<String>,
+    Option<String>,
+    Option<String>,
+    String,
+    Option<f64>,
+    Option<f64>,
+);
+/// Outputs and the inputs they feed, by stages.
+type Stages = Vec<Vec<(String, String)>>;
 /// Texts by run.
 type Told = Vec<(usize, String)>;
 /// Courses and measures, (runs, outputs, times or measures) each, errors and notes.
@@ -40,23 +73,61 @@ fn python(error: Error) -> PyErr {
 
 #[pymethods]
 impl Loaded {
+    /// An FMU.
     #[new]
     fn new(py: Python, path: PathBuf, execution_tool: bool) -> PyResult<Self> {
         let open = if execution_tool { Fmu::open_with_execution_tool } else { Fmu::open };
         // SAFETY: the user names a file that is an FMU; its library is trusted as any extension module is.
         #[allow(unsafe_code)]
         let fmu = py.detach(|| unsafe { open(&path) }).map_err(python)?;
-        Ok(Self(Mutex::new(Some(Arc::new(fmu)))))
+        Ok(Self(Mutex::new(Some(Model::Fmu(fmu)))))
+    }
+
+    /// A system from an SSP.
+    #[staticmethod]
+    fn ssp(py: Python, path: PathBuf, order: &str) -> PyResult<Self> {
+        let order = order_of(order)?;
+        // SAFETY: as in `new`.
+        #[allow(unsafe_code)]
+        let system = py.detach(|| unsafe { System::open(&path, order) }).map_err(python)?;
+        Ok(Self(Mutex::new(Some(Model::System(system)))))
+    }
+
+    /// FMUs that are wired: components by name, connections from outputs to inputs.
+    #[staticmethod]
+    fn wired(
+        name: &str,
+        components: Vec<(String, PyRef<'_, Self>)>,
+        connections: Vec<(String, String)>,
+        order: &str,
+    ) -> PyResult<Self> {
+        let fmus = components.iter().map(|(name, loaded)| match loaded.model()? {
+            Model::Fmu(fmu) => Ok((name.as_str(), fmu)),
+            Model::System(_) => {
+                Err(PyValueError::new_err(format!("component {name} is a system; only FMUs are wired")))
+            }
+        });
+        let fmus = fmus.collect::<PyResult<Vec<_>>>()?;
+        let wiring = Wiring {
+            name,
+            components: fmus.iter().map(|(name, fmu)| (*name, fmu)).collect(),
+            connections: connections.iter().map(|(from, to)| (from.as_str(), to.as_str())).collect(),
+            order: order_of(order)?,
+        };
+        let system = System::connect(&wiring).map_err(python)?;
+        Ok(Self(Mutex::new(Some(Model::System(system)))))
     }
 
     fn close(&self, py: Python) {
-        let fmu = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
-        py.detach(|| drop(fmu));
+        let model = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
+        py.detach(|| drop(model));
     }
 
-    /// Edition of the standard, name of the model, token, whether there may be one instance only.
+    /// Of an FMU: edition of the standard, name of the model, token, whether there may be one instance only.
     fn about(&self) -> PyResult<(String, String, String, bool)> {
-        let fmu = self.fmu()?;
+        let Model::Fmu(fmu) = self.model()? else {
+            return Err(PyValueError::new_err("a system has no model description"));
+        };
         let about = fmu.description();
         let version = match about.standard {
             fmu_run::Standard::Fmi2 => "2.0",
@@ -66,13 +137,24 @@ impl Loaded {
         Ok((version.to_owned(), about.model_name.clone(), about.token.clone(), once))
     }
 
+    /// Of a system: its name, the stages of its connections, when its experiment ends.
+    fn about_system(&self) -> PyResult<(String, Stages, Option<f64>)> {
+        let system = self.model()?;
+        let stages = system
+            .stages()
+            .into_iter()
+            .map(|stage| stage.into_iter().map(|(from, to)| (from.to_owned(), to.to_owned())).collect());
+        Ok((system.name().to_owned(), stages.collect(), system.stop_time()))
+    }
+
     fn variables(&self) -> PyResult<Vec<Described>> {
-        let describe = |variable: &fmu_run::Variable| {
-            let fmu_run::Variable { name, base, causality, variability, start, unit, description, .. } =
-                variable.clone();
-            (name, base.to_string(), causality, variability, start, unit, description)
+        let describe = |(name, variable): (String, &fmu_run::Variable)| {
+            let fmu_run::Variable {
+                base, causality, variability, start, unit, description, min, max, ..
+            } = variable.clone();
+            (name, base.to_string(), causality, variability, start, unit, description, min, max)
         };
-        Ok(self.fmu()?.description().variables.iter().map(describe).collect())
+        Ok(self.model()?.variables().map(describe).collect())
     }
 
     /// Sees to Ctrl-C, which ends the runs after those that are under way, and calls progress(done, runs).
@@ -83,7 +165,7 @@ impl Loaded {
         time: Bound<'py, PyAny>,
         inputs: Vec<(String, Bound<'py, PyAny>)>,
         input_derivatives: Vec<(String, Bound<'py, PyAny>)>,
-        start: Vec<(String, Bound<'py, PyAny>)>,
+        start: Option<Bound<'py, PyDict>>,
         outputs: Vec<String>,
         every: Option<usize>,
         measures: Vec<String>,
@@ -91,23 +173,23 @@ impl Loaded {
         read_before_set: bool,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Result4<'py>> {
-        let fmu = self.fmu()?;
+        let model = self.model()?;
         let measures = measures.iter().map(|name| name.parse()).collect::<Result<Vec<_>, String>>();
         let time = Numbers::of(&time)?;
         let [inputs, input_derivatives] = [numbers(&inputs)?, numbers(&input_derivatives)?];
-        let start = start_values(&start)?;
+        let start = Start::of(&model, start.as_ref())?;
         let batch = Batch {
             time: time.values(),
             inputs: courses(&inputs),
             input_derivatives: courses(&input_derivatives),
-            start: starts(&start),
+            start: start.values(),
             outputs: outputs.iter().map(String::as_str).collect(),
             every,
             measures: measures.map_err(PyValueError::new_err)?,
             threads,
             read_before_set,
         };
-        let planned = fmu.plan(&batch).map_err(python)?;
+        let planned = model.plan(&batch).map_err(python)?;
         let size = planned.size();
         if size.courses().is_none() || size.measures().is_none() {
             return Err(python(Error::too_much()));
@@ -121,9 +203,19 @@ impl Loaded {
 }
 
 impl Loaded {
-    fn fmu(&self) -> PyResult<Arc<Fmu>> {
-        let fmu = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        fmu.ok_or_else(|| FmuError::new_err("the FMU is closed"))
+    fn model(&self) -> PyResult<Model> {
+        let model = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        model.ok_or_else(|| FmuError::new_err("the FMU is closed"))
+    }
+}
+
+fn order_of(name: &str) -> PyResult<Order> {
+    match name {
+        "dependencies" => Ok(Order::Dependencies),
+        "jacobi" => Ok(Order::Jacobi),
+        other => {
+            Err(PyValueError::new_err(format!("order must be 'dependencies' or 'jacobi', not {other:?}")))
+        }
     }
 }
 
@@ -139,36 +231,6 @@ fn courses(given: &[(String, Numbers)]) -> Vec<(&str, Course<'_>)> {
         _ => (name.as_str(), Course::EachRun(values.values())),
     });
     course.collect()
-}
-
-/// A text or numbers.
-enum StartValue {
-    Text(String),
-    Numbers(Numbers),
-}
-
-fn start_values(given: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<(String, StartValue)>> {
-    given
-        .iter()
-        .map(|(name, value)| {
-            let value = match value.extract() {
-                Ok(text) => StartValue::Text(text),
-                Err(_) => StartValue::Numbers(Numbers::of(value)?),
-            };
-            Ok((name.clone(), value))
-        })
-        .collect()
-}
-
-fn starts(given: &[(String, StartValue)]) -> Vec<(&str, Start<'_>)> {
-    let start = given.iter().map(|(name, value)| match value {
-        StartValue::Text(text) => (name.as_str(), Start::Text(text)),
-        StartValue::Numbers(values) if values.shape().is_empty() => {
-            (name.as_str(), Start::Same(values.values()[0]))
-        }
-        StartValue::Numbers(values) => (name.as_str(), Start::EachRun(values.values())),
-    });
-    start.collect()
 }
 
 /// The runs, in other threads; this one listens to Python.

@@ -1,4 +1,4 @@
-//! Many runs of one FMU.
+//! Many runs of an FMU or a system.
 
 mod measure;
 mod plan;
@@ -8,7 +8,8 @@ pub use measure::Measure;
 pub use run::Watch;
 
 use crate::error::Error;
-use crate::fmu::Fmu;
+use crate::start::Start;
+use crate::system::System;
 
 /// What is to be run. A value for each run is what makes it many runs; without one it is a single run.
 ///
@@ -45,17 +46,6 @@ pub enum Course<'a> {
     /// A value for each time, the same in each run.
     Shared(&'a [f64]),
     /// A course for each run, one after the other: runs times times.
-    EachRun(&'a [f64]),
-}
-
-/// A start value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Start<'a> {
-    /// The same number in each run; 0 and 1 for Booleans.
-    Same(f64),
-    /// The same text in each run.
-    Text(&'a str),
-    /// A number for each run.
     EachRun(&'a [f64]),
 }
 
@@ -108,7 +98,7 @@ pub struct Runs {
     pub notes: Vec<(usize, String)>,
 }
 
-impl Fmu {
+impl System {
     /// Carries out the runs.
     ///
     /// # Errors
@@ -128,11 +118,11 @@ impl Fmu {
     /// # Errors
     /// [`Error::Request`], as [`run`](Self::run).
     pub fn plan<'a>(&'a self, batch: &'a Batch) -> Result<Planned<'a>, Error> {
-        Ok(Planned { fmu: self, plan: plan::Plan::of(self, batch)? })
+        Ok(Planned { system: self, plan: plan::Plan::of(self, batch)? })
     }
 }
 
-/// A [`Batch`] that fits its FMU, which stays loaded for it.
+/// A [`Batch`] that fits its system, which stays loaded for it.
 ///
 /// ```compile_fail,E0505
 /// fn close_too_early(fmu: fmu_run::Fmu, batch: fmu_run::Batch) {
@@ -142,7 +132,7 @@ impl Fmu {
 /// }
 /// ```
 pub struct Planned<'a> {
-    fmu: &'a Fmu,
+    system: &'a System,
     plan: plan::Plan<'a>,
 }
 
@@ -161,7 +151,7 @@ impl Planned<'_> {
     /// Carries out the runs, into memory of the caller, as [`Runs`] has it; returns [`Runs::errors`] and [`Runs::notes`].
     ///
     /// # Errors
-    /// As [`Fmu::run`].
+    /// As [`System::run`].
     ///
     /// # Panics
     /// When there is too little room.
@@ -171,7 +161,7 @@ impl Planned<'_> {
         courses: &mut [f64],
         measures: &mut [f64],
     ) -> Result<[Vec<(usize, String)>; 2], Error> {
-        run::run(self.fmu, &self.plan, watch, [courses, measures])
+        run::run(self.system, &self.plan, watch, [courses, measures])
     }
 }
 

@@ -1,21 +1,19 @@
 //! From names to value references: a batch that fits the FMU.
 
-use super::{Batch, Course, Measure, Start};
-use crate::error::Error;
-use crate::fmu::Fmu;
-use crate::selection::{Selection, fits, number, request, text_of_start};
+use super::{Batch, Course, Measure};
+use crate::error::{Error, request};
+use crate::selection::{Selection, fits};
+use crate::start::StartValues;
+use crate::system::System;
 use fmi_abi::{BaseType, Interface};
-use std::ffi::CString;
 
 /// A batch after all checks.
 pub(super) struct Plan<'a> {
     pub time: &'a [f64],
     pub runs: usize,
-    pub real_inputs: Inputs<'a>,
-    pub other_inputs: Vec<(BaseType, u32, Values<'a>)>,
+    pub inputs: Inputs<'a>,
     pub derivatives: Inputs<'a>,
-    pub start: Vec<(BaseType, u32, Values<'a>)>,
-    pub texts: Vec<(u32, CString)>,
+    pub start: StartValues<'a>,
     pub outputs: Selection,
     pub every: Option<usize>,
     pub measures: &'a [Measure],
@@ -23,10 +21,10 @@ pub(super) struct Plan<'a> {
     pub read_before_set: bool,
 }
 
-/// Inputs that are set by one call.
+/// Inputs, and what each does.
 #[derive(Default)]
 pub(super) struct Inputs<'a> {
-    pub references: Vec<u32>,
+    pub variables: Selection,
     pub values: Vec<Values<'a>>,
 }
 
@@ -67,30 +65,26 @@ impl ByTime<'_> {
 }
 
 impl<'a> Plan<'a> {
-    pub fn of(fmu: &Fmu, batch: &'a Batch) -> Result<Self, Error> {
-        fmu.library(Interface::CoSimulation)?;
+    pub fn of(system: &System, batch: &'a Batch) -> Result<Self, Error> {
+        system.check_interface(Interface::CoSimulation)?;
         let time = checked_time(batch.time)?;
         let runs = runs(batch)?;
         let mut plan = Self {
             time,
             runs,
-            real_inputs: Inputs::default(),
-            other_inputs: Vec::new(),
+            inputs: Inputs::default(),
             derivatives: Inputs::default(),
-            start: Vec::new(),
-            texts: Vec::new(),
-            outputs: Selection::default(),
+            start: StartValues::of(system, &batch.start)?,
+            outputs: system.select(&batch.outputs)?,
             every: batch.every,
             measures: &batch.measures,
-            threads: fmu.threads(Interface::CoSimulation, batch.threads)?.min(runs.max(1)),
+            threads: system.threads(Interface::CoSimulation, batch.threads)?.min(runs.max(1)),
             read_before_set: batch.read_before_set,
         };
         if batch.every == Some(0) {
             return request("every must be at least 1".to_owned());
         }
-        plan.find_inputs(fmu, batch)?;
-        plan.find_start(fmu, batch)?;
-        plan.outputs = fmu.select(&batch.outputs)?;
+        plan.find_inputs(system, batch)?;
         Ok(plan)
     }
 
@@ -99,11 +93,11 @@ impl<'a> Plan<'a> {
         self.every.map_or(0, |every| self.time.len().div_ceil(every))
     }
 
-    fn find_inputs(&mut self, fmu: &Fmu, batch: &'a Batch) -> Result<(), Error> {
-        let description = fmu.description();
+    fn find_inputs(&mut self, system: &System, batch: &'a Batch) -> Result<(), Error> {
         let mut seen = Vec::new();
         for (name, course) in &batch.inputs {
-            let of = number(fmu, name)?;
+            let variables = system.find_numbers(name)?;
+            let of = system.find_own(name)?[0].of;
             let settable = matches!(of.causality.as_str(), "input" | "parameter");
             if !settable || of.variability.as_deref() == Some("fixed") {
                 return request(format!(
@@ -113,52 +107,26 @@ impl<'a> Plan<'a> {
                 ));
             }
             once(&mut seen, name, "inputs")?;
-            let values = self.course(name, of.base, *course)?;
-            match of.base {
-                BaseType::Real => {
-                    self.real_inputs.references.push(of.reference);
-                    self.real_inputs.values.push(values);
-                }
-                base => self.other_inputs.push((base, of.reference, values)),
-            }
+            self.inputs.values.push(self.course(name, of.base, *course)?);
+            self.inputs.variables.push(name, &variables);
         }
-        if !batch.input_derivatives.is_empty()
-            && description.co_simulation.as_ref().is_none_or(|offer| !offer.input_derivatives)
-        {
+        let offer = system.sole().and_then(|fmu| fmu.description.co_simulation.as_ref());
+        if !batch.input_derivatives.is_empty() && offer.is_none_or(|offer| !offer.input_derivatives) {
             return request(format!(
                 "{} takes no input derivatives (canInterpolateInputs of FMI 2.0)",
-                description.model_name
+                system.name()
             ));
         }
         let mut seen = Vec::new();
         for (name, course) in &batch.input_derivatives {
-            let of = number(fmu, name)?;
+            let variables = system.find_numbers(name)?;
+            let of = variables[0].of;
             if of.base != BaseType::Real || of.causality != "input" {
                 return request(format!("{name} is no Real input; only these have input derivatives"));
             }
             once(&mut seen, name, "input derivatives")?;
-            self.derivatives.references.push(of.reference);
             self.derivatives.values.push(self.course(name, of.base, *course)?);
-        }
-        Ok(())
-    }
-
-    fn find_start(&mut self, fmu: &Fmu, batch: &'a Batch) -> Result<(), Error> {
-        let mut seen = Vec::new();
-        for (name, start) in &batch.start {
-            once(&mut seen, name, "start values")?;
-            let values = match *start {
-                Start::Text(text) => {
-                    self.texts.push(text_of_start(fmu, name, text)?);
-                    continue;
-                }
-                Start::Same(value) => Values { values: &[], constant: value, of_run: 0, of_time: 0 },
-                Start::EachRun(values) => Values { values, constant: 0.0, of_run: 1, of_time: 0 },
-            };
-            let of = number(fmu, name)?;
-            let all = if values.of_run == 0 { std::slice::from_ref(&values.constant) } else { values.values };
-            fits(name, of.base, all)?;
-            self.start.push((of.base, of.reference, values));
+            self.derivatives.variables.push(name, &variables);
         }
         Ok(())
     }
@@ -214,10 +182,7 @@ fn runs(batch: &Batch) -> Result<usize, Error> {
             Course::EachRun(values) => Some((*name, values.len(), batch.time.len())),
             _ => None,
         });
-    let starts = batch.start.iter().filter_map(|(name, start)| match start {
-        Start::EachRun(values) => Some((*name, values.len(), 1)),
-        _ => None,
-    });
+    let starts = batch.start.iter().filter_map(|(name, start)| Some((*name, start.count()?, 1)));
     for (name, length, times) in courses.chain(starts) {
         if length % times != 0 {
             return request(format!("{name} has {length} values, which is no multiple of the {times} times"));

@@ -3,10 +3,10 @@
 use super::measure::Measured;
 use super::plan::{ByTime, Plan, Values};
 use crate::error::Error;
-use crate::fmu::Fmu;
-use crate::instance::Instance;
 use crate::refusal::Refusal;
-use fmi_abi::{BaseType, Interface};
+use crate::running::Running;
+use crate::system::System;
+use fmi_abi::Interface;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{self, Duration};
@@ -17,7 +17,7 @@ pub(super) type Told = Vec<(usize, String)>;
 /// How much longer than the runs took [`ask`] may take.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// How the caller of [`Fmu::run`] looks on from another thread.
+/// How the caller of [`System::run`] looks on from another thread.
 #[derive(Debug, Default)]
 pub struct Watch {
     done: AtomicUsize,
@@ -49,7 +49,7 @@ struct Row<'a> {
 
 /// Fills the courses and the measures; returns the errors and the notes.
 pub(super) fn run(
-    fmu: &Fmu,
+    system: &System,
     plan: &Plan,
     watch: &Watch,
     [courses, measures]: [&mut [f64]; 2],
@@ -68,7 +68,7 @@ pub(super) fn run(
     let next = || rows.lock().unwrap_or_else(PoisonError::into_inner).next();
     // One instance a thread, whoever takes the next run.
     let found = pool.broadcast(|_| {
-        let mut worker = Worker::new(fmu, plan, None);
+        let mut worker = Worker::new(system, plan, None);
         let (mut failures, mut notes) = (Vec::new(), Vec::new());
         while !watch.is_cancelled()
             && let Some(row) = next()
@@ -94,18 +94,18 @@ pub(super) fn run(
     notes.sort_unstable_by_key(|(run, _)| *run);
     let until = time::Instant::now() + begin.elapsed() + PATIENCE;
     if failures.iter().any(|(_, failure)| failure.is_silent) {
-        pool.install(|| ask(fmu, plan, watch, until, &mut failures));
+        pool.install(|| ask(system, plan, watch, until, &mut failures));
     }
     Ok([failures.into_iter().map(|(run, failure)| (run, failure.text)).collect(), notes])
 }
 
 /// Many FMUs give their reasons only where logging is on. Runs that failed without one are made again with it, as far as
 /// they got, after all others and with nothing kept of them but the reason.
-fn ask(fmu: &Fmu, plan: &Plan, watch: &Watch, until: time::Instant, failures: &mut [(usize, Failure)]) {
+fn ask(system: &System, plan: &Plan, watch: &Watch, until: time::Instant, failures: &mut [(usize, Failure)]) {
     let silent = Mutex::new(failures.iter_mut().filter(|(_, failure)| failure.is_silent));
     let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
     rayon::broadcast(|_| {
-        let mut worker = Worker::new(fmu, plan, Some(until));
+        let mut worker = Worker::new(system, plan, Some(until));
         let mut courses = vec![0.0; plan.outputs.len() * plan.kept()];
         let mut measures = vec![0.0; plan.outputs.len() * plan.measures.len()];
         while !watch.is_cancelled()
@@ -144,11 +144,11 @@ struct Failure {
 
 /// A thread's instance, and room for what goes to and fro.
 struct Worker<'a> {
-    fmu: &'a Fmu,
+    system: &'a System,
     plan: &'a Plan<'a>,
     /// Logging is on, until then at most.
     logging: Option<time::Instant>,
-    instance: Option<Instance>,
+    instance: Option<Running>,
     room: Room<'a>,
 }
 
@@ -156,7 +156,6 @@ struct Room<'a> {
     /// What the inputs of this run do.
     inputs: Vec<ByTime<'a>>,
     derivatives: Vec<ByTime<'a>>,
-    others: Vec<(BaseType, u32, ByTime<'a>)>,
     /// What goes to the FMU in one call, and comes from it.
     set: Vec<f64>,
     slopes: Vec<f64>,
@@ -174,10 +173,9 @@ impl<'a> Room<'a> {
         Self {
             inputs: Vec::new(),
             derivatives: Vec::new(),
-            others: Vec::new(),
-            set: vec![0.0; plan.real_inputs.references.len()],
-            slopes: vec![0.0; plan.derivatives.references.len()],
-            orders: vec![1; plan.derivatives.references.len()],
+            set: vec![0.0; plan.inputs.variables.len()],
+            slopes: vec![0.0; plan.derivatives.variables.len()],
+            orders: vec![1; plan.derivatives.variables.len()],
             got: Vec::with_capacity(plan.outputs.len()),
             row: vec![0.0; plan.outputs.len()],
             rows: 0,
@@ -187,19 +185,16 @@ impl<'a> Room<'a> {
 
     fn begin(&mut self, plan: &Plan<'a>, run: usize) {
         let of_run = |values: &Vec<Values<'a>>| values.iter().map(|values| values.of_run(run)).collect();
-        self.inputs = of_run(&plan.real_inputs.values);
+        self.inputs = of_run(&plan.inputs.values);
         self.derivatives = of_run(&plan.derivatives.values);
-        let others = plan.other_inputs.iter();
-        self.others =
-            others.map(|(base, reference, values)| (*base, *reference, values.of_run(run))).collect();
         self.rows = 0;
         self.measured.begin();
     }
 }
 
 impl<'a> Worker<'a> {
-    fn new(fmu: &'a Fmu, plan: &'a Plan<'a>, logging: Option<time::Instant>) -> Self {
-        Self { fmu, plan, logging, instance: None, room: Room::of(plan) }
+    fn new(system: &'a System, plan: &'a Plan<'a>, logging: Option<time::Instant>) -> Self {
+        Self { system, plan, logging, instance: None, room: Room::of(plan) }
     }
 
     /// A run over these times. There may be something to note of one that reaches the last of them.
@@ -232,7 +227,7 @@ impl<'a> Worker<'a> {
             }
         }
         let terminated = if refused { Ok(()) } else { instance.terminate() };
-        self.instance = Some(instance).filter(Instance::is_alive);
+        self.instance = Some(instance).filter(Running::is_alive);
         let Some((at, refusal)) = stopped else {
             return Ok(terminated.err().map(|refusal| format!("finished; then {refusal}")));
         };
@@ -247,9 +242,10 @@ impl<'a> Worker<'a> {
     }
 
     /// An instance as new, or why there is none, and whether that comes without a reason.
-    fn instance(&mut self) -> Result<Instance, (String, bool)> {
+    fn instance(&mut self) -> Result<Running, (String, bool)> {
         let used = self.instance.take();
-        let instance = Instance::renewed(used, self.fmu, Interface::CoSimulation, self.logging.is_some())?;
+        let logging_on = self.logging.is_some();
+        let instance = Running::renewed(used, self.system, Interface::CoSimulation, logging_on)?;
         instance.forget_log();
         Ok(instance)
     }
@@ -262,7 +258,7 @@ type Stopped = (Option<usize>, Refusal);
 fn follow(
     plan: &Plan,
     times: &[f64],
-    instance: &mut Instance,
+    instance: &mut Running,
     room: &mut Room,
     run: usize,
     courses: &mut [f64],
@@ -288,7 +284,7 @@ fn follow(
         }
         let keep = wait == 0 && place < kept;
         if (keep || measures)
-            && let Err(refusal) = plan.outputs.get(instance, &mut room.got, &mut room.row)
+            && let Err(refusal) = instance.get(&plan.outputs, &mut room.got, &mut room.row)
         {
             return Err(at(ended.unwrap_or(refusal)));
         }
@@ -328,34 +324,30 @@ fn follow(
 }
 
 /// Start values before the initialization, inputs in it.
-fn start(plan: &Plan, instance: &mut Instance, room: &mut Room, run: usize) -> Result<(), Refusal> {
-    let numbers = plan.start.iter();
-    let numbers = numbers.map(|(base, reference, values)| (*base, *reference, values.of_run(run).at(0)));
-    instance.begin(plan.time[0], plan.time.last().copied(), &plan.texts, numbers)?;
+fn start(plan: &Plan, instance: &mut Running, room: &mut Room, run: usize) -> Result<(), Refusal> {
+    instance.begin(plan.time[0], plan.time.last().copied(), &plan.start, run)?;
     set_values(plan, instance, room, 0)?;
     instance.exit_initialization_mode()
 }
 
 #[inline]
-fn set_inputs(plan: &Plan, instance: &mut Instance, room: &mut Room, time: usize) -> Result<(), Refusal> {
+fn set_inputs(plan: &Plan, instance: &mut Running, room: &mut Room, time: usize) -> Result<(), Refusal> {
     set_values(plan, instance, room, time)?;
     if room.derivatives.is_empty() {
         return Ok(());
     }
     fill(&mut room.slopes, &room.derivatives, time);
-    instance.set_input_derivatives(&plan.derivatives.references, &room.orders, &room.slopes)
+    let references = plan.derivatives.variables.references().unwrap_or_default();
+    instance.sole().set_input_derivatives(references, &room.orders, &room.slopes)
 }
 
 #[inline]
-fn set_values(plan: &Plan, instance: &mut Instance, room: &mut Room, time: usize) -> Result<(), Refusal> {
-    if !room.inputs.is_empty() {
-        fill(&mut room.set, &room.inputs, time);
-        instance.set_reals(&plan.real_inputs.references, &room.set)?;
+fn set_values(plan: &Plan, instance: &mut Running, room: &mut Room, time: usize) -> Result<(), Refusal> {
+    if room.inputs.is_empty() {
+        return Ok(());
     }
-    for (base, reference, values) in &room.others {
-        instance.set_number(*base, *reference, values.at(time))?;
-    }
-    Ok(())
+    fill(&mut room.set, &room.inputs, time);
+    instance.set(&plan.inputs.variables, &mut room.got, &room.set)
 }
 
 #[inline]

@@ -1,0 +1,297 @@
+//! The instances of a system's components, which run as one.
+
+use crate::instance::{Instance, Saved};
+use crate::refusal::Refusal;
+use crate::selection::{Place, Selection};
+use crate::start::StartValues;
+use crate::system::{Exchange, Order, System};
+use fmi_abi::Interface;
+
+/// An instance of each component; what is said here of one holds for all. An FMU alone is a system of one component, without
+/// connections.
+#[derive(Debug)]
+pub(crate) struct Running {
+    parts: Vec<Instance>,
+    system: System,
+    /// Inputs are to be fed before anything is read or stepped ([`Order::Dependencies`]).
+    is_due: bool,
+    /// What outputs were after the last step ([`Order::Jacobi`]), and in the places of saved states.
+    passed: Vec<f64>,
+    saved: Vec<Vec<f64>>,
+    /// Room for what goes to and fro.
+    row: Vec<f64>,
+    buffer: Vec<f64>,
+}
+
+impl Running {
+    /// Used instances as new, or others in their place; or why there is none, and whether the FMU said so.
+    pub fn renewed(
+        used: Option<Self>,
+        system: &System,
+        interface: Interface,
+        logging_on: bool,
+    ) -> Result<Self, (String, bool)> {
+        let used = used.filter(Self::is_alive).and_then(|mut used| {
+            used.parts.iter_mut().try_for_each(Instance::reset).ok()?;
+            Some(used)
+        });
+        // Some FMUs cannot be reset. The old instances are gone by now: there may be one at a time only.
+        if let Some(used) = used {
+            return Ok(used);
+        }
+        let parts =
+            system.parts().iter().map(|part| Instance::new(&part.fmu, &part.name, interface, logging_on));
+        let parts = parts.collect::<Result<Vec<_>, _>>()?;
+        let (system, [passed, row, buffer]) = (system.clone(), [const { Vec::new() }; 3]);
+        Ok(Self { parts, system, is_due: false, passed, saved: Vec::new(), row, buffer })
+    }
+
+    /// Start values, and into the initialization: so both editions of the standard allow it.
+    pub fn begin(
+        &mut self,
+        start_time: f64,
+        stop_time: Option<f64>,
+        start: &StartValues,
+        of: usize,
+    ) -> Result<(), Refusal> {
+        self.each(|_, instance| instance.set_up(start_time, stop_time))?;
+        for (place, text) in start.texts(of) {
+            self.parts[place.part].set_text(place.reference, text)?;
+        }
+        for (Place { part, base, reference }, value) in start.numbers(of) {
+            self.parts[part].set_number(base, reference, value)?;
+        }
+        self.each(|_, instance| instance.enter_initialization_mode(start_time, stop_time))
+    }
+
+    pub fn exit_initialization_mode(&mut self) -> Result<(), Refusal> {
+        self.agree()?;
+        self.each(|_, instance| instance.exit_initialization_mode())?;
+        self.stepped()
+    }
+
+    /// Before the first step outputs may depend on inputs otherwise than later. They are passed on until they no longer
+    /// change; in Jacobi's order as often as there are components, as libcosim does.
+    fn agree(&mut self) -> Result<(), Refusal> {
+        let system = self.system.clone();
+        let Exchange { order, stages } = system.exchange();
+        let most = match order {
+            _ if stages.is_empty() => return Ok(()),
+            Order::Jacobi => self.parts.len(),
+            Order::Dependencies => 1 + stages.iter().map(|stage| stage.outputs.len()).sum::<usize>(),
+        };
+        let mut before: Vec<u64> = Vec::new();
+        for _ in 0..most {
+            let mut now = Vec::new();
+            for stage in stages {
+                self.row.resize(stage.outputs.len(), 0.0);
+                stage.outputs.get(&mut self.parts, &mut self.buffer, &mut self.row)?;
+                now.extend(self.row.iter().map(|value| value.to_bits()));
+                stage.inputs.set(&mut self.parts, &mut self.buffer, &self.row)?;
+            }
+            if now == before {
+                return Ok(());
+            }
+            before = now;
+        }
+        match order {
+            Order::Jacobi => Ok(()),
+            Order::Dependencies => Err(Refusal::of_ours(
+                "initialization",
+                "the outputs depend on each other before the first step, so that passing them on does not come to an end",
+            )),
+        }
+    }
+
+    /// Feeds the inputs, if they are to be fed.
+    #[inline]
+    fn pass_on(&mut self) -> Result<(), Refusal> {
+        if self.is_due { self.pass_all_on() } else { Ok(()) }
+    }
+
+    fn pass_all_on(&mut self) -> Result<(), Refusal> {
+        let Self { parts, system, row, buffer, .. } = self;
+        for stage in &system.exchange().stages {
+            row.resize(stage.outputs.len(), 0.0);
+            stage.outputs.get(parts, buffer, row)?;
+            stage.inputs.set(parts, buffer, row)?;
+        }
+        self.is_due = false;
+        Ok(())
+    }
+
+    /// After a step or the initialization.
+    #[inline]
+    fn stepped(&mut self) -> Result<(), Refusal> {
+        let Self { parts, system, passed, buffer, .. } = self;
+        let Exchange { order, stages } = system.exchange();
+        match (order, stages.first()) {
+            (_, None) => {}
+            (Order::Dependencies, _) => self.is_due = true,
+            (Order::Jacobi, Some(stage)) => {
+                passed.resize(stage.outputs.len(), 0.0);
+                stage.outputs.get(parts, buffer, passed)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refused also where an FMU ends the simulation; then the others have done the step.
+    #[inline]
+    pub fn step(&mut self, time: f64, size: f64) -> Result<(), Refusal> {
+        if let [instance] = &mut *self.parts
+            && self.system.exchange().stages.is_empty()
+        {
+            return instance.step(time, size);
+        }
+        self.pass_on()?;
+        if !self.passed.is_empty() {
+            let stage = &self.system.exchange().stages[0];
+            stage.inputs.set(&mut self.parts, &mut self.buffer, &self.passed)?;
+        }
+        let mut ended = None;
+        self.each(|_, instance| match instance.step(time, size) {
+            Err(refusal) if refusal.ended().is_some() => {
+                ended.get_or_insert(refusal);
+                Ok(())
+            }
+            stepped => stepped,
+        })?;
+        // What has ended takes no more inputs.
+        ended.map_or_else(|| self.stepped(), Err)
+    }
+
+    #[inline]
+    pub fn get(
+        &mut self,
+        variables: &Selection,
+        buffer: &mut Vec<f64>,
+        row: &mut [f64],
+    ) -> Result<(), Refusal> {
+        self.pass_on()?;
+        variables.get(&mut self.parts, buffer, row)
+    }
+
+    #[inline]
+    pub fn set(&mut self, variables: &Selection, buffer: &mut Vec<f64>, row: &[f64]) -> Result<(), Refusal> {
+        variables.set(&mut self.parts, buffer, row)?;
+        let Exchange { order, stages } = self.system.exchange();
+        self.is_due |= *order == Order::Dependencies && !stages.is_empty();
+        Ok(())
+    }
+
+    pub fn get_text(&mut self, place: Place) -> Result<String, Refusal> {
+        self.pass_on()?;
+        self.parts[place.part].get_text(place.reference)
+    }
+
+    /// The instance of an FMU that runs alone.
+    #[inline]
+    pub fn sole(&mut self) -> &mut Instance {
+        &mut self.parts[0]
+    }
+
+    pub fn is_alive(&self) -> bool {
+        self.parts.iter().all(Instance::is_alive)
+    }
+
+    pub fn forget_log(&self) {
+        self.parts.iter().for_each(Instance::forget_log);
+    }
+
+    pub fn terminate(&mut self) -> Result<(), Refusal> {
+        self.each(|_, instance| instance.terminate())
+    }
+
+    /// Saves the state, in a place of its own, which is the same in all instances.
+    pub fn save(&mut self) -> Result<Saved, Refusal> {
+        self.keep(|_, instance| instance.save())
+    }
+
+    pub fn restore(&mut self, saved: Saved) -> Result<(), Refusal> {
+        self.each(|_, instance| instance.restore(saved))?;
+        match self.saved.get(saved.place()) {
+            Some(passed) => self.passed.clone_from(passed),
+            None => self.is_due = !self.system.exchange().stages.is_empty(),
+        }
+        Ok(())
+    }
+
+    pub fn forget(&mut self, saved: Saved) -> Result<(), Refusal> {
+        self.each(|_, instance| instance.forget(saved))
+    }
+
+    /// The bytes of an FMU alone as they are; else those of all components, each after its length, and what was passed on.
+    pub fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Refusal> {
+        if self.system.sole().is_some() {
+            return self.sole().serialize(saved);
+        }
+        let mut all = Vec::new();
+        self.each(|_, instance| {
+            let bytes = instance.serialize(saved)?;
+            all.extend((bytes.len() as u64).to_le_bytes());
+            all.extend(bytes);
+            Ok(())
+        })?;
+        let passed = self.saved.get(saved.place()).into_iter().flatten();
+        all.extend(passed.flat_map(|value| value.to_le_bytes()));
+        Ok(all)
+    }
+
+    pub fn deserialize(&mut self, bytes: &[u8]) -> Result<Saved, Refusal> {
+        if self.system.sole().is_some() {
+            return self.sole().deserialize(bytes);
+        }
+        let mut rest = bytes;
+        let short = || Refusal::of_ours("deserialize", "the bytes are no state of this system");
+        let parts = self.parts.iter().map(|_| {
+            let (length, after) = rest.split_first_chunk()?;
+            let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
+            let (own, after) = after.split_at_checked(length)?;
+            rest = after;
+            Some(own)
+        });
+        let parts: Vec<_> = parts.collect::<Option<_>>().ok_or_else(short)?;
+        if rest.len() != size_of::<f64>() * self.passed.len() {
+            return Err(short());
+        }
+        let now = rest.chunks_exact(8).filter_map(|bytes| Some(f64::from_le_bytes(bytes.try_into().ok()?)));
+        let before = std::mem::replace(&mut self.passed, now.collect());
+        let saved = self.keep(|part, instance| instance.deserialize(parts[part]));
+        self.passed = before;
+        saved
+    }
+
+    /// Keeps a state of each instance, or of none, with what is passed on.
+    fn keep(
+        &mut self,
+        mut state: impl FnMut(usize, &mut Instance) -> Result<Saved, Refusal>,
+    ) -> Result<Saved, Refusal> {
+        let mut done = None;
+        let kept = self.each(|part, instance| {
+            done = Some((part, state(part, instance)?));
+            Ok(())
+        });
+        let (last, saved) = match (kept, done) {
+            (Ok(()), Some(done)) => done,
+            (Err(refusal), Some((last, saved))) => {
+                self.parts[..=last].iter_mut().for_each(|instance| _ = instance.forget(saved));
+                return Err(refusal);
+            }
+            (kept, None) => return kept.and(Err(Refusal::of_ours("save", "there is no instance"))),
+        };
+        debug_assert_eq!(last + 1, self.parts.len(), "all have kept one");
+        if !self.passed.is_empty() {
+            self.saved.resize(self.saved.len().max(saved.place() + 1), Vec::new());
+            self.saved[saved.place()].clone_from(&self.passed);
+        }
+        Ok(saved)
+    }
+
+    fn each(
+        &mut self,
+        mut body: impl FnMut(usize, &mut Instance) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        self.parts.iter_mut().enumerate().try_for_each(|(part, instance)| body(part, instance))
+    }
+}

@@ -1,0 +1,372 @@
+//! FMUs that run as one.
+
+mod order;
+mod ssp;
+
+use crate::description::{Description, Variable};
+use crate::error::{Error, request};
+use crate::fmu::{Fmu, Loaded};
+use crate::selection::Selection;
+use crate::start::StartValues;
+use fmi_abi::{BaseType, Interface};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// FMUs whose outputs feed each other's inputs, in Co-Simulation; they run as one FMU does, also side by side in
+/// [batches](System::run) and as [instances](System::instances). An [`Fmu`](crate::Fmu) is one of a single component.
+///
+/// Variables are named `component.variable`, or as the system itself calls its inputs and outputs. From one communication
+/// point to the next all components step from the values they were given there; when those are passed on is said by the
+/// [`Order`].
+#[derive(Clone, Debug)]
+pub struct System(Arc<Whole>);
+
+#[derive(Debug)]
+struct Whole {
+    name: String,
+    parts: Vec<Part>,
+    /// Names of the system's own inputs and outputs, and the variables they stand for.
+    connectors: BTreeMap<String, Vec<String>>,
+    connections: Vec<(String, String)>,
+    exchange: Exchange,
+    start: Vec<(String, StartValue)>,
+    stop_time: Option<f64>,
+}
+
+/// A component.
+#[derive(Debug)]
+pub(crate) struct Part {
+    /// Its name; empty where it is the only one.
+    pub name: String,
+    pub fmu: Arc<Loaded>,
+}
+
+/// When outputs are passed on to the inputs they feed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// At each communication point until all agree: an output is read after the inputs are set on which it depends without a
+    /// step, by what the FMUs say of their outputs. Where such dependencies go in a circle, an algebraic loop, the system is
+    /// refused.
+    #[default]
+    Dependencies,
+    /// When a step is done all outputs are read, and when the next begins all inputs are set, as FMPy and libcosim do. What
+    /// depends on inputs without a step is late by one; so there are no algebraic loops.
+    Jacobi,
+}
+
+/// How FMUs are wired.
+#[derive(Clone, Debug, Default)]
+pub struct Wiring<'a> {
+    /// What the system is called.
+    pub name: &'a str,
+    /// Names and FMUs; one FMU may be there more than once.
+    pub components: Vec<(&'a str, &'a Fmu)>,
+    /// Outputs and the inputs they feed, as `component.variable`.
+    pub connections: Vec<(&'a str, &'a str)>,
+    /// When values are passed on.
+    pub order: Order,
+}
+
+/// How values are passed on: all of a stage are read, then all are set, then those of the next.
+#[derive(Debug, Default)]
+pub(crate) struct Exchange {
+    pub order: Order,
+    pub stages: Vec<Stage>,
+}
+
+/// Outputs and the inputs they feed, one after the other.
+#[derive(Debug)]
+pub(crate) struct Stage {
+    pub outputs: Selection,
+    pub inputs: Selection,
+}
+
+/// A start value, as it is set.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StartValue {
+    /// A number, 0 and 1 for Booleans.
+    Number(f64),
+    /// A text.
+    Text(String),
+}
+
+/// A variable of a component.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Found<'a> {
+    /// Which component.
+    pub part: usize,
+    pub of: &'a Variable,
+    pub description: &'a Description,
+    /// The output that feeds it.
+    pub fed_by: Option<&'a str>,
+}
+
+impl System {
+    /// Wires FMUs.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when components share a name, a variable is not there or of the wrong causality, the ends of a
+    /// connection do not fit, an input is fed twice, or there is an algebraic loop; [`Error::Fmu`] when an FMU has no
+    /// Co-Simulation, or can be there only once.
+    pub fn connect(wiring: &Wiring) -> Result<Self, Error> {
+        let parts =
+            wiring.components.iter().map(|(name, fmu)| ((*name).to_owned(), Arc::clone(fmu.loaded())));
+        let connections = wiring.connections.iter().map(|(from, to)| ((*from).to_owned(), (*to).to_owned()));
+        let mut whole = Whole::of(wiring.name, parts.map(|(name, fmu)| Part { name, fmu }).collect());
+        whole.connections = connections.collect();
+        whole.finish(wiring.order)
+    }
+
+    /// An FMU alone.
+    pub(crate) fn of_one(fmu: Loaded) -> Self {
+        let name = fmu.description.model_name.clone();
+        Self(Arc::new(Whole::of(&name, vec![Part { name: String::new(), fmu: Arc::new(fmu) }])))
+    }
+
+    /// What it is called; for an FMU, its model.
+    pub fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    /// All variables of its components, by the names they have here; connectors of the system first.
+    pub fn variables(&self) -> impl Iterator<Item = (String, &Variable)> {
+        let own = self.0.connectors.iter();
+        let own = own.filter_map(|(name, ends)| Some((name.clone(), self.0.look_up(ends.first()?)?.of)));
+        own.chain(self.parts().iter().flat_map(|part| {
+            part.fmu.description.variables.iter().map(|of| (joined(&part.name, &of.name), of))
+        }))
+    }
+
+    /// In which order values are passed on at a communication point: outputs and the inputs they feed, those of a stage
+    /// together.
+    pub fn stages(&self) -> Vec<Vec<(&str, &str)>> {
+        let stages = self.0.exchange.stages.iter();
+        let pairs = |stage: &Stage| {
+            let of = |(from, to): (_, _)| {
+                let known = self.0.connections.iter().find(|(a, b)| (a, b) == (from, to))?;
+                Some((known.0.as_str(), known.1.as_str()))
+            };
+            stage.outputs.names().iter().zip(stage.inputs.names()).filter_map(of).collect()
+        };
+        stages.map(pairs).collect()
+    }
+
+    /// Start values that it came with.
+    pub fn start(&self) -> &[(String, StartValue)] {
+        &self.0.start
+    }
+
+    /// When the experiment it came with ends, s, if that is said.
+    pub fn stop_time(&self) -> Option<f64> {
+        self.0.stop_time
+    }
+
+    /// How a value in another unit becomes one in the variable's own: factor and offset, value in the other = factor * value
+    /// + offset.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when the variable is not there, or its FMU does not say how these units belong together.
+    pub fn display_unit(&self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
+        self.find_first(name)?.display_unit(name, unit)
+    }
+
+    pub(crate) fn parts(&self) -> &[Part] {
+        &self.0.parts
+    }
+
+    pub(crate) fn exchange(&self) -> &Exchange {
+        &self.0.exchange
+    }
+
+    /// The one FMU, if there are no others.
+    pub(crate) fn sole(&self) -> Option<&Loaded> {
+        self.parts().first().filter(|part| part.name.is_empty()).map(|part| &*part.fmu)
+    }
+
+    /// Fails unless all components have this type of interface.
+    pub(crate) fn check_interface(&self, interface: Interface) -> Result<(), Error> {
+        if interface == Interface::ModelExchange && self.sole().is_none() {
+            return Err(Error::Fmu(format!("{} is a system, which has Co-Simulation only", self.name())));
+        }
+        self.parts().iter().try_for_each(|part| part.fmu.library(interface).map(drop))
+    }
+
+    /// One at a time is all there may be in a process.
+    pub(crate) fn once_per_process(&self, interface: Interface) -> bool {
+        self.parts().iter().any(|part| part.fmu.once_per_process(interface))
+    }
+
+    /// How many threads instances may be in: those asked for, or one for each processor.
+    pub(crate) fn threads(&self, interface: Interface, asked: Option<usize>) -> Result<usize, Error> {
+        if asked == Some(0) {
+            return request("threads must be at least 1".to_owned());
+        }
+        if self.once_per_process(interface) {
+            return Ok(1);
+        }
+        Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)))
+    }
+
+    /// The variables that have this name: more than one where an input of the system feeds several.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when there is none; one of a similar name is told.
+    pub(crate) fn find(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
+        self.0.find(name)
+    }
+
+    pub(crate) fn find_first(&self, name: &str) -> Result<Found<'_>, Error> {
+        self.find(name).map(|found| found[0])
+    }
+
+    /// Variables that are numbers.
+    pub(crate) fn find_numbers(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
+        let found = self.find(name)?;
+        match found.iter().any(|found| matches!(found.of.base, BaseType::String | BaseType::Binary)) {
+            true => request(format!("{name} is no number")),
+            false => Ok(found),
+        }
+    }
+
+    /// Variables that a caller may set: inputs that are fed by outputs are not his.
+    pub(crate) fn find_own(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
+        let found = self.find(name)?;
+        match found.iter().find_map(|found| found.fed_by) {
+            Some(output) => request(format!("{name} is fed by {output}, it cannot be set")),
+            None => Ok(found),
+        }
+    }
+}
+
+impl Found<'_> {
+    fn display_unit(self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
+        let Some(own) = &self.of.unit else {
+            return request(format!("{name} has no unit, its values cannot be in {unit}"));
+        };
+        if own == unit {
+            return Ok((1.0, 0.0));
+        }
+        let others = self.description.display_units.get(own).map_or(&[][..], Vec::as_slice);
+        if let Some((_, factor, offset)) = others.iter().find(|(name, ..)| name == unit) {
+            return Ok((*factor, *offset));
+        }
+        let known: Vec<_> =
+            std::iter::once(own.as_str()).chain(others.iter().map(|(name, ..)| name.as_str())).collect();
+        request(format!("{name} can be given in {}, not in {unit:?}", known.join(" or ")))
+    }
+}
+
+impl Whole {
+    fn of(name: &str, parts: Vec<Part>) -> Self {
+        Self {
+            name: name.to_owned(),
+            parts,
+            connectors: BTreeMap::new(),
+            connections: Vec::new(),
+            exchange: Exchange::default(),
+            start: Vec::new(),
+            stop_time: None,
+        }
+    }
+
+    /// Checks the wiring and puts it into its order.
+    fn finish(mut self, order: Order) -> Result<System, Error> {
+        if self.parts.is_empty() {
+            return request("a system needs one component at least".to_owned());
+        }
+        for (place, Part { name, fmu }) in self.parts.iter().enumerate() {
+            if name.is_empty() {
+                return request("a component has no name".to_owned());
+            }
+            let before = &self.parts[..place];
+            if before.iter().any(|other| other.name == *name) {
+                return request(format!("two components are named {name}"));
+            }
+            fmu.library(Interface::CoSimulation)?;
+            if fmu.once_per_process(Interface::CoSimulation)
+                && before.iter().any(|other| Arc::ptr_eq(&other.fmu, fmu))
+            {
+                return Err(Error::Fmu(format!(
+                    "{} can be there only once in a process (canBeInstantiatedOnlyOncePerProcess)",
+                    fmu.description.model_name
+                )));
+            }
+        }
+        for (place, (from, to)) in self.connections.iter().enumerate() {
+            let (output, input) = (self.end(from, "output")?, self.end(to, "input")?);
+            if let Err(why) = output.description.connects(output.of, input.description, input.of) {
+                return request(format!("{from} cannot feed {to}: {why}"));
+            }
+            if matches!(output.of.base, BaseType::String | BaseType::Binary) {
+                return request(format!("{from} cannot feed {to}: only numbers and Booleans are passed on"));
+            }
+            if self.connections[..place].iter().any(|(_, other)| other == to) {
+                return request(format!("{to} is fed twice"));
+            }
+        }
+        self.exchange = Exchange { order, stages: order::stages(&self, order)? };
+        let system = System(Arc::new(self));
+        StartValues::of(&system, &[])?;
+        Ok(system)
+    }
+
+    fn end(&self, name: &str, wanted: &str) -> Result<Found<'_>, Error> {
+        let found = self.find(name)?[0];
+        match found.of.causality.as_str() {
+            causality if causality == wanted => Ok(found),
+            causality => request(format!("{name} is {causality}, not {wanted}")),
+        }
+    }
+
+    fn look_up(&self, name: &str) -> Option<Found<'_>> {
+        let with = |part: usize, own: &str| {
+            let description = &self.parts[part].fmu.description;
+            let fed = self.connections.iter().find(|(_, to)| to == name);
+            let fed_by = fed.map(|(from, _)| from.as_str());
+            Some(Found { part, of: description.variable(own)?, description, fed_by })
+        };
+        match &*self.parts {
+            [part] if part.name.is_empty() => with(0, name),
+            parts => parts.iter().enumerate().find_map(|(place, part)| {
+                with(place, name.strip_prefix(part.name.as_str())?.strip_prefix('.')?)
+            }),
+        }
+    }
+
+    fn find(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
+        let found: Vec<_> = match self.connectors.get(name) {
+            Some(ends) => ends.iter().filter_map(|end| self.look_up(end)).collect(),
+            None => self.look_up(name).into_iter().collect(),
+        };
+        if !found.is_empty() {
+            return Ok(found);
+        }
+        let names = self
+            .parts
+            .iter()
+            .flat_map(|part| part.fmu.description.variables.iter().map(|of| joined(&part.name, &of.name)));
+        let hint = nearest(name, names.chain(self.connectors.keys().cloned()));
+        let hint = hint.map_or(String::new(), |near| format!("; did you mean {near:?}?"));
+        request(format!("{} has no variable {name:?}{hint}", self.name))
+    }
+}
+
+/// The name that is most like another. The derivative of a variable is seldom meant.
+fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
+    let wanted = name.to_lowercase();
+    let distance = |known: &String| {
+        let known = known.to_lowercase();
+        // Abbreviations, too: "height" for "h".
+        let short = wanted.starts_with(&known) || known.starts_with(&wanted);
+        let derived = known.starts_with("der(") && !wanted.starts_with("der(");
+        f64::from(u8::from(derived))
+            - 0.1 * f64::from(u8::from(short))
+            - strsim::jaro_winkler(&known, &wanted)
+    };
+    let names = names.map(|known| (distance(&known), known));
+    names.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
+}
+
+fn joined(component: &str, name: &str) -> String {
+    if component.is_empty() { name.to_owned() } else { format!("{component}.{name}") }
+}

@@ -1,0 +1,242 @@
+"""Systems of testbed and controller, against instances that are wired by hand; to the bit."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from itertools import product
+
+import fmu_run
+import numpy as np
+import pytest
+from built import built
+
+SENSED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
+MOVED = ("theta1", "theta2", "omega1", "omega2")
+WIRES = {f"testbed.{name}": f"controller.{name}" for name in SENSED}
+WIRES |= {f"controller.{name}": f"testbed.{name}" for name in MOVED}
+GOAL = {"controller.pitch_ref": 0.3, "controller.roll_ref": -0.4}
+SHOWN = ("testbed.pitch", "testbed.tau1", "testbed.tau2", "controller.theta1", "controller.tau1")
+ORDERS = ("dependencies", "jacobi")
+
+
+@pytest.fixture(params=[("", ""), ("", "fmi3"), ("fmi3", "")], ids=["2.0", "2.0 and 3.0", "3.0 and 2.0"])
+def fmus(request):
+    """Controller and testbed, of the same edition of the standard or not."""
+    names = [
+        f"{folder}/{name}".strip("/") for folder, name in zip(request.param, ("prw_controller.fmu", "prw_testbed.fmu"))
+    ]
+    with fmu_run.Fmu(built(names[0])) as controller, fmu_run.Fmu(built(names[1])) as testbed:
+        yield {"controller": controller, "testbed": testbed}
+
+
+def by_hand(fmus, order: str, steps: int, k1: float) -> np.ndarray:
+    """SHOWN at each communication point, with an instance of each FMU."""
+    start = {name.split(".")[1]: value for name, value in GOAL.items()}
+    law, wrist = fmus["controller"].instances(start=start), fmus["testbed"].instances(start={"k1": k1})
+    rows = []
+    sensed, moved = wrist.get(SENSED), law.get(MOVED)
+    for _ in range(steps):
+        if order == "dependencies":
+            # Torques depend on the motors at once, nothing else does.
+            wrist.set(MOVED, law.get(MOVED))
+            law.set(SENSED, wrist.get(SENSED))
+        of = {"testbed": wrist, "controller": law}
+        rows.append([of[name.split(".")[0]].get(name.split(".")[1])[0] for name in SHOWN])
+        if order == "jacobi":
+            wrist.set(MOVED, moved)
+            law.set(SENSED, sensed)
+        law.step(1e-3)
+        wrist.step(1e-3)
+        sensed, moved = wrist.get(SENSED), law.get(MOVED)
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_system_does_what_its_fmus_do(fmus, order) -> None:
+    stiffness = [80.0, 120.0]
+    expected = [by_hand(fmus, order, 150, k1) for k1 in stiffness]
+    loop = fmu_run.System(fmus, WIRES, order=order)
+    pairs = loop.instances(2, start=GOAL | {"testbed.k1": stiffness}, threads=2)
+    for k in range(150):
+        assert np.array_equal(pairs.get(SHOWN), [run[k] for run in expected]), k
+        pairs.step(1e-3)
+    # Times that are multiples of the step to the last bit.
+    time = np.arange(100) / 1024
+    runs = loop.run(time, start=GOAL | {"testbed.k1": stiffness}, outputs=SHOWN, measures=["end"], every=1)
+    again = loop.instances(2, start=GOAL | {"testbed.k1": stiffness})
+    for k in range(len(time)):
+        assert np.array_equal(again.get(SHOWN).T, [runs[name][:, k] for name in SHOWN])
+        again.step(1 / 1024)
+    assert np.array_equal(runs["testbed.pitch", "end"], runs["testbed.pitch"][:, -1])
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_states_of_all_components_are_saved(fmus, order) -> None:
+    loop = fmu_run.System(fmus, WIRES, order=order)
+    pairs = loop.instances(3, start=GOAL | {"testbed.k1": [70.0, 90.0, 110.0]})
+
+    def onwards() -> np.ndarray:
+        rows = []
+        for _ in range(30):
+            pairs.step(1e-3)
+            rows.append(pairs.get(SHOWN))
+        return np.array(rows)
+
+    for _ in range(40):
+        pairs.step(1e-3)
+    saved = pairs.save()
+    first = onwards()
+    texts = pairs.serialize(saved)
+    pairs.restore(saved)
+    assert np.array_equal(pairs.time, np.full(3, pairs.time[0])) and np.array_equal(onwards(), first)
+    pairs.reset()
+    pairs.restore(pairs.deserialize(texts))
+    assert np.array_equal(onwards(), first)
+    with pytest.raises(fmu_run.FmuError, match=re.escape("the bytes are no state of this system")):
+        pairs.deserialize([text[:-9] for text in texts])
+    pairs.restore(saved, mask=[False, True, False])
+    assert len(set(pairs.time)) == 2
+
+
+def test_torques_are_passed_on_after_the_motors_are_set(fmus) -> None:
+    stages = fmu_run.System(fmus, WIRES).stages
+    assert [{wire for wire in stage if ".tau" in wire[0]} for stage in stages] == [
+        set(),
+        {(f"testbed.tau{i}", f"controller.tau{i}") for i in (1, 2)},
+    ]
+    assert sorted(sum(stages, [])) == sorted(WIRES.items())
+    assert len(fmu_run.System(fmus, WIRES, order="jacobi").stages) == 1
+
+
+@pytest.mark.parametrize(
+    "wires, order, complaint",
+    [
+        ({"testbed.pich": "controller.pitch"}, "jacobi", 'system has no variable "testbed.pich"; did you mean "testbed.pitch"?'),
+        ({"testbed.pitch": "controller.tau1"}, "jacobi", "testbed.pitch cannot feed controller.tau1: the one is in rad, the other in N.m"),
+        ({"controller.pitch": "testbed.theta1"}, "jacobi", "controller.pitch is input, not output"),
+        ({"testbed.pitch": "testbed.roll"}, "jacobi", "testbed.roll is output, not input"),
+        ({"testbed.pitch": ["controller.pitch", "controller.pitch"]}, "jacobi", "controller.pitch is fed twice"),
+        ({}, "gauss", "order must be 'dependencies' or 'jacobi', not \"gauss\""),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_together_is_named(wires, order, complaint) -> None:
+    fmus = {name: fmu_run.Fmu(built(f"prw_{name}.fmu")) for name in ("controller", "testbed")}
+    with pytest.raises(ValueError, match=re.escape(complaint)):
+        fmu_run.System(fmus, wires, order=order)
+
+
+def test_what_is_fed_cannot_be_set() -> None:
+    with fmu_run.Fmu(built("prw_controller.fmu")) as controller, fmu_run.Fmu(built("prw_testbed.fmu")) as testbed:
+        loop = fmu_run.System({"controller": controller, "testbed": testbed}, WIRES)
+        pair = loop.instances()
+        for call in (
+            lambda: pair.set("testbed.theta1", 1.0),
+            lambda: loop.run([0, 1e-3], inputs={"testbed.theta1": 1.0}, outputs=["testbed.roll"]),
+            lambda: loop.run([0, 1e-3], start={"testbed.theta1": 1.0}, outputs=["testbed.roll"]),
+        ):
+            with pytest.raises(ValueError, match="testbed.theta1 is fed by controller.theta1, it cannot be set"):
+                call()
+        with pytest.raises(ValueError, match="of one FMU and not of a system"):
+            pair.directional_derivative("testbed.tau1", "controller.roll_ref", 1.0)
+        with pytest.raises(fmu_run.FmuError, match="system is a system, which has Co-Simulation only"):
+            loop.instances(interface="model-exchange")
+        # What an FMU refuses is told with the name of its component.
+        runs = loop.run([0, 1e-3], start={"testbed.k1": [-1.0, 90.0]}, outputs=["testbed.roll"])
+        assert list(runs.errors) == [0] and "testbed: " in runs.errors[0] and "k1" in runs.errors[0]
+
+
+def test_algebraic_loops_are_named(unruly) -> None:
+    """Its outputs may depend on anything, as far as its description tells."""
+    with fmu_run.Fmu(unruly) as fmu:
+        with pytest.raises(ValueError, match="an algebraic loop: a.instances -> a.count; .* Order Jacobi"):
+            fmu_run.System({"a": fmu}, {"a.instances": "a.count"})
+        delayed = fmu_run.System({"a": fmu}, {"a.instances": "a.count"}, order="jacobi")
+        assert delayed.run([0.0, 1.0], outputs=["a.count"])["a.count"][0, 1] == 1
+        with pytest.raises(fmu_run.FmuError, match="only once in a process"):
+            fmu_run.System({"a": fmu, "b": fmu})
+
+
+def rewritten(folder, change) -> str:
+    """The closed loop's SSP with another system structure."""
+    source, to = built("prw_closed_loop.ssp"), folder / "changed.ssp"
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(to, "w") as new:
+        for name in old.namelist():
+            text = old.read(name)
+            new.writestr(name, change(text.decode()) if name == "SystemStructure.ssd" else text)
+    return str(to)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
+    ssp = fmu_run.System(built("prw_closed_loop.ssp"), order=order)
+    with fmu_run.Fmu(built("prw_controller.fmu")) as controller, fmu_run.Fmu(built("prw_testbed.fmu")) as testbed:
+        wired = fmu_run.System({"controller": controller, "testbed": testbed}, WIRES, order=order)
+        goal = {
+            "controller.pitch_ref": np.deg2rad(30.0),
+            "controller.roll_ref": np.deg2rad(60.0),
+            "testbed.use_omega": "true",
+        }
+        time = np.linspace(0.0, 0.5, 501)
+        expected = wired.run(time, start=goal, outputs=["testbed.pitch", "testbed.roll"])
+    # Its connectors have the names that the system gives them, and its start values are there.
+    found = ssp.run(time, outputs=["pitch", "roll"])
+    assert all(np.array_equal(found[name], expected[f"testbed.{name}"]) for name in ("pitch", "roll"))
+    assert ssp.stop_time == 1.0 and ssp.variables["pitch_ref"].unit == "rad" and ssp.name == "prw_closed_loop"
+    other = ssp.run(time, start={"pitch_ref": (10.0, "deg")}, inputs={"roll_ref": 0.0}, outputs=["pitch", "roll"])
+    assert abs(np.rad2deg(other["pitch"][0, -1]) - 10.0) < 0.2 and np.abs(other["roll"][0, -1]) < 1e-3
+
+    # The same in a system of its own within the system.
+    def nested(text: str) -> str:
+        begin, end = text.index('<ssd:Component name="controller"'), text.index('<ssd:Component name="testbed"')
+        connectors = re.search(r"<ssd:Connectors>.*?</ssd:Connectors>", text[begin:end], re.S)
+        assert connectors
+        inner = (
+            "".join(
+                f'<ssd:Connection startElement="{a}" startConnector="{name}" endElement="{b}" endConnector="{name}"/>'
+                for name, kind in re.findall(r'name="(\w+)" kind="(\w+)"', connectors[0])
+                for a, b in [("", "controller") if kind == "input" else ("controller", "")]
+            )
+            .replace('startElement="" ', "")
+            .replace('endElement="" ', "")
+        )
+        component = f'<ssd:System name="laws">{connectors[0]}<ssd:Elements>{text[begin:end]}</ssd:Elements>'
+        rest = text[end:].replace('Element="controller"', 'Element="laws"')
+        return text[:begin] + component + f"<ssd:Connections>{inner}</ssd:Connections></ssd:System>" + rest
+
+    deep = fmu_run.System(rewritten(tmp_path, nested), order=order)
+    again = deep.run(time, outputs=["pitch", "laws.controller.theta1"])
+    assert np.array_equal(again["pitch"], found["pitch"]) and np.ptp(again["laws.controller.theta1"]) > 0.1
+
+
+@pytest.mark.parametrize(
+    "old, new, complaint",
+    [
+        ("</ssd:SystemStructureDescription>", "", "SystemStructure.ssd is no XML"),
+        ("resources/prw_testbed.fmu", "resources/other.fmu", "component testbed: resources/other.fmu: cannot be opened"),
+        ("x-fmu-sharedlibrary\" source=\"resources/prw_t", "x-ssp\" source=\"resources/prw_t", "component testbed is no FMU"),
+        ("resources/testbed.ssv", "resources/none.ssv", "there is no readable resources/none.ssv"),
+        ("<ssd:Component name=\"testbed\"", "<ssd:Component", "a Component lacks name"),
+        ("endConnector=\"roll\"/>", "endConnector=\"roll\"><ssc:LinearTransformation factor=\"2\"/></ssd:Connection>", "LinearTransformation"),
+    ],
+)  # fmt: skip
+def test_ssps_that_cannot_be_run(old, new, complaint, tmp_path) -> None:
+    with pytest.raises(fmu_run.FmuError, match=complaint):
+        fmu_run.System(rewritten(tmp_path, lambda text: text.replace(old, new)))
+    with pytest.raises(fmu_run.FmuError, match="it is no SSP"):
+        fmu_run.System(built("prw_testbed.fmu"))
+    with pytest.raises(ValueError, match="an SSP has its own connections"):
+        fmu_run.System(built("prw_closed_loop.ssp"), {})
+
+
+def test_one_input_of_the_system_feeds_several(tmp_path) -> None:
+    def both(text: str) -> str:
+        return text.replace('startConnector="roll_ref"', 'startConnector="pitch_ref"')
+
+    with fmu_run.System(rewritten(tmp_path, both)) as loop:
+        one = loop.instances()
+        one.set("pitch_ref", 0.25)
+        assert list(one.get(["controller.pitch_ref", "controller.roll_ref"])[0]) == [0.25, 0.25]
+        runs = loop.run([0.0, 0.1], start={"pitch_ref": [0.1, 0.2]}, outputs=["controller.roll_ref", "pitch_ref"])
+        for name, run in product(("controller.roll_ref", "pitch_ref"), (0, 1)):
+            assert runs[name][run, 0] == (0.1, 0.2)[run]
