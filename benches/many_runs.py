@@ -56,7 +56,7 @@ class Case:
         identifier = self.description.coSimulation.modelIdentifier
         library = self.folder / "binaries" / "linux64" / f"{identifier}.so"
         lists = (",".join(map(str, references)) for references in self.references)
-        command = [ROOT / "target/bench/loop", library, self.description.guid, self.runs, SAMPLES, STEP, *lists]
+        command = [ROOT / "target/bench/loop", library, self.description.guid, self.runs, SAMPLES, STEP, *lists, 1]
         done = subprocess.run(
             [str(word) for word in command], input=self.table.tobytes(), capture_output=True, check=True
         )

@@ -13,7 +13,7 @@ from built import ROOT
 from lagrange import linear_model, table_1
 from reference import at_rest, follow
 
-NAMES = ("lqr", "quiet_motion", "identify", "tolerances")
+NAMES = ("lqr", "quiet_motion", "identify", "tolerances", "gains")
 #: The eigenvalues of eq. (11) with Table 1, 1/s, those with positive imaginary parts for their pairs.
 POLES = np.array([-174.87270665, -174.36733032, -18.94465405 + 32.14568305j, -9.68285129 + 34.67786598j])
 
@@ -116,6 +116,14 @@ def test_blame_is_the_variance_that_a_parameter_makes_alone(tolerances: Any, mon
         monkeypatch.setattr(tolerances, "TOLERANCES", others)
         for axis, alone in variances().items():
             assert shares[axis][name] == pytest.approx(alone / whole[axis], abs=0.1), (axis, name)
+
+
+def test_tuned_gains_serve_more_wrists() -> None:
+    gains = importlib.import_module("gains")
+    figure, found = gains.main(wrists=6)
+    most = {name: np.percentile(times, 95) for name, times in found.items()}
+    assert 0.3 < most["tuned"] <= most["as shipped"] < 0.8
+    assert len(figure.axes) == 3
 
 
 def test_identify_finds_the_pretended_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

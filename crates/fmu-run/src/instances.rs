@@ -9,7 +9,6 @@ use crate::selection::{Place, Selection};
 use crate::start::{Start, StartValues};
 use crate::system::System;
 use fmi_abi::{BaseType, Interface};
-use rayon::prelude::*;
 
 /// How instances are made.
 #[derive(Clone, Debug)]
@@ -117,7 +116,7 @@ impl System {
         let start = StartValues::of(self, &[])?;
         let one = || One { instance: None, error: None, own: Own::default() };
         let threads = self.threads(setup.interface, setup.threads)?.min(setup.count);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads - 1);
         let pool = (threads > 1).then(|| pool.build()).transpose();
         let mut instances = Instances {
             system: self.clone(),
@@ -542,22 +541,7 @@ impl Instances {
                 row.fill(f64::NAN);
             }
         };
-        let (Some(pool), 1..) = (&self.pool, length) else {
-            let mut rows = values.chunks_exact_mut(length.max(1));
-            for (place, one) in self.all.iter_mut().enumerate() {
-                body(place, one, rows.next().unwrap_or_default());
-            }
-            return;
-        };
-        let part = self.all.len().div_ceil(pool.current_num_threads());
-        pool.install(|| {
-            let parts = self.all.par_chunks_mut(part).zip(values.par_chunks_mut(part * length));
-            parts.enumerate().for_each(|(number, (all, values))| {
-                for (k, (one, row)) in all.iter_mut().zip(values.chunks_exact_mut(length)).enumerate() {
-                    body(number * part + k, one, row);
-                }
-            });
-        });
+        in_parts(self.pool.as_ref(), &mut self.all, length, values, body);
     }
 }
 
@@ -591,7 +575,7 @@ fn initialize(
     Ok(event)
 }
 
-/// Each of those that the mask has, in parts as there are threads.
+/// Each of those that the mask has.
 fn each(
     pool: Option<&rayon::ThreadPool>,
     all: &mut [One],
@@ -601,23 +585,42 @@ fn each(
     if let Some(mask) = mask {
         assert_eq!(mask.len(), all.len(), "a truth value for each instance");
     }
-    let is_meant = |place: usize| mask.is_none_or(|mask| mask[place]);
-    let one = |(place, one): (usize, &mut One)| {
-        if is_meant(place) {
+    in_parts(pool, all, 0, &mut [], |place, one, _| {
+        if mask.is_none_or(|mask| mask[place]) {
             body(place, one);
         }
-    };
-    match pool {
-        None => all.iter_mut().enumerate().for_each(one),
-        Some(pool) => {
-            let part = all.len().div_ceil(pool.current_num_threads());
-            pool.install(|| {
-                all.par_chunks_mut(part).enumerate().for_each(|(number, all)| {
-                    all.iter_mut().enumerate().for_each(|(k, each)| one((number * part + k, each)));
-                });
-            });
+    });
+}
+
+/// Each with its row of so many values, in as many parts as there are threads: one here, one in each thread of the pool.
+fn in_parts(
+    pool: Option<&rayon::ThreadPool>,
+    all: &mut [One],
+    length: usize,
+    values: &mut [f64],
+    body: impl Fn(usize, &mut One, &mut [f64]) + Sync,
+) {
+    let work = |first: usize, all: &mut [One], values: &mut [f64]| {
+        let mut rows = values.chunks_exact_mut(length.max(1));
+        for (k, one) in all.iter_mut().enumerate() {
+            body(first + k, one, rows.next().unwrap_or_default());
         }
-    }
+    };
+    let Some(pool) = pool else { return work(0, all, values) };
+    let part = all.len().div_ceil(pool.current_num_threads() + 1);
+    // What waits in another thread needs time to wake; this one is awake.
+    pool.in_place_scope(|scope| {
+        let (own, others) = all.split_at_mut(part);
+        let (own_values, other_values) = values.split_at_mut(part * length);
+        let mut rest = other_values;
+        for (number, others) in others.chunks_mut(part).enumerate() {
+            let (now, after) = std::mem::take(&mut rest).split_at_mut(others.len() * length);
+            rest = after;
+            let work = &work;
+            scope.spawn(move |_| work((number + 1) * part, others, now));
+        }
+        work(0, own, own_values);
+    });
 }
 
 /// A row for each instance, or one for all.

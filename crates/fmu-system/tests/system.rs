@@ -81,8 +81,14 @@ fn what_does_not_fit_is_named() {
     for (change, message) in [
         ((|s| s.connections.push(("plant.y", "law.x"))) as fn(&mut System), "no FMU has a variable law.x"),
         (|s| s.connections.push(("plant.u", "law.y")), "plant.u is input, not output"),
-        (|s| s.connections.push(("plant.delay", "law.r")), "plant.delay cannot feed law.r: the one is in s, the other in rad"),
-        (|s| s.connections.push(("plant.y", "law.n")), "plant.y cannot feed law.n: the one is Real, the other Integer"),
+        (
+            |s| s.connections.push(("plant.delay", "law.r")),
+            "plant.delay cannot feed law.r: the one is in s, the other in rad",
+        ),
+        (
+            |s| s.connections.push(("plant.y", "law.n")),
+            "plant.y cannot feed law.n: the one is Real, the other Integer",
+        ),
         (|s| s.connections.push(("plant.y", "law.r")), "law.r is fed twice"),
         (|s| s.outputs.push(("x", "plant.on")), "plant.on is parameter, not output"),
         (|s| s.start.push(("plant.y", "0".into())), "plant.y is output and takes no start value"),
