@@ -76,7 +76,6 @@ struct One {
 struct Own {
     time: f64,
     event: Event,
-    buffer: Vec<f64>,
 }
 
 /// States that [`Instances`] have saved, one for each that had not dropped out. They are places among
@@ -218,9 +217,7 @@ impl Instances {
     pub fn set(&mut self, variables: &Selection, values: &[f64], mask: Mask) -> Result<(), Error> {
         variables.check(values)?;
         let rows = rows(variables.len(), values.len(), self.len());
-        self.alive(mask, |place, own, instance| {
-            instance.set(variables, &mut own.buffer, rows.of(values, place))
-        });
+        self.alive(mask, |place, _, instance| instance.set(variables, rows.of(values, place)));
         Ok(())
     }
 
@@ -229,9 +226,7 @@ impl Instances {
     /// # Panics
     /// When there is room for another number of values.
     pub fn get(&mut self, variables: &Selection, values: &mut [f64]) {
-        self.fill(variables.len(), values, |own, instance, row| {
-            instance.get(variables, &mut own.buffer, row)
-        });
+        self.fill(variables.len(), values, |instance, row| instance.get(variables, row));
     }
 
     /// Steps of Co-Simulation of this size, s.
@@ -269,10 +264,10 @@ impl Instances {
         set.check(values)?;
         let rows = rows(set.len(), values.len(), self.len());
         self.fill_by_place(get.len(), read, |place, own, instance, row| {
-            instance.set(set, &mut own.buffer, rows.of(values, place))?;
+            instance.set(set, rows.of(values, place))?;
             instance.step(own.time, size)?;
             own.time += size;
-            instance.get(get, &mut own.buffer, row)
+            instance.get(get, row)
         });
         Ok(())
     }
@@ -399,7 +394,7 @@ impl Instances {
     /// As [`get`](Self::get).
     pub fn get_output_derivatives(&mut self, outputs: &Selection, values: &mut [f64]) -> Result<(), Error> {
         let (references, orders) = (self.real(outputs)?, vec![1; outputs.len()]);
-        self.fill(outputs.len(), values, |_, instance, row| {
+        self.fill(outputs.len(), values, |instance, row| {
             instance.sole().get_output_derivatives(references, &orders, row)
         });
         Ok(())
@@ -432,9 +427,7 @@ impl Instances {
     /// # Panics
     /// When there is room for another number of values.
     pub fn get_continuous(&mut self, what: Continuous, values: &mut [f64]) {
-        self.fill(self.continuous(what), values, |_, instance, row| {
-            instance.sole().get_continuous(what, row)
-        });
+        self.fill(self.continuous(what), values, |instance, row| instance.sole().get_continuous(what, row));
     }
 
     /// How many there are of these.
@@ -458,7 +451,7 @@ impl Instances {
         let rows = rows(set.len(), values.len(), self.len());
         self.alive(mask, |place, own, instance| {
             instance.sole().enter_event_mode()?;
-            instance.set(set, &mut own.buffer, rows.of(values, place))?;
+            instance.set(set, rows.of(values, place))?;
             own.event = instance.sole().event()?;
             instance.sole().enter_continuous_time_mode()
         });
@@ -471,7 +464,7 @@ impl Instances {
     /// # Panics
     /// When there is no room for two values of each.
     pub fn completed_integrator_step(&mut self, wanted: &mut [f64]) {
-        self.fill(2, wanted, |_, instance, row| {
+        self.fill(2, wanted, |instance, row| {
             row.copy_from_slice(
                 &instance.sole().completed_integrator_step()?.map(|wanted| f64::from(u8::from(wanted))),
             );
@@ -523,9 +516,9 @@ impl Instances {
         &mut self,
         length: usize,
         values: &mut [f64],
-        body: impl Fn(&mut Own, &mut Running, &mut [f64]) -> Result<(), Refusal> + Sync,
+        body: impl Fn(&mut Running, &mut [f64]) -> Result<(), Refusal> + Sync,
     ) {
-        self.fill_by_place(length, values, |_, own, instance, row| body(own, instance, row));
+        self.fill_by_place(length, values, |_, _, instance, row| body(instance, row));
     }
 
     /// A row of values of each; not a number of those that have dropped out.

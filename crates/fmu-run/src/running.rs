@@ -73,8 +73,8 @@ impl Running {
     /// Before the first step outputs may depend on inputs otherwise than later. They are passed on until they no longer
     /// change; in Jacobi's order as often as there are components, as libcosim does.
     fn agree(&mut self) -> Result<(), Refusal> {
-        let system = self.system.clone();
-        let Exchange { order, stages } = system.exchange();
+        let Exchange { order, stages } = self.system.exchange();
+        let order = *order;
         let most = match order {
             _ if stages.is_empty() => return Ok(()),
             Order::Jacobi => self.parts.len(),
@@ -83,12 +83,7 @@ impl Running {
         let mut before: Vec<u64> = Vec::new();
         for _ in 0..most {
             let mut now = Vec::new();
-            for stage in stages {
-                self.row.resize(stage.outputs.len(), 0.0);
-                stage.outputs.get(&mut self.parts, &mut self.buffer, &mut self.row)?;
-                now.extend(self.row.iter().map(|value| value.to_bits()));
-                stage.inputs.set(&mut self.parts, &mut self.buffer, &self.row)?;
-            }
+            self.pass_all_on(|values| now.extend(values.iter().map(|value| value.to_bits())))?;
             if now == before {
                 return Ok(());
             }
@@ -106,14 +101,15 @@ impl Running {
     /// Feeds the inputs, if they are to be fed.
     #[inline]
     fn pass_on(&mut self) -> Result<(), Refusal> {
-        if self.is_due { self.pass_all_on() } else { Ok(()) }
+        if self.is_due { self.pass_all_on(|_| ()) } else { Ok(()) }
     }
 
-    fn pass_all_on(&mut self) -> Result<(), Refusal> {
+    fn pass_all_on(&mut self, mut told: impl FnMut(&[f64])) -> Result<(), Refusal> {
         let Self { parts, system, row, buffer, .. } = self;
         for stage in &system.exchange().stages {
             row.resize(stage.outputs.len(), 0.0);
             stage.outputs.get(parts, buffer, row)?;
+            told(row);
             stage.inputs.set(parts, buffer, row)?;
         }
         self.is_due = false;
@@ -162,19 +158,14 @@ impl Running {
     }
 
     #[inline]
-    pub fn get(
-        &mut self,
-        variables: &Selection,
-        buffer: &mut Vec<f64>,
-        row: &mut [f64],
-    ) -> Result<(), Refusal> {
+    pub fn get(&mut self, variables: &Selection, row: &mut [f64]) -> Result<(), Refusal> {
         self.pass_on()?;
-        variables.get(&mut self.parts, buffer, row)
+        variables.get(&mut self.parts, &mut self.buffer, row)
     }
 
     #[inline]
-    pub fn set(&mut self, variables: &Selection, buffer: &mut Vec<f64>, row: &[f64]) -> Result<(), Refusal> {
-        variables.set(&mut self.parts, buffer, row)?;
+    pub fn set(&mut self, variables: &Selection, row: &[f64]) -> Result<(), Refusal> {
+        variables.set(&mut self.parts, &mut self.buffer, row)?;
         let Exchange { order, stages } = self.system.exchange();
         self.is_due |= *order == Order::Dependencies && !stages.is_empty();
         Ok(())

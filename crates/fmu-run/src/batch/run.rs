@@ -156,11 +156,10 @@ struct Room<'a> {
     /// What the inputs of this run do.
     inputs: Vec<ByTime<'a>>,
     derivatives: Vec<ByTime<'a>>,
-    /// What goes to the FMU in one call, and comes from it.
+    /// What goes to the FMU in one call.
     set: Vec<f64>,
     slopes: Vec<f64>,
     orders: Vec<i32>,
-    got: Vec<f64>,
     /// The outputs of a time, in their order.
     row: Vec<f64>,
     /// How many times the run has reached.
@@ -176,7 +175,6 @@ impl<'a> Room<'a> {
             set: vec![0.0; plan.inputs.variables.len()],
             slopes: vec![0.0; plan.derivatives.variables.len()],
             orders: vec![1; plan.derivatives.variables.len()],
-            got: Vec::with_capacity(plan.outputs.len()),
             row: vec![0.0; plan.outputs.len()],
             rows: 0,
             measured: Measured::new(plan.measures, plan.outputs.len()),
@@ -284,7 +282,7 @@ fn follow(
         }
         let keep = wait == 0 && place < kept;
         if (keep || measures)
-            && let Err(refusal) = instance.get(&plan.outputs, &mut room.got, &mut room.row)
+            && let Err(refusal) = instance.get(&plan.outputs, &mut room.row)
         {
             return Err(at(ended.unwrap_or(refusal)));
         }
@@ -347,7 +345,7 @@ fn set_values(plan: &Plan, instance: &mut Running, room: &mut Room, time: usize)
         return Ok(());
     }
     fill(&mut room.set, &room.inputs, time);
-    instance.set(&plan.inputs.variables, &mut room.got, &room.set)
+    instance.set(&plan.inputs.variables, &room.set)
 }
 
 #[inline]
