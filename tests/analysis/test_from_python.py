@@ -66,6 +66,12 @@ def test_priors_fixed_values_and_bounds(recording, fmu, experiment):
     assert found.parameters["J2"].relative <= 0.0201 and found.parameters["J2"].prior == (0.004, 0.02)
 
 
+def test_either_version_of_fmi(recording, fmu, found):
+    again = prw.identify(recording, fmu=fmu.parent / "fmi3" / fmu.name)
+    assert again.values == found.values and again.known.real == found.known.real
+    assert again.to_ssv() == found.to_ssv()
+
+
 def test_what_stays_open_is_no_error(tmp_path, fmu):
     rig.write(tmp_path / "run.csv", rig.measure(rig.experiment(3, 5, pattern="equal"), 1, ("tau1", "tau2")))
     found = prw.identify(tmp_path / "run.csv", estimate=["k2", "J3"], starts=1, fmu=fmu)

@@ -117,6 +117,6 @@ def test_complaints(fmu, arguments, complaint):
 
 def test_no_fmu(tmp_path):
     (tmp_path / "no.fmu").write_text("not a zip")
-    for name, complaint in (("absent.fmu", "no such FMU"), ("no.fmu", "cannot be read")):
+    for name, complaint in (("absent.fmu", "no such FMU"), ("no.fmu", "cannot be loaded")):
         with pytest.raises(UserError, match=complaint):
             linearize(tmp_path / name)

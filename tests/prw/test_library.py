@@ -198,7 +198,6 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, testbed: Pa
     for call, package, extra in [
         (run.plot, "matplotlib", "plot"),
         (run.to_pandas, "pandas", "pandas"),
-        (prw.linearize, "fmpy", "linearize"),
         (prw.sweep, "pyarrow", "sweep"),
     ]:
         with pytest.raises(prw.UserError, match=rf"{package} missing; .*pip install 'prw\[{extra}\]'"):

@@ -39,6 +39,8 @@ def test_one_instance_for_many(pendulum: Path) -> None:
             assert linearizer.at({"stiffness": k, "angle": 0.0}).A[1, 0] == -k
         with pytest.raises(prw.UserError, match="stiffness: 'soft' is not a value of type"):
             linearizer.at({"stiffness": "soft"})
+        with pytest.raises(prw.UserError, match="stiffness: None is not a value of type"):
+            linearizer.at({"stiffness": None})
         model = linearizer.at()
         assert model.A[1, 0] == pytest.approx(-9 * np.cos(0.5), rel=1e-15)
         np.testing.assert_array_equal(model.C, [[0, 1]])
@@ -108,7 +110,7 @@ def _description(fmu: Path) -> str:
 
 
 def test_each_one_hears_its_own_fmu(testbed: Path, tmp_path: Path) -> None:
-    """FMPy would crash in the second half: messages would go to the one that is gone. In a process of its own."""
+    """Also when others are gone. In a process of its own, which a message to one of those would end."""
     program = f"""
 import gc, prw
 first = prw.Linearizer({str(testbed)!r})

@@ -43,6 +43,14 @@ def existing_fmu(fmu: str | os.PathLike[str] | None) -> Path:
     return path
 
 
+def loaded(fmu: Path) -> fmu_run.Fmu:
+    """The FMU file, loaded. Raises UserError where that is impossible."""
+    try:
+        return fmu_run.Fmu(fmu)
+    except fmu_run.FmuError as error:
+        raise UserError(f"{fmu}: cannot be loaded ({str(error).removeprefix(f'{fmu}: ')})") from None
+
+
 class Testbed:
     """The testbed FMU, loaded once for any number of runs. A context manager: leaving it unloads the library and
     removes the unpacked files.
@@ -56,10 +64,7 @@ class Testbed:
     def __init__(self, fmu: Path | None = None):
         """Unpack and load the FMU file `fmu` (default: see `default_fmu`)."""
         fmu = existing_fmu(fmu)
-        try:
-            self.loaded = fmu_run.Fmu(fmu)
-        except fmu_run.FmuError as error:
-            raise UserError(f"{fmu}: cannot be loaded ({str(error).removeprefix(f'{fmu}: ')})") from None
+        self.loaded = loaded(fmu)
         missing = [name for name in (*ANGLES, "use_omega", *OUTPUTS) if name not in self.loaded.variables]
         if missing:
             self.close()
