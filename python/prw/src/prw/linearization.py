@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from numbers import Real
 from typing import Any, Literal
 
 import fmu_run
 import numpy as np
 
+from prw.arguments import names_of
 from prw.description import CONTINUOUS, read_description
 from prw.errors import UserError
 from prw.state_space import StateSpace
@@ -24,21 +25,21 @@ HELD: dict[str, Literal["co-simulation", "model-exchange"]] = {
 
 
 def linearize(
-    fmu: str | os.PathLike[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
     *,
-    outputs: Sequence[str] | None = None,
+    fmu: str | os.PathLike[str] | None = None,
+    outputs: str | Iterable[str] | None = None,
     fmi_type: str | None = None,
 ) -> StateSpace:
     """The linear model of any FMU of FMI 2.0 or 3.0 that has directional derivatives, at its initial state.
 
     Parameters
     ----------
-    fmu
-        The FMU (default: the testbed's).
     parameters
         Start values of parameters, states and inputs by name, in the FMU's units; others keep their own. The
         testbed is linear, so of these only parameters matter there.
+    fmu
+        The FMU (default: the testbed's).
     outputs, fmi_type
         As for `Linearizer`, which is faster where this is asked for again and again.
 
@@ -68,7 +69,7 @@ class Linearizer:
         self,
         fmu: str | os.PathLike[str] | None = None,
         *,
-        outputs: Sequence[str] | None = None,
+        outputs: str | Iterable[str] | None = None,
         fmi_type: str | None = None,
     ):
         self.fmu = existing_fmu(fmu)
@@ -79,13 +80,13 @@ class Linearizer:
             self.loaded.close()
             raise
 
-    def _look(self, outputs: Sequence[str] | None, fmi_type: str | None) -> None:
+    def _look(self, outputs: str | Iterable[str] | None, fmi_type: str | None) -> None:
         """Find what there is to linearize. Raises UserError."""
         description, variables = read_description(self.fmu), self.loaded.variables
         self._interface = HELD[self._chosen(fmi_type, description.directional, description.attribute)]
         self.states = tuple(description.derivatives)
         self.inputs = tuple(v.name for v in variables.values() if v.causality == "input" and v.type in CONTINUOUS)
-        self.outputs = tuple(description.outputs if outputs is None else outputs)
+        self.outputs = description.outputs if outputs is None else names_of("outputs", outputs)
         for name in self.outputs:
             if name not in description.outputs and name not in self.states:
                 choice = ", ".join(dict.fromkeys([*description.outputs, *self.states]))
@@ -107,6 +108,8 @@ class Linearizer:
         units); others keep the FMU's own. Raises UserError for a name or a value that the FMU does not take."""
         if self._closed:
             raise UserError(f"{self.fmu}: is closed")
+        if parameters is not None and not isinstance(parameters, Mapping):
+            raise UserError(f"parameters: {parameters!r} are no values by name; an FMU is named by `fmu=`")
         start = {name: self._start(name, value) for name, value in (parameters or {}).items()}
         table = np.zeros((len(self._knowns), len(self._unknowns)))
         try:

@@ -44,7 +44,7 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw linearize`. Raises UserError with one line on what is wrong."""
     model = linearize(
-        arguments.fmu, {name: _number(name, text) for name, text in pairs(arguments.set, "--set").items()}
+        {name: _number(name, text) for name, text in pairs(arguments.set, "--set").items()}, fmu=arguments.fmu
     )
     with replacing(arguments.out) as temporary:
         temporary.write_text(json.dumps(content(model), indent=2) + "\n", encoding="utf-8")
