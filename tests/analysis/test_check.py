@@ -178,7 +178,9 @@ def test_two_components_with_one_name(right, soft, fmu, tmp_path):
     assert prw.check(path, fmu=fmu).agrees
     assert not prw.check(path, component="other", fmu=fmu).agrees
     path = write_csv(tmp_path / "either.csv", {"time": right["time"], "a.roll": right["roll"], "b.roll": soft["roll"]})
-    with pytest.raises(prw.UserError, match="component: there are several roll in .*, of the components a, b; say which"):
+    with pytest.raises(
+        prw.UserError, match="component: there are several roll in .*, of the components a, b; say which"
+    ):
         prw.check(path, fmu=fmu)
 
 

@@ -14,17 +14,22 @@ Values are in the FMU's units, which `Fmu.variables` tells. FMI 2.0 and 3.0.
 
 from __future__ import annotations
 
+import importlib
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fmu_run._native import Fmu as _Loaded
 from fmu_run._native import FmuError, Instances, States
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 __all__ = ["Fmu", "FmuError", "Instances", "Measure", "Runs", "States", "Variable"]
 
@@ -54,7 +59,7 @@ class Runs(Mapping[str, _Array]):
 
     runs["roll"]: (runs, times), what was kept. runs["roll", "peak"]: (runs,). Where a run has not reached a time there is
     not a number. Nor are there measures of a run that the FMU refused; those of one that it ended are of the times until
-    then.
+    then. As a mapping it has the courses by output, none where only measures were asked for; it is true all the same.
     """
 
     #: (times,), s: the times that were kept.
@@ -64,6 +69,8 @@ class Runs(Mapping[str, _Array]):
     errors: dict[int, str]
     #: What is to be said of finished runs: that the FMU ended at the last time by itself, or refused to be terminated.
     notes: dict[int, str]
+    #: (runs,): the start values that were given, by name; those that are texts as they are.
+    start: dict[str, _Array | str]
 
     def __init__(
         self,
@@ -74,8 +81,13 @@ class Runs(Mapping[str, _Array]):
         measured: _Array,
         errors: dict[int, str],
         notes: dict[int, str],
+        start: Mapping[str, float | str | _Array],
     ):
         self.time, self.errors, self.notes = time, errors, notes
+        runs = courses.shape[0]
+        self.start = {
+            name: value if isinstance(value, str) else np.broadcast_to(value, runs) for name, value in start.items()
+        }
         self._outputs = {name: place for place, name in enumerate(outputs)}
         self._measures = {name: place for place, name in enumerate(measures)}
         self._courses, self._measured = courses, measured
@@ -113,6 +125,44 @@ class Runs(Mapping[str, _Array]):
 
     def __len__(self) -> int:
         return len(self._outputs) if self._courses.shape[2] else 0
+
+    def __bool__(self) -> bool:
+        return True
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row for each run and each time that was kept, with both as index; for each run alone where there are only
+        measures.
+
+        The columns: start values by name, outputs by name, measures as `roll_peak`; what belongs to a run stands in all of its
+        rows. A start value of an output is called `roll at start`. Raises ImportError without pandas.
+        """
+        pandas = _needed("pandas")
+        runs = np.arange(self.count)
+        index, repeat = pandas.Index(runs, name="run"), 1
+        if len(self):
+            index, repeat = pandas.MultiIndex.from_product([runs, self.time], names=["run", "time"]), len(self.time)
+        by_run = {**self._starts(), **self._by_name()}
+        columns = {name: v if isinstance(v, str) else np.repeat(v, repeat) for name, v in by_run.items()}
+        return pandas.DataFrame({**columns, **{name: course.ravel() for name, course in self.items()}}, index=index)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Outputs over the dimensions run and time, measures as `roll_peak` over run, start values as coordinates of run. A
+        start value of an output is called `roll at start`. Raises ImportError without xarray."""
+        xarray = _needed("xarray")
+        starts = {name: value if isinstance(value, str) else ("run", value) for name, value in self._starts().items()}
+        measures = {name: ("run", values) for name, values in self._by_name().items()}
+        times = {"time": self.time} if len(self) else {}
+        return xarray.Dataset(
+            {**{name: (("run", "time"), course) for name, course in self.items()}, **measures},
+            {"run": np.arange(self.count), **times, **starts},
+        )
+
+    def _starts(self) -> dict[str, _Array | str]:
+        return {f"{name} at start" if name in self else name: value for name, value in self.start.items()}
+
+    def _by_name(self) -> dict[str, _Array]:
+        names = [(output, measure) for output in self._outputs for measure in self._measures]
+        return {f"{output}_{measure}": self[output, measure] for output, measure in names}
 
     def __repr__(self) -> str:
         measures = f", measures {', '.join(self._measures)}" if self._measures else ""
@@ -194,11 +244,12 @@ class Fmu:
         kept = 1 if every is None and not wanted else every
         if kept is not None and kept < 1:
             raise ValueError(f"every must be at least 1, it is {kept}")
+        starts = [(name, _start(name, value)) for name, value in (start or {}).items()]
         courses, measured, errors, notes = self._loaded.run(
             times,
             [(name, _course(name, values, len(times))) for name, values in (inputs or {}).items()],
             [(name, _course(name, values, len(times))) for name, values in (input_derivatives or {}).items()],
-            [(name, _start(name, value)) for name, value in (start or {}).items()],
+            starts,
             names,
             kept,
             wanted,
@@ -207,7 +258,7 @@ class Fmu:
             progress,
         )
         kept_times = times[:: kept or len(times)][: courses.shape[2]]
-        return Runs(kept_times, names, courses, wanted, measured, dict(errors), dict(notes))
+        return Runs(kept_times, names, courses, wanted, measured, dict(errors), dict(notes), dict(starts))
 
     def instances(
         self,
@@ -243,6 +294,13 @@ class Fmu:
             If the FMU has no such interface, or refuses all of them.
         """
         return Instances(self._loaded, count, interface, dict(start or {}), start_time, stop_time, threads)
+
+
+def _needed(package: str) -> Any:
+    try:
+        return importlib.import_module(package)
+    except ImportError:
+        raise ImportError(f"{package} is missing; install it with: pip install {package}", name=package) from None
 
 
 def _array(name: str, values: ArrayLike) -> _Array:
