@@ -103,8 +103,10 @@ def test_unknown_names(pendulum: Path) -> None:
 
 
 def test_an_fmu_in_place_of_the_parameters(testbed: Path) -> None:
-    with pytest.raises(prw.UserError, match="parameters: .* are no values by name; an FMU is named by `fmu=`"):
-        prw.linearize(testbed)  # type: ignore[arg-type]
+    with pytest.raises(
+        prw.UserError, match="parameters: .* is no JSON file with values by name; an FMU is named by `fmu`"
+    ):
+        prw.linearize(testbed)
 
 
 def _description(fmu: Path) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from prw.arguments import names_of
 from prw.description import CONTINUOUS, read_description
 from prw.errors import UserError
+from prw.parameters import Given, values_of
 from prw.state_space import StateSpace
 from prw.testbed import existing_fmu, loaded
 
@@ -25,7 +26,7 @@ HELD: dict[str, Literal["co-simulation", "model-exchange"]] = {
 
 
 def linearize(
-    parameters: Mapping[str, Any] | None = None,
+    parameters: Given = None,
     *,
     fmu: str | os.PathLike[str] | None = None,
     outputs: str | Iterable[str] | None = None,
@@ -36,7 +37,8 @@ def linearize(
     Parameters
     ----------
     parameters
-        Start values of parameters, states and inputs by name, in the FMU's units; others keep their own. The
+        Start values of parameters, states and inputs by name, in the FMU's units, or the JSON file with them that
+        `prw.identify` writes; others keep their own. The
         testbed is linear, so of these only parameters matter there.
     fmu
         The FMU (default: the testbed's).
@@ -103,14 +105,13 @@ class Linearizer:
         self._given: set[str] = set()
         self._closed = False
 
-    def at(self, parameters: Mapping[str, Any] | None = None) -> StateSpace:
+    def at(self, parameters: Given = None) -> StateSpace:
         """The linear model with start values `parameters` (of parameters, states and inputs, by name, in the FMU's
-        units); others keep the FMU's own. Raises UserError for a name or a value that the FMU does not take."""
+        units, or a file with them); others keep the FMU's own. Raises UserError for a name or a value that the FMU does not take."""
         if self._closed:
             raise UserError(f"{self.fmu}: is closed")
-        if parameters is not None and not isinstance(parameters, Mapping):
-            raise UserError(f"parameters: {parameters!r} are no values by name; an FMU is named by `fmu=`")
-        start = {name: self._start(name, value) for name, value in (parameters or {}).items()}
+        given = values_of(parameters, self.fmu, self.loaded)
+        start = {name: self._start(name, value) for name, value in given.items()}
         table = np.zeros((len(self._knowns), len(self._unknowns)))
         try:
             instance = self._initialized(start)

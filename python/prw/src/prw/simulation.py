@@ -6,7 +6,7 @@ import html
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from prw.channels import QUANTITIES, si_unit
 from prw.errors import UserError
 from prw.extras import need
 from prw.motion import Array, Motion, fig4
+from prw.parameters import Given, values_of
 from prw.recording import Recording, read_motion
 from prw.testbed import OUTPUTS, Testbed
 
@@ -97,7 +98,7 @@ class Run(Mapping[str, Array]):
 
 def simulate(
     motion: Motion | Recording | Run | str | os.PathLike[str] | Table | None = None,
-    parameters: Mapping[str, Any] | None = None,
+    parameters: Given = None,
     *,
     fmu: str | os.PathLike[str] | None = None,
     outputs: Sequence[str] = OUTPUTS,
@@ -110,7 +111,7 @@ def simulate(
         What the motors do, or a recording of it (a CSV file, a DataFrame or a dict of arrays as `prw.read` takes it;
         only its motors matter here), or a run, to be made again. Default: the paper's experiment of Fig. 4.
     parameters
-        Values in SI by name; others keep the FMU's start values.
+        Values in SI by name, or the JSON file with them that `prw.identify` writes; others keep the FMU's start values.
     fmu
         The testbed FMU, of FMI 2.0 or 3.0 (default: the one inside this package, see `default_fmu`).
     outputs
@@ -129,11 +130,12 @@ def simulate(
     course = motion_of(motion)
     names = names_of("outputs", outputs)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
-        values = testbed.with_starts(parameters or {})
+        given = values_of(parameters, testbed.fmu, testbed.loaded)
+        values = testbed.with_starts(given)
         for name in names:
             if name not in testbed.loaded.variables:
                 raise UserError(f"outputs: {name} is not known; there are {', '.join(testbed.loaded.variables)}")
-        found = testbed.respond(course, names, parameters or {})
+        found = testbed.respond(course, names, given)
     return Run(course, found, values)
 
 

@@ -65,7 +65,7 @@ class Testbed:
 
     def __init__(self, fmu: Path | None = None):
         """Unpack and load the FMU file `fmu` (default: see `default_fmu`)."""
-        fmu = existing_fmu(fmu)
+        self.fmu = fmu = existing_fmu(fmu)
         self.loaded = loaded(fmu)
         missing = [name for name in (*ANGLES, "use_omega", *OUTPUTS) if name not in self.loaded.variables]
         if missing:
