@@ -16,6 +16,8 @@ from instance import assert_close
 from lagrange import OUTPUTS
 from reference import backward_slope, follow
 
+from prw.errors import UserError
+from prw.recording import read as read_all
 from prw.recording import read_motion as read
 
 EXAMPLES = ROOT / "examples"
@@ -271,6 +273,45 @@ def test_spellings_of_one_recording(tmp_path, content):
     np.testing.assert_array_equal(motion.time, [0, 0.001, 0.002])
     np.testing.assert_array_equal(motion.theta, [[0.1, 0.2]] * 3)
     assert any("columns ignored: note" in note for note in motion.notes) == (b"note" in content)
+
+
+@pytest.mark.parametrize("delimiter, end", [(",", "\n"), (";", "\r\n"), ("\t", "\n")])
+def test_many_rows_at_a_time_are_the_rows(tmp_path, monkeypatch, delimiter, end):
+    """To the bit what Python makes of each cell, empty or not, in columns of text too; and with the same complaints."""
+    draws = np.random.default_rng(6)
+    numbers = draws.standard_normal((500, 5)) * 10.0 ** draws.integers(-310, 300, (500, 5))
+    cells = [[repr(k * 1e-3), "up", *map(repr, row.tolist())] for k, row in enumerate(numbers)]
+    for row in cells[::3]:
+        row[5:] = ["", "nan"]
+    if delimiter == ";":
+        cells = [[cell.replace(".", ",") for cell in row] for row in cells]
+    header = ["time", "state", "theta1", "theta2", "x", "tau1", "pitch"]
+    path = tmp_path / "run.csv"
+
+    def write():
+        path.write_bytes(end.join(delimiter.join(row) for row in [header, *cells, []]).encode())
+
+    write()
+    monkeypatch.setattr("prw.table.BLOCK", 1000)
+    monkeypatch.setattr("prw.table._rows", None)  # is not asked
+    recording = read_all(path)
+    expected = np.array([[float(cell.replace(",", ".") or "nan") for cell in row[2:]] for row in cells])
+    np.testing.assert_array_equal(recording["theta1"], expected[:, 0])
+    np.testing.assert_array_equal(recording["tau1"], expected[:, 3])
+    np.testing.assert_array_equal(recording["pitch"], expected[:, 4])
+    monkeypatch.undo()
+    for column, cell, complaint in [
+        (2, "", "row 402, column theta1: empty cell"),
+        (2, "1_0", "row 402, column theta1: '1_0' is not a number"),
+        (3, "inf", "row 402, column theta2: inf is not finite"),
+        (0, "0", "row 402, column time: 0 runs backwards"),
+        (1, f"up{delimiter}", "row 402: 8 cells, but the header has 7"),
+    ]:
+        before, cells[400][column] = cells[400][column], cell
+        write()
+        with pytest.raises(UserError, match=re.escape(complaint)):
+            read_all(path)
+        cells[400][column] = before
 
 
 def test_degrees(tmp_path):
