@@ -55,7 +55,7 @@ help:
 	@echo 'make source-fmu              the FMU as C sources, for real-time targets -> $(SOURCE_FMU)'
 	@echo 'make test-platforms          make it and run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make it twice and compare every byte'
-	@echo 'make study                   set up prw identify, excite, sweep and linearize  (see python/prw/tutorial.md)'
+	@echo 'make study                   set up prw identify, excite, sweep and check  (see python/prw/tutorial.md)'
 	@echo 'make monte-carlo             200 identifications of simulated rigs -> out/monte_carlo.json'
 	@echo 'make fuzz                    look for calls that break the FMU, for 10 minutes (FUZZ_SECONDS=600)'
 	@echo 'make sanitize                the tests under address, leak, thread and real-time sanitizers and valgrind'
@@ -73,7 +73,7 @@ fmu: need-rust
 test: test-rust test-python test-fmu test-closed-loop test-importers test-examples
 
 # C programs are compiled against the standard's headers, which FMPy brings.
-headers: $(VENV)/study.stamp
+headers: $(VENV)/test.stamp
 
 test-rust: need-rust headers
 	$(CARGO) fmt --all --check
@@ -101,11 +101,11 @@ test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication
 
 # Ratios of one run; quiet the machine first.
-bench: $(VENV)/study.stamp closed-loop-fmus source-fmu
+bench: $(VENV)/test.stamp closed-loop-fmus source-fmu
 	@benches/run $(FMU) $(SOURCE_FMU) $(PY)
 
 # Instructions of a step, counted by callgrind.
-profile: $(VENV)/study.stamp fmu
+profile: $(VENV)/test.stamp fmu
 	@benches/profile $(FMU) $(PY)
 
 # The figures and their copies for documentation and README.
@@ -174,7 +174,7 @@ test-reproducible: release
 	@$(DIST_VENV)/bin/python platforms/rebuild.py
 
 study: $(VENV)/study.stamp fmu
-	@echo 'ready: $(VENV)/bin/prw identify, excite, sweep and linearize (with --help); python/prw/tutorial.md shows how'
+	@echo 'ready: $(VENV)/bin/prw identify, excite, sweep and check (with --help); python/prw/tutorial.md shows how'
 
 # Takes minutes; `make test` has the short version.
 monte-carlo: $(VENV)/study.stamp fmu

@@ -15,8 +15,9 @@ from matplotlib.colors import to_rgb
 from PIL import Image, ImageSequence
 
 from prw import UserError, animate, simulate
-from prw.animation import MEASURED, RATES, angles_and_torques, still
+from prw.animation import RATES
 from prw.motion import Motion
+from prw.picture import MEASURED, angles_and_torques, still
 from prw.plots import GREEN, PURPLE
 from prw.simulation import Run
 from prw.wrist import Wrist, about_x, about_y
@@ -107,6 +108,7 @@ def test_movie(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "change, path, speed, complaint",
     [
+        ({}, "run", 1.0, "run: an animation is a .gif, an .mp4 or an .html"),
         ({}, "run.avi", 1.0, "a .gif, an .mp4 or an .html"),
         ({}, "run.gif", 0.0, "must be positive"),
         ({}, "run.gif", 1e-4, "too long; choose a speed of 0.0037"),

@@ -151,7 +151,7 @@ def test_names_units_and_separators_of_others(right, fmu, tmp_path):
     spoken.write_text("\n".join([f"# a tool's\nmode,{header}", "# begins", *(f"true,{row}," for row in rows)]))
     assert prw.check(spoken, units=dict.fromkeys(DEGREES, "deg"), fmu=fmu).agrees
     assert prw.check(plain, units=dict.fromkeys(DEGREES, "deg"), fmu=fmu).agrees
-    assert "roll looks like degrees; say so with --units roll=deg" in prw.check(plain, fmu=fmu).notes
+    assert "roll looks like degrees; say so by the units: roll=deg" in prw.check(plain, fmu=fmu).notes
 
 
 def test_of_two_rows_at_one_time_the_last_counts(right, fmu, tmp_path):
@@ -178,7 +178,9 @@ def test_two_components_with_one_name(right, soft, fmu, tmp_path):
     assert prw.check(path, fmu=fmu).agrees
     assert not prw.check(path, component="other", fmu=fmu).agrees
     path = write_csv(tmp_path / "either.csv", {"time": right["time"], "a.roll": right["roll"], "b.roll": soft["roll"]})
-    with pytest.raises(prw.UserError, match="several roll, of the components a, b; say which with --component"):
+    with pytest.raises(
+        prw.UserError, match="component: there are several roll in .*, of the components a, b; say which"
+    ):
         prw.check(path, fmu=fmu)
 
 

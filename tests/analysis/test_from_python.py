@@ -66,6 +66,12 @@ def test_priors_fixed_values_and_bounds(recording, fmu, experiment):
     assert found.parameters["J2"].relative <= 0.0201 and found.parameters["J2"].prior == (0.004, 0.02)
 
 
+def test_either_version_of_fmi(recording, fmu, found):
+    again = prw.identify(recording, fmu=fmu.parent / "fmi3" / fmu.name)
+    assert again.values == found.values and again.known.real == found.known.real
+    assert again.to_ssv() == found.to_ssv()
+
+
 def test_what_stays_open_is_no_error(tmp_path, fmu):
     rig.write(tmp_path / "run.csv", rig.measure(rig.experiment(3, 5, pattern="equal"), 1, ("tau1", "tau2")))
     found = prw.identify(tmp_path / "run.csv", estimate=["k2", "J3"], starts=1, fmu=fmu)
@@ -78,11 +84,18 @@ def test_what_stays_open_is_no_error(tmp_path, fmu):
     [
         ({"estimate": ["k9"]}, "estimate: k9 is not known; there are J2, J3, H3, k1"),
         ({"estimate": []}, "estimate: nothing is named"),
-        ({"priors": {"k1": -0.1}}, "priors k1: "),
+        ({"estimate": None}, "estimate: None is neither a name nor several"),
+        ({"priors": {"k1": -0.1}}, "priors: k1 -0.1 is not a positive number"),
+        ({"priors": {"J3": 10}}, "priors: J3 has a standard deviation of 1000%; 100 % is the most"),
+        ({"priors": {"J3": (None, 0.1)}}, "priors: J3 None is not a positive number"),
+        ({"fixed": {"k1": None}}, "fixed: k1 None is not a positive number"),
+        ({"bounds": {"k1": None}}, "bounds: k1 None; write (least, greatest)"),
         ({"fixed": {"k1": float("nan")}}, "fixed: k1 nan is not a positive number"),
         ({"bounds": {"k1": (5, 2)}}, "bounds: k1 from 5 to 2"),
         ({"noise": {"pitch": 0.1}}, "noise: pitch is not known; there are tau1"),
+        ({"noise": {"tau1": None}}, "noise: tau1 None is not a positive number"),
         ({"starts": 0}, "starts 0: at least 1"),
+        ({"starts": None}, "starts None: at least 1"),
         ({"fmu": "none.fmu"}, "none.fmu: no such FMU"),
     ],
 )
@@ -92,10 +105,33 @@ def test_what_cannot_be(recording, fmu, options, message):
     assert message in str(error.value)
 
 
+def test_files_that_are_none():
+    for files, message in (
+        (None, "None is no recording"),
+        ([None], "None is no recording"),
+        ([], "files: there are none"),
+    ):
+        with pytest.raises(prw.UserError, match=message):
+            prw.identify(files)
+
+
+def test_columns_in_memory_and_one_name(recording, fmu):
+    """A dict in place of the file, alone or in a list, and a name in place of a list of one."""
+    read = prw.read(recording)
+    columns = {name: read[name] for name in read.units}
+    expected = prw.identify(recording, estimate=["k1"], starts=1, fmu=fmu).values
+    for files in (columns, [columns]):
+        assert prw.identify(files, estimate="k1", starts=1, fmu=fmu).values == expected
+
+
 def test_excite(fmu):
     ranking = prw.excite(["tau1", "tau2"], estimate=["k1", "c3"], duration=4, rate=500, fmu=fmu)
     assert [e.typical_error for e in ranking] == sorted(e.typical_error for e in ranking)
     assert set(ranking[0].expected_errors) == {"k1", "c3"} and isinstance(ranking[0].motion, prw.Motion)
     assert np.abs(ranking[0].motion.theta).max() <= np.deg2rad(40.001)
-    with pytest.raises(prw.UserError, match="measure: tau3 is not known"):
-        prw.excite(["tau3"], fmu=fmu)
+    for arguments, message in [
+        ({"measure": "tau3"}, "measure: tau3 is not known"),
+        ({"angle": None}, "angle None is not a positive number"),
+    ]:
+        with pytest.raises(prw.UserError, match=message):
+            prw.excite(fmu=fmu, **arguments)

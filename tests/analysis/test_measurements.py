@@ -94,5 +94,5 @@ def test_what_is_wrong_is_said(file, text, message):
 
 
 def test_units_that_contradict(file):
-    with pytest.raises(UserError, match="column pitch: in deg by its header, but in rad by --units"):
+    with pytest.raises(UserError, match="column pitch: in deg by its header, but in rad by the units given"):
         read(file(lines("time,theta1,theta2,pitch [deg]")), units={"pitch": "rad"})

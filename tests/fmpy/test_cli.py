@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
+import re
 import subprocess
 import sys
 
@@ -14,6 +16,8 @@ from instance import assert_close
 from lagrange import OUTPUTS
 from reference import backward_slope, follow
 
+from prw.errors import UserError
+from prw.recording import read as read_all
 from prw.recording import read_motion as read
 
 EXAMPLES = ROOT / "examples"
@@ -63,6 +67,71 @@ def test_examples(prw, tmp_path, model, name):
     assert_close(columns, expected, 1e-10)
     for output in ("tau1", "tau2", "pitch_rate"):
         assert abs(columns[output][0]) < 1e-12, "starts with a bang"
+
+
+def test_other_parameters(prw, tmp_path, model):
+    """In units of the FMU's choice in the file that identification writes, in SI by --set, which is stronger."""
+    entries = {"k1": {"value": 2.0, "unit": "N.m/deg"}, "c3": {"value": 0.2, "unit": "N.m.s/rad"}, "N": 9, "k2": 77.0}
+    (tmp_path / "mine.json").write_text(json.dumps(entries))
+    (tmp_path / "report.json").write_text(json.dumps({"fmu": {}, "parameters": entries}))
+    (tmp_path / "good.csv").write_text(GOOD.replace("0.002,0.1", "0.002,0.3") + "0.01,0.3,0.2\n")
+    found = {}
+    for name, arguments in {
+        "file": ["--parameters", "mine.json"],
+        "report": ["--parameters", "report.json"],
+        "set": ["--set", f"k1={360 / np.pi!r},c3=0.2", "--set", "N=9", "--set", "k2=77"],
+        "both": ["--parameters", "mine.json", "--set", "k2=50"],
+        "none": [],
+    }.items():
+        result = prw("simulate", "good.csv", "--out", name, *arguments)
+        assert result.returncode == 0 and ("k2 " in result.stdout) == (name != "none"), result
+        found[name] = table(tmp_path / name / "good.csv")["tau1"][-1]
+    assert found["file"] == found["report"] == pytest.approx(found["set"], rel=1e-11)
+    assert len({found[name] for name in ("file", "both", "none")}) == 3
+    for entry, complaint in [
+        ({"k9": 1.0}, "--parameters: k9 is not known; there are J2"),
+        ({"k1": {"value": 1.0, "unit": "N.m/rev"}}, "mine.json: k1 is in N.m/rev; it must be in N.m/rad, N.m/deg"),
+        ({"k1": {"unit": "N.m/rad"}}, "mine.json: k1 is None, not a number"),
+        ([1.0], "--parameters: mine.json is no JSON file with values by name"),
+    ]:
+        (tmp_path / "mine.json").write_text(json.dumps(entry))
+        result = prw("simulate", "--parameters", "mine.json")
+        assert result.returncode == 1 and complaint in result.stderr and result.stderr.count("\n") == 1
+    for arguments, complaint in [
+        (["--set", "k9=1"], "--set: k9 is not known; there are J2"),
+        (["--set", "k1=stiff"], "--set k1=stiff: 'stiff' is not a number"),
+        (["--parameters", "absent.json"], "--parameters: absent.json cannot be read (No such file"),
+        (["good.csv", "--input", "good.csv"], "give one recording"),
+    ]:
+        result = prw("simulate", *arguments)
+        assert result.returncode == 1 and complaint in result.stderr and result.stderr.count("\n") == 1, result
+
+
+def test_without_matplotlib(tmp_path, fmu):
+    """The table is written all the same, and one line says what brings the figure."""
+    program = "import sys; sys.modules['matplotlib'] = None; from prw.cli import main; sys.exit(main(sys.argv[1:]))"
+
+    def run(*arguments):
+        line = [sys.executable, "-c", program, "simulate", "--fmu", str(fmu), *arguments]
+        return subprocess.run(line, capture_output=True, text=True, cwd=tmp_path)
+
+    result = run()
+    assert result.returncode == 0 and result.stderr == "", result.stderr
+    assert "no figure   matplotlib missing; install with: pip install 'prw[plot]'" in result.stdout
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["fig4.csv"] and "next        look at out" in result.stdout
+    result = run("--animate", "fig4.gif", "--out", "other")
+    assert result.returncode == 1 and "prw simulate: matplotlib missing; install" in result.stderr
+    assert result.stderr.count("\n") == 1 and not (tmp_path / "other").exists()
+
+
+def test_no_hint_leads_to_a_clone(prw):
+    """Who has the wheel has no make, no cargo and no examples."""
+    commands = ["simulate", "check", "linearize", "identify", "excite", "sweep"]
+    for arguments in (["simulate"], *([command, "--help"] for command in commands)):
+        said = prw(*arguments).stdout
+        assert "next  " in said or "usage" in said
+        assert not re.search(r"\bmake (demo|fmu|study)|cargo|README|examples/", said), said
+    assert re.fullmatch(r"prw \d+\.\d+\.\d+\n", prw("--version", with_fmu=False).stdout)
 
 
 def test_examples_are_what_their_script_writes(tmp_path):
@@ -160,9 +229,9 @@ def test_other_complaints(prw, tmp_path):
     for arguments, complaint in [
         (["--input", "absent.csv"], "absent.csv: cannot be read (No such file or directory)"),
         (["--input", "."], "cannot be read (Is a directory)"),
-        (["--input", "good.csv", "--fmu", "absent.fmu"], "absent.fmu: no such FMU; `make fmu` builds it"),
+        (["--input", "good.csv", "--fmu", "absent.fmu"], "absent.fmu: no such FMU\n"),
         (["--input", "good.csv", "--fmu", "no.fmu"], "no.fmu: cannot be loaded"),
-        (["--degrees"], "--degrees belongs to --input"),
+        (["--degrees"], "--degrees belongs to a recording"),
     ]:
         result = prw("simulate", *arguments, with_fmu=False)
         assert result.returncode == 1 and complaint in result.stderr, result.stderr
@@ -206,6 +275,45 @@ def test_spellings_of_one_recording(tmp_path, content):
     assert any("columns ignored: note" in note for note in motion.notes) == (b"note" in content)
 
 
+@pytest.mark.parametrize("delimiter, end", [(",", "\n"), (";", "\r\n"), ("\t", "\n")])
+def test_many_rows_at_a_time_are_the_rows(tmp_path, monkeypatch, delimiter, end):
+    """To the bit what Python makes of each cell, empty or not, in columns of text too; and with the same complaints."""
+    draws = np.random.default_rng(6)
+    numbers = draws.standard_normal((500, 5)) * 10.0 ** draws.integers(-310, 300, (500, 5))
+    cells = [[repr(k * 1e-3), "up", *map(repr, row.tolist())] for k, row in enumerate(numbers)]
+    for row in cells[::3]:
+        row[5:] = ["", "nan"]
+    if delimiter == ";":
+        cells = [[cell.replace(".", ",") for cell in row] for row in cells]
+    header = ["time", "state", "theta1", "theta2", "x", "tau1", "pitch"]
+    path = tmp_path / "run.csv"
+
+    def write():
+        path.write_bytes(end.join(delimiter.join(row) for row in [header, *cells, []]).encode())
+
+    write()
+    monkeypatch.setattr("prw.table.BLOCK", 1000)
+    monkeypatch.setattr("prw.table._rows", None)  # is not asked
+    recording = read_all(path)
+    expected = np.array([[float(cell.replace(",", ".") or "nan") for cell in row[2:]] for row in cells])
+    np.testing.assert_array_equal(recording["theta1"], expected[:, 0])
+    np.testing.assert_array_equal(recording["tau1"], expected[:, 3])
+    np.testing.assert_array_equal(recording["pitch"], expected[:, 4])
+    monkeypatch.undo()
+    for column, cell, complaint in [
+        (2, "", "row 402, column theta1: empty cell"),
+        (2, "1_0", "row 402, column theta1: '1_0' is not a number"),
+        (3, "inf", "row 402, column theta2: inf is not finite"),
+        (0, "0", "row 402, column time: 0 runs backwards"),
+        (1, f"up{delimiter}", "row 402: 8 cells, but the header has 7"),
+    ]:
+        before, cells[400][column] = cells[400][column], cell
+        write()
+        with pytest.raises(UserError, match=re.escape(complaint)):
+            read_all(path)
+        cells[400][column] = before
+
+
 def test_degrees(tmp_path):
     path = tmp_path / "degrees.csv"
     path.write_text("time,theta1,theta2,omega1,omega2\n0,40,-10,0,0\n0.1,43,-10,60,0\n")
@@ -213,7 +321,7 @@ def test_degrees(tmp_path):
     np.testing.assert_allclose(motion.theta, np.deg2rad([[40, -10], [43, -10]]), rtol=1e-15)
     np.testing.assert_allclose(motion.omega, np.deg2rad([[0, 0], [60, 0]]), rtol=1e-15)
     assert motion.notes == []
-    assert any("add --degrees" in note for note in read(path).notes)
+    assert any("if it is in degrees, call it theta1 [deg]" in note for note in read(path).notes)
 
 
 def test_rates_that_are_not_the_angles_rates_are_noted(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 
 import fmpy
 import fmu_run
@@ -140,9 +141,39 @@ def test_measures_and_what_is_kept(testbed):
     np.testing.assert_array_equal(runs["roll", "end"], course[:, -1])
     np.testing.assert_array_equal(runs["M", "mean"], [4, 4])
     np.testing.assert_array_equal(measured["roll", "peak"], runs["roll", "peak"])
-    assert len(measured) == 0 and len(measured.time) == 0
+    assert measured and len(measured) == 0 and len(measured.time) == 0
     with pytest.raises(KeyError, match="every=1"):
         measured["roll"]
+
+
+def test_frames_and_datasets(testbed, monkeypatch):
+    """Every number at its run, its time and the start values of its run; those that the FMU refuses are not numbers."""
+    time, inputs = motion(5)
+    start = {"k1": [80.0, -1.0, 90.0], "use_omega": True, "theta1": 0.25}
+    with fmu_run.Fmu(testbed) as fmu:
+        runs = fmu.run(time, inputs=inputs, start=start, outputs=["roll", "theta1"], every=2, measures=["peak"])
+        measured = fmu.run(time, inputs=inputs, start=start, outputs=["roll"], measures=["peak", "end"])
+    assert list(runs.errors) == [1] and runs.start["k1"].tolist() == start["k1"]
+    frame, dataset = runs.to_pandas(), runs.to_xarray()
+    names = ["k1", "use_omega", "theta1 at start", "roll_peak", "theta1_peak", "roll", "theta1"]
+    assert frame.index.names == ["run", "time"] and list(frame) == names and len(frame) == 9
+    assert dict(dataset.sizes) == {"run": 3, "time": 3} and set(dataset.coords) == {"run", "time", *names[:3]}
+    for run in (0, 2):
+        for place, t in enumerate(time[::2]):
+            row = frame.loc[(run, t)]
+            assert row["roll"] == runs["roll"][run, place] == dataset["roll"].sel(run=run, time=t)
+            assert row["roll_peak"] == runs["roll", "peak"][run] == dataset["roll_peak"].sel(run=run)
+            assert row["theta1"] == inputs["theta1"][::2][place] and row["theta1 at start"] == 0.25
+            assert row["k1"] == start["k1"][run] == dataset["k1"].sel(run=run) and row["use_omega"] == 1
+    assert frame.loc[1]["roll"].isna().all() and dataset["roll_peak"].isnull().values.tolist() == [False, True, False]
+    frame = measured.to_pandas()
+    assert frame.index.name == "run" and list(frame) == ["k1", "use_omega", "theta1", "roll_peak", "roll_end"]
+    np.testing.assert_array_equal(frame["roll_end"], measured["roll", "end"])
+    assert dict(measured.to_xarray().sizes) == {"run": 3}
+    for package, call in (("pandas", runs.to_pandas), ("xarray", runs.to_xarray)):
+        monkeypatch.setitem(sys.modules, package, None)
+        with pytest.raises(ImportError, match=f"{package} is missing; install it with: pip install {package}"):
+            call()
 
 
 def test_many_short_runs_leave_nothing_behind(testbed, tmp_path, monkeypatch):

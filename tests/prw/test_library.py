@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas
 import pyarrow.parquet as pq
 import pytest
 from built import ROOT
@@ -125,9 +127,75 @@ def test_a_recording_with_measurements(tmp_path: Path) -> None:
         prw.read(path)
 
 
+def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
+    """A dict, a DataFrame and the CSV file that it writes are one recording, also with the time as index."""
+    time = np.arange(4) * 1e-3
+    table: dict[str, Any] = {
+        "time": time,
+        "theta1 [deg]": time * 90,
+        "theta2": -time,
+        "tau1": [1, None, 2, 3],
+        "x": "abcd",
+    }
+    frame = pandas.DataFrame({**table, "x": list("abcd")})
+    frame.to_csv(tmp_path / "recording.csv", index=False)
+    from_file = prw.read(tmp_path / "recording.csv")
+    for source in (table, frame, frame.set_index("time")):
+        recording = prw.read(source)
+        for name in ("time", "theta1", "theta2", "tau1"):
+            np.testing.assert_array_equal(recording[name], from_file[name])
+        assert (recording.units, recording.notes) == (from_file.units, from_file.notes)
+        assert prw.simulate(source, fmu=testbed)["roll"][-1] == prw.simulate(from_file, fmu=testbed)["roll"][-1]
+    run = prw.simulate(frame, fmu=testbed)
+    for again in (prw.simulate(run, fmu=testbed), prw.simulate(run.to_pandas(), fmu=testbed)):
+        np.testing.assert_array_equal(again["tau1"], run["tau1"])
+    good = {"time": [0.0, 1.0], "theta1": [0.0, 1.0], "theta2": [0.0, 1.0]}
+    wrong: list[tuple[Any, str]] = [
+        ({"time": [0.0, 1.0]}, "recording: column theta1 is missing; the header has time"),
+        ({**good, "theta2": [0.0, None]}, "recording, column theta2: nan at place 1 is not finite"),
+        ({**good, "theta2": ["a", "b"]}, "recording, column theta2: is not made of numbers"),
+        ({**good, "theta2": [0.0]}, "recording, column theta2: has 1 rows, but time has 2"),
+        ({**good, "theta2": [[0.0], [1.0]]}, r"recording, column theta2: has the shape \(2, 1\)"),
+        ({**good, "time": pandas.to_datetime(["2026-01-01", "2026-01-02"])}, "column time: has dates"),
+        ({**good, "time": [1.0, 0.0]}, "time must increase"),
+        ({**good, "theta1 [deg]": [0.0, 1.0]}, "recording, column theta1: appears twice"),
+        (None, "None is no recording: neither a file nor a DataFrame"),
+    ]
+    for source, complaint in wrong:
+        with pytest.raises(prw.UserError, match=complaint):
+            prw.read(source)
+
+
+def test_errors_are_those_of_python_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ValueError, match="no recording"):
+        prw.read(7)  # type: ignore[arg-type]
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    with pytest.raises(ImportError, match="pip install"):
+        prw.sweep()
+
+
+def test_the_fmu_inside_comes_first(tmp_path: Path) -> None:
+    """Of a package that is installed, whatever stands in the working directory; a clone has its own."""
+    own, here = tmp_path / "site" / "prw", tmp_path / "work" / "target" / "fmu"
+    shutil.copytree(Path(prw.__path__[0]), own, ignore=shutil.ignore_patterns("__pycache__"))
+    here.mkdir(parents=True)
+    shutil.copy(prw.default_fmu(), here)
+    program = (
+        f"import sys; sys.path.insert(0, {str(own.parent)!r}); import prw; print(prw.default_fmu()); prw.simulate()"
+    )
+    line = [sys.executable, "-c", program]
+    alone = subprocess.run(line, cwd=tmp_path / "work", capture_output=True, text=True)
+    assert "prw_testbed.fmu: no such FMU\n" in alone.stderr
+    (own / "fmu").mkdir()
+    shutil.copy(prw.default_fmu(), own / "fmu")
+    assert python(program, tmp_path / "work") == f"{own / 'fmu' / 'prw_testbed.fmu'}\n"
+    assert prw.default_fmu() == ROOT / "target" / "fmu" / "prw_testbed.fmu"
+
+
 def test_wrong_motions() -> None:
     time, theta = [0.0, 1.0], [[0.0, 0.0], [1.0, 1.0]]
     for arguments, complaint in [
+        ((None, theta), "motion: time is None; it must be an array"),
         (([0.0], [[0.0, 0.0]]), r"time has the shape \(1,\); it must be \(n,\), with at least two times"),
         ((time, [0.0, 1.0]), r"theta has the shape \(2,\); it must be \(2, 2\), a column each motor"),
         ((time, theta, [[0.0, 0.0]]), r"omega has the shape \(1, 2\)"),
@@ -146,8 +214,10 @@ def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
         ({"parameters": {"N": 7.5}}, "N.* 7.5"),
         ({"parameters": {"k1": np.array([1.0, 2.0])}}, r"k1 is array\(\[1., 2.\]\), not a number; prw.sweep takes"),
         ({"parameters": {"k1": "stiff"}}, "k1 is 'stiff', not a number"),
+        ({"parameters": {"k1": None}}, "k1 is None, not a number"),
         ({"outputs": ["yaw"]}, "outputs: yaw is not known; there are theta1"),
-        ({"fmu": tmp_path / "absent.fmu"}, "absent.fmu: no such FMU; `make fmu` builds it"),
+        ({"outputs": None}, "outputs: None is neither a name nor several"),
+        ({"fmu": tmp_path / "absent.fmu"}, "absent.fmu: no such FMU$"),
         ({"motion": tmp_path / "absent.csv"}, "absent.csv: cannot be read"),
     ]:
         with pytest.raises(prw.UserError, match=complaint) as caught:
@@ -183,8 +253,12 @@ def test_wrong_sweeps(testbed: Path) -> None:
         ({"grid": {"k9": [1.0]}}, "k9 is not known; there are J2"),
         ({"grid": {"k1": []}}, "k1: .* are not the values of a parameter"),
         ({"grid": {"k1": [1.0]}, "random": {"k1": 0.1}}, "k1 is in the grid and random; choose one"),
-        ({"random": {"k1": -0.1}}, "k1: -0.1; the value and its relative standard deviation must be positive"),
+        ({"grid": {"k1": None}}, "k1: None are not the values of a parameter"),
+        ({"random": {"k1": -0.1}}, "random: k1 -0.1 is not a positive number"),
+        ({"random": {"k1": None}}, "random: k1 None is not a positive number"),
+        ({"random": {"k1": 10}}, "random: k1 has a standard deviation of 1000%; 100 % is the most"),
         ({"random": {"k1": 0.1}, "runs": 0}, "runs 0: at least 1"),
+        ({"random": {"k1": 0.1}, "runs": None}, "runs None: at least 1"),
         ({"random": {"k1": 0.1}, "threads": 0}, "threads 0: at least 1"),
         ({"grid": {"k1": np.ones(4000), "k2": np.ones(4000)}}, "16000000 runs are more than"),
     ]:
@@ -198,7 +272,6 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, testbed: Pa
     for call, package, extra in [
         (run.plot, "matplotlib", "plot"),
         (run.to_pandas, "pandas", "pandas"),
-        (prw.linearize, "fmpy", "linearize"),
         (prw.sweep, "pyarrow", "sweep"),
     ]:
         with pytest.raises(prw.UserError, match=rf"{package} missing; .*pip install 'prw\[{extra}\]'"):
@@ -213,7 +286,7 @@ def test_the_command_linearize(testbed: Path, tmp_path: Path) -> None:
     result = command("--set", "k1=90")
     assert result.returncode == 0 and "states      theta3, theta4" in result.stdout, result.stderr
     written = json.loads((tmp_path / "out" / "linear.json").read_text())
-    np.testing.assert_array_equal(written["A"], prw.linearize(testbed, {"k1": 90.0}).A)
+    np.testing.assert_array_equal(written["A"], prw.linearize({"k1": 90.0}, fmu=testbed).A)
     assert written["outputs"][0] == "tau1" and written["units"]["tau1"] == "N.m"
     for wrong, complaint in (
         ("k1", "--set k1: write NAME=VALUE"),

@@ -65,7 +65,8 @@ def run(arguments: argparse.Namespace) -> None:
         for page, draw in ((TESTBED, draw_testbed), (CONTROLLER, draw_controller)):
             write_png(page.content / ICON, draw(), dpi=128)
             write_svg(page.content / ICON_SVG, draw())
-        from prw.animation import animate, still
+        from prw.animation import animate
+        from prw.picture import still
         from tools.figures.film import POSE, SPEED, story
 
         run, captions = story(arguments.fmu, arguments.fmu.with_name("prw_controller.fmu"))

@@ -31,7 +31,7 @@ class Transfer(NamedTuple):
 
 def transfers(found: Results) -> tuple[list[Transfer], list[Transfer]]:
     """The eight plots of H(s), Fig. 5 (a) to (h), and the four of G(s) from motor angles to torques."""
-    response = found.model.frequency_response(CURVE, ANGLE_OF)
+    response = found.model.response_at_hz(CURVE, ANGLE_OF)
     frequency, points, _ = found.sweep
     assert found.sweep.outputs == found.model.outputs
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from fmu_run import Fmu
 
-from prw.animation import MEASURED
 from prw.motion import Array, Motion
+from prw.picture import MEASURED
 from prw.simulation import Run
 
 #: Communication step, s.

@@ -51,10 +51,10 @@ class Results(NamedTuple):
 
 def results(fmu: Path) -> Results:
     """Run and measure the FMU file `fmu`; takes some seconds. Raises UserError where it is missing or refuses."""
-    model = linearize(fmu)
+    model = linearize(fmu=fmu)
     slowest = -np.linalg.eigvals(model.A).real.max()
     return Results(
-        linearize(fmu, outputs=(*SHAFTS, *TORQUES)),
+        linearize(fmu=fmu, outputs=(*SHAFTS, *TORQUES)),
         pitch_and_roll(model),
         sweep(fmu, POINTS, slowest),
         _run(fmu, fig4()),
@@ -85,8 +85,8 @@ def _step(fmu: Path, sides: tuple[int, int]) -> Step:
 def numbers(found: Results) -> dict[str, object]:
     """What the documentation quotes, by name, and which matplotlib drew the figures."""
     low = POINTS <= STATED
-    ratio = found.sweep.response / found.model.frequency_response(POINTS, ANGLE_OF)
-    high = found.model.frequency_response(1e5, ANGLE_OF)
+    ratio = found.sweep.response / found.model.response_at_hz(POINTS, ANGLE_OF)
+    high = found.model.response_at_hz(1e5, ANGLE_OF)
     _, opposite = found.fig4
     _, equal = found.fig4_equal
     late = found.fig4[0].time >= 1.0

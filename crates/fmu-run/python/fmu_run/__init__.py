@@ -18,7 +18,7 @@ Values are in the FMU's units, which `Fmu.variables` tells. FMI 2.0 and 3.0.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Literal, Self
@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fmu_run._native import FmuError, Instances, States
 from fmu_run._native import Loaded as _Loaded
+from fmu_run.runs import Runs
 
 __all__ = ["Fmu", "FmuError", "Instances", "Measure", "Runs", "Start", "States", "System", "Variable"]
 
@@ -57,77 +58,6 @@ class Variable:
     description: str
     min: float | None
     max: float | None
-
-
-class Runs(Mapping[str, _Array]):
-    """What came of `Fmu.run`: courses by output, measures by output and measure.
-
-    runs["roll"]: (runs, times), what was kept. runs["roll", "peak"]: (runs,). Where a run has not reached a time there is
-    not a number. Nor are there measures of a run that the FMU refused; those of one that it ended are of the times until
-    then.
-    """
-
-    #: (times,), s: the times that were kept.
-    time: _Array
-    #: The runs that the FMU refused or ended before the last time, by their numbers, how far they got and why, in the
-    #: words of the FMU ("at 0.5 s: ...", "ended by the FMU at t = 0.5 s: ...").
-    errors: dict[int, str]
-    #: What is to be said of finished runs: that the FMU ended at the last time by itself, or refused to be terminated.
-    notes: dict[int, str]
-
-    def __init__(
-        self,
-        time: _Array,
-        outputs: Sequence[str],
-        courses: _Array,
-        measures: Sequence[str],
-        measured: _Array,
-        errors: dict[int, str],
-        notes: dict[int, str],
-    ):
-        self.time, self.errors, self.notes = time, errors, notes
-        self._outputs = {name: place for place, name in enumerate(outputs)}
-        self._measures = {name: place for place, name in enumerate(measures)}
-        self._courses, self._measured = courses, measured
-
-    @property
-    def count(self) -> int:
-        """The number of runs."""
-        return int(self._courses.shape[0])
-
-    @property
-    def ok(self) -> NDArray[np.bool_]:
-        """(runs,): which have reached the last time."""
-        finished = np.ones(self.count, dtype=bool)
-        finished[list(self.errors)] = False
-        return finished
-
-    def check(self) -> Runs:
-        """Itself, if all runs are finished; raises FmuError with the first refusal otherwise."""
-        if self.errors:
-            number, why = next(iter(self.errors.items()))
-            many = f" ({len(self.errors)} of {self.count} runs failed)" if self.count > 1 else ""
-            raise FmuError(f"run {number}: {why}{many}" if self.count > 1 else why)
-        return self
-
-    def __getitem__(self, key: str | tuple[str, str]) -> _Array:
-        if isinstance(key, str):
-            if not self._courses.shape[2]:
-                raise KeyError(f"{key}: no courses were kept; ask for them with every=1, or for [output, measure]")
-            return self._courses[:, self._outputs[key], :]
-        output, measure = key
-        return self._measured[:, self._outputs[output], self._measures[measure]]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._outputs if self._courses.shape[2] else ())
-
-    def __len__(self) -> int:
-        return len(self._outputs) if self._courses.shape[2] else 0
-
-    def __repr__(self) -> str:
-        measures = f", measures {', '.join(self._measures)}" if self._measures else ""
-        failed = f", {len(self.errors)} failed" if self.errors else ""
-        return f"<Runs: {self.count} of {', '.join(self._outputs)}, {len(self.time)} times{measures}{failed}>"
 
 
 class _Model:
@@ -195,7 +125,7 @@ class _Model:
         kept = 1 if every is None and not wanted else every
         if kept is not None and kept < 1:
             raise ValueError(f"every must be at least 1, it is {kept}")
-        courses, measured, errors, notes = self._loaded.run(
+        courses, measured, errors, notes, starts = self._loaded.run(
             times,
             [(name, _course(name, values, len(times))) for name, values in (inputs or {}).items()],
             [(name, _course(name, values, len(times))) for name, values in (input_derivatives or {}).items()],
@@ -208,7 +138,7 @@ class _Model:
             progress,
         )
         kept_times = times[:: kept or len(times)][: courses.shape[2]]
-        return Runs(kept_times, names, courses, wanted, measured, dict(errors), dict(notes))
+        return Runs(kept_times, names, courses, wanted, measured, dict(errors), dict(notes), starts)
 
     def instances(
         self,

@@ -60,8 +60,8 @@ type Described = (
 type Stages = Vec<Vec<(String, String)>>;
 /// Texts by run.
 type Told = Vec<(usize, String)>;
-/// Courses and measures, (runs, outputs, times or measures) each, errors and notes.
-type Result4<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Told, Told);
+/// Courses and measures, (runs, outputs, times or measures) each, errors, notes and start values.
+type Result5<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Told, Told, Bound<'py, PyDict>);
 
 fn python(error: Error) -> PyErr {
     match error {
@@ -172,7 +172,7 @@ impl Loaded {
         threads: Option<usize>,
         read_before_set: bool,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<Result4<'py>> {
+    ) -> PyResult<Result5<'py>> {
         let model = self.model()?;
         let measures = measures.iter().map(|name| name.parse()).collect::<Result<Vec<_>, String>>();
         let time = Numbers::of(&time)?;
@@ -198,7 +198,7 @@ impl Loaded {
         let ((courses, mut kept), (measures, mut measured)) = (array(size.kept)?, array(size.measures)?);
         let room = [kept.values(), measured.values()];
         let [errors, notes] = carry_out(py, &planned, room, progress.as_ref())?;
-        Ok((courses, measures, errors, notes))
+        Ok((courses, measures, errors, notes, start.dict(py)?))
     }
 }
 

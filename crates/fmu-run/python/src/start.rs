@@ -4,11 +4,11 @@ use crate::buffers::Numbers;
 use fmu_run::System;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString, PyTuple};
+use pyo3::types::{PyDict, PyString};
 
 /// By name: a number or an array with one for each run or instance, a text or a sequence of such.
 #[derive(Default)]
-pub struct Start(Vec<(String, Value)>);
+pub struct Start(Vec<(String, Value, Py<PyAny>)>);
 
 enum Value {
     Numbers(Numbers),
@@ -22,16 +22,36 @@ impl Start {
         let mut start = Self::default();
         for (name, value) in given.into_iter().flatten() {
             let name: String = name.extract()?;
-            let value = Value::of(system, &name, &value)?;
-            start.0.push((name, value));
+            let value = in_own_unit(system, &name, value)?;
+            start.0.push((name.clone(), Value::of(&name, &value)?, value.unbind()));
         }
         Ok(start)
     }
 
     /// As Rust has them.
     pub fn values(&self) -> Vec<(&str, fmu_run::Start<'_>)> {
-        self.0.iter().map(|(name, of)| (name.as_str(), of.value())).collect()
+        self.0.iter().map(|(name, of, _)| (name.as_str(), of.value())).collect()
     }
+
+    /// As Python has them, in the units of the variables.
+    pub fn dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (name, _, value) in &self.0 {
+            dict.set_item(name, value)?;
+        }
+        Ok(dict)
+    }
+}
+
+/// (value, unit) in the unit of the variable; what has no unit as it is.
+fn in_own_unit<'py>(system: &System, name: &str, value: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let Ok((number, unit)) = value.extract::<(Bound<'py, PyAny>, String)>() else { return Ok(value) };
+    if number.is_instance_of::<PyString>() {
+        return Ok(value);
+    }
+    let (factor, offset) = system.display_unit(name, &unit).map_err(crate::python)?;
+    let numbers = value.py().import("numpy")?.call_method1("asarray", (number, "float64"))?;
+    numbers.sub(offset)?.div(factor)
 }
 
 impl Value {
@@ -44,19 +64,9 @@ impl Value {
         }
     }
 
-    fn of(system: &System, name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
+    fn of(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
         if let Ok(text) = value.cast::<PyString>() {
             return Ok(Self::Text(text.extract()?));
-        }
-        if let Ok(pair) = value.cast::<PyTuple>()
-            && pair.len() == 2
-            && let (number, Ok(unit)) = (pair.get_item(0)?, pair.get_item(1)?.cast::<PyString>())
-            && !number.is_instance_of::<PyString>()
-        {
-            let unit: String = unit.extract()?;
-            let (factor, offset) = system.display_unit(name, &unit).map_err(crate::python)?;
-            let numbers = value.py().import("numpy")?.call_method1("asarray", (number, "float64"))?;
-            return Self::of(system, name, &numbers.sub(offset)?.div(factor)?);
         }
         if let Ok(texts) = value.extract::<Vec<String>>() {
             return Ok(Self::Texts(texts));

@@ -2,6 +2,7 @@ from . import motion as motion
 from .animation import animate as animate
 from .checking import check as check
 from .checking.agreement import Agreement as Agreement
+from .errors import MissingPackage as MissingPackage
 from .errors import UserError as UserError
 from .identification import identify as identify
 from .identification.excitation import Excitation as Excitation

@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 from types import ModuleType
 
 from prw import progress
@@ -25,6 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def run(program: str, description: str, commands: Sequence[ModuleType], argv: Sequence[str] | None) -> int:
     """Run one of the commands as `program COMMAND ...`."""
     parser = argparse.ArgumentParser(prog=program, description=description)
+    parser.add_argument("--version", action="version", version=f"{program} {version('prw')}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for command in commands:
         command.add_parser(subparsers)

@@ -38,8 +38,9 @@ def columns(
     """Time, both angles, both rates if they are there, and what there is of `outputs` (names of measured outputs).
 
     A column's unit is in its header (`pitch [deg]`) or in `units` by name; without either it is SI, or degrees and
-    degrees per second if `degrees`. Raises UserError naming file, row (`line`) and column.
+    degrees per second if `degrees`. Raises UserError naming file, row (`line`, 0 where there are none) and column.
     """
+    where = f"{path}, row {line}" if line else str(path)
     wanted = ("time", *MOTORS, *outputs)
     found: dict[str, int] = {}
     chosen: dict[str, str] = {}
@@ -50,19 +51,19 @@ def columns(
             ignored.append(text or "(blank)")
             continue
         if name in found:
-            raise UserError(f"{path}, row {line}, column {name}: appears twice in the header")
+            raise UserError(f"{where}, column {name}: appears twice in the header")
         found[name] = index
         try:
             chosen[name] = _unit(name, unit, (units or {}).get(name, ""), degrees)
         except UserError as error:
-            raise UserError(f"{path}, row {line}, column {name}: {error}") from None
+            raise UserError(f"{where}, column {name}: {error}") from None
     for name in ("time", *ANGLES):
         if name not in found:
-            hint = "; separate columns by comma, semicolon or tab" if len(header) == 1 else ""
-            raise UserError(f"{path}, row {line}: column {name} is missing; the header has {shown(header)}{hint}")
+            hint = "; separate columns by comma, semicolon or tab" if line and len(header) == 1 else ""
+            raise UserError(f"{where}: column {name} is missing; the header has {shown(header)}{hint}")
     if (RATES[0] in found) != (RATES[1] in found):
         missing = RATES[1] if RATES[0] in found else RATES[0]
-        raise UserError(f"{path}, row {line}: column {missing} is missing; give both {' and '.join(RATES)}, or neither")
+        raise UserError(f"{where}: column {missing} is missing; give both {' and '.join(RATES)}, or neither")
     notes = [f"columns ignored: {', '.join(ignored)}"] if ignored else []
     return Columns([(name, found[name]) for name in wanted if name in found], chosen, notes)
 
@@ -89,7 +90,7 @@ def column(text: str) -> tuple[str, str]:
 
 def _unit(name: str, in_header: str, given: str, degrees: bool) -> str:
     if in_header and given and factor(name, in_header) != factor(name, given):
-        raise UserError(f"in {in_header} by its header, but in {given} by --units")
+        raise UserError(f"in {in_header} by its header, but in {given} by the units given")
     default = si_unit(name)
     if degrees and QUANTITIES[name] in ("angle", "rate"):
         default = default.replace("rad", "deg")

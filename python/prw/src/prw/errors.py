@@ -1,5 +1,9 @@
-"""The one exception whose text is meant for the user."""
+"""The exceptions whose text is meant for the user."""
 
 
-class UserError(Exception):
+class UserError(ValueError):
     """Something the user can put right. The message is one line and says what and where; `prw` exits with status 1."""
+
+
+class MissingPackage(UserError, ImportError):
+    """A package that only some of `prw` needs is not installed."""

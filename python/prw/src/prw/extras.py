@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 
-from prw.errors import UserError
+from prw.errors import MissingPackage
 
 
 def need(extra: str, *packages: str) -> None:
-    """Raise UserError unless the packages, which `pip install prw[extra]` brings, are installed."""
+    """Raise MissingPackage unless the packages, which `pip install prw[extra]` brings, are installed."""
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if missing:
-        raise UserError(f"{', '.join(missing)} missing; install with: pip install 'prw[{extra}]'")
+        raise MissingPackage(f"{', '.join(missing)} missing; install with: pip install 'prw[{extra}]'")

@@ -36,6 +36,8 @@ class Motion:
     def __post_init__(self) -> None:
         for name in ("time", "theta", "omega"):
             value = getattr(self, name)
+            if value is None and name != "omega":
+                raise UserError(f"motion: {name} is None; it must be an array")
             if value is not None:
                 object.__setattr__(self, name, _numbers(name, value))
         count = len(self.time) if self.time.ndim == 1 else 0

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from PIL import Image
 
+from prw.errors import UserError
 from prw.extras import need
 
 PAGE = """<!DOCTYPE html>
@@ -72,6 +73,12 @@ def write_movie(path: Path, pictures: Iterable[Image.Image], rate: int) -> None:
     need("movie", "imageio_ffmpeg")
     import imageio_ffmpeg
 
+    try:
+        imageio_ffmpeg.get_ffmpeg_exe()
+    except RuntimeError:
+        raise UserError(
+            f"{path.suffix}: imageio-ffmpeg has no ffmpeg for this machine; install ffmpeg, or write a .gif"
+        ) from None
     writer = None
     # Players want even sides.
     options = ["-vf", "crop=floor(iw/2)*2:floor(ih/2)*2", "-crf", "20"]

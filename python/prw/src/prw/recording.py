@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from prw.arguments import Table, columns_of, is_path, is_table, numbers_of
 from prw.channels import MEASURED, QUANTITIES, factor
 from prw.columns import ANGLES, RATES, Columns, columns
 from prw.errors import UserError
 from prw.motion import Array, Motion
 from prw.output import inputs_of
-from prw.table import read_table
+from prw.table import Choice, read_table
 
 #: Faster than the testbed's motors will turn on any wrist move, in rad/s; degrees taken for radians are beyond it.
 PLAUSIBLE_SPEED = 30.0
@@ -28,6 +30,8 @@ SLOW = 0.1
 SLOW_SAMPLING = 0.5
 #: A motor does not turn this far, in rad, from sample to sample; angles that jump by a turn do.
 JUMP = 0.9 * np.pi
+#: What a recording that comes from no file is called.
+IN_MEMORY = Path("recording")
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,7 @@ class Recording:
     """One recorded experiment, in SI. recording["tau1"]: (n,), and so for time, motors and whatever was measured.
 
     motion: what the motors did, (n,) times. measured: (n,) by name, of `prw.channels.MEASURED`; NaN where a cell is
-    empty. units: the unit in the file, by column. source: the file.
+    empty. units: the unit in the file, by column. source: the file, or "recording" where there is none.
     """
 
     source: Path
@@ -79,8 +83,10 @@ class Recording:
         return f"<Recording {self.name}: {', '.join(self.units)}; {len(self.time)} times, {span}>"
 
 
-def read(path: str | os.PathLike[str], units: Mapping[str, str] | None = None, degrees: bool = False) -> Recording:
-    """Read a recorded experiment from a CSV file.
+def read(
+    path: str | os.PathLike[str] | Table, units: Mapping[str, str] | None = None, degrees: bool = False
+) -> Recording:
+    """Read a recorded experiment from a CSV file, or from a DataFrame or a dict of arrays with the same columns.
 
     Its columns: time (s), theta1, theta2 (rad) and, where present, omega1, omega2 (rad/s) and any of tau1, tau2
     (N.m), theta3, theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s), in any order; others are ignored. It is
@@ -100,15 +106,22 @@ def read(path: str | os.PathLike[str], units: Mapping[str, str] | None = None, d
     UserError
         Something cannot be read; file, row and column are named.
     """
-    return _read(Path(path), units, degrees, tuple(MEASURED))
+    return _read(path, units, degrees, tuple(MEASURED))
 
 
-def read_motion(path: str | os.PathLike[str], units: Mapping[str, str] | None = None, degrees: bool = False) -> Motion:
+def read_motion(
+    path: str | os.PathLike[str] | Table, units: Mapping[str, str] | None = None, degrees: bool = False
+) -> Motion:
     """The motors' motion alone, as `read` reads it: what was measured is ignored, and may be anything."""
-    return _read(Path(path), units, degrees, ()).motion
+    return _read(path, units, degrees, ()).motion
 
 
-def _read(path: Path, units: Mapping[str, str] | None, degrees: bool, measured: tuple[str, ...]) -> Recording:
+def _read(
+    source: str | os.PathLike[str] | Table, units: Mapping[str, str] | None, degrees: bool, measured: tuple[str, ...]
+) -> Recording:
+    if not is_path(source) and not is_table(source):
+        raise UserError(f"{source!r} is no recording: neither a file nor a DataFrame or a dict of arrays")
+    path = Path(source) if isinstance(source, (str, os.PathLike)) else IN_MEMORY
     for name in units or {}:
         if name not in QUANTITIES:
             raise UserError(f"units: {name} is not known; there are {', '.join(QUANTITIES)}")
@@ -120,7 +133,11 @@ def _read(path: Path, units: Mapping[str, str] | None, degrees: bool, measured: 
         found = columns(path, header, line, measured, units, degrees)
         return found.taken
 
-    values = read_table(path, choose, may_be_empty=measured, increasing=True)
+    values = (
+        _gathered(source, choose, may_be_empty=measured)
+        if is_table(source)
+        else read_table(path, choose, may_be_empty=measured, increasing=True)
+    )
     table = {name: values[:, i] * factor(name, found.units[name]) for i, (name, _) in enumerate(found.taken)}
     time = table.pop("time")
     theta = np.column_stack([table.pop(name) for name in ANGLES])
@@ -128,6 +145,23 @@ def _read(path: Path, units: Mapping[str, str] | None, degrees: bool, measured: 
     with np.errstate(all="ignore"):  # angles near the largest number are the FMU's to refuse
         notes = found.notes + doubts(time, theta, omega, found.units)
     return Recording(path, Motion(time, theta, omega, path.stem, notes), table, found.units)
+
+
+def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array:
+    """What `read_table` returns, of columns in memory."""
+    columns = columns_of(table)
+    taken = choose(list(columns), 0)
+    found: list[Array] = []
+    values = list(columns.values())
+    for name, index in taken:
+        column = numbers_of(f"{IN_MEMORY}, column {name}", values[index])
+        if found and len(column) != len(found[0]):
+            raise UserError(f"{IN_MEMORY}, column {name}: has {len(column)} rows, but time has {len(found[0])}")
+        bad = ~np.isfinite(column) if name not in may_be_empty else np.isinf(column)
+        if bad.any():
+            raise UserError(f"{IN_MEMORY}, column {name}: {column[bad][0]} at place {int(bad.argmax())} is not finite")
+        found.append(column)
+    return np.column_stack(found)
 
 
 def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, str]) -> list[str]:
@@ -139,7 +173,7 @@ def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, s
         # A percentile, for a single step of a coarse encoder is no speed.
         speed = np.percentile(np.abs(np.diff(theta[:, side]) / np.diff(time)), 99)
         reach = np.abs(theta[:, side]).max()
-        hint = "if the angles are in degrees, add --degrees" if units[name] == "rad" else "are these the right units?"
+        hint = f"if it is in degrees, call it {name} [deg]" if units[name] == "rad" else "are these the right units?"
         steps = np.abs(np.diff(theta[:, side]))
         if len(steps) and (jump := steps.max()) > JUMP:
             notes.append(

@@ -6,14 +6,16 @@ import html
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from prw.arguments import Table, names_of
 from prw.channels import QUANTITIES, si_unit
 from prw.errors import UserError
 from prw.extras import need
 from prw.motion import Array, Motion, fig4
+from prw.parameters import Given, values_of
 from prw.recording import Recording, read_motion
 from prw.testbed import OUTPUTS, Testbed
 
@@ -95,8 +97,8 @@ class Run(Mapping[str, Array]):
 
 
 def simulate(
-    motion: Motion | Recording | str | os.PathLike[str] | None = None,
-    parameters: Mapping[str, Any] | None = None,
+    motion: Motion | Recording | Run | str | os.PathLike[str] | Table | None = None,
+    parameters: Given = None,
     *,
     fmu: str | os.PathLike[str] | None = None,
     outputs: Sequence[str] = OUTPUTS,
@@ -106,13 +108,12 @@ def simulate(
     Parameters
     ----------
     motion
-        What the motors do, or a recording of it (a CSV file as `prw.read` takes it; only its motors matter here).
-        Default: the paper's experiment of Fig. 4.
+        What the motors do, or a recording of it (a CSV file, a DataFrame or a dict of arrays as `prw.read` takes it;
+        only its motors matter here), or a run, to be made again. Default: the paper's experiment of Fig. 4.
     parameters
-        Values in SI by name; others keep the FMU's start values.
+        Values in SI by name, or the JSON file with them that `prw.identify` writes; others keep the FMU's start values.
     fmu
-        The testbed FMU, of FMI 2.0 or 3.0 (default: the one built in this checkout, or installed with this
-        package).
+        The testbed FMU, of FMI 2.0 or 3.0 (default: the one inside this package, see `default_fmu`).
     outputs
         Names of any Real variables.
 
@@ -127,24 +128,25 @@ def simulate(
         The FMU is missing or refuses a value, a name is unknown or a file unreadable.
     """
     course = motion_of(motion)
-    names = [outputs] if isinstance(outputs, str) else list(outputs)
+    names = names_of("outputs", outputs)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
-        values = testbed.with_starts(parameters or {})
+        given = values_of(parameters, testbed.fmu, testbed.loaded)
+        values = testbed.with_starts(given)
         for name in names:
             if name not in testbed.loaded.variables:
                 raise UserError(f"outputs: {name} is not known; there are {', '.join(testbed.loaded.variables)}")
-        found = testbed.respond(course, names, parameters or {})
+        found = testbed.respond(course, names, given)
     return Run(course, found, values)
 
 
-def motion_of(source: Motion | Recording | str | os.PathLike[str] | None) -> Motion:
-    """The motion itself, that of a recording or of a file, or that of Fig. 4. Raises UserError for an unreadable
-    file."""
+def motion_of(source: Motion | Recording | Run | str | os.PathLike[str] | Table | None) -> Motion:
+    """The motion itself, that of a recording, a run, a file or columns, or that of Fig. 4. Raises UserError for what
+    cannot be read."""
     if source is None:
         return fig4()
-    if isinstance(source, Recording):
+    if isinstance(source, (Recording, Run)):
         return source.motion
-    return source if isinstance(source, Motion) else read_motion(Path(source))
+    return source if isinstance(source, Motion) else read_motion(source)
 
 
 def _unit(name: str) -> str:

@@ -58,15 +58,16 @@ class StateSpace:
         return np.ascontiguousarray(whole[:, :, kept], dtype=np.complex128)
 
     def moved(self, rates: Mapping[str, str]) -> tuple[str, ...]:
-        """The inputs that are not among `rates`: the columns of `transfer` and `frequency_response`."""
+        """The inputs that are not among `rates`: the columns of `transfer` and `response_at_hz`."""
         for name in (*rates, *rates.values()):
             if name not in self.inputs:
                 raise UserError(f"rates: {name} is no input; there are {', '.join(self.inputs)}")
         return tuple(name for name in self.inputs if name not in rates)
 
-    def frequency_response(self, frequency: ArrayLike, rates: Mapping[str, str] | None = None) -> Complex:
+    def response_at_hz(self, frequency: ArrayLike, rates: Mapping[str, str] | None = None) -> Complex:
         """The response to sines, for frequencies (k,) in Hz: complex amplitudes of outputs per input, (k, p, m).
-        rates: as for `transfer`."""
+        rates: as for `transfer`. For frequencies in rad/s, `transfer(1j * omega)`, or python-control's own:
+        `to_control().frequency_response(omega)`."""
         return self.transfer(2j * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64)), rates)
 
     def to_control(self) -> control.StateSpace:

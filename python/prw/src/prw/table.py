@@ -8,6 +8,7 @@ import os
 import re
 from array import array
 from collections.abc import Callable, Container, Sequence
+from itertools import repeat
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,6 +21,8 @@ from prw.progress import Progress
 DELIMITERS = (",", ";", "\t")
 #: Rows between two progress reports.
 REPORT_ROWS = 4096
+#: Characters that are read at a time where rows are plain.
+BLOCK = 1 << 22
 
 #: The columns to read, (name, index), of a header in the line with this number.
 Choice = Callable[[Sequence[str], int], Sequence[tuple[str, int]]]
@@ -47,13 +50,17 @@ def _parse(path: Path, file: IO[str], choose: Choice, may_be_empty: Container[st
     if not first:
         raise UserError(f"{path}: the file is empty; a header and at least two rows are needed")
     delimiter = next((d for d in DELIMITERS if d in first), ",")
-    file.seek(0)
-    table = csv.reader(file, delimiter=delimiter, skipinitialspace=True)
+    table = _reader(file, delimiter)
     try:
-        header = [name.strip() for name in next(row for row in table if row and table.line_num > begin)]
+        header = [name.strip() for name in _header(table, begin)]
         header[0] = header[0].lstrip("# ")
         columns = choose(header, table.line_num)
         size = os.fstat(file.fileno()).st_size
+        quick = _plain_rows(path, file, table.line_num, len(header), columns, delimiter, size, may_be_empty, increasing)
+        if quick is not None:
+            return quick
+        table = _reader(file, delimiter)
+        _header(table, begin)
         values = _rows(path, table, len(header), columns, delimiter == ";", size, may_be_empty, increasing)
     except csv.Error as error:
         raise UserError(f"{_where(path, table.line_num)}: not a readable CSV row ({error})") from None
@@ -72,6 +79,61 @@ def _top(file: IO[str]) -> tuple[int, str]:
     if comment and line.strip() and re.match(r"[-+.\d]", line.lstrip()):
         return count - 1, comment
     return count, line
+
+
+def _reader(file: IO[str], delimiter: str) -> Any:
+    file.seek(0)
+    return csv.reader(file, delimiter=delimiter, skipinitialspace=True)
+
+
+def _header(table: Any, begin: int) -> list[str]:
+    """The first row below `begin` lines."""
+    return next(row for row in table if row and table.line_num > begin)
+
+
+def _plain_rows(
+    path: Path,
+    file: IO[str],
+    begin: int,
+    width: int,
+    columns: Sequence[tuple[str, int]],
+    delimiter: str,
+    size: int,
+    may_be_empty: Container[str],
+    increasing: bool,
+) -> Array | None:
+    """What `_rows` makes of the lines below `begin`, many at a time; None where there is something to look at."""
+    file.seek(0)
+    for _ in range(begin):
+        file.readline()
+    parts, bytes_read = [], 0
+    with Progress(f"reading {path}", size) as progress:
+        while text := file.read(BLOCK) + file.readline():
+            bytes_read += len(text)
+            if "\r" in text:
+                text = text.replace("\r\n", "\n")
+            if delimiter == ";" and "," in text:
+                text = text.replace(",", ".")
+            if any(mark in text for mark in '"#\r'):
+                return None
+            while delimiter * 2 in text:
+                text = text.replace(delimiter * 2, f"{delimiter}nan{delimiter}")
+            if f"{delimiter}\n" in text:
+                text = text.replace(f"{delimiter}\n", f"{delimiter}nan\n")
+            lines = list(filter(None, text.split("\n")))
+            if not {width - 1}.issuperset(map(str.count, lines, repeat(delimiter))):
+                return None
+            try:
+                used = [index for _, index in columns]
+                parts.append(np.loadtxt(lines, delimiter=delimiter, usecols=used, comments=None, ndmin=2))
+            except ValueError:
+                return None
+            progress(bytes_read)
+    values = np.concatenate(parts) if parts else np.empty((0, len(columns)))
+    empty = [name in may_be_empty for name, _ in columns]
+    if len(values) < 2 or np.isinf(values).any() or np.isnan(values[:, np.logical_not(empty)]).any():
+        return None
+    return None if increasing and not (np.diff(values[:, 0]) > 0).all() else values
 
 
 def _rows(

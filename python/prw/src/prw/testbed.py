@@ -22,25 +22,35 @@ ANGLE_OF = dict(zip(RATES, ANGLES))
 Value = float | int | bool
 #: What a continuous variable is called in FMI 2.0 and in 3.0.
 REAL = ("Real", "Float64")
-#: Where `make fmu` leaves the FMU, within a checkout.
-BUILT = Path("target/fmu/prw_testbed.fmu")
 _PACKAGE = Path(__file__).parent
+#: The FMU in the wheel, and where `make fmu` leaves it in a clone, to which a package belongs that has none inside.
+INSIDE = _PACKAGE / "fmu" / "prw_testbed.fmu"
+_CLONE = Path(os.path.normpath(_PACKAGE / "../../../.."))
+BUILT = _CLONE / "target" / "fmu" / "prw_testbed.fmu"
 
 
 def default_fmu() -> Path:
-    """The testbed FMU that is used if none is named: that built in the working directory, in the checkout this package
-    belongs to, or the one that was installed with it. Where there is none, the path at which `make fmu` would leave it.
+    """The testbed FMU that is used if none is named: the one inside the installed package, or, in a clone, the one
+    that `make fmu` builds. For all that runs FMUs: `fmu_run.Fmu(prw.default_fmu())`.
     """
-    places = (BUILT, *(folder / BUILT for folder in _PACKAGE.parents[3:4]), _PACKAGE / "fmu" / BUILT.name)
-    return next((path for path in places if path.is_file()), BUILT)
+    return INSIDE if INSIDE.is_file() else BUILT
 
 
 def existing_fmu(fmu: str | os.PathLike[str] | None) -> Path:
     """The FMU file `fmu`, or the default one. Raises UserError where there is none."""
     path = default_fmu() if fmu is None else Path(fmu)
     if not path.is_file():
-        raise UserError(f"{path}: no such FMU; `make fmu` builds it")
+        hint = "; `make fmu` builds it" if path == BUILT and (_CLONE / "Makefile").is_file() else ""
+        raise UserError(f"{path}: no such FMU{hint}")
     return path
+
+
+def loaded(fmu: Path) -> fmu_run.Fmu:
+    """The FMU file, loaded. Raises UserError where that is impossible."""
+    try:
+        return fmu_run.Fmu(fmu)
+    except fmu_run.FmuError as error:
+        raise UserError(f"{fmu}: cannot be loaded ({str(error).removeprefix(f'{fmu}: ')})") from None
 
 
 class Testbed:
@@ -55,11 +65,8 @@ class Testbed:
 
     def __init__(self, fmu: Path | None = None):
         """Unpack and load the FMU file `fmu` (default: see `default_fmu`)."""
-        fmu = existing_fmu(fmu)
-        try:
-            self.loaded = fmu_run.Fmu(fmu)
-        except fmu_run.FmuError as error:
-            raise UserError(f"{fmu}: cannot be loaded ({str(error).removeprefix(f'{fmu}: ')})") from None
+        self.fmu = fmu = existing_fmu(fmu)
+        self.loaded = loaded(fmu)
         missing = [name for name in (*ANGLES, "use_omega", *OUTPUTS) if name not in self.loaded.variables]
         if missing:
             self.close()

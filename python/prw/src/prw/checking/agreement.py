@@ -237,7 +237,7 @@ def _notes(bare: Agreement, result: Result) -> list[str]:
             continue
         ratio = float(found @ expected / power)
         if abs(ratio / np.rad2deg(1) - 1) < NEAR:
-            notes.append(f"{name} looks like degrees; say so with --units {name}=deg{'/s' * name.endswith('rate')}")
+            notes.append(f"{name} looks like degrees; say so by the units: {name}=deg{'/s' * name.endswith('rate')}")
         elif abs(ratio + 1) < NEAR:
             notes.append(f"{name} has the other sign")
     late = _late_by(bare, result)

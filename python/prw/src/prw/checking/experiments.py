@@ -61,7 +61,7 @@ def read_experiments(fmu: Path) -> list[Experiment]:
     except (OSError, zipfile.BadZipFile) as error:
         raise UserError(f"{fmu}: cannot be read ({error})") from None
     except KeyError:
-        raise UserError(f"{fmu}: has no reference experiments; take the testbed FMU that `make fmu` builds") from None
+        raise UserError(f"{fmu}: has no reference experiments; take the FMU of the testbed") from None
 
 
 def find(known: Sequence[Experiment], name: str) -> Experiment:

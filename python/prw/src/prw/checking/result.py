@@ -77,7 +77,7 @@ def _choose(
             continue
         if any(not np.array_equal(other[2], same[0][2]) for other in same[1:]):
             owners = ", ".join(owner or "none" for owner, _, _ in same)
-            raise UserError(f"{path}: there are several {name}, of the components {owners}; say which with --component")
+            raise UserError(f"component: there are several {name} in {path}, of the components {owners}; say which")
         _, unit, values = same[0]
         try:
             found[name] = values * factor(name, unit or units.get(name, "") or si_unit(name))
@@ -121,6 +121,8 @@ def _mat(path: Path) -> dict[str, Array]:
         content = loadmat(path, squeeze_me=True, struct_as_record=False, chars_as_strings=True)
         if "dataInfo" in content:
             return _modelica(path, loadmat(path, chars_as_strings=False))
+    except UserError:
+        raise
     except NotImplementedError:
         raise UserError(f"{path}: is of MATLAB's format 7.3; save it with: save('{path.name}', ..., '-v7')") from None
     except (OSError, ValueError, TypeError, MatReadError) as error:

@@ -7,9 +7,13 @@ import contextlib
 import math
 import re
 from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
 
 from prw.errors import UserError
 from prw.identification import DEFAULT_ESTIMATE
+from prw.parameters import values_of
+from prw.testbed import existing_fmu, loaded
 
 
 class FORMATTER(argparse.RawDescriptionHelpFormatter):
@@ -71,6 +75,37 @@ def number(text: str, what: str) -> float:
 def listed(text: str) -> tuple[str, ...]:
     """Names with commas, each once."""
     return tuple(dict.fromkeys(filter(None, (part.strip() for part in text.split(",")))))
+
+
+def add_parameter_options(parser: argparse.ArgumentParser, unit: str) -> None:
+    """Options on the parameters of a run or a model."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help=f"start value in {unit} (default: the FMU's). May be repeated",
+    )
+    parser.add_argument(
+        "--parameters",
+        type=Path,
+        metavar="FILE",
+        help="parameters in JSON, as `prw identify` writes; --set is stronger",
+    )
+
+
+def parameters_of(arguments: argparse.Namespace, fmu: Path) -> dict[str, Any]:
+    """What these options say."""
+    found: dict[str, Any] = {}
+    if arguments.parameters is not None:
+        with loaded(existing_fmu(fmu)) as inside:
+            found = values_of(arguments.parameters, fmu, inside)
+    for name, text in pairs(arguments.set, "--set").items():
+        try:
+            found[name] = text == "true" if text in ("true", "false") else float(text)
+        except ValueError:
+            raise UserError(f"--set {name}={text}: {text!r} is not a number") from None
+    return found
 
 
 def numbers(texts: Iterable[str], option: str) -> dict[str, float]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from prw.checking import check
-from prw.commands.assignments import FORMATTER, pairs
+from prw.commands.assignments import FORMATTER, pairs, said_of_options
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.commands.simulate import write_png
 from prw.errors import UserError
@@ -56,14 +56,15 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw check`. Raises UserError with one line on what is wrong, also where the result does not agree."""
     units = pairs([part for part in arguments.units.split(",") if part], "--units")
-    found = check(
-        arguments.file,
-        arguments.experiment,
-        model_exchange=arguments.model_exchange,
-        component=arguments.component,
-        units=units,
-        fmu=arguments.fmu,
-    )
+    with said_of_options(experiment="experiment", component="component", units="units"):
+        found = check(
+            arguments.file,
+            arguments.experiment,
+            model_exchange=arguments.model_exchange,
+            component=arguments.component,
+            units=units,
+            fmu=arguments.fmu,
+        )
     print(found.summary())
     if found.agrees:
         print("agrees      with the reference")

@@ -20,7 +20,7 @@ DESCRIPTION = """\
 Proposes motor motions within the motors' limits and ranks them by what they tell about the parameters: the standard
 errors to be expected from measuring the given channels once, with unknown sensor offsets. Kinds: multisines (slow,
 wide, and one whose spectrum is optimal for the parameters), chirps; with equal, opposite, single and independent
-motors. Each motion becomes a CSV file for `prw simulate --input` or for your motor controller (s, rad, rad/s).
+motors. Each motion becomes a CSV file for `prw simulate` or for your motor controller (s, rad, rad/s).
 """
 
 EXAMPLES = """\
@@ -120,7 +120,7 @@ def run(arguments: argparse.Namespace) -> None:
     for combination in best.undetermined:
         print(f"note        even the best: {combination}")
     print(f"wrote       {len(ranking)} motions and ranking.json into {arguments.out}")
-    print(f"next        look at the best: prw simulate --input {arguments.out / best.name}.csv")
+    print(f"next        look at the best: prw simulate {arguments.out / best.name}.csv")
 
 
 def _percent(value: float) -> str:

@@ -42,7 +42,7 @@ examples:
   prw identify run.csv --prior J3=10% --prior H3=10% inertias too, known to 10 % (one sigma)
   prw identify run.csv --estimate k1,k2 --set c3=0.3 two of them, c3 held at another value
 then:
-  cargo run --release --bin build_fmu -- --parameters out/identified/identified.json --out mine
+  prw simulate motors.csv --parameters out/identified/identified.json
 """
 
 
@@ -134,10 +134,7 @@ def run(arguments: argparse.Namespace) -> None:
     found.to_parameters(parameters)
     found.to_ssv(ssv)
     print(f"wrote       {report}, {numbers_}, {parameters}, {ssv}")
-    print(
-        "next        look at the report; then: cargo run --release --bin build_fmu -- "
-        f"--parameters {parameters} --out mine"
-    )
+    print(f"next        look at the report; then: prw simulate {arguments.files[0]} --parameters {parameters}")
 
 
 def _quantum(text: str | None) -> float:

@@ -7,9 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from prw.commands.assignments import pairs
+from prw.commands.assignments import add_parameter_options, parameters_of, said_of_options
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
-from prw.errors import UserError
 from prw.files import replacing
 from prw.linearization import linearize
 from prw.state_space import StateSpace
@@ -23,13 +22,7 @@ def add_parser(subparsers: Any) -> None:
         description="Writes A, B, C, D of the testbed's FMU, or of any other with directional derivatives (FMI 2.0 or 3.0), "
         "with the names and units of states, inputs and outputs, and prints the poles.",
     )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="start value in the FMU's unit (default: the FMU's). May be repeated",
-    )
+    add_parameter_options(parser, "the FMU's unit")
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the FMU (default: %(default)s)")
     parser.add_argument(
         "--out",
@@ -43,9 +36,8 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw linearize`. Raises UserError with one line on what is wrong."""
-    model = linearize(
-        arguments.fmu, {name: _number(name, text) for name, text in pairs(arguments.set, "--set").items()}
-    )
+    with said_of_options(parameters="parameters"):
+        model = linearize(parameters_of(arguments, arguments.fmu), fmu=arguments.fmu)
     with replacing(arguments.out) as temporary:
         temporary.write_text(json.dumps(content(model), indent=2) + "\n", encoding="utf-8")
     for kind in ("states", "inputs", "outputs"):
@@ -59,10 +51,3 @@ def content(model: StateSpace) -> dict[str, Any]:
     matrices = {name: getattr(model, name).tolist() for name in "ABCD"}
     names = {kind: list(getattr(model, kind)) for kind in ("states", "inputs", "outputs")}
     return {**matrices, **names, "units": dict(model.units)}
-
-
-def _number(name: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise UserError(f"--set {name}={text}: {text!r} is not a number") from None

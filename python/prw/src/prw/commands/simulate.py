@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from prw.animation import animate, suffix_of
+from prw.commands.assignments import add_parameter_options, parameters_of, said_of_options
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
-from prw.errors import UserError
-from prw.extras import need
+from prw.errors import MissingPackage, UserError
 from prw.files import replacing
 from prw.motion import fig4
 from prw.recording import read_motion
@@ -26,15 +27,19 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "simulate",
         help="simulate the paper's experiment or a recording",
-        description="Simulate the paper's experiment (Fig. 4) or, with --input, the response to recorded motor angles. "
-        "Writes a CSV table (time, inputs, all outputs; rad, rad/s, N.m) and a PNG figure.",
+        description="Simulate the paper's experiment (Fig. 4) or the response to recorded motor angles. Writes a CSV table "
+        "(time, inputs, all outputs; s, rad, rad/s, N.m) and, with the extra prw[plot], a PNG figure.",
     )
     parser.add_argument(
-        "--input",
+        "file",
         type=Path,
+        nargs="?",
         metavar="FILE",
-        help="CSV recording with columns time (s), theta1, theta2 (rad) and, if known, omega1, omega2 (rad/s)",
+        help="CSV recording with columns time (s), theta1, theta2 (rad) and, if known, omega1, omega2 (rad/s); other "
+        "units in the header, as in `theta1 [deg]` (default: the paper's experiment)",
     )
+    parser.add_argument("--input", type=Path, metavar="FILE", help="the same")
+    add_parameter_options(parser, "SI")
     parser.add_argument("--degrees", action="store_true", help="the recording is in degrees and degrees per second")
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
     parser.add_argument(
@@ -51,30 +56,39 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw simulate`. Raises UserError with one line on what is wrong."""
-    need("plot", "matplotlib")
+    if arguments.file is not None and arguments.input is not None:
+        raise UserError(f"{arguments.file} and --input {arguments.input}: give one recording")
+    arguments.input = arguments.file or arguments.input
+    if arguments.animate is not None:
+        suffix_of(arguments.animate)
     recorded = arguments.input is not None
     if recorded:
         motion = read_motion(arguments.input, degrees=arguments.degrees)
         title = f"Response to {arguments.input.name}"
     else:
         if arguments.degrees:
-            raise UserError("--degrees belongs to --input; the paper's experiment is in radians")
+            raise UserError("--degrees belongs to a recording; the paper's experiment is in radians")
         motion, title = fig4(), "Fig. 4: equal and opposite motor velocities"
     table, picture = (arguments.out / f"{motion.name}{suffix}" for suffix in (".csv", ".png"))
     if recorded and table.exists() and table.samefile(arguments.input):
         raise UserError(
             f"{table}: is the recording itself and would be overwritten; choose another directory with --out"
         )
-    response = simulate(motion, fmu=arguments.fmu)
+    with said_of_options(parameters="parameters"):
+        given = parameters_of(arguments, arguments.fmu)
+    with said_of_options(parameters="set" if arguments.set else "parameters"):
+        response = simulate(motion, given, fmu=arguments.fmu)
     response.to_csv(table)
-    write_png(picture, response.plot(title, angles=recorded))
-    written = [table, picture]
+    written, missing = [table], ""
+    try:
+        write_png(picture, response.plot(title, angles=recorded))
+        written.append(picture)
+    except MissingPackage as error:
+        missing = str(error)
     if arguments.animate is not None:
-        from prw.animation import animate  # matplotlib takes a while to load
-
         animate(response, arguments.animate)
         written.append(arguments.animate)
-    print("\n".join(_summary(arguments, response, written)))
+    print("\n".join(_summary(arguments, response, given, written, missing)))
 
 
 def write_png(path: Path, figure: Figure) -> None:
@@ -83,7 +97,9 @@ def write_png(path: Path, figure: Figure) -> None:
         figure.savefig(temporary, dpi=150)
 
 
-def _summary(arguments: argparse.Namespace, response: Run, written: Sequence[Path]) -> list[str]:
+def _summary(
+    arguments: argparse.Namespace, response: Run, given: Mapping[str, Any], written: Sequence[Path], missing: str
+) -> list[str]:
     """What was done, the key figures, and what to do next; one line each."""
     motion = response.motion
     time, steps = motion.time, np.diff(motion.time)
@@ -96,6 +112,8 @@ def _summary(arguments: argparse.Namespace, response: Run, written: Sequence[Pat
     source = "the paper's experiment (Sec. 4, Fig. 4)" if arguments.input is None else str(arguments.input)
     rates = "rates from omega1, omega2" if motion.omega is not None else "rates from the angles"
     lines = [f"simulated   {source}: {time[-1] - time[0]:.4g} s in {spacing}, {rates}"]
+    if given:
+        lines.append(f"with        {', '.join(f'{name} {value:.5g}' for name, value in given.items())} (SI)")
 
     def peak(*names: str) -> float:
         return max(float(np.abs(response[name]).max()) for name in names)
@@ -110,14 +128,13 @@ def _summary(arguments: argparse.Namespace, response: Run, written: Sequence[Pat
         lines.append(f"at the end  pitch {_degrees(response['pitch'][-1])}, roll {_degrees(response['roll'][-1])}")
     lines += [f"note        {note}" for note in motion.notes]
     lines.append(f"wrote       {', '.join(map(str, written))}")
+    if missing:
+        lines.append(f"no figure   {missing}")
+    look = f"look at {written[min(1, len(written) - 1)]}"
     if arguments.input is None:
-        lines.append(
-            "next        look at the figure; then your own motors: make demo INPUT=examples/point_to_point.csv"
-        )
+        lines.append(f"next        {look}; then your own motors: prw simulate motors.csv (see prw simulate --help)")
     else:
-        lines.append(
-            "next        look at the figure; the FMU also loads in Simulink, OpenModelica and others, see README.md"
-        )
+        lines.append(f"next        {look}; {arguments.fmu} also loads in Simulink, OpenModelica and others")
     return lines
 
 

@@ -92,7 +92,8 @@ def run(arguments: argparse.Namespace) -> None:
         with said_of_options(grid="grid", random="random"):
             values = layout(grid, random, arguments.runs, arguments.seed, testbed.starts)
         study = Study(arguments.fmu.read_bytes(), motion, tuple(values), np.column_stack(list(values.values())))
-        swept = carry_out(study, testbed, arguments.out, threads, arguments.scheduler)
+        with said_of_options(scheduler="scheduler", out="out"):
+            swept = carry_out(study, testbed, arguments.out, threads, arguments.scheduler)
     print("\n".join(_summary(arguments, swept, threads)))
 
 

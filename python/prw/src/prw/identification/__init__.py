@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias, cast
 
+from prw.arguments import Table, counted, is_path, is_table, names_of, positive, spread_of
 from prw.errors import UserError
 from prw.extras import need
 
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from prw.identification.results import Identification
     from prw.recording import Recording
 
+    #: What an experiment is read from.
+    Source: TypeAlias = str | os.PathLike[str] | Recording | Table
+
 #: What is estimated if nothing is said.
 DEFAULT_ESTIMATE = ("k1", "k2", "c1", "c2", "c3")
 #: Default bounds: this factor about the start value.
@@ -28,9 +32,9 @@ REACH = 100.0
 
 
 def identify(
-    files: str | os.PathLike[str] | Recording | Sequence[str | os.PathLike[str] | Recording],
+    files: Source | Iterable[Source],
     *,
-    estimate: Sequence[str] = DEFAULT_ESTIMATE,
+    estimate: str | Iterable[str] = DEFAULT_ESTIMATE,
     priors: Mapping[str, float | tuple[float, float]] = {},
     fixed: Mapping[str, float] = {},
     bounds: Mapping[str, tuple[float, float]] = {},
@@ -50,12 +54,12 @@ def identify(
     Parameters
     ----------
     files
-        CSV tables as `prw.read` reads them, or what it returned.
+        CSV tables, DataFrames or dicts of arrays as `prw.read` reads them, or what it returned.
     estimate
-        Names of the parameters.
+        Names of the parameters, or one.
     priors
-        What is known beforehand of a parameter, by name: the standard deviation as a fraction of its start value,
-        or (value, fraction). It is then estimated along.
+        What is known beforehand of a parameter, by name: the standard deviation as a fraction of its start value
+        (0.1 is 10 %, 1 the most), or (value, fraction). It is then estimated along.
     fixed
         Other start values, or values of what is not estimated.
     bounds
@@ -84,7 +88,7 @@ def identify(
     UserError
         A file cannot be read, a name is not known, or the FMU refuses a value.
     """
-    need("identify", "scipy", "threadpoolctl", "lxml")
+    need("identify", "scipy", "threadpoolctl")
     # They take a while to load.
     from threadpoolctl import threadpool_limits
 
@@ -95,9 +99,11 @@ def identify(
     from prw.identification.statistics import certainty
     from prw.recording import Recording, read
 
-    if starts < 1:
-        raise UserError(f"starts {starts}: at least 1 is needed")
-    several = [files] if isinstance(files, (str, os.PathLike, Recording)) else list(files)
+    starts = counted("starts", starts)
+    one = is_path(files) or is_table(files) or isinstance(files, Recording) or not isinstance(files, Iterable)
+    several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
+    if not several:
+        raise UserError("files: there are none")
     # Many small matrices: more threads only get into each other's way.
     with Model(fmu) as model, threadpool_limits(1):
         task = task_of(model.known, estimate, priors, fixed, bounds, noise, offsets)
@@ -117,7 +123,7 @@ def identify(
 
 def task_of(
     known: Parameters,
-    estimate: Sequence[str],
+    estimate: str | Iterable[str],
     priors: Mapping[str, float | tuple[float, float]] = {},
     fixed: Mapping[str, float] = {},
     bounds: Mapping[str, tuple[float, float]] = {},
@@ -128,32 +134,28 @@ def task_of(
     from prw.channels import MEASURED
     from prw.identification.fit import Prior, Task
 
-    counted = f"; {', '.join(known.counts)} are counted, not estimated" if known.counts else ""
+    estimate = names_of("estimate", estimate)
+    whole = f"; {', '.join(known.counts)} are counted, not estimated" if known.counts else ""
     for what, names in (("estimate", estimate), ("priors", priors), ("fixed", fixed), ("bounds", bounds)):
-        _check(what, names, known.real, counted)
+        _check(what, names, known.real, whole)
     _check("noise", noise, MEASURED)
     start = {**known.starts, **fixed}
     if not estimate and not priors:
         raise UserError(f"estimate: nothing is named; there are {', '.join(known.real)}")
-    beliefs = {name: Prior(*p) if isinstance(p, tuple) else Prior(start[name], p) for name, p in priors.items()}
+    beliefs = {name: Prior(*spread_of(f"priors: {name}", p, start[name])) for name, p in priors.items()}
     chosen = tuple(name for name in known.real if name in estimate or name in beliefs)
-    for what, values in (
-        ("fixed", fixed),
-        ("noise", noise),
-        *((f"priors {name}", prior._asdict()) for name, prior in beliefs.items()),
-    ):
+    for what, values in (("fixed", fixed), ("noise", noise)):
         for name, value in values.items():
-            if not 0 < value < float("inf"):
-                raise UserError(f"{what}: {name} {value!r} is not a positive number")
+            positive(f"{what}: {name}", value)
     for name in chosen:
         if start[name] <= 0:
             raise UserError(f"{name} starts at {start[name]:g} and cannot be estimated from there; fix another value")
     spans = {**{name: (value / REACH, value * REACH) for name, value in start.items()}, **bounds}
-    for name, (low, high) in bounds.items():
-        if not 0 < low < high < float("inf"):
-            raise UserError(
-                f"bounds: {name} from {low:g} to {high:g}; both must be positive and the first below the second"
-            )
+    for name, span in bounds.items():
+        if not isinstance(span, Sequence) or len(span) != 2:
+            raise UserError(f"bounds: {name} {span!r}; write (least, greatest)")
+        if not positive(f"bounds: {name}", span[0]) < positive(f"bounds: {name}", span[1]):
+            raise UserError(f"bounds: {name} from {span[0]:g} to {span[1]:g}; the first must be below the second")
     return Task(chosen, start, spans, beliefs, dict(noise), offsets)
 
 

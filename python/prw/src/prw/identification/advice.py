@@ -68,7 +68,7 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
         if error < UNDETERMINED:
             sentences.append(f"measuring {name} as well in the same motion (worst standard error then {error:.1%})")
     if not sentences:
-        sentences.append("no single motion or pair of sensors; fix one of them or give it a --prior")
+        sentences.append("no single motion or pair of sensors; fix one of them or give it a prior")
     return sentences
 
 

@@ -167,7 +167,7 @@ def _optimal(
     share = 1e-4
     logarithms = task.first()
     steps = share * np.vstack([np.eye(len(logarithms)), -np.eye(len(logarithms))])
-    response = np.array([model.at(task.values(logarithms + s)).frequency_response(frequency, ANGLE_OF) for s in steps])
+    response = np.array([model.at(task.values(logarithms + s)).response_at_hz(frequency, ANGLE_OF) for s in steps])
     slopes = (response[: len(logarithms)] - response[len(logarithms) :]) / (2 * share)
     rows = [OUTPUTS.index(name) for name in noise]
     weighted = slopes[:, :, rows] / np.array(list(noise.values()))[:, None]

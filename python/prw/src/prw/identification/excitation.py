@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
+from prw.arguments import names_of, positive
 from prw.channels import MEASURED
 from prw.errors import UserError
 from prw.extras import need
@@ -36,14 +37,14 @@ class Excitation(NamedTuple):
 
 
 def excite(
-    measure: Sequence[str] | None = None,
+    measure: str | Iterable[str] | None = None,
     *,
     angle: float = np.deg2rad(40.0),
     speed: float = np.deg2rad(450.0),
     acceleration: float = np.deg2rad(20000.0),
     duration: float = 10.0,
     rate: float = 1000.0,
-    estimate: Sequence[str] = DEFAULT_ESTIMATE,
+    estimate: str | Iterable[str] = DEFAULT_ESTIMATE,
     fixed: Mapping[str, float] = {},
     noise: Mapping[str, float] = {},
     fmu: str | os.PathLike[str] | None = None,
@@ -79,7 +80,17 @@ def excite(
     from prw.identification.model import Model
     from prw.identification.statistics import covariance_of, undetermined
 
-    channels = tuple(MEASURED if measure is None else measure)
+    angle, speed, acceleration, duration, rate = (
+        positive(name, value)
+        for name, value in {
+            "angle": angle,
+            "speed": speed,
+            "acceleration": acceleration,
+            "duration": duration,
+            "rate": rate,
+        }.items()
+    )
+    channels = tuple(MEASURED) if measure is None else names_of("measure", measure)
     for name in channels:
         if name not in MEASURED:
             raise UserError(f"measure: {name} is not known; there are {', '.join(MEASURED)}")
@@ -96,7 +107,7 @@ def excite(
         task = task_of(model.known, estimate, fixed=fixed, noise=noise)
         known = {**design.default_noise(), **noise}
         assumed = {name: known[name] for name in channels}
-        limits = design.Limits(float(angle), float(speed), float(acceleration))
+        limits = design.Limits(angle, speed, acceleration)
         for motion in design.motions(model, task, limits, duration, rate, assumed):
             told = design.information(model, [planned(motion, channels)], task, task.first(), assumed)
             errors = dict(zip(task.names, np.sqrt(np.diag(covariance_of(told))).tolist()))

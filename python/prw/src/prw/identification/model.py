@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
+from xml.etree import ElementTree
 
-import fmpy
+import fmu_run
 import numpy as np
-from lxml import etree
 
+from prw.description import CONTINUOUS, Description, read_description
 from prw.linearization import Linearizer
 from prw.motion import Array
 from prw.state_space import StateSpace
@@ -18,7 +19,6 @@ from prw.testbed import OUTPUTS
 
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
-BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
 class Parameter(NamedTuple):
@@ -46,24 +46,20 @@ class Parameters:
     """The parameters that the model description of the testbed declares. real: by name. counts: those that are whole
     numbers, with their start values. guid: of the FMU, a hash of its sources and start values."""
 
-    def __init__(self, description: Any):
-        self.guid: str = description.guid
+    def __init__(self, fmu: fmu_run.Fmu, description: Description):
+        self.guid: str = fmu.token
         self.real: dict[str, Parameter] = {}
         self.counts: dict[str, int] = {}
-        self._units, self._meanings = description.unitDefinitions, {}
-        factors = {
-            (unit.name, display.name): 1 / display.factor
-            for unit in description.unitDefinitions
-            for display in unit.displayUnits
-        }
-        for v in description.modelVariables:
+        self._units, self._meanings = description.units, {}
+        for v in fmu.variables.values():
+            unit, start = v.unit or "", v.start or "0"
             # Where a run starts is no property of the testbed.
-            if v.causality == "parameter" and v.type == "Real" and not v.name.endswith("_start"):
-                shown = v.displayUnit or v.unit
-                factor = factors.get((v.unit, shown), 1.0)
-                self.real[v.name] = Parameter(float(v.start), v.unit, shown, factor, v.description or "")
-            elif v.causality == "parameter" and v.type == "Integer":
-                self.counts[v.name], self._meanings[v.name] = int(v.start), v.description or ""
+            if v.causality == "parameter" and v.type in CONTINUOUS and not v.name.endswith("_start"):
+                shown = description.display_units[v.name] or unit
+                factor = description.units[unit].displayed.get(shown, 1.0) if unit in description.units else 1.0
+                self.real[v.name] = Parameter(float(start), unit, shown, factor, v.description)
+            elif v.causality == "parameter" and "Int" in v.type:
+                self.counts[v.name], self._meanings[v.name] = int(start), v.description
 
     @property
     def starts(self) -> dict[str, float]:
@@ -84,22 +80,25 @@ class Parameters:
 
     def ssv(self, values: Mapping[str, float], title: str) -> str:
         """All parameters as a parameter set of SSP 1.0 in SI, with the units' definitions."""
-        root = etree.Element(f"{{{SSV}}}ParameterSet", nsmap={"ssv": SSV, "ssc": SSC}, version="1.0", name=title)
-        parameters = etree.SubElement(root, f"{{{SSV}}}Parameters")
+        for prefix, space in (("ssv", SSV), ("ssc", SSC)):
+            ElementTree.register_namespace(prefix, space)
+        root = ElementTree.Element(f"{{{SSV}}}ParameterSet", version="1.0", name=title)
+        parameters = ElementTree.SubElement(root, f"{{{SSV}}}Parameters")
         for name, parameter in self.real.items():
-            element = etree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
-            etree.SubElement(element, f"{{{SSV}}}Real", value=repr(float(values[name])), unit=parameter.unit)
+            element = ElementTree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
+            value = {"value": repr(float(values[name])), "unit": parameter.unit}
+            ElementTree.SubElement(element, f"{{{SSV}}}Real", value)
         for name, count in self.counts.items():
-            element = etree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
-            etree.SubElement(element, f"{{{SSV}}}Integer", value=str(count))
-        units, used = etree.SubElement(root, f"{{{SSV}}}Units"), {p.unit for p in self.real.values()}
-        for unit in self._units:
-            if unit.name in used:
-                exponents = {base: str(power) for base in BASE_UNITS if (power := getattr(unit.baseUnit, base))}
-                element = etree.SubElement(units, f"{{{SSC}}}Unit", name=unit.name)
-                etree.SubElement(element, f"{{{SSC}}}BaseUnit", **exponents)
-        found: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
-        return found.decode("utf-8")
+            element = ElementTree.SubElement(parameters, f"{{{SSV}}}Parameter", name=name)
+            ElementTree.SubElement(element, f"{{{SSV}}}Integer", value=str(count))
+        units, used = ElementTree.SubElement(root, f"{{{SSV}}}Units"), {p.unit for p in self.real.values()}
+        for name, unit in self._units.items():
+            if name in used:
+                element = ElementTree.SubElement(units, f"{{{SSC}}}Unit", name=name)
+                ElementTree.SubElement(element, f"{{{SSC}}}BaseUnit", dict(unit.exponents))
+        ElementTree.indent(root)
+        found: bytes = ElementTree.tostring(root, "UTF-8", xml_declaration=True)
+        return found.decode("utf-8") + "\n"
 
 
 class Model:
@@ -113,7 +112,7 @@ class Model:
         """Unpack, load and instantiate the FMU file `fmu` (default: see prw.testbed.default_fmu)."""
         self._linearizer = Linearizer(fmu, outputs=OUTPUTS)
         self.fmu = self._linearizer.fmu
-        self.known = Parameters(fmpy.read_model_description(str(self.fmu)))
+        self.known = Parameters(self._linearizer.loaded, read_description(self.fmu))
 
     def __enter__(self) -> Model:
         return self

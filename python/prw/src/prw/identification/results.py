@@ -135,7 +135,7 @@ class Identification:
         for name in solution.task.names:
             low, high = solution.task.bounds[name]
             if min(self.values[name] / low, high / self.values[name]) < 1.001:
-                lines.append(f"{name} ended at its bound; widen it with --bounds, or doubt the data")
+                lines.append(f"{name} ended at its bound; give wider bounds, or doubt the data")
         for point, _ in solution.rivals:
             values = ", ".join(
                 f"{name} {value / self.known.real[name].factor:.4g}"

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from prw.arguments import Table, counted, spread_of
 from prw.errors import UserError
 from prw.extras import need
 from prw.motion import Array, Motion
 from prw.progress import Progress
 from prw.recording import Recording
-from prw.simulation import motion_of
+from prw.simulation import Run, motion_of
 from prw.sweeps.study import Rows, Study, chunks, run_chunk
 from prw.testbed import Testbed, existing_fmu
 
@@ -44,7 +45,7 @@ def sweep(
     *,
     runs: int = 1000,
     seed: int = 0,
-    motion: Motion | Recording | str | os.PathLike[str] | None = None,
+    motion: Motion | Recording | Run | str | os.PathLike[str] | Table | None = None,
     threads: int | None = None,
     scheduler: str | None = None,
     fmu: str | os.PathLike[str] | None = None,
@@ -95,9 +96,7 @@ def carry_out(study: Study, testbed: Testbed, out: Path | None, threads: int | N
     """Make the runs of the study that are missing in the folder `out`, here with `testbed`; the rest as for `sweep`."""
     from prw.sweeps.store import Memory, Store
 
-    if threads is not None and threads < 1:
-        raise UserError(f"threads {threads}: at least 1 is needed")
-    threads = threads or os.cpu_count() or 1
+    threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
     store = Memory(study) if out is None else Store(out, study)
     total, done = len(study.table), store.done()
     missing = [number for number in range(total) if number not in done]
@@ -134,9 +133,7 @@ def layout(
             raise UserError(f"{name} is in the grid and random; choose one")
     if not grid and not random:
         raise UserError("nothing varies; give values by parameter (grid), or relative standard deviations (random)")
-    draws = runs if random else 1
-    if draws < 1:
-        raise UserError(f"runs {draws}: at least 1 is needed")
+    draws = counted("runs", runs) if random else 1
     axes = {name: _column(name, values) for name, values in grid.items()}
     total = math.prod(map(len, axes.values())) * draws
     if total > MOST_RUNS:
@@ -147,9 +144,7 @@ def layout(
     table = dict(zip(axes, np.repeat(combinations, draws, axis=0).T))
     generator = np.random.default_rng(seed)
     for name, spread in random.items():
-        value, relative = spread if isinstance(spread, tuple) else (starts[name], spread)
-        if not (np.isfinite([value, relative]).all() and value > 0 and relative > 0):
-            raise UserError(f"{name}: {spread!r}; the value and its relative standard deviation must be positive")
+        value, relative = spread_of(f"random: {name}", spread, starts[name])
         table[name] = value * np.exp(relative * generator.standard_normal(total))
     return table
 

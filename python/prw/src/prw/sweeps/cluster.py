@@ -62,8 +62,8 @@ def _connect(address: str) -> Any:
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise UserError(f"--scheduler {address}: no Dask scheduler answers there ({error or 'timeout'})") from None
+        raise UserError(f"scheduler {address}: no Dask scheduler answers there ({error or 'timeout'})") from None
     if not client.scheduler_info()["workers"]:
         client.close()
-        raise UserError(f"--scheduler {address}: the cluster has no workers; start some with `dask worker {address}`")
+        raise UserError(f"scheduler {address}: the cluster has no workers; start some with `dask worker {address}`")
     return client

@@ -1,0 +1,141 @@
+"""What came of many runs."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fmu_run._native import FmuError
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+_Array = NDArray[np.float64]
+
+
+class Runs(Mapping[str, _Array]):
+    """What came of `Fmu.run`: courses by output, measures by output and measure.
+
+    runs["roll"]: (runs, times), what was kept. runs["roll", "peak"]: (runs,). Where a run has not reached a time there is
+    not a number. Nor are there measures of a run that the FMU refused; those of one that it ended are of the times until
+    then. As a mapping it has the courses by output, none where only measures were asked for; it is true all the same.
+    """
+
+    #: (times,), s: the times that were kept.
+    time: _Array
+    #: The runs that the FMU refused or ended before the last time, by their numbers, how far they got and why, in the
+    #: words of the FMU ("at 0.5 s: ...", "ended by the FMU at t = 0.5 s: ...").
+    errors: dict[int, str]
+    #: What is to be said of finished runs: that the FMU ended at the last time by itself, or refused to be terminated.
+    notes: dict[int, str]
+    #: (runs,): the start values that were given, by name; those that are texts as they are.
+    start: dict[str, _Array | str]
+
+    def __init__(
+        self,
+        time: _Array,
+        outputs: Sequence[str],
+        courses: _Array,
+        measures: Sequence[str],
+        measured: _Array,
+        errors: dict[int, str],
+        notes: dict[int, str],
+        start: Mapping[str, float | str | _Array],
+    ):
+        self.time, self.errors, self.notes = time, errors, notes
+        runs = courses.shape[0]
+        self.start = {
+            name: value if isinstance(value, str) else np.broadcast_to(value, runs) for name, value in start.items()
+        }
+        self._outputs = {name: place for place, name in enumerate(outputs)}
+        self._measures = {name: place for place, name in enumerate(measures)}
+        self._courses, self._measured = courses, measured
+
+    @property
+    def count(self) -> int:
+        """The number of runs."""
+        return int(self._courses.shape[0])
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """(runs,): which have reached the last time."""
+        finished = np.ones(self.count, dtype=bool)
+        finished[list(self.errors)] = False
+        return finished
+
+    def check(self) -> Runs:
+        """Itself, if all runs are finished; raises FmuError with the first refusal otherwise."""
+        if self.errors:
+            number, why = next(iter(self.errors.items()))
+            many = f" ({len(self.errors)} of {self.count} runs failed)" if self.count > 1 else ""
+            raise FmuError(f"run {number}: {why}{many}" if self.count > 1 else why)
+        return self
+
+    def __getitem__(self, key: str | tuple[str, str]) -> _Array:
+        if isinstance(key, str):
+            if not self._courses.shape[2]:
+                raise KeyError(f"{key}: no courses were kept; ask for them with every=1, or for [output, measure]")
+            return self._courses[:, self._outputs[key], :]
+        output, measure = key
+        return self._measured[:, self._outputs[output], self._measures[measure]]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._outputs if self._courses.shape[2] else ())
+
+    def __len__(self) -> int:
+        return len(self._outputs) if self._courses.shape[2] else 0
+
+    def __bool__(self) -> bool:
+        return True
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row for each run and each time that was kept, with both as index; for each run alone where there are only
+        measures.
+
+        The columns: start values by name, outputs by name, measures as `roll_peak`; what belongs to a run stands in all of its
+        rows. A start value of an output is called `roll at start`. Raises ImportError without pandas.
+        """
+        pandas = _needed("pandas")
+        runs = np.arange(self.count)
+        index, repeat = pandas.Index(runs, name="run"), 1
+        if len(self):
+            index, repeat = pandas.MultiIndex.from_product([runs, self.time], names=["run", "time"]), len(self.time)
+        by_run = {**self._starts(), **self._by_name()}
+        columns = {name: v if isinstance(v, str) else np.repeat(v, repeat) for name, v in by_run.items()}
+        return pandas.DataFrame({**columns, **{name: course.ravel() for name, course in self.items()}}, index=index)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Outputs over the dimensions run and time, measures as `roll_peak` over run, start values as coordinates of run. A
+        start value of an output is called `roll at start`. Raises ImportError without xarray."""
+        xarray = _needed("xarray")
+        starts = {name: value if isinstance(value, str) else ("run", value) for name, value in self._starts().items()}
+        measures = {name: ("run", values) for name, values in self._by_name().items()}
+        times = {"time": self.time} if len(self) else {}
+        return xarray.Dataset(
+            {**{name: (("run", "time"), course) for name, course in self.items()}, **measures},
+            {"run": np.arange(self.count), **times, **starts},
+        )
+
+    def _starts(self) -> dict[str, _Array | str]:
+        return {f"{name} at start" if name in self else name: value for name, value in self.start.items()}
+
+    def _by_name(self) -> dict[str, _Array]:
+        names = [(output, measure) for output in self._outputs for measure in self._measures]
+        return {f"{output}_{measure}": self[output, measure] for output, measure in names}
+
+    def __repr__(self) -> str:
+        measures = f", measures {', '.join(self._measures)}" if self._measures else ""
+        failed = f", {len(self.errors)} failed" if self.errors else ""
+        return f"<Runs: {self.count} of {', '.join(self._outputs)}, {len(self.time)} times{measures}{failed}>"
+
+
+def _needed(package: str) -> Any:
+    try:
+        return importlib.import_module(package)
+    except ImportError:
+        raise ImportError(f"{package} is missing; install it with: pip install {package}", name=package) from None

@@ -1,0 +1,84 @@
+"""What callers hand over in more than one form, or refused with a word that names the argument."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from prw.errors import UserError
+
+#: A relative standard deviation above is a slip: percent taken for a fraction.
+MOST_RELATIVE = 1.0
+#: Rows of CSV, in memory.
+Table = Mapping[str, Any]
+
+
+def names_of(argument: str, given: str | Iterable[str]) -> tuple[str, ...]:
+    """A name or several, as a tuple."""
+    if isinstance(given, str):
+        return (given,)
+    if not isinstance(given, Iterable):
+        raise UserError(f"{argument}: {given!r} is neither a name nor several")
+    return tuple(given)
+
+
+def counted(argument: str, value: Any) -> int:
+    """A whole number of at least 1."""
+    if not isinstance(value, Integral) or value < 1:
+        raise UserError(f"{argument} {value!r}: at least 1 is needed")
+    return int(value)
+
+
+def positive(what: str, value: Any) -> float:
+    """A finite number above 0."""
+    if not isinstance(value, Real) or not 0 < float(value) < math.inf:
+        raise UserError(f"{what} {value!r} is not a positive number")
+    return float(value)
+
+
+def spread_of(what: str, given: Any, start: float) -> tuple[float, float]:
+    """What a parameter varies about, and its relative standard deviation: `given` is this alone, then `start` is the
+    other, or both."""
+    value, relative = given if isinstance(given, Sequence) and len(given) == 2 else (start, given)
+    value, relative = positive(what, value), positive(what, relative)
+    if relative > MOST_RELATIVE:
+        raise UserError(f"{what} has a standard deviation of {relative:.0%}; 100 % is the most, as a fraction 1")
+    return value, relative
+
+
+def is_path(given: Any) -> bool:
+    """Whether it names a file."""
+    return isinstance(given, (str, os.PathLike))
+
+
+def is_table(given: Any) -> bool:
+    """Whether it has columns by name: a DataFrame, a dict of arrays and the like."""
+    return not is_path(given) and (hasattr(given, "keys") or hasattr(given, "columns"))
+
+
+def columns_of(table: Any) -> dict[str, Any]:
+    """The columns of a DataFrame (of pandas, polars, ...) or a dict of arrays, that of a named index first."""
+    names = table.keys() if hasattr(table, "keys") else table.columns
+    index = getattr(getattr(table, "index", None), "name", None)
+    first = {} if index is None or index in names else {str(index): table.index}
+    return first | {str(name): table[name] for name in names}
+
+
+def numbers_of(where: str, values: Any) -> NDArray[np.float64]:
+    """A column (n,). Raises UserError, saying where."""
+    array = np.asarray(values)
+    if array.dtype.kind in "mM":
+        raise UserError(f"{where}: has dates or durations; write seconds as numbers")
+    try:
+        array = array.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        raise UserError(f"{where}: is not made of numbers ({error})") from None
+    if array.ndim != 1:
+        raise UserError(f"{where}: has the shape {array.shape}; a column is (n,)")
+    return array

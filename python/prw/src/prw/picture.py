@@ -1,0 +1,268 @@
+"""A run as a moving picture: the testbed in three dimensions, and the courses of its angles and torques below."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import matplotlib
+import numpy as np
+from matplotlib.animation import FuncAnimation
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import ArrayLike
+from PIL import Image
+
+from prw.errors import UserError
+from prw.files import replacing
+from prw.motion import Array
+from prw.moving import write_gif, write_movie, write_page
+from prw.plots import BLUE, GREEN, PURPLE, STYLE, VERMILION
+from prw.wrist import DARK, PALE, STEEL, Wrist
+
+if TYPE_CHECKING:
+    from prw.simulation import Run
+
+#: The outputs of a run that are shown.
+MEASURED = ("theta3", "theta4", "pitch", "roll", "tau1", "tau2")
+#: Pixels, and inches at DPI, of the picture.
+SIZE, DPI = (720, 405), 92
+#: The same for a still, and the upper share of the picture that shows the testbed.
+STILL_DPI, SCENE = 138, 0.66
+#: The twist of a coupling that the largest one in a run is shown with, rad.
+SHOWN_TWIST = 0.9
+#: But by no more than this.
+MOST_TWISTED = 100.0
+#: Where the viewer is, deg: from the left of motor 2, and above.
+AZIMUTH, ELEVATION = -64, 20
+#: Directions to the viewer and to the lamp in matplotlib's axes.
+VIEWER = np.array([np.cos(np.deg2rad(AZIMUTH)), np.sin(np.deg2rad(AZIMUTH)), np.tan(np.deg2rad(ELEVATION))])
+LAMP = np.array([0.15, -0.62, 0.77])
+#: Degrees of brightness above the darkest: few, so that a GIF needs few colours.
+LEVELS = 2
+#: The share of its colour that a course has before it is reached.
+FAINT = 0.25
+#: Words beside what does not move: place in the figure, text, colour.
+LABELS = (
+    (0.14, 0.585, "motor 1", BLUE),
+    (0.86, 0.40, "motor 2", VERMILION),
+    (0.68, 0.86, "gripper: roll", PURPLE),
+    (0.68, 0.80, "ring: pitch", GREEN),
+)
+
+
+class Panel(NamedTuple):
+    """Courses below the testbed: title, factor from SI, digits and format of numbers, and of each variable label and
+    colour."""
+
+    title: str
+    factor: float
+    digits: int
+    number: str
+    curves: dict[str, tuple[str, str]]
+
+
+PANELS = (
+    Panel("Motors", 180 / np.pi, 0, "{:.0f}°", {"theta1": ("θ₁", BLUE), "theta2": ("θ₂", VERMILION)}),
+    Panel("Wrist", 180 / np.pi, 0, "{:.0f}°", {"pitch": ("pitch", GREEN), "roll": ("roll", PURPLE)}),
+    Panel("Torque (N m)", 1.0, 1, "{:.1f}", {"tau1": ("τ₁", BLUE), "tau2": ("τ₂", VERMILION)}),
+)
+
+
+class Moving(NamedTuple):
+    """What is moved for a variable: the line so far, the dot at its end, and the value in figures."""
+
+    name: str
+    panel: Panel
+    line: Line2D
+    dot: Line2D
+    shown: Text
+
+
+def drawn(
+    run: Run, speed: float, count: int, rate: int, target: Path | None, captions: Sequence[tuple[float, str]]
+) -> FuncAnimation:
+    """The animation of `count` pictures, `rate` a second, `speed` times as fast as the run, written to `target`; see
+    `prw.animate`."""
+    time = run.time
+    picture = _Picture(time, angles_and_torques(run), speed, captions)
+    instants = np.linspace(time[0], time[-1], max(count, 2))
+
+    def draw(number: int) -> list[Any]:
+        picture.draw(float(instants[number]))
+        return []
+
+    animation = FuncAnimation(picture.figure, draw, frames=len(instants), interval=1000 / rate, init_func=list)
+    if target is not None:
+        with matplotlib.rc_context(STYLE), replacing(target) as temporary:
+            pictures = (picture.at(float(instant)) for instant in instants)
+            if target.suffix.lower() == ".gif":
+                write_gif(temporary, pictures, rate, _colours())
+            elif target.suffix.lower() == ".html":
+                write_page(temporary, pictures, rate)
+            else:
+                write_movie(temporary, pictures, rate)
+    return animation
+
+
+def still(run: Run, instant: float) -> Image.Image:
+    """The testbed at an instant (s) as a picture of its own, sharp and on no ground, for light and dark pages."""
+    picture = _Picture(run.time, angles_and_torques(run), 1.0, ())
+    picture.figure.set_dpi(STILL_DPI)
+    for ground in (picture.figure, picture.scene):
+        ground.set_facecolor("none")
+    picture.note.set_visible(False)
+    pixels = picture.at(instant)
+    return pixels.crop((0, 0, pixels.width, round(SCENE * pixels.height)))
+
+
+def angles_and_torques(run: Run) -> dict[str, Array]:
+    """Everything that moves, (n,) each by name. Raises UserError where something is missing."""
+    for name in MEASURED:
+        if name not in run:
+            raise UserError(f"the run has no {name}, which an animation shows; ask for it with `outputs=`")
+    courses = dict(zip(("theta1", "theta2"), run.motion.theta.T)) | {name: run[name] for name in MEASURED}
+    for name, course in courses.items():
+        if not np.isfinite(course).all():
+            raise UserError(f"{name} of the run has values that are not finite and cannot be shown")
+    turned = run.parameters["M"] / run.parameters["N"] * run["roll"]  # eq. (1), solved for the carriers
+    return courses | {"theta5": run["pitch"] + turned, "theta6": run["pitch"] - turned}
+
+
+class _Picture:
+    """The figure of one run, drawn for one instant after the other."""
+
+    def __init__(
+        self,
+        time: Array,
+        courses: Mapping[str, Array],
+        speed: float,
+        captions: Sequence[tuple[float, str]],
+    ):
+        self.time, self.courses, self.captions = time, courses, captions
+        self._ground: Any = None
+        pairs = (("theta1", "theta3"), ("theta3", "theta5"), ("theta2", "theta4"), ("theta4", "theta6"))
+        twist = max(float(np.abs(courses[a] - courses[b]).max()) for a, b in pairs)
+        factor = _round_below(min(SHOWN_TWIST / max(twist, 1e-6), MOST_TWISTED))
+        self.wrist = Wrist(factor)
+        with matplotlib.rc_context({**STYLE, "font.size": 9, "axes.titlesize": 9}):
+            self.figure = Figure(figsize=(SIZE[0] / DPI, SIZE[1] / DPI), dpi=DPI, facecolor="white", edgecolor="0.7")
+            FigureCanvasAgg(self.figure)
+            self._scene(factor, speed)
+            self.moving = [one for number, panel in enumerate(PANELS) for one in self._panel(number, panel)]
+
+    def _scene(self, factor: float, speed: float) -> None:
+        """Axes as high as the figure is wide, because matplotlib keeps them square; most of their height is empty."""
+        square = SIZE[0] / SIZE[1]
+        axes: Any = self.figure.add_axes((0, 0.616 - square / 2, 1, square), projection="3d")
+        axes.set_axis_off()
+        axes.view_init(elev=ELEVATION, azim=AZIMUTH)
+        axes.set_proj_type("persp", focal_length=1.0)
+        # The limits are the sides of the box, so that a length is the same in each direction.
+        box = np.array([10.0, 4.0, 4.0])
+        axes.set(**{f"{axis}lim": (-side / 2, side / 2) for axis, side in zip("xyz", box)})
+        axes.set_box_aspect(box, zoom=0.97)
+        self.scene = axes
+        self.bodies: Any = None
+        self.caption = self.figure.text(0.02, 0.955, "", fontsize=11.5, fontweight="bold", va="center")
+        note = f"couplings' twist × {factor:g}"
+        if abs(speed - 1) > 1e-3:
+            note = f"{speed:.2g} × real time, {note}"
+        self.note = self.figure.text(0.98, 0.955, note, fontsize=8, color="0.35", ha="right", va="center")
+        for x, y, words, colour in LABELS:
+            self.figure.text(x, y, words, color=colour, ha="center", va="center")
+
+    def _panel(self, number: int, panel: Panel) -> list[Moving]:
+        """Axes with the whole courses, pale, and what is to be moved on them."""
+        axis = self.figure.add_axes((0.055 + 0.328 * number, 0.085, 0.265, 0.2))
+        axis.set_title(panel.title)
+        values = {name: panel.factor * self.courses[name] for name in panel.curves}
+        moving = []
+        for (name, (label, colour)), place, style in zip(panel.curves.items(), (0.71, 1.03), ("-", (0, (3, 1.5)))):
+            axis.plot(self.time, values[name], color=colour, alpha=FAINT, linewidth=1)
+            (line,) = axis.plot([], [], color=colour, linewidth=1.8, linestyle=style)
+            (dot,) = axis.plot([], [], "o", color=colour, markersize=5)
+            axis.text(place - 0.19, 1.07, label, color=colour, ha="right", transform=axis.transAxes)
+            number_shown = axis.text(place, 1.07, "", color=colour, ha="right", transform=axis.transAxes)
+            moving.append(Moving(name, panel, line, dot, number_shown))
+        peak = max(10.0**-panel.digits, *(float(np.abs(course).max()) for course in values.values()))
+        axis.set(xlim=(self.time[0], self.time[-1]), ylim=(-1.15 * peak, 1.15 * peak))
+        axis.locator_params(axis="y", nbins=4)
+        axis.tick_params(labelsize=8, length=2)
+        return moving
+
+    def draw(self, instant: float) -> None:
+        """Show the instant (s)."""
+        at = {name: float(np.interp(instant, self.time, course)) for name, course in self.courses.items()}
+        if self.bodies is not None:
+            self.bodies.remove()
+        # matplotlib's axes have the depth second and the height third: Y, the roll axis, is up.
+        faces = self.wrist.faces(at)
+        corners = [face.corners[:, [0, 2, 1]] * (1, -1, 1) for face in faces]
+        colours = _lit(corners, [face.colour for face in faces])
+        self.bodies = Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.8)
+        self.scene.add_collection3d(self.bodies, autolim=False)
+        passed = [text for begin, text in self.captions if begin <= instant + 1e-9]
+        self.caption.set_text(passed[-1] if passed else "")
+        before = self.time <= instant
+        for name, panel, line, dot, shown in self.moving:
+            value = panel.factor * at[name]
+            line.set_data(
+                np.append(self.time[before], instant), np.append(panel.factor * self.courses[name][before], value)
+            )
+            dot.set_data([instant], [value])
+            # Adding 0 to what is rounded leaves no minus before a zero.
+            shown.set_text(panel.number.format(round(value, panel.digits) + 0.0).replace("-", "\N{MINUS SIGN}"))
+
+    def at(self, instant: float) -> Image.Image:
+        """The picture at the instant (s), with its transparency."""
+        self.draw(instant)
+        canvas: Any = self.figure.canvas
+        moved = [self.bodies, *(artist for one in self.moving for artist in one[2:]), *self.figure.texts]
+        if self._ground is None:
+            # What never moves, axes and whole courses, takes longest: it is drawn once.
+            for artist in moved:
+                artist.set_visible(False)
+            canvas.draw()
+            self._ground = canvas.copy_from_bbox(self.figure.bbox)
+            for artist in moved:
+                artist.set_visible(True)
+        canvas.restore_region(self._ground)
+        self.bodies.do_3d_projection()
+        for artist in moved:
+            self.figure.draw_artist(artist)
+        return Image.fromarray(np.array(canvas.buffer_rgba()))
+
+
+def _colours() -> Iterator[ArrayLike]:
+    """All there are but for smooth edges: bodies in every brightness, pale courses, text and grid."""
+    for name in (BLUE, VERMILION, GREEN, PURPLE, STEEL, DARK, PALE):
+        yield from (_bright(to_rgb(name), level) for level in range(LEVELS + 1))
+    for name in (BLUE, VERMILION, GREEN, PURPLE):
+        yield 1 - FAINT * (1 - np.array(to_rgb(name)))
+    yield from ((grey, grey, grey) for grey in (0.0, 0.35, 0.63, 0.9, 1.0))
+
+
+def _lit(faces: Sequence[Array], colours: Sequence[tuple[float, float, float]]) -> Array:
+    """The colours (n, 3) of the faces, corners (k, 3) each, in the light: of the sides which the viewer sees."""
+    first, second, third = np.moveaxis(np.array([corners[:3] for corners in faces]), 1, 0)
+    normal = np.cross(second - first, third - second)
+    normal *= (np.sign(normal @ VIEWER) / np.maximum(np.linalg.norm(normal, axis=1), 1e-12))[:, None]
+    return _bright(colours, np.rint(LEVELS * np.maximum(normal @ LAMP, 0.0))[:, None])
+
+
+def _bright(colour: ArrayLike, level: ArrayLike) -> Array:
+    """The colour at one of the degrees of brightness, 0 ... LEVELS."""
+    bright: Array = (0.6 + 0.4 * np.asarray(level) / LEVELS) * np.asarray(colour)
+    return bright
+
+
+def _round_below(value: float) -> float:
+    """1, 2 or 5 times a power of ten, the largest up to value; 1 at least."""
+    power = 10.0 ** float(np.floor(np.log10(max(value, 1))))
+    return max(float(step * power) for step in (1.0, 2.0, 5.0) if step * power <= max(value, 1))
