@@ -109,6 +109,8 @@ def test_they_are_instances_stepped_by_hand(task, mode) -> None:
             assert np.array_equal(seen, expected) and not terminated.any()
             seen[:] = np.nan  # is the caller's
     envs.close()
+    with pytest.raises(fmu_run.FmuError, match="closed"):
+        envs._own.instances()
 
 
 def test_one_is_many_of_one_and_seeds_are_reproducible(task) -> None:
