@@ -13,7 +13,7 @@ from prw.files import write_text
 from tools.figures.writing import write_small_png
 
 PAGE, FIGURES = Path("docs/examples.md"), Path("docs/examples")
-EXAMPLES = ("lqr", "quiet_motion", "identify", "tolerances", "gains")
+EXAMPLES = ("lqr", "quiet_motion", "identify", "tolerances", "gains", "learned_move", "predictive_control")
 HEAD = """# Examples
 
 <!-- written by make docs -->

@@ -13,7 +13,7 @@ from built import ROOT
 from lagrange import linear_model, table_1
 from reference import at_rest, follow
 
-NAMES = ("lqr", "quiet_motion", "identify", "tolerances", "gains")
+NAMES = ("lqr", "quiet_motion", "identify", "tolerances", "gains", "learned_move", "predictive_control")
 #: The eigenvalues of eq. (11) with Table 1, 1/s, those with positive imaginary parts for their pairs.
 POLES = np.array([-174.87270665, -174.36733032, -18.94465405 + 32.14568305j, -9.68285129 + 34.67786598j])
 
@@ -21,7 +21,7 @@ POLES = np.array([-174.87270665, -174.36733032, -18.94465405 + 32.14568305j, -9.
 @pytest.mark.parametrize("name", NAMES)
 def test_it_is_short_and_says_what_it_is_for(name: str) -> None:
     lines = (ROOT / "examples" / f"{name}.py").read_text().splitlines()
-    assert len(lines) < 100
+    assert len(lines) < 120
     assert lines[2].startswith("You learn ")
     assert any(line.startswith("    make examples") for line in lines[:12])
 
@@ -138,3 +138,42 @@ def test_identify_finds_the_pretended_rig(tmp_path: Path, capsys: pytest.Capture
     for name in ("k1", "k2"):
         estimate = found.parameters[name]
         assert abs(estimate.value - np.rad2deg(float(truth[name]))) < 4 * estimate.standard_error
+
+
+@pytest.fixture(scope="module")
+def learned() -> Any:
+    return importlib.import_module("learned_move")
+
+
+def test_shapers_leave_nothing_on_the_wrist_they_are_made_for(learned: Any) -> None:
+    """By the oracle; a quintic does."""
+    left = {}
+    for impulses in (1, 2, 3):
+        slope = np.append(learned.shaped(impulses, 0.25), 0.0)
+        theta = np.append(0.0, learned.STEP * np.cumsum(slope[:-1]))
+        assert theta[-1] == pytest.approx(learned.GOAL, rel=1e-9)
+        time = learned.STEP * np.arange(len(theta))
+        at, _ = follow(linear_model(table_1()), time, np.tile(theta, (2, 1)).T, np.tile(slope, (2, 1)).T)
+        left[impulses] = np.rad2deg(np.ptp(at["pitch"][round(0.25 / learned.STEP) :]))
+    assert left[1] > 2 and left[2] < 0.05 and left[3] < 0.05
+
+
+def test_a_little_learning_beats_the_shaper_on_other_wrists(learned: Any) -> None:
+    figure, left = learned.main(count=512, rounds=40, fresh=100)
+    assert {name: len(values) for name, values in left.items()} == dict.fromkeys(left, 100)
+    assert left["learned"].mean() < 0.5 * left["ZV"].mean() < 0.1 * left["quintic"].mean()
+    assert len(figure.axes) == 2
+
+
+def test_the_wrists_learned_on_differ_as_they_say(learned: Any) -> None:
+    drawn = learned.draw(2.0, 3, np.random.default_rng(1), 7)
+    assert len({*drawn}) == 3 and np.array_equal(drawn[:3], drawn[3:6]) and (np.abs(drawn - 2.0) <= 0.4).all()
+
+
+def test_what_is_planned_goes_to_the_goal_and_stays(capsys: pytest.CaptureFixture[str]) -> None:
+    planner = importlib.import_module("predictive_control")
+    figure, errors = planner.main(rollouts=256, length=1.0)
+    since = planner.STEP * np.arange(100) % planner.EACH > 0.25
+    assert np.abs(errors["planned"][since]).max() < 1.0 < np.abs(errors["straight"][since]).max()
+    assert "decisions a second, 256 rollouts" in capsys.readouterr().out
+    assert len(figure.axes) == 2

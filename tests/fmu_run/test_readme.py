@@ -19,3 +19,4 @@ def test_the_programs_run(fmu, monkeypatch):
     assert names["torques"].shape == (1000, 2) and names["wrists"].errors == {}
     assert len({*names["wrists"].time}) == 2, "some have gone back"
     assert names["peaks"]["tau1", "peak"].max() == abs(runs["tau1"]).max()
+    assert names["rewards"].shape == (1024,) and (names["envs"].steps == 100).all()

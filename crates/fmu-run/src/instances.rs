@@ -322,16 +322,20 @@ impl Instances {
         }
     }
 
-    /// States that were [serialized](Self::serialize), one for each instance.
+    /// States that were [serialized](Self::serialize), one for each instance, or none.
     ///
     /// # Errors
     /// [`Error::Request`] when there are other than so many, [`Error::Fmu`] when an instance refuses one.
-    pub fn deserialize(&mut self, bytes: &[impl AsRef<[u8]>]) -> Result<States, Error> {
+    pub fn deserialize(&mut self, bytes: &[Option<impl AsRef<[u8]>>]) -> Result<States, Error> {
         if bytes.len() != self.len() {
             return request(format!("there are {} states for {} instances", bytes.len(), self.len()));
         }
         let mut states = Vec::new();
         for (place, (one, bytes)) in self.all.iter_mut().zip(bytes).enumerate() {
+            let Some(bytes) = bytes else {
+                states.push(None);
+                continue;
+            };
             let Some((time, bytes)) = bytes.as_ref().split_first_chunk() else {
                 return request(format!("the state of instance {place} is cut short"));
             };

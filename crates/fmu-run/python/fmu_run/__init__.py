@@ -253,7 +253,7 @@ def _array(name: str, values: ArrayLike) -> _Array:
         raise ValueError(f"{name}: these are no numbers ({error})") from None
     # Else None were not a number, and texts were numbers.
     if array.dtype.kind not in "biuf":
-        raise ValueError(f"{name}: {values} is no number" if array.ndim == 0 else f"{name}: these are no numbers")
+        raise ValueError(f"{name}: {values!r} is no number" if array.ndim == 0 else f"{name}: these are no numbers")
     return np.ascontiguousarray(array, dtype=np.float64).reshape(array.shape)
 
 

@@ -112,14 +112,15 @@ class Runs(Mapping[str, _Array]):
     def to_xarray(self) -> xarray.Dataset:
         """Outputs over the dimensions run and time, measures as `roll_peak` over run, start values as coordinates of run. A
         start value of an output is called `roll at start`. Raises ImportError without xarray."""
-        xarray = _needed("xarray")
+        needed = _needed("xarray")
         starts = {name: value if isinstance(value, str) else ("run", value) for name, value in self._starts().items()}
         measures = {name: ("run", values) for name, values in self._by_name().items()}
         times = {"time": self.time} if len(self) else {}
-        return xarray.Dataset(
+        dataset: xarray.Dataset = needed.Dataset(
             {**{name: (("run", "time"), course) for name, course in self.items()}, **measures},
             {"run": np.arange(self.count), **times, **starts},
         )
+        return dataset
 
     def _starts(self) -> dict[str, _Array | str]:
         return {f"{name} at start" if name in self else name: value for name, value in self.start.items()}

@@ -6,6 +6,7 @@ use crate::{FmuError, python};
 use fmu_run::{Continuous, Error, Interface, Selection, Setup, System};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict, PyString, PyTuple};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -250,9 +251,9 @@ impl Instances {
         Ok(found.into_iter().map(|bytes| bytes.map(|bytes| PyBytes::new(py, &bytes))).collect())
     }
 
-    /// States of bytes that `serialize` has made, here or in another process: one for each instance.
-    fn deserialize(&self, states: Vec<Vec<u8>>) -> PyResult<States> {
-        let read = lock(&self.held).deserialize(&states).map_err(python)?;
+    /// States of bytes that `serialize` has made, here or in another process: one for each instance, None for those that have none.
+    fn deserialize(&self, py: Python, states: Vec<Option<PyBackedBytes>>) -> PyResult<States> {
+        let read = py.detach(|| lock(&self.held).deserialize(&states)).map_err(python)?;
         Ok(States { held: Arc::clone(&self.held), states: Some(Arc::new(read)) })
     }
 

@@ -1,0 +1,315 @@
+"""Gymnasium's environments of any FMU: one (`Env`), or thousands side by side (`VectorEnv`), both of one `Task`.
+
+    task = Task("model.fmu", actions={"u": (-1, 1)}, observations=("y",), step=0.01, length=500,
+                reward=lambda before, action, after: -abs(after[:, 0]))
+    envs = VectorEnv(task, 1024)
+
+Needs the package gymnasium: pip install fmu-run[gymnasium].
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, SupportsFloat
+
+import gymnasium
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.spaces import Box
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike, NDArray
+
+import fmu_run
+
+__all__ = ["AutoresetMode", "Env", "Task", "VectorEnv"]
+
+_Array = NDArray[np.float64]
+_Bools = NDArray[np.bool_]
+_Named = str | Sequence[str] | Mapping[str, tuple[float, float]]
+_Info = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """What is to be learned, on which FMU. Its functions take and return arrays, a row for each of n instances.
+
+    Parameters
+    ----------
+    fmu
+        The path of the FMU, or of an SSP with a system of FMUs, or one that is open and stays so. Only with a path can the task
+        be registered or go to another process.
+    actions
+        What acts: inputs by name with their (low, high), or names alone, whose bounds are those of the description, if any.
+    observations
+        The variables that are seen after each step, any that are numbers, in the same forms.
+    reward
+        (observation before, action, observation after) -> (n,)
+    step
+        The time from action to action, s.
+    length
+        After how many steps an episode is truncated.
+    terminated
+        The same arguments -> (n,) of bool: whose episode ends by itself.
+    inputs, to_inputs
+        Where actions are no inputs, which inputs they make, and how: (actions, those inputs before, (n, inputs)) -> (n, inputs).
+        Actions may have any names then.
+    start
+        Start values for all episodes: numbers, or texts.
+    drawn
+        Start values that are drawn anew for each episode: (low, high), or (generator, count) -> (count,).
+    failed_reward
+        For a step that the FMU refuses.
+    threads
+        See `Fmu.instances`.
+    """
+
+    fmu: str | os.PathLike[str] | fmu_run.Fmu | fmu_run.System
+    actions: _Named
+    observations: _Named
+    reward: Callable[[_Array, _Array, _Array], ArrayLike]
+    step: float
+    length: int
+    terminated: Callable[[_Array, _Array, _Array], ArrayLike] | None = None
+    inputs: Sequence[str] | None = None
+    to_inputs: Callable[[_Array, _Array], ArrayLike] | None = None
+    start: Mapping[str, float | str] = field(default_factory=dict)
+    drawn: Mapping[str, tuple[float, float] | Callable[[np.random.Generator, int], ArrayLike]] = field(
+        default_factory=dict
+    )
+    failed_reward: float = 0.0
+    threads: int | None = 1
+
+
+class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
+    """Instances of one FMU that live through episodes side by side.
+
+    An instance that the FMU refuses something, or one of whose observations is no finite number, has its episode terminated:
+    the last observation is repeated, `infos["error"]` says why, and the others go on.
+
+    Parameters
+    ----------
+    task
+        What is to be learned.
+    num_envs
+        How many instances.
+    autoreset_mode
+        When an episode that is over gives way to the next: NEXT_STEP, in the next step, whose action goes nowhere and whose
+        reward is 0; SAME_STEP, at once, with `infos["final_obs"]` and `infos["final_info"]`; DISABLED, by
+        `reset(options={"reset_mask": ...})`.
+
+    Raises
+    ------
+    ValueError
+        For what does not fit the FMU or itself.
+    fmu_run.FmuError
+        If the FMU cannot be loaded, or refuses the start values; from `reset` and `step`, if it refuses those drawn.
+    """
+
+    _own: fmu_run.Fmu | fmu_run.System | None = None
+
+    def __init__(self, task: Task, num_envs: int = 1, *, autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP):
+        if task.length < 1 or not task.step > 0:
+            raise ValueError(f"length must be at least 1 and step above 0, they are {task.length} and {task.step}")
+        if (task.inputs is None) != (task.to_inputs is None):
+            raise ValueError("give inputs and to_inputs, or neither")
+        self.task, self.num_envs = task, num_envs
+        self._mode = AutoresetMode(autoreset_mode)
+        self.metadata = {"autoreset_mode": self._mode}
+        fmu = _opened(task.fmu)
+        self._own = None if fmu is task.fmu else fmu
+        try:
+            actions = _bounds("actions", task.actions, fmu.variables)
+            observations = _bounds("observations", task.observations, fmu.variables)
+            self._inputs, self._observed = tuple(task.inputs or actions), tuple(observations)
+            for name in self._inputs:
+                if name in fmu.variables and (found := fmu.variables[name].causality) != "input":
+                    raise ValueError(f"{name} is no input, its causality is {found}")
+            self._instances = fmu.instances(num_envs, start=task.start, threads=task.threads)
+            for names in (self._inputs, self._observed):
+                self._instances.get(names)  # Are they there?
+        except Exception:
+            self.close()
+            raise
+        self.single_action_space, self.single_observation_space = _box(actions), _box(observations)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        #: (num_envs,): the steps of each since its episode began.
+        self.steps = np.zeros(num_envs, dtype=np.int64)
+        self._drawn = {name: np.empty(num_envs) for name in task.drawn}
+        self._over: _Bools = np.zeros(num_envs, dtype=bool)
+        self._observation: _Array | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[_Array, _Info]:
+        """Begin new episodes: all, or those of `options["reset_mask"]`, (num_envs,) of bool.
+
+        Returns
+        -------
+        (num_envs, observations), and an empty dict
+        """
+        super().reset(seed=seed)
+        which = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, dtype=bool)))
+        if which.shape != (self.num_envs,) or which.dtype != bool:
+            raise ValueError(f"reset_mask must be ({self.num_envs},) of bool, it is {which.shape} of {which.dtype}")
+        if self._observation is None:
+            which = np.ones(self.num_envs, dtype=bool)
+            self._observation = np.empty((self.num_envs, len(self._observed)))
+        self._begin(which, self._observation)
+        return self._observation.copy(), {}
+
+    def step(self, actions: ArrayLike) -> tuple[_Array, _Array, _Bools, _Bools, _Info]:
+        """Take a step with all instances.
+
+        Parameters
+        ----------
+        actions
+            (num_envs, actions)
+
+        Returns
+        -------
+        observations (num_envs, observations), rewards, terminated and truncated (num_envs,), and infos
+        """
+        before, renew = self._observation, self._over
+        if before is None or (self._mode is AutoresetMode.DISABLED and renew.any()):
+            which = "all" if before is None else f"episodes {np.flatnonzero(renew).tolist()} are over"
+            raise ResetNeeded(f"reset comes before step: {which}")
+        acting = np.asarray(actions, dtype=np.float64)
+        if acting.shape != self.action_space.shape:
+            raise ValueError(f"actions must be {self.action_space.shape}, they are {acting.shape}")
+        after, errors = self._advance(acting, before)
+        self.steps += 1
+        rewards = self._judged("reward", self.task.reward(before, acting, after)).astype(np.float64)
+        rewards[list(errors)] = self.task.failed_reward
+        ends = self.task.terminated
+        terminated = np.zeros(self.num_envs, dtype=bool)
+        if ends is not None:
+            terminated = self._judged("terminated", ends(before, acting, after)).astype(bool)
+        terminated[list(errors)] = True
+        truncated = self.steps >= self.task.length
+        if self._mode is AutoresetMode.NEXT_STEP and renew.any():
+            errors = {place: why for place, why in errors.items() if not renew[place]}
+            rewards[renew], terminated[renew], truncated[renew] = 0.0, False, False
+            self._begin(renew, after)
+        infos: _Info = {}
+        for place, why in errors.items():
+            self._add_info(infos, {"error": why}, place)
+        self._observation, self._over = after, terminated | truncated
+        if self._mode is AutoresetMode.SAME_STEP and self._over.any():
+            over, final = self._over.copy(), np.full(self.num_envs, None, dtype=object)
+            for ended in np.flatnonzero(over):
+                final[ended] = after[ended].copy()
+            infos = {"final_obs": final, "_final_obs": over, "final_info": infos, "_final_info": over.copy()}
+            self._begin(over, after)
+        return after.copy(), rewards, terminated, truncated, infos
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Free the instances, and the FMU if it was opened here."""
+        self.__dict__.pop("_instances", None)
+        if self._own is not None:
+            self._own.close()
+
+    def _advance(self, actions: _Array, before: _Array) -> tuple[_Array, dict[int, str]]:
+        """The observations after a step, and who has failed why."""
+        after, values = np.full_like(before, np.nan), actions
+        if self.task.to_inputs is not None:
+            values = np.asarray(self.task.to_inputs(actions, self._instances.get(self._inputs)), dtype=np.float64)
+            if values.shape != (wanted := (self.num_envs, len(self._inputs))):
+                raise ValueError(f"to_inputs must return {wanted}, it returned {values.shape}")
+        try:
+            self._instances.advance(self._inputs, values, self.task.step, self._observed, out=after)
+        except fmu_run.FmuError:  # The last has failed.
+            if not self._instances.errors:
+                raise
+        failed = ~np.isfinite(after).all(axis=1)
+        if not failed.any():
+            return after, {}
+        after[failed], why = before[failed], self._instances.errors
+        places = np.flatnonzero(failed).tolist()
+        return after, {place: why.get(place, "an observation is no finite number") for place in places}
+
+    def _begin(self, which: _Bools, observation: _Array) -> None:
+        """New episodes for some, and what is observed of them."""
+        for name, how in self.task.drawn.items():
+            count = int(which.sum())
+            self._drawn[name][which] = (
+                how(self.np_random, count) if callable(how) else self.np_random.uniform(*how, count)
+            )
+        try:
+            self._instances.reset(which, start=dict(self._drawn))
+        except fmu_run.FmuError:
+            if not self._instances.errors:
+                raise
+        for place, why in self._instances.errors.items():
+            if which[place]:
+                drawn = ", ".join(f"{name} = {values[place]:g}" for name, values in self._drawn.items())
+                raise fmu_run.FmuError(f"instance {place} cannot begin an episode with {drawn or 'its start'}: {why}")
+        observation[which] = self._instances.get(self._observed)[which]
+        self.steps[which], self._over[which] = 0, False
+
+    def _judged(self, name: str, values: ArrayLike) -> NDArray[Any]:
+        judged = np.asarray(values)
+        if judged.shape != (self.num_envs,):
+            raise ValueError(f"{name} must return ({self.num_envs},), it returned {judged.shape}")
+        return judged
+
+
+class Env(gymnasium.Env[_Array, _Array]):
+    """One instance of an FMU that lives through episodes: a `VectorEnv` of one, see there.
+
+    Parameters
+    ----------
+    task
+        What is to be learned.
+    """
+
+    def __init__(self, task: Task):
+        self._one = VectorEnv(task, autoreset_mode=AutoresetMode.DISABLED)
+        self.action_space, self.observation_space = self._one.single_action_space, self._one.single_observation_space
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[_Array, _Info]:
+        """Begin a new episode."""
+        super().reset(seed=seed)
+        self._one.np_random = self.np_random
+        observation, _ = self._one.reset()
+        return observation[0], {}
+
+    def step(self, action: ArrayLike) -> tuple[_Array, SupportsFloat, bool, bool, _Info]:
+        """Take a step; `info["error"]` says why the FMU refused it."""
+        observation, reward, terminated, truncated, info = self._one.step(np.asarray(action)[None])
+        said = {name: values[0] for name, values in info.items() if not name.startswith("_")}
+        return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), said
+
+    def close(self) -> None:
+        """Free the instance, and the FMU if it was opened here."""
+        self._one.close()
+
+
+def _opened(fmu: str | os.PathLike[str] | fmu_run.Fmu | fmu_run.System) -> fmu_run.Fmu | fmu_run.System:
+    if isinstance(fmu, fmu_run.Fmu | fmu_run.System):
+        return fmu
+    return fmu_run.System(fmu) if os.fspath(fmu).endswith(".ssp") else fmu_run.Fmu(fmu)
+
+
+def _bounds(what: str, named: _Named, variables: Mapping[str, fmu_run.Variable]) -> dict[str, tuple[float, float]]:
+    if not isinstance(named, Mapping):
+        found = {name: variables.get(name) for name in ([named] if isinstance(named, str) else named)}
+        named = {
+            name: (
+                -np.inf if of is None or of.min is None else of.min,
+                np.inf if of is None or of.max is None else of.max,
+            )
+            for name, of in found.items()
+        }
+    for name, bounds in named.items():
+        if len(bounds) != 2 or not bounds[0] < bounds[1]:
+            raise ValueError(f"{what}: {name} needs (low, high), low below high, not {bounds}")
+    if not named:
+        raise ValueError(f"{what}: name at least one variable")
+    return dict(named)
+
+
+def _box(bounds: Mapping[str, tuple[float, float]]) -> Box:
+    low, high = np.array(list(bounds.values()), dtype=np.float64).T
+    return Box(low, high, dtype=np.float64)

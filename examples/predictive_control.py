@@ -1,0 +1,87 @@
+"""Predictive control of a model that is a black box, by 1,024 rollouts a decision
+
+You learn to plan with any FMU as its own model (MPPI: model predictive path integral control): the state of the plant goes
+as bytes to 1,024 instances (`serialize`, `deserialize`), which try as many motions of the motors from there.
+
+    make examples; .venv/bin/python examples/predictive_control.py
+"""
+
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from fmu_run import Fmu, Instances
+from matplotlib.figure import Figure
+
+STEP, AHEAD, EACH, LENGTH = 0.01, 16, 0.5, 2.0  # s; steps that are planned; s to a goal; s
+GOALS = np.array([(20, 0), (20, 40), (-10, 40), (0, 0)])  # one after the other, pitch and roll, deg
+RATE, SPREAD = 6.0, 2.0  # limit of the motors, and deviation of what is tried, rad/s
+MOTORS, WRIST = ("theta1", "theta2", "omega1", "omega2"), ("pitch", "roll")
+TO_SIDES = np.array([[1, 4 / 7], [1, -4 / 7]])  # from pitch and roll to the two motors: eq. (1) solved, M = 4, N = 7
+
+
+def advance(wrists: Instances, rates: np.ndarray) -> np.ndarray:
+    """A step with these rates of the motors (n, 2); returns pitch and roll (n, 2), deg."""
+    motors = wrists.get(MOTORS)
+    return np.rad2deg(wrists.advance(MOTORS, np.hstack([motors[:, :2] + STEP * motors[:, 2:], rates]), STEP, WRIST))
+
+
+def planned(wrist: Instances, copies: Instances, goal: np.ndarray, plan: np.ndarray, rng: np.random.Generator) -> Any:
+    """A better plan, the motors' rates (AHEAD, 2): the mean of what is tried, by weights that fall with the cost."""
+    state = [found for found in wrist.serialize(wrist.save()) if found is not None]
+    copies.restore(copies.deserialize(state * len(copies)))
+    between = [np.interp(np.arange(AHEAD), np.linspace(0, AHEAD - 1, 6), knot) for knot in np.eye(6)]
+    spread = SPREAD * rng.choice([0.1, 0.3, 1], (len(copies), 1, 1))
+    tried = np.clip(
+        plan + spread * np.einsum("nkm,kt->ntm", rng.normal(size=(len(copies), 6, 2)), between), -RATE, RATE
+    )
+    tried[0] = plan
+    cost = 2e-3 * (np.diff(tried, axis=1) ** 2).sum(axis=(1, 2))
+    for rates in tried.swapaxes(0, 1):
+        cost += ((advance(copies, rates) - goal) ** 2).sum(axis=1)
+    weights = np.exp(-(cost - cost.min()) / (0.3 * np.std(np.sort(cost)[: len(copies) // 20]) + 1e-9))
+    return np.average(tried, axis=0, weights=weights)
+
+
+def follow(copies: Instances | None, wrist: Instances, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Goals and wrist (times, 2), deg: planned with copies, or with motors that go straight to where they belong."""
+    rng, plan, rows = np.random.default_rng(1), np.zeros((AHEAD, 2)), []
+    for k in range(round(length / STEP)):
+        goal = GOALS[int(k * STEP / EACH) % len(GOALS)]
+        if copies is None:
+            motors = wrist.get(MOTORS)[0]
+            ahead = TO_SIDES @ np.deg2rad(goal) - motors[:2] - STEP * motors[2:]
+            plan[:] = np.clip(ahead / STEP, -RATE, RATE)
+        else:
+            plan = planned(wrist, copies, goal, np.vstack([plan[1:], np.zeros(2)]), rng)
+        rows.append((goal, advance(wrist, plan[:1])[0]))
+    return tuple(np.array(rows).swapaxes(0, 1))
+
+
+def main(rollouts: int = 1024, length: float = LENGTH) -> tuple[Figure, dict[str, np.ndarray]]:
+    """Control, print and draw; returns the figure, and by name how far pitch and roll are from the goal (times, 2), deg."""
+    picture, errors = Figure(figsize=(8, 3.2), layout="constrained"), {}
+    axes = picture.subplots(1, 2, sharex=True)
+    with Fmu("target/fmu/prw_testbed.fmu") as fmu:
+        for name, colour in (("straight", "#D55E00"), ("planned", "#0072B2")):
+            copies = fmu.instances(rollouts, threads=None) if name == "planned" else None
+            begun = perf_counter()
+            goal, wrist = follow(copies, fmu.instances(start={"use_omega": True}), length)
+            rate, errors[name] = len(goal) / (perf_counter() - begun), wrist - goal
+            since = np.arange(len(goal)) * STEP % EACH
+            worst = np.abs(errors[name][since > 0.2]).max()
+            print(f"{name:<8} {worst:.2f} deg off at most from 0.2 s after each change of the goal on")
+            for axis, course, title in zip(axes, wrist.T, WRIST):
+                axis.plot(STEP * np.arange(1, len(goal) + 1), course, color=colour, label=name)
+                axis.set(title=title, xlabel="time (s)", ylabel="angle (deg)")
+    print(f"{rate:.0f} decisions a second, {rollouts} rollouts of {AHEAD} steps each")
+    for axis, course in zip(axes, goal.T):
+        axis.step(
+            STEP * np.arange(len(goal)), course, "--", color="0.5", where="post", linewidth=1, label="goal", zorder=0
+        )
+    picture.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    return picture, errors
+
+
+if __name__ == "__main__":
+    main()[0].savefig("predictive_control.png", dpi=110)

@@ -1,0 +1,265 @@
+"""Gymnasium's environments of FMUs, beside instances that are stepped by hand."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import warnings
+from dataclasses import replace
+
+import fmu_run
+import gymnasium
+import numpy as np
+import pytest
+from built import built
+from fmu_run.gymnasium import AutoresetMode, Env, Task, VectorEnv
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import SyncVectorEnv
+
+MOTORS, SEEN, STEP = ("theta1", "theta2"), ("pitch", "roll", "tau1"), 2e-3
+
+
+def effort(before, action, after):
+    return -np.abs(after[:, 0] - 0.1) - 0.01 * (action**2).sum(axis=1) - (after[:, 1] - before[:, 1]) ** 2
+
+
+@pytest.fixture
+def task(testbed) -> Task:
+    return Task(
+        fmu=testbed,
+        actions=dict.fromkeys(MOTORS, (-1.0, 1.0)),
+        observations=dict.fromkeys(SEEN, (-50.0, 50.0)),
+        reward=effort,
+        step=STEP,
+        length=20,
+        drawn={"k1": (100.0, 140.0), "J3": lambda rng, n: 0.0127 * rng.lognormal(0.0, 0.1, n)},
+    )
+
+
+def played(envs, steps, seed=5):
+    """All that comes of actions drawn at random."""
+    envs.action_space.seed(seed)
+    found = [envs.reset(seed=seed)[0]]
+    for _ in range(steps):
+        found += envs.step(envs.action_space.sample())[:4]
+    return found
+
+
+def same(one, other) -> bool:
+    return len(one) == len(other) and all(np.array_equal(a, b) for a, b in zip(one, other))
+
+
+def test_importing_fmu_run_needs_no_gymnasium() -> None:
+    program = "import sys, fmu_run; sys.exit('gymnasium' in sys.modules)"
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_gymnasium_finds_no_fault(task) -> None:
+    gymnasium.register("Wrist-v0", Env, vector_entry_point=VectorEnv, kwargs={"task": task})
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with gymnasium.make("Wrist-v0") as env:
+                check_env(env.unwrapped)
+            envs = gymnasium.make_vec("Wrist-v0", num_envs=3)
+            assert isinstance(envs, VectorEnv) and envs.num_envs == 3
+            assert envs.reset()[0] in envs.observation_space
+            envs.close()
+    finally:
+        del gymnasium.registry["Wrist-v0"]
+
+
+def test_a_system_is_an_environment_with_the_bounds_of_its_description(task) -> None:
+    loop = replace(
+        task,
+        fmu=built("prw_closed_loop.ssp"),
+        actions="pitch_ref",
+        observations=["pitch", "testbed.k1", "controller.Kp"],
+        drawn={"testbed.k1": (100.0, 140.0)},
+    )
+    envs = VectorEnv(loop, 3)
+    assert envs.single_observation_space.low[2] == 0.0 and envs.single_observation_space.high[2] == 1e9
+    first, _ = envs.reset(seed=4)
+    for _ in range(15):
+        seen, _, _, _, infos = envs.step(np.full((3, 1), 0.2))
+    assert (seen[:, 0] > 1e-4).all() and infos == {} and np.array_equal(seen[:, 1], first[:, 1])
+    assert len(set(seen[:, 1])) == 3
+    envs.close()
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_they_are_instances_stepped_by_hand(task, mode) -> None:
+    """To the bit, over the ends of episodes, with the parameters that the same generator draws."""
+    count, envs = 4, VectorEnv(task, 4, autoreset_mode=mode)
+    rng, actions = np.random.default_rng(3), np.random.default_rng(4).uniform(-1, 1, (50, count, 2))
+
+    def begun():
+        drawn = {"k1": rng.uniform(100.0, 140.0, count), "J3": 0.0127 * rng.lognormal(0.0, 0.1, count)}
+        wrists.reset(start=drawn)
+        assert np.array_equal(envs._instances.get(("k1", "J3")).T, [*drawn.values()])
+        return wrists.get(SEEN)
+
+    with fmu_run.Fmu(task.fmu) as fmu:
+        wrists = fmu.instances(count)
+        seen, _ = envs.reset(seed=3)
+        expected, k = begun(), 0
+        assert np.array_equal(seen, expected)
+        for action in actions:
+            seen, rewards, terminated, truncated, infos = envs.step(action)
+            if k == task.length and mode is AutoresetMode.NEXT_STEP:
+                expected, k = begun(), 0
+                assert not (rewards.any() or truncated.any())
+            else:
+                before, k = expected, k + 1
+                wrists.set(MOTORS, action)
+                wrists.step(STEP)
+                expected = wrists.get(SEEN)
+                assert np.array_equal(rewards, effort(before, action, expected))
+                assert truncated.all() == truncated.any() == (k == task.length)
+            if k == task.length and mode is AutoresetMode.SAME_STEP:
+                assert infos["_final_obs"].all() and same(infos["final_obs"], expected)
+                expected, k = begun(), 0
+            elif k == task.length and mode is AutoresetMode.DISABLED:
+                with pytest.raises(gymnasium.error.ResetNeeded, match=r"\[0, 1, 2, 3\] are over"):
+                    envs.step(action)
+                assert np.array_equal(seen, expected)
+                seen, _ = envs.reset(options={"reset_mask": np.ones(count, dtype=bool)})
+                expected, k = begun(), 0
+            assert np.array_equal(seen, expected) and not terminated.any()
+            seen[:] = np.nan  # is the caller's
+    envs.close()
+    with pytest.raises(fmu_run.FmuError, match="closed"):
+        envs._own.instances()
+
+
+def test_one_is_many_of_one_and_seeds_are_reproducible(task) -> None:
+    one, many = played(SyncVectorEnv([lambda: Env(task)]), 50), played(VectorEnv(task, 1), 50)
+    assert same(one, many)
+    assert same(many, played(VectorEnv(task, 1), 50))
+    assert not same(many, played(VectorEnv(task, 1), 50, seed=6))
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+@pytest.mark.parametrize("count", [1, 3])
+def test_one_that_fails_ends_its_own_episode(task, mode, count) -> None:
+    envs = VectorEnv(replace(task, failed_reward=-7.0), count, autoreset_mode=mode)
+    other = VectorEnv(task, count, autoreset_mode=mode)
+    bad, last = np.zeros((count, 2)), np.arange(count) == count - 1
+    for each in (envs, other):
+        each.reset(seed=1)
+        seen, *_ = each.step(bad + 0.1)
+    bad[-1, 0] = np.nan
+    after, rewards, terminated, _, infos = envs.step(bad)
+    expected, good, *_ = other.step(np.nan_to_num(bad))
+    assert np.array_equal(terminated, last)
+    assert np.array_equal(after[:-1], expected[:-1]) and np.array_equal(rewards[:-1], good[:-1]) and rewards[-1] == -7.0
+    if mode == "SameStep":
+        assert np.array_equal(infos["_final_info"], last) and envs.steps[-1] == 0
+        final, infos = infos["final_obs"][-1], infos["final_info"]
+    else:
+        final = after[-1]
+    assert np.array_equal(final, seen[-1]), "what was seen last"
+    assert np.array_equal(infos["_error"], last) and "theta1" in infos["error"][-1]
+    if mode == "Disabled":
+        envs.reset(options={"reset_mask": last})
+    after, _, terminated, _, infos = envs.step(np.zeros((count, 2)))
+    expected, *_ = other.step(np.zeros((count, 2)))
+    assert np.isfinite(after).all() and np.array_equal(after[:-1], expected[:-1])
+    assert not terminated.any() and infos == {} and envs.steps[-1] == (0 if mode == "NextStep" else 1)
+
+
+@pytest.mark.parametrize(
+    ("mood", "slope", "words"),
+    [
+        (1, 1.0, "fmi2DoStep"),
+        (8, 1.0, "ended by the FMU at t = 0.525 s"),
+        (0, np.inf, "an observation is no finite number"),
+    ],
+)
+def test_an_fmu_that_ends_or_tells_no_numbers_ends_the_episode(unruly, mood, slope, words) -> None:
+    """It may be there once in a process, so closing one gives way to the next."""
+    task = Task(
+        fmu=unruly,
+        actions="slope",
+        observations="y",
+        reward=lambda before, action, after: after[:, 0],
+        step=0.1,
+        length=100,
+        start={"mood": mood},
+    )
+    with Env(task) as env:
+        for _ in range(2):
+            env.reset()
+            for k in range(5):
+                seen, reward, *ended, info = env.step([1.0])
+                assert seen == pytest.approx([reward]) == [4.1 + 0.1 * k] and ended == [False, False] and info == {}
+            assert np.array_equal(env.step([slope])[0], seen)
+        env.reset()
+        for _ in range(5):
+            env.step([1.0])
+        *_, terminated, truncated, info = env.step([slope])
+        assert terminated and not truncated and words in info["error"]
+
+
+def test_actions_that_make_inputs(task) -> None:
+    """A rate, integrated by what the inputs were; failures with all gone, too."""
+    by_rate = replace(
+        task,
+        actions={"rate": (-6.0, 6.0)},
+        inputs=MOTORS,
+        to_inputs=lambda action, motors: motors + STEP * action * [1, -1],
+        observations=(*MOTORS, "roll"),
+        start={"theta1": 0.1},
+        terminated=lambda before, action, after: after[:, 0] > 0.15,
+    )
+    envs = VectorEnv(by_rate, 2)
+    assert np.array_equal(envs.reset()[0][:, :2], [[0.1, 0.0]] * 2)
+    for _ in range(3):
+        seen, _, terminated, *_ = envs.step([[5.0], [10.0]])
+    assert np.allclose(seen[:, :2], [[0.13, -0.03], [0.16, -0.06]], atol=1e-15)
+    assert terminated.tolist() == [False, True]
+    seen, _, terminated, *_ = envs.step([[np.nan], [0.0]])
+    assert terminated.tolist() == [True, False] and np.allclose(seen[:, 0], [0.13, 0.1])
+    envs.step([[np.nan], [np.nan]])
+    envs.step([[0.0], [0.0]])
+    broken = VectorEnv(replace(by_rate, to_inputs=lambda action, motors: action), 2)
+    broken.reset()
+    with pytest.raises(ValueError, match=r"to_inputs must return \(2, 2\), it returned \(2, 1\)"):
+        broken.step([[0.0], [0.0]])
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"actions": {"pitch": (-1, 1)}}, "pitch is no input, its causality is output"),
+        ({"actions": "theta9"}, "theta9"),
+        ({"observations": ("yaw",)}, "yaw"),
+        ({"observations": ()}, "observations: name at least one"),
+        ({"actions": {"theta1": (1, -1)}}, "theta1 needs"),
+        ({"length": 0}, "length must be at least 1"),
+        ({"step": 0.0}, "step above 0"),
+        ({"inputs": MOTORS}, "inputs and to_inputs, or neither"),
+        ({"start": {"k9": 1.0}}, "k9"),
+    ],
+)
+def test_what_does_not_fit_is_refused(task, changed, words) -> None:
+    with pytest.raises(ValueError, match=words):
+        VectorEnv(replace(task, **changed), 2)
+
+
+def test_what_functions_must_return_and_draws_must_be(task) -> None:
+    for name in ("reward", "terminated"):
+        envs = VectorEnv(replace(task, **{name: lambda before, action, after: after}), 2)
+        with pytest.raises(gymnasium.error.ResetNeeded, match="reset comes before step"):
+            envs.step(np.zeros((2, 2)))
+        envs.reset()
+        with pytest.raises(ValueError, match=rf"{name} must return \(2,\), it returned \(2, 3\)"):
+            envs.step(np.zeros((2, 2)))
+        with pytest.raises(ValueError, match=r"actions must be \(2, 2\), they are \(2,\)"):
+            envs.step(np.zeros(2))
+        with pytest.raises(ValueError, match=r"reset_mask must be \(2,\) of bool"):
+            envs.reset(options={"reset_mask": [1, 0]})
+    for count in (1, 2):
+        envs = VectorEnv(replace(task, drawn={"k1": lambda rng, n: np.linspace(100, -1, n + 1)[1:]}), count)
+        with pytest.raises(fmu_run.FmuError, match=rf"instance {count - 1} cannot begin .* k1 = -1: .*k1"):
+            envs.reset()
