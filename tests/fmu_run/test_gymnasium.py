@@ -74,7 +74,7 @@ def test_a_system_is_an_environment_with_the_bounds_of_its_description(task) -> 
         task,
         fmu=built("prw_closed_loop.ssp"),
         actions="pitch_ref",
-        observations=["pitch", "testbed.k1", "controller.Kp"],
+        observations=["roll", "testbed.k1", "controller.Kp"],
         drawn={"testbed.k1": (100.0, 140.0)},
     )
     envs = VectorEnv(loop, 3)
