@@ -251,6 +251,10 @@ def test_mat_files_that_cannot_be_read(fmu, tmp_path):
 def test_the_command(prw, right, soft, tmp_path):
     result = prw("check", write_csv(tmp_path / "right.csv", right))
     assert result.returncode == 0 and "agrees      with the reference" in result.stdout
+    either = write_csv(
+        tmp_path / "either.csv", {"time": right["time"], "a.roll": right["roll"], "b.roll": soft["roll"]}
+    )
+    assert "prw check: --component: there are several roll" in prw("check", either).stderr
     result = prw("check", write_csv(tmp_path / "soft.csv", soft), "--out", tmp_path / "out")
     assert result.returncode == 1 and "TOO FAR" in result.stdout and result.stderr.count("\n") == 1
     assert "too far from fig4_opposite" in result.stderr and (tmp_path / "out" / "soft_check.png").stat().st_size > 1000

@@ -143,7 +143,7 @@ def test_inertias_that_only_occur_together_are_named_and_a_prior_settles_them(pr
     rig.write(tmp_path / "run.csv", rig.measure(experiment, 1, ("tau1", "tau2", "pitch")), rows=slice(0, 5000))
     result = prw("identify", "run.csv", "--estimate", "J2,J3,H3", *_fixed(experiment), "--starts", 1)
     assert result.returncode == 1
-    assert "J2, J3 and H3 cannot be told apart" in result.stderr and "--prior" in result.stderr
+    assert "J2, J3 and H3 cannot be told apart" in result.stderr and "give it a prior" in result.stderr
     result = prw("identify", "run.csv", "--estimate", "J3,H3", "--prior", "J2=5%", *_fixed(experiment), "--starts", 1)
     assert result.returncode == 0, result.stderr
     found = report(tmp_path / "out" / "identified")["parameters"]

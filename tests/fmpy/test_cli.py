@@ -112,14 +112,16 @@ def test_without_matplotlib(tmp_path, fmu):
     program = "import sys; sys.modules['matplotlib'] = None; from prw.cli import main; sys.exit(main(sys.argv[1:]))"
 
     def run(*arguments):
-        line = [sys.executable, "-c", program, "simulate", "--fmu", str(fmu), *arguments]
+        line = [sys.executable, "-c", program, *arguments, "--fmu", str(fmu)]
         return subprocess.run(line, capture_output=True, text=True, cwd=tmp_path)
 
-    result = run()
+    result = run("simulate")
     assert result.returncode == 0 and result.stderr == "", result.stderr
     assert "no figure   matplotlib missing; install with: pip install 'prw[plot]'" in result.stdout
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["fig4.csv"] and "next        look at out" in result.stdout
-    result = run("--animate", "fig4.gif", "--out", "other")
+    result = run("check", "out/fig4.csv", "--experiment", "closed_loop")
+    assert result.returncode == 1 and "for a figure of both, matplotlib missing; install" in result.stderr
+    result = run("simulate", "--animate", "fig4.gif", "--out", "other")
     assert result.returncode == 1 and "prw simulate: matplotlib missing; install" in result.stderr
     assert result.stderr.count("\n") == 1 and not (tmp_path / "other").exists()
 

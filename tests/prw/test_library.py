@@ -19,6 +19,7 @@ from lagrange import linear_model, table_1
 from reference import follow
 
 import prw
+from prw.digits import lines_of
 
 MOTION = ROOT / "examples" / "point_to_point.csv"
 
@@ -104,6 +105,36 @@ def test_where_a_run_goes(testbed: Path, tmp_path: Path) -> None:
     assert "<td>tau1</td><td>N.m</td>" in run._repr_html_() and "tau1" in repr(run)
 
 
+def test_numbers_are_written_as_python_writes_them() -> None:
+    """To the letter: short and long ones, ties, those next to powers of ten and two, and what has an exponent."""
+    draws = np.random.default_rng(2)
+    powers = np.concatenate([10.0 ** np.arange(-6, 20), 2.0 ** np.arange(-16, 60)])
+    anything = 10.0 ** draws.uniform(-6, 18, 20_000)
+    values = [
+        [
+            0.0,
+            7.0,
+            70.0,
+            np.inf,
+            np.nan,
+            5e-324,
+            1.7976931348623157e308,
+            123456789012.5,
+            0.1234567890125,
+            999999999999.5,
+        ],
+        np.concatenate([powers, np.nextafter(powers, 0), np.nextafter(powers, np.inf)]),
+        draws.integers(0, 2**20, 20_000) / 2.0 ** draws.integers(0, 30, 20_000),
+        np.arange(5_000) * 1e-3,
+        anything,
+        [float(f"{value:.{k % 17 + 1}g}") for k, value in enumerate(anything)],
+        draws.integers(0, 2**63 - 1, 20_000).view(np.float64),
+    ]
+    numbers = np.concatenate([*map(np.asarray, values), *(-np.asarray(some) for some in values)])
+    lines = lines_of(np.column_stack([numbers, numbers]), 1).decode().splitlines()
+    assert lines == [f"{number!r},{number:.12g}" for number in numbers.tolist()]
+
+
 def test_a_recording_with_measurements(tmp_path: Path) -> None:
     path = tmp_path / "rig.csv"
     path.write_text("time [ms],theta1,theta2,tau1 [mN.m],pitch,site\n0,1,2,3,90,a\n5,1,2,,90,b\n10,1,2,5,90,c\n")
@@ -157,7 +188,8 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
         ({**good, "theta2": [0.0]}, "recording, column theta2: has 1 rows, but time has 2"),
         ({**good, "theta2": [[0.0], [1.0]]}, r"recording, column theta2: has the shape \(2, 1\)"),
         ({**good, "time": pandas.to_datetime(["2026-01-01", "2026-01-02"])}, "column time: has dates"),
-        ({**good, "time": [1.0, 0.0]}, "time must increase"),
+        ({**good, "time": [1.0, 0.0]}, "recording, column time: time must increase"),
+        (dict.fromkeys(good, [0.0]), "recording: has 1 rows; at least two are needed"),
         ({**good, "theta1 [deg]": [0.0, 1.0]}, "recording, column theta1: appears twice"),
         (None, "None is no recording: neither a file nor a DataFrame"),
     ]

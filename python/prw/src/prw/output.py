@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from prw.digits import lines_of
 from prw.files import replacing
 from prw.motion import Array, Motion
 from prw.progress import Progress
@@ -36,13 +37,12 @@ def write_table(path: Path, motion: Motion, response: Mapping[str, Array], outpu
     inputs = inputs_of(motion)
     # + 0.0 turns -0.0, which reads oddly, into 0.0
     table = np.column_stack([*inputs.values(), *(response[name] for name in outputs)]) + 0.0
-    row_format = ",".join(["%r"] * len(inputs) + ["%.12g"] * len(outputs)) + "\n"
     with (
         replacing(path) as temporary,
         Progress(f"writing {path}", len(table)) as progress,
-        open(temporary, "w", encoding="ascii", newline="") as file,
+        open(temporary, "wb") as file,
     ):
-        file.write(",".join([*inputs, *outputs]) + "\n")
+        file.write((",".join([*inputs, *outputs]) + "\n").encode("ascii"))
         for start in range(0, len(table), BLOCK):
-            file.writelines(row_format % tuple(row) for row in table[start : start + BLOCK].tolist())
+            file.write(lines_of(table[start : start + BLOCK], len(inputs)))
             progress(start)

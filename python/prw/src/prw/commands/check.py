@@ -10,7 +10,7 @@ from prw.checking import check
 from prw.commands.assignments import FORMATTER, pairs, said_of_options
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.commands.simulate import write_png
-from prw.errors import UserError
+from prw.errors import MissingPackage, UserError
 
 DESCRIPTION = """\
 Compares a table of results with one of the reference experiments that travel in the FMU: motions of the motors, and
@@ -70,6 +70,10 @@ def run(arguments: argparse.Namespace) -> None:
         print("agrees      with the reference")
         return
     picture = arguments.out / f"{arguments.file.stem}_check.png"
-    write_png(picture, found.plot())
+    try:
+        write_png(picture, found.plot())
+        shown = f"{picture} shows both"
+    except MissingPackage as error:
+        shown = f"for a figure of both, {error}"
     far = [name for name, difference in found.variables.items() if not difference.agrees]
-    raise UserError(f"{arguments.file}: {', '.join(far)} too far from {found.experiment.name}; {picture} shows both")
+    raise UserError(f"{arguments.file}: {', '.join(far)} too far from {found.experiment.name}; {shown}")
