@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import orjson
 
-from prw.digits import lines_of
 from prw.files import replacing
 from prw.motion import Array, Motion
 from prw.progress import Progress
@@ -32,7 +32,7 @@ def inputs_of(motion: Motion) -> dict[str, Array]:
 def write_table(path: Path, motion: Motion, response: Mapping[str, Array], outputs: Sequence[str] = OUTPUTS) -> None:
     """Write time (s), the inputs given (rad, rad/s) and the outputs (N.m, rad, rad/s) to `path`, one row per sample.
 
-    Time and inputs keep all their digits, so that they can be read back unchanged; outputs have twelve.
+    Numbers have as many digits as it takes to read them back unchanged.
     """
     inputs = inputs_of(motion)
     # + 0.0 turns -0.0, which reads oddly, into 0.0
@@ -44,5 +44,7 @@ def write_table(path: Path, motion: Motion, response: Mapping[str, Array], outpu
     ):
         file.write((",".join([*inputs, *outputs]) + "\n").encode("ascii"))
         for start in range(0, len(table), BLOCK):
-            file.write(lines_of(table[start : start + BLOCK], len(inputs)))
+            # Rows as JSON has them, [[1.0,2.0],[3.0,4.0]], with their brackets and null for what is not a number.
+            rows = orjson.dumps(table[start : start + BLOCK], option=orjson.OPT_SERIALIZE_NUMPY)
+            file.write(rows[2:-2].replace(b"],[", b"\n").replace(b"null", b"nan") + b"\n")
             progress(start)
