@@ -224,6 +224,11 @@ def test_what_does_not_fit_is_named(testbed) -> None:
             (lambda: fmu.instances(2, start={"k1": [1.0, 2.0, 3.0]}), "k1 has 3 start values for 2 instances"),
             (lambda: fmu.instances(interface="both"), "co-simulation"),
             (lambda: wrists.deserialize([b""]), "1 states for 3 instances"),
+            (lambda: wrists.deserialize([None, b"", None]), "the state of instance 1 is cut short"),
+            (lambda: wrists.handle_events(), "for Co-Simulation; this is for Model Exchange"),
+            (lambda: wrists.get_derivatives(), "for Co-Simulation; this is for Model Exchange"),
+            (lambda: wrists.set_time(0.0), "for Co-Simulation; this is for Model Exchange"),
+            (lambda: fmu.instances(interface="model-exchange").step(1e-3), "only Co-Simulation steps"),
         ]:
             with pytest.raises(ValueError, match=words):
                 call()

@@ -179,6 +179,9 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
         }
         time = np.linspace(0.0, 0.5, 501)
         expected = wired.run(time, start=goal, outputs=["testbed.pitch", "testbed.roll"])
+    paths = {name: built(f"prw_{name}.fmu") for name in ("controller", "testbed")}
+    pairs = fmu_run.System(paths, WIRES.items(), order=order)
+    assert [sorted(stage) for stage in pairs.stages] == [sorted(stage) for stage in ssp.stages]
     # Its connectors have the names that the system gives them, and its start values are there.
     found = ssp.run(time, outputs=["pitch", "roll"])
     assert all(np.array_equal(found[name], expected[f"testbed.{name}"]) for name in ("pitch", "roll"))

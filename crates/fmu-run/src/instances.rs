@@ -144,6 +144,11 @@ impl Instances {
         self.all.is_empty()
     }
 
+    /// Who integrates.
+    pub fn interface(&self) -> Interface {
+        self.interface
+    }
+
     /// What they are instances of.
     pub fn system(&self) -> &System {
         &self.system

@@ -18,7 +18,7 @@ Values are in the FMU's units, which `Fmu.variables` tells. FMI 2.0 and 3.0.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Literal, Self
@@ -203,11 +203,11 @@ class System(_Model):
     Parameters
     ----------
     source
-        An SSP file, or the components by name: FMUs that are open, of FMI 2.0 or 3.0, with Co-Simulation. One may be there more
-        than once.
+        An SSP file, or the components by name: FMUs of FMI 2.0 or 3.0 with Co-Simulation, open ones or their paths. One may be
+        there more than once.
     connections
-        Outputs and the inputs they feed, `{"law.u": "plant.u"}`; several inputs of one output as a list. Not with an SSP, which
-        has its own.
+        Outputs and the inputs they feed, `{"law.u": "plant.u"}` or pairs; several inputs of one output as a list. Not with an
+        SSP, which has its own.
     order
         When values are passed on. "dependencies": at each communication point until all agree, an output read after the inputs
         on which it depends without a step; where these go in a circle, an algebraic loop, ValueError names it. "jacobi": all
@@ -224,15 +224,15 @@ class System(_Model):
 
     def __init__(
         self,
-        source: str | os.PathLike[str] | Mapping[str, Fmu],
-        connections: Mapping[str, str | Sequence[str]] | None = None,
+        source: str | os.PathLike[str] | Mapping[str, Fmu | str | os.PathLike[str]],
+        connections: Mapping[str, str | Sequence[str]] | Iterable[tuple[str, str | Sequence[str]]] | None = None,
         *,
         order: Literal["dependencies", "jacobi"] = "dependencies",
     ):
         if isinstance(source, Mapping):
-            ends = {output: [to] if isinstance(to, str) else list(to) for output, to in (connections or {}).items()}
-            wires = [(output, to) for output, inputs in ends.items() for to in inputs]
-            fmus = [(name, fmu._loaded) for name, fmu in source.items()]
+            given = connections.items() if isinstance(connections, Mapping) else connections or ()
+            wires = [(output, to) for output, ends in given for to in ([ends] if isinstance(ends, str) else ends)]
+            fmus = [(name, (fmu if isinstance(fmu, Fmu) else Fmu(fmu))._loaded) for name, fmu in source.items()]
             super().__init__(_Loaded.wired("system", fmus, wires, order))
         elif connections is not None:
             raise ValueError("an SSP has its own connections; give connections with FMUs only")

@@ -182,6 +182,7 @@ impl Instances {
     /// A step of Co-Simulation: by `size`, or to the time `to`, s.
     #[pyo3(signature = (size=None, *, to=None, mask=None))]
     fn step(&self, py: Python, size: Option<f64>, to: Option<f64>, mask: Given) -> PyResult<()> {
+        self.only(Interface::CoSimulation)?;
         let mask = self.mask(mask)?;
         match (size, to) {
             (Some(size), None) => self.with(py, |all| all.step(size, mask.as_deref())),
@@ -201,6 +202,7 @@ impl Instances {
         get: &Bound<'py, PyAny>,
         out: Given<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        self.only(Interface::CoSimulation)?;
         let (set, get) = (self.named(set)?, self.named(get)?);
         let values = self.fitting(set.columns(), Numbers::of(values)?)?;
         let (array, mut room) = Room::of(py, out, &self.shape(get.columns()))?;
@@ -319,6 +321,7 @@ impl Instances {
     /// Model Exchange: the time of each, s: a number or (n,).
     #[pyo3(signature = (time, mask=None))]
     fn set_time(&self, py: Python, time: &Bound<'_, PyAny>, mask: Given) -> PyResult<()> {
+        self.only(Interface::ModelExchange)?;
         let (mask, time) = (self.mask(mask)?, self.fitting(None, Numbers::of(time)?)?);
         self.with(py, |all| all.set_time(time.values(), mask.as_deref()))
     }
@@ -326,6 +329,7 @@ impl Instances {
     /// Model Exchange: the continuous states, (states,) for all or (n, states).
     #[pyo3(signature = (states, mask=None))]
     fn set_continuous_states(&self, py: Python, states: &Bound<'_, PyAny>, mask: Given) -> PyResult<()> {
+        self.only(Interface::ModelExchange)?;
         let columns = Some(lock(&self.held).continuous(Continuous::States));
         let (mask, states) = (self.mask(mask)?, self.fitting(columns, Numbers::of(states)?)?);
         self.with(py, |all| all.set_continuous_states(states.values(), mask.as_deref()))
@@ -366,6 +370,7 @@ impl Instances {
     ///     Which instances; all if it is not given.
     #[pyo3(signature = (variables=None, values=None, *, mask=None))]
     fn handle_events(&self, py: Python, variables: Given, values: Given, mask: Given) -> PyResult<()> {
+        self.only(Interface::ModelExchange)?;
         let mask = self.mask(mask)?;
         let (named, values) = match (&variables, &values) {
             (Some(variables), Some(values)) => {
@@ -386,6 +391,7 @@ impl Instances {
     /// -------
     /// (n, 2): 1 where an instance wants an event, and where it wants the end, else 0
     fn completed_integrator_step<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.only(Interface::ModelExchange)?;
         self.read(py, Some(2), None, |all, values| {
             all.completed_integrator_step(values);
             Ok(())
@@ -454,6 +460,20 @@ impl Instances {
         }
     }
 
+    /// Fails unless they are for this interface, before an instance is asked what it must refuse.
+    fn only(&self, wanted: Interface) -> PyResult<()> {
+        let why = match (wanted, lock(&self.held).interface()) {
+            (wanted, interface) if wanted == interface => return Ok(()),
+            (Interface::ModelExchange, _) => {
+                "these instances are for Co-Simulation; this is for Model Exchange: instances(interface=\"model-exchange\")"
+            }
+            _ => {
+                "these instances are for Model Exchange, which you integrate yourself; only Co-Simulation steps"
+            }
+        };
+        Err(PyValueError::new_err(why))
+    }
+
     /// The states, if they are of these instances.
     fn own(&self, states: &States) -> PyResult<Arc<fmu_run::States>> {
         let own = states.states.clone().filter(|_| Arc::ptr_eq(&self.held, &states.held));
@@ -504,6 +524,7 @@ impl Instances {
         what: Continuous,
         out: Given<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        self.only(Interface::ModelExchange)?;
         let columns = lock(&self.held).continuous(what);
         self.read(py, Some(columns), out, |all, values| {
             all.get_continuous(what, values);
