@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from prw.commands.assignments import add_reading_options, reading_options
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import UserError
 from prw.extras import need
@@ -35,7 +36,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="FILE",
         help="CSV recording with columns time (s), theta1, theta2 (rad) and, if known, omega1, omega2 (rad/s)",
     )
-    parser.add_argument("--degrees", action="store_true", help="the recording is in degrees and degrees per second")
+    add_reading_options(parser)
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
     parser.add_argument(
         "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
@@ -54,7 +55,7 @@ def run(arguments: argparse.Namespace) -> None:
     need("plot", "matplotlib")
     recorded = arguments.input is not None
     if recorded:
-        motion = read_motion(arguments.input, degrees=arguments.degrees)
+        motion = read_motion(arguments.input, **reading_options(arguments))
         title = f"Response to {arguments.input.name}"
     else:
         if arguments.degrees:

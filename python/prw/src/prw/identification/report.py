@@ -146,7 +146,9 @@ def _digits(value: float, count: int = 4) -> str:
     return text.replace("-", "−")
 
 
-def _percent(value: float) -> str:
+def _percent(value: float | None) -> str:
+    if value is None:
+        return "at rest"
     if not np.isfinite(value) or abs(value) > 10:
         return "> 1000 %"
     return f"{100 * value:.{1 if abs(value) >= 0.1 else 2 if abs(value) >= 0.001 else 3}f} %".replace("-", "−")
