@@ -93,7 +93,9 @@ class Response:
         """Spectra of the states (f, 6) with transients `d` (6,), and from what is added to the states in every step to
         the channels (f, c, 6)."""
         states = self._states + self._z * (self._resolvent @ d[:, None])
-        return states[..., 0], self._filters[..., None] * (self.model.C @ self._resolvent)
+        steps: Complex = np.asarray(self.model.C @ self._resolvent, dtype=np.complex128)
+        through = self._filters[..., None] * steps
+        return states[..., 0], through
 
     def _together(self, table: Array | Complex) -> Complex:
         table = np.asarray(table, dtype=np.complex128)
@@ -117,4 +119,5 @@ class Response:
         ]
         there: Complex = self.outputs + self.transients @ d
         more: Complex = self._growths[..., None] * self.transfer
-        return np.concatenate([outputs, self._growths * there]), np.concatenate([transfer, more])
+        wider: Complex = np.concatenate([outputs, self._growths * there])
+        return wider, np.concatenate([transfer, more])

@@ -163,7 +163,7 @@ class Identification:
                 lines.append(f"{name} ended at its bound; widen it with --bounds, or doubt the data")
         for point, _ in solution.rivals:
             values = ", ".join(
-                f"{name} {value / self.known.real[name].factor:.4g}"
+                f"{name} {value / self.known.real[name].factor:.4g} {self.known.real[name].shown}"
                 for name, value in zip(solution.task.names, np.exp(point))
             )
             swapped = " (the couplings exchanged)" if self._exchanged(point) else ""
