@@ -21,9 +21,10 @@ from prw.motion import Array
 from prw.state_space import Complex
 from prw.testbed import OUTPUTS
 
-#: Chance that a channel of a good fit looks coherent with the motion; a fault's estimate over its error that is no
+#: Chance that a channel of a good fit looks coherent with the motion: little, for an encoder's steps are not as normal as it
+#: assumes, and in slow motion 1e-8 was seen; a fault's estimate over its error that is no
 #: chance, and from which on intervals grow to cover it.
-CHANCE, CLEAR, SMALL = 1e-6, 4.7, 2.5
+CHANCE, CLEAR, SMALL = 1e-10, 4.7, 2.5
 #: The same for what follows the sign of a rate, which in a periodic motion encoders' steps do, too.
 CLEAR_SIGN = 7.0
 #: A channel's noise in the band may be this much stronger than above it, besides what chance does in so few values.
