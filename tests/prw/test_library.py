@@ -188,7 +188,8 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
         ({**good, "theta2": [0.0]}, "recording, column theta2: has 1 rows, but time has 2"),
         ({**good, "theta2": [[0.0], [1.0]]}, r"recording, column theta2: has the shape \(2, 1\)"),
         ({**good, "time": pandas.to_datetime(["2026-01-01", "2026-01-02"])}, "column time: has dates"),
-        ({**good, "time": [1.0, 0.0]}, "time must increase"),
+        ({**good, "time": [1.0, 0.0]}, "recording, column time: time must increase"),
+        (dict.fromkeys(good, [0.0]), "recording: has 1 rows; at least two are needed"),
         ({**good, "theta1 [deg]": [0.0, 1.0]}, "recording, column theta1: appears twice"),
         (None, "None is no recording: neither a file nor a DataFrame"),
     ]

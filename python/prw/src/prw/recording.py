@@ -197,6 +197,10 @@ def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array
         if bad.any():
             raise UserError(f"{IN_MEMORY}, column {name}: {column[bad][0]} at place {int(bad.argmax())} is not finite")
         found.append(column)
+    if len(found[0]) < 2:
+        raise UserError(f"{IN_MEMORY}: has {len(found[0])} rows; at least two are needed")
+    if not (np.diff(found[0]) > 0).all():
+        raise UserError(f"{IN_MEMORY}, column time: time must increase from row to row")
     return np.column_stack(found)
 
 
