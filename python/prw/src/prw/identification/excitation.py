@@ -20,8 +20,8 @@ MOST_SAMPLES, SLOWEST = 2_000_000, 50.0
 
 
 class Excitation(NamedTuple):
-    """A motion, and what one experiment with it would tell. typical_error: the standard error, as a fraction, that is
-    the same for all parameters in an equally good experiment; infinite where some stay open. expected_errors: of each
+    """A motion, and what one experiment with it would tell. typical_error: root mean square of the expected standard
+    errors, as a fraction; infinite where some stay open. expected_errors: of each
     parameter. undetermined: combinations that stay open. noise: assumed of the channels, SI."""
 
     motion: Motion

@@ -9,6 +9,7 @@ Domain Approach, 2nd ed., Sec. 6.3.2).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,9 @@ from prw.identification.model import Matrices
 from prw.motion import Array
 from prw.state_space import Complex
 from prw.testbed import OUTPUTS
+
+#: The number of a channel, and its frequency response and the derivative of that's logarithm at s = 2 pi i f (f,).
+Distorted = tuple[int, Callable[[Complex], tuple[Complex, Complex]]]
 
 
 class Discrete(NamedTuple):
@@ -55,7 +59,10 @@ def discrete(models: Matrices, step: float, channels: tuple[str, ...]) -> Discre
 class Response:
     """What a model answers to the motors of an experiment, at its first `bins` frequencies (f)."""
 
-    def __init__(self, model: Discrete, experiment: Experiment, bins: int):
+    def __init__(
+        self, model: Discrete, experiment: Experiment, bins: int, distortions: Sequence[Distorted | None] = ()
+    ):
+        """distortions: what each does to its channel, or None where that was not measured."""
         self.model = model
         turn = 2j * np.pi * np.arange(bins) / len(experiment.time)
         self._z, self._s = np.exp(turn)[:, None, None], (turn / experiment.step)[:, None, None]
@@ -71,6 +78,24 @@ class Response:
         self._moved = self._together(self._driven)
         #: From the motors' angles, moving with their rates, to the channels: (f, c, 2).
         self.transfer: Complex = model.C @ self._moved + self._together(model.D)
+        self._filters = np.ones((bins, model.C.shape[0]), dtype=complex)
+        self._growths = np.zeros((len(distortions), bins, model.C.shape[0]), dtype=complex)
+        for k, distortion in enumerate(distortions):
+            if distortion is not None:
+                channel, response = distortion
+                through, self._growths[k, :, channel] = response(self._s[:, 0, 0].astype(np.complex128))
+                self._filters[:, channel] *= through
+        self.outputs *= self._filters
+        self.transients *= self._filters[..., None]
+        self.transfer *= self._filters[..., None]
+
+    def moving(self, d: Array) -> tuple[Complex, Complex]:
+        """Spectra of the states (f, 6) with transients `d` (6,), and from what is added to the states in every step to
+        the channels (f, c, 6)."""
+        states = self._states + self._z * (self._resolvent @ d[:, None])
+        steps: Complex = np.asarray(self.model.C @ self._resolvent, dtype=np.complex128)
+        through = self._filters[..., None] * steps
+        return states[..., 0], through
 
     def _together(self, table: Array | Complex) -> Complex:
         table = np.asarray(table, dtype=np.complex128)
@@ -78,7 +103,8 @@ class Response:
         return moved
 
     def slopes(self, change: Discrete, d: Array) -> tuple[Complex, Complex]:
-        """Derivatives by p parameters, of outputs with transients `d` (6,): (p, f, c), and of transfer: (p, f, c, 2).
+        """Derivatives by p parameters and the distortions, of outputs with transients `d` (6,): (p, f, c), and of
+        transfer: (p, f, c, 2).
 
         change: the model's derivatives by them."""
         states = self._states + self._z * (self._resolvent @ d[:, None])
@@ -87,4 +113,11 @@ class Response:
         moved = self._resolvent @ (per.A @ states + driven @ self._motors)
         outputs = per.C @ states + per.D @ self._motors + self.model.C @ moved
         moved = self._resolvent @ (per.A @ self._moved + self._together(driven))
-        return outputs[..., 0], per.C @ self._moved + self._together(per.D) + self.model.C @ moved
+        outputs = outputs[..., 0] * self._filters
+        transfer: Complex = (per.C @ self._moved + self._together(per.D) + self.model.C @ moved) * self._filters[
+            ..., None
+        ]
+        there: Complex = self.outputs + self.transients @ d
+        more: Complex = self._growths[..., None] * self.transfer
+        wider: Complex = np.concatenate([outputs, self._growths * there])
+        return wider, np.concatenate([transfer, more])
