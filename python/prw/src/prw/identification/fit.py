@@ -183,32 +183,29 @@ class Comparison:
         change: the model's derivatives by the parameters; those by the distortions follow. What encoders' errors add to the squares is no information:
         with equal motors, say, the difference of two encoders' steps seems to roll the wrist a little, and J3 would
         look determined."""
-        return self.along(*self.response.slopes(change, self.initial))
-
-    def along(self, outputs: Complex, transfer: Complex) -> tuple[Array, Array]:
-        """The same, for changes of outputs (p, f, c) and transfer (p, f, c, 2)."""
+        outputs, transfer = self.response.slopes(change, self.initial)
         bins, whiten = self.experiment.bins, self._whiten
-        outputs = np.moveaxis(self.experiment.seen(np.moveaxis(outputs, 0, -1)), -1, 0)
-        moved = whiten @ self._through(transfer[:, :bins] * self.experiment.shares[:, None], self._scaled)
-        moved = moved @ whiten.conj().swapaxes(-1, -2)
+        errors = np.sqrt(self.experiment.motor_power)[:, None, :]
+        moving = np.moveaxis(transfer[:, :bins] * (self.experiment.shares[:, None] * errors), 0, 2)
+        # Whitened, what an error of each encoder adds: changes (bins, c, p, 2) and what there is (bins, c, 2).
+        direct = (whiten @ moving.reshape(bins, moving.shape[1], -1)).reshape(moving.shape)
+        there = (whiten @ (self._scaled * errors)).conj().swapaxes(-1, -2)
+        moved = (direct.reshape(bins, -1, 2) @ there).reshape(*moving.shape[:3], -1)
+        direct, moved = np.moveaxis(direct, 2, 0), np.moveaxis(moved, 2, 0)
         # Of the inverse of a Cholesky factor: the lower half of the covariance's change, seen through it.
         lower = np.tril(moved + moved.conj().swapaxes(-1, -2))
         diagonal = np.arange(lower.shape[-1])
         lower[..., diagonal, diagonal] /= 2
-        white = -whiten @ outputs[..., None] - lower @ (whiten @ self._rest[:, :, None])
-        table = self.project(self._parts(np.moveaxis(white[..., 0], 0, -1)))
+        followed = (lower @ (whiten @ self._rest[:, :, None]))[..., 0]
+        table = self.seen_along(outputs) - self.project(self._parts(np.moveaxis(followed, 0, -1)))
         # E |d residual|^2, where d residual = -(whitened dG) n_u - lower r, with errors n_u of the encoders.
-        errors = np.sqrt(self.experiment.motor_power)[:, None, :]
-        direct = whiten @ (transfer[:, :bins] * self.experiment.shares[:, None] * errors)
         rows = [t.reshape(len(t), -1) for t in (direct, lower, moved)]
         a, s, b = (np.hstack([t.real, t.imag]) for t in rows)
         return table, 2 * (a @ a.T + s @ s.T - b @ s.T - s @ b.T)
 
     def seen_along(self, outputs: Complex) -> Array:
         """Changes (2, bins, c, q) of the residual with changes of the outputs (q, f, c)."""
-        seen = np.moveaxis(self.experiment.seen(np.moveaxis(outputs, 0, -1)), -1, 0)
-        white = -self._whiten @ seen[..., None]
-        return self.project(self._parts(np.moveaxis(white[..., 0], 0, -1)))
+        return self.project(self._parts(-self._whiten @ self.experiment.seen(np.moveaxis(outputs, 0, -1))))
 
     def _through(self, first: Complex, second: Complex | None = None) -> Complex:
         """What encoders' errors do to the channels: first P second^H, (..., bins, c, c)."""
