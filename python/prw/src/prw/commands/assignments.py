@@ -175,7 +175,7 @@ def bounds(texts: Iterable[str]) -> dict[str, tuple[float, float]]:
 
 @contextlib.contextmanager
 def said_of_options(**options: str) -> Iterator[None]:
-    """Turn an error on an argument in Python, `fixed: k9 is not known`, into one on the option that it came from,
+    """Turn an error on an argument in Python, `parameters: k9 is not known`, into one on the option that it came from,
     `--set: k9 ...`. options: by argument."""
     try:
         yield

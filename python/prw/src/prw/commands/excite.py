@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> None:
         for name in ("angle", "speed", "acceleration", "duration", "rate")
     )
     with said_of_options(
-        measure="measure", duration="duration", rate="rate", noise="noise", estimate="estimate", fixed="set"
+        measure="measure", duration="duration", rate="rate", noise="noise", estimate="estimate", parameters="set"
     ):
         ranking = excite(
             None if arguments.measure == "all" else listed(arguments.measure),
@@ -91,7 +91,7 @@ def run(arguments: argparse.Namespace) -> None:
             duration=duration,
             rate=rate,
             estimate=listed(arguments.estimate),
-            fixed=numbers(arguments.set, "--set"),
+            parameters=numbers(arguments.set, "--set"),
             noise=numbers(arguments.noise, "--noise"),
             fmu=arguments.fmu,
         )

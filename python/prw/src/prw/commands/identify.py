@@ -109,7 +109,7 @@ def run(arguments: argparse.Namespace) -> None:
     need("identify", "scipy", "jinja2", "threadpoolctl")
     with said_of_options(
         estimate="estimate",
-        fixed="set",
+        parameters="set",
         priors="prior",
         noise="noise",
         units="units",
@@ -122,7 +122,7 @@ def run(arguments: argparse.Namespace) -> None:
             arguments.files,
             estimate=listed(arguments.estimate),
             priors=spreads(arguments.prior, "--prior"),
-            fixed=numbers(arguments.set, "--set"),
+            parameters=numbers(arguments.set, "--set"),
             bounds=bounds(arguments.bounds),
             noise=numbers(arguments.noise, "--noise"),
             **reading_options(arguments),

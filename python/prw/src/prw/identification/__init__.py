@@ -39,7 +39,7 @@ def identify(
     *,
     estimate: str | Iterable[str] = DEFAULT_ESTIMATE,
     priors: Mapping[str, float | tuple[float, float]] = {},
-    fixed: Mapping[str, float] = {},
+    parameters: Mapping[str, float] = {},
     bounds: Mapping[str, tuple[float, float]] = {},
     noise: Mapping[str, float] = {},
     units: Mapping[str, str] = {},
@@ -69,7 +69,7 @@ def identify(
     priors
         What is known beforehand of a parameter, by name: the standard deviation as a fraction of its start value
         (0.1 is 10 %, 1 the most), or (value, fraction). It is then estimated along.
-    fixed
+    parameters
         Other start values, or values of what is not estimated.
     bounds
         (least, greatest) by parameter.
@@ -121,7 +121,9 @@ def identify(
     # Many small matrices: more threads only get into each other's way.
     with Model(fmu) as model, threadpool_limits(1):
         distortions = tuple(Distortion(k, n) for k, names in zip(KINDS, (delay, lag, gain)) for n in names)
-        task = replace(task_of(model.known, estimate, priors, fixed, bounds, noise, offsets), distortions=distortions)
+        task = replace(
+            task_of(model.known, estimate, priors, parameters, bounds, noise, offsets), distortions=distortions
+        )
         measured = [each if isinstance(each, Recording) else read(each, units, degrees, **header) for each in several]
         channels = dict.fromkeys(name for m in measured for name in m.measured)
         for what, named in (("noise", noise), ("delay", delay), ("lag", lag), ("gain", gain)):
@@ -149,7 +151,7 @@ def task_of(
     known: Parameters,
     estimate: str | Iterable[str],
     priors: Mapping[str, float | tuple[float, float]] = {},
-    fixed: Mapping[str, float] = {},
+    parameters: Mapping[str, float] = {},
     bounds: Mapping[str, tuple[float, float]] = {},
     noise: Mapping[str, float] = {},
     offsets: bool = True,
@@ -160,15 +162,15 @@ def task_of(
 
     estimate = names_of("estimate", estimate)
     whole = f"; {', '.join(known.counts)} are counted, not estimated" if known.counts else ""
-    for what, names in (("estimate", estimate), ("priors", priors), ("fixed", fixed), ("bounds", bounds)):
+    for what, names in (("estimate", estimate), ("priors", priors), ("parameters", parameters), ("bounds", bounds)):
         _check(what, names, known.real, whole)
     _check("noise", noise, MEASURED)
-    start = {**known.starts, **fixed}
+    start = {**known.starts, **parameters}
     if not estimate and not priors:
         raise UserError(f"estimate: nothing is named; there are {', '.join(known.real)}")
     beliefs = {name: Prior(*spread_of(f"priors: {name}", p, start[name])) for name, p in priors.items()}
     chosen = tuple(name for name in known.real if name in estimate or name in beliefs)
-    for what, values in (("fixed", fixed), ("noise", noise)):
+    for what, values in (("parameters", parameters), ("noise", noise)):
         for name, value in values.items():
             positive(f"{what}: {name}", value)
     for name in chosen:
