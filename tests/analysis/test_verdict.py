@@ -81,6 +81,14 @@ def test_a_rig_with_a_fault_does_not_fit(experiment, fmu, fault):
     assert any(said in text for text in found.diagnosis), found.diagnosis
 
 
+def test_what_two_channels_have_in_common_is_seen_where_parameters_make_up_for_each_alone(fmu):
+    # Torques 0.7 ms late, without encoders on the shafts: c1 is off by half, and the residuals look like noise.
+    truth = rig.late(rig.experiment(400004, 6, pattern="slow"), 7e-4)
+    found = prw.identify(recording(truth, ("tau1", "tau2", "pitch", "roll")), starts=1, fmu=fmu)
+    assert {misfit.channel for misfit in found.verdict.misfits} == {"tau1", "tau2"}, found.misfits
+    assert "--delay tau1,tau2" in found.diagnosis[0], found.diagnosis
+
+
 @pytest.mark.parametrize("spoil", SPOILT_SENSORS, ids=lambda spoil: spoil.__name__)
 def test_a_sensor_with_a_fault_is_named(experiment, fmu, spoil):
     channel, said = SPOILT_SENSORS[spoil]

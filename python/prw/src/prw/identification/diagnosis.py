@@ -12,10 +12,9 @@ from prw.channels import QUANTITIES
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Distortion, Fitter, Solution, settled
 from prw.identification.statistics import covariance_of, information_of
-from prw.identification.verdict import CLEAR, Verdict, judge
+from prw.identification.verdict import CLEAR, PAIRS, Verdict, groups, judge, named
 from prw.motion import Array
 
-PAIRS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"), ("pitch_rate", "roll_rate"))
 #: Gains that a slip with units makes, give or take TOLERANCE (a factor); what a channel is then.
 SLIPS = {57.3: "in degrees, not radians", 1 / 57.3: "in radians, not degrees", 1000.0: "in thousandths of its unit"}
 TOLERANCE = 1.7
@@ -109,19 +108,18 @@ def _flat(name: str, time: Array, column: Array) -> Iterator[str]:
 def _refits(solution: Solution, verdict: Verdict) -> Iterator[tuple[float, str]]:
     """Rise of twice the log likelihood, and what it would mean, with distortions of single channels, pairs and all."""
     channels = solution.fitter.channels
-    groups: list[tuple[str, ...]] = [(name,) for name in channels] + [p for p in PAIRS if set(p) <= set(channels)]
-    if len(channels) > 2:
-        groups.append(channels)
     clear = {fault.name: fault for fault in verdict.faults}
     trials = []
     for kind in ("delay", "lag", "gain"):
-        for group in groups:
+        for group in groups(channels):
             new = tuple(Distortion(kind, name) for name in group)
             if set(new) & set(solution.task.distortions) or (kind == "gain" and len(group) > 2):
                 continue
-            linear = [clear.get(str(Distortion("gain" if kind == "gain" else "delay", name))) for name in group]
+            like = "gain" if kind == "gain" else "delay"
+            parts = sum(fault.gain for name in group if (fault := clear.get(named(like, (name,)))))
+            whole = clear.get(named(like, group))
             # A set that explains no more than its parts comes after them.
-            promise = sum(fault.gain for fault in linear if fault) - 10 * len(group)
+            promise = max(parts, whole.gain if whole else 0.0) - 10 * len(group)
             trials.append((promise, kind, group, new))
     trials.sort(key=lambda trial: -trial[0])
     tried = [t for kind in ("delay", "lag", "gain") for t in [t for t in trials if t[1] == kind][:TRIED]]

@@ -8,7 +8,7 @@ their strength is compared with that of the noise at frequencies at which the mo
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +35,21 @@ PIECE, MOST_PIECES = 16, 6
 NEW = 0.02
 #: A rate that is this share of its greatest has a sign.
 TURNING = 0.02
+
+
+#: Channels that come in pairs, through one amplifier or converter.
+PAIRS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"), ("pitch_rate", "roll_rate"))
+
+
+def groups(channels: Sequence[str]) -> list[tuple[str, ...]]:
+    """Channels that a fault may have in common: each alone, pairs, all."""
+    found = [(name,) for name in channels] + [pair for pair in PAIRS if set(pair) <= set(channels)]
+    return found + [tuple(channels)] * (len(channels) > 2)
+
+
+def named(kind: str, group: Sequence[str]) -> str:
+    """The name of a fault that channels have in common."""
+    return f"{kind} of {' and '.join(group) if len(group) < 3 else 'all channels'}"
 
 
 class Fault(NamedTuple):
@@ -121,8 +136,8 @@ def judge(solution: Solution) -> Verdict:
         fault = clear[0]
         e = solution.fitter.experiments[0]
         text = f"{fault.name} of {fault.size:.3g} +- {fault.error:.1g} {fault.unit}".rstrip()
-        channel = next((name for name in e.channels if fault.name.endswith(name)), "all")
-        misfits.append(Misfit(e.name, channel, 0.0, e.band, f"{text} would explain more of the data"))
+        for channel in [name for name in e.channels if name in fault.name.split()] or ["all"]:
+            misfits.append(Misfit(e.name, channel, 0.0, e.band, f"{text} would explain more of the data"))
     return Verdict(tuple(misfits), tuple(faults), widening)
 
 
@@ -195,16 +210,17 @@ def _faults(solution: Solution, experiment: Experiment, comparison: Comparison) 
     response, count = comparison.response, experiment.needed_bins
     there = response.outputs + response.transients @ comparison.initial
     s: Complex = 2j * np.pi * np.arange(count, dtype=complex) / (len(experiment.time) * experiment.step)
-    for j, name in enumerate(experiment.channels):
-        for kind, unit in (("delay", "ms"), ("lag", "ms"), ("gain", "")):
-            distortion = Distortion(kind, name)
-            if distortion in solution.task.distortions:
+    # A lag is the same as a delay to first order. What two channels have in common may be ten standard errors where it is
+    # one and two of each alone, because parameters make up for the rest.
+    for kind, unit in (("delay", "ms"), ("gain", "")):
+        for group in groups(experiment.channels):
+            distortions = {Distortion(kind, name) for name in group}
+            if distortions & set(solution.task.distortions) or (kind == "gain" and len(group) > 2):
                 continue
+            places = [experiment.channels.index(name) for name in group]
             column = np.zeros_like(there)
-            column[:, j] = distortion.response(0.0, s)[1] * there[:, j]
-            # A delay and a lag are the same to first order.
-            if kind != "lag":
-                yield str(distortion), unit, column
+            column[:, places] = Distortion(kind, group[0]).response(0.0, s)[1][:, None] * there[:, places]
+            yield named(kind, group), unit, column
     turning = [_sign(experiment.omega[:, i]) for i in (0, 1)]
     signs = spectra(np.column_stack(turning))[:count]
     yield "backlash at the motors", "rad", -(response.transfer @ signs[..., None])[..., 0] / 2
