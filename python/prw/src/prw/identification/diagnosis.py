@@ -36,7 +36,7 @@ def diagnose(solution: Solution, verdict: Verdict) -> list[str]:
     trials = [(gain, text) for gain, text in _refits(solution, verdict)]
     for fault in verdict.faults:
         if fault.clear > CLEAR and fault.signs:
-            size = f"{abs(fault.size):.2g} +- {fault.error:.1g} {fault.unit}"
+            size = f"{fault.size:.2g} +- {fault.error:.1g} {fault.unit}"
             trials.append(
                 (fault.gain, f"{fault.name} of {size} would explain it: the residual follows the sign of a rate")
             )

@@ -2,7 +2,7 @@
 
 The residuals of a fit that is right are noise. They are tested against the motion: by local regression on the motors'
 spectra and the channel's own, frequency by frequency (their coherence); along what single faults would leave (a delay,
-a lag or a gain of a channel; friction; backlash), as score tests (Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50); and
+a lag or a gain of a channel, or of two in common; friction; backlash), as score tests (Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50); and
 their strength is compared with that of the noise at frequencies at which the motors do not move.
 """
 
@@ -124,7 +124,8 @@ def judge(solution: Solution) -> Verdict:
                 misfits.append(Misfit(experiment.name, name, *_where(experiment, comparison, j), "; ".join(texts)))
         for name, unit, column in _faults(solution, experiment, comparison):
             fault = score(column[None]).fault(name, unit)
-            if fault is not None:
+            # Neither friction nor backlash is ever negative.
+            if fault is not None and (fault.size > 0 or not fault.signs):
                 faults.append(fault)
     faults.sort(key=lambda fault: -fault.clear)
     widening = np.zeros(len(inverse))
