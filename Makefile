@@ -56,7 +56,7 @@ help:
 	@echo 'make test-platforms          make it and run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make it twice and compare every byte'
 	@echo 'make study                   set up prw identify, excite, sweep and check  (see python/prw/tutorial.md)'
-	@echo 'make monte-carlo             200 identifications of simulated rigs -> out/monte_carlo.json'
+	@echo 'make monte-carlo             identifications of 300 simulated rigs and 1500 with faults -> out/'
 	@echo 'make fuzz                    look for calls that break the FMU, for 10 minutes (FUZZ_SECONDS=600)'
 	@echo 'make sanitize                the tests under address, leak, thread and real-time sanitizers and valgrind'
 	@echo 'make clean                   remove .venv, .venv-dist, target, out and dist'
@@ -179,6 +179,7 @@ study: $(VENV)/study.stamp fmu
 # Takes minutes; `make test` has the short version.
 monte-carlo: $(VENV)/study.stamp fmu
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --out out/monte_carlo.json $(ARGS)
+	$(PY) tests/analysis/monte_carlo.py $(FMU) --faulty 50 --figure docs/detection.svg --out out/detection.json $(ARGS)
 
 # libFuzzer keeps what is new in target/fuzz/corpus; crates/fmu-export/fuzz/corpus has the committed beginnings.
 fuzz: need-rust need-nightly

@@ -6,11 +6,12 @@ the response to each is exact (transfer function), and so is the transient from 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from lagrange import linear_model, pitch_roll, table_1
+from scipy.signal import lfilter
 
 SHAFT_SENSORS = ("theta3", "theta4")
 ALL = ("tau1", "tau2", "theta3", "theta4", "pitch", "roll")
@@ -28,6 +29,7 @@ class Truth(NamedTuple):
     theta: np.ndarray
     omega: np.ndarray
     outputs: dict[str, np.ndarray]
+    at: Callable[[np.ndarray], dict[str, np.ndarray]]
 
 
 def experiment(
@@ -64,8 +66,6 @@ def respond(parameters, time: np.ndarray, frequency: np.ndarray, waves: np.ndarr
     turning = np.exp(np.outer(time, s))
     scale = reach / max(np.abs((turning @ wave).real).max() for wave in waves)
     waves = scale * waves
-    theta = (turning @ waves.T).real
-    omega = ((turning * s) @ waves.T).real
     model = linear_model(parameters)
     response = np.array(
         [
@@ -73,14 +73,29 @@ def respond(parameters, time: np.ndarray, frequency: np.ndarray, waves: np.ndarr
             for sk, wave in zip(s, waves.T)
         ]
     )
-    steady = (turning @ response).real
-    missing = np.concatenate([theta[0], theta[0], [0, 0]]) - steady[0]
+    steady = (np.exp(time[0] * s) @ response).real
+    first = (np.exp(time[0] * s) @ waves.T).real
+    missing = np.concatenate([first, first, [0, 0]]) - steady
     values, vectors = np.linalg.eig(model.a)
-    transient = (np.exp(np.outer(time - time[0], values)) * np.linalg.solve(vectors, missing)) @ vectors.T
-    x = steady + transient.real
-    tau = x @ model.c.T + theta @ model.d_angle.T + omega @ model.d_rate.T
+    share = np.linalg.solve(vectors, missing)
+
+    def at(when: np.ndarray) -> dict[str, np.ndarray]:
+        """Motors and outputs at the times; at rest before the first."""
+        when = np.maximum(when, time[0])
+        turned = np.exp(np.outer(when, s))
+        transient = (np.exp(np.outer(when - time[0], values)) * share) @ vectors.T
+        x = (turned @ response).real + transient.real
+        theta, omega = (turned @ waves.T).real, ((turned * s) @ waves.T).real
+        tau = x @ model.c.T + theta @ model.d_angle.T + omega @ model.d_rate.T
+        return {"theta": theta, "omega": omega, **_outputs(x, tau, parameters)}
+
+    found = at(time)
+    return Truth(parameters, time, found.pop("theta"), found.pop("omega"), found, at)
+
+
+def _outputs(x: np.ndarray, tau: np.ndarray, parameters) -> dict[str, np.ndarray]:
     pitch, roll = pitch_roll(x[:, 2], x[:, 3], parameters)
-    outputs = {
+    return {
         "tau1": tau[:, 0],
         "tau2": tau[:, 1],
         "theta3": x[:, 0],
@@ -88,7 +103,65 @@ def respond(parameters, time: np.ndarray, frequency: np.ndarray, waves: np.ndarr
         "pitch": pitch,
         "roll": roll,
     }
-    return Truth(parameters, time, theta, omega, outputs)
+
+
+#: Steps of the nonlinear rigs in one of the recording.
+FINE = 16
+
+
+def nonlinear(truth: Truth, backlash: float = 0.0, friction: float = 0.0) -> Truth:
+    """The same rig with a play of `backlash` rad between each motor and its shaft, and dry friction of `friction` N.m
+    about pitch and roll; Heun's rule in fine steps."""
+    p, model = truth.parameters, linear_model(truth.parameters)
+    count = (len(truth.time) - 1) * FINE + 1
+    fine = np.interp(np.arange(count) / FINE, np.arange(len(truth.time)), truth.time)
+    step = fine[1] - fine[0]
+    motors = truth.at(fine)
+    theta, omega = motors["theta"], motors["omega"]
+    if backlash:
+        played = np.empty_like(theta)
+        played[0] = theta[0]
+        for k in range(1, count):
+            played[k] = np.clip(played[k - 1], theta[k] - backlash / 2, theta[k] + backlash / 2)
+        theta, omega = played, np.gradient(played, fine, axis=0)
+    driven = theta @ model.b_angle.T + omega @ model.b_rate.T
+    ratio = p["N"] / (2 * p["M"])
+    turns = np.array([[0.5, 0.5], [ratio, -ratio]])
+    inertia = p["J2"] * np.eye(2) + turns.T @ np.diag([p["H3"], p["J3"]]) @ turns
+    brake = -friction * np.linalg.inv(inertia) @ turns.T
+
+    def rate(x, k):
+        found = model.a @ x + driven[k]
+        found[4:] += brake @ np.tanh(turns @ x[4:] / 0.02)
+        return found
+
+    x = np.empty((count, 6))
+    x[0] = np.concatenate([theta[0], theta[0], [0, 0]])
+    for k in range(count - 1):
+        slope = rate(x[k], k)
+        x[k + 1] = x[k] + step / 2 * (slope + rate(x[k] + step * slope, k + 1))
+    tau = x @ model.c.T + theta @ model.d_angle.T + omega @ model.d_rate.T
+    outputs = {name: y[::FINE] for name, y in _outputs(x, tau, p).items()}
+    return truth._replace(outputs=outputs)
+
+
+def lagging(truth: Truth, seconds: float) -> Truth:
+    """The same behind sensors with a first-order lag, from their steady state."""
+    fine = np.interp(np.arange((len(truth.time) - 1) * FINE + 1) / FINE, np.arange(len(truth.time)), truth.time)
+    step, outputs = fine[1] - fine[0], {}
+    decay, exact = np.exp(-step / seconds), truth.at(fine)
+    rise = 1 - seconds / step * (1 - decay)
+    for name in truth.outputs:
+        y = exact[name]
+        slow = lfilter([rise, 1 - rise - decay], [1, -decay], y - y[0]) + y[0]
+        outputs[name] = slow[::FINE]
+    return truth._replace(outputs=outputs)
+
+
+def late(truth: Truth, seconds: float, channels: Sequence[str] = ("tau1", "tau2")) -> Truth:
+    """The same with some channels late."""
+    delayed = truth.at(truth.time - seconds)
+    return truth._replace(outputs={**truth.outputs, **{name: delayed[name] for name in channels}})
 
 
 def measure(truth: Truth, seed: int, channels: Sequence[str] = ALL, counts: int = COUNTS, log_rates: bool = False):

@@ -7,7 +7,7 @@ import pytest
 
 from prw.errors import UserError
 from prw.identification.experiment import prepare
-from prw.recording import read
+from prw.recording import read, read_motion
 
 
 def lines(header: str, rows: int = 30, row: str = "{t},0.1,0.2,{x}") -> str:
@@ -96,3 +96,38 @@ def test_what_is_wrong_is_said(file, text, message):
 def test_units_that_contradict(file):
     with pytest.raises(UserError, match="column pitch: in deg by its header, but in rad by the units given"):
         read(file(lines("time,theta1,theta2,pitch [deg]")), units={"pitch": "rad"})
+
+
+def moving(rows) -> str:
+    return "time,theta1,theta2,tau1\n" + "".join(f"{k / 1000},{np.sin(k / 100)},0.1,{k % 7}\n" for k in rows)
+
+
+def test_a_gap_is_refused_or_told(file):
+    """By all that read recordings. The motors may have done anything in 0.2 s; a path goes through 20 ms."""
+    with pytest.raises(UserError, match=r"no rows from 0.299 to 0.5 s, 0.201 s where 0.001 s is usual"):
+        read_motion(file(moving([*range(300), *range(500, 900)])))
+    measured = read(file(moving([*range(300), *range(320, 900)])))
+    assert measured.notes[0] == "rows are missing once, for up to 0.021 s after 0.299 s; a smooth path bridges that"
+    assert not any("missing" in note for note in read(file(moving(range(0, 900, 3)))).notes)
+    still = [f"{k / 1000},0.1,0.1,{k % 7}" for k in [*range(300), *range(500, 900)]]
+    assert "rows are missing once" in read(file("\n".join(["time,theta1,theta2,tau1", *still]))).notes[0]
+
+
+def test_headers_of_other_tools(tmp_path):
+    """A preamble, other names with units, an encoder's counts, and the encoding that Excel writes."""
+    rows = "".join(f"{k / 100};{k};{2 * k};{k % 7}\n" for k in range(30))
+    path = tmp_path / "run.csv"
+    path.write_text("type;float\ncapture;2026\n\nX;Motor 1;Motor 2;T [mNm]\n" + rows, encoding="utf-16")
+    names = {"X": "time", "Motor 1": "theta1", "Motor 2": "theta2", "T": "tau1"}
+    counted = {"theta1": "rev/10000", "theta2": "rev/10000"}
+    measured = read(path, counted, names=names, skip=2)
+    np.testing.assert_allclose(measured.theta[29], np.array([29, 58]) * 2 * np.pi / 10000)
+    assert measured["tau1"][6] == pytest.approx(6e-3) and measured.time[-1] == pytest.approx(0.29)
+    path.write_text(path.read_text(encoding="utf-16"), encoding="latin-1")
+    assert read(path, counted, names=names, skip=2, encoding="latin-1").time[-1] == pytest.approx(0.29)
+    with pytest.raises(UserError, match="row 4: no column 'Motor 3'; the header has X, Motor 1"):
+        read(path, names={"Motor 3": "theta1"}, skip=2)
+    with pytest.raises(UserError, match="names: tau3 is not known"):
+        read(path, names={"X": "tau3"})
+    with pytest.raises(UserError, match="encoding: 'utf-7000' is not known"):
+        read(path, encoding="utf-7000")

@@ -36,7 +36,7 @@ def fixed(truth: rig.Truth, model) -> dict[str, float]:
 @pytest.mark.parametrize("rows", [slice(None), slice(1234, 3235)], ids=["from rest", "in motion"])
 def test_perfect_sensors_leave_nothing(model, truth, rows):
     """A recording that starts and ends anywhere is explained to one part in a million."""
-    task = task_of(model.known, rig.NAMES, fixed=fixed(truth, model), offsets=False)
+    task = task_of(model.known, rig.NAMES, parameters=fixed(truth, model), offsets=False)
     fitter = Fitter(model, [prepare(recording(truth, rows))], task, dict.fromkeys(rig.ALL, 1.0))
     modelled = fitter.modelled(task.first())[0]
     for i, name in enumerate(rig.ALL):
@@ -48,7 +48,7 @@ def test_perfect_sensors_leave_nothing(model, truth, rows):
 def test_missing_and_uneven_rows_change_nothing(model, truth):
     keep = np.sort(np.random.default_rng(0).choice(len(truth.time), 3000, replace=False))
     slow = np.where(np.arange(len(truth.time)) % 10 == 0, truth.outputs["pitch"], np.nan)
-    task = task_of(model.known, rig.NAMES, fixed=fixed(truth, model), offsets=False)
+    task = task_of(model.known, rig.NAMES, parameters=fixed(truth, model), offsets=False)
     for measured in (recording(truth, pitch=slow), recording(truth, keep)):
         fitter = Fitter(model, [prepare(measured)], task, dict.fromkeys(rig.ALL, 1.0))
         comparison, at = fitter.compare(task.first())[0], np.searchsorted(truth.time, measured.time)
@@ -63,7 +63,7 @@ def test_derivatives_by_the_parameters(model, truth):
     columns = rig.measure(truth, 5, counts=2000)
     motion = Motion(truth.time, np.column_stack([columns["theta1"], columns["theta2"]]))
     measured = Recording(Path("run.csv"), motion, {name: columns[name] for name in rig.ALL}, {})
-    task = task_of(model.known, rig.NAMES, fixed=fixed(truth, model))
+    task = task_of(model.known, rig.NAMES, parameters=fixed(truth, model))
     noise = {"tau1": 0.02, "tau2": 0.02, "theta3": 1e-3, "theta4": 1e-3, "pitch": 1e-3, "roll": 1e-3}
     fitter, at = Fitter(model, [prepare(measured)], task, noise), task.first()
     found = fitter.slopes(at)

@@ -178,7 +178,7 @@ BAD = {
     ),
     "latin-1": ("time,theta1,theta2,größe\n0,1,1,1\n".encode("latin-1"), "row 1: not UTF-8 text"),
     "latin-1 later": ("time,theta1,theta2,x\n0,1,1,1\n1,1,1,ß\n".encode("latin-1"), "row 3: not UTF-8 text"),
-    "utf-16": ("time,theta1,theta2\n0,1,1\n".encode("utf-16"), "row 1: not UTF-8 text"),
+    "utf-16 without its mark": ("time,theta1,ö\n0,1,1\n".encode("utf-16-le"), "row 1: not UTF-8 text"),
     "nul": (b"time,theta1,theta2\n0,1,1\n1,\0,1\n", "row 3"),
     "decimal comma": (b"time\ttheta1\ttheta2\n0\t1\t1\n0,1\t1\t1\n", "row 3, column time: '0,1' is not a number"),
 }

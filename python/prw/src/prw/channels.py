@@ -55,7 +55,10 @@ QUANTITIES = {"time": "time", **MOTORS, **{name: channel.quantity for name, chan
 
 def factor(name: str, unit: str) -> float:
     """What a value of column `name` in `unit` is multiplied with to be in SI. Raises UserError for a unit that does
-    not fit."""
+    not fit. A unit may be divided, as in rev/10000 for the counts of an encoder."""
+    whole, slash, count = unit.partition("/")
+    if slash and count.strip().isdigit() and int(count) > 0:
+        return factor(name, whole) / int(count)
     known = UNITS[QUANTITIES[name]]
     text = unit.strip().replace("·", ".").replace("*", ".").replace(" ", ".")
     text = ALIASES.get(text, text)

@@ -18,8 +18,8 @@ COMMANDS = (simulate, check, linearize, identify, excite, sweep)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run `prw` with the arguments argv (default: the process's). Returns the exit status: 0, 1 after a UserError, 130
-    when interrupted."""
+    """Run `prw` with the arguments argv (default: the process's). Returns the exit status: 0, that of a UserError (1;
+    3 where data do not fit), 130 when interrupted."""
     return run("prw", "Simulate the pitch-roll wrist testbed through its FMU.", COMMANDS, argv)
 
 
@@ -37,7 +37,7 @@ def run(program: str, description: str, commands: Sequence[ModuleType], argv: Se
         sys.stdout.flush()
     except UserError as error:
         print(f"{program} {arguments.command}: {error}", file=sys.stderr)
-        return 1
+        return error.status
     except KeyboardInterrupt:
         print(f"\n{program} {arguments.command}: interrupted", file=sys.stderr)
         return 130

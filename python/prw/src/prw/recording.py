@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 
 from prw.arguments import Table, columns_of, is_path, is_table, numbers_of
 from prw.channels import MEASURED, QUANTITIES, factor
-from prw.columns import ANGLES, RATES, Columns, columns
+from prw.columns import ANGLES, RATES, Columns, columns, shown
 from prw.errors import UserError
 from prw.motion import Array, Motion
 from prw.output import inputs_of
@@ -28,6 +29,9 @@ SMALL_MOVE = 0.02
 SLOW = 0.1
 #: Longer between two samples, in s, than anyone lets a motor run unobserved; milliseconds taken for seconds are beyond.
 SLOW_SAMPLING = 0.5
+#: Rows are missing where this many usual steps are between two. Longer than the other, in s, a motor may have done
+#: anything, unless it rests in so many rows before and after.
+MISSING, UNKNOWN, REST = 5.0, 0.04, 5
 #: A motor does not turn this far, in rad, from sample to sample; angles that jump by a turn do.
 JUMP = 0.9 * np.pi
 #: What a recording that comes from no file is called.
@@ -84,66 +88,98 @@ class Recording:
 
 
 def read(
-    path: str | os.PathLike[str] | Table, units: Mapping[str, str] | None = None, degrees: bool = False
+    path: str | os.PathLike[str] | Table,
+    units: Mapping[str, str] | None = None,
+    degrees: bool = False,
+    *,
+    names: Mapping[str, str] = {},
+    skip: int = 0,
+    encoding: str = "",
 ) -> Recording:
     """Read a recorded experiment from a CSV file, or from a DataFrame or a dict of arrays with the same columns.
 
     Its columns: time (s), theta1, theta2 (rad) and, where present, omega1, omega2 (rad/s) and any of tau1, tau2
     (N.m), theta3, theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s), in any order; others are ignored. It is
-    UTF-8 text with a header line, perhaps below comments after `#`, separated by commas, semicolons or tabs (with
-    semicolons, a decimal comma is understood). Time may be uneven but must increase. A measured column may have
-    empty cells.
+    UTF-8 text (or UTF-16 with its mark) with a header line, perhaps below comments after `#`, separated by commas,
+    semicolons or tabs (with semicolons, a decimal comma is understood). Time may be uneven but must increase; where
+    rows are missing for longer than a path can be laid through, the recording is refused, and where it can, a note says
+    so. A measured column may have empty cells.
 
     Parameters
     ----------
     units
-        Unit by column, where the header has none (`pitch [deg]` has one). Default: SI.
+        Unit by column, where the header has none (`pitch [deg]` has one). Default: SI. An encoder's counts are
+        `rev/10000`.
     degrees
         Columns without a unit are in degrees and degrees per second.
+    names
+        What columns are, where they are called otherwise: {"Motor 1": "theta1"}.
+    skip
+        Lines above the header, as dSPACE writes them.
+    encoding
+        Of the file, as Python calls it (default: UTF-8, or UTF-16 where its mark is there).
 
     Raises
     ------
     UserError
         Something cannot be read; file, row and column are named.
     """
-    return _read(path, units, degrees, tuple(MEASURED))
+    return _read(path, units, degrees, tuple(MEASURED), names, skip, encoding)
 
 
 def read_motion(
-    path: str | os.PathLike[str] | Table, units: Mapping[str, str] | None = None, degrees: bool = False
+    path: str | os.PathLike[str] | Table,
+    units: Mapping[str, str] | None = None,
+    degrees: bool = False,
+    *,
+    names: Mapping[str, str] = {},
+    skip: int = 0,
+    encoding: str = "",
 ) -> Motion:
     """The motors' motion alone, as `read` reads it: what was measured is ignored, and may be anything."""
-    return _read(path, units, degrees, ()).motion
+    return _read(path, units, degrees, (), names, skip, encoding).motion
 
 
 def _read(
-    source: str | os.PathLike[str] | Table, units: Mapping[str, str] | None, degrees: bool, measured: tuple[str, ...]
+    source: str | os.PathLike[str] | Table,
+    units: Mapping[str, str] | None,
+    degrees: bool,
+    measured: tuple[str, ...],
+    names: Mapping[str, str],
+    skip: int,
+    encoding: str,
 ) -> Recording:
     if not is_path(source) and not is_table(source):
         raise UserError(f"{source!r} is no recording: neither a file nor a DataFrame or a dict of arrays")
     path = Path(source) if isinstance(source, (str, os.PathLike)) else IN_MEMORY
-    for name in units or {}:
-        if name not in QUANTITIES:
-            raise UserError(f"units: {name} is not known; there are {', '.join(QUANTITIES)}")
+    for what, known in (("units", units or {}), ("names", names.values())):
+        for name in known:
+            if name not in QUANTITIES:
+                raise UserError(f"{what}: {name} is not known; there are {', '.join(QUANTITIES)}")
+    if skip < 0:
+        raise UserError(f"skip {skip}: it must be 0 or more lines")
 
     found = Columns([], {}, [])
 
     def choose(header: Sequence[str], line: int) -> Sequence[tuple[str, int]]:
         nonlocal found
-        found = columns(path, header, line, measured, units, degrees)
+        for name in names:
+            if not any(text.startswith(name) for text in header):
+                raise UserError(f"{path}, row {line}: no column {name!r}; the header has {shown(header)}")
+        found = columns(path, [_renamed(text, names) for text in header], line, measured, units, degrees)
         return found.taken
 
     values = (
         _gathered(source, choose, may_be_empty=measured)
         if is_table(source)
-        else read_table(path, choose, may_be_empty=measured, increasing=True)
+        else read_table(path, choose, measured, True, skip, encoding)
     )
     table = {name: values[:, i] * factor(name, found.units[name]) for i, (name, _) in enumerate(found.taken)}
     time = table.pop("time")
     theta = np.column_stack([table.pop(name) for name in ANGLES])
     omega = np.column_stack([table.pop(name) for name in RATES]) if RATES[0] in table else None
     with np.errstate(all="ignore"):  # angles near the largest number are the FMU's to refuse
-        notes = found.notes + doubts(time, theta, omega, found.units)
+        notes = found.notes + _gaps(path, time, theta) + doubts(time, theta, omega, found.units)
     return Recording(path, Motion(time, theta, omega, path.stem, notes), table, found.units)
 
 
@@ -166,6 +202,37 @@ def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array
     if not (np.diff(found[0]) > 0).all():
         raise UserError(f"{IN_MEMORY}, column time: time must increase from row to row")
     return np.column_stack(found)
+
+
+def _renamed(text: str, names: Mapping[str, str]) -> str:
+    """The header `text` by what `names` calls it, with the unit that follows its own name."""
+    name = max((n for n in names if re.fullmatch(re.escape(n) + r"\s*([\[(].*[\])])?", text)), key=len, default="")
+    return names[name] + text.removeprefix(name) if name else text
+
+
+def _gaps(path: Path, time: Array, theta: Array) -> list[str]:
+    """A note on rows that are missing. Raises UserError where nobody can know what the motors did meanwhile."""
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(steps > MISSING * usual)
+    long = [int(k) for k in gaps if steps[k] > UNKNOWN and _moves(theta, int(k))]
+    if long:
+        worst = int(max(long, key=lambda k: float(steps[k])))
+        raise UserError(
+            f"{path}: no rows from {time[worst]:.6g} to {time[worst + 1]:.6g} s, {steps[worst]:.3g} s where {usual:.3g} s is usual, while "
+            "the motors move; what they did is not known. Cut the recording there, into files of their own"
+        )
+    if not len(gaps):
+        return []
+    k = int(gaps[np.argmax(steps[gaps])])
+    count = "rows are missing once" if len(gaps) == 1 else f"rows are missing in {len(gaps)} places"
+    return [f"{count}, for up to {steps[k]:.3g} s after {time[k]:.6g} s; a smooth path bridges that"]
+
+
+def _moves(theta: Array, k: int) -> bool:
+    """Whether the motors move about the rows k and k + 1."""
+    near = theta[max(k - REST, 0) : k + 2 + REST]
+    return bool(np.ptp(near, axis=0).max() > max(SMALL_MOVE / 10, 0.002 * float(np.ptp(theta, axis=0).max())))
 
 
 def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, str]) -> list[str]:

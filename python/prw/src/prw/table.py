@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import math
 import os
@@ -28,25 +29,45 @@ BLOCK = 1 << 22
 Choice = Callable[[Sequence[str], int], Sequence[tuple[str, int]]]
 
 
-def read_table(path: Path, choose: Choice, may_be_empty: Container[str] = (), increasing: bool = False) -> Array:
+def read_table(
+    path: Path,
+    choose: Choice,
+    may_be_empty: Container[str] = (),
+    increasing: bool = False,
+    skip: int = 0,
+    encoding: str = "",
+) -> Array:
     """The columns that `choose` takes of the header, (rows, columns), from UTF-8 text as `prw.read` describes it.
 
     An empty cell in a column of `may_be_empty` becomes NaN. increasing: whether the first column, the time, must
-    increase. Raises UserError naming file, line and column.
+    increase. skip: lines above the header. encoding: of the file (default: UTF-8, or UTF-16 where its mark is there).
+    Raises UserError naming file, line and column.
     """
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            return _parse(path, file, choose, may_be_empty, increasing)
-    except UnicodeDecodeError:
+        chosen = encoding or _encoding(path)
+        with open(path, encoding=chosen, newline="") as file:
+            return _parse(path, file, choose, may_be_empty, increasing, skip)
+    except UnicodeError:
+        if encoding:
+            raise UserError(f"{path}: not {encoding} text; give its encoding, or save it as UTF-8 CSV") from None
         raise UserError(
-            f"{_where(path, _undecodable_line(path))}: not UTF-8 text; save the file as UTF-8 CSV"
+            f"{_where(path, _undecodable_line(path))}: not UTF-8 text; give its encoding, or save it as UTF-8 CSV"
         ) from None
+    except LookupError:
+        raise UserError(f"encoding: {encoding!r} is not known; try utf-16 or latin-1") from None
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
 
 
-def _parse(path: Path, file: IO[str], choose: Choice, may_be_empty: Container[str], increasing: bool) -> Array:
-    begin, first = _top(file)
+def _encoding(path: Path) -> str:
+    with open(path, "rb") as file:
+        return "utf-16" if file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig"
+
+
+def _parse(
+    path: Path, file: IO[str], choose: Choice, may_be_empty: Container[str], increasing: bool, skip: int
+) -> Array:
+    begin, first = _top(file, skip)
     if not first:
         raise UserError(f"{path}: the file is empty; a header and at least two rows are needed")
     delimiter = next((d for d in DELIMITERS if d in first), ",")
@@ -70,10 +91,12 @@ def _parse(path: Path, file: IO[str], choose: Choice, may_be_empty: Container[st
     return values
 
 
-def _top(file: IO[str]) -> tuple[int, str]:
-    """How many lines stand above the header, blank or comments after `#`, and the header, "" if there is none. numpy
-    writes a `#` before the header as well: it is the last comment then, with numbers right below."""
-    count, comment, line = 0, "", file.readline()
+def _top(file: IO[str], skip: int) -> tuple[int, str]:
+    """How many lines stand above the header, `skip` and then blank ones or comments after `#`, and the header, "" if
+    there is none. numpy writes a `#` before the header as well: it is the last comment then, with numbers right below."""
+    for _ in range(skip):
+        file.readline()
+    count, comment, line = skip, "", file.readline()
     while line and (not line.strip() or line.lstrip().startswith("#")):
         count, comment, line = count + 1, line.strip() and line, file.readline()
     if comment and line.strip() and re.match(r"[-+.\d]", line.lstrip()):

@@ -47,6 +47,41 @@ def add_task_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_reading_options(parser: argparse.ArgumentParser) -> None:
+    """Options on how recordings are written."""
+    parser.add_argument(
+        "--units",
+        default="",
+        metavar="NAME=UNIT,...",
+        help="units of columns whose header has none; an encoder's counts are theta1=rev/10000",
+    )
+    parser.add_argument("--degrees", action="store_true", help="columns without a unit are in deg and deg/s, not SI")
+    parser.add_argument(
+        "--names",
+        action="append",
+        default=[],
+        metavar="NAME=HEADER",
+        help="what a column is called in the file, as in 'theta1=Motor 1'. May be repeated",
+    )
+    parser.add_argument(
+        "--skip-lines", type=int, default=0, metavar="N", help="lines above the header, as dSPACE writes them"
+    )
+    parser.add_argument(
+        "--encoding", default="", help="of the file (default: UTF-8, or UTF-16 where the file begins with its mark)"
+    )
+
+
+def reading_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Arguments of `prw.read` from these options."""
+    return {
+        "units": pairs([arguments.units], "--units"),
+        "degrees": arguments.degrees,
+        "names": {header: name for name, header in pairs(arguments.names, "--names").items()},
+        "skip": arguments.skip_lines,
+        "encoding": arguments.encoding,
+    }
+
+
 def pairs(texts: Iterable[str], option: str) -> dict[str, str]:
     """NAME=TEXT, each perhaps several with commas, as a dict. Raises UserError naming the option."""
     found: dict[str, str] = {}
@@ -140,7 +175,7 @@ def bounds(texts: Iterable[str]) -> dict[str, tuple[float, float]]:
 
 @contextlib.contextmanager
 def said_of_options(**options: str) -> Iterator[None]:
-    """Turn an error on an argument in Python, `fixed: k9 is not known`, into one on the option that it came from,
+    """Turn an error on an argument in Python, `parameters: k9 is not known`, into one on the option that it came from,
     `--set: k9 ...`. options: by argument."""
     try:
         yield

@@ -18,7 +18,9 @@ from prw.output import write_motion
 
 DESCRIPTION = """\
 Proposes motor motions within the motors' limits and ranks them by what they tell about the parameters: the standard
-errors to be expected from measuring the given channels once, with unknown sensor offsets. Kinds: multisines (slow,
+errors to be expected from measuring the given channels once, with unknown sensor offsets. The noise that is assumed:
+torques 0.02 N.m, angles 0.001 rad, rates 0.01 rad/s, white, a standard deviation; --noise has yours. "typical" is the root
+mean square of a row. Kinds: multisines (slow,
 wide, and one whose spectrum is optimal for the parameters), chirps; with equal, opposite, single and independent
 motors. Each motion becomes a CSV file for `prw simulate` or for your motor controller (s, rad, rad/s).
 """
@@ -79,7 +81,7 @@ def run(arguments: argparse.Namespace) -> None:
         for name in ("angle", "speed", "acceleration", "duration", "rate")
     )
     with said_of_options(
-        measure="measure", duration="duration", rate="rate", noise="noise", estimate="estimate", fixed="set"
+        measure="measure", duration="duration", rate="rate", noise="noise", estimate="estimate", parameters="set"
     ):
         ranking = excite(
             None if arguments.measure == "all" else listed(arguments.measure),
@@ -89,7 +91,7 @@ def run(arguments: argparse.Namespace) -> None:
             duration=duration,
             rate=rate,
             estimate=listed(arguments.estimate),
-            fixed=numbers(arguments.set, "--set"),
+            parameters=numbers(arguments.set, "--set"),
             noise=numbers(arguments.noise, "--noise"),
             fmu=arguments.fmu,
         )

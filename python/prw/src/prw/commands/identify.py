@@ -10,17 +10,18 @@ from typing import Any
 from prw.channels import factor
 from prw.commands.assignments import (
     FORMATTER,
+    add_reading_options,
     add_task_options,
     bounds,
     listed,
     number,
     numbers,
-    pairs,
+    reading_options,
     said_of_options,
     spreads,
 )
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
-from prw.errors import UserError
+from prw.errors import DoesNotFit, UserError
 from prw.extras import need
 from prw.identification import identify
 
@@ -33,6 +34,8 @@ Each FILE is one experiment, a CSV table with the columns
   tau1 tau2 theta3 theta4 pitch roll pitch_rate roll_rate      any of these; cells may be empty
 Units stand in the header, as in `pitch [deg]` or `tau1_mNm`, or in --units; otherwise SI: s, rad, rad/s, N.m. Rows may
 be uneven; lines above the header that start with # are comments.
+
+Exit status: 0, 1 where something is wrong or parameters stay open, 3 where the FMU does not explain the data.
 """
 
 EXAMPLES = """\
@@ -72,12 +75,18 @@ def add_parser(subparsers: Any) -> None:
         metavar="NAME=LOW:HIGH",
         help="range of a parameter in SI (default: a factor of 100 about its start value). May be repeated",
     )
-    parser.add_argument("--units", default="", metavar="NAME=UNIT,...", help="units of columns whose header has none")
-    parser.add_argument("--degrees", action="store_true", help="columns without a unit are in deg and deg/s, not SI")
+    add_reading_options(parser)
     parser.add_argument(
         "--quantum",
         metavar="ANGLE",
         help="resolution of the motors' encoders, as in 0.036deg or 0.000628rad (default: found in the data)",
+    )
+    for kind, said in (("delay", "come late"), ("lag", "lag, to first order"), ("gain", "read too much or too little")):
+        parser.add_argument(
+            f"--{kind}", default="", metavar="NAMES", help=f"channels that may {said}, with commas: estimated along"
+        )
+    parser.add_argument(
+        "--write-anyway", action="store_true", help="write parameters even if the FMU does not explain the data"
     )
     parser.add_argument("--no-offsets", action="store_true", help="the sensors have no offsets")
     parser.add_argument(
@@ -99,21 +108,31 @@ def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw identify`. Raises UserError with one line on what is wrong."""
     need("identify", "scipy", "jinja2", "threadpoolctl")
     with said_of_options(
-        estimate="estimate", fixed="set", priors="prior", noise="noise", units="units", starts="starts"
+        estimate="estimate",
+        parameters="set",
+        priors="prior",
+        noise="noise",
+        units="units",
+        names="names",
+        skip="skip-lines",
+        encoding="encoding",
+        starts="starts",
     ):
         found = identify(
             arguments.files,
             estimate=listed(arguments.estimate),
             priors=spreads(arguments.prior, "--prior"),
-            fixed=numbers(arguments.set, "--set"),
+            parameters=numbers(arguments.set, "--set"),
             bounds=bounds(arguments.bounds),
             noise=numbers(arguments.noise, "--noise"),
-            units=pairs([arguments.units], "--units"),
-            degrees=arguments.degrees,
+            **reading_options(arguments),
             quantum=_quantum(arguments.quantum),
             offsets=not arguments.no_offsets,
             starts=arguments.starts,
             seed=arguments.seed,
+            delay=listed(arguments.delay),
+            lag=listed(arguments.lag),
+            gain=listed(arguments.gain),
             fmu=arguments.fmu,
         )
     report, numbers_, parameters, ssv = (
@@ -122,11 +141,21 @@ def run(arguments: argparse.Namespace) -> None:
     found.report(report)
     found.to_json(numbers_)
     print(found.summary())
-    # The parameters only if the data determine them, and never beside another fit's report.
-    if found.undetermined:
+    # The parameters only if they are those of the testbed, and never beside another fit's report.
+    wrong = not found.fits and not arguments.write_anyway
+    if wrong or found.undetermined:
         parameters.unlink(missing_ok=True)
         ssv.unlink(missing_ok=True)
         print(f"wrote       {report}, {numbers_}")
+    if wrong:
+        channels = ", ".join(dict.fromkeys(misfit.channel for misfit in found.verdict.misfits))
+        perhaps = f"; perhaps {found.diagnosis[0]}" if found.diagnosis else ""
+        left = f"; besides, {'; '.join(found.undetermined)}" if found.undetermined else ""
+        raise DoesNotFit(
+            f"the FMU does not explain the data ({channels}){perhaps}{left}. {report} has the rest; identified.json was "
+            "not written (--write-anyway writes it)"
+        )
+    if found.undetermined:
         raise UserError(
             f"{'; '.join(found.undetermined)}. What would settle it: {'; or '.join(found.advice)}. {report} has the rest; "
             "identified.json was not written"
@@ -134,6 +163,8 @@ def run(arguments: argparse.Namespace) -> None:
     found.to_parameters(parameters)
     found.to_ssv(ssv)
     print(f"wrote       {report}, {numbers_}, {parameters}, {ssv}")
+    if not found.fits:
+        raise DoesNotFit("the FMU does not explain the data; the parameters that were written are not to be trusted")
     print(f"next        look at the report; then: prw simulate {arguments.files[0]} --parameters {parameters}")
 
 

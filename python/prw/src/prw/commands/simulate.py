@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from prw.animation import animate, suffix_of
-from prw.commands.assignments import add_parameter_options, parameters_of, said_of_options
+from prw.commands.assignments import (
+    add_parameter_options,
+    add_reading_options,
+    parameters_of,
+    reading_options,
+    said_of_options,
+)
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import MissingPackage, UserError
 from prw.files import replacing
@@ -40,7 +46,7 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--input", type=Path, metavar="FILE", help="the same")
     add_parameter_options(parser, "SI")
-    parser.add_argument("--degrees", action="store_true", help="the recording is in degrees and degrees per second")
+    add_reading_options(parser)
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
     parser.add_argument(
         "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
@@ -63,7 +69,7 @@ def run(arguments: argparse.Namespace) -> None:
         suffix_of(arguments.animate)
     recorded = arguments.input is not None
     if recorded:
-        motion = read_motion(arguments.input, degrees=arguments.degrees)
+        motion = read_motion(arguments.input, **reading_options(arguments))
         title = f"Response to {arguments.input.name}"
     else:
         if arguments.degrees:

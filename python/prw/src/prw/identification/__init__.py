@@ -2,15 +2,16 @@
 
 In the order in which the files build on each other: path (where the motors really
 were), experiment (spectra of both, and of their errors), model (the FMU's equations), response (what they answer),
-fit (least squares), statistics and profile (how sure that is), design and advice (what would tell more), results and
-report. `identify` below puts them together.
+fit (least squares), verdict (whether the model explains the data), diagnosis (what may be wrong if not), statistics and
+profile (how sure the estimates are), design and advice (what would tell more), results and report. `identify` below puts them together.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, TypeAlias, cast
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from prw.arguments import Table, counted, is_path, is_table, names_of, positive, spread_of
 from prw.errors import UserError
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 #: What is estimated if nothing is said.
 DEFAULT_ESTIMATE = ("k1", "k2", "c1", "c2", "c3")
+#: What a channel may be distorted by, in the order of `identify`'s arguments.
+KINDS = ("delay", "lag", "gain")
 #: Default bounds: this factor about the start value.
 REACH = 100.0
 
@@ -36,7 +39,7 @@ def identify(
     *,
     estimate: str | Iterable[str] = DEFAULT_ESTIMATE,
     priors: Mapping[str, float | tuple[float, float]] = {},
-    fixed: Mapping[str, float] = {},
+    parameters: Mapping[str, float] = {},
     bounds: Mapping[str, tuple[float, float]] = {},
     noise: Mapping[str, float] = {},
     units: Mapping[str, str] = {},
@@ -45,6 +48,12 @@ def identify(
     offsets: bool = True,
     starts: int = 6,
     seed: int = 0,
+    delay: Sequence[str] = (),
+    lag: Sequence[str] = (),
+    gain: Sequence[str] = (),
+    names: Mapping[str, str] = {},
+    skip: int = 0,
+    encoding: str = "",
     fmu: str | os.PathLike[str] | None = None,
 ) -> Identification:
     """Estimate parameters of the testbed from one experiment or several.
@@ -60,13 +69,13 @@ def identify(
     priors
         What is known beforehand of a parameter, by name: the standard deviation as a fraction of its start value
         (0.1 is 10 %, 1 the most), or (value, fraction). It is then estimated along.
-    fixed
+    parameters
         Other start values, or values of what is not estimated.
     bounds
         (least, greatest) by parameter.
     noise
         Standard deviations of channels, where they are known.
-    units, degrees
+    units, degrees, names, skip, encoding
         As for `prw.read`.
     quantum
         Resolution of the motors' encoders, rad (default: found in the data).
@@ -74,14 +83,16 @@ def identify(
         Whether sensors may have any.
     starts
         Places to search from, at random with `seed`.
+    delay, lag, gain
+        Channels that may be late, lag (first order), or read too much or too little: estimated along.
     fmu
         The testbed FMU (default: as for `prw.simulate`).
 
     Returns
     -------
     Identification
-        Estimates, standard errors and doubts. Parameters that the data leave open are no error: see its
-        `undetermined`.
+        Estimates, standard errors and doubts. Data that the model does not explain are no error, nor are parameters
+        that they leave open: see its `fits`, `misfits` and `undetermined`.
 
     Raises
     ------
@@ -93,39 +104,54 @@ def identify(
     from threadpoolctl import threadpool_limits
 
     from prw.identification.experiment import prepare
-    from prw.identification.fit import fit
+    from prw.identification.fit import Distortion, fit
     from prw.identification.model import Model
     from prw.identification.results import Identification
     from prw.identification.statistics import certainty
+    from prw.identification.verdict import judge
     from prw.recording import Recording, read
 
     starts = counted("starts", starts)
+    header: Any = {"names": names, "skip": skip, "encoding": encoding}
     one = is_path(files) or is_table(files) or isinstance(files, Recording) or not isinstance(files, Iterable)
     several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
     if not several:
         raise UserError("files: there are none")
+    delay, lag, gain = names_of("delay", delay), names_of("lag", lag), names_of("gain", gain)
     # Many small matrices: more threads only get into each other's way.
     with Model(fmu) as model, threadpool_limits(1):
-        task = task_of(model.known, estimate, priors, fixed, bounds, noise, offsets)
-        measured = [each if isinstance(each, Recording) else read(each, units, degrees) for each in several]
-        _check("noise", noise, dict.fromkeys(name for m in measured for name in m.measured))
+        distortions = tuple(Distortion(k, n) for k, names in zip(KINDS, (delay, lag, gain)) for n in names)
+        task = replace(
+            task_of(model.known, estimate, priors, parameters, bounds, noise, offsets), distortions=distortions
+        )
+        measured = [each if isinstance(each, Recording) else read(each, units, degrees, **header) for each in several]
+        channels = dict.fromkeys(name for m in measured for name in m.measured)
+        for what, named in (("noise", noise), ("delay", delay), ("lag", lag), ("gain", gain)):
+            _check(what, named, channels)
         experiments = [prepare(each, quantum) for each in measured]
         solution = fit(model, experiments, task, starts, seed)
-        sure = certainty(solution)
-        hints = []
+        verdict = judge(solution)
+        sure = certainty(solution, verdict.widening)
+        hints: list[str] = []
+        diagnosis: list[str] = []
+        if not verdict.fits:
+            from prw.identification.diagnosis import diagnose
+
+            diagnosis = diagnose(solution, verdict)
         if sure.undetermined:
             from prw.identification.advice import advice
 
             hints = advice(model, experiments, solution)
         sources = tuple(str(each.source) for each in measured)
-        return Identification(model.fmu, model.known, sources, tuple(experiments), solution, sure, tuple(hints))
+        said = verdict, tuple(diagnosis), tuple(hints)
+        return Identification(model.fmu, model.known, sources, tuple(experiments), solution, sure, *said)
 
 
 def task_of(
     known: Parameters,
     estimate: str | Iterable[str],
     priors: Mapping[str, float | tuple[float, float]] = {},
-    fixed: Mapping[str, float] = {},
+    parameters: Mapping[str, float] = {},
     bounds: Mapping[str, tuple[float, float]] = {},
     noise: Mapping[str, float] = {},
     offsets: bool = True,
@@ -136,15 +162,15 @@ def task_of(
 
     estimate = names_of("estimate", estimate)
     whole = f"; {', '.join(known.counts)} are counted, not estimated" if known.counts else ""
-    for what, names in (("estimate", estimate), ("priors", priors), ("fixed", fixed), ("bounds", bounds)):
+    for what, names in (("estimate", estimate), ("priors", priors), ("parameters", parameters), ("bounds", bounds)):
         _check(what, names, known.real, whole)
     _check("noise", noise, MEASURED)
-    start = {**known.starts, **fixed}
+    start = {**known.starts, **parameters}
     if not estimate and not priors:
         raise UserError(f"estimate: nothing is named; there are {', '.join(known.real)}")
     beliefs = {name: Prior(*spread_of(f"priors: {name}", p, start[name])) for name, p in priors.items()}
     chosen = tuple(name for name in known.real if name in estimate or name in beliefs)
-    for what, values in (("fixed", fixed), ("noise", noise)):
+    for what, values in (("parameters", parameters), ("noise", noise)):
         for name, value in values.items():
             positive(f"{what}: {name}", value)
     for name in chosen:

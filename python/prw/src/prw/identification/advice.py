@@ -35,9 +35,9 @@ SAID = {
 def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) -> list[str]:
     """What would determine all parameters, each with the largest standard error to be expected; the best
     motion with the same sensors, and the best pair of sensors with the same motions. Only what helps is named."""
-    task = solution.task
+    task = replace(solution.task, distortions=())
     first = np.log([task.start[name] for name in task.names])
-    point = np.clip(solution.logarithms, first - np.log(REACH), first + np.log(REACH))
+    point = np.clip(solution.logarithms[: len(first)], first - np.log(REACH), first + np.log(REACH))
     task = replace(task, start=task.values(point))
     noise = {**design.default_noise(), **solution.noise}
     have = design.with_priors(design.information(model, experiments, task, point, noise), task)

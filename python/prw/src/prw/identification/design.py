@@ -16,7 +16,7 @@ from prw.channels import MEASURED
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Fitter, Task
 from prw.identification.model import Model
-from prw.identification.statistics import condition, information_of, noise_corrected
+from prw.identification.statistics import condition, covariance_of, information_of, noise_corrected
 from prw.motion import Array, Motion
 from prw.testbed import ANGLE_OF, OUTPUTS
 
@@ -191,11 +191,10 @@ def _optimal(
 
 
 def typical_error(information: Array) -> float:
-    """The standard error, as a fraction, that is the same for all parameters in an equally good experiment:
-    det(F)^(-1/2p)."""
+    """Root mean square of the parameters' standard errors, as fractions; infinite where a combination stays open."""
     if condition(information) > SINGULAR:
         return np.inf
-    return float(np.exp(-np.linalg.slogdet(information)[1] / (2 * len(information))))
+    return float(np.sqrt(np.mean(np.diag(covariance_of(information)))))
 
 
 def with_priors(information: Array, task: Task) -> Array:

@@ -20,8 +20,8 @@ MOST_SAMPLES, SLOWEST = 2_000_000, 50.0
 
 
 class Excitation(NamedTuple):
-    """A motion, and what one experiment with it would tell. typical_error: the standard error, as a fraction, that is
-    the same for all parameters in an equally good experiment; infinite where some stay open. expected_errors: of each
+    """A motion, and what one experiment with it would tell. typical_error: root mean square of the expected standard
+    errors, as a fraction; infinite where some stay open. expected_errors: of each
     parameter. undetermined: combinations that stay open. noise: assumed of the channels, SI."""
 
     motion: Motion
@@ -45,7 +45,7 @@ def excite(
     duration: float = 10.0,
     rate: float = 1000.0,
     estimate: str | Iterable[str] = DEFAULT_ESTIMATE,
-    fixed: Mapping[str, float] = {},
+    parameters: Mapping[str, float] = {},
     noise: Mapping[str, float] = {},
     fmu: str | os.PathLike[str] | None = None,
 ) -> list[Excitation]:
@@ -64,7 +64,7 @@ def excite(
         Of a motion, s.
     rate
         Samples per second.
-    estimate, fixed, noise, fmu
+    estimate, parameters, noise, fmu
         As for `prw.identify`.
 
     Raises
@@ -104,7 +104,7 @@ def excite(
         raise UserError(f"rate {rate:g}: the testbed moves at up to 30 Hz; sample with 50 Hz or more")
     ranking = []
     with Model(fmu) as model, threadpool_limits(1):
-        task = task_of(model.known, estimate, fixed=fixed, noise=noise)
+        task = task_of(model.known, estimate, parameters=parameters, noise=noise)
         known = {**design.default_noise(), **noise}
         assumed = {name: known[name] for name in channels}
         limits = design.Limits(angle, speed, acceleration)

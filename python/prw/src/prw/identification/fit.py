@@ -14,7 +14,7 @@ Sec. 9.11). The noise of each channel is what its residuals have beyond that, or
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +47,35 @@ SAME = 0.01
 RIVAL = 9.0
 
 
+#: What a channel may be distorted by, and the unit of each, in which 1 is a likely size: the logarithm of a gain is its own.
+DISTORTIONS = {"delay": 1e-3, "lag": 1e-3, "gain": 1.0}
+#: Bounds of a distortion in these units.
+FURTHEST = 50.0
+
+
+class Distortion(NamedTuple):
+    """What stands between a channel and its record: a delay (s), a first-order lag (time constant, s) or a gain."""
+
+    kind: str
+    channel: str
+
+    def __str__(self) -> str:
+        return f"{self.kind} of {self.channel}"
+
+    def value(self, x: float) -> float:
+        """The delay or lag in s, or the gain, from the unknown x."""
+        return float(np.exp(x)) if self.kind == "gain" else x * DISTORTIONS[self.kind]
+
+    def response(self, x: float, s: Complex) -> tuple[Complex, Complex]:
+        """Frequency response (f,) and the derivative of its logarithm by x."""
+        if self.kind == "gain":
+            return np.full(len(s), np.exp(x) + 0j), np.ones(len(s), dtype=complex)
+        s = s * DISTORTIONS[self.kind]
+        if self.kind == "delay":
+            return np.exp(-s * x), -s
+        return 1 / (1 + s * x), -s / (1 + s * x)
+
+
 class Prior(NamedTuple):
     """What is known beforehand: the parameter is `value` (SI) give or take the fraction `relative` (one sigma)."""
 
@@ -58,7 +87,7 @@ class Prior(NamedTuple):
 class Task:
     """What to estimate. names: of the parameters. start: all parameters in SI by name. bounds: (least, greatest) by
     name, SI. priors: by name. noise: given standard deviations by channel, SI. offsets: whether each channel has an
-    unknown one."""
+    unknown one. distortions: of channels, unknowns that follow the parameters' logarithms in every point (p,)."""
 
     names: tuple[str, ...]
     start: Mapping[str, float]
@@ -66,23 +95,30 @@ class Task:
     priors: Mapping[str, Prior]
     noise: Mapping[str, float]
     offsets: bool = True
+    distortions: tuple[Distortion, ...] = ()
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Names of all unknowns: parameters, then distortions."""
+        return (*self.names, *map(str, self.distortions))
 
     def values(self, logarithms: Array) -> dict[str, float]:
         """All parameters in SI, with the estimated ones at these logarithms."""
         return {**self.start, **dict(zip(self.names, np.exp(logarithms).tolist()))}
 
     def first(self) -> Array:
-        """Logarithms (p,) of the start values of `names`."""
-        return np.log([self.start[name] for name in self.names])
+        """Logarithms (p,) of the start values of `names`, and no distortion."""
+        return np.append(np.log([self.start[name] for name in self.names]), np.zeros(len(self.distortions)))
 
     def span(self) -> tuple[Array, Array]:
-        """The bounds of the logarithms of `names`: least (p,) and greatest (p,)."""
+        """The bounds of the unknowns: least (p,) and greatest (p,)."""
         low, high = np.log([self.bounds[name] for name in self.names]).T
-        return low, high
+        reach = np.full(len(self.distortions), FURTHEST)
+        return np.append(low, -reach), np.append(high, reach)
 
     def prior_information(self) -> Array:
-        """What the priors know about the logarithms of `names`: (p, p)."""
-        return np.diag([1 / self.priors[n].relative ** 2 if n in self.priors else 0.0 for n in self.names])
+        """What the priors know about the unknowns: (p, p)."""
+        return np.diag([1 / self.priors[n].relative ** 2 if n in self.priors else 0.0 for n in self.unknowns])
 
 
 class Comparison:
@@ -91,8 +127,11 @@ class Comparison:
     residual: (2, bins, c), real and imaginary parts of the difference of measured and modelled spectra, uncorrelated
     and of variance 1, offsets and initial state taken out. offsets: (c,) SI. initial: (6,), x[0] - x[n]."""
 
-    def __init__(self, experiment: Experiment, response: Response, noise: Array, offsets: bool):
-        """noise: (c,) standard deviations, SI. offsets: whether the channels have any."""
+    def __init__(
+        self, experiment: Experiment, response: Response, noise: Array, offsets: bool, edges: Sequence[int] = ()
+    ):
+        """noise: (c,) standard deviations, SI. offsets: whether the channels have any. edges: channels that are delayed
+        or lag, of which the first samples come from before the recording."""
         self.experiment, self.response = experiment, response
         bins, channels = experiment.bins, len(experiment.channels)
         share = experiment.shares
@@ -107,6 +146,12 @@ class Comparison:
             steady = np.zeros((experiment.needed_bins, channels, channels), dtype=complex)
             steady[0] = np.sqrt(len(experiment.time)) * np.eye(channels)
             columns.insert(0, experiment.seen(steady))
+        if edges:
+            early = np.zeros((experiment.needed_bins, channels, 3 * len(edges)), dtype=complex)
+            s = 1j * np.arange(experiment.needed_bins) / experiment.bins
+            for k, i in enumerate(edges):
+                early[:, i, 3 * k : 3 * k + 3] = s[:, None] ** np.arange(3)
+            columns.insert(1 if offsets else 0, experiment.seen(early))
         nuisance = np.concatenate(columns, axis=2)
         difference = np.zeros((bins, channels), dtype=complex)
         if experiment.values is not None:
@@ -118,8 +163,14 @@ class Comparison:
         self._basis = left[:, seen]
         found = (right[seen].T / sizes[seen]) @ (self._basis.T @ flat[:, -1])
         self.residual = self.project(white[..., -1])
-        self.offsets, self.initial = found[:-6] if offsets else np.zeros(channels), found[-6:]
+        self.offsets, self.initial = found[:channels] if offsets else np.zeros(channels), found[-6:]
         self._rest = difference - nuisance @ found
+
+    @property
+    def spread(self) -> float:
+        """Twice the logarithm of the determinants of all covariances."""
+        diagonal = np.einsum("fcc->fc", self._whiten).real
+        return float(-4 * np.log(diagonal).sum())
 
     def project(self, table: Array) -> Array:
         """Parts (2, bins, c, ...) with what offsets and initial state could explain taken out."""
@@ -129,26 +180,32 @@ class Comparison:
     def slopes(self, change: Discrete) -> tuple[Array, Array]:
         """Derivatives (2, bins, c, p) of `residual`, and the part (p, p) of their squares that is noise.
 
-        change: the model's derivatives by the parameters. What encoders' errors add to the squares is no information:
+        change: the model's derivatives by the parameters; those by the distortions follow. What encoders' errors add to the squares is no information:
         with equal motors, say, the difference of two encoders' steps seems to roll the wrist a little, and J3 would
         look determined."""
         outputs, transfer = self.response.slopes(change, self.initial)
         bins, whiten = self.experiment.bins, self._whiten
-        outputs = np.moveaxis(self.experiment.seen(np.moveaxis(outputs, 0, -1)), -1, 0)
-        moved = whiten @ self._through(transfer[:, :bins] * self.experiment.shares[:, None], self._scaled)
-        moved = moved @ whiten.conj().swapaxes(-1, -2)
+        errors = np.sqrt(self.experiment.motor_power)[:, None, :]
+        moving = np.moveaxis(transfer[:, :bins] * (self.experiment.shares[:, None] * errors), 0, 2)
+        # Whitened, what an error of each encoder adds: changes (bins, c, p, 2) and what there is (bins, c, 2).
+        direct = (whiten @ moving.reshape(bins, moving.shape[1], -1)).reshape(moving.shape)
+        there = (whiten @ (self._scaled * errors)).conj().swapaxes(-1, -2)
+        moved = (direct.reshape(bins, -1, 2) @ there).reshape(*moving.shape[:3], -1)
+        direct, moved = np.moveaxis(direct, 2, 0), np.moveaxis(moved, 2, 0)
         # Of the inverse of a Cholesky factor: the lower half of the covariance's change, seen through it.
         lower = np.tril(moved + moved.conj().swapaxes(-1, -2))
         diagonal = np.arange(lower.shape[-1])
         lower[..., diagonal, diagonal] /= 2
-        white = -whiten @ outputs[..., None] - lower @ (whiten @ self._rest[:, :, None])
-        table = self.project(self._parts(np.moveaxis(white[..., 0], 0, -1)))
+        followed = (lower @ (whiten @ self._rest[:, :, None]))[..., 0]
+        table = self.seen_along(outputs) - self.project(self._parts(np.moveaxis(followed, 0, -1)))
         # E |d residual|^2, where d residual = -(whitened dG) n_u - lower r, with errors n_u of the encoders.
-        errors = np.sqrt(self.experiment.motor_power)[:, None, :]
-        direct = whiten @ (transfer[:, :bins] * self.experiment.shares[:, None] * errors)
         rows = [t.reshape(len(t), -1) for t in (direct, lower, moved)]
         a, s, b = (np.hstack([t.real, t.imag]) for t in rows)
         return table, 2 * (a @ a.T + s @ s.T - b @ s.T - s @ b.T)
+
+    def seen_along(self, outputs: Complex) -> Array:
+        """Changes (2, bins, c, q) of the residual with changes of the outputs (q, f, c)."""
+        return self.project(self._parts(-self._whiten @ self.experiment.seen(np.moveaxis(outputs, 0, -1))))
 
     def _through(self, first: Complex, second: Complex | None = None) -> Complex:
         """What encoders' errors do to the channels: first P second^H, (..., bins, c, c)."""
@@ -213,6 +270,11 @@ class Solution:
         """All parameters in SI."""
         return self.task.values(self.logarithms)
 
+    @property
+    def unlikeliness(self) -> float:
+        """Minus twice the logarithm of the likelihood, give or take a constant."""
+        return self.misfit + sum(comparison.spread for comparison in self.comparisons)
+
 
 class Fitter:
     """The experiments and the FMU, ready to be compared at any parameters and noise."""
@@ -234,18 +296,34 @@ class Fitter:
         one = discrete(self._matrices(logarithms[None]), experiment.step, experiment.channels)
         return Discrete(*(block[0] for block in one))
 
+    def _response(self, logarithms: Array, experiment: Experiment, bins: int) -> Response:
+        x = logarithms[len(self.task.names) :]
+        distortions = [
+            (experiment.channels.index(d.channel), lambda s, d=d, xi=float(xi): d.response(xi, s))
+            if d.channel in experiment.channels
+            else None
+            for d, xi in zip(self.task.distortions, x)
+        ]
+        return Response(self._model(logarithms, experiment), experiment, bins, distortions)
+
     def compare(self, logarithms: Array) -> list[Comparison]:
         """Every experiment beside the FMU at one set of parameters."""
         at = logarithms.tobytes()
         if self._responses[0] != at:
             self.evaluations += 1
-            self._responses = at, [Response(self._model(logarithms, e), e, e.needed_bins) for e in self.experiments]
+            self._responses = at, [self._response(logarithms, e, e.needed_bins) for e in self.experiments]
         key = (at, *self.noise.items())
         if self._comparisons[0] != key:
             self._comparisons = (
                 key,
                 [
-                    Comparison(e, response, np.array([self.noise[n] for n in e.channels]), self.task.offsets)
+                    Comparison(
+                        e,
+                        response,
+                        np.array([self.noise[n] for n in e.channels]),
+                        self.task.offsets,
+                        self._edges(e),
+                    )
                     for e, response in zip(self.experiments, self._responses[1])
                 ],
             )
@@ -254,10 +332,10 @@ class Fitter:
     def jacobians(self, logarithms: Array) -> tuple[list[Array], Array]:
         """For each experiment the derivatives (2, bins, c, p) of the residuals by the logarithms; and the part (p, p)
         of all their squares that is noise."""
-        steps = DIFFERENCE * np.eye(len(logarithms))
+        steps = DIFFERENCE * np.eye(len(self.task.names), len(logarithms))
         around = self._matrices(np.vstack([logarithms + steps, logarithms - steps]))
-        self.evaluations += 2 * len(logarithms)
-        tables, noise = [], np.zeros_like(steps)
+        self.evaluations += 2 * len(steps)
+        tables, noise = [], np.zeros((len(logarithms), len(logarithms)))
         for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
             table, of_noise = comparison.slopes(
                 discrete(around, experiment.step, experiment.channels).slopes(DIFFERENCE)
@@ -270,7 +348,7 @@ class Fitter:
         """For each experiment the channels (s, c) as the FMU has them, offsets included, SI."""
         found = []
         for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
-            whole = Response(self._model(logarithms, experiment), experiment, experiment.all_bins)
+            whole = self._response(logarithms, experiment, experiment.all_bins)
             found.append(experiment.courses(whole.outputs + whole.transients @ comparison.initial) + comparison.offsets)
         return found
 
@@ -328,7 +406,7 @@ class Fitter:
             for name, ratio in zip(experiment.channels, comparison.noise_ratios().T):
                 sums[name] = sums[name] + ratio
                 freedom[name] += 2 * experiment.bins - taken
-        each, judged = len(self.task.names) / len(self.channels), {}
+        each, judged = len(self.task.unknowns) / len(self.channels), {}
         for name, (found, expected) in sums.items():
             left = max(freedom[name] - each, 1.0) / max(freedom[name], 1.0)
             noise = self.noise[name] * float(np.sqrt(found / (expected * left)))
@@ -346,11 +424,15 @@ class Fitter:
 
     def _priors(self) -> tuple[Array, Array]:
         """Logarithms (p,) of the priors' values, and 1/sigma (p,), 0 where there is none."""
-        priors = [self.task.priors.get(name) for name in self.task.names]
+        priors = [self.task.priors.get(name) for name in self.task.unknowns]
         return (
             np.array([np.log(prior.value) if prior else 0.0 for prior in priors]),
             np.array([1 / prior.relative if prior else 0.0 for prior in priors]),
         )
+
+    def _edges(self, experiment: Experiment) -> list[int]:
+        late = {d.channel for d in self.task.distortions if d.kind != "gain"}
+        return [i for i, name in enumerate(experiment.channels) if name in late]
 
     def _columns(self, name: str) -> list[tuple[Array, Array]]:
         """Values (s,) and errors' power (bins,) of the channel in every experiment that has it."""
@@ -392,19 +474,29 @@ def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int
         point = fitter.settle(alike[0][0])
         misfit = 2 * fitter.search(point).cost
     rivals = [(x, chi) for x, chi in alike[1:] if np.abs(x - point).max() > SAME]
+    return _solution(fitter, point, misfit, rivals, len(others) + 1)
+
+
+def _solution(fitter: Fitter, point: Array, misfit: float, rivals: list[tuple[Array, float]], tried: int) -> Solution:
+    compared, jacobians = fitter.compare(point), fitter.jacobians(point)
+    modelled, count = fitter.modelled(point), fitter.evaluations
     return Solution(
-        task,
-        point,
-        fitter.noise,
-        fitter.compare(point),
-        *fitter.jacobians(point),
-        fitter.modelled(point),
-        misfit,
-        rivals,
-        len(others) + 1,
-        fitter.evaluations,
-        fitter,
+        fitter.task, point, fitter.noise, compared, *jacobians, modelled, misfit, rivals, tried, count, fitter
     )
+
+
+def settled(solution: Solution, distortions: tuple[Distortion, ...]) -> Solution:
+    """The fit once more, with further distortions as unknowns, from where it is and from where it began."""
+    task = replace(solution.task, distortions=(*solution.task.distortions, *distortions))
+    places = [np.append(solution.logarithms, np.zeros(len(distortions))), task.first()]
+    found = []
+    for place in places:
+        fitter = Fitter(solution.fitter.model, solution.fitter.experiments, task, solution.noise)
+        point = fitter.settle(fitter.search(place, COARSE).x)
+        found.append(_solution(fitter, point, 2 * fitter.search(point).cost, [], 1))
+        if np.abs(point[: len(task.names)] - task.first()[: len(task.names)]).max() < 1:
+            break
+    return min(found, key=lambda each: each.unlikeliness)
 
 
 def _other_starts(task: Task, point: Array, count: int, seed: int) -> list[Array]:
@@ -423,5 +515,6 @@ def _other_starts(task: Task, point: Array, count: int, seed: int) -> list[Array
     random = np.random.default_rng(seed)
     (low, high), first = task.span(), task.first()
     while len(starts) < count:
-        starts.append(np.clip(first + random.uniform(-np.log(3), np.log(3), len(first)), low, high))
+        moved = random.uniform(-np.log(3), np.log(3), len(task.names))
+        starts.append(np.clip(first + np.append(moved, np.zeros(len(task.distortions))), low, high))
     return starts

@@ -2,35 +2,23 @@
 
 from __future__ import annotations
 
-import io
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import matplotlib
 import numpy as np
 from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
 from prw.channels import si_unit
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Solution
 from prw.identification.model import Parameters
-from prw.motion import Array
-from prw.plots import BLUE, PAGE_STYLE, VERMILION, envelope
+from prw.motion import Array, envelope
 
-#: Stands in figures for the page's text colour, which depends on light or dark, as those of the curves do.
-INK = "#010203"
-COLOURS = {INK: "currentColor", BLUE.lower(): "var(--blue)", VERMILION.lower(): "var(--red)"}
-FIGURE_STYLE = {
-    **PAGE_STYLE,
-    **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK),
-    "axes.grid": False,
-    "lines.linewidth": 1.0,
-    "font.size": 8.5,
-    "svg.fonttype": "none",
-}
+#: Size of a figure, and of the margins left, right, above and below each of its two axes.
+WIDTH, HEIGHT, LEFT, RIGHT, ABOVE, BELOW = 640, 180, 66, 10, 26, 30
+#: Marks along an axis, at least, and the steps that are round.
+MARKS, ROUND = 4, (5.0, 2.0, 1.0)
 #: Time intervals in which a curve is drawn by its extremes; about one for each point on the screen.
 INTERVALS = 500
 #: Shown in these units: more telling than radians.
@@ -79,56 +67,72 @@ def page(
 def figures(experiments: Sequence[Experiment], solution: Solution, residuals: Sequence[Array]) -> list[dict[str, str]]:
     """A figure for every channel of every experiment: a close-up of measured and modelled, and the residual."""
     drawn = []
-    with matplotlib.rc_context(FIGURE_STYLE):
-        figure = _Curves()
-        for experiment, residual, modelled in zip(experiments, residuals, solution.modelled):
-            for j, name in enumerate(experiment.channels):
-                unit, factor = SHOWN.get(si_unit(name), (si_unit(name), 1.0))
-                keep = np.isfinite(residual[:, j])
-                curves = factor * modelled[keep, j], factor * residual[keep, j]
-                svg = figure.svg(experiment.sampled[keep], *curves, unit.replace("N.m", "N m"))
-                title = f"{experiment.name}: {name}" if len(experiments) > 1 else name
-                drawn.append({"title": title, "svg": Markup(svg)})
+    for experiment, residual, modelled in zip(experiments, residuals, solution.modelled):
+        for j, name in enumerate(experiment.channels):
+            unit, factor = SHOWN.get(si_unit(name), (si_unit(name), 1.0))
+            keep = np.isfinite(residual[:, j])
+            svg = _curves(experiment.sampled[keep], factor * modelled[keep, j], factor * residual[keep, j], unit)
+            title = f"{experiment.name}: {name}" if len(experiments) > 1 else name
+            drawn.append({"title": title, "svg": Markup(svg)})
     return drawn
 
 
-class _Curves:
-    """A figure that is drawn again and again with other curves, which takes half the time of a new one."""
+def _curves(time: Array, modelled: Array, residual: Array, unit: str) -> str:
+    """Measured and modelled (n,), close by, and the residual (n,) at the times (n,) s, as SVG with the page's colours."""
+    measured, unit = modelled + residual, unit.replace("N.m", "N m")
+    # The liveliest second, where measured and modelled can be told apart.
+    centre = time[np.argmax(np.abs(measured - measured.mean()))]
+    part = (time >= centre - CLOSE / 2) & (time <= centre + CLOSE / 2)
+    close = [("blue", "", measured[part]), ("red", ' stroke-dasharray="5 3"', modelled[part])]
+    key = (
+        f'<text x="{WIDTH - RIGHT}" y="16" text-anchor="end"><tspan fill="var(--blue)">measured</tspan>'
+        ' <tspan fill="var(--red)" dx="8">FMU (dashed)</tspan></text>'
+    )
+    parts = [
+        _axes(0, "measured and modelled, the liveliest second", time[part], close, unit),
+        key,
+        _axes(HEIGHT, "residual, all of it; time in s", time, [("blue", "", residual)], unit),
+    ]
+    return (
+        f'<svg viewBox="0 0 {WIDTH} {2 * HEIGHT}" role="img" font-size="13" fill="currentColor">{"".join(parts)}</svg>'
+    )
 
-    def __init__(self) -> None:
-        # Margins by hand: to find them, matplotlib draws everything twice.
-        self._figure = Figure(figsize=(6.4, 3.6))
-        self._figure.subplots_adjust(left=0.12, right=0.985, top=0.93, bottom=0.115, hspace=0.5)
-        self._close, self._all = self._figure.subplots(2)
-        self._measured = self._close.plot([], color=BLUE, label="measured")[0]
-        self._modelled = self._close.plot([], color=VERMILION, dashes=(4, 2), label="FMU")[0]
-        self._residual = self._all.plot([], color=BLUE, linewidth=0.7)[0]
-        self._close.legend(loc="lower right", bbox_to_anchor=(1, 0.98), ncols=2, borderaxespad=0)
-        self._close.set_title("measured and modelled, the liveliest second")
-        self._all.set(title="residual, all of it", xlabel="time (s)")
-        for axes in (self._close, self._all):
-            axes.locator_params(axis="y", nbins=4)
 
-    def svg(self, time: Array, modelled: Array, residual: Array, unit: str) -> str:
-        """The curves (n,) at the times (n,) s as SVG that takes its colours from the page."""
-        measured = modelled + residual
-        # The liveliest second, where measured and modelled can be told apart.
-        centre = time[np.argmax(np.abs(measured - measured.mean()))]
-        part = (time >= centre - CLOSE / 2) & (time <= centre + CLOSE / 2)
-        self._measured.set_data(*envelope(time[part], measured[part], INTERVALS))
-        self._modelled.set_data(*envelope(time[part], modelled[part], INTERVALS))
-        self._residual.set_data(*envelope(time, residual, INTERVALS))
-        for axes, span in ((self._close, time[part]), (self._all, time)):
-            axes.relim()
-            axes.autoscale_view(scalex=False)
-            axes.set(xlim=(span[0], span[-1]), ylabel=unit)
-        text = io.StringIO()
-        self._figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-        svg = text.getvalue()
-        svg = svg[svg.index("<svg") :]
-        for drawn, shown in COLOURS.items():
-            svg = svg.replace(drawn, shown)
-        return re.sub(r'width="[\d.]+pt" height="[\d.]+pt"', 'role="img"', svg, count=1)
+def _axes(top: float, title: str, time: Array, curves: Sequence[tuple[str, str, Array]], unit: str) -> str:
+    """Curves as (colour, style, values (n,)) over the times (n,), with marks at round values."""
+    low, high = (float(end([end(y) for _, _, y in curves])) for end in (np.min, np.max))
+    margin = 0.05 * (high - low) or 1.0
+    low, high, first, last = low - margin, high + margin, float(time[0]), float(time[-1])
+    bottom, height = top + HEIGHT - BELOW, HEIGHT - ABOVE - BELOW
+    right, width = WIDTH - RIGHT, WIDTH - LEFT - RIGHT
+
+    def x(t: Array | float) -> Array | float:
+        return LEFT + width * (t - first) / ((last - first) or 1.0)
+
+    def y(value: Array | float) -> Array | float:
+        return bottom - height * (value - low) / (high - low)
+
+    parts = [
+        f'<text x="{LEFT}" y="{top + 16}">{title}</text><text x="4" y="{top + 16}">{unit}</text>',
+        f'<path d="M{LEFT} {top + ABOVE}V{bottom}H{right}" fill="none" stroke="currentColor"/>',
+    ]
+    for mark in _marks(low, high):
+        parts.append(f'<text x="{LEFT - 6}" y="{y(mark) + 4:.1f}" text-anchor="end">{_digits(mark)}</text>')
+    for mark in _marks(first, last):
+        parts.append(f'<text x="{x(mark):.1f}" y="{bottom + 16}" text-anchor="middle">{_digits(mark)}</text>')
+    for colour, style, values in curves:
+        times, drawn = envelope(time, values, INTERVALS)
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(np.asarray(x(times)), np.asarray(y(drawn))))
+        parts.append(f'<polyline points="{points}" fill="none" stroke="var(--{colour})"{style}/>')
+    return "".join(parts)
+
+
+def _marks(low: float, high: float) -> list[float]:
+    """Round values from `low` to `high`."""
+    power = 10.0 ** np.floor(np.log10(high - low)) if high > low else 1.0
+    step = next((s * p for p in (power, power / 10) for s in ROUND if (high - low) / (s * p) >= MARKS - 1), power)
+    found = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
+    return [float(value) for value in np.round(found, 12) + 0.0]
 
 
 def _shown(channel: Mapping[str, Any]) -> dict[str, Any]:
@@ -146,7 +150,9 @@ def _digits(value: float, count: int = 4) -> str:
     return text.replace("-", "−")
 
 
-def _percent(value: float) -> str:
+def _percent(value: float | None) -> str:
+    if value is None:
+        return "at rest"
     if not np.isfinite(value) or abs(value) > 10:
         return "> 1000 %"
     return f"{100 * value:.{1 if abs(value) >= 0.1 else 2 if abs(value) >= 0.001 else 3}f} %".replace("-", "−")

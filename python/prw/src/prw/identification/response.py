@@ -9,6 +9,7 @@ Domain Approach, 2nd ed., Sec. 6.3.2).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,9 @@ from prw.identification.model import Matrices
 from prw.motion import Array
 from prw.state_space import Complex
 from prw.testbed import OUTPUTS
+
+#: The number of a channel, and its frequency response and the derivative of that's logarithm at s = 2 pi i f (f,).
+Distorted = tuple[int, Callable[[Complex], tuple[Complex, Complex]]]
 
 
 class Discrete(NamedTuple):
@@ -55,36 +59,70 @@ def discrete(models: Matrices, step: float, channels: tuple[str, ...]) -> Discre
 class Response:
     """What a model answers to the motors of an experiment, at its first `bins` frequencies (f)."""
 
-    def __init__(self, model: Discrete, experiment: Experiment, bins: int):
+    def __init__(
+        self, model: Discrete, experiment: Experiment, bins: int, distortions: Sequence[Distorted | None] = ()
+    ):
+        """distortions: what each does to its channel, or None where that was not measured."""
         self.model = model
         turn = 2j * np.pi * np.arange(bins) / len(experiment.time)
-        self._z, self._s = np.exp(turn)[:, None, None], (turn / experiment.step)[:, None, None]
-        self._motors = experiment.motors[:bins, :, None]
+        self._z, self._s = np.exp(turn)[:, None, None], (turn / experiment.step).astype(np.complex128)
+        # The motors as they moved, and each of them alone: an error of an angle comes with one of its rate.
+        self._motors = np.zeros((bins, 4, 3), dtype=complex)
+        self._motors[..., 0] = experiment.motors[:bins]
+        self._motors[:, [0, 1], [1, 2]], self._motors[:, [2, 3], [1, 2]] = 1, self._s[:, None]
         self._resolvent = np.linalg.inv(self._z * np.eye(6) - model.A)
-        self._driven = self._resolvent @ (model.before + self._z * model.after)
-        self._states = self._driven @ self._motors
+        self._states = self._resolvent @ ((model.before + self._z * model.after) @ self._motors)
+        answers: Complex = model.C @ self._states + model.D @ self._motors
         #: Spectra of the channels (f, c), periodic.
-        self.outputs: Complex = (model.C @ self._states + model.D @ self._motors)[..., 0]
+        self.outputs: Complex = answers[..., 0]
+        #: From the motors' angles, moving with their rates, to the channels: (f, c, 2).
+        self.transfer: Complex = answers[..., 1:]
         #: What each of the six numbers d adds, (f, c, 6).
         self.transients: Complex = self._z * (model.C @ self._resolvent)
-        # An error of a motor's angle comes with one of its rate.
-        self._moved = self._together(self._driven)
-        #: From the motors' angles, moving with their rates, to the channels: (f, c, 2).
-        self.transfer: Complex = model.C @ self._moved + self._together(model.D)
+        self._filters = np.ones((bins, model.C.shape[0]), dtype=complex)
+        self._growths = np.zeros((len(distortions), bins, model.C.shape[0]), dtype=complex)
+        for k, distortion in enumerate(distortions):
+            if distortion is not None:
+                channel, response = distortion
+                through, self._growths[k, :, channel] = response(self._s)
+                self._filters[:, channel] *= through
+        self.outputs *= self._filters
+        self.transients *= self._filters[..., None]
+        self.transfer *= self._filters[..., None]
 
-    def _together(self, table: Array | Complex) -> Complex:
-        table = np.asarray(table, dtype=np.complex128)
-        moved: Complex = table[..., :2] + self._s * table[..., 2:]
-        return moved
+    def moving(self, d: Array) -> tuple[Complex, Complex]:
+        """Spectra of the states (f, 6) with transients `d` (6,), and from what is added to the states in every step to
+        the channels (f, c, 6)."""
+        steps: Complex = np.asarray(self.model.C @ self._resolvent, dtype=np.complex128)
+        through = self._filters[..., None] * steps
+        return self._with(d)[..., 0], through
+
+    def _with(self, d: Array) -> Complex:
+        """The states, with transients `d` (6,) where the motors moved as they did."""
+        states: Complex = self._states.copy()
+        states[..., 0] += (self._z * self._resolvent) @ d
+        return states
 
     def slopes(self, change: Discrete, d: Array) -> tuple[Complex, Complex]:
-        """Derivatives by p parameters, of outputs with transients `d` (6,): (p, f, c), and of transfer: (p, f, c, 2).
+        """Derivatives by p parameters and the distortions, of outputs with transients `d` (6,): (p, f, c), and of
+        transfer: (p, f, c, 2).
 
         change: the model's derivatives by them."""
-        states = self._states + self._z * (self._resolvent @ d[:, None])
-        per = Discrete(*(block[:, None] for block in change))
-        driven = per.before + self._z * per.after
-        moved = self._resolvent @ (per.A @ states + driven @ self._motors)
-        outputs = per.C @ states + per.D @ self._motors + self.model.C @ moved
-        moved = self._resolvent @ (per.A @ self._moved + self._together(driven))
-        return outputs[..., 0], per.C @ self._moved + self._together(per.D) + self.model.C @ moved
+        count, bins = len(change.A), len(self._states)
+
+        def moved_by(block: Array, table: Complex) -> Complex:
+            """`block` (p, r, q) times `table` (f, q, 3): (f, 3, p, r), as one product of two large matrices."""
+            product: Complex = np.tensordot(table, block, (1, 2))
+            return product
+
+        states = self._with(d)
+        driven = moved_by(change.A, states) + moved_by(change.before, self._motors)
+        driven += moved_by(change.after, self._z * self._motors)
+        moved = driven.reshape(bins, 3 * count, 6) @ self._resolvent.swapaxes(-1, -2) @ self.model.C.T
+        table = moved.reshape(bins, 3, count, -1) + moved_by(change.C, states) + moved_by(change.D, self._motors)
+        table = (table * self._filters[:, None, None]).transpose(2, 0, 3, 1)
+        outputs, transfer = table[..., 0], table[..., 1:]
+        there: Complex = self.outputs + self.transients @ d
+        more: Complex = self._growths[..., None] * self.transfer
+        wider: Complex = np.concatenate([outputs, self._growths * there])
+        return wider, np.concatenate([transfer, more])

@@ -18,12 +18,11 @@ from prw.identification.experiment import Experiment
 from prw.identification.fit import Prior, Solution
 from prw.identification.model import Parameters
 from prw.identification.statistics import Certainty
+from prw.identification.verdict import Verdict
 from prw.motion import Array
 
 #: Residuals this much stronger than the noise that was given, or weaker by as much, are worth a word.
 UNLIKE = 1.5
-#: A channel of which less than this share is explained (1 - |residual| / |motion|) does not fit.
-POOR_FIT = 0.5
 #: An estimate that is off its prior by this many standard deviations contradicts it.
 CONTRADICTION = 3.0
 #: From this standard error on, a number is no estimate.
@@ -52,7 +51,8 @@ class Estimate(NamedTuple):
 
 class ChannelFit(NamedTuple):
     """How one channel of one experiment came out. samples: how many have a value. noise: strength in the band beyond what encoders
-    explain, residual: rms over all frequencies, offset: of the sensor, all SI. explained: share of its motion."""
+    explain, residual: rms over all frequencies, offset: of the sensor, all SI. explained: share of its motion, or None
+    where the motors do not move it."""
 
     experiment: str
     channel: str
@@ -61,15 +61,16 @@ class ChannelFit(NamedTuple):
     noise: float
     residual: float
     offset: float
-    explained: float
+    explained: float | None
 
 
 @dataclass(frozen=True, repr=False)
 class Identification:
     """What came of identifying the parameters of the FMU `fmu` from `files`.
 
-    known: the FMU's parameters. advice: what would settle open combinations, if there are any. measured: what was
-    worth a word when the files were read. solution, sure: the fit itself and its statistics."""
+    known: the FMU's parameters. solution, sure: the fit itself and its statistics. verdict: whether the model explains
+    the data. diagnosis: what may be wrong if it does not. advice: what would settle open combinations, if there are
+    any."""
 
     fmu: Path
     known: Parameters
@@ -77,6 +78,8 @@ class Identification:
     experiments: tuple[Experiment, ...]
     solution: Solution
     sure: Certainty
+    verdict: Verdict
+    diagnosis: tuple[str, ...]
     advice: tuple[str, ...]
 
     @property
@@ -96,8 +99,29 @@ class Identification:
         return self.solution.values
 
     @property
+    def distortions(self) -> dict[str, tuple[float, float]]:
+        """Delays and lags (s) and gains that were estimated along, with their standard errors, by name."""
+        task, found = self.solution.task, {}
+        for i, distortion in enumerate(task.distortions, len(task.names)):
+            value = distortion.value(float(self.solution.logarithms[i]))
+            unit = value if distortion.kind == "gain" else distortion.value(1.0)
+            found[str(distortion)] = value, float(self.sure.relative[i]) * unit
+        return found
+
+    @property
+    def fits(self) -> bool:
+        """Whether the model explains the data. If not, the parameters are not those of the testbed."""
+        return self.verdict.fits
+
+    @property
+    def misfits(self) -> list[str]:
+        """What the model does not explain, by channel, with its frequencies; empty where it fits."""
+        several = len(self.experiments) > 1
+        return [f"{misfit.experiment}: {misfit}" if several else str(misfit) for misfit in self.verdict.misfits]
+
+    @property
     def correlation(self) -> Array:
-        """Of the estimates, (p, p), in the order of `parameters`."""
+        """Of the estimates, (p, p), in the order of `parameters`; distortions follow."""
         return self.sure.correlation
 
     @property
@@ -122,8 +146,9 @@ class Identification:
                 spread, rms = np.nanstd(measured[:, j]), float(np.sqrt(np.nanmean(residual[:, j] ** 2)))
                 count = int(np.isfinite(residual[:, j]).sum())
                 offset = float(self.solution.comparisons[i].offsets[j])
-                explained = float(1 - rms / spread) if spread > 0 else 0.0
                 noise = self.solution.noise[name]
+                still = max(float(np.nanstd(self.solution.modelled[i][:, j])), float(spread) - rms) < rms / 2
+                explained = None if still else float(1 - rms / spread) if spread > 0 else 0.0
                 found.append(ChannelFit(experiment.name, name, si_unit(name), count, noise, rms, offset, explained))
         return found
 
@@ -138,7 +163,7 @@ class Identification:
                 lines.append(f"{name} ended at its bound; give wider bounds, or doubt the data")
         for point, _ in solution.rivals:
             values = ", ".join(
-                f"{name} {value / self.known.real[name].factor:.4g}"
+                f"{name} {value / self.known.real[name].factor:.4g} {self.known.real[name].shown}"
                 for name, value in zip(solution.task.names, np.exp(point))
             )
             swapped = " (the couplings exchanged)" if self._exchanged(point) else ""
@@ -146,12 +171,12 @@ class Identification:
                 f"the data fit as well with {values}{swapped}; given is what is nearest to the start values. "
                 "theta3 and theta4 would tell"
             )
-        for channel in self.channels:
-            if channel.explained < POOR_FIT and channel.channel not in solution.task.noise:
-                lines.append(
-                    f"{channel.experiment}: {channel.channel} fits badly ({channel.explained:.0%} of its motion is "
-                    "explained); check its unit and sign, and whether the motors move it at all"
-                )
+        if self.fits and self.verdict.widening.any() and not sure.undetermined:
+            first = self.verdict.faults[0]
+            lines.append(
+                f"intervals allow for a {first.name} of {first.size:.2g} +- {first.error:.1g} {first.unit}".rstrip()
+                + ", which the data suggest but do not prove"
+            )
         for name in solution.task.noise:
             times = self._times_its_noise(name)
             if not 1 / UNLIKE < times < UNLIKE:
@@ -172,19 +197,28 @@ class Identification:
         channels = ", ".join(dict.fromkeys(name for e in self.experiments for name in e.channels))
         seconds = sum(e.sampled[-1] - e.sampled[0] for e in self.experiments)
         lines = [f"identified  from {', '.join(self.files)}: {seconds:.4g} s with {channels}"]
+        if self.fits:
+            lines.append("verdict     the FMU explains the data")
+        else:
+            lines.append("verdict     THE FMU DOES NOT EXPLAIN THE DATA; the values below are not to be trusted")
+            lines += [f"  {misfit}" for misfit in self.misfits]
+            lines += [f"perhaps     {text}" for text in self.diagnosis or ["nothing that is known by its looks"]]
         for name, found in self.parameters.items():
             value, low, high = (v / found.factor for v in (found.value, *found.interval))
             sureness = f"+- {found.relative:.2%}   95 % interval {low:.5g} to {high:.5g}"
             sureness = "not determined" if found.hopeless else sureness
             lines.append(f"  {name:<9} {value:.5g} {found.shown}  {sureness}{', prior' if found.prior else ''}")
+        for name, (value, error) in self.distortions.items():
+            factor, unit = (1.0, "") if name.startswith("gain") else (1e3, " ms")
+            lines.append(f"  {name}: {value * factor:.4g} +- {error * factor:.2g}{unit}")
         noise = (f"{name} {value:.2g} {si_unit(name)}" for name, value in self.solution.noise.items())
         lines.append("noise       " + ", ".join(noise))
         return "\n".join([*lines, *(f"note        {note}" for note in self.notes)])
 
     def report(self, path: str | os.PathLike[str]) -> None:
         """Write the report, one HTML page that needs nothing beside it: estimates, doubts, residuals. Raises UserError
-        without jinja2 and matplotlib, or where it cannot be written."""
-        need("identify", "jinja2", "matplotlib")
+        without jinja2, or where it cannot be written."""
+        need("identify", "jinja2")
         from prw.identification.report import page
 
         residuals = [self.residual(i) for i in range(len(self.experiments))]
@@ -217,7 +251,9 @@ class Identification:
             cells = [name, "not determined", "", "", found.shown] if found.hopeless else cells
             rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
         head = "".join(f"<th>{h}</th>" for h in ("parameter", "estimate", "standard error", "95 % interval", "unit"))
-        notes = "".join(f"<p>{escape(text)}</p>" for text in [*self.undetermined, *self.notes])
+        notes = "".join(
+            f"<p>{escape(text)}</p>" for text in [*self.misfits, *self.diagnosis, *self.undetermined, *self.notes]
+        )
         return f"<table><tr>{head}</tr>{''.join(rows)}</table>{notes}"
 
     def _times_its_noise(self, name: str) -> float:
@@ -259,7 +295,17 @@ class Identification:
         return {
             "fmu": {"file": str(self.fmu), "guid": self.known.guid},
             "files": list(self.files),
-            "identified": not sure.undetermined,
+            "identified": self.fits and not sure.undetermined,
+            "verdict": {
+                "fits": self.fits,
+                "misfits": [misfit._asdict() for misfit in self.verdict.misfits],
+                "diagnosis": list(self.diagnosis),
+                "tried": [
+                    {"fault": f.name, "unit": f.unit, "size": f.size, "standard_error": f.error}
+                    for f in self.verdict.faults
+                ],
+            },
+            "distortions": {n: {"value": v, "standard_error": e} for n, (v, e) in self.distortions.items()},
             "parameters": parameters,
             "correlation": {"names": list(sure.names), "matrix": sure.correlation.tolist()},
             "information": {

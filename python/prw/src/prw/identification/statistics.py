@@ -66,9 +66,10 @@ class Certainty(NamedTuple):
     undetermined: list[Combination]
 
 
-def certainty(solution: Solution, level: float = 0.95) -> Certainty:
-    """Standard errors, correlation, intervals and open combinations of a fit."""
-    names, prior = solution.task.names, solution.task.prior_information()
+def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 0.95) -> Certainty:
+    """Standard errors, correlation, intervals and open combinations of a fit. widening: (p,) standard deviations, of
+    what may be wrong besides noise."""
+    names, prior = solution.task.unknowns, solution.task.prior_information()
     squares = prior + information_of(solution.jacobians)
     inverse = covariance_of(_positive(squares - solution.noise_information))
     expected, shown = prior.copy(), prior.copy()
@@ -83,6 +84,8 @@ def certainty(solution: Solution, level: float = 0.95) -> Certainty:
     covariance = expected * np.outer(whiteness, whiteness)
     corrected = noise_corrected(squares, solution.noise_information)
     open_ones = undetermined(names, corrected)
+    # An open combination is as uncertain as can be.
+    errors = np.hypot(errors, 0.0 if open_ones else widening)
     if open_ones:
         errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(corrected))))
     low, high = ends(solution, inverse, errors, float(ndtri(0.5 + level / 2)))

@@ -1,0 +1,159 @@
+"""What may be wrong where the model does not explain the data: faults known by what they look like, and fits in which
+channels may be late, lag, or have another gain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from prw.channels import QUANTITIES
+from prw.identification.experiment import Experiment
+from prw.identification.fit import Distortion, Fitter, Solution, settled
+from prw.identification.statistics import covariance_of, information_of
+from prw.identification.verdict import CLEAR, PAIRS, Verdict, groups, judge, named
+from prw.motion import Array
+
+#: Gains that a slip with units makes, give or take TOLERANCE (a factor); what a channel is then.
+SLIPS = {57.3: "in degrees, not radians", 1 / 57.3: "in radians, not degrees", 1000.0: "in thousandths of its unit"}
+TOLERANCE = 1.7
+#: A course that follows another one has this correlation with it, and one that does not, less.
+ALIKE, UNLIKE = 0.9, 0.7
+#: Values at an end of a channel's range that come one after another so often are no chance, s; so long at rest: stuck.
+FLAT, FLATS, STUCK = 4, 3, 0.25
+#: So many of the sets of channels that promise most are fitted.
+TRIED = 5
+#: A fault that explains this share of what the best explains is named as well.
+SHARE = 0.6
+
+
+def diagnose(solution: Solution, verdict: Verdict) -> list[str]:
+    """What may be wrong, a sentence each, the likeliest first."""
+    found = [text for i, e in enumerate(solution.fitter.experiments) for text in _looks(solution, i, e)]
+    if found:
+        return list(dict.fromkeys(found))
+    trials = [(gain, text) for gain, text in _refits(solution, verdict)]
+    for fault in verdict.faults:
+        if fault.clear > CLEAR and fault.signs:
+            size = f"{fault.size:.2g} +- {fault.error:.1g} {fault.unit}"
+            trials.append(
+                (fault.gain, f"{fault.name} of {size} would explain it: the residual follows the sign of a rate")
+            )
+    trials.sort(key=lambda trial: -trial[0])
+    return [text for gain, text in trials[:2] if gain > SHARE * trials[0][0]]
+
+
+def _looks(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
+    """Faults that can be seen without another fit."""
+    assert experiment.values is not None
+    before = Fitter(solution.fitter.model, [experiment], replace(solution.task, distortions=()), solution.noise)
+    first = before.task.first()
+    gains, likes = [], []
+    for outputs in (before.compare(first)[0].response.outputs, solution.comparisons[i].response.outputs):
+        y, m = experiment.seen(outputs)[2:], experiment.measured[2:]
+        size = np.maximum(np.linalg.norm(y, axis=0), 1e-300)
+        product = (y.conj().T @ m).real
+        gains.append(np.diag(product) / size**2)
+        likes.append(product / np.outer(size, np.maximum(np.linalg.norm(m, axis=0), 1e-300)))
+    angles = [j for j, name in enumerate(experiment.channels) if QUANTITIES[name] != "torque"]
+    if len(angles) > 1 and all(_slip(gains[0][j]) == 1 / 57.3 and likes[0][j, j] > UNLIKE for j in angles):
+        yield "theta1, theta2 look as if they were in degrees, not radians"
+        return
+    for j, name in enumerate(experiment.channels):
+        column = experiment.values[:, j]
+        pair = next((p for p in PAIRS if name in p and set(p) <= set(experiment.channels)), None)
+        if pair and name == pair[0]:
+            k = experiment.channels.index(pair[1])
+            for like in likes:
+                if min(like[j, k], like[k, j]) > ALIKE and max(like[j, j], like[k, k]) < UNLIKE:
+                    yield f"{name} and {pair[1]} are swapped: each follows what the FMU has for the other"
+                    return
+        for gain, like in zip(gains, likes):
+            if like[j, j] < -ALIKE or (like[j, j] < -UNLIKE and abs(np.log(-gain[j])) < np.log(TOLERANCE)):
+                yield f"{name} has the wrong sign: it moves against what the FMU has, {gain[j]:.2g} times as far"
+                break
+            slip = _slip(gain[j])
+            if slip and like[j, j] > UNLIKE:
+                yield f"{name} looks as if it were {SLIPS[slip]}: it is {gain[j]:.3g} times what the FMU has"
+                break
+        yield from _flat(name, experiment.sampled, column)
+
+
+def _slip(gain: float) -> float:
+    return next((s for s in SLIPS if gain > 0 and abs(np.log(gain / s)) < np.log(TOLERANCE)), 0.0)
+
+
+def _flat(name: str, time: Array, column: Array) -> Iterator[str]:
+    """Whether a channel is cut off at an end of its range, or stands still while others do not."""
+    there = np.isfinite(column)
+    time, column = time[there], column[there]
+    edges = np.flatnonzero(np.diff(column) != 0)
+    first, last = np.concatenate([[0], edges + 1]), np.concatenate([edges, [len(column) - 1]])
+    long = last - first + 1
+    # What an encoder at rest does is no fault: sensors without noise stand still as often anywhere.
+    usual = float(np.median(long))
+    if usual > 2:
+        return
+    for level, said in ((column.max(), "above"), (column.min(), "below")):
+        flats = (column[first] == level) & (long >= FLAT)
+        if flats.sum() >= FLATS:
+            yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, and what lies {said} is lost"
+            return
+    longest = int(np.argmax(long))
+    if time[last[longest]] - time[first[longest]] > STUCK:
+        yield f"{name} is stuck from {time[first[longest]]:.4g} to {time[last[longest]]:.4g} s, at {column[first[longest]]:.4g} (SI)"
+
+
+def _refits(solution: Solution, verdict: Verdict) -> Iterator[tuple[float, str]]:
+    """Rise of twice the log likelihood, and what it would mean, with distortions of single channels, pairs and all."""
+    channels = solution.fitter.channels
+    clear = {fault.name: fault for fault in verdict.faults}
+    trials = []
+    for kind in ("delay", "lag", "gain"):
+        for group in groups(channels):
+            new = tuple(Distortion(kind, name) for name in group)
+            if set(new) & set(solution.task.distortions) or (kind == "gain" and len(group) > 2):
+                continue
+            like = "gain" if kind == "gain" else "delay"
+            parts = sum(fault.gain for name in group if (fault := clear.get(named(like, (name,)))))
+            whole = clear.get(named(like, group))
+            # A set that explains no more than its parts comes after them.
+            promise = max(parts, whole.gain if whole else 0.0) - 10 * len(group)
+            trials.append((promise, kind, group, new))
+    trials.sort(key=lambda trial: -trial[0])
+    tried = [t for kind in ("delay", "lag", "gain") for t in [t for t in trials if t[1] == kind][:TRIED]]
+    best = -np.inf
+    results = []
+    for _, kind, group, new in tried:
+        found = settled(solution, new)
+        gain = solution.unlikeliness - found.unlikeliness - 12 * len(group)
+        results.append((gain, kind, group, found))
+        best = max(best, gain)
+    results.sort(key=lambda result: -result[0])
+    said: set[str] = set()
+    for gain, kind, group, found in results:
+        # Of one kind the best set alone.
+        if gain < SHARE * best or gain < CLEAR**2 or kind in said:
+            continue
+        said.add(kind)
+        errors = np.sqrt(np.diag(covariance_of(information_of(found.jacobians) + found.task.prior_information())))
+        sizes: dict[str, list[str]] = {}
+        for k, distortion in enumerate(found.task.distortions[-len(group) :]):
+            at = len(errors) - len(group) + k
+            value, error = distortion.value(found.logarithms[at]), float(errors[at])
+            sizes.setdefault(_size(distortion, value, error), []).append(distortion.channel)
+        options = ",".join(group)
+        good = judge(found).fits
+        then = "with that, the data fit" if good else "that explains a part of it"
+        said_of = "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
+        yield gain, f"{said_of}: {then} (--{kind} {options} estimates it along)"
+
+
+def _size(distortion: Distortion, value: float, error: float) -> str:
+    if distortion.kind == "gain":
+        return f"reads {value:.4g} +- {error * value:.1g} times what it should"
+    late = "late" if value > 0 else "early"
+    if distortion.kind == "lag":
+        return f"lags with a time constant of {value * 1e3:.3g} +- {error:.1g} ms"
+    return f"comes {abs(value) * 1e3:.3g} +- {error:.1g} ms {late}"

@@ -1,0 +1,151 @@
+"""Data that the model does not explain are told from those that it does, and what is wrong with them is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rig
+
+import prw
+
+
+def late(seconds):
+    return lambda truth: rig.late(truth, seconds)
+
+
+def recording(truth, channels=rig.ALL, spoil=None, counts=rig.COUNTS) -> prw.Recording:
+    columns = rig.measure(truth, 5, channels, counts)
+    if spoil:
+        spoil(columns)
+    theta = np.column_stack([columns["theta1"], columns["theta2"]])
+    measured = {name: columns[name] for name in channels}
+    return prw.Recording(Path("run.csv"), prw.Motion(columns["time"], theta), measured, {})
+
+
+def clipped(columns):
+    for name in ("tau1", "tau2"):
+        columns[name] = np.clip(columns[name], -3, 3)
+
+
+def degrees(columns):
+    columns["pitch"] = np.degrees(columns["pitch"])
+
+
+def motors_in_degrees(columns):
+    for name in ("theta1", "theta2"):
+        columns[name] = np.degrees(columns[name])
+
+
+def turned(columns):
+    columns["theta3"] = -columns["theta3"]
+
+
+def swapped(columns):
+    columns["tau1"], columns["tau2"] = columns["tau2"], columns["tau1"]
+
+
+def stuck(columns):
+    columns["pitch"][2000:2600] = columns["pitch"][2000]
+
+
+def too_strong(columns):
+    columns["tau1"] = 1.02 * columns["tau1"]
+
+
+SPOILT_MOTIONS = {
+    "late by 1 ms": (late(1e-3), ["tau1", "tau2"], "ms late"),
+    "late by 0.1 ms": (late(1e-4), ["tau1", "tau2"], "ms late"),
+    "lag of 2 ms": (lambda truth: rig.lagging(truth, 2e-3), list(rig.ALL), "lags with a time constant of 2 +-"),
+    "backlash": (lambda truth: rig.nonlinear(truth, backlash=2e-3), ["theta3"], "backlash at the motors of 0.002 +-"),
+    "friction": (lambda truth: rig.nonlinear(truth, friction=0.15), ["pitch"], "friction about pitch and roll of 0.15"),
+}
+SPOILT_SENSORS = {
+    clipped: ("tau1", "tau1 is cut off at 3"),
+    degrees: ("pitch", "pitch looks as if it were in degrees"),
+    motors_in_degrees: ("tau1", "theta1, theta2 look as if they were in degrees"),
+    turned: ("theta3", "theta3 has the wrong sign"),
+    swapped: ("tau2", "tau1 and tau2 are swapped"),
+    stuck: ("pitch", "pitch is stuck from 2 to 2.599 s"),
+    too_strong: ("tau1", "tau1 reads 1.02"),
+}
+
+
+@pytest.mark.parametrize("fault", SPOILT_MOTIONS)
+def test_a_rig_with_a_fault_does_not_fit(experiment, fmu, fault):
+    spoil, channels, said = SPOILT_MOTIONS[fault]
+    found = prw.identify(recording(spoil(experiment)), starts=1, fmu=fmu)
+    assert not found.fits
+    assert set(channels) <= {misfit.channel for misfit in found.verdict.misfits}, found.misfits
+    assert any(said in text for text in found.diagnosis), found.diagnosis
+
+
+def test_what_two_channels_have_in_common_is_seen_where_parameters_make_up_for_each_alone(fmu):
+    # Torques 0.7 ms late, without encoders on the shafts: c1 is off by half, and the residuals look like noise.
+    truth = rig.late(rig.experiment(400004, 6, pattern="slow"), 7e-4)
+    found = prw.identify(recording(truth, ("tau1", "tau2", "pitch", "roll")), starts=1, fmu=fmu)
+    assert {misfit.channel for misfit in found.verdict.misfits} == {"tau1", "tau2"}, found.misfits
+    assert "--delay tau1,tau2" in found.diagnosis[0], found.diagnosis
+
+
+@pytest.mark.parametrize("spoil", SPOILT_SENSORS, ids=lambda spoil: spoil.__name__)
+def test_a_sensor_with_a_fault_is_named(experiment, fmu, spoil):
+    channel, said = SPOILT_SENSORS[spoil]
+    found = prw.identify(recording(experiment, spoil=spoil), starts=1, fmu=fmu)
+    assert channel in {misfit.channel for misfit in found.verdict.misfits}, found.misfits
+    assert said in found.diagnosis[0], found.diagnosis
+
+
+@pytest.mark.parametrize("pattern", ["independent", "equal", "slow", "fig4"])
+def test_a_rig_without_faults_fits(fmu, pattern):
+    found = prw.identify(recording(rig.experiment(30, 6, pattern=pattern)), starts=1, fmu=fmu)
+    assert found.fits and not found.misfits and not found.diagnosis
+    assert all(fault.size > 0 for fault in found.verdict.faults if fault.signs)
+    assert not any("roll" in note and "intervals allow for" not in note for note in found.notes), found.notes
+    at_rest = {c.channel for c in found.channels if c.explained is None}
+    assert at_rest == {"equal": {"roll"}, "fig4": {"pitch"}}.get(pattern, set())
+
+
+@pytest.mark.parametrize(
+    "spoil, option, channels, size",
+    [
+        (late(1e-3), "delay", ("tau1", "tau2"), 1e-3),
+        (lambda truth: rig.lagging(truth, 2e-3), "lag", rig.ALL, 2e-3),
+        (
+            lambda truth: truth._replace(outputs={**truth.outputs, "tau1": 1.02 * truth.outputs["tau1"]}),
+            "gain",
+            ("tau1",),
+            1.02,
+        ),
+    ],
+)
+def test_what_is_wrong_is_estimated_along(experiment, fmu, spoil, option, channels, size):
+    found = prw.identify(recording(spoil(experiment)), starts=1, fmu=fmu, **{option: channels})
+    assert found.fits, found.misfits
+    for name in channels:
+        value, error = found.distortions[f"{option} of {name}"]
+        assert abs(value - size) < 4.5 * error and error < 0.05 * size
+    for name, estimate in found.parameters.items():
+        assert abs(estimate.value - experiment.parameters[name]) < 4.5 * estimate.standard_error
+
+
+def test_the_command_tells_and_writes_no_parameters(prw, tmp_path, experiment):
+    rig.write(tmp_path / "run.csv", rig.measure(rig.late(experiment, 1e-3), 5))
+    out = tmp_path / "out" / "identified"
+    result = prw("identify", "run.csv", "--starts", 1)
+    assert result.returncode == 3 and result.stderr.count("\n") == 1, result.stderr
+    assert "tau1, tau2" in result.stderr and "--delay" in result.stderr and "--write-anyway" in result.stderr
+    assert result.stdout.index("DOES NOT EXPLAIN") < result.stdout.index("k1 ")
+    assert not (out / "identified.json").exists()
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "verdict bad" in page and "The FMU does not explain these data" in page
+    result = prw("identify", "run.csv", "--starts", 1, "--write-anyway")
+    assert result.returncode == 3 and (out / "identified.json").exists()
+    result = prw("identify", "run.csv", "--starts", 1, "--delay", "tau1,tau2")
+    assert result.returncode == 0 and "delay of tau1" in result.stdout, result.stderr
+
+
+def test_a_delay_of_what_was_not_measured(fmu, experiment):
+    with pytest.raises(prw.UserError, match="delay: tau2 is not known; there are tau1"):
+        prw.identify(recording(experiment, ("tau1",)), delay=["tau2"], fmu=fmu)
