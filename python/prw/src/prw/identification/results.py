@@ -180,7 +180,7 @@ class Identification:
         for name in solution.task.noise:
             times = self._times_its_noise(name)
             if not 1 / UNLIKE < times < UNLIKE:
-                lines.append(f"{name}: its residuals are {times:.2g} times the noise that was given")
+                lines.append(f"{name}: its residuals are {float(f'{times:.2g}'):g} times the noise that was given")
         for name, estimate in self.parameters.items():
             if estimate.prior is not None:
                 off = abs(np.log(estimate.value / estimate.prior.value)) / estimate.prior.relative

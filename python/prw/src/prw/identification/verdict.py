@@ -119,7 +119,9 @@ def judge(solution: Solution) -> Verdict:
             if chance < CHANCE:
                 texts.append("what the FMU does not explain follows the motors")
             if spread[j] > EXCESS * (1 + LUCK / np.sqrt(4 * experiment.bins)):
-                texts.append(f"the residual is {spread[j]:.2g} times the noise at frequencies at which the motors rest")
+                texts.append(
+                    f"the residual is {float(f'{spread[j]:.2g}'):g} times the noise at frequencies at which the motors rest"
+                )
             if texts:
                 misfits.append(Misfit(experiment.name, name, *_where(experiment, comparison, j), "; ".join(texts)))
         for name, unit, column in _faults(solution, experiment, comparison):
