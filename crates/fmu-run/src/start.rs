@@ -128,9 +128,7 @@ fn one<T>(values: &[T], of: usize) -> Option<&T> {
 }
 
 fn checked<'a>(found: Found, name: &str, numbers: Cow<'a, [f64]>) -> Result<Cow<'a, [f64]>, Error> {
-    if matches!(found.of.base, BaseType::String | BaseType::Binary) {
-        return request(format!("{name} is no number"));
-    }
+    found.check_number(name)?;
     fits(name, found.of.base, &numbers)?;
     Ok(numbers)
 }

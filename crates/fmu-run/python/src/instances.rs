@@ -149,9 +149,7 @@ impl Instances {
         values: &Bound<'_, PyAny>,
         mask: Given,
     ) -> PyResult<()> {
-        let (named, mask) = (self.named(variables)?, self.mask(mask)?);
-        let values = self.fitting(named.columns(), Numbers::of(values)?)?;
-        self.attempt(py, |all| all.set(&named.selection, values.values(), mask.as_deref()))
+        self.put(py, variables, values, mask, fmu_run::Instances::set)
     }
 
     /// Read variables: (n,) for a str, (n, variables) for a sequence; into `out` if it is given.
@@ -299,9 +297,7 @@ impl Instances {
         values: &Bound<'_, PyAny>,
         mask: Given,
     ) -> PyResult<()> {
-        let (named, mask) = (self.named(variables)?, self.mask(mask)?);
-        let values = self.fitting(named.columns(), Numbers::of(values)?)?;
-        self.attempt(py, |all| all.set_input_derivatives(&named.selection, values.values(), mask.as_deref()))
+        self.put(py, variables, values, mask, fmu_run::Instances::set_input_derivatives)
     }
 
     /// Co-Simulation: time derivatives of outputs, of order 1, in the shapes of `get`.
@@ -504,6 +500,20 @@ impl Instances {
             Ok(all.none_left().map(str::to_owned))
         });
         left.map_err(python)?.map_or(Ok(()), |why| Err(FmuError::new_err(why)))
+    }
+
+    /// Hands values of variables over, by rows or one for all.
+    fn put(
+        &self,
+        py: Python,
+        variables: &Bound<'_, PyAny>,
+        values: &Bound<'_, PyAny>,
+        mask: Given,
+        body: fn(&mut fmu_run::Instances, &Selection, &[f64], fmu_run::Mask) -> Result<(), Error>,
+    ) -> PyResult<()> {
+        let (named, mask) = (self.named(variables)?, self.mask(mask)?);
+        let values = self.fitting(named.columns(), Numbers::of(values)?)?;
+        self.attempt(py, |all| body(all, &named.selection, values.values(), mask.as_deref()))
     }
 
     fn read<'py>(

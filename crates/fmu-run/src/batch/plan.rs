@@ -97,7 +97,8 @@ impl<'a> Plan<'a> {
         let mut seen = Vec::new();
         for (name, course) in &batch.inputs {
             let variables = system.find_numbers(name)?;
-            let of = system.find_own(name)?[0].of;
+            variables.iter().try_for_each(|found| found.check_own(name))?;
+            let of = variables[0].of;
             let settable = matches!(of.causality.as_str(), "input" | "parameter");
             if !settable || of.variability.as_deref() == Some("fixed") {
                 return request(format!(

@@ -141,14 +141,8 @@ impl System {
     /// together.
     pub fn stages(&self) -> Vec<Vec<(&str, &str)>> {
         let stages = self.0.exchange.stages.iter();
-        let pairs = |stage: &Stage| {
-            let of = |(from, to): (_, _)| {
-                let known = self.0.connections.iter().find(|(a, b)| (a, b) == (from, to))?;
-                Some((known.0.as_str(), known.1.as_str()))
-            };
-            stage.outputs.names().iter().zip(stage.inputs.names()).filter_map(of).collect()
-        };
-        stages.map(pairs).collect()
+        let pairs = stages.map(|Stage { outputs, inputs }| outputs.names().iter().zip(inputs.names()));
+        pairs.map(|pairs| pairs.map(|(from, to)| (from.as_str(), to.as_str())).collect()).collect()
     }
 
     /// Start values that it came with.
@@ -222,23 +216,34 @@ impl System {
     /// Variables that are numbers.
     pub(crate) fn find_numbers(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         let found = self.find(name)?;
-        match found.iter().any(|found| matches!(found.of.base, BaseType::String | BaseType::Binary)) {
-            true => request(format!("{name} is no number")),
-            false => Ok(found),
-        }
+        found.iter().try_for_each(|found| found.check_number(name))?;
+        Ok(found)
     }
 
     /// Variables that a caller may set: inputs that are fed by outputs are not his.
     pub(crate) fn find_own(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         let found = self.find(name)?;
-        match found.iter().find_map(|found| found.fed_by) {
-            Some(output) => request(format!("{name} is fed by {output}, it cannot be set")),
-            None => Ok(found),
-        }
+        found.iter().try_for_each(|found| found.check_own(name))?;
+        Ok(found)
     }
 }
 
 impl Found<'_> {
+    pub fn check_number(self, name: &str) -> Result<(), Error> {
+        match self.of.base {
+            BaseType::String | BaseType::Binary => request(format!("{name} is no number")),
+            _ => Ok(()),
+        }
+    }
+
+    /// Fails if an output feeds it.
+    pub fn check_own(self, name: &str) -> Result<(), Error> {
+        match self.fed_by {
+            Some(output) => request(format!("{name} is fed by {output}, it cannot be set")),
+            None => Ok(()),
+        }
+    }
+
     fn display_unit(self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
         let Some(own) = &self.of.unit else {
             return request(format!("{name} has no unit, its values cannot be in {unit}"));
