@@ -130,7 +130,9 @@ validation: need-rust $(VENV)/importers.stamp closed-loop-fmus
 closed-loop-fmus: fmu
 	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller
 	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_closed_loop
-	@$(CARGO) run $(LOCKED) --release -p lag_fmu -- --out target/fmu
+	@$(CARGO) build $(LOCKED) --quiet -p cargo-fmu
+	@rm -rf target/lag && target/debug/cargo-fmu fmu new target/lag --name lag > /dev/null
+	@cd target/lag && CARGO_TARGET_DIR=$(CURDIR)/target/models ../debug/cargo-fmu fmu build --out ../fmu
 
 closed-loop: need-rust $(VENV)/importers.stamp closed-loop-fmus
 	@$(PY) -m tools closed-loop $(ARGS)

@@ -45,7 +45,7 @@ def test_links_are_found() -> None:
 
 def test_the_published_crates() -> None:
     names = {folder.name for folder in published()}
-    assert names == {"fmi-abi", "fmu-export", "fmu-package", "fmu-run", "fmu-system"}, (
+    assert names == {"cargo-fmu", "fmi-abi", "fmu-export", "fmu-package", "fmu-run", "fmu-system"}, (
         "a package without `publish = false`"
     )
 
@@ -62,7 +62,13 @@ def test_a_crate_has_all_that_its_page_needs(home: Path) -> None:
     outside = [link for link in found if leads_out(readme, link, home)]
     assert not outside, f"{readme.relative_to(ROOT)} leads out of the crate, where it is read without the repository"
     # The page of the documentation is the README.
-    assert (home / "src/lib.rs").read_text(encoding="utf-8").startswith('#![doc = include_str!("../README.md")]')
+    code = next(path for path in (home / "src/lib.rs", home / "src/main.rs") if path.exists())
+    assert code.read_text(encoding="utf-8").startswith('#![doc = include_str!("../README.md")]')
+    newest = re.search(r"^## .*$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    released = newest is not None and "(" in newest[0]
+    assert ("in no registry yet" in readme.read_text(encoding="utf-8")) != released, (
+        f"{readme.relative_to(ROOT)}: until a release, say where the crate is; with it, no longer"
+    )
 
 
 def anchors(page: Path) -> set[str]:

@@ -82,7 +82,7 @@ pub struct ModelExchangeOffer {
 /// Exports a [`Model`] with its capabilities as an FMU: the functions of FMI 2.0 and of FMI 3.0 as symbols of the
 /// library.
 ///
-/// Goes once into the library crate of an FMU, which must be a `cdylib`. The symbols live in the crate that calls
+/// Goes once into `src/lib.rs` of an FMU's crate, which must be a `cdylib`. The symbols live in the crate that calls
 /// the macro, so several FMU crates can share a workspace.
 ///
 /// ```text
@@ -93,6 +93,10 @@ macro_rules! export_fmu {
     ($model:ty : $first:ident $(+ $next:ident)*) => {
         $crate::offer!($model: $first $(+ $next)*);
         $crate::symbols!($model);
+
+        #[doc(hidden)]
+        #[allow(non_camel_case_types)]
+        pub type model_of_export_fmu = $model;
     };
 }
 

@@ -1,5 +1,6 @@
 //! Compiles a model's library with cargo.
 
+use crate::cross::{ZIGBUILD, rustc_for};
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 use std::ffi::OsString;
@@ -32,8 +33,7 @@ impl LibraryBuild<'_> {
     /// # Errors
     /// When cargo cannot be started or fails, or the package has no shared library.
     pub fn run(&self) -> Result<PathBuf> {
-        // Inside `cargo run` this names the cargo that is running.
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        let (cargo, target) = rustc_for(self.target);
         let mut command = Command::new(&cargo);
         command
             // Where a package makes an rlib, too, cargo leaves link-time optimization out.
@@ -43,8 +43,13 @@ impl LibraryBuild<'_> {
             .current_dir(&self.folder)
             .stdin(Stdio::null())
             .stdout(Stdio::piped());
-        if let Some(target) = self.target {
+        if let Some(target) = &target {
             command.args(["--target", target]);
+        }
+        // Nobody debugs there; for macOS its linker has no tool to strip.
+        if cargo == ZIGBUILD {
+            let strip = !target.is_some_and(|target| target.contains("-apple-"));
+            command.env(format!("CARGO_PROFILE_{}_STRIP", self.profile.to_uppercase()), strip.to_string());
         }
         if !self.arguments.is_empty() {
             command.arg("--").args(self.arguments);
@@ -66,8 +71,14 @@ impl LibraryBuild<'_> {
         }
         let status = child.wait().context("cannot wait for cargo")?;
         if !status.success() {
-            let target = self.target.map(|target| format!(" for {target}")).unwrap_or_default();
-            bail!("cargo could not build the library of {}{target}; its messages are above", self.package);
+            let Some(target) = self.target else {
+                bail!("cargo could not build the library of {}; its messages are above", self.package)
+            };
+            bail!(
+                "cargo could not build the library of {} for {target}; its messages are above (if it is the linker \
+                 that is missing, {ZIGBUILD} has one for every system: pip install {ZIGBUILD})",
+                self.package
+            );
         }
         library.with_context(|| {
             format!("{} has no shared library: crate-type must contain cdylib", self.package)

@@ -4,22 +4,27 @@ use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources, chec
 use crate::cargo::LibraryBuild;
 use crate::changes::Changes;
 use crate::connectors::{Terminal, terminals};
+use crate::cross::{TARGETS, check_targets};
 use crate::files::write_atomically;
 use crate::library::check_platform;
 use crate::pack::{Library, Parts, pack};
 use crate::packages::Neighbourhood;
 use crate::platform::Platform;
 use crate::sources::Sources;
-use crate::terminal::short;
+use crate::terminal::{exit, short};
+use crate::universal::join_for_macos;
 use crate::variant::{NO_GUID, Variant};
 use crate::version::Fmi;
 use crate::{fmi2, fmi3};
 use anyhow::{Context, Result, bail, ensure};
+use clap::{CommandFactory, FromArgMatches, ValueEnum};
 use fmu_export::Exported;
 use std::ffi::OsString;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use zip::ZipArchive;
 
 /// The options that every `build_fmu` has. A model with more flattens them into its own.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -39,7 +44,10 @@ pub struct BuildOptions {
     /// Compile for this Rust target instead of this machine; repeat it for several
     #[arg(long, value_name = "TRIPLE")]
     pub target: Vec<String>,
-    /// Put in this compiled library, for example win64=model.dll or x86_64-windows=model.dll; repeat it for several
+    /// Compile for Linux, Windows and macOS, Intel and ARM (needs Rust's libraries for them and cargo-zigbuild)
+    #[arg(long, conflicts_with_all = ["target", "describe", "c_sources"])]
+    pub all_targets: bool,
+    /// Put in this compiled library, for example win64=model.dll or x86_64-windows=model.fmu, which has it; repeat it for several
     #[arg(long, value_name = "PLATFORM=PATH", value_parser = binary)]
     pub binary: Vec<(String, PathBuf)>,
     /// Make the FMU of C sources instead, for targets with no Rust (FMI 2.0, in the folder source; needs wasm2c)
@@ -50,11 +58,55 @@ pub struct BuildOptions {
     pub any_processor: bool,
 }
 
+impl BuildOptions {
+    /// The arguments that say the same, with paths that hold in every folder.
+    pub fn arguments(&self) -> Vec<OsString> {
+        let everywhere = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        let flags = [
+            (self.tunable, "--tunable"),
+            (self.describe, "--describe"),
+            (self.all_targets, "--all-targets"),
+            (self.c_sources, "--c-sources"),
+            (self.any_processor, "--any-processor"),
+        ];
+        let mut arguments: Vec<OsString> =
+            flags.into_iter().filter(|(given, _)| *given).map(|(_, name)| name.into()).collect();
+        let mut with = |name: &str, value: OsString| arguments.extend([name.into(), value]);
+        if let Some(fmi) = self.fmi.and_then(|fmi| fmi.to_possible_value()) {
+            with("--fmi", fmi.get_name().into());
+        }
+        if let Some(out) = &self.out {
+            with("--out", everywhere(out).into());
+        }
+        for target in &self.target {
+            with("--target", target.into());
+        }
+        for (platform, path) in &self.binary {
+            let mut binary = OsString::from(format!("{platform}="));
+            binary.push(everywhere(path));
+            with("--binary", binary);
+        }
+        arguments
+    }
+}
+
 fn binary(text: &str) -> Result<(String, PathBuf), String> {
     text.split_once('=')
         .filter(|(platform, path)| !platform.is_empty() && !path.is_empty())
         .map(|(platform, path)| (platform.to_owned(), path.into()))
         .ok_or_else(|| "write PLATFORM=PATH, for example linux64=libmodel.so".to_owned())
+}
+
+/// The `main` of a `build_fmu`: does what the arguments of the program say for model `M`.
+pub fn build<M: Exported>(builder: &Builder) -> ExitCode {
+    #[derive(clap::Parser)]
+    struct Options {
+        #[command(flatten)]
+        build: BuildOptions,
+    }
+    let command = Options::command().override_usage(format!("{} [-- OPTIONS]", builder.command));
+    let options = BuildOptions::from_arg_matches(&command.get_matches()).map_err(anyhow::Error::from);
+    exit(options.and_then(|options| builder.run::<M>(&options)))
 }
 
 /// How a model's FMU is built. The crate must have a [`build_script`](crate::build_script).
@@ -135,7 +187,7 @@ impl Builder {
         };
         let versions = match options.fmi {
             None if options.c_sources => vec![Fmi::V2],
-            None => self.fmi.clone(),
+            None => self.versions::<M>(),
             Some(fmi) => vec![fmi],
         };
         ensure!(!options.c_sources || versions == [Fmi::V2], "C sources are made for FMI 2.0 only");
@@ -163,9 +215,12 @@ impl Builder {
             return write_description(&path, description);
         }
 
-        let libraries = if options.c_sources { Vec::new() } else { self.libraries(options)? };
+        let mut libraries = if options.c_sources { Vec::new() } else { self.libraries(options)? };
         for library in &libraries {
             check_library(library, &guid, options.any_processor)?;
+        }
+        if versions.contains(&Fmi::V2) {
+            join_for_macos(&mut libraries)?;
         }
         let folder = match &options.out {
             Some(folder) => folder.clone(),
@@ -213,6 +268,14 @@ impl Builder {
         Ok(())
     }
 
+    /// Those that have all the types of the model's variables.
+    fn versions<M: Exported>(&self) -> Vec<Fmi> {
+        let lacking = M::TABLE.iter().find(|variable| !variable.base().is_in_fmi2());
+        let Some(variable) = lacking.filter(|_| self.fmi.contains(&Fmi::V3)) else { return self.fmi.clone() };
+        println!("{} is {}, which FMI 2.0 lacks: for FMI 3.0 only", variable.name(), variable.base());
+        vec![Fmi::V3]
+    }
+
     fn variant(&self, tunable: bool) -> Result<Variant> {
         let sources = self.sources.fingerprint()?;
         ensure!(
@@ -227,12 +290,20 @@ impl Builder {
     fn libraries(&self, options: &BuildOptions) -> Result<Vec<Library>> {
         let mut libraries = Vec::new();
         for (platform, path) in &options.binary {
-            libraries.push(Library { platform: Platform::of_folder(platform)?, path: path.clone() });
+            let platform = Platform::of_folder(platform)?;
+            let is_fmu = path.extension().is_some_and(|suffix| suffix == "fmu");
+            let path = if is_fmu { self.unpack_library(path, platform)? } else { path.clone() };
+            libraries.push(Library { platform, path });
         }
-        // What cannot be meant is said before anything is compiled.
+        let targets = match options.all_targets {
+            true => TARGETS.map(str::to_owned).to_vec(),
+            false => options.target.clone(),
+        };
+        // What cannot be meant or is missing is said before anything is compiled.
         let platforms: Vec<_> =
-            options.target.iter().map(|target| Platform::of_target(target)).collect::<Result<_>>()?;
-        for (platform, target) in platforms.into_iter().zip(&options.target) {
+            targets.iter().map(|target| Platform::of_target(target)).collect::<Result<_>>()?;
+        check_targets(&targets, options.all_targets)?;
+        for (platform, target) in platforms.into_iter().zip(&targets) {
             libraries.push(Library { platform, path: self.compile(options.tunable, Some(target), &[])? });
         }
         if libraries.is_empty() {
@@ -242,6 +313,24 @@ impl Builder {
             });
         }
         Ok(libraries)
+    }
+
+    /// The library for a platform that is in an FMU, as another machine has made it.
+    fn unpack_library(&self, fmu: &Path, platform: Platform) -> Result<PathBuf> {
+        let of = || format!("cannot take the library for {platform} out of {}", fmu.display());
+        let mut archive = ZipArchive::new(fs::File::open(fmu).with_context(of)?).with_context(of)?;
+        let in_folder = |name: &String| {
+            let mut parts = name.split('/');
+            parts.next() == Some("binaries")
+                && parts.next().and_then(|folder| Platform::of_folder(folder).ok()) == Some(platform)
+        };
+        let name = archive.file_names().flatten().map(|name| name.into_owned()).find(in_folder);
+        let name = name.context("it has none").with_context(of)?;
+        let folder = Neighbourhood::of(&self.sources.folder)?.workspace.join("target/binaries");
+        let path = folder.join(platform.to_string()).join(name.rsplit('/').next().unwrap_or_default());
+        let mut entry = archive.by_name(&name).with_context(of)?;
+        write_atomically(&path, |file| Ok(std::io::copy(&mut entry, file).map(|_| ())?))?;
+        Ok(path)
     }
 
     /// The sources in C, for every platform.
@@ -254,6 +343,8 @@ impl Builder {
 
     fn compile(&self, tunable: bool, target: Option<&str>, arguments: &[&str]) -> Result<PathBuf> {
         let mut environment = self.environment.clone();
+        // For crates without a build script; one of `build_script` says the same.
+        environment.push(("FMU_GUID", Some(self.variant(tunable)?.guid().into())));
         environment.push(("FMU_TUNABLE", tunable.then(|| OsString::from("1"))));
         let build = LibraryBuild {
             folder: self.sources.folder.clone(),
@@ -273,8 +364,19 @@ fn check_library(library: &Library, guid: &str, any_processor: bool) -> Result<(
     let bytes = fs::read(path)
         .with_context(|| format!("cannot read {}, the library for {platform}", path.display()))?;
     check_platform(&bytes, *platform, any_processor).with_context(|| path.display().to_string())?;
+    let has = |text: &str| bytes.windows(text.len()).any(|window| window == text.as_bytes());
     ensure!(
-        bytes.windows(guid.len()).any(|window| window == guid.as_bytes()),
+        has("fmi2Instantiate") && has("fmi3InstantiateCoSimulation"),
+        "{} has no functions of FMI; its crate needs `export_fmu!(...)` in src/lib.rs (`offer!` makes none)",
+        path.display()
+    );
+    ensure!(
+        has(guid) || !has(NO_GUID),
+        "{} has no guid, as its crate's build.rs does not call fmu_package::build_script, or INFO does not begin with info!",
+        path.display()
+    );
+    ensure!(
+        has(guid),
         "{} was not compiled from these sources and parameters (the guid {guid} is not in it); compile it again",
         path.display()
     );

@@ -16,7 +16,7 @@
 //! | files | `xml`, `files` |
 //! | the description | `changes`, `check`, `sample`, `memory`, `structure`, `definitions`, `describe`, `fmi2`, `fmi3` |
 //! | the FMU | `connectors`, `version`, `platform`, `cargo`, `pack` |
-//! | the command | `library`, `c_sources`, `terminal`, `command` |
+//! | the command | `library`, `universal`, `cross`, `c_sources`, `terminal`, `command` |
 
 #![cfg_attr(not(feature = "command"), allow(rustdoc::broken_intra_doc_links))]
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -69,9 +69,13 @@ mod c_sources;
 #[cfg(feature = "command")]
 mod command;
 #[cfg(feature = "command")]
+mod cross;
+#[cfg(feature = "command")]
 mod library;
 #[cfg(feature = "command")]
 pub mod terminal;
+#[cfg(feature = "command")]
+mod universal;
 
 pub use content::{ContentFile, content_files};
 pub use fingerprint::Fingerprint;
@@ -81,7 +85,7 @@ pub use variant::{NO_GUID, Variant, build_script};
 #[cfg(feature = "command")]
 pub use c_sources::{CSources, LINKING, WEBASSEMBLY, c_sources, check_tools};
 #[cfg(feature = "command")]
-pub use command::{BuildOptions, Builder};
+pub use command::{BuildOptions, Builder, build};
 #[cfg(feature = "package")]
 pub use {
     cargo::LibraryBuild,

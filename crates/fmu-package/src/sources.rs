@@ -32,14 +32,15 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// Of a package in the usual layout: `Cargo.toml`, `build.rs`, `build_fmu.rs`, `src`, and the folder
-    /// `modelDescription` if there is one.
+    /// Of a package in the usual layout: `Cargo.toml`, `src`, and `build.rs`, `build_fmu.rs` and the folder
+    /// `modelDescription` where there are such.
     pub fn of_package(folder: impl Into<PathBuf>) -> Self {
         let folder = folder.into();
+        let code = ["Cargo.toml", "build.rs", "build_fmu.rs", "src"];
         Self {
             content: folder.join("modelDescription").is_dir().then_some("modelDescription"),
+            code: code.into_iter().filter(|name| folder.join(name).exists()).collect(),
             folder,
-            code: vec!["Cargo.toml", "build.rs", "build_fmu.rs", "src"],
             not_content: vec!["modelDescription.xml"],
             licenses: Vec::new(),
         }

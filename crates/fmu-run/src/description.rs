@@ -60,6 +60,8 @@ pub struct Description {
     pub co_simulation: Option<Offer>,
     /// What it offers in Model Exchange, if it has that.
     pub model_exchange: Option<Offer>,
+    /// The experiment that it proposes: start, stop and step size of the communication, s, as far as it says them.
+    pub default_experiment: [Option<f64>; 3],
     /// The number of continuous states.
     pub states: usize,
     /// The number of event indicators.
@@ -107,6 +109,7 @@ impl Description {
             token: needed(root, token)?,
             co_simulation,
             model_exchange,
+            default_experiment: default_experiment(root),
             states: states(root),
             event_indicators: event_indicators(root)?,
             places: variables.iter().enumerate().map(|(place, of)| (of.name.clone(), place)).collect(),
@@ -195,6 +198,11 @@ fn offer(standard: Standard, node: Node) -> Result<Offer, String> {
         needs_execution_tool: is_true("needsExecutionTool"),
         input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
     })
+}
+
+fn default_experiment(root: Node) -> [Option<f64>; 3] {
+    let of = |name| child(root, "DefaultExperiment")?.attribute(name)?.trim().parse().ok();
+    [of("startTime"), of("stopTime"), of("stepSize")]
 }
 
 /// A derivative for each (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).

@@ -1,6 +1,6 @@
 //! Models that offer less than everything: the FMU refuses what it does not have, in words, and the rest works.
 
-use crate::toys::{Ball, Sum, sum::Name};
+use crate::toys::{Sum, sum::Name};
 use fmu_export::Exported;
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_test_kit::{Arguments, Either, Importer};
@@ -30,6 +30,35 @@ fn what_it_has_works() {
     assert_eq!(fmu.get([U, Y, GAIN]), [0.0, 0.0, 1.0]);
 }
 
+/// A model that importers integrate, and nothing else.
+mod drift {
+    use fmu_export::*;
+
+    #[derive(Clone, Default)]
+    pub struct Drift {
+        x: f64,
+    }
+
+    variables! { for Drift;
+        /// Grows
+        x = output(&NUMBER).state() in x;
+        /// As fast as this
+        der_x = local(&NUMBER).derivative_of(x) by |_| 1.0;
+    }
+
+    impl Model for Drift {
+        const INFO: Info = info!("Drift", "drift");
+
+        fn new(_: &Setup) -> Result<Self, Error> {
+            Ok(Self::default())
+        }
+    }
+
+    impl ModelExchange for Drift {}
+
+    offer!(Drift: ModelExchange);
+}
+
 fn refused_interface<M: Exported>(interface: Interface) -> String {
     let log = Importer::try_with::<M>(&Arguments::of::<M>(interface));
     let [message] = &log.expect_err("it has no such interface")[..] else { panic!("one message expected") };
@@ -39,7 +68,10 @@ fn refused_interface<M: Exported>(interface: Interface) -> String {
 #[test]
 fn the_other_interface_type() {
     assert_eq!(refused_interface::<Sum>(ModelExchange), "fmi2Instantiate: this FMU has no Model Exchange");
-    assert_eq!(refused_interface::<Ball>(CoSimulation), "fmi2Instantiate: this FMU has no Co-Simulation");
+    assert_eq!(
+        refused_interface::<drift::Drift>(CoSimulation),
+        "fmi2Instantiate: this FMU has no Co-Simulation"
+    );
 }
 
 /// What the model itself refuses comes back as its words, and the step can be repeated.

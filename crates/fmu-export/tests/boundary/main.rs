@@ -16,6 +16,7 @@ macro_rules! for_every_toy {
         $function::<crate::toys::Talker>($($argument),*);
         $function::<crate::toys::Sum>($($argument),*);
         $function::<crate::toys::Fuse>($($argument),*);
+        $function::<crate::toys::Motor>($($argument),*);
         $function::<crate::toys::Lazy>($($argument),*);
         $function::<crate::toys::Balance>($($argument),*);
     }};

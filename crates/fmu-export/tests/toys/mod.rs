@@ -3,12 +3,15 @@
 #![allow(dead_code, missing_docs, unused_imports, reason = "not every test uses every toy")]
 
 pub mod balance;
+#[path = "../../../cargo-fmu/models/ball/src/ball.rs"]
 pub mod ball;
 pub mod counter;
 pub mod faulty;
 pub mod fuse;
 pub mod grumbler;
 pub mod lazy;
+#[path = "../../../cargo-fmu/models/motor/src/motor.rs"]
+pub mod motor;
 pub mod oscillator;
 pub mod palette;
 pub mod sum;
@@ -22,8 +25,12 @@ pub use faulty::Faulty;
 pub use fuse::Fuse;
 pub use grumbler::Grumbler;
 pub use lazy::Lazy;
+pub use motor::Motor;
 pub use oscillator::Oscillator;
 pub use palette::Palette;
 pub use sum::Sum;
 pub use talker::Talker;
 pub use ticker::Ticker;
+
+fmu_export::offer!(Ball: CoSimulation + ModelExchange);
+fmu_export::offer!(Motor: CoSimulation + ModelExchange);

@@ -1,4 +1,4 @@
-//! A first-order lag as an FMU: the smallest complete model, to copy and to grow.
+//! A first-order lag as an FMU: the smallest complete model, to grow.
 
 use fmu_export::*;
 

@@ -1,4 +1,4 @@
-//! A bouncing ball, for importers that integrate: an event where an indicator changes its sign, and an end.
+//! The ball: events where an indicator changes its sign, states that events change, and an end.
 
 use fmu_export::*;
 
@@ -42,11 +42,78 @@ variables! { for Ball, memory in apex;
 }
 
 impl Model for Ball {
-    const INFO: Info = Info { description: "Bouncing ball", guid: "{ball}", ..info!("Ball", "ball") };
+    const INFO: Info = Info {
+        description: "Bouncing ball",
+        default_experiment: DefaultExperiment {
+            stop_time: 3.0,
+            step_size: 0.01,
+            ..info!("", "").default_experiment
+        },
+        ..info!("Ball", "ball")
+    };
 
     fn new(_: &Setup) -> Result<Self, Error> {
         let (height, velocity, gravity) = (1.0, 0.0, 9.81);
         Ok(Self { height, velocity, gravity, restitution: 0.7, bounces: 0, most_bounces: 5, apex: height })
+    }
+}
+
+impl Ball {
+    /// Turns the ball round; tells whether it has bounced enough.
+    fn bounce(&mut self) -> bool {
+        self.velocity *= -self.restitution;
+        self.apex = (0.5 * self.velocity * self.velocity / self.gravity).min(1e6);
+        self.bounces = self.bounces.saturating_add(1);
+        self.bounces >= self.most_bounces
+    }
+
+    /// How long it flies until it meets the floor, s.
+    fn flight(&self) -> f64 {
+        let speed = (self.velocity * self.velocity + 2.0 * self.gravity * self.height.max(0.0)).sqrt();
+        (self.velocity + speed) / self.gravity
+    }
+
+    fn fly(&mut self, time: f64) {
+        self.height = (self.height + time * (self.velocity - 0.5 * self.gravity * time)).max(0.0);
+        self.velocity -= self.gravity * time;
+    }
+}
+
+impl CoSimulation for Ball {
+    /// Where it has bounced enough.
+    const ENDS_EARLY: bool = true;
+
+    /// Flights are parabolas: a step goes from bounce to bounce, and none of them is missed or late.
+    fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+        const MOST: usize = 10_000;
+        // A step that fails must leave the model as it was.
+        let mut ball = self.clone();
+        let mut left = step.size;
+        for _ in 0..MOST {
+            let flight = ball.flight();
+            if flight > left {
+                ball.fly(left);
+                *self = ball;
+                return Ok(Stepped::Done);
+            }
+            ball.fly(flight);
+            ball.height = 0.0;
+            left -= flight;
+            if ball.bounce() {
+                *self = ball;
+                return Ok(Stepped::Terminate(step.time + step.size - left));
+            }
+            // So low that it lies.
+            if ball.apex < 1e-12 {
+                ball.velocity = 0.0;
+                *self = ball;
+                return Ok(Stepped::Done);
+            }
+        }
+        Err(Error::new(format!(
+            "the ball bounces more than {MOST} times in a step of {} s; make shorter ones",
+            step.size
+        )))
     }
 }
 
@@ -63,15 +130,8 @@ impl ModelExchange for Ball {
         if self.height > 0.0 || self.velocity >= 0.0 {
             return Ok(Event::default());
         }
-        self.velocity *= -self.restitution;
-        self.apex = (0.5 * self.velocity * self.velocity / self.gravity).min(1e6);
-        self.bounces = self.bounces.saturating_add(1);
-        Ok(Event {
-            states_changed: true,
-            nominals_changed: true,
-            terminate: self.bounces >= self.most_bounces,
-            ..Event::default()
-        })
+        let terminate = self.bounce();
+        Ok(Event { states_changed: true, nominals_changed: true, terminate, ..Event::default() })
     }
 
     /// An importer that has overlooked the sign is told here; where it is too late, that this must end.
@@ -84,5 +144,3 @@ impl ModelExchange for Ball {
         nominals[0] = self.apex.max(1e-6);
     }
 }
-
-offer!(Ball: ModelExchange);

@@ -1,0 +1,189 @@
+//! The motor: its voltage is switched on and off at times that are known before, which are time events.
+
+use fmu_export::*;
+
+/// A DC motor with pulse-width modulation: in each period the supply is on for a part that the duty says.
+#[derive(Clone)]
+pub struct Motor {
+    duty: f64,
+    load: f64,
+    current: f64,
+    speed: f64,
+    on: bool,
+    supply: f64,
+    resistance: f64,
+    inductance: f64,
+    constant: f64,
+    inertia: f64,
+    period: f64,
+    /// When it is switched next, s.
+    next: f64,
+    /// Whether a period begins then.
+    rises: bool,
+    /// When the last one began, s.
+    begin: f64,
+}
+
+const VOLTAGE: Type = Type::real("Voltage", &Unit::new("V").kg(1).m(2).s(-3).A(-1)).min(0.0);
+const CURRENT: Type = Type::real("Current", &Unit::new("A").A(1)).nominal(10.0);
+const CURRENT_RATE: Type = Type::real("CurrentRate", &Unit::new("A/s").A(1).s(-1));
+const SPEED: Type = Type::real("AngularVelocity", &units::RAD_PER_S).nominal(100.0);
+const ACCELERATION: Type = Type::real("AngularAcceleration", &units::RAD_PER_S2);
+const TORQUE: Type = Type::real("Torque", &units::N_M);
+const RESISTANCE: Type =
+    Type::real("Resistance", &Unit::new("Ohm").kg(1).m(2).s(-3).A(-2)).min(1e-3).max(1e3);
+const INDUCTANCE: Type = Type::real("Inductance", &Unit::new("H").kg(1).m(2).s(-2).A(-2)).min(1e-5).max(1.0);
+const CONSTANT: Type =
+    Type::real("MotorConstant", &Unit::new("N.m/A").kg(1).m(2).s(-2).A(-1)).min(1e-4).max(10.0);
+const INERTIA: Type = Type::real("Inertia", &units::KG_M2).min(1e-6).max(1e3);
+const PERIOD: Type = Type::real("Period", &units::S).min(1e-5).max(1.0);
+const RATIO: Type = Type::real("Ratio", &units::ONE).min(0.0).max(1.0);
+
+variables! { for Motor, memory in next, rises, begin;
+    /// Part of each period in which the supply is on; what is below 0 or above 1 counts as these
+    duty = input(&RATIO) in duty;
+    /// What brakes the shaft
+    load = input(&TORQUE) in load;
+    /// Through the winding
+    current = output(&CURRENT).state() in current;
+    /// Of the shaft
+    speed = output(&SPEED).state() in speed;
+    /// Whether the supply is on
+    on = output(&BOOLEAN).exact() in on;
+    /// Rate of the current
+    der_current as "der(current)" = local(&CURRENT_RATE).derivative_of(current) by |motor| motor.rates().0;
+    /// Rate of the speed
+    der_speed as "der(speed)" = local(&ACCELERATION).derivative_of(speed) by |motor| motor.rates().1;
+    /// Of the supply
+    supply = parameter(&VOLTAGE) in supply;
+    /// Of the winding
+    resistance = parameter(&RESISTANCE) in resistance;
+    /// Of the winding
+    inductance = parameter(&INDUCTANCE) in inductance;
+    /// Torque for each ampere, and voltage for each rad/s
+    constant = parameter(&CONSTANT) in constant;
+    /// Of the shaft and what turns with it
+    inertia = parameter(&INERTIA) in inertia;
+    /// From switching on to switching on
+    period = parameter(&PERIOD) in period;
+}
+
+impl Motor {
+    /// Of current and speed.
+    fn rates(&self) -> (f64, f64) {
+        let voltage = if self.on { self.supply } else { 0.0 };
+        (
+            (voltage - self.resistance * self.current - self.constant * self.speed) / self.inductance,
+            (self.constant * self.current - self.load) / self.inertia,
+        )
+    }
+
+    /// Switches on where a period begins, off after its part; tells itself when to come back.
+    fn switch(&mut self) {
+        let duty = self.duty.clamp(0.0, 1.0);
+        if self.rises {
+            self.begin = self.next;
+        }
+        self.on = self.rises && duty > 0.0;
+        self.rises = !(self.on && duty < 1.0);
+        self.next = self.begin + if self.rises { self.period } else { duty * self.period };
+    }
+
+    /// Integrates with the classical Runge-Kutta method, in steps that are short for the winding.
+    fn integrate(&mut self, time: f64) {
+        let short = 0.2 * (self.inductance / self.resistance).min(self.period);
+        let steps = (time / short).ceil().max(1.0);
+        let size = time / steps;
+        for _ in 0..steps as u64 {
+            let (current, speed) = (self.current, self.speed);
+            let mut slope = [self.rates(); 4];
+            for stage in 1..4 {
+                let part = if stage == 3 { size } else { 0.5 * size };
+                self.current = current + part * slope[stage - 1].0;
+                self.speed = speed + part * slope[stage - 1].1;
+                slope[stage] = self.rates();
+            }
+            let mean = |of: fn((f64, f64)) -> f64| {
+                (of(slope[0]) + 2.0 * (of(slope[1]) + of(slope[2])) + of(slope[3])) / 6.0
+            };
+            self.current = current + size * mean(|slope| slope.0);
+            self.speed = speed + size * mean(|slope| slope.1);
+        }
+    }
+}
+
+impl Model for Motor {
+    const INFO: Info = Info {
+        description: "DC motor with pulse-width modulation",
+        default_experiment: DefaultExperiment {
+            stop_time: 0.2,
+            step_size: 1e-4,
+            ..info!("", "").default_experiment
+        },
+        ..info!("Motor", "motor")
+    };
+
+    fn new(_: &Setup) -> Result<Self, Error> {
+        let (supply, resistance, inductance, constant, inertia) = (24.0, 0.5, 1e-3, 0.05, 2e-4);
+        Ok(Self {
+            duty: 0.5,
+            load: 0.0,
+            current: 0.0,
+            speed: 0.0,
+            on: false,
+            supply,
+            resistance,
+            inductance,
+            constant,
+            inertia,
+            period: 1e-3,
+            next: 0.0,
+            rises: true,
+            begin: 0.0,
+        })
+    }
+
+    fn initialize(&mut self, experiment: &Experiment) -> Result<(), Error> {
+        self.begin = experiment.start_time;
+        self.next = experiment.start_time;
+        Ok(())
+    }
+}
+
+impl CoSimulation for Motor {
+    /// Goes from switching to switching.
+    fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+        const MOST: f64 = 10_000.0;
+        let end = step.time + step.size;
+        // What begins at the end belongs to the next step, also if rounding has it begin just before.
+        let last = end - 1e-9 * self.period;
+        if (end - self.next) / self.period > MOST || end + self.period == end {
+            return Err(Error::new(format!("a step may have {MOST} periods, and they must not vanish")));
+        }
+        // A step that fails must leave the model as it was.
+        let mut motor = self.clone();
+        let mut time = step.time;
+        while motor.next < last {
+            motor.integrate((motor.next - time).max(0.0));
+            time = motor.next;
+            motor.switch();
+        }
+        motor.integrate(end - time);
+        if !(motor.current.is_finite() && motor.speed.is_finite()) {
+            return Err(Error::new("current or speed leave the range of numbers"));
+        }
+        *self = motor;
+        Ok(Stepped::Done)
+    }
+}
+
+impl ModelExchange for Motor {
+    fn event(&mut self, time: f64) -> Result<Event, Error> {
+        let switched = time >= self.next;
+        if switched {
+            self.switch();
+        }
+        let again = time >= self.next;
+        Ok(Event { again, states_changed: switched, next: Some(self.next), ..Event::default() })
+    }
+}

@@ -1,0 +1,116 @@
+//! Draws what an FMU did: an SVG with a panel for each unit.
+
+use anyhow::{Result, anyhow};
+use plotters::prelude::*;
+use std::fs;
+use std::path::Path;
+
+/// A variable over time.
+pub struct Course<'a> {
+    pub name: &'a str,
+    pub unit: &'a str,
+    /// Whether it stays as it is until it jumps.
+    pub jumps: bool,
+    pub values: &'a [f64],
+}
+
+/// Colours that stay apart for colour-blind eyes (Okabe and Ito).
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+];
+
+/// Draws the courses over time; those of one unit share a panel.
+pub fn plot(path: &Path, title: &str, time: &[f64], courses: &[Course]) -> Result<()> {
+    let mut svg = String::new();
+    draw(&mut svg, title, time, courses).map_err(|error| anyhow!("{error}"))?;
+    // The backend knows whole numbers only: it draws on a large paper, which is then shown smaller.
+    let (begin, rest) = svg.split_once('>').unwrap_or_default();
+    let size = |name: &str| {
+        let (_, value) = begin.split_once(&format!(" {name}=\""))?;
+        value.split('"').next()?.parse::<u32>().ok()
+    };
+    let (width, height) = (size("width").unwrap_or_default(), size("height").unwrap_or_default());
+    let (small, low) = (width / FINE, height / FINE);
+    let begin = format!(
+        "<svg width=\"{small}\" height=\"{low}\" viewBox=\"0 0 {width} {height}\" xmlns=\"http://www.w3.org/2000/svg\""
+    );
+    Ok(fs::write(path, format!("{begin}>{rest}"))?)
+}
+
+/// How much larger the paper is.
+const FINE: u32 = 10;
+
+fn draw(
+    svg: &mut String,
+    title: &str,
+    time: &[f64],
+    courses: &[Course],
+) -> Result<(), Box<dyn std::error::Error>> {
+    let mut panels: Vec<(&str, Vec<&Course>)> = Vec::new();
+    for course in courses {
+        match panels.iter_mut().find(|(unit, panel)| *unit == course.unit && panel.len() < COLOURS.len()) {
+            Some((_, panel)) => panel.push(course),
+            None => panels.push((course.unit, vec![course])),
+        }
+    }
+    let height = 70 + 260 * panels.len() as u32;
+    let root = SVGBackend::with_string(svg, (840 * FINE, height * FINE)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let root = root.margin(10 * FINE, 0, 0, 0).titled(title, ("sans-serif", 22 * FINE))?;
+    for (area, (unit, panel)) in root.split_evenly((panels.len(), 1)).iter().zip(&panels) {
+        let values =
+            || panel.iter().flat_map(|course| course.values).copied().filter(|value| value.is_finite());
+        let (low, high) =
+            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
+        let margin = if high > low { 0.05 * (high - low) } else { 0.5 * high.abs().max(1.0) };
+        let mut chart = ChartBuilder::on(area)
+            .margin(12 * FINE)
+            .x_label_area_size(40 * FINE)
+            .y_label_area_size(76 * FINE)
+            .build_cartesian_2d(time[0]..time[time.len() - 1], low - margin..high + margin)?;
+        let label = |value: &f64| format!("{}", (value * 1e9).round() / 1e9);
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(BLACK.mix(0.12).stroke_width(FINE))
+            .axis_style(BLACK.stroke_width(FINE))
+            .set_all_tick_mark_size(5 * FINE)
+            .x_desc("time in s")
+            .y_desc(if unit.is_empty() || *unit == "1" { String::new() } else { format!("in {unit}") })
+            .x_label_formatter(&label)
+            .label_style(("sans-serif", 14 * FINE))
+            .axis_desc_style(("sans-serif", 14 * FINE))
+            .draw()?;
+        for (course, colour) in panel.iter().zip(COLOURS) {
+            let mut points: Vec<(f64, f64)> = Vec::with_capacity(2 * time.len());
+            for (time, value) in time.iter().zip(course.values).filter(|point| point.1.is_finite()) {
+                let last = points.last().filter(|_| course.jumps).map(|last| (*time, last.1));
+                points.extend(last.into_iter().chain([(*time, *value)]));
+            }
+            chart
+                .draw_series(LineSeries::new(points, colour.stroke_width(2 * FINE)))?
+                .label(course.name)
+                .legend(move |(x, y)| {
+                    PathElement::new([(x, y), (x + 20 * FINE as i32, y)], colour.stroke_width(2 * FINE))
+                });
+        }
+        chart
+            .configure_series_labels()
+            .background_style(WHITE.mix(0.8))
+            .border_style(TRANSPARENT)
+            .margin(8 * FINE)
+            .legend_area_size(30 * FINE)
+            .position(SeriesLabelPosition::UpperRight)
+            .label_font(("sans-serif", 14 * FINE))
+            .draw()?;
+    }
+    root.present()?;
+    Ok(())
+}

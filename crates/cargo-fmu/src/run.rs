@@ -1,0 +1,291 @@
+//! Simulates the FMU of a model.
+
+use crate::builder::{self, Purpose};
+use crate::plot::{Course as Curve, plot};
+use crate::project::{Place, Project};
+use anyhow::{Context, Result, bail, ensure};
+use fmu_package::terminal::short;
+use fmu_package::{BuildOptions, Fmi};
+use fmu_run::{BaseType, Batch, Course, Description, Fmu, Interface, Start, Variable, Watch};
+use notify::{RecursiveMode, Watcher};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+/// How to simulate.
+#[derive(clap::Args, Clone, Debug)]
+pub struct Options {
+    #[command(flatten)]
+    place: Place,
+    /// A start value: a number, true, false, a name of an enumeration, or a text; repeat it for several
+    #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
+    set: Vec<(String, String)>,
+    /// Inputs over time: a table (CSV) with a column time and one for each input
+    #[arg(long, value_name = "FILE")]
+    input: Option<PathBuf>,
+    /// When it ends, s [default: as the model proposes]
+    #[arg(long, value_name = "S")]
+    stop: Option<f64>,
+    /// How long a step is, s [default: as the model proposes]
+    #[arg(long, value_name = "S")]
+    step: Option<f64>,
+    /// What to show, with commas between the names [default: all outputs]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    show: Vec<String>,
+    /// Simulate the FMU for FMI 2.0 or that for FMI 3.0 [default: 2, if the model has only what that has]
+    #[arg(long, value_enum, value_name = "2|3", hide_possible_values = true)]
+    fmi: Option<Fmi>,
+    /// Stay, and do it again whenever a file of the model changes
+    #[arg(long)]
+    watch: bool,
+}
+
+fn assignment(text: &str) -> Result<(String, String), String> {
+    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, for example gain=2.5")?;
+    Ok((name.trim().to_owned(), value.trim().to_owned()))
+}
+
+/// Builds and simulates; tells whether that was possible.
+pub fn run(options: &Options) -> Result<bool> {
+    if !options.watch {
+        return once(options);
+    }
+    let project = Project::find(&options.place)?;
+    let (sender, changes) = mpsc::channel();
+    let mut watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
+        if event.is_ok_and(|event| !event.kind.is_access()) {
+            // The other end is gone when the program ends.
+            let _ = sender.send(());
+        }
+    })?;
+    for name in ["Cargo.toml", "src", "modelDescription"] {
+        let path = project.folder.join(name);
+        if path.exists() {
+            watcher.watch(&path, RecursiveMode::Recursive)?;
+        }
+    }
+    if let Some(input) = &options.input {
+        watcher.watch(input, RecursiveMode::NonRecursive)?;
+    }
+    loop {
+        let begin = Instant::now();
+        match once(options) {
+            Ok(true) => {
+                println!("done in {:.1} s; waiting for a change (Ctrl-C ends)", begin.elapsed().as_secs_f64())
+            }
+            Ok(false) => println!("waiting for a change (Ctrl-C ends)"),
+            Err(error) => println!("error: {error:#}\nwaiting for a change (Ctrl-C ends)"),
+        }
+        changes.recv().context("nobody watches the files any more")?;
+        // An editor changes several at once.
+        while changes.recv_timeout(Duration::from_millis(100)).is_ok() {}
+    }
+}
+
+fn once(options: &Options) -> Result<bool> {
+    let project = Project::find(&options.place)?;
+    let folder = project.workspace.join("target/fmu");
+    let build = BuildOptions { fmi: options.fmi, out: Some(folder.clone()), ..BuildOptions::default() };
+    let begin = std::time::SystemTime::now();
+    if !builder::build(&project, &build, Purpose::Trial, &[])? {
+        return Ok(false);
+    }
+    let fmu = newest(&folder, begin).with_context(|| format!("there is no new FMU in {}", short(&folder)))?;
+    simulate(options, &fmu, &folder)?;
+    Ok(true)
+}
+
+/// The FMU that was just made, that for FMI 2.0 if there are both.
+fn newest(folder: &Path, since: std::time::SystemTime) -> Option<PathBuf> {
+    let made = |path: &PathBuf| {
+        let is_new =
+            |data: fs::Metadata| data.modified().is_ok_and(|time| time + Duration::from_secs(2) > since);
+        path.extension().is_some_and(|suffix| suffix == "fmu") && fs::metadata(path).is_ok_and(is_new)
+    };
+    let in_folder = |folder: PathBuf| {
+        let mut made: Vec<_> =
+            fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path()).filter(made).collect();
+        made.sort_by_key(|path| fs::metadata(path).and_then(|data| data.modified()).ok());
+        made.pop()
+    };
+    in_folder(folder.to_owned()).or_else(|| in_folder(folder.join("fmi3")))
+}
+
+fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<()> {
+    // SAFETY: the FMU is the user's own model, which was just compiled.
+    #[allow(unsafe_code)]
+    let fmu = unsafe { Fmu::open(path) }?;
+    let description = fmu.description();
+    ensure!(
+        description.offer(Interface::CoSimulation).is_some(),
+        "{} is for Model Exchange only, whose equations an importer with a solver integrates; add CoSimulation, or \
+         simulate it there (with FMPy: `fmpy simulate {} --show-plot`)",
+        description.model_name,
+        short(path)
+    );
+    let table = options.input.as_deref().map(Table::read).transpose()?;
+    let time = times(options, description, table.as_ref())?;
+    let courses = match &table {
+        Some(table) => table.at(&time)?,
+        None => Vec::new(),
+    };
+    let shown = shown(&options.show, description)?;
+    let names: Vec<&str> = shown.iter().map(|variable| variable.name.as_str()).collect();
+    let batch = Batch {
+        time: &time,
+        inputs: courses.iter().map(|(name, course)| (name.as_str(), Course::Shared(course))).collect(),
+        start: options
+            .set
+            .iter()
+            .map(|(name, value)| Ok((name.as_str(), start(description, name, value)?)))
+            .collect::<Result<_>>()?,
+        outputs: names,
+        every: Some(1),
+        threads: Some(1),
+        ..Batch::default()
+    };
+    let runs = fmu.run(&batch, &Watch::default())?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let (csv, svg) = (folder.join(format!("{name}.csv")), folder.join(format!("{name}.svg")));
+    let curves: Vec<Curve> = shown
+        .iter()
+        .zip(runs.courses.chunks(time.len()))
+        .map(|(variable, values)| Curve {
+            name: &variable.name,
+            unit: variable.unit.as_deref().unwrap_or_default(),
+            jumps: variable.base != BaseType::Real || variable.variability.as_deref() == Some("discrete"),
+            values,
+        })
+        .collect();
+    write_table(&csv, &time, &curves).with_context(|| format!("cannot write {}", short(&csv)))?;
+    plot(&svg, &description.model_name, &time, &curves)
+        .with_context(|| format!("cannot draw {}", short(&svg)))?;
+    let width = curves.iter().map(|curve| curve.name.len()).max().unwrap_or_default();
+    for curve in &curves {
+        let finite = || curve.values.iter().copied().filter(|value| value.is_finite());
+        println!(
+            "{:width$}  from {:.6} to {:.6} {}",
+            curve.name,
+            finite().fold(f64::INFINITY, f64::min),
+            finite().fold(f64::NEG_INFINITY, f64::max),
+            curve.unit,
+        );
+    }
+    println!(
+        "{}, {}: {} to {} s in {} steps",
+        short(&csv),
+        short(&svg),
+        time[0],
+        time[time.len() - 1],
+        time.len() - 1
+    );
+    for (_, note) in runs.notes.iter().chain(&runs.errors) {
+        println!("{note}");
+    }
+    Ok(())
+}
+
+/// From the proposed start on, or the times of the inputs if nothing else is said.
+fn times(options: &Options, description: &Description, table: Option<&Table>) -> Result<Vec<f64>> {
+    let [start, stop, step] = description.default_experiment;
+    let start = table.and_then(|table| table.time.first().copied()).or(start).unwrap_or(0.0);
+    let end_of_table = table.and_then(|table| table.time.last().copied());
+    let stop = options.stop.or(end_of_table).or(stop).unwrap_or(start + 1.0);
+    let step = options.step.or(step).unwrap_or((stop - start) / 500.0);
+    ensure!(step > 0.0 && stop > start, "--stop {stop} must be after {start}, and --step {step} positive");
+    let steps = ((stop - start) / step).round();
+    ensure!(
+        (1.0..=1e7).contains(&steps),
+        "{steps} steps of {step} s are too few or too many; see --stop and --step"
+    );
+    // Not a sum of steps, which would run away.
+    Ok((0..=steps as u32).map(|number| start + f64::from(number) * step).collect())
+}
+
+fn shown<'a>(names: &[String], description: &'a Description) -> Result<Vec<&'a Variable>> {
+    let is_number = |variable: &&Variable| !matches!(variable.base, BaseType::String | BaseType::Binary);
+    if names.is_empty() {
+        let outputs: Vec<_> = description
+            .variables
+            .iter()
+            .filter(|variable| variable.causality == "output")
+            .filter(is_number)
+            .collect();
+        ensure!(
+            !outputs.is_empty(),
+            "the model has no outputs that are numbers; name what to show with --show"
+        );
+        return Ok(outputs);
+    }
+    names
+        .iter()
+        .map(|name| {
+            description.variable(name).with_context(|| format!("there is no variable {name} to show"))
+        })
+        .collect()
+}
+
+/// A start value as the variable's type has it.
+fn start<'a>(description: &Description, name: &str, value: &'a str) -> Result<Start<'a>> {
+    let variable =
+        description.variable(name).with_context(|| format!("there is no variable {name} to set"))?;
+    // Texts are for texts and Booleans, and name the items of enumerations.
+    Ok(match value.parse() {
+        Ok(number) if variable.base != BaseType::String => Start::Same(number),
+        _ => Start::Text(value),
+    })
+}
+
+fn write_table(path: &Path, time: &[f64], curves: &[Curve]) -> Result<()> {
+    let mut writer = csv::Writer::from_path(path)?;
+    writer.write_record(std::iter::once("time").chain(curves.iter().map(|curve| curve.name)))?;
+    for (row, time) in time.iter().enumerate() {
+        let values = curves.iter().map(|curve| curve.values[row]);
+        writer.write_record(std::iter::once(*time).chain(values).map(|value| value.to_string()))?;
+    }
+    Ok(writer.flush()?)
+}
+
+/// Inputs over time.
+struct Table {
+    time: Vec<f64>,
+    inputs: Vec<(String, Vec<f64>)>,
+}
+
+impl Table {
+    fn read(file: &Path) -> Result<Self> {
+        let of = || short(file);
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(file).with_context(of)?;
+        let names: Vec<String> = reader.headers().with_context(of)?.iter().map(str::to_owned).collect();
+        let mut columns = vec![Vec::new(); names.len()];
+        for (row, record) in reader.records().enumerate() {
+            for (place, field) in record.with_context(of)?.iter().enumerate() {
+                let value: f64 = field
+                    .parse()
+                    .with_context(|| format!("{}, line {}: {} is {field:?}", of(), row + 2, names[place]))?;
+                columns[place].push(value);
+            }
+        }
+        let mut columns: Vec<_> = names.into_iter().zip(columns).collect();
+        let Some(time) = columns.iter().position(|(name, _)| name == "time") else {
+            bail!("{} has no column time", of());
+        };
+        let (_, time) = columns.remove(time);
+        ensure!(time.len() > 1, "{} needs two times at least", of());
+        ensure!(time.is_sorted_by(|a, b| a < b), "{}: its times must rise", of());
+        Ok(Self { time, inputs: columns })
+    }
+
+    /// The inputs at these times, straight lines between the given ones.
+    fn at(&self, times: &[f64]) -> Result<Vec<(String, Vec<f64>)>> {
+        let value = |values: &[f64], time: f64| {
+            let after = self.time.partition_point(|given| *given <= time).clamp(1, self.time.len() - 1);
+            let (begin, end) = (self.time[after - 1], self.time[after]);
+            let part = ((time - begin) / (end - begin)).clamp(0.0, 1.0);
+            values[after - 1] + part * (values[after] - values[after - 1])
+        };
+        let course = |values: &[f64]| times.iter().map(|time| value(values, *time)).collect();
+        Ok(self.inputs.iter().map(|(name, values)| (name.clone(), course(values))).collect())
+    }
+}

@@ -1,0 +1,188 @@
+//! `cargo fmu` as someone uses it who begins a model.
+#![allow(missing_docs)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+/// A folder for models. They share what cargo makes, here and in the Makefile.
+struct Folder(TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn run(&self, folder: &str, program: &str, arguments: &[&str]) -> Output {
+        Command::new(program)
+            .args(arguments)
+            .current_dir(self.0.path().join(folder))
+            .env("CARGO_TARGET_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("models"))
+            .env("WASM2C", "/nowhere/wasm2c")
+            .env_remove("FMU_GUID")
+            .output()
+            .unwrap()
+    }
+
+    fn fmu(&self, folder: &str, arguments: &[&str]) -> Output {
+        self.run(folder, env!("CARGO_BIN_EXE_cargo-fmu"), &[&["fmu"], arguments].concat())
+    }
+
+    /// What it says where it succeeds.
+    #[track_caller]
+    fn says(&self, folder: &str, arguments: &[&str]) -> String {
+        let output = self.fmu(folder, arguments);
+        assert!(output.status.success(), "{arguments:?}\n{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// What it says where it fails.
+    #[track_caller]
+    fn refuses(&self, folder: &str, arguments: &[&str]) -> String {
+        let output = self.fmu(folder, arguments);
+        assert!(!output.status.success(), "{arguments:?}");
+        String::from_utf8(output.stderr).unwrap()
+    }
+
+    fn path(&self, path: &str) -> PathBuf {
+        self.0.path().join(path)
+    }
+
+    fn read(&self, path: &str) -> String {
+        fs::read_to_string(self.path(path)).unwrap()
+    }
+}
+
+/// Begun, tested and simulated as `new` proposes.
+fn grows(from: &str, arguments: &[&str], columns: &str, course: &str) -> Folder {
+    let folder = Folder::new();
+    let name = format!("my-{from}");
+    let said = folder.says("", &["new", &name, "--from", from]);
+    assert!(said.contains(&format!("cd {name}")) && said.contains("cargo fmu run"), "{said}");
+    let output = folder.run(&name, env!("CARGO"), &["test", "--quiet"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = folder.says(&name, &[&["run"], arguments].concat());
+    assert!(said.contains(course), "{said}");
+    let fmu = format!("my_{from}");
+    let table = folder.read(&format!("{name}/target/fmu/{fmu}.csv"));
+    assert_eq!(table.lines().next(), Some(columns));
+    assert!(folder.read(&format!("{name}/target/fmu/{fmu}.svg")).starts_with("<svg width=\"840\""));
+    for path in [format!("{fmu}.fmu"), format!("fmi3/{fmu}.fmu")] {
+        let file = fs::File::open(folder.path(&format!("{name}/target/fmu/{path}"))).unwrap();
+        let mut fmu = zip::ZipArchive::new(file).unwrap();
+        let text = std::io::read_to_string(fmu.by_name("modelDescription.xml").unwrap()).unwrap();
+        assert!(text.contains(&format!("modelIdentifier=\"my_{from}\"")), "{text}");
+        assert_eq!(fmu.by_name("resources/winter.csv").is_ok(), from == "house");
+    }
+    folder
+}
+
+/// 1 - e^-1 after a second.
+#[test]
+fn lag() {
+    let folder = grows("lag", &["--set", "u=1"], "time,x", "from 0.000000 to 0.632121 1");
+    inputs_come_from_a_table(&folder);
+    options_reach_the_program_that_packs(&folder);
+}
+
+/// It ends when it has bounced five times.
+#[test]
+fn ball() {
+    grows("ball", &[], "time,height,velocity,bounces", "ended by the FMU at t = 2.0527167766");
+}
+
+#[test]
+fn motor() {
+    grows("motor", &["--set", "duty=1"], "time,current,speed,on", "rad/s");
+}
+
+#[test]
+fn house() {
+    grows("house", &[], "time,room,outside", "from -6.000000 to 2.500000 degC");
+}
+
+fn inputs_come_from_a_table(folder: &Folder) {
+    fs::write(folder.path("my-lag/step.csv"), "time, u\n0, 2\n4, 2\n").unwrap();
+    let said = folder.says("my-lag", &["run", "--input", "step.csv", "--step", "0.5", "--show", "x,u"]);
+    assert!(said.contains("0 to 4 s in 8 steps"), "{said}");
+    let table = folder.read("my-lag/target/fmu/my_lag.csv");
+    let last: Vec<f64> =
+        table.lines().next_back().unwrap().split(',').map(|value| value.parse().unwrap()).collect();
+    assert!((last[1] - 2.0 * (1.0 - (-4.0_f64).exp())).abs() < 1e-12 && last[2] == 2.0, "{last:?}");
+
+    for (arguments, word) in [
+        (&["run", "--set", "y=1"][..], "there is no variable y to set"),
+        (&["run", "--show", "y"], "there is no variable y to show"),
+        (&["run", "--step", "0"], "--step 0 positive"),
+        (&["run", "--input", "nothing.csv"], "nothing.csv"),
+    ] {
+        let said = folder.refuses("my-lag", arguments);
+        assert!(said.contains(word), "{said}");
+    }
+}
+
+/// Options of `build_fmu`, with the package named from elsewhere.
+fn options_reach_the_program_that_packs(folder: &Folder) {
+    let manifest = "my-lag/Cargo.toml";
+    let said = folder.says("", &["build", "--manifest-path", manifest, "--fmi", "3", "--out", "made"]);
+    assert!(said.contains("made/fmi3/my_lag.fmu") && said.contains("guid {"), "{said}");
+    assert!(folder.path("made/fmi3/my_lag.fmu").is_file());
+    assert!(!folder.path("made/my_lag.fmu").exists());
+
+    // As it would be kept with the sources: without what changes with each of them.
+    folder.says("my-lag", &["build", "--describe", "--out", "described"]);
+    let text = folder.read("my-lag/described/modelDescription.xml");
+    assert!(text.contains("guid=\"{00000000-0000-0000-0000-000000000000}\""), "{text}");
+    assert!(text.contains("<Unknown index=\"3\" dependencies=\"1 2\""), "{text}");
+
+    for (arguments, words) in [
+        (&["--binary", "linux64=a.so", "--any-processor"][..], "--any-processor goes with --fmi 2 only"),
+        (&["--c-sources"], "wasm2c"),
+        (&["--target", "x86_64-unknown-nonsense"], "no FMU platform is known for the target"),
+        (&["--fmi", "2", "--binary", "win64=Cargo.toml"], "it is no shared library"),
+    ] {
+        let said = folder.refuses("my-lag", &[&["build"], arguments].concat());
+        assert!(said.contains(words) && said.contains("error: "), "{said}");
+    }
+}
+
+#[test]
+fn what_is_no_model_is_named() {
+    let folder = Folder::new();
+    folder.says("", &["new", "odd"]);
+    let [library, manifest] = ["odd/src/lib.rs", "odd/Cargo.toml"].map(|path| folder.read(path));
+    let with = |path: &str, text: &str| fs::write(folder.path(path), text).unwrap();
+
+    with("odd/src/lib.rs", &library.replace("export_fmu!", "offer!"));
+    let said = folder.refuses("odd", &["build"]);
+    assert!(said.contains("not there? src/lib.rs of odd must end with export_fmu!(...);"), "{said}");
+    with("odd/src/lib.rs", &library);
+
+    with("odd/Cargo.toml", &manifest.replace("\"cdylib\", ", ""));
+    let said = folder.refuses("odd", &["build"]);
+    assert!(said.contains("crate-type = [\"cdylib\", \"rlib\"]"), "{said}");
+    with(
+        "odd/Cargo.toml",
+        &manifest.replace("fmu-export =", "other = { package = \"fmu-run\", path = \"x\" } #"),
+    );
+    assert!(folder.refuses("odd", &["build"]).starts_with("error: "));
+
+    let said = folder.refuses("", &["new", "odd"]);
+    assert_eq!(said, "error: odd is there already; name a new folder\n");
+    let said = folder.refuses("", &["new", "7-segments"]);
+    assert!(said.starts_with("error: invalid character `7` in package name"), "{said}");
+    assert!(!folder.path("7-segments").exists());
+    let said = folder.refuses("", &["build"]);
+    assert!(said.contains("could not find `Cargo.toml`"), "{said}");
+}
+
+/// The READMEs show the least there is, word for word.
+#[test]
+fn the_readme_shows_a_whole_fmu() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let source = fs::read_to_string(crates.join("cargo-fmu/models/lag/src/lib.rs")).unwrap();
+    let (_, code) = source.split_once("\n\n").unwrap();
+    let readme = fs::read_to_string(crates.join("fmu-export/README.md")).unwrap();
+    assert!(readme.contains(&format!("```rust,ignore\n{code}```")), "{readme}");
+}

@@ -1,0 +1,78 @@
+//! Compiling for other systems: cargo-zigbuild links for all of them.
+
+use crate::platform::Platform;
+use anyhow::{Result, bail};
+use std::ffi::OsString;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// The program that is cargo with a linker for every system.
+pub const ZIGBUILD: &str = "cargo-zigbuild";
+
+/// What `--all-targets` compiles for.
+pub const TARGETS: [&str; 5] = [
+    "x86_64-unknown-linux-gnu",
+    "aarch64-unknown-linux-gnu",
+    "x86_64-pc-windows-gnu",
+    "x86_64-apple-darwin",
+    "aarch64-apple-darwin",
+];
+
+/// The oldest glibc that libraries for Linux ask for: that of Enterprise Linux 7 and of everything since.
+const GLIBC: &str = "2.17";
+
+/// Fails with all that is missing to compile for these targets, and where to get it; only `all` of them need
+/// cargo-zigbuild, as cargo's configuration may have a linker for one.
+pub fn check_targets(targets: &[String], all: bool) -> Result<()> {
+    let mut missing = Vec::new();
+    for target in targets.iter().filter(|target| !has_std(target)) {
+        missing.push(format!("Rust's library for it: rustup target add {target}"));
+    }
+    if all && !has_zigbuild() {
+        missing.push(
+            "cargo-zigbuild, which links for other systems: pip install cargo-zigbuild (brings zig), or \
+             cargo install cargo-zigbuild (and zig from ziglang.org)"
+                .to_owned(),
+        );
+    }
+    if !missing.is_empty() {
+        bail!("to compile for other systems, there is still to be installed:\n  {}", missing.join("\n  "));
+    }
+    Ok(())
+}
+
+/// The cargo that compiles for this target, and how it writes the target.
+///
+/// A single target that cargo can link for by itself, as its configuration may say, is left to cargo where there is no
+/// cargo-zigbuild.
+pub fn rustc_for(target: Option<&str>) -> (OsString, Option<String>) {
+    match target.filter(|target| is_foreign(target) && has_zigbuild()) {
+        Some(target) if target.contains("-linux-gnu") => (ZIGBUILD.into(), Some(format!("{target}.{GLIBC}"))),
+        Some(target) => (ZIGBUILD.into(), Some(target.to_owned())),
+        // Inside `cargo run` this names the cargo that is running.
+        None => (std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()), target.map(str::to_owned)),
+    }
+}
+
+/// For another system or processor than this machine's, but for what every compiler can make.
+fn is_foreign(target: &str) -> bool {
+    let own = Platform::host().ok();
+    !target.starts_with("wasm") && (own.is_none() || Platform::of_target(target).ok() != own)
+}
+
+/// Whether the compiler has the standard library of a target. Where that cannot be asked, cargo will say it.
+fn has_std(target: &str) -> bool {
+    let asked = Command::new("rustc").args(["--print", "target-libdir", "--target", target]).output();
+    let Ok(asked) = asked else { return true };
+    let folder = String::from_utf8_lossy(&asked.stdout).trim().to_owned();
+    asked.status.success()
+        && Path::new(&folder).read_dir().is_ok_and(|files| {
+            files.flatten().any(|file| file.file_name().to_string_lossy().starts_with("libstd-"))
+        })
+}
+
+fn has_zigbuild() -> bool {
+    let mut command = Command::new(ZIGBUILD);
+    let status = command.arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    status.is_ok_and(|status| status.success())
+}
