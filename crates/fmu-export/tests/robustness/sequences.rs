@@ -5,7 +5,7 @@ use fmu_test_kit::careless::{RunBytes, Tally, run, run_seeds};
 use fmu_test_kit::{FUNCTIONS, Importer, fmi3};
 
 /// All toys but the faulty one.
-const TOYS: [(&str, RunBytes); 8] = [
+const TOYS: [(&str, RunBytes); 9] = [
     ("oscillator", run::<Importer, Oscillator>),
     ("ball", run::<Importer, Ball>),
     ("counter", run::<Importer, Counter>),
@@ -14,10 +14,11 @@ const TOYS: [(&str, RunBytes); 8] = [
     ("fuse", run::<Importer, Fuse>),
     ("lazy", run::<Importer, Lazy>),
     ("balance", run::<Importer, Balance>),
+    ("rod", run::<Importer, Rod>),
 ];
 
 /// The same in FMI 3.0, with those that have more than FMI 2.0.
-const TOYS_OF_FMI3: [(&str, RunBytes); 8] = [
+const TOYS_OF_FMI3: [(&str, RunBytes); 9] = [
     ("oscillator", run::<fmi3::Importer, Oscillator>),
     ("ball", run::<fmi3::Importer, Ball>),
     ("counter", run::<fmi3::Importer, Counter>),
@@ -26,6 +27,7 @@ const TOYS_OF_FMI3: [(&str, RunBytes); 8] = [
     ("fuse", run::<fmi3::Importer, Fuse>),
     ("ticker", run::<fmi3::Importer, Ticker>),
     ("palette", run::<fmi3::Importer, Palette>),
+    ("rod", run::<fmi3::Importer, Rod>),
 ];
 
 /// What never succeeds: there are no asynchronous steps, and no model here has the rest.
