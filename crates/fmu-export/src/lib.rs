@@ -52,5 +52,8 @@ pub use {
         spread_names, write_names,
     },
     value::{Dimensions, visit_enumeration},
-    variable::{Read, ReadAt, Shape, Store, StoreAt, read, read_reals, shape_of_calculation, shape_of_place},
+    variable::{
+        Read, ReadAt, Shape, Store, StoreAt, read, read_real, read_reals, read_value, set_real, set_value,
+        shape_of_calculation, shape_of_place,
+    },
 };

@@ -1,7 +1,7 @@
 //! The table of variables: [`variables!`](crate::variables) and what it makes.
 
 use crate::saved::StateVisitor;
-use crate::variable::{Variable, refuse};
+use crate::variable::{Index, Variable, refuse};
 use std::fmt::Debug;
 
 /// The variables of a model. Implemented by [`variables!`](crate::variables).
@@ -277,7 +277,7 @@ const fn derivative<M>(table: &[Variable<M>], state: u32) -> Option<u32> {
 /// Refuses a line that cannot be, at the place in the author's file where this is called.
 #[doc(hidden)]
 #[track_caller]
-pub const fn check_line<M>(lines: &[Variable<M>], line: u32) {
+pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
     let of = &lines[line as usize];
     if let Some(fault) = of.fault() {
         refuse(of.name(), fault);
@@ -337,7 +337,7 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// Writes a model's table of variables: what each variable is, and where its value lives or how it is calculated.
 ///
 /// ```text
-/// variables! { for Model, memory in PLACE, PLACE, ...;      // "memory in" if there is any
+/// variables! { for Model, names Name, memory in PLACE, ...;  // both if you like, and there is any
 ///     /// Description that importers show
 ///     name = KIND(&TYPE).refinement() in PLACE;              // lives in a field of the model
 ///     name = KIND(&TYPE) in PLACE then |model| { ... };      // and this is done after it was set
@@ -361,8 +361,9 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// What lives in a place and all that is in the `memory` belongs to a serialized state; see [`Saved`](crate::Saved). What
 /// `initialize`, a step or an event changes must be there; `build_fmu` of fmu-package refuses models where something is missing.
 ///
-/// The macro implements [`Variables`] for the model and defines `Name`, an enum with the names of the lines, for
-/// [`Partials`](crate::Partials) and its like; [`Variables::place`] tells where in the table a name is.
+/// The macro implements [`Variables`] for the model and defines an enum with the names of the lines, for
+/// [`Partials`](crate::Partials) and its like: `Name`, or what stands behind `names`, as where a module has two models or a `Name`
+/// of its own. [`Variables::place`] tells where in the table a name is.
 ///
 /// ```
 /// use fmu_export::{NUMBER, variables};
@@ -390,11 +391,12 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 macro_rules! variables {
     (
         for $model:ty
+        $(, names $names:ident )?
         $(, memory in $( $memory:ident $([ $memory_at:expr ])* $( . $memory_field:tt $([ $memory_place:expr ])* )* ),+ )? ;
         $(
             $(#[doc = $text:literal])*
             $name:ident $( as $label:literal )? =
-                $kind:ident $of:tt $( . $refinement:ident ( $($argument:expr),* $(,)? ) )*
+                $kind:tt $of:tt $( . $refinement:ident $arguments:tt )*
                 $(
                     in $first:ident $([ $at:expr ])* $( . $field:tt $([ $place:expr ])* )*
                     $( then | $changed:ident | $after:block )?
@@ -402,13 +404,7 @@ macro_rules! variables {
                 $( by $calculate:expr )? ;
         )+
     ) => {
-        /// The names of the variables: what stands at the begin of each line of `variables!`.
-        #[allow(non_camel_case_types)]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(u32)]
-        pub enum Name {
-            $( $(#[doc = $text])* $name ),+
-        }
+        $crate::variables! { @names [$($names)?] $( $(#[doc = $text])* $name ),+ }
 
         const _: () = {
             #[allow(non_upper_case_globals, non_camel_case_types, unused)]
@@ -421,26 +417,28 @@ macro_rules! variables {
             }
 
             $(
-                // A function called like the kind, so that the compiler points at the author's line: where the macro has the
-                // arguments first, they keep their place in the author's file.
-                #[allow(long_running_const_eval)]
+                // A function called like the kind, so that the compiler points at the author's line: tokens keep their place in
+                // the author's file where a macro uses them first.
+                #[allow(long_running_const_eval, clippy::needless_borrows_for_generic_args)]
                 const _: () = {
                     #[track_caller]
                     const fn $kind<T: ::core::marker::Copy>(_: T) {
-                        $crate::check_line(<$model as $crate::Variables>::LINES, Name::$name as u32);
+                        $crate::check_line(<$model as $crate::Variables>::LINES, index::$name);
                     }
                     $kind $of
                 };
             )+
 
             impl $crate::Variables for $model {
-                type Name = Name;
+                type Name = $crate::variables!(@name $($names)?);
 
                 const LINES: &'static [$crate::Variable<Self>] = &[$({
                     let variable = {
                         #[allow(unused_imports)]
                         use index::*;
-                        $crate::Variable::<$model>::$kind $of $( . $refinement($($argument),*) )*
+                        $crate::variables!(
+                            @refined [$crate::Variable::<$model>::$kind $of] $( . $refinement $arguments )*
+                        )
                     };
                     $(
                         let variable = variable.stored(
@@ -448,32 +446,26 @@ macro_rules! variables {
                                 shape: $crate::shape_of_place(|model: &$model| {
                                     &(*model).$first $([$at])* $( .$field $([$place])* )*
                                 }),
-                                real: |model| $crate::Scalar::real($crate::Place::element(
-                                    &(*model).$first $([$at])* $( .$field $([$place])* )*,
-                                    0,
-                                )),
-                                value: |model| $crate::Scalar::value($crate::Place::element(
-                                    &(*model).$first $([$at])* $( .$field $([$place])* )*,
-                                    0,
-                                )),
+                                real: |model| {
+                                    $crate::read_real(&(*model).$first $([$at])* $( .$field $([$place])* )*, 0)
+                                },
+                                value: |model| {
+                                    $crate::read_value(&(*model).$first $([$at])* $( .$field $([$place])* )*, 0)
+                                },
                             },
                             $crate::Store {
                                 real: |model, value| {
-                                    $crate::Scalar::set_real(
-                                        $crate::Place::element_mut(
-                                            &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
-                                            0,
-                                        ),
+                                    $crate::set_real(
+                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
+                                        0,
                                         value,
                                     );
                                     $( { let $changed = model; $after } )?
                                 },
                                 value: |model, value| {
-                                    $crate::Scalar::assign(
-                                        $crate::Place::element_mut(
-                                            &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
-                                            0,
-                                        ),
+                                    $crate::set_value(
+                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
+                                        0,
                                         value,
                                     );
                                     $( { let $changed = model; $after } )?
@@ -489,28 +481,23 @@ macro_rules! variables {
                                     first,
                                     values,
                                 ),
-                                value: |model, number| $crate::Scalar::value($crate::Place::element(
-                                    &(*model).$first $([$at])* $( .$field $([$place])* )*,
-                                    number,
-                                )),
+                                value: |model, number| {
+                                    $crate::read_value(&(*model).$first $([$at])* $( .$field $([$place])* )*, number)
+                                },
                             },
                             $crate::StoreAt {
                                 real: |model, number, value| {
-                                    $crate::Scalar::set_real(
-                                        $crate::Place::element_mut(
-                                            &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
-                                            number,
-                                        ),
+                                    $crate::set_real(
+                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
+                                        number,
                                         value,
                                     );
                                     $( { let $changed = model; $after } )?
                                 },
                                 value: |model, number, value| {
-                                    $crate::Scalar::assign(
-                                        $crate::Place::element_mut(
-                                            &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
-                                            number,
-                                        ),
+                                    $crate::set_value(
+                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
+                                        number,
                                         value,
                                     );
                                     $( { let $changed = model; $after } )?
@@ -522,23 +509,14 @@ macro_rules! variables {
                         let variable = variable.read_by(
                             $crate::Read {
                                 shape: $crate::shape_of_calculation(|model: &$model| $crate::read(model, $calculate)),
-                                real: |model| {
-                                    $crate::Scalar::real($crate::Place::element(&$crate::read(model, $calculate), 0))
-                                },
-                                value: |model| {
-                                    $crate::Scalar::value($crate::Place::element(&$crate::read(model, $calculate), 0))
-                                },
+                                real: |model| $crate::read_real(&$crate::read(model, $calculate), 0),
+                                value: |model| $crate::read_value(&$crate::read(model, $calculate), 0),
                             },
                             $crate::ReadAt {
                                 reals: |model, first, values| {
                                     $crate::read_reals(&$crate::read(model, $calculate), first, values)
                                 },
-                                value: |model, number| {
-                                    $crate::Scalar::value($crate::Place::element(
-                                        &$crate::read(model, $calculate),
-                                        number,
-                                    ))
-                                },
+                                value: |model, number| $crate::read_value(&$crate::read(model, $calculate), number),
                             },
                         );
                     )?
@@ -557,10 +535,10 @@ macro_rules! variables {
                     &TABLE
                 };
 
-                const NAMES: &'static [Name] = {
+                const NAMES: &'static [Self::Name] = {
                     const LINES: &[$crate::Variable<$model>] = <$model as $crate::Variables>::LINES;
-                    const NAMES: [Name; $crate::count_elements(LINES)] =
-                        $crate::spread_names(LINES, &[$(Name::$name),+]);
+                    const NAMES: [<$model as $crate::Variables>::Name; $crate::count_elements(LINES)] =
+                        $crate::spread_names(LINES, &[$(<<$model as $crate::Variables>::Name>::$name),+]);
                     &NAMES
                 };
 
@@ -583,6 +561,26 @@ macro_rules! variables {
                 }
             }
         };
+    };
+    (@names [] $($variants:tt)+) => { $crate::variables! { @names [Name] $($variants)+ } };
+    (@names [$names:ident] $($variants:tt)+) => {
+        /// The names of the variables: what stands at the begin of each line of `variables!`, which defines them. `names` says
+        /// there what this is called.
+        #[allow(non_camel_case_types)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u32)]
+        pub enum $names {
+            $($variants)+
+        }
+    };
+    (@name) => { Name };
+    (@name $names:ident) => { $names };
+    (@refined [$($variable:tt)+]) => { $($variable)+ };
+    (@refined [$($variable:tt)+] . depends_on ($($known:ident),+ $(,)?) $($rest:tt)*) => {
+        $crate::variables!(@refined [$($variable)+ . depends_on(&[$($known),+])] $($rest)*)
+    };
+    (@refined [$($variable:tt)+] . $refinement:ident $arguments:tt $($rest:tt)*) => {
+        $crate::variables!(@refined [$($variable)+ . $refinement $arguments] $($rest)*)
     };
     (@label $name:ident) => { ::core::stringify!($name) };
     (@label $name:ident $label:literal) => { $label };

@@ -282,7 +282,8 @@ impl<M> Variable<M> {
     }
 
     /// The variable, an output or local, as one that depends on no inputs, states, parameters and other start
-    /// values but these, given by their names.
+    /// values but these, given by their names: `depends_on(u, x)` in the table, or `depends_on(&[u, x])`; on nothing
+    /// `depends_on(&[])`.
     ///
     /// It is about direct dependence (section 2.2.8): at a communication point or instant, and while
     /// initializing. An output that an input reaches through a step or a state only does not depend on that
@@ -610,6 +611,34 @@ pub const fn shape_of_place<M, T: Place>(_: fn(&M) -> &T) -> Shape {
 #[doc(hidden)]
 pub const fn shape_of_calculation<M, T: Place>(_: fn(&M) -> T) -> Shape {
     Shape { base: T::Element::BASE, dimensions: T::DIMENSIONS }
+}
+
+/// The Real that is an element of an array, or the scalar.
+#[doc(hidden)]
+#[inline(always)]
+pub fn read_real(place: &impl Place, number: usize) -> f64 {
+    place.element(number).real()
+}
+
+/// The same of any type.
+#[doc(hidden)]
+#[inline(always)]
+pub fn read_value(place: &impl Place, number: usize) -> Value {
+    place.element(number).value()
+}
+
+/// Sets a Real.
+#[doc(hidden)]
+#[inline(always)]
+pub fn set_real(place: &mut impl Place, number: usize, value: f64) {
+    place.element_mut(number).set_real(value);
+}
+
+/// Sets a value of any type.
+#[doc(hidden)]
+#[inline(always)]
+pub fn set_value(place: &mut impl Place, number: usize, value: &Value) {
+    place.element_mut(number).assign(value);
 }
 
 /// The Reals of an array, from an element on; 0 if they are finite.

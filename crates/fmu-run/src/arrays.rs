@@ -163,3 +163,63 @@ impl Arrays {
         whole
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::description::Description;
+
+    const TEXT: &str = r#"<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="{}">
+        <ModelExchange modelIdentifier="m"/>
+        <ModelVariables>
+            <UInt64 name="n" valueReference="7" causality="structuralParameter" start="3"/>
+            <Float64 name="x" valueReference="2" causality="output" start="1 2 3"><Dimension valueReference="7"/></Float64>
+            <Float64 name="der(x)" valueReference="4"><Dimension valueReference="7"/></Float64>
+            <Int8 name="m" valueReference="3" start="5"><Dimension start="2"/><Dimension start="3"/></Int8>
+            <String name="s" valueReference="9"><Dimension start="2"/><Start value="a b"/><Start value=""/></String>
+            <Float64 name="huge" valueReference="8" start="0"><Dimension start="4000000000"/></Float64>
+            <Float64 name="more" valueReference="6" start="0"><Dimension start="4294967296"/><Dimension start="4294967296"/></Float64>
+            <Float64 name="unsized" valueReference="5"><Dimension valueReference="70"/></Float64>
+            <Float64 name="y" valueReference="1" causality="output"/>
+        </ModelVariables>
+        <ModelStructure>
+            <Output valueReference="2" dependencies="3 1"/>
+            <ContinuousStateDerivative valueReference="4"/>
+        </ModelStructure>
+    </fmiModelDescription>"#;
+
+    #[test]
+    fn elements_are_variables() {
+        let description = Description::parse(TEXT).unwrap();
+        let names: Vec<_> = description.variables.iter().map(|of| of.name.as_str()).collect();
+        let expected = "n x[1] x[2] x[3] der(x[1]) der(x[2]) der(x[3]) m[1,1] m[1,2] m[1,3] m[2,1] m[2,2] m[2,3] s[1] s[2] y";
+        assert_eq!(names.join(" "), expected);
+        assert_eq!(description.states, 3);
+        let of = |name| description.variable(name).unwrap();
+        let start = |name| of(name).start.as_deref();
+        assert_eq!(
+            [start("x[3]"), start("m[2,2]"), start("s[1]"), start("s[2]")],
+            [Some("3"), Some("5"), Some("a b"), Some("")]
+        );
+        let mut references: Vec<_> = description.variables.iter().map(|of| of.reference).collect();
+        references.sort_unstable();
+        references.dedup();
+        assert_eq!(references.len(), names.len(), "each has its own");
+        let known: Vec<_> = (1..=2).flat_map(|i| (1..=3).map(move |j| format!("m[{i},{j}]"))).collect();
+        let known = known.iter().map(|name| of(name).reference).chain([1]).collect();
+        assert_eq!(of("x[2]").depends_on, Some(known));
+    }
+
+    #[test]
+    fn whole_arrays_are_passed() {
+        let description = Description::parse(TEXT).unwrap();
+        let references: Vec<_> = ["x[3]", "y", "x[1]", "x[3]"]
+            .iter()
+            .map(|name| description.variable(name).unwrap().reference)
+            .collect();
+        let whole = description.arrays.whole(&references);
+        assert_eq!((whole.references.clone(), whole.count), (vec![2, 1], 4));
+        assert_eq!(whole.places, [2, 3, 0, 2]);
+        assert!(!whole.is_complete() && description.arrays.among(&references));
+        assert!(!description.arrays.among(&[1, 2, 7]));
+    }
+}

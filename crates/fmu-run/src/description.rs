@@ -280,9 +280,12 @@ fn depend(root: Node, standard: Standard, variables: &mut [Variable], arrays: &A
             for node in outputs {
                 let Some(reference) = number(node, "valueReference") else { continue };
                 let own = arrays.elements(reference);
-                let known = list(node, "dependencies").map(|known| {
-                    known.into_iter().flat_map(|known| arrays.elements(known)).collect::<Vec<_>>()
+                let known = list(node, "dependencies").filter(|known| {
+                    // Of large arrays, which may depend on all inputs for all that is known here.
+                    own.len() * known.iter().map(|known| arrays.length(*known)).sum::<usize>() < 1 << 22
                 });
+                let known: Option<Vec<u32>> =
+                    known.map(|known| known.into_iter().flat_map(|known| arrays.elements(known)).collect());
                 let outputs = variables.iter_mut().filter(|of| own.contains(&of.reference));
                 outputs.for_each(|output| output.depends_on.clone_from(&known));
             }

@@ -49,12 +49,12 @@ variables! { for Rod;
     /// Whether they are switched on
     switches = input(&SWITCH) in switches;
     /// Rates of the temperatures
-    der_T as "der(T)" = local(&RATE).derivative_of(T).depends_on(&[wall, T, power, switches, capacities, conductance])
+    der_T as "der(T)" = local(&RATE).derivative_of(T).depends_on(wall, T, power, switches, capacities, conductance)
         by |rod| rod.rates();
     /// Mean temperature
     mean = output(&TEMPERATURE).depends_on(&[T]) by |rod| rod.temperatures.iter().sum::<f64>() / PIECES as f64;
     /// Means of the halves
-    means = output(&TEMPERATURE).depends_on(&[T]) by |rod| rod.means();
+    means = output(&TEMPERATURE).depends_on(T) by |rod| rod.means();
     /// Capacities of the pieces
     capacities = parameter(&CAPACITY) in capacities;
     /// Conductance from piece to piece

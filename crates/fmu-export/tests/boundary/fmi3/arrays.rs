@@ -150,24 +150,20 @@ macro_rules! rack {
             bytes: [Vec<u8>; 2],
         }
 
-        mod names {
-            use super::*;
-
-            variables! { for Rack;
-                $(
-                    /// Two
-                    $name = input(&{ $kind }) in $name;
-                )+
+        variables! { for Rack, names Shelf;
+            $(
                 /// Two
-                bytes = input(&BINARY) in bytes;
-            }
+                $name = input(&{ $kind }) in $name;
+            )+
+            /// Two
+            bytes = input(&BINARY) in bytes;
         }
 
         #[test]
         fn numbers_of_every_type() {
             let fmu = Importer::in_mode::<Rack>(Interface::CoSimulation, Mode::StepComplete);
             $({
-                let vr = reference(Rack::place(names::Name::$name) as u32);
+                let vr = reference(Rack::place(Shelf::$name) as u32);
                 let (values, mut read) = ([<$type>::MAX, <$type>::MIN], [<$type>::default(); 2]);
                 fmu.ok(fmu.$set(&vr, 1, values.as_ptr(), 2));
                 fmu.ok(fmu.$get(&vr, 1, read.as_mut_ptr(), 2));
@@ -213,7 +209,7 @@ offer!(Rack: CoSimulation);
 #[test]
 fn bytes_of_two() {
     let fmu = Importer::in_mode::<Rack>(Interface::CoSimulation, Mode::StepComplete);
-    let vr = reference(Rack::place(names::Name::bytes) as u32);
+    let vr = reference(Rack::place(Shelf::bytes) as u32);
     let (sizes, values) = ([3, 1], [c"abc", c"d"].map(|text| text.as_ptr().cast()));
     fmu.ok(fmu.fmi3SetBinary(&vr, 1, sizes.as_ptr(), values.as_ptr(), 2));
     let (mut sizes, mut read) = ([0; 2], [null::<u8>(); 2]);
