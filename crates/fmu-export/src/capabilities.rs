@@ -158,6 +158,24 @@ pub trait Partials: Model {
     fn partial_by_time(&self, _unknown: Self::Name) -> Option<f64> {
         Some(0.0)
     }
+
+    /// All three for models with arrays, whose elements count from 0, row by row; a scalar is its element 0. The known is
+    /// `None` for the time; `initial` in Initialization Mode.
+    ///
+    /// Without it, all elements of an array have the same derivatives.
+    #[inline]
+    fn element_partial(
+        &self,
+        unknown: (Self::Name, usize),
+        known: Option<(Self::Name, usize)>,
+        initial: bool,
+    ) -> Option<f64> {
+        match known {
+            None => self.partial_by_time(unknown.0),
+            Some((known, _)) if initial => self.initial_partial(unknown.0, known),
+            Some((known, _)) => self.partial(unknown.0, known),
+        }
+    }
 }
 
 /// The model uses time derivatives of inputs in Co-Simulation (section 4.2.1).
@@ -165,6 +183,13 @@ pub trait InputDerivatives: CoSimulation {
     /// Takes the time derivative of an input, of order 1 or higher, at the current communication point. Orders that
     /// the model has no use for are ignored.
     fn set_input_derivative(&mut self, of: Self::Name, order: u32, value: f64);
+
+    /// The same for models with arrays among their inputs, whose elements count from 0, row by row; a scalar is its
+    /// element 0. Without it, that of each element goes to [`set_input_derivative`](Self::set_input_derivative).
+    #[inline]
+    fn set_element_derivative(&mut self, of: Self::Name, _element: usize, order: u32, value: f64) {
+        self.set_input_derivative(of, order, value);
+    }
 }
 
 /// The model knows time derivatives of its variables in Co-Simulation (section 4.2.1).
@@ -175,4 +200,11 @@ pub trait OutputDerivatives: CoSimulation {
     /// The time derivative of an order from 1 to [`HIGHEST`](Self::HIGHEST) of any Real variable that is no parameter,
     /// now.
     fn output_derivative(&self, of: Self::Name, order: u32) -> f64;
+
+    /// The same for models with arrays, whose elements count from 0, row by row; a scalar is its element 0. Without it,
+    /// all elements have that of [`output_derivative`](Self::output_derivative).
+    #[inline]
+    fn element_derivative(&self, of: Self::Name, _element: usize, order: u32) -> f64 {
+        self.output_derivative(of, order)
+    }
 }

@@ -38,16 +38,16 @@ pub trait Exported: Model {
     #[doc(hidden)]
     fn exported_partial(
         &self,
-        _unknown: Self::Name,
-        _known: Option<Self::Name>,
+        _unknown: (Self::Name, usize),
+        _known: Option<(Self::Name, usize)>,
         _initial: bool,
     ) -> Option<f64> {
         None
     }
     #[doc(hidden)]
-    fn exported_input_derivative(&mut self, _of: Self::Name, _order: u32, _value: f64) {}
+    fn exported_input_derivative(&mut self, _of: (Self::Name, usize), _order: u32, _value: f64) {}
     #[doc(hidden)]
-    fn exported_output_derivative(&self, _of: Self::Name, _order: u32) -> f64 {
+    fn exported_output_derivative(&self, _of: (Self::Name, usize), _order: u32) -> f64 {
         0.0
     }
 }
@@ -180,31 +180,34 @@ macro_rules! offer {
 
         fn exported_partial(
             &self,
-            unknown: <Self as $crate::Variables>::Name,
-            known: ::core::option::Option<<Self as $crate::Variables>::Name>,
+            unknown: (<Self as $crate::Variables>::Name, usize),
+            known: ::core::option::Option<(<Self as $crate::Variables>::Name, usize)>,
             initial: bool,
         ) -> ::core::option::Option<f64> {
-            match known {
-                ::core::option::Option::None => $crate::Partials::partial_by_time(self, unknown),
-                ::core::option::Option::Some(known) if initial => {
-                    $crate::Partials::initial_partial(self, unknown, known)
-                }
-                ::core::option::Option::Some(known) => $crate::Partials::partial(self, unknown, known),
-            }
+            $crate::Partials::element_partial(self, unknown, known, initial)
         }
     };
     (@capability InputDerivatives) => {
         const INPUT_DERIVATIVES: bool = true;
 
-        fn exported_input_derivative(&mut self, of: <Self as $crate::Variables>::Name, order: u32, value: f64) {
-            $crate::InputDerivatives::set_input_derivative(self, of, order, value);
+        fn exported_input_derivative(
+            &mut self,
+            (of, element): (<Self as $crate::Variables>::Name, usize),
+            order: u32,
+            value: f64,
+        ) {
+            $crate::InputDerivatives::set_element_derivative(self, of, element, order, value);
         }
     };
     (@capability OutputDerivatives) => {
         const OUTPUT_DERIVATIVES: u32 = <Self as $crate::OutputDerivatives>::HIGHEST;
 
-        fn exported_output_derivative(&self, of: <Self as $crate::Variables>::Name, order: u32) -> f64 {
-            $crate::OutputDerivatives::output_derivative(self, of, order)
+        fn exported_output_derivative(
+            &self,
+            (of, element): (<Self as $crate::Variables>::Name, usize),
+            order: u32,
+        ) -> f64 {
+            $crate::OutputDerivatives::element_derivative(self, of, element, order)
         }
     };
     (@capability $other:ident) => {

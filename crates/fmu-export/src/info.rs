@@ -32,6 +32,12 @@ pub struct Info {
 }
 
 /// The experiment an importer proposes to its user (section 2.2.5).
+///
+/// ```
+/// use fmu_export::DefaultExperiment;
+///
+/// const TEN_SECONDS: DefaultExperiment = DefaultExperiment { stop_time: 10.0, ..DefaultExperiment::DEFAULT };
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct DefaultExperiment {
     /// Start time, s.
@@ -42,6 +48,17 @@ pub struct DefaultExperiment {
     pub step_size: f64,
     /// Relative tolerance for the importer's solver in Model Exchange.
     pub tolerance: f64,
+}
+
+impl DefaultExperiment {
+    /// A second in steps of a millisecond.
+    pub const DEFAULT: Self = Self { start_time: 0.0, stop_time: 1.0, step_size: 1e-3, tolerance: 1e-6 };
+}
+
+impl Default for DefaultExperiment {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
 }
 
 impl Info {
@@ -56,12 +73,7 @@ impl Info {
             version: "",
             license: "",
             copyright: "",
-            default_experiment: DefaultExperiment {
-                start_time: 0.0,
-                stop_time: 1.0,
-                step_size: 1e-3,
-                tolerance: 1e-6,
-            },
+            default_experiment: DefaultExperiment::DEFAULT,
             smooth: false,
         }
     }

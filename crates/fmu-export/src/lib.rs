@@ -40,14 +40,20 @@ pub use saved::{Saved, StateVisitor};
 pub use table::Variables;
 pub use types::{Attributes, BINARY, BOOLEAN, INTEGER, Item, NUMBER, STRING, TIME, Type};
 pub use units::{BaseUnit, DisplayUnit, Unit};
-pub use value::{Enumeration, Scalar, Value};
+pub use value::{Enumeration, Place, Scalar, Value};
 pub use variable::{Index, Variable};
 
 #[doc(hidden)]
 pub use {
     fmi_abi::{fmi2_functions, fmi3_functions},
     instance::{SavedTrial, Trial},
-    table::{StateOfTable, check_names, count_states, find_states},
-    value::visit_enumeration,
-    variable::{Read, Store, base_of_calculation, base_of_place, read},
+    table::{
+        StateOfTable, check_line, count_elements, count_letters, count_states, find_states, spread,
+        spread_names, write_names,
+    },
+    value::{Dimensions, visit_enumeration},
+    variable::{
+        Read, ReadAt, Shape, Store, StoreAt, read, read_real, read_reals, read_value, set_real, set_value,
+        shape_of_calculation, shape_of_place,
+    },
 };

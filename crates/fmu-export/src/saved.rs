@@ -1,5 +1,7 @@
 //! What a serialized state holds: [`Saved`] for every Rust type that a model may remember something in.
 
+use std::collections::{BTreeMap, VecDeque};
+
 /// Sees every value of a model's state in turn; counts it, writes it or replaces it.
 pub trait StateVisitor {
     /// A floating-point value, of any kind.
@@ -23,8 +25,8 @@ pub trait StateVisitor {
 
 /// A value that can be written into a serialized state and read back.
 ///
-/// Implemented for numbers, truth values, texts, options, pairs, arrays and vectors of such; [`saved!`](crate::saved)
-/// implements it for a struct.
+/// Implemented for numbers, truth values, texts, and for options, boxes, tuples, arrays, vectors, queues and ordered maps of such;
+/// [`saved!`](crate::saved) implements it for a struct.
 pub trait Saved {
     /// Shows every value to the visitor, always in the same order: the same list serves to write and to read.
     fn visit(&mut self, visitor: &mut dyn StateVisitor);
@@ -63,7 +65,7 @@ macro_rules! whole_numbers {
     };
 }
 
-whole_numbers!(i8 i16 i32 i64 u8 u16 u32);
+whole_numbers!(i8 i16 i32 i64 isize u8 u16 u32);
 
 /// The same bits as an `i64`.
 impl Saved for u64 {
@@ -71,6 +73,18 @@ impl Saved for u64 {
         let mut number = self.cast_signed();
         visitor.integer(&mut number);
         *self = number.cast_unsigned();
+    }
+}
+
+/// What fits another machine only is refused there.
+impl Saved for usize {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        let mut number = *self as u64;
+        number.visit(visitor);
+        match Self::try_from(number) {
+            Ok(number) => *self = number,
+            Err(_) => visitor.invalid(),
+        }
     }
 }
 
@@ -92,10 +106,21 @@ impl<T: Saved, const N: usize> Saved for [T; N] {
     }
 }
 
-impl<A: Saved, B: Saved> Saved for (A, B) {
+macro_rules! tuples {
+    ($(($($type:ident $place:tt),+))+) => {
+        $(impl<$($type: Saved),+> Saved for ($($type),+) {
+            fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+                $( self.$place.visit(visitor); )+
+            }
+        })+
+    };
+}
+
+tuples!((A 0, B 1) (A 0, B 1, C 2) (A 0, B 1, C 2, D 3));
+
+impl<T: Saved> Saved for Box<T> {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
-        self.0.visit(visitor);
-        self.1.visit(visitor);
+        (**self).visit(visitor);
     }
 }
 
@@ -122,6 +147,26 @@ impl<T: Saved + Default> Saved for Vec<T> {
             value.visit(visitor);
             self.push(value);
         }
+    }
+}
+
+impl<T: Saved + Default> Saved for VecDeque<T> {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        let mut values = Vec::from(std::mem::take(self));
+        values.visit(visitor);
+        *self = values.into();
+    }
+}
+
+impl<K: Saved + Default + Ord, V: Saved + Default> Saved for BTreeMap<K, V> {
+    fn visit(&mut self, visitor: &mut dyn StateVisitor) {
+        let mut entries: Vec<(K, V)> = std::mem::take(self).into_iter().collect();
+        entries.visit(visitor);
+        // No map was written in another order.
+        if !entries.is_sorted_by(|(one, _), (next, _)| one < next) {
+            visitor.invalid();
+        }
+        *self = entries.into_iter().collect();
     }
 }
 

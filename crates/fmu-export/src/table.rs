@@ -1,23 +1,45 @@
 //! The table of variables: [`variables!`](crate::variables) and what it makes.
 
 use crate::saved::StateVisitor;
-use crate::variable::{Variable, refuse};
+use crate::variable::{Index, Variable, refuse};
 use std::fmt::Debug;
 
 /// The variables of a model. Implemented by [`variables!`](crate::variables).
 pub trait Variables: Sized + 'static {
-    /// The names of the variables.
+    /// The names of the lines.
     type Name: Copy + PartialEq + Debug + 'static;
 
-    /// The variables; a variable's place in this list is its value reference.
+    /// The variables, one for each line.
+    #[doc(hidden)]
+    const LINES: &'static [Variable<Self>];
+
+    /// The variables, of an array each element; a variable's place in this list is its value reference in FMI 2.0.
     const TABLE: &'static [Variable<Self>];
 
-    /// Their names, in the same order.
+    /// Their names, in the same order; the elements of an array have the same.
     const NAMES: &'static [Self::Name];
 
     /// Places of the states and of their derivatives in the table, by the place of the state.
     #[doc(hidden)]
     const STATES: &'static [StateOfTable];
+
+    /// Whether there is an array among the variables.
+    #[doc(hidden)]
+    const ARRAYS: bool = has_arrays(Self::LINES);
+
+    /// The place in the table of a variable, of an array that of its first element.
+    fn place(name: Self::Name) -> usize {
+        let place = Self::NAMES.iter().position(|known| *known == name);
+        place.expect("the table has a variable for each name")
+    }
+
+    /// The name of the variable at a place of the table, and which element of it that is.
+    #[doc(hidden)]
+    #[inline]
+    fn element(place: u32) -> (Self::Name, usize) {
+        let number = if Self::ARRAYS { Self::TABLE[place as usize].element() } else { 0 };
+        (Self::NAMES[place as usize], number)
+    }
 
     /// Shows what the model remembers besides its variables.
     #[doc(hidden)]
@@ -41,6 +63,177 @@ pub struct StateOfTable {
     pub derivative: u32,
 }
 
+const fn has_arrays<M>(lines: &[Variable<M>]) -> bool {
+    let mut line = 0;
+    while line < lines.len() {
+        if is_array(&lines[line]) {
+            return true;
+        }
+        line += 1;
+    }
+    false
+}
+
+const fn is_array<M>(variable: &Variable<M>) -> bool {
+    !variable.dimensions().is_empty()
+}
+
+/// The number of variables before a line.
+const fn place_of<M>(lines: &[Variable<M>], line: usize) -> usize {
+    let (mut place, mut before) = (0, 0);
+    while before < line {
+        place += lines[before].length();
+        before += 1;
+    }
+    place
+}
+
+/// The number of variables that lines have, each element of an array being one.
+#[doc(hidden)]
+pub const fn count_elements<M>(lines: &[Variable<M>]) -> usize {
+    place_of(lines, lines.len())
+}
+
+/// The number of bytes of the names of all elements of arrays.
+#[doc(hidden)]
+pub const fn count_letters<M>(lines: &[Variable<M>]) -> usize {
+    let (mut count, mut line) = (0, 0);
+    while line < lines.len() {
+        let mut element = 0;
+        while is_array(&lines[line]) && element < lines[line].length() {
+            count += NameOfElement::new(&lines[line], element).length;
+            element += 1;
+        }
+        line += 1;
+    }
+    count
+}
+
+/// The names of all elements of arrays, which have this many bytes.
+#[doc(hidden)]
+pub const fn write_names<M, const LETTERS: usize>(lines: &[Variable<M>]) -> [u8; LETTERS] {
+    let mut letters = [0; LETTERS];
+    let (mut written, mut line) = (0, 0);
+    while line < lines.len() {
+        let mut element = 0;
+        while is_array(&lines[line]) && element < lines[line].length() {
+            let name = NameOfElement::new(&lines[line], element);
+            let mut place = 0;
+            while place < name.length {
+                letters[written] = name.letters[place];
+                written += 1;
+                place += 1;
+            }
+            element += 1;
+        }
+        line += 1;
+    }
+    letters
+}
+
+/// The name of an array with the indices of an element, which count from 1 (section 2.2.9 of FMI 2.0): they belong to the
+/// variable, as in `der(T[3])`.
+struct NameOfElement {
+    letters: [u8; 300],
+    length: usize,
+}
+
+impl NameOfElement {
+    const fn new<M>(array: &Variable<M>, element: usize) -> Self {
+        let name = array.name_of_array().as_bytes();
+        let is_derivative = matches!(name, [b'd', b'e', b'r', b'(', ..]);
+        let mut end = 0;
+        while end < name.len() && !(is_derivative && matches!(name[end], b',' | b')')) {
+            end += 1;
+        }
+        let mut written = Self { letters: [0; 300], length: 0 }.with(name.split_at(end).0);
+        let sizes = array.dimensions();
+        let mut direction = 0;
+        while direction < sizes.len() {
+            let (mut row, mut inner) = (1, direction + 1);
+            while inner < sizes.len() {
+                row *= sizes[inner];
+                inner += 1;
+            }
+            written = written.with(if direction == 0 { b"[" } else { b"," });
+            written = written.with_number(element / row % sizes[direction] + 1);
+            direction += 1;
+        }
+        written.with(b"]").with(name.split_at(end).1)
+    }
+
+    const fn with(mut self, text: &[u8]) -> Self {
+        let mut place = 0;
+        while place < text.len() {
+            assert!(self.length < self.letters.len(), "the name of an array is too long");
+            self.letters[self.length] = text[place];
+            self.length += 1;
+            place += 1;
+        }
+        self
+    }
+
+    const fn with_number(self, number: usize) -> Self {
+        let written = if number < 10 { self } else { self.with_number(number / 10) };
+        written.with(&[b'0' + (number % 10) as u8])
+    }
+}
+
+/// The table of variables, with their names from the letters of [`write_names`].
+#[doc(hidden)]
+pub const fn spread<M, const COUNT: usize>(
+    lines: &[Variable<M>],
+    letters: &'static [u8],
+) -> [Variable<M>; COUNT] {
+    let mut table = [lines[0]; COUNT];
+    let (mut place, mut line, mut letters) = (0, 0, letters);
+    while line < lines.len() {
+        let of = &lines[line];
+        let differentiated = match of.differentiates() {
+            Some(line) => Some(place_of(lines, line as usize)),
+            None => None,
+        };
+        let mut element = 0;
+        while element < of.length() {
+            let name = if is_array(of) {
+                let (name, rest) = letters.split_at(NameOfElement::new(of, element).length);
+                letters = rest;
+                match std::str::from_utf8(name) {
+                    Ok(name) => name,
+                    Err(_) => of.name(),
+                }
+            } else {
+                of.name()
+            };
+            table[place] = of.spread(line, element, name);
+            if let Some(first) = differentiated {
+                table[place] = table[place].differentiating(first + element);
+            }
+            place += 1;
+            element += 1;
+        }
+        line += 1;
+    }
+    table
+}
+
+/// The names of the lines, each as often as it has elements.
+#[doc(hidden)]
+pub const fn spread_names<M, N: Copy, const COUNT: usize>(lines: &[Variable<M>], names: &[N]) -> [N; COUNT] {
+    let mut spread = [names[0]; COUNT];
+    let (mut place, mut line) = (0, 0);
+    while line < lines.len() {
+        let mut element = 0;
+        while element < lines[line].length() {
+            spread[place] = names[line];
+            place += 1;
+            element += 1;
+        }
+        line += 1;
+    }
+    spread
+}
+
 /// The number of states in a table.
 #[doc(hidden)]
 pub const fn count_states<M>(table: &[Variable<M>]) -> usize {
@@ -58,13 +251,10 @@ pub const fn find_states<M, const N: usize>(table: &[Variable<M>]) -> [StateOfTa
     let mut states = [StateOfTable { state: 0, derivative: 0 }; N];
     let (mut found, mut place) = (0, 0);
     while place < table.len() {
-        if table[place].is_state() {
-            let Some(derivative) = derivative(table, place as u32) else {
-                refuse(
-                    table[place].name(),
-                    "a state needs its derivative in the table: ... = local(...).derivative_of(the state) by ...",
-                );
-            };
+        // A line without is refused.
+        if table[place].is_state()
+            && let Some(derivative) = derivative(table, place as u32)
+        {
             states[found] = StateOfTable { state: place as u32, derivative };
             found += 1;
         }
@@ -84,20 +274,56 @@ const fn derivative<M>(table: &[Variable<M>], state: u32) -> Option<u32> {
     None
 }
 
-/// Names are unique (section 2.2.7). The compiler sees to those of the items, not to those that are texts.
+/// Refuses a line that cannot be, at the place in the author's file where this is called.
 #[doc(hidden)]
-pub const fn check_names<M>(table: &[Variable<M>]) {
-    let mut place = 0;
-    while place < table.len() {
-        let mut other = 0;
-        while other < place {
-            if is_equal(table[place].name().as_bytes(), table[other].name().as_bytes()) {
-                refuse(table[place].name(), "there are two variables of this name");
-            }
-            other += 1;
+#[track_caller]
+pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
+    let of = &lines[line as usize];
+    if let Some(fault) = of.fault() {
+        refuse(of.name(), fault);
+    }
+    // Section 2.2.7. The compiler sees to the names of the items, not to those that are texts.
+    let mut other = 0;
+    while other < lines.len() {
+        if other < line as usize && has_name(of, &lines[other]) || is_element(of, &lines[other]) {
+            refuse(of.name(), "there are two variables of this name");
         }
+        other += 1;
+    }
+    if of.is_state() && derivative(lines, line).is_none() {
+        refuse(
+            of.name(),
+            "a state needs its derivative in the table: ... = local(...).derivative_of(the state) by ...",
+        );
+    }
+    if let Some(differentiated) = of.differentiates()
+        && !of.has_dimensions(&lines[differentiated as usize])
+    {
+        refuse(of.name(), "it must be an array of the same length as what it is the derivative of");
+    }
+}
+
+const fn has_name<M>(one: &Variable<M>, other: &Variable<M>) -> bool {
+    is_equal(one.name().as_bytes(), other.name().as_bytes())
+}
+
+/// Whether a variable is called like an element of an array.
+const fn is_element<M>(one: &Variable<M>, array: &Variable<M>) -> bool {
+    let name = one.name().as_bytes();
+    let (mut place, mut has_index) = (0, false);
+    while place < name.len() {
+        has_index |= name[place] == b'[';
         place += 1;
     }
+    let mut element = 0;
+    while has_index && is_array(array) && element < array.length() {
+        let of = NameOfElement::new(array, element);
+        if is_equal(name, of.letters.split_at(of.length).0) {
+            return true;
+        }
+        element += 1;
+    }
+    false
 }
 
 const fn is_equal(one: &[u8], other: &[u8]) -> bool {
@@ -111,7 +337,7 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// Writes a model's table of variables: what each variable is, and where its value lives or how it is calculated.
 ///
 /// ```text
-/// variables! { for Model, memory in PLACE, PLACE, ...;      // "memory in" if there is any
+/// variables! { for Model, names Name, memory in PLACE, ...;  // both if you like, and there is any
 ///     /// Description that importers show
 ///     name = KIND(&TYPE).refinement() in PLACE;              // lives in a field of the model
 ///     name = KIND(&TYPE) in PLACE then |model| { ... };      // and this is done after it was set
@@ -125,11 +351,19 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// is a path of fields, such as `motors[0].theta`. Start values are those of the model that
 /// [`Model::new`](crate::Model::new) makes.
 ///
+/// A value that is an array, in a place or calculated, makes the line an array: `[f64; 8]`, or `[[f64; 2]; 3]` as a matrix,
+/// row by row. FMI 3.0 has one variable for it, FMI 2.0 a scalar for each element, `T[1]` to `T[8]`; a start value, a range and
+/// a refusal are those of an element. `then` follows the setting of each element; `by` gives the whole array, which is calculated
+/// once for elements that are read together. The derivative of an array is an array of the same length, and whoever depends on
+/// an array depends on all of its elements. With arrays, the names of all variables must be those of the structured naming convention
+/// (section 2.2.9 of FMI 2.0): as in Modelica, for example `motor.current`, `axes[1].angle`, `'any text'`.
+///
 /// What lives in a place and all that is in the `memory` belongs to a serialized state; see [`Saved`](crate::Saved). What
 /// `initialize`, a step or an event changes must be there; `build_fmu` of fmu-package refuses models where something is missing.
 ///
-/// The macro implements [`Variables`] for the model and defines `Name`, an enum with the names of the variables,
-/// for [`Partials`](crate::Partials) and its like.
+/// The macro implements [`Variables`] for the model and defines an enum with the names of the lines, for
+/// [`Partials`](crate::Partials) and its like: `Name`, or what stands behind `names`, as where a module has two models or a `Name`
+/// of its own. [`Variables::place`] tells where in the table a name is.
 ///
 /// ```
 /// use fmu_export::{NUMBER, variables};
@@ -150,18 +384,19 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// }
 ///
 /// use fmu_export::Variables;
-/// assert_eq!(Lag::TABLE[Name::der_x as usize].name(), "der(x)");
-/// assert_eq!(Lag::TABLE[Name::x as usize].description(), "Output, follows the input");
+/// assert_eq!(Lag::TABLE[Lag::place(Name::der_x)].name(), "der(x)");
+/// assert_eq!(Lag::TABLE[Lag::place(Name::x)].description(), "Output, follows the input");
 /// ```
 #[macro_export]
 macro_rules! variables {
     (
         for $model:ty
+        $(, names $names:ident )?
         $(, memory in $( $memory:ident $([ $memory_at:expr ])* $( . $memory_field:tt $([ $memory_place:expr ])* )* ),+ )? ;
         $(
             $(#[doc = $text:literal])*
             $name:ident $( as $label:literal )? =
-                $kind:ident ( $($of:expr),* ) $( . $refinement:ident ( $($argument:expr),* $(,)? ) )*
+                $kind:tt $of:tt $( . $refinement:ident $arguments:tt )*
                 $(
                     in $first:ident $([ $at:expr ])* $( . $field:tt $([ $place:expr ])* )*
                     $( then | $changed:ident | $after:block )?
@@ -169,13 +404,7 @@ macro_rules! variables {
                 $( by $calculate:expr )? ;
         )+
     ) => {
-        /// The names of the variables.
-        #[allow(non_camel_case_types)]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(u32)]
-        pub enum Name {
-            $( $(#[doc = $text])* $name ),+
-        }
+        $crate::variables! { @names [$($names)?] $( $(#[doc = $text])* $name ),+ }
 
         const _: () = {
             #[allow(non_upper_case_globals, non_camel_case_types, unused)]
@@ -187,56 +416,109 @@ macro_rules! variables {
                 $( pub const $name: $crate::Index = $crate::Index(Place::$name as u32); )+
             }
 
-            impl $crate::Variables for $model {
-                type Name = Name;
+            $(
+                // A function called like the kind, so that the compiler points at the author's line: tokens keep their place in
+                // the author's file where a macro uses them first.
+                #[allow(long_running_const_eval, clippy::needless_borrows_for_generic_args)]
+                const _: () = {
+                    #[track_caller]
+                    const fn $kind<T: ::core::marker::Copy>(_: T) {
+                        $crate::check_line(<$model as $crate::Variables>::LINES, index::$name);
+                    }
+                    $kind $of
+                };
+            )+
 
-                const TABLE: &'static [$crate::Variable<Self>] = &[$({
+            impl $crate::Variables for $model {
+                type Name = $crate::variables!(@name $($names)?);
+
+                const LINES: &'static [$crate::Variable<Self>] = &[$({
                     let variable = {
                         #[allow(unused_imports)]
                         use index::*;
-                        $crate::Variable::<$model>::$kind($($of),*) $( . $refinement($($argument),*) )*
+                        $crate::variables!(
+                            @refined [$crate::Variable::<$model>::$kind $of] $( . $refinement $arguments )*
+                        )
                     };
                     $(
                         let variable = variable.stored(
                             $crate::Read {
-                                base: $crate::base_of_place(|model: &$model| {
-                                    &model.$first $([$at])* $( .$field $([$place])* )*
+                                shape: $crate::shape_of_place(|model: &$model| {
+                                    &(*model).$first $([$at])* $( .$field $([$place])* )*
                                 }),
-                                real: |model| $crate::Scalar::real(
-                                    &model.$first $([$at])* $( .$field $([$place])* )*
-                                ),
-                                value: |model| $crate::Scalar::value(
-                                    &model.$first $([$at])* $( .$field $([$place])* )*
-                                ),
+                                real: |model| {
+                                    $crate::read_real(&(*model).$first $([$at])* $( .$field $([$place])* )*, 0)
+                                },
+                                value: |model| {
+                                    $crate::read_value(&(*model).$first $([$at])* $( .$field $([$place])* )*, 0)
+                                },
                             },
                             $crate::Store {
                                 real: |model, value| {
-                                    $crate::Scalar::set_real(
-                                        &mut model.$first $([$at])* $( .$field $([$place])* )*,
+                                    $crate::set_real(
+                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
+                                        0,
                                         value,
                                     );
                                     $( { let $changed = model; $after } )?
                                 },
                                 value: |model, value| {
-                                    $crate::Scalar::assign(
-                                        &mut model.$first $([$at])* $( .$field $([$place])* )*,
+                                    $crate::set_value(
+                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
+                                        0,
                                         value,
                                     );
                                     $( { let $changed = model; $after } )?
                                 },
                                 visit: |model, visitor| $crate::Saved::visit(
-                                    &mut model.$first $([$at])* $( .$field $([$place])* )*,
+                                    &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
                                     visitor,
                                 ),
+                            },
+                            $crate::ReadAt {
+                                reals: |model, first, values| $crate::read_reals(
+                                    &(*model).$first $([$at])* $( .$field $([$place])* )*,
+                                    first,
+                                    values,
+                                ),
+                                value: |model, number| {
+                                    $crate::read_value(&(*model).$first $([$at])* $( .$field $([$place])* )*, number)
+                                },
+                            },
+                            $crate::StoreAt {
+                                real: |model, number, value| {
+                                    $crate::set_real(
+                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
+                                        number,
+                                        value,
+                                    );
+                                    $( { let $changed = model; $after } )?
+                                },
+                                value: |model, number, value| {
+                                    $crate::set_value(
+                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
+                                        number,
+                                        value,
+                                    );
+                                    $( { let $changed = model; $after } )?
+                                },
                             },
                         );
                     )?
                     $(
-                        let variable = variable.read_by($crate::Read {
-                            base: $crate::base_of_calculation(|model: &$model| $crate::read(model, $calculate)),
-                            real: |model| $crate::Scalar::real(&$crate::read(model, $calculate)),
-                            value: |model| $crate::Scalar::value(&$crate::read(model, $calculate)),
-                        });
+                        let variable = variable.read_by(
+                            $crate::Read {
+                                shape: $crate::shape_of_calculation(|model: &$model| $crate::read(model, $calculate)),
+                                real: |model| $crate::read_real(&$crate::read(model, $calculate), 0),
+                                value: |model| $crate::read_value(&$crate::read(model, $calculate), 0),
+                            },
+                            $crate::ReadAt {
+                                reals: |model, first, values| {
+                                    $crate::read_reals(&$crate::read(model, $calculate), first, values)
+                                },
+                                value: |model, number| $crate::read_value(&$crate::read(model, $calculate), number),
+                            },
+                        );
                     )?
                     variable.finished(
                         $crate::variables!(@label $name $($label)?),
@@ -244,10 +526,24 @@ macro_rules! variables {
                     )
                 }),+];
 
-                const NAMES: &'static [Name] = &[$(Name::$name),+];
+                #[allow(long_running_const_eval)]
+                const TABLE: &'static [$crate::Variable<Self>] = {
+                    const LINES: &[$crate::Variable<$model>] = <$model as $crate::Variables>::LINES;
+                    const LETTERS: &[u8] = &$crate::write_names::<$model, { $crate::count_letters(LINES) }>(LINES);
+                    const TABLE: [$crate::Variable<$model>; $crate::count_elements(LINES)] =
+                        $crate::spread(LINES, LETTERS);
+                    &TABLE
+                };
 
+                const NAMES: &'static [Self::Name] = {
+                    const LINES: &[$crate::Variable<$model>] = <$model as $crate::Variables>::LINES;
+                    const NAMES: [<$model as $crate::Variables>::Name; $crate::count_elements(LINES)] =
+                        $crate::spread_names(LINES, &[$(<<$model as $crate::Variables>::Name>::$name),+]);
+                    &NAMES
+                };
+
+                #[allow(long_running_const_eval)]
                 const STATES: &'static [$crate::StateOfTable] = {
-                    const _: () = $crate::check_names(<$model as $crate::Variables>::TABLE);
                     const COUNT: usize = $crate::count_states(<$model as $crate::Variables>::TABLE);
                     const STATES: [$crate::StateOfTable; COUNT] =
                         $crate::find_states(<$model as $crate::Variables>::TABLE);
@@ -265,6 +561,26 @@ macro_rules! variables {
                 }
             }
         };
+    };
+    (@names [] $($variants:tt)+) => { $crate::variables! { @names [Name] $($variants)+ } };
+    (@names [$names:ident] $($variants:tt)+) => {
+        /// The names of the variables: what stands at the begin of each line of `variables!`, which defines them. `names` says
+        /// there what this is called.
+        #[allow(non_camel_case_types)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u32)]
+        pub enum $names {
+            $($variants)+
+        }
+    };
+    (@name) => { Name };
+    (@name $names:ident) => { $names };
+    (@refined [$($variable:tt)+]) => { $($variable)+ };
+    (@refined [$($variable:tt)+] . depends_on ($($known:ident),+ $(,)?) $($rest:tt)*) => {
+        $crate::variables!(@refined [$($variable)+ . depends_on(&[$($known),+])] $($rest)*)
+    };
+    (@refined [$($variable:tt)+] . $refinement:ident $arguments:tt $($rest:tt)*) => {
+        $crate::variables!(@refined [$($variable)+ . $refinement $arguments] $($rest)*)
     };
     (@label $name:ident) => { ::core::stringify!($name) };
     (@label $name:ident $label:literal) => { $label };

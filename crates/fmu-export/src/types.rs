@@ -93,7 +93,8 @@ pub const STRING: Type = Type { name: "", attributes: Attributes::String, base: 
 pub const BINARY: Type = Type::binary("", "application/octet-stream");
 
 impl Type {
-    /// A physical quantity of this name in this unit, without range and nominal value.
+    /// A physical quantity of this name in this unit, without range and nominal value; [`quantity`](Self::quantity) gives it another
+    /// name than the type.
     pub const fn real(name: &'static str, unit: &'static Unit) -> Self {
         let attributes = Attributes::Real { quantity: name, unit, min: None, max: None, nominal: None };
         Self { name, attributes, base: BaseType::Real }
@@ -124,6 +125,14 @@ impl Type {
     /// One of a list of names. [`enumeration!`](crate::enumeration) makes the list.
     pub const fn enumeration(name: &'static str, items: &'static [Item]) -> Self {
         Self { name, attributes: Attributes::Enumeration(items), base: BaseType::Enumeration }
+    }
+
+    /// With the quantity that it is of, for a Real, where that is not its name: `Velocity` for a type `Speed`.
+    #[must_use]
+    pub const fn quantity(mut self, name: &'static str) -> Self {
+        let Attributes::Real { quantity, .. } = &mut self.attributes else { panic!("quantity is for Reals") };
+        *quantity = name;
+        self
     }
 
     /// With a smallest value, for a Real.
@@ -214,6 +223,10 @@ mod tests {
         assert_eq!(
             (quantity, unit, min, max, nominal),
             ("Length", &units::ONE, Some(-1.0), Some(2.0), Some(3.0))
+        );
+        let width = length.quantity("Width");
+        assert!(
+            matches!(width.attributes, Attributes::Real { quantity: "Width", .. }) && width.name == "Length"
         );
         assert_eq!(
             (length.nominal_or_one(), NUMBER.nominal_or_one(), STRING.nominal_or_one()),

@@ -21,6 +21,13 @@ pub enum Value {
     Binary(Vec<u8>),
 }
 
+impl Value {
+    /// Of a Real; of others it is no number.
+    pub(crate) fn real(&self) -> f64 {
+        if let Self::Real(value) = self { *value } else { f64::NAN }
+    }
+}
+
 impl From<f64> for Value {
     fn from(value: f64) -> Self {
         Self::Real(value)
@@ -60,16 +67,109 @@ pub trait Scalar: Saved {
     /// The [`value`](Self::value) of a Real, for types that have it without a detour; of others it is no number.
     #[inline]
     fn real(&self) -> f64 {
-        match self.value() {
-            Value::Real(value) => value,
-            _ => f64::NAN,
-        }
+        self.value().real()
     }
 
     /// [Takes](Self::assign) the value of a Real, for types that can without a detour.
     #[inline]
     fn set_real(&mut self, value: f64) {
         self.assign(&Value::Real(value));
+    }
+}
+
+/// Where a variable's value may live: a [`Scalar`], or an array of such, as `[f64; 8]` or `[[f64; 2]; 3]`.
+#[diagnostic::on_unimplemented(
+    message = "no variable can have a value of the type `{Self}`",
+    label = "the type is `{Self}`",
+    note = "values are f64, f32, whole numbers from i8 to u64, bool, String, Vec<u8>, enums made by enumeration!, and \
+            arrays of them, such as [f64; 8]"
+)]
+pub trait Place: Saved {
+    /// What an element is.
+    type Element: Scalar;
+
+    /// How many elements there are, in each direction.
+    const DIMENSIONS: Dimensions;
+
+    /// An element, counted from 0, row by row; the scalar itself.
+    fn element(&self, number: usize) -> &Self::Element;
+
+    /// The same, to be changed.
+    fn element_mut(&mut self, number: usize) -> &mut Self::Element;
+}
+
+impl<T: Scalar> Place for T {
+    type Element = T;
+    const DIMENSIONS: Dimensions = Dimensions::SCALAR;
+
+    #[inline]
+    fn element(&self, _: usize) -> &T {
+        self
+    }
+
+    #[inline]
+    fn element_mut(&mut self, _: usize) -> &mut T {
+        self
+    }
+}
+
+impl<T: Place, const N: usize> Place for [T; N] {
+    type Element = T::Element;
+    const DIMENSIONS: Dimensions = T::DIMENSIONS.of_array(N);
+
+    #[inline]
+    fn element(&self, number: usize) -> &T::Element {
+        let row = T::DIMENSIONS.length();
+        self[number / row].element(number % row)
+    }
+
+    #[inline]
+    fn element_mut(&mut self, number: usize) -> &mut T::Element {
+        let row = T::DIMENSIONS.length();
+        self[number / row].element_mut(number % row)
+    }
+}
+
+/// The sizes of an array, that of the rows last; none of a scalar.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dimensions {
+    sizes: [usize; 3],
+    /// How many there are. Of what has more, none is known.
+    count: usize,
+}
+
+impl Dimensions {
+    pub(crate) const SCALAR: Self = Self { sizes: [0; 3], count: 0 };
+
+    const fn of_array(self, size: usize) -> Self {
+        assert!(self.count < 3, "an array has at most three dimensions here");
+        let [a, b, _] = self.sizes;
+        Self { sizes: [size, a, b], count: self.count + 1 }
+    }
+
+    pub(crate) const fn sizes(&self) -> &[usize] {
+        self.sizes.split_at(self.count).0
+    }
+
+    /// The number of elements.
+    pub(crate) const fn length(&self) -> usize {
+        let (mut length, mut place) = (1, 0);
+        while place < self.count {
+            length *= self.sizes[place];
+            place += 1;
+        }
+        length
+    }
+
+    pub(crate) const fn is_scalar(&self) -> bool {
+        self.count == 0
+    }
+
+    pub(crate) const fn is(&self, other: &Self) -> bool {
+        let [a, b, c] = self.sizes;
+        let [d, e, f] = other.sizes;
+        self.count == other.count && a == d && b == e && c == f
     }
 }
 
@@ -208,13 +308,13 @@ macro_rules! enumeration {
     (
         $(#[$attribute:meta])*
         $visibility:vis enum $name:ident {
-            $( $(#[doc = $text:literal])+ $item:ident = $number:literal ),+ $(,)?
+            $( $(#[doc = $text:literal])* $item:ident = $number:literal ),+ $(,)?
         }
     ) => {
         $(#[$attribute])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         $visibility enum $name {
-            $( $(#[doc = $text])+ $item = $number ),+
+            $( $(#[doc = $text])* $item = $number ),+
         }
 
         impl $crate::Enumeration for $name {
@@ -222,7 +322,7 @@ macro_rules! enumeration {
                 $( $crate::Item {
                     name: ::core::stringify!($item),
                     value: $number,
-                    description: ::core::concat!($($text),+).trim_ascii(),
+                    description: ::core::concat!($($text),*).trim_ascii(),
                 } ),+
             ];
 

@@ -3,12 +3,14 @@
 use crate::causality::{Causality, Initial, Variability};
 use crate::saved::StateVisitor;
 use crate::settable::settable;
+use crate::table::Variables;
 use crate::types::Type;
-use crate::value::{Scalar, Value};
+use crate::value::{Dimensions, Place, Scalar, Value};
 use fmi_abi::BaseType;
 use fmi_abi::Situations;
+use std::mem::MaybeUninit;
 
-/// A variable's place in the table. Authors write its name; see [`variables!`](crate::variables).
+/// A variable's line in the table. Authors write its name; see [`variables!`](crate::variables).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Index(#[doc(hidden)] pub u32);
 
@@ -17,9 +19,15 @@ impl Index {
     pub const TIME: Self = Self(u32::MAX);
 }
 
-/// A variable of model `M`: an entry of the table that [`variables!`](crate::variables) makes.
+/// A variable of model `M`: an entry of the table that [`variables!`](crate::variables) makes, of an array an element.
 pub struct Variable<M> {
     name: &'static str,
+    /// That of the array, if it is an element of one.
+    name_of_line: &'static str,
+    /// Its line, and which element of an array it is.
+    line: u32,
+    element: u32,
+    dimensions: Dimensions,
     description: &'static str,
     causality: Causality,
     variability: Variability,
@@ -27,6 +35,7 @@ pub struct Variable<M> {
     of: &'static Type,
     /// Follows from the type; here for speed.
     base: BaseType,
+    /// A line; a place once the lines are spread into a table.
     derivative_of: Option<Index>,
     depends_on: Option<&'static [Index]>,
     state: bool,
@@ -37,6 +46,11 @@ pub struct Variable<M> {
     pub(crate) takes_reals: Situations,
     read: Option<Read<M>>,
     store: Option<Store<M>>,
+    /// The same for elements of arrays only.
+    read_at: Option<ReadAt<M>>,
+    store_at: Option<StoreAt<M>>,
+    /// What is known to be wrong before the line is finished.
+    refused: Option<&'static str>,
 }
 
 impl<M> Clone for Variable<M> {
@@ -47,42 +61,60 @@ impl<M> Clone for Variable<M> {
 
 impl<M> Copy for Variable<M> {}
 
-/// How a value is read.
-#[doc(hidden)]
-pub struct Read<M> {
-    pub base: BaseType,
-    pub real: fn(&M) -> f64,
-    pub value: fn(&M) -> Value,
+macro_rules! functions {
+    ($($(#[$about:meta])* $name:ident { $($field:ident: $type:ty),+ })+) => {
+        $(
+            $(#[$about])*
+            #[doc(hidden)]
+            pub struct $name<M> {
+                $(pub $field: $type),+
+            }
+
+            impl<M> Clone for $name<M> {
+                fn clone(&self) -> Self {
+                    *self
+                }
+            }
+
+            impl<M> Copy for $name<M> {}
+        )+
+    };
 }
 
-impl<M> Clone for Read<M> {
-    fn clone(&self) -> Self {
-        *self
+functions! {
+    /// How a value is read.
+    Read { shape: Shape, real: fn(&M) -> f64, value: fn(&M) -> Value }
+
+    /// How a value that lives in the model is set, and visited to be saved: of an array as a whole.
+    Store {
+        real: fn(&mut M, f64),
+        value: fn(&mut M, &Value),
+        visit: fn(&mut M, &mut dyn StateVisitor)
     }
+
+    /// How elements of an array are read: as many as there is room for, from one on, with 0 if all are finite; or one.
+    ReadAt { reals: fn(&M, usize, &mut [MaybeUninit<f64>]) -> f64, value: fn(&M, usize) -> Value }
+
+    /// How an element of an array that lives in the model is set.
+    StoreAt { real: fn(&mut M, usize, f64), value: fn(&mut M, usize, &Value) }
 }
 
-impl<M> Copy for Read<M> {}
-
-/// How a value that lives in the model is set, and visited to be saved.
+/// What kind of value it is, and how many.
 #[doc(hidden)]
-pub struct Store<M> {
-    pub real: fn(&mut M, f64),
-    pub value: fn(&mut M, &Value),
-    pub visit: fn(&mut M, &mut dyn StateVisitor),
+#[derive(Clone, Copy)]
+pub struct Shape {
+    base: BaseType,
+    dimensions: Dimensions,
 }
-
-impl<M> Clone for Store<M> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<M> Copy for Store<M> {}
 
 impl<M> Variable<M> {
     const fn new(causality: Causality, variability: Variability, of: &'static Type) -> Self {
         Self {
             name: "",
+            name_of_line: "",
+            line: 0,
+            element: 0,
+            dimensions: Dimensions::SCALAR,
             description: "",
             causality,
             variability,
@@ -97,6 +129,9 @@ impl<M> Variable<M> {
             takes_reals: Situations::NONE,
             read: None,
             store: None,
+            read_at: None,
+            store_at: None,
+            refused: None,
         }
     }
 
@@ -139,6 +174,27 @@ impl<M> Variable<M> {
     pub const fn calculated_parameter(of: &'static Type) -> Self {
         let mut variable = Self::new(Causality::CalculatedParameter, Variability::Fixed, of);
         variable.initial = Some(Initial::Calculated);
+        variable
+    }
+
+    /// So that the compiler says why there is none.
+    #[doc(hidden)]
+    pub const fn clock(of: &'static Type) -> Self {
+        let mut variable = Self::local(of);
+        variable.refused = Some(
+            "clocks are not offered, nor is Scheduled Execution: events take their place, see ModelExchange::event \
+             and CoSimulation::EVENTS",
+        );
+        variable
+    }
+
+    /// The same.
+    #[doc(hidden)]
+    pub const fn structural_parameter(of: &'static Type) -> Self {
+        let mut variable = Self::parameter(of);
+        variable.refused = Some(
+            "structural parameters are not offered: an array has the length that the field has in Rust, as 8 in [f64; 8]",
+        );
         variable
     }
 
@@ -226,7 +282,8 @@ impl<M> Variable<M> {
     }
 
     /// The variable, an output or local, as one that depends on no inputs, states, parameters and other start
-    /// values but these, given by their names.
+    /// values but these, given by their names: `depends_on(u, x)` in the table, or `depends_on(&[u, x])`; on nothing
+    /// `depends_on(&[])`.
     ///
     /// It is about direct dependence (section 2.2.8): at a communication point or instant, and while
     /// initializing. An output that an input reaches through a step or a state only does not depend on that
@@ -240,27 +297,42 @@ impl<M> Variable<M> {
 
     /// Called by the macro: the value lives in the model.
     #[doc(hidden)]
-    pub const fn stored(mut self, read: Read<M>, store: Store<M>) -> Self {
-        self.read = Some(read);
+    pub const fn stored(
+        mut self,
+        read: Read<M>,
+        store: Store<M>,
+        read_at: ReadAt<M>,
+        store_at: StoreAt<M>,
+    ) -> Self {
         self.store = Some(store);
-        self
+        if !read.shape.dimensions.is_scalar() {
+            self.store_at = Some(store_at);
+        }
+        self.read_by(read, read_at)
     }
 
     /// Called by the macro: the value is calculated from the model.
     #[doc(hidden)]
-    pub const fn read_by(mut self, read: Read<M>) -> Self {
+    pub const fn read_by(mut self, read: Read<M>, read_at: ReadAt<M>) -> Self {
+        if let Some(Read { shape: Shape { dimensions, .. }, .. }) = &self.read
+            && !dimensions.is(&read.shape.dimensions)
+        {
+            self.refused = Some("what in and by give must be arrays of the same length");
+        }
         self.read = Some(read);
+        self.dimensions = read.shape.dimensions;
+        if !self.dimensions.is_scalar() {
+            self.read_at = Some(read_at);
+        }
         self
     }
 
-    /// Called by the macro at last: name and description, and what cannot be is refused when compiling.
+    /// Called by the macro at last: name and description.
     #[doc(hidden)]
     pub const fn finished(mut self, name: &'static str, description: &'static str) -> Self {
         self.name = name;
+        self.name_of_line = name;
         self.description = description.trim_ascii();
-        if let Some(fault) = self.fault() {
-            refuse(name, fault);
-        }
         let real = matches!(self.of.base(), BaseType::Real);
         self.settable =
             settable(self.causality, self.variability, self.initial, self.state, self.reinit, real);
@@ -271,8 +343,22 @@ impl<M> Variable<M> {
         self
     }
 
+    /// An element of the array that this line is, or the line's only variable.
+    pub(crate) const fn spread(mut self, line: usize, element: usize, name: &'static str) -> Self {
+        self.line = line as u32;
+        self.element = element as u32;
+        self.name = name;
+        self
+    }
+
+    /// With the place of what it is the derivative of.
+    pub(crate) const fn differentiating(mut self, place: usize) -> Self {
+        self.derivative_of = Some(Index(place as u32));
+        self
+    }
+
     /// What is wrong with the variable on its own.
-    const fn fault(&self) -> Option<&'static str> {
+    pub(crate) const fn fault(&self) -> Option<&'static str> {
         use Causality::*;
         use Variability::*;
         let legal = matches!(
@@ -283,6 +369,9 @@ impl<M> Variable<M> {
                 | (Local, _)
                 | (Independent, Continuous)
         );
+        if self.refused.is_some() {
+            return self.refused;
+        }
         if self.description.is_empty() {
             return Some("say in a comment above it (///) what it is");
         }
@@ -331,10 +420,13 @@ impl<M> Variable<M> {
             Some(_) if matches!(self.causality, Independent) => {
                 return Some("its value is the time: it has neither in nor by");
             }
-            Some(Read { base, .. }) if base as u8 != self.of.base() as u8 => {
+            Some(Read { shape: Shape { base, .. }, .. }) if base as u8 != self.of.base() as u8 => {
                 return Some(wrong_type(self.of.base()));
             }
             _ => {}
+        }
+        if self.length() == 0 {
+            return Some("an array has at least one element");
         }
         let is_set = self.state
             || matches!(self.causality, Parameter | Input)
@@ -346,9 +438,33 @@ impl<M> Variable<M> {
         None
     }
 
-    /// The name.
+    /// The name: of an element of an array with its indices, which count from 1, as `T[3]`, `T[1,2]`, `der(T[3])`.
     pub const fn name(&self) -> &'static str {
         self.name
+    }
+
+    /// The name without indices: for an element of an array that of the array.
+    pub const fn name_of_array(&self) -> &'static str {
+        self.name_of_line
+    }
+
+    /// The sizes of the array that it is an element of; none if it is a scalar.
+    pub const fn dimensions(&self) -> &[usize] {
+        self.dimensions.sizes()
+    }
+
+    /// The number of elements of the array that it is an element of; 1 for a scalar.
+    pub const fn length(&self) -> usize {
+        self.dimensions.length()
+    }
+
+    /// Which element of an array it is, counted from 0, row by row; 0 for a scalar.
+    pub const fn element(&self) -> usize {
+        self.element as usize
+    }
+
+    pub(crate) const fn has_dimensions(&self, of: &Self) -> bool {
+        self.dimensions.is(&of.dimensions)
     }
 
     /// One sentence for the user.
@@ -390,10 +506,17 @@ impl<M> Variable<M> {
         }
     }
 
-    /// What [`depends_on`](Self::depends_on) has said, as places in the table, but for [`Index::TIME`].
-    pub fn dependencies(&self) -> Option<impl Iterator<Item = u32> + use<M>> {
-        self.depends_on
-            .map(|knowns| knowns.iter().filter(|known| **known != Index::TIME).map(|known| known.0))
+    /// What [`depends_on`](Self::depends_on) has said, as places in the table, but for [`Index::TIME`]: of an array all
+    /// elements.
+    pub fn dependencies(&self) -> Option<impl Iterator<Item = u32> + use<M>>
+    where
+        M: Variables,
+    {
+        let places = |known: &Index| {
+            let line = known.0;
+            (0..).zip(M::TABLE).filter(move |(_, of)| of.line == line).map(|(place, _)| place)
+        };
+        self.depends_on.map(|knowns| knowns.iter().flat_map(places))
     }
 
     /// Whether [`depends_on`](Self::depends_on) names [`Index::TIME`], if anything is said there.
@@ -421,47 +544,111 @@ impl<M> Variable<M> {
 
     /// Its value, where it does not depend on the instance: `None` for the time.
     pub fn value(&self, model: &M) -> Option<Value> {
-        self.read.map(|read| (read.value)(model))
+        match &self.read_at {
+            Some(read) => Some((read.value)(model, self.element())),
+            None => self.read.map(|read| (read.value)(model)),
+        }
     }
 
     /// Sets its value in the model, without any check. What is calculated stays as it is.
     pub fn set(&self, model: &mut M, value: &Value) {
-        if let Some(store) = self.store {
-            (store.value)(model, value);
+        match (&self.store_at, &self.store) {
+            (Some(store), _) => (store.value)(model, self.element(), value),
+            (None, Some(store)) => (store.value)(model, value),
+            (None, None) => {}
         }
     }
 
+    /// Shows the value to a visitor, if it lives in the model: of an array all of it at the first element.
+    pub(crate) fn visit(&self, model: &mut M, visitor: &mut dyn StateVisitor) {
+        if let Some(store) = self.store
+            && self.element == 0
+        {
+            (store.visit)(model, visitor);
+        }
+    }
+}
+
+impl<M: Variables> Variable<M> {
     /// The value of a Real; `None` for the time.
     #[inline]
     pub(crate) fn real(&self, model: &M) -> Option<f64> {
+        if M::ARRAYS && self.read_at.is_some() {
+            return self.value(model).map(|value| value.real());
+        }
         self.read.as_ref().map(|read| (read.real)(model))
+    }
+
+    /// The values of Reals of one array from this element on, for which there is room, or of the scalar; 0 if they are
+    /// finite.
+    pub(crate) fn reals(&self, model: &M, time: f64, values: &mut [MaybeUninit<f64>]) -> f64 {
+        if let Some(read) = &self.read_at {
+            return (read.reals)(model, self.element(), values);
+        }
+        values.iter_mut().map(|value| *value.write(self.real(model).unwrap_or(time)) * 0.0).sum()
     }
 
     #[inline]
     pub(crate) fn set_real(&self, model: &mut M, value: f64) {
+        if M::ARRAYS
+            && let Some(store) = &self.store_at
+        {
+            return (store.real)(model, self.element(), value);
+        }
         if let Some(store) = &self.store {
             (store.real)(model, value);
-        }
-    }
-
-    /// Shows the value to a visitor, if it lives in the model.
-    pub(crate) fn visit(&self, model: &mut M, visitor: &mut dyn StateVisitor) {
-        if let Some(store) = self.store {
-            (store.visit)(model, visitor);
         }
     }
 }
 
 /// The kind of value in a place of the model.
 #[doc(hidden)]
-pub const fn base_of_place<M, T: Scalar>(_: fn(&M) -> &T) -> BaseType {
-    T::BASE
+pub const fn shape_of_place<M, T: Place>(_: fn(&M) -> &T) -> Shape {
+    Shape { base: T::Element::BASE, dimensions: T::DIMENSIONS }
 }
 
 /// The kind of value that a calculation gives.
 #[doc(hidden)]
-pub const fn base_of_calculation<M, T: Scalar>(_: fn(&M) -> T) -> BaseType {
-    T::BASE
+pub const fn shape_of_calculation<M, T: Place>(_: fn(&M) -> T) -> Shape {
+    Shape { base: T::Element::BASE, dimensions: T::DIMENSIONS }
+}
+
+/// The Real that is an element of an array, or the scalar.
+#[doc(hidden)]
+#[inline(always)]
+pub fn read_real(place: &impl Place, number: usize) -> f64 {
+    place.element(number).real()
+}
+
+/// The same of any type.
+#[doc(hidden)]
+#[inline(always)]
+pub fn read_value(place: &impl Place, number: usize) -> Value {
+    place.element(number).value()
+}
+
+/// Sets a Real.
+#[doc(hidden)]
+#[inline(always)]
+pub fn set_real(place: &mut impl Place, number: usize, value: f64) {
+    place.element_mut(number).set_real(value);
+}
+
+/// Sets a value of any type.
+#[doc(hidden)]
+#[inline(always)]
+pub fn set_value(place: &mut impl Place, number: usize, value: &Value) {
+    place.element_mut(number).assign(value);
+}
+
+/// The Reals of an array, from an element on; 0 if they are finite.
+#[doc(hidden)]
+pub fn read_reals(array: &impl Place, first: usize, values: &mut [MaybeUninit<f64>]) -> f64 {
+    values
+        .iter_mut()
+        .zip(first..)
+        .map(|(value, number)| *value.write(array.element(number).real()) * 0.0)
+        .sum()
 }
 
 /// Calls a closure whose argument's type it need not say.
@@ -472,6 +659,7 @@ pub fn read<M, T>(model: &M, calculate: impl Fn(&M) -> T) -> T {
 }
 
 /// Ends the compilation with a message: a variable's name and what is wrong with it.
+#[track_caller]
 pub(crate) const fn refuse(name: &str, fault: &str) -> ! {
     panic!("{}", Message::new(name, fault).text())
 }

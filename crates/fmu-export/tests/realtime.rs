@@ -5,6 +5,34 @@ mod toys;
 
 fmu_test_kit::control_loop!(toys::Oscillator);
 
+/// Arrays, whole in FMI 3.0 and by their elements in FMI 2.0.
+#[test]
+fn arrays_are_set_and_read_without_allocation() {
+    use fmu_export::Variables;
+    use fmu_test_kit::Either;
+    use toys::{Rod, rod::Name};
+    let [power, temperatures, rates] =
+        [Name::power, Name::T, Name::der_T].map(|name| Rod::place(name) as u32);
+    let whole = fmu_test_kit::fmi3::Importer::initialized_at::<Rod>(0.0);
+    let elements = fmu_test_kit::Importer::initialized_at::<Rod>(0.0);
+    let references = [temperatures, rates].map(fmu_export::fmi3::reference);
+    let places: [u32; 16] = std::array::from_fn(|k| k as u32 % 8 + if k < 8 { temperatures } else { rates });
+    let (mut of_fmi3, mut of_fmi2) = ([f64::NAN; 16], [f64::NAN; 16]);
+    let count = fmu_test_kit::realtime::allocations(|| {
+        for k in 0..5 {
+            let (time, powers) = (f64::from(k) * 0.25, [f64::from(k), 3.0]);
+            let vr = fmu_export::fmi3::reference(power);
+            whole.ok(whole.fmi3SetFloat64(&vr, 1, powers.as_ptr(), 2));
+            whole.step(time, 0.25);
+            whole.ok(whole.fmi3GetFloat64(references.as_ptr(), 2, of_fmi3.as_mut_ptr(), 16));
+            elements.ok(elements.try_set(&[power, power + 1], &powers));
+            elements.step(time, 0.25);
+            elements.ok(elements.try_get(&places, &mut of_fmi2));
+        }
+    });
+    assert_eq!((count, of_fmi3), (0, of_fmi2));
+}
+
 #[cfg(rtsan)]
 #[test]
 #[ignore = "the sanitizer must end it, and does if make sanitize goes on"]

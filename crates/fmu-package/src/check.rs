@@ -9,6 +9,7 @@ use fmu_export::{
     Variability, Variable,
 };
 use std::collections::HashSet;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Start values by value reference; `None` for what has none.
 pub(crate) type Starts = Vec<Option<Value>>;
@@ -25,6 +26,12 @@ pub(crate) fn check<M: Exported>(changes: &Changes) -> Result<Starts> {
         let name = variable.name();
         ensure!(is_text(name), "the variable name '{}' is empty or more than one line", name.escape_debug());
         ensure!(is_line(variable.description()), "the description of {name} is more than one line");
+        ensure!(
+            !M::ARRAYS || is_structured(name),
+            "the variable name '{}' is no name of the structured naming convention, which a model with arrays needs: \
+             write names as in Modelica, such as motor.torque, der(x), or 'any text' (section 2.2.9 of FMI 2.0)",
+            name.escape_debug()
+        );
         let of = variable.variable_type();
         let named = if of.name.is_empty() {
             "its type".to_owned()
@@ -76,6 +83,60 @@ fn is_text(name: &str) -> bool {
 fn is_identifier(text: &str) -> bool {
     let is_letter = |c: char| c.is_ascii_alphabetic() || c == '_';
     text.starts_with(is_letter) && text.chars().all(|c| is_letter(c) || c.is_ascii_digit())
+}
+
+/// Section 2.2.9 of FMI 2.0, 2.4.7.5 of FMI 3.0: `a.'b c'[1,2].d`, `der(a[1])`, `der(a, 2)`.
+fn is_structured(name: &str) -> bool {
+    if let Some(differentiated) = name.strip_prefix("der(").and_then(|name| name.strip_suffix(')')) {
+        // A comma within brackets separates indices.
+        return match differentiated.rsplit_once(',') {
+            Some((of, order)) if is_number(order.trim()) => is_path(of),
+            _ => is_path(differentiated),
+        };
+    }
+    is_path(name)
+}
+
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|digit| digit.is_ascii_digit())
+}
+
+/// Names with indices or without, with dots between them.
+fn is_path(mut rest: &str) -> bool {
+    loop {
+        rest = match rest.strip_prefix('\'') {
+            Some(quoted) => {
+                let mut escaped = false;
+                let end = quoted.find(|c| {
+                    let ends = c == '\'' && !escaped;
+                    escaped = c == '\\' && !escaped;
+                    ends
+                });
+                match end {
+                    Some(end) if end > 0 => &quoted[end + 1..],
+                    _ => return false,
+                }
+            }
+            None => {
+                let end = rest.find(['[', '.']).unwrap_or(rest.len());
+                if !is_identifier(&rest[..end]) {
+                    return false;
+                }
+                &rest[end..]
+            }
+        };
+        if let Some(indices) = rest.strip_prefix('[') {
+            let Some((indices, behind)) = indices.split_once(']') else { return false };
+            if !indices.split(',').all(is_number) {
+                return false;
+            }
+            rest = behind;
+        }
+        match rest.strip_prefix('.') {
+            Some(behind) => rest = behind,
+            None => return rest.is_empty(),
+        }
+    }
 }
 
 fn is_positive(value: f64) -> bool {
@@ -239,8 +300,17 @@ fn check_starts<M: Exported>() -> Result<Starts> {
     let mut all: Vec<(Interface, Starts)> = Vec::new();
     for interface in interfaces::<M>() {
         let model = new_model::<M>(interface)?;
-        let start = |variable: &Variable<M>| variable.value(&model).filter(|_| variable.has_start());
-        all.push((interface, M::TABLE.iter().map(start).collect()));
+        let start = |variable: &Variable<M>| {
+            let value = catch_unwind(AssertUnwindSafe(|| variable.value(&model))).map_err(|_| {
+                anyhow!(
+                    "{} cannot be read from a new model: what stands behind its `in` or `by` panics, as with an index that \
+                     is not there",
+                    variable.name()
+                )
+            })?;
+            Ok(value.filter(|_| variable.has_start()))
+        };
+        all.push((interface, M::TABLE.iter().map(start).collect::<Result<_>>()?));
     }
     for (_, starts) in &all {
         for (variable, start) in M::TABLE.iter().zip(starts) {

@@ -113,6 +113,10 @@ impl Terminal {
             ensure!(names.insert(name), "it has two members with the name {name}");
             let of = M::TABLE.iter().find(|of| of.name() == *variable);
             let of = of.with_context(|| format!("its member {name} is {variable}, which is no variable"))?;
+            ensure!(
+                of.dimensions().is_empty(),
+                "its member {name} is {variable}, an element of an array, which terminals cannot have"
+            );
             use Causality::*;
             ensure!(
                 !["signal", "inflow", "outflow"].contains(kind)

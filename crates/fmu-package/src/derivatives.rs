@@ -52,8 +52,8 @@ fn check_pair<M: Exported>(points: &[(M, f64)], running: bool, unknown: u32, kno
     let size = points.iter().filter_map(|(model, _)| real(of, model)).fold(nominal, |a, b| a.max(b.abs()));
     let mut wrong = Vec::new();
     for (model, now) in points {
-        let by = (known != time).then(|| M::NAMES[known as usize]);
-        let Some(said) = model.exported_partial(M::NAMES[unknown as usize], by, !running) else {
+        let by = (known != time).then(|| M::element(known));
+        let Some(said) = model.exported_partial(M::element(unknown), by, !running) else {
             return Ok(());
         };
         let variable = M::TABLE.get(known as usize).filter(|_| known != time);

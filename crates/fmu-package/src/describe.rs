@@ -20,7 +20,7 @@ pub(crate) fn root<M: Exported>(version: &str, guid: &str, changes: &Changes) ->
         .with_some("copyright", filled(info.copyright))
         .with_some("license", filled(info.license))
         .with("generationTool", concat!("fmu-package ", env!("CARGO_PKG_VERSION")))
-        .with("variableNamingConvention", "flat")
+        .with("variableNamingConvention", if M::ARRAYS { "structured" } else { "flat" })
 }
 
 pub(crate) fn log_categories() -> Option<Element> {
@@ -41,15 +41,16 @@ pub(crate) fn default_experiment<M: Exported>() -> Element {
         .with("stepSize", of.step_size)
 }
 
-/// The element with what a variable is, whatever its type.
+/// The element with what a variable of this name is, whatever its type.
 pub(crate) fn with_facts<M>(
     element: Element,
+    name: &str,
     variable: &Variable<M>,
     vr: u32,
     tunable_parameters: bool,
 ) -> Element {
     element
-        .with("name", variable.name())
+        .with("name", name)
         .with("valueReference", vr)
         .with_some("description", filled(variable.description()))
         .with("causality", causality(variable.causality()))

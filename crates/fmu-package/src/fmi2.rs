@@ -96,7 +96,7 @@ fn scalar_variable<M: Exported>(
         .with_some("start", start)
         .with_some("derivative", variable.differentiates().map(index))
         .with_some("reinit", is_reinit(variable));
-    with_facts(Element::new("ScalarVariable"), variable, vr, changes.tunable_parameters)
+    with_facts(Element::new("ScalarVariable"), variable.name(), variable, vr, changes.tunable_parameters)
         .containing([with_attributes(value, of)])
 }
 

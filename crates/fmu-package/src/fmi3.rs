@@ -1,7 +1,8 @@
 //! The model description of FMI 3.0 (section 2.4).
 //!
 //! Behind the table come variables that only FMI 3.0 asks for: the [time](independent), where it is no variable of the
-//! model, and the [event indicators](indicator). [Value references](reference()) count from 1 in this order.
+//! model, and the [event indicators](indicator). [Value references](reference()) count from 1 in this order, an array as many
+//! times as it has elements.
 
 use crate::changes::Changes;
 use crate::check::check;
@@ -23,7 +24,7 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
     memory::check::<M>(&starts)?;
     let structure = ModelStructure::of_fmi3::<M>(changes.tunable_parameters)?;
     let types: Vec<_> = M::TABLE.iter().map(Variable::variable_type).collect();
-    let names: Vec<_> = M::TABLE.iter().map(Variable::name).collect();
+    let names: Vec<_> = M::TABLE.iter().map(Variable::name_of_array).collect();
     let generated = generated::<M>();
     for name in generated.iter().filter_map(|variable| variable.attribute("name")) {
         ensure!(
@@ -32,9 +33,11 @@ pub fn describe<M: Exported>(changes: &Changes) -> Result<String> {
              has the name"
         );
     }
-    let variables = M::TABLE.iter().zip(starts).zip(0..);
-    let variables =
-        variables.map(|((of, start), place)| variable(of, reference(place), start, changes)).chain(generated);
+    let variables = (0..).zip(M::TABLE).filter(|(_, of)| of.element() == 0).map(|(place, of)| {
+        let starts = starts[place as usize..][..of.length()].iter().flatten();
+        variable(of, reference(place), starts, changes)
+    });
+    let variables = variables.chain(generated);
 
     let children = [
         M::MODEL_EXCHANGE.map(|_| interface::<M>(Interface::ModelExchange)),
@@ -124,25 +127,36 @@ fn type_definition(of: &Type) -> Element {
     element.containing(items(of))
 }
 
+/// A scalar, or an array with the start values of its elements.
+///
 /// Of what the type says, only the range is repeated: fmi-sim 0.7 reads no FMU whose variables have a quantity, a unit or a
 /// nominal value themselves, although they may (section 2.4.7.3).
-fn variable<M: Exported>(of: &Variable<M>, vr: u32, start: Option<Value>, changes: &Changes) -> Element {
+fn variable<'a, M: Exported>(
+    of: &Variable<M>,
+    vr: u32,
+    starts: impl Iterator<Item = &'a Value>,
+    changes: &Changes,
+) -> Element {
     let variable_type = of.variable_type();
-    let start = start.map(|start| match start {
+    let starts = starts.map(|start| match start {
         // As short as single precision allows.
-        Value::Real(value) if of.base() == BaseType::Float32 => (value as f32).to_string(),
+        Value::Real(value) if of.base() == BaseType::Float32 => (*value as f32).to_string(),
         other => other.to_string(),
     });
     let is_element = matches!(of.base(), BaseType::String | BaseType::Binary);
-    let (child, attribute) = if is_element { (start, None) } else { (None, start) };
+    let (children, list): (Vec<_>, Vec<_>) = starts.partition(|_| is_element);
+    let start = (!list.is_empty()).then(|| list.join(" "));
+    let dimension = |size: &usize| Element::new("Dimension").with("start", size);
     let element = Element::new(name(of.base()));
-    let element = with_facts(element, of, vr, changes.tunable_parameters)
+    let element = with_facts(element, of.name_of_array(), of, vr, changes.tunable_parameters)
         .with_some("declaredType", filled(variable_type.name))
-        .with_some("start", attribute)
+        .with_some("start", start)
         .with_some("derivative", of.differentiates().map(reference))
         .with_some("reinit", is_reinit(of));
     let with = if variable_type.name.is_empty() { with_attributes } else { with_range };
-    with(element, variable_type).containing(child.map(|start| Element::new("Start").with("value", start)))
+    with(element, variable_type)
+        .containing(of.dimensions().iter().map(dimension))
+        .containing(children.into_iter().map(|start| Element::new("Start").with("value", start)))
 }
 
 fn model_structure<M: Exported>(structure: &ModelStructure) -> Element {

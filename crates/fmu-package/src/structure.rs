@@ -35,7 +35,7 @@ pub struct Unknown {
 }
 
 /// How a known enters an unknown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DependencyKind {
     /// Times a factor that never changes.
     Constant,
@@ -70,12 +70,17 @@ impl ModelStructure {
     }
 
     /// The same as FMI 3.0 wants it: outputs and derivatives of states depend on parameters, too, and everything on
-    /// the time, also where that is no variable of the model.
+    /// the time, also where that is no variable of the model; an array is one unknown or known, with the place of its
+    /// first element, and depends on what any of its elements depends on.
     ///
     /// # Errors
     /// As [`of`](Self::of).
     pub fn of_fmi3<M: Exported>(tunable_parameters: bool) -> Result<Self> {
-        Self::with::<M>(tunable_parameters, Some(independent::<M>().0))
+        let Self { outputs, derivatives, initial_unknowns } =
+            Self::with::<M>(tunable_parameters, Some(independent::<M>().0))?;
+        let [outputs, derivatives, initial_unknowns] =
+            [outputs, derivatives, initial_unknowns].map(of_arrays::<M>);
+        Ok(Self { outputs, derivatives, initial_unknowns })
     }
 
     /// With `time`, its value reference, for FMI 3.0.
@@ -134,6 +139,28 @@ impl ModelStructure {
             initial_unknowns: initial_unknowns.collect::<Result<_>>()?,
         })
     }
+}
+
+/// The list with each array for its elements.
+fn of_arrays<M: Exported>(unknowns: Vec<Unknown>) -> Vec<Unknown> {
+    let first = |place: u32| known::<M>(place).map_or(place, |of| place - of.element() as u32);
+    let mut list: Vec<Unknown> = Vec::new();
+    for of in unknowns {
+        let vr = first(of.vr);
+        if list.last().is_none_or(|last| last.vr != vr) {
+            list.push(Unknown { vr, dependencies: Vec::new() });
+        }
+        let Some(Unknown { dependencies, .. }) = list.last_mut() else { continue };
+        for (known, kind) in of.dependencies {
+            let known = first(known);
+            match dependencies.iter_mut().find(|(other, _)| *other == known) {
+                Some((_, other)) => *other = kind.max(*other),
+                None => dependencies.push((known, kind)),
+            }
+        }
+        dependencies.sort_unstable();
+    }
+    list
 }
 
 fn variable<M: Exported>(vr: u32) -> &'static Variable<M> {
@@ -196,7 +223,7 @@ fn by_derivative<M: Exported>(
             && variable::<M>(unknown).base() == BaseType::Real
             && self::known::<M>(known).is_some_and(is_variable);
         let partial = |sample: &FactorSample<M>| {
-            sample.model.exported_partial(M::NAMES[unknown as usize], Some(M::NAMES[known as usize]), false)
+            sample.model.exported_partial(M::element(unknown), Some(M::element(known)), false)
         };
         let samples = samples.iter().filter(|_| differentiable);
         let factors: Option<Vec<_>> = samples.map(|sample| Some((sample, partial(sample)?))).collect();

@@ -1,15 +1,17 @@
 //! What the model description says, as far as running or wiring the FMU needs it.
 
+use crate::arrays::{Array, Arrays};
 use fmi_abi::{BaseType, Interface, Standard};
 use roxmltree::{Document, Node};
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
-/// A variable of an FMU.
+/// A variable of an FMU. Each element of an array of FMI 3.0 is one, called as FMI 2.0 calls it: `T[3]`, `T[1,2]`, `der(T[3])`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
     /// Its name.
     pub name: String,
-    /// Its value reference.
+    /// Its value reference; of an element of an array a number of its own, which no variable has.
     pub reference: u32,
     /// Its type; an Int32 of FMI 3.0 is an Integer, a Float64 a Real.
     pub base: BaseType,
@@ -74,6 +76,8 @@ pub struct Description {
     pub display_units: BTreeMap<String, Vec<(String, f64, f64)>>,
     /// The enumerations by their names, each with the names and numbers of its items.
     pub enumerations: BTreeMap<String, Vec<(String, String)>>,
+    /// What the elements of arrays are.
+    pub(crate) arrays: Arc<Arrays>,
     places: HashMap<String, usize>,
 }
 
@@ -97,12 +101,11 @@ impl Description {
         if co_simulation.is_none() && model_exchange.is_none() {
             return Err("it has neither Co-Simulation nor Model Exchange".to_owned());
         }
-        let (token, variables) = match standard {
-            Standard::Fmi2 => ("guid", variables_of_fmi2(root)),
-            Standard::Fmi3 => ("instantiationToken", variables_of_fmi3(root)),
+        let (token, (mut variables, arrays)) = match standard {
+            Standard::Fmi2 => ("guid", (variables_of_fmi2(root)?, Arrays::default())),
+            Standard::Fmi3 => ("instantiationToken", variables_of_fmi3(root)?),
         };
-        let mut variables = variables?;
-        depend(root, standard, &mut variables);
+        depend(root, standard, &mut variables, &arrays);
         Ok(Self {
             standard,
             model_name: needed(root, "modelName")?,
@@ -110,8 +113,9 @@ impl Description {
             co_simulation,
             model_exchange,
             default_experiment: default_experiment(root),
-            states: states(root),
-            event_indicators: event_indicators(root)?,
+            states: states(root, &arrays),
+            event_indicators: event_indicators(root, &arrays)?,
+            arrays: Arc::new(arrays),
             places: variables.iter().enumerate().map(|(place, of)| (of.name.clone(), place)).collect(),
             variables,
             units: elements(root, "UnitDefinitions").map(unit).collect(),
@@ -206,24 +210,31 @@ fn default_experiment(root: Node) -> [Option<f64>; 3] {
 }
 
 /// A derivative for each (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
-fn states(root: Node) -> usize {
-    let of_fmi3 =
-        elements(root, "ModelStructure").filter(|node| node.has_tag_name("ContinuousStateDerivative"));
+fn states(root: Node, arrays: &Arrays) -> usize {
     let structure = child(root, "ModelStructure");
     let of_fmi2 = structure.map_or(0, |structure| elements(structure, "Derivatives").count());
-    of_fmi2 + of_fmi3.count()
+    of_fmi2 + count(root, "ContinuousStateDerivative", arrays)
 }
 
 /// A number in FMI 2.0, in FMI 3.0 they are variables.
-fn event_indicators(root: Node) -> Result<usize, String> {
-    let of_fmi3 = elements(root, "ModelStructure").filter(|node| node.has_tag_name("EventIndicator"));
+fn event_indicators(root: Node, arrays: &Arrays) -> Result<usize, String> {
     let of_fmi2 = match root.attribute("numberOfEventIndicators") {
         Some(text) => text.parse().map_err(|_| {
             format!("modelDescription.xml: numberOfEventIndicators is {text:?}, which is no number")
         })?,
         None => 0,
     };
-    Ok(of_fmi2 + of_fmi3.count())
+    Ok(of_fmi2 + count(root, "EventIndicator", arrays))
+}
+
+/// How many there are of these in the structure of FMI 3.0, where an array counts as many times as it has elements.
+fn count(root: Node, name: &str, arrays: &Arrays) -> usize {
+    let listed = elements(root, "ModelStructure").filter(|node| node.has_tag_name(name));
+    listed.map(|node| number(node, "valueReference").map_or(1, |reference| arrays.length(reference))).sum()
+}
+
+fn number(node: Node, name: &str) -> Option<u32> {
+    node.attribute(name)?.trim().parse().ok()
 }
 
 fn attributes(node: Node) -> Vec<(String, String)> {
@@ -250,7 +261,7 @@ fn display_units(node: Node) -> (String, Vec<(String, f64, f64)>) {
 }
 
 /// Which outputs depend on what: by places in FMI 2.0, counted from 1, by value references in FMI 3.0.
-fn depend(root: Node, standard: Standard, variables: &mut [Variable]) {
+fn depend(root: Node, standard: Standard, variables: &mut [Variable], arrays: &Arrays) {
     let list = |node: Node, name: &str| -> Option<Vec<u32>> {
         let list = node.attribute(name)?.split_whitespace();
         Some(list.filter_map(|number| number.parse().ok()).collect())
@@ -275,9 +286,16 @@ fn depend(root: Node, standard: Standard, variables: &mut [Variable]) {
         Standard::Fmi3 => {
             let outputs = elements(root, "ModelStructure").filter(|node| node.has_tag_name("Output"));
             for node in outputs {
-                let reference = list(node, "valueReference").and_then(|index| index.first().copied());
-                let outputs = variables.iter_mut().filter(|of| Some(of.reference) == reference);
-                outputs.for_each(|output| output.depends_on = list(node, "dependencies"));
+                let Some(reference) = number(node, "valueReference") else { continue };
+                let own = arrays.elements(reference);
+                let known = list(node, "dependencies").filter(|known| {
+                    // Of large arrays, which may depend on all inputs for all that is known here.
+                    own.len() * known.iter().map(|known| arrays.length(*known)).sum::<usize>() < 1 << 22
+                });
+                let known: Option<Vec<u32>> =
+                    known.map(|known| known.into_iter().flat_map(|known| arrays.elements(known)).collect());
+                let outputs = variables.iter_mut().filter(|of| own.contains(&of.reference));
+                outputs.for_each(|output| output.depends_on.clone_from(&known));
             }
         }
     }
@@ -316,19 +334,50 @@ fn variables_of_fmi2(root: Node) -> Result<Vec<Variable>, String> {
     Ok(found)
 }
 
-/// The element's name is the type (section 2.4.7 of FMI 3.0). Arrays and clocks are passed over: nothing here sets or
-/// reads them.
-fn variables_of_fmi3(root: Node) -> Result<Vec<Variable>, String> {
+/// The element's name is the type (section 2.4.7 of FMI 3.0). An array is replaced by its elements. Clocks are passed over, and
+/// arrays whose size is not known or beyond all use: nothing here sets or reads them.
+fn variables_of_fmi3(root: Node) -> Result<(Vec<Variable>, Arrays), String> {
     let mut found = Vec::new();
     let types = types(root);
+    let largest = elements(root, "ModelVariables").filter_map(|node| number(node, "valueReference")).max();
+    let mut arrays = Arrays::after(largest.unwrap_or_default());
     for node in elements(root, "ModelVariables") {
-        if let Some(base) = base_of_fmi3(node.tag_name().name())
-            && child(node, "Dimension").is_none()
-        {
-            found.push(variable(node, node, base, &types)?);
+        let Some(base) = base_of_fmi3(node.tag_name().name()) else { continue };
+        let variable = variable(node, node, base, &types)?;
+        let mut dimensions = node.children().filter(|child| child.has_tag_name("Dimension")).peekable();
+        if dimensions.peek().is_none() {
+            found.push(variable);
+            continue;
         }
+        let sizes: Option<Vec<usize>> = dimensions.map(|dimension| size(root, dimension)).collect();
+        let texts = node.children().filter(|child| child.has_tag_name("Start"));
+        let start: Vec<&str> = match node.attribute("start") {
+            Some(list) => list.split_whitespace().collect(),
+            None => texts.filter_map(|start| start.attribute("value")).collect(),
+        };
+        let Some(sizes) = sizes else { continue };
+        let array = Array::new(variable.reference, base, sizes, &start);
+        let Some(references) = arrays.push(array) else { continue };
+        let array = &arrays.all()[arrays.all().len() - 1];
+        found.extend(references.enumerate().map(|(number, reference)| Variable {
+            name: array.name(&variable.name, number),
+            reference,
+            start: array.start(number).map(str::to_owned),
+            ..variable.clone()
+        }));
     }
-    Ok(found)
+    Ok((found, arrays))
+}
+
+/// Of an array in one direction: a number, or the start value of a structural parameter (section 2.4.7.5.1 of FMI 3.0).
+fn size(root: Node, dimension: Node) -> Option<usize> {
+    if let Some(size) = dimension.attribute("start") {
+        return size.trim().parse().ok();
+    }
+    let reference = number(dimension, "valueReference")?;
+    let parameter =
+        elements(root, "ModelVariables").find(|node| number(*node, "valueReference") == Some(reference))?;
+    parameter.attribute("start")?.trim().parse().ok()
 }
 
 fn elements<'a>(root: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a, 'a>> {
@@ -354,7 +403,7 @@ fn variable(node: Node, of_type: Node, base: BaseType, types: &Types) -> Result<
     let of_both = |name: &str| {
         of_type.attribute(name).or_else(|| declared.iter().find_map(|node| node.attribute(name)))
     };
-    let number = |name: &str| of_both(name).and_then(|text| text.parse().ok());
+    let limit = |name: &str| of_both(name).and_then(|text| text.parse().ok());
     Ok(Variable {
         name: name_of(node).to_owned(),
         reference: reference
@@ -364,8 +413,8 @@ fn variable(node: Node, of_type: Node, base: BaseType, types: &Types) -> Result<
         variability: text("variability"),
         start: start.map(str::to_owned),
         unit: of_both("unit").map(str::to_owned),
-        min: number("min"),
-        max: number("max"),
+        min: limit("min"),
+        max: limit("max"),
         declared_type: declared_type.map(str::to_owned),
         depends_on: None,
         description: text("description").unwrap_or_default(),

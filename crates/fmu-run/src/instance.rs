@@ -1,6 +1,7 @@
 //! An instance of an FMU, whichever the standard: safe to call, because lengths are checked, the library stays, and nothing
 //! is called any more after fmi2Fatal.
 
+use crate::arrays::{Arrays, Whole};
 use crate::fmu::Loaded;
 use crate::library::{Functions, Library};
 use crate::log::{Log, log_of_fmi3, logger_of_fmi2};
@@ -9,6 +10,7 @@ use fmi_abi::c_types::{c_int, c_void};
 use fmi_abi::fmi2::types::*;
 use fmi_abi::fmi3::types::*;
 use fmi_abi::{BaseType, Interface, Status};
+use std::collections::HashMap;
 use std::ffi::{CStr, CString};
 use std::ptr::{null, null_mut};
 use std::rc::Rc;
@@ -27,6 +29,16 @@ pub struct Instance {
     saved: Vec<*mut c_void>,
     /// Of its component; empty where there is only one.
     name: String,
+    arrays: Arc<Arrays>,
+    /// What arrays have been set to before the initialization, when they cannot be read yet; `None` after it has begun.
+    early: Option<Early>,
+}
+
+/// The values of arrays by their places, once they have been set.
+#[derive(Debug, Default)]
+struct Early {
+    numbers: HashMap<usize, Vec<f64>>,
+    texts: HashMap<usize, Vec<CString>>,
 }
 
 /// The place of a state that an instance has saved.
@@ -161,6 +173,48 @@ macro_rules! get {
     };
 }
 
+/// All values of an array, which only FMI 3.0 has.
+macro_rules! set_all {
+    ($self:ident $base:ident $vr:ident $values:ident;
+     $($name:ident $set2:ident $get2:ident $type2:ident $set3:ident $get3:ident $type3:ident)+) => {
+        match $base {
+            $(BaseType::$name => {
+                let of_fmi2: Vec<_> = $values.iter().map(|value| *value as $type2).collect();
+                let of_fmi3: Vec<_> = $values.iter().map(|value| *value as $type3).collect();
+                let (n, of_fmi2, values) = (of_fmi3.len(), of_fmi2.as_ptr(), of_fmi3.as_ptr());
+                call!($self, $set2(&$vr, 1, of_fmi2), $set3(&$vr, 1, values, n))
+            })+
+            _ => {
+                let of_fmi2: Vec<_> = $values.iter().map(|value| fmi2Boolean::from(*value != 0.0)).collect();
+                let of_fmi3: Vec<_> = $values.iter().map(|value| fmi3Boolean::from(*value != 0.0)).collect();
+                let (n, of_fmi2, values) = (of_fmi3.len(), of_fmi2.as_ptr(), of_fmi3.as_ptr());
+                call!($self, fmi2SetBoolean(&$vr, 1, of_fmi2), fmi3SetBoolean(&$vr, 1, values, n))
+            }
+        }
+    };
+}
+
+macro_rules! get_all {
+    ($self:ident $base:ident $vr:ident $length:ident;
+     $($name:ident $set2:ident $get2:ident $type2:ident $set3:ident $get3:ident $type3:ident)+) => {
+        match $base {
+            $(BaseType::$name => {
+                let mut of_fmi2 = vec![$type2::default(); $length];
+                let mut of_fmi3 = vec![$type3::default(); $length];
+                let (of_fmi2, values) = (of_fmi2.as_mut_ptr(), of_fmi3.as_mut_ptr());
+                call!($self, $get2(&$vr, 1, of_fmi2), $get3(&$vr, 1, values, $length))?;
+                Ok(of_fmi3.iter().map(|value| *value as f64).collect::<Vec<f64>>())
+            })+
+            _ => {
+                let (mut of_fmi2, mut of_fmi3) = (vec![fmi2False; $length], vec![fmi3False; $length]);
+                let (of_fmi2, values) = (of_fmi2.as_mut_ptr(), of_fmi3.as_mut_ptr());
+                call!($self, fmi2GetBoolean(&$vr, 1, of_fmi2), fmi3GetBoolean(&$vr, 1, values, $length))?;
+                Ok(of_fmi3.iter().map(|value| f64::from(u8::from(*value != fmi3False))).collect())
+            }
+        }
+    };
+}
+
 impl Instance {
     /// A new instance of an FMU that has this type of interface; or why there is none, and whether the FMU said so. Its name
     /// is that of its component.
@@ -232,7 +286,8 @@ impl Instance {
             return Err((of + &why, log.is_empty()));
         }
         let (saved, name) = (Vec::new(), component.to_owned());
-        Ok(Self { handle, log, _callbacks: callbacks, library, saved, name })
+        let (arrays, early) = (Arc::clone(&fmu.description.arrays), Some(Early::default()));
+        Ok(Self { handle, log, _callbacks: callbacks, library, saved, name, arrays, early })
     }
 
     #[cold]
@@ -294,7 +349,9 @@ impl Instance {
             self,
             fmi2EnterInitializationMode(),
             fmi3EnterInitializationMode(fmi3False, 0.0, start_time, defined, stop)
-        )
+        )?;
+        self.early = None;
+        Ok(())
     }
 
     pub(crate) fn exit_initialization_mode(&mut self) -> Result<(), Refusal> {
@@ -304,6 +361,9 @@ impl Instance {
     #[inline]
     pub(crate) fn set_reals(&mut self, vr: &[u32], values: &[f64]) -> Result<(), Refusal> {
         assert_eq!(vr.len(), values.len());
+        if self.arrays.among(vr) {
+            return self.set_elements(vr, values);
+        }
         let (vr, n, values) = (vr.as_ptr(), vr.len(), values.as_ptr());
         call!(self, fmi2SetReal(vr, n, values), fmi3SetFloat64(vr, n, values, n))
     }
@@ -311,25 +371,148 @@ impl Instance {
     #[inline]
     pub(crate) fn get_reals(&mut self, vr: &[u32], values: &mut [f64]) -> Result<(), Refusal> {
         assert_eq!(vr.len(), values.len());
+        if self.arrays.among(vr) {
+            let whole = self.arrays.whole(vr);
+            let all = self.get_whole(&whole)?;
+            whole.places.iter().zip(values).for_each(|(place, value)| *value = all[*place]);
+            return Ok(());
+        }
         let (vr, n, values) = (vr.as_ptr(), vr.len(), values.as_mut_ptr());
         call!(self, fmi2GetReal(vr, n, values), fmi3GetFloat64(vr, n, values, n))
     }
 
+    /// The Reals of whole arrays, and others.
+    fn get_whole(&mut self, whole: &Whole) -> Result<Vec<f64>, Refusal> {
+        let mut all = vec![0.0; whole.count];
+        let (vr, n, values) = (whole.references.as_ptr(), whole.references.len(), all.as_mut_ptr());
+        let count = whole.count;
+        call!(self, fmi2GetReal(vr, n, values), fmi3GetFloat64(vr, n, values, count))?;
+        Ok(all)
+    }
+
+    /// Reals of which some are elements of arrays: what is not among them stays as it is.
+    #[cold]
+    fn set_elements(&mut self, vr: &[u32], values: &[f64]) -> Result<(), Refusal> {
+        let whole = self.arrays.whole(vr);
+        let mut all = if whole.is_complete() {
+            vec![0.0; whole.count]
+        } else if self.early.is_some() {
+            let mut all = vec![0.0; whole.count];
+            for (array, begin) in &whole.arrays {
+                let known = self.early_numbers(*array);
+                all[*begin..][..known.len()].copy_from_slice(&known);
+            }
+            all
+        } else {
+            self.get_whole(&whole)?
+        };
+        whole.places.iter().zip(values).for_each(|(place, value)| all[*place] = *value);
+        let (vr, n, values) = (whole.references.as_ptr(), whole.references.len(), all.as_ptr());
+        call!(self, fmi2SetReal(vr, n, values), fmi3SetFloat64(vr, n, values, all.len()))?;
+        if let Some(early) = &mut self.early {
+            for (array, begin) in whole.arrays {
+                let length = self.arrays.length(self.arrays.all()[array].reference);
+                early.numbers.insert(array, all[begin..][..length].to_vec());
+            }
+        }
+        Ok(())
+    }
+
+    /// What an array has before the initialization: what it was set to, or its start values.
+    fn early_numbers(&self, array: usize) -> Vec<f64> {
+        if let Some(known) = self.early.as_ref().and_then(|early| early.numbers.get(&array)) {
+            return known.clone();
+        }
+        let of = &self.arrays.all()[array];
+        let number = |number| match of.start(number) {
+            Some("true") => 1.0,
+            start => start.and_then(|start| start.parse().ok()).unwrap_or_default(),
+        };
+        (0..self.arrays.length(of.reference)).map(number).collect()
+    }
+
+    /// All numbers of an array now.
+    fn array_numbers(&mut self, array: usize) -> Result<Vec<f64>, Refusal> {
+        let arrays = Arc::clone(&self.arrays);
+        let of = &arrays.all()[array];
+        let (base, vr, length) = (of.base, of.reference, arrays.length(of.reference));
+        numbers!(get_all: self base vr length)
+    }
+
+    /// One number of an array, whose others stay as they are.
+    fn set_element(&mut self, (array, number): (usize, usize), value: f64) -> Result<(), Refusal> {
+        let arrays = Arc::clone(&self.arrays);
+        let (base, vr) = (arrays.all()[array].base, arrays.all()[array].reference);
+        let mut all =
+            if self.early.is_some() { self.early_numbers(array) } else { self.array_numbers(array)? };
+        all[number] = value;
+        let values = &all;
+        numbers!(set_all: self base vr values)?;
+        if let Some(early) = &mut self.early {
+            early.numbers.insert(array, all);
+        }
+        Ok(())
+    }
+
     /// A number of any type, or 0 and 1 for a Boolean.
     pub(crate) fn set_number(&mut self, base: BaseType, vr: u32, value: f64) -> Result<(), Refusal> {
+        if let Some(element) = self.arrays.find(vr) {
+            return self.set_element(element, value);
+        }
         numbers!(set: self base vr value)
     }
 
     pub(crate) fn get_number(&mut self, base: BaseType, vr: u32) -> Result<f64, Refusal> {
+        if let Some((array, number)) = self.arrays.find(vr) {
+            return Ok(self.array_numbers(array)?[number]);
+        }
         numbers!(get: self base vr)
     }
 
+    /// All texts of an array, in FMI 3.0.
+    fn array_texts(&mut self, array: usize) -> Result<Vec<CString>, Refusal> {
+        let vr = self.arrays.all()[array].reference;
+        let mut texts = vec![null(); self.arrays.length(vr)];
+        let (values, n) = (texts.as_mut_ptr(), texts.len());
+        call!(self, fmi2GetString(&vr, 1, values), fmi3GetString(&vr, 1, values, n))?;
+        // SAFETY: texts of the FMU's, which stay until the next call of it.
+        let owned =
+            |text: &fmi3String| unsafe { (!text.is_null()).then(|| CStr::from_ptr(*text).to_owned()) };
+        Ok(texts.iter().map(owned).map(Option::unwrap_or_default).collect())
+    }
+
+    /// One text of an array, whose others stay as they are.
+    fn set_text_element(&mut self, (array, number): (usize, usize), value: &CStr) -> Result<(), Refusal> {
+        let (arrays, vr) = (Arc::clone(&self.arrays), self.arrays.all()[array].reference);
+        let start =
+            |number| CString::new(arrays.all()[array].start(number).unwrap_or_default()).unwrap_or_default();
+        let known = self.early.as_ref().map(|early| early.texts.get(&array).cloned());
+        let mut all = match known {
+            Some(set) => set.unwrap_or_else(|| (0..arrays.length(vr)).map(start).collect()),
+            None => self.array_texts(array)?,
+        };
+        all[number] = value.to_owned();
+        let texts: Vec<_> = all.iter().map(|text| text.as_ptr()).collect();
+        let (values, n) = (texts.as_ptr(), texts.len());
+        call!(self, fmi2SetString(&vr, 1, values), fmi3SetString(&vr, 1, values, n))?;
+        if let Some(early) = &mut self.early {
+            early.texts.insert(array, all);
+        }
+        Ok(())
+    }
+
     pub(crate) fn set_text(&mut self, vr: u32, value: &CStr) -> Result<(), Refusal> {
+        if let Some(element) = self.arrays.find(vr) {
+            return self.set_text_element(element, value);
+        }
         let text = value.as_ptr();
         call!(self, fmi2SetString(&vr, 1, &text), fmi3SetString(&vr, 1, &text, 1))
     }
 
     pub(crate) fn get_text(&mut self, vr: u32) -> Result<String, Refusal> {
+        if let Some((array, number)) = self.arrays.find(vr) {
+            return Ok(self.array_texts(array)?.swap_remove(number).to_string_lossy().into_owned());
+        }
         let mut text = null();
         call!(self, fmi2GetString(&vr, 1, &mut text), fmi3GetString(&vr, 1, &mut text, 1))?;
         if text.is_null() {
@@ -360,6 +543,20 @@ impl Instance {
         values: &mut [f64],
     ) -> Result<(), Refusal> {
         assert!(vr.len() == values.len() && vr.len() == orders.len());
+        if self.arrays.among(vr) {
+            // All orders are 1.
+            let Whole { references, count, places, .. } = self.arrays.whole(vr);
+            let (orders, mut all) = (vec![1; references.len()], vec![0.0; count]);
+            let (vr, n, orders, whole) =
+                (references.as_ptr(), references.len(), orders.as_ptr(), all.as_mut_ptr());
+            call!(
+                self,
+                fmi2GetRealOutputDerivatives(vr, n, orders, whole),
+                fmi3GetOutputDerivatives(vr, n, orders, whole, count)
+            )?;
+            places.iter().zip(values).for_each(|(place, value)| *value = all[*place]);
+            return Ok(());
+        }
         let (vr, n, orders, values) = (vr.as_ptr(), vr.len(), orders.as_ptr(), values.as_mut_ptr());
         call!(
             self,
@@ -485,6 +682,9 @@ impl Instance {
         result: &mut [f64],
     ) -> Result<(), Refusal> {
         assert!(knowns.len() == seed.len() && unknowns.len() == result.len());
+        if self.arrays.among(unknowns) || self.arrays.among(knowns) {
+            return self.directional_derivative_of_elements(unknowns, knowns, seed, result);
+        }
         let (unknown, m) = (unknowns.as_ptr(), unknowns.len());
         let (known, n) = (knowns.as_ptr(), knowns.len());
         let (seed, result) = (seed.as_ptr(), result.as_mut_ptr());
@@ -493,6 +693,31 @@ impl Instance {
             fmi2GetDirectionalDerivative(unknown, m, known, n, seed, result),
             fmi3GetDirectionalDerivative(unknown, m, known, n, seed, n, result, m)
         )
+    }
+
+    /// The same where some are elements of arrays: the others of these do not change.
+    #[cold]
+    fn directional_derivative_of_elements(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        result: &mut [f64],
+    ) -> Result<(), Refusal> {
+        let (of_unknowns, of_knowns) = (self.arrays.whole(unknowns), self.arrays.whole(knowns));
+        let (mut seeds, mut results) = (vec![0.0; of_knowns.count], vec![0.0; of_unknowns.count]);
+        of_knowns.places.iter().zip(seed).for_each(|(place, seed)| seeds[*place] += seed);
+        let (unknown, m) = (of_unknowns.references.as_ptr(), of_unknowns.references.len());
+        let (known, n) = (of_knowns.references.as_ptr(), of_knowns.references.len());
+        let (seed, seed_count) = (seeds.as_ptr(), seeds.len());
+        let (sensitivity, count) = (results.as_mut_ptr(), results.len());
+        call!(
+            self,
+            fmi2GetDirectionalDerivative(unknown, m, known, n, seed, sensitivity),
+            fmi3GetDirectionalDerivative(unknown, m, known, n, seed, seed_count, sensitivity, count)
+        )?;
+        of_unknowns.places.iter().zip(result).for_each(|(place, value)| *value = results[*place]);
+        Ok(())
     }
 
     pub(crate) fn enter_event_mode(&mut self) -> Result<(), Refusal> {
@@ -586,6 +811,8 @@ impl Instance {
     }
 
     pub(crate) fn reset(&mut self) -> Result<(), Refusal> {
-        call!(self, fmi2Reset(), fmi3Reset())
+        call!(self, fmi2Reset(), fmi3Reset())?;
+        self.early = Some(Early::default());
+        Ok(())
     }
 }

@@ -7,6 +7,7 @@
 //! functions, `instance` calls them, `log` hears what they say. `unsafe` is in these last three alone, and for the caller
 //! where an FMU is [opened](Fmu::open).
 
+mod arrays;
 mod batch;
 mod description;
 mod error;

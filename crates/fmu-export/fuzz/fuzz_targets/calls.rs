@@ -14,7 +14,7 @@ use toys::*;
 /// The toys in FMI 2.0, then in FMI 3.0. What is new goes to the end: the committed bytes count on the places.
 ///
 /// Any exported model can stand here: `run::<Importer, prw_testbed::TestbedFmu>` with that crate among the dependencies.
-const MODELS: [RunBytes; 14] = [
+const MODELS: [RunBytes; 16] = [
     run::<Importer, Oscillator>,
     run::<Importer, Ball>,
     run::<Importer, Counter>,
@@ -29,6 +29,8 @@ const MODELS: [RunBytes; 14] = [
     run::<fmi3::Importer, Fuse>,
     run::<fmi3::Importer, Ticker>,
     run::<fmi3::Importer, Palette>,
+    run::<Importer, Rod>,
+    run::<fmi3::Importer, Rod>,
 ];
 
 static CALLS: AtomicU64 = AtomicU64::new(0);

@@ -1,6 +1,7 @@
 //! The importer's arrays, places and strings.
 
-use crate::instance::{Outcome, refuse};
+use crate::export::Exported;
+use crate::instance::{Instance, Outcome, Reference, elements_of, refuse};
 use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 use std::mem::MaybeUninit;
@@ -38,13 +39,37 @@ pub(crate) unsafe fn output<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), length) })
 }
 
-/// All variables are scalars: there are as many values as variables.
+/// As many values as variables have.
 #[inline]
 pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
     if count == needed {
         return Ok(());
     }
     refuse(format!("there are {needed} {what}, the array has {count} elements"))
+}
+
+/// Does something with variables that an importer of FMI 3.0 names, in a model with arrays: by the value reference of its
+/// first element it means the whole array, of which the values follow each other (section 2.2.7.2).
+///
+/// # Safety
+/// The value references are NULL or an array of this length, which stays as it is.
+pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
+    instance: &mut Instance<M>,
+    vr: *const u32,
+    count: usize,
+    value_count: usize,
+    body: impl FnOnce(&mut Instance<M>, &[u32]) -> Outcome,
+) -> Outcome {
+    // SAFETY: the caller's promise.
+    let vr: &[R] = unsafe { array(R::cast(vr), count, R::REFERENCES) }?;
+    same("values", instance.count_elements(vr)?, value_count)?;
+    // Out of the instance for as long as it is needed, which gets it back with its memory.
+    let mut elements = std::mem::take(&mut instance.elements);
+    elements.clear();
+    elements.extend(vr.iter().flat_map(|vr| elements_of::<M>(vr.place())));
+    let outcome = body(instance, &elements);
+    instance.elements = elements;
+    outcome
 }
 
 /// The importer's place for one value.

@@ -2,7 +2,7 @@
 
 use super::{array, output, same};
 use crate::export::Exported;
-use crate::instance::{Direction, Instance, Outcome, Reference};
+use crate::instance::{Direction, Instance, Outcome, Reference, elements_of};
 
 /// Partial derivatives (section 2.1.9 of FMI 2.0, 2.2.11 of FMI 3.0): unknowns, knowns, seed and result, each with its
 /// length and called by `names`.
@@ -18,10 +18,6 @@ pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference>(
     result: (*mut f64, usize),
     direction: Direction,
 ) -> Outcome {
-    let (seeded, wanted) = match direction {
-        Direction::Forward => (("knowns", known.1), ("unknowns", unknown.1)),
-        Direction::Adjoint => (("unknowns", unknown.1), ("knowns", known.1)),
-    };
     let (seed_count, result_count) = (seed.1, result.1);
     // SAFETY: the caller's promise.
     let (unknown, known, seed, result) = unsafe {
@@ -32,9 +28,23 @@ pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference>(
             output(result.0, result.1, names[3])?,
         )
     };
+    let counts =
+        [("unknowns", instance.count_elements(unknown)?), ("knowns", instance.count_elements(known)?)];
+    let [wanted, seeded] = match direction {
+        Direction::Forward => counts,
+        Direction::Adjoint => [counts[1], counts[0]],
+    };
     same(seeded.0, seeded.1, seed_count)?;
     same(wanted.0, wanted.1, result_count)?;
+    if M::ARRAYS && R::ARRAYS {
+        let [unknown, known] = [unknown, known].map(elements::<M, R>);
+        return instance.derivatives(&unknown, &known, seed, result, direction);
+    }
     instance.derivatives(unknown, known, seed, result, direction)
+}
+
+fn elements<M: Exported, R: Reference>(vr: &[R]) -> Vec<u32> {
+    vr.iter().flat_map(|vr| elements_of::<M>(vr.place())).collect()
 }
 
 /// Time derivatives of outputs (section 4.2.2 of FMI 2.0, 4.2.4 of FMI 3.0).
@@ -57,6 +67,13 @@ pub(crate) unsafe fn output_derivatives<M: Exported, R: Reference>(
             output(value, value_count, R::VALUES)?,
         )
     };
-    same("values", count, value_count)?;
+    same("values", instance.count_elements(vr)?, value_count)?;
+    if M::ARRAYS && R::ARRAYS {
+        // The order is that of the whole array (section 4.2.4 of FMI 3.0).
+        let of_elements =
+            |(vr, order): (&R, &i32)| elements_of::<M>(vr.place()).map(|_| *order).collect::<Vec<_>>();
+        let order: Vec<i32> = vr.iter().zip(order).flat_map(of_elements).collect();
+        return instance.get_output_derivatives(&elements::<M, R>(vr), &order, value);
+    }
     instance.get_output_derivatives(vr, order, value)
 }

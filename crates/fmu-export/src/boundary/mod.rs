@@ -13,7 +13,7 @@ pub(crate) mod states;
 pub(crate) mod values;
 pub(crate) mod webassembly;
 
-pub(crate) use arrays::{array, output, place, same, string};
+pub(crate) use arrays::{array, of_elements, output, place, same, string};
 pub(crate) use call::{Component, call, forget_panic, panic_message};
 pub(crate) use derivatives::{output_derivatives, partial_derivatives};
 pub(crate) use importer_log::{Callback, ImporterLog};

@@ -36,6 +36,13 @@ macro_rules! getters_and_setters {
             $(, $value_count: usize)?
         ) -> Outcome {
             let value_count = [$($value_count,)? count][0];
+            if M::ARRAYS && <$reference as crate::instance::Reference>::ARRAYS {
+                // SAFETY: by contract arrays of these lengths that do not overlap.
+                return unsafe { crate::boundary::of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
+                    let values = crate::boundary::output(values, value_count, <$reference as crate::instance::Reference>::VALUES)?;
+                    $get_values(instance, vr, values, &$bases)
+                }) };
+            }
             // SAFETY: by contract arrays of these lengths that do not overlap.
             let (vr, values) = unsafe { to_write::<$reference, _>(vr, count, values, value_count) }?;
             $get_values(instance, vr, values, &$bases)
@@ -52,6 +59,12 @@ macro_rules! getters_and_setters {
             let value_count = [$($value_count,)? count][0];
             // SAFETY: by contract arrays of these lengths, texts strings.
             unsafe {
+                if M::ARRAYS && <$reference as crate::instance::Reference>::ARRAYS {
+                    return crate::boundary::of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
+                        let values = crate::boundary::array(values, value_count, <$reference as crate::instance::Reference>::VALUES)?;
+                        $set_values(instance, vr, values, &$bases)
+                    });
+                }
                 let (vr, values) = to_read::<$reference, _>(vr, count, values, value_count)?;
                 $set_values(instance, vr, values, &$bases)
             }

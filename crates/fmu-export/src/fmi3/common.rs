@@ -6,7 +6,7 @@
 use super::{FromOne, types::*};
 use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
-use crate::boundary::{array, output, partial_derivatives, place};
+use crate::boundary::{array, of_elements, output, partial_derivatives, place};
 use crate::export::Exported;
 use crate::instance::{Direction, Instance, Outcome, refuse};
 use crate::value::Value;
@@ -55,21 +55,24 @@ pub unsafe fn fmi3GetBinary<M: Exported>(
     value_count: usize,
 ) -> Outcome {
     // SAFETY: by contract arrays of these lengths that do not overlap.
-    let ((vr, values), sizes) = unsafe {
-        (to_write::<FromOne, _>(vr, count, values, value_count)?, output(sizes, value_count, "valueSizes")?)
-    };
-    let mut found = Vec::with_capacity(count);
-    instance.get(vr, &[BaseType::Binary], |_, value| {
-        if let Value::Binary(bytes) = value {
-            found.push(bytes);
-        }
-    })?;
-    for ((bytes, size), value) in found.iter().zip(sizes).zip(values) {
-        size.write(bytes.len());
-        value.write(bytes.as_ptr());
+    unsafe {
+        of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
+            let values = output(values, value_count, "values")?;
+            let sizes = output(sizes, value_count, "valueSizes")?;
+            let mut found = Vec::with_capacity(vr.len());
+            instance.get(vr, &[BaseType::Binary], |_, value| {
+                if let Value::Binary(bytes) = value {
+                    found.push(bytes);
+                }
+            })?;
+            for ((bytes, size), value) in found.iter().zip(sizes).zip(values) {
+                size.write(bytes.len());
+                value.write(bytes.as_ptr());
+            }
+            instance.bytes = found;
+            Ok(())
+        })
     }
-    instance.bytes = found;
-    Ok(())
 }
 
 pub unsafe fn fmi3SetBinary<M: Exported>(
@@ -80,17 +83,19 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
     values: *const fmi3Binary,
     value_count: usize,
 ) -> Outcome {
-    // SAFETY: by contract arrays of these lengths.
-    let ((vr, values), sizes) = unsafe {
-        (to_read::<FromOne, _>(vr, count, values, value_count)?, array(sizes, value_count, "valueSizes")?)
-    };
-    let mut bytes = Vec::with_capacity(count);
-    for ((vr, size), value) in vr.iter().zip(sizes).zip(values) {
-        let name = instance.name(*vr, BaseType::Binary)?;
-        // SAFETY: by contract NULL or an array of this length.
-        bytes.push(Value::Binary(unsafe { array(*value, *size, name) }?.to_vec()));
+    // SAFETY: by contract arrays of these lengths, each value NULL or an array of its size.
+    unsafe {
+        of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
+            let values: &[fmi3Binary] = array(values, value_count, "values")?;
+            let sizes = array(sizes, value_count, "valueSizes")?;
+            let mut bytes = Vec::with_capacity(vr.len());
+            for ((vr, size), value) in vr.iter().zip(sizes).zip(values) {
+                let name = instance.name(*vr, BaseType::Binary)?;
+                bytes.push(Value::Binary(array(*value, *size, name)?.to_vec()));
+            }
+            instance.set(vr, &[BaseType::Binary], bytes.iter().cloned())
+        })
     }
-    instance.set(vr, &[BaseType::Binary], bytes.iter().cloned())
 }
 
 macro_rules! derivatives {

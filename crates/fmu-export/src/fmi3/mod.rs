@@ -1,13 +1,14 @@
 //! FMI 3.0: what its C functions do, in the same form as [`fmi2`](crate::fmi2).
 //!
-//! A model needs nothing for it: the variables are those of FMI 2.0, the instantiation token is the guid. What FMI 3.0
-//! has more is refused, with the reason: arrays, clocks, structural parameters, intermediate update and Scheduled
-//! Execution.
+//! A model needs nothing for it: the variables are those of FMI 2.0, the instantiation token is the guid. Arrays are
+//! variables, where FMI 2.0 has one for each element. What FMI 3.0 has more is refused, with the reason: clocks,
+//! structural parameters, intermediate update and Scheduled Execution.
 //!
 //! Every model has a time, as the standard asks for: the independent variable of the table, or one behind all others
 //! ([`independent`]). Behind it there is a local variable for each event indicator ([`indicator`]).
 //!
-//! [Value references](reference()) count from 1 in the order of the variables: OMSimulator 3.0.0 takes those of
+//! [Value references](reference()) count from 1 in the order of the variables, where an array counts as many times as it
+//! has elements: OMSimulator 3.0.0 takes those of
 //! dependencies for places in the list, which count from 1 in FMI 2.0, and both readings lead to the same variable.
 //!
 //! # Safety
@@ -46,6 +47,7 @@ pub const fn reference(place: u32) -> fmi3ValueReference {
 struct FromOne(fmi3ValueReference);
 
 impl Reference for FromOne {
+    const ARRAYS: bool = true;
     const REFERENCES: &str = "valueReferences";
     const VALUES: &str = "values";
 

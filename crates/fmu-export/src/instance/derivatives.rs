@@ -69,8 +69,8 @@ impl<M: Exported> Instance<M> {
                     Direction::Forward => (wanted.place(), seeded.place()),
                     Direction::Adjoint => (seeded.place(), wanted.place()),
                 };
-                let by = (known != time).then(|| M::NAMES[known as usize]);
-                let Some(partial) = model.exported_partial(M::NAMES[unknown as usize], by, initial) else {
+                let by = (known != time).then(|| M::element(known));
+                let Some(partial) = model.exported_partial(M::element(unknown), by, initial) else {
                     return refuse(format!(
                         "the derivative of {} with respect to {} is not provided",
                         self.name(unknown, BaseType::Real)?,
@@ -102,8 +102,7 @@ impl<M: Exported> Instance<M> {
             }
         }
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {
-            let name = M::NAMES[*vr as usize];
-            self.state.model.exported_input_derivative(name, order.unsigned_abs(), *value);
+            self.state.model.exported_input_derivative(M::element(*vr), order.unsigned_abs(), *value);
         }
         self.state.stale = true;
         Ok(())
@@ -183,7 +182,7 @@ fn derivative<M: Exported>(model: &M, place: usize, order: u32) -> f64 {
     match M::TABLE[place].causality() {
         Causality::Parameter | Causality::CalculatedParameter => 0.0,
         Causality::Independent => derivative_of_time(order.cast_signed()),
-        _ => model.exported_output_derivative(M::NAMES[place], order),
+        _ => model.exported_output_derivative(M::element(place as u32), order),
     }
 }
 

@@ -24,7 +24,7 @@ use crate::log::Logger;
 use crate::model::{Error, Experiment, Setup};
 use crate::types::{NUMBER, TIME};
 use crate::value::Value;
-use crate::variable::{Read, Variable};
+use crate::variable::{Read, ReadAt, Variable, shape_of_calculation};
 use fmi_abi::BaseType;
 use fmi_abi::Status;
 use fmi_abi::{Interface, Mode, Situation, Standard};
@@ -50,6 +50,8 @@ pub(crate) struct Instance<M> {
     pub texts: Vec<std::ffi::CString>,
     /// Bytes that the importer reads until the next call.
     pub bytes: Vec<Vec<u8>>,
+    /// Room for the places of variables that a call is about, of arrays each element; for models with arrays.
+    pub elements: Vec<u32>,
 }
 
 /// What an importer has said when it made an instance.
@@ -69,6 +71,8 @@ impl Importer {
 
 /// How an importer calls a variable: by a number that stands for its place in the table, or behind it.
 pub(crate) trait Reference: Copy {
+    /// Whether one may stand for a whole array.
+    const ARRAYS: bool;
     /// What the standard calls an array of these, and one of values.
     const REFERENCES: &str;
     const VALUES: &str;
@@ -81,6 +85,7 @@ pub(crate) trait Reference: Copy {
 
 /// Of FMI 2.0: the place itself.
 impl Reference for u32 {
+    const ARRAYS: bool = false;
     const REFERENCES: &str = "vr";
     const VALUES: &str = "value";
 
@@ -166,6 +171,7 @@ impl<M: Exported> Instance<M> {
             kept: BTreeMap::new(),
             texts: Vec::new(),
             bytes: Vec::new(),
+            elements: Vec::with_capacity(if M::ARRAYS { M::TABLE.len() } else { 0 }),
         };
         instance.listen();
         instance.logger.log(Status::Ok, "instantiated");
@@ -340,10 +346,31 @@ impl<M: Exported> Instance<M> {
         }
     }
 
+    /// How many values the variables have that an importer names, in FMI 3.0 arrays among them.
+    pub fn count_elements<R: Reference>(&self, vr: &[R]) -> Outcome<usize> {
+        if !(M::ARRAYS && R::ARRAYS) {
+            return Ok(vr.len());
+        }
+        let mut count = 0;
+        for place in vr.iter().map(|vr| vr.place()) {
+            if M::TABLE.get(place as usize).is_some_and(|of| of.element() > 0) {
+                return self.refuse_place(place);
+            }
+            count += elements_of::<M>(place).count();
+        }
+        Ok(count)
+    }
+
     fn refuse_place<T>(&self, place: u32) -> Outcome<T> {
         let reference = self.standard().reference(place);
         refuse(format!("there is no variable with value reference {reference}"))
     }
+}
+
+/// The places of the elements of an array of FMI 3.0, whose first has this place; of a scalar its own.
+pub(crate) fn elements_of<M: crate::Variables>(place: u32) -> impl Iterator<Item = u32> {
+    let length = M::TABLE.get(place as usize).map_or(1, |of| of.length() as u32);
+    (0..length).map(move |number| place.wrapping_add(number))
 }
 
 struct Implicit<M>(std::marker::PhantomData<M>);
@@ -353,7 +380,14 @@ impl<M: 'static> Implicit<M> {
 
     /// Any of them: who reads it has its value from the model.
     const INDICATOR: &'static Variable<M> = &Variable::local(&NUMBER)
-        .read_by(Read { base: BaseType::Real, real: |_| f64::NAN, value: |_| Value::Real(f64::NAN) })
+        .read_by(
+            Read {
+                shape: shape_of_calculation(|_: &M| f64::NAN),
+                real: |_| f64::NAN,
+                value: |_| Value::Real(f64::NAN),
+            },
+            ReadAt { reals: |_, _, _| f64::NAN, value: |_, _| Value::Real(f64::NAN) },
+        )
         .finished("eventIndicator", "An event happens where it changes its sign");
 }
 

@@ -82,6 +82,9 @@ impl<M: Exported> Instance<M> {
 
     fn fill(&mut self, values: &mut [MaybeUninit<f64>], which: impl Fn(&StateOfTable) -> u32) -> Outcome {
         check_count::<M>(values.len())?;
+        if M::ARRAYS {
+            return self.get_reals_of_arrays(|number| which(&M::STATES[number]), values);
+        }
         let model = self.calculated();
         for (state, value) in M::STATES.iter().zip(values) {
             let variable = &M::TABLE[which(state) as usize];

@@ -231,6 +231,7 @@ impl StateVisitor for Reader<'_> {
 mod tests {
     use super::{Counter, Reader, Writer};
     use crate::saved::Saved;
+    use std::collections::{BTreeMap, VecDeque};
 
     fn written<T: Saved>(mut value: T) -> Vec<u8> {
         let mut counter = Counter(0);
@@ -272,6 +273,11 @@ mod tests {
         comes_back([u32::MAX, 0]);
         comes_back(i64::MIN);
         comes_back((7_u8, Some(-3_i16)));
+        comes_back([usize::MAX, 0]);
+        comes_back((isize::MIN, Box::new(2.5), "c".to_owned()));
+        comes_back((1_u8, (2_u8, 3_u8), false, 4.0));
+        comes_back(VecDeque::from([1.5, -2.0, 0.25]));
+        comes_back(BTreeMap::from([(-3, vec![true]), (7, vec![])]));
         comes_back([None, Some(2.5)]);
         comes_back(vec![vec![String::new(), "a".to_owned()], vec![], vec!["bc".to_owned()]]);
     }
@@ -282,9 +288,14 @@ mod tests {
         assert_eq!(read::<u8>(&written(256_i32)), None);
         assert_eq!(read::<u32>(&written(-1_i64)), None);
         assert_eq!(read::<i32>(&written(i64::MAX)), None);
+        for wrong in [[(2, 1.0), (1, 1.0)], [(1, 1.0), (1, 2.0)]] {
+            assert_eq!(read::<BTreeMap<i32, f64>>(&written(wrong.to_vec())), None);
+        }
         assert_eq!(read::<String>(&[written(1_i64), vec![0xff]].concat()), None);
         for length in [1, 2, 1 << 40, i64::MAX, -1] {
             assert_eq!(read::<Vec<f64>>(&written(length)), None);
+            assert_eq!(read::<VecDeque<f64>>(&written(length)), None);
+            assert_eq!(read::<BTreeMap<i32, f64>>(&written(length)), None);
             assert_eq!(
                 read::<Vec<Vec<f64>>>(&[written(2_i64), written(length), written(length)].concat()),
                 None

@@ -18,6 +18,9 @@ impl<M: Exported> Instance<M> {
         if !vr.iter().all(in_table) {
             return self.get_reals_one_by_one(vr, values);
         }
+        if M::ARRAYS {
+            return self.get_reals_of_arrays(|number| vr[number].place(), values);
+        }
         let time = self.state.time;
         let model = self.calculated();
         // 0 as long as all values are finite: one question at the end costs less than one for each.
@@ -28,6 +31,31 @@ impl<M: Exported> Instance<M> {
             value.write(read);
         }
         if none == 0.0 { Ok(()) } else { self.get_reals_one_by_one(vr, values) }
+    }
+
+    /// Elements of one array that follow each other at one go: what calculates an array is called once.
+    pub(super) fn get_reals_of_arrays(
+        &mut self,
+        place: impl Fn(usize) -> u32,
+        values: &mut [MaybeUninit<f64>],
+    ) -> Outcome {
+        let time = self.state.time;
+        let model = self.calculated();
+        let mut done = 0;
+        while done < values.len() {
+            let first = place(done);
+            let variable = &M::TABLE[first as usize];
+            let most = (variable.length() - variable.element()).min(values.len() - done);
+            let follows = |number: &usize| place(done + number) as usize == first as usize + number;
+            let run = 1 + (1..most).take_while(follows).count();
+            if variable.reals(model, time, &mut values[done..done + run]) != 0.0 {
+                for variable in &M::TABLE[first as usize..][..run] {
+                    finite(variable, variable.real(model).unwrap_or(time))?;
+                }
+            }
+            done += run;
+        }
+        Ok(())
     }
 
     /// With the time and the event indicators of FMI 3.0, which are not in the table; the first value that is not finite

@@ -5,7 +5,7 @@ use fmu_test_kit::careless::{RunBytes, Tally, run, run_seeds};
 use fmu_test_kit::{FUNCTIONS, Importer, fmi3};
 
 /// All toys but the faulty one.
-const TOYS: [(&str, RunBytes); 9] = [
+const TOYS: [(&str, RunBytes); 10] = [
     ("oscillator", run::<Importer, Oscillator>),
     ("ball", run::<Importer, Ball>),
     ("counter", run::<Importer, Counter>),
@@ -15,10 +15,11 @@ const TOYS: [(&str, RunBytes); 9] = [
     ("lazy", run::<Importer, Lazy>),
     ("balance", run::<Importer, Balance>),
     ("motor", run::<Importer, Motor>),
+    ("rod", run::<Importer, Rod>),
 ];
 
 /// The same in FMI 3.0, with those that have more than FMI 2.0.
-const TOYS_OF_FMI3: [(&str, RunBytes); 9] = [
+const TOYS_OF_FMI3: [(&str, RunBytes); 10] = [
     ("oscillator", run::<fmi3::Importer, Oscillator>),
     ("ball", run::<fmi3::Importer, Ball>),
     ("counter", run::<fmi3::Importer, Counter>),
@@ -28,6 +29,7 @@ const TOYS_OF_FMI3: [(&str, RunBytes); 9] = [
     ("ticker", run::<fmi3::Importer, Ticker>),
     ("palette", run::<fmi3::Importer, Palette>),
     ("motor", run::<fmi3::Importer, Motor>),
+    ("rod", run::<fmi3::Importer, Rod>),
 ];
 
 /// What never succeeds: there are no asynchronous steps, and no model here has the rest.

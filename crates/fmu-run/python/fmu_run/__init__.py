@@ -65,8 +65,8 @@ class _Model:
 
     def __init__(self, loaded: _Loaded):
         self._loaded = loaded
-        #: dict[str, Variable]: the variables by name, in the order of the model description. Arrays and clocks of FMI 3.0 are
-        #: left out.
+        #: dict[str, Variable]: the variables by name, in the order of the model description. Of an array of FMI 3.0
+        #: each element is one, as in FMI 2.0: T[3]. Clocks are left out.
         self.variables = {fields[0]: Variable(*fields) for fields in loaded.variables()}
 
     def __enter__(self) -> Self:

@@ -21,14 +21,19 @@ pub struct Variables {
     typed: [(&'static str, Vec<u32>); 10],
     states: usize,
     indicators: usize,
+    /// The value references of arrays and how many values each has, in FMI 3.0.
+    arrays: Vec<(u32, usize)>,
 }
 
 impl Variables {
     /// Those of a standard.
     pub fn of<M: Exported>(standard: Standard) -> Self {
         let reference = |place| standard.reference(place);
+        // Elements of arrays are no variables in FMI 3.0.
+        let is_one =
+            |variable: &fmu_export::Variable<M>| standard == Standard::Fmi2 || variable.element() == 0;
         let those = |wanted: &dyn Fn(&fmu_export::Variable<M>) -> bool| {
-            let places = (0..).zip(M::TABLE).filter(|(_, variable)| wanted(variable));
+            let places = (0..).zip(M::TABLE).filter(|(_, variable)| is_one(variable) && wanted(variable));
             places.map(|(place, _)| reference(place)).collect::<Vec<u32>>()
         };
         let real = |variable: &fmu_export::Variable<M>| variable.base() == BaseType::Real;
@@ -59,7 +64,19 @@ impl Variables {
             ],
             states: M::STATES.len(),
             indicators: M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators),
+            arrays: (0..)
+                .zip(M::TABLE)
+                .filter(|(_, variable)| standard == Standard::Fmi3 && variable.element() == 0)
+                .map(|(place, variable)| (reference(place), variable.length()))
+                .filter(|(_, length)| *length > 1)
+                .collect(),
         }
+    }
+
+    /// How many values these have.
+    fn values(&self, references: &[u32]) -> usize {
+        let length = |reference: &u32| self.arrays.iter().find(|(array, _)| array == reference);
+        references.iter().map(|reference| length(reference).map_or(1, |(_, length)| *length)).sum()
     }
 
     /// Value references, mostly of variables that the function can use.
@@ -99,6 +116,9 @@ enum Fault {
 pub struct CallArguments {
     pub vr: Vec<u32>,
     pub known: Vec<u32>,
+    /// How many values these have.
+    pub values: usize,
+    pub known_values: usize,
     pub orders: Vec<i32>,
     pub reals: Vec<f64>,
     pub integers: Vec<i32>,
@@ -223,10 +243,14 @@ impl CallArguments {
         }
         // Not every second text a wrong one.
         let good = if u.ratio(3, 4)? { &TEXTS[..5] } else { &TEXTS };
+        let vr = variables.references(u, count, function)?;
+        let (values, known_values) = (variables.values(&vr), variables.values(&known));
         Ok(Self {
-            vr: variables.references(u, count, function)?,
+            vr,
+            values,
+            known_values,
             orders: array(count, || if u.ratio(15, 16)? { Ok(1) } else { small(u) })?,
-            reals: reals(u, count.max(known.len()))?,
+            reals: reals(u, count.max(values).max(known_values))?,
             integers: array(count, || small(u))?,
             texts: texts(u, count, good)?,
             categories: texts(u, count, &CATEGORIES)?,

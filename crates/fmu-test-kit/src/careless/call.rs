@@ -101,9 +101,9 @@ impl<'a> Outputs<'a> {
         self.array(places, f64::INFINITY, call, |value| finite(*value))
     }
 
-    /// The same with one text for each value reference.
+    /// The same with texts.
     pub fn texts(&mut self, call: impl FnOnce(*mut *const c_char) -> Status) -> Status {
-        let places = (1, self.arguments.vr.len());
+        let places = (1, self.arguments.values);
         self.array(places, UNTOUCHED_TEXT.as_ptr(), call, |text| {
             assert!(!text.is_null() && *text != UNTOUCHED_TEXT.as_ptr(), "no text");
             // SAFETY: a string of the FMU's, valid until the next call.

@@ -19,11 +19,11 @@ macro_rules! numbers {
             Some(match function {
                 $(
                     stringify!($get) => {
-                        $out.array((1, a.vr.len()), $untouched, |value| $self.$get(vr, n, value, $m), $bits)
+                        $out.array((1, a.values), $untouched, |value| $self.$get(vr, n, value, $m), $bits)
                     }
                     stringify!($set) => {
                         let mut source: Vec<_> = a.$source.iter().map($convert).collect();
-                        source.resize(a.vr.len() + 2, source.first().copied().unwrap_or_default());
+                        source.resize(a.values + 2, source.first().copied().unwrap_or_default());
                         $self.$set(vr, n, a.pointer(1, &source), $m)
                     }
                 )+
@@ -82,8 +82,9 @@ impl Caller for Importer {
         let a = out.arguments;
         let (vr, n, all) = (a.pointer(0, &a.vr), a.count(a.vr.len()), (1, a.vr.len()));
         // At times another number of values.
-        let m = if a.kind == 3 { n.saturating_add(1) } else { n };
-        let room = a.vr.len() + 2;
+        let m = a.count(a.values);
+        let m = if a.kind == 3 { m.saturating_add(1) } else { m };
+        let room = a.values + 2;
         if let Some(status) = self.numbers(function, out, m) {
             return status;
         }
@@ -107,7 +108,7 @@ impl Caller for Importer {
                 let (mut sizes, mut arrays) = (vec![usize::MAX; room], vec![null(); room]);
                 let arrays_to = a.output(1, &mut arrays);
                 let status = self.fmi3GetBinary(vr, n, a.output(2, &mut sizes), arrays_to, m);
-                let written = if status == Status::Ok { a.vr.len() } else { 0 };
+                let written = if status == Status::Ok { a.values } else { 0 };
                 assert!(sizes[written..].iter().all(|size| *size == usize::MAX), "too much: {a:?}");
                 for (size, bytes) in sizes[..written].iter().zip(&arrays) {
                     // SAFETY: as many bytes of the FMU's, valid until the next call.
@@ -127,11 +128,12 @@ impl Caller for Importer {
             }
             "fmi3GetDirectionalDerivative" | "fmi3GetAdjointDerivative" => {
                 let forward = function == "fmi3GetDirectionalDerivative";
-                let (wanted, seeds) = if forward { (n, a.known.len()) } else { (a.known.len(), n) };
+                let (unknowns, knowns) = (a.count(a.values), a.known_values);
+                let (wanted, seeds) = if forward { (unknowns, knowns) } else { (knowns, unknowns) };
                 let (seed, known) = (a.pointer(2, &a.reals), a.pointer(3, &a.known));
                 let call =
                     if forward { Self::fmi3GetDirectionalDerivative } else { Self::fmi3GetAdjointDerivative };
-                let count = if forward { a.vr.len() } else { a.known.len() };
+                let count = if forward { a.values } else { a.known_values };
                 out.reals((1, count), |result| {
                     call(self, vr, n, known, a.known.len(), seed, seeds, result, wanted)
                 })
@@ -170,7 +172,7 @@ impl Caller for Importer {
             }
             "fmi3GetOutputDerivatives" => {
                 let orders = a.pointer(2, &a.orders);
-                out.reals(all, |x| self.fmi3GetOutputDerivatives(vr, n, orders, x, m))
+                out.reals((1, a.values), |x| self.fmi3GetOutputDerivatives(vr, n, orders, x, m))
             }
             "fmi3DoStep" => {
                 let (mut flags, mut end) = ([2_u8; 3], f64::NAN);

@@ -47,7 +47,7 @@ impl Model for Ball {
         default_experiment: DefaultExperiment {
             stop_time: 3.0,
             step_size: 0.01,
-            ..info!("", "").default_experiment
+            ..DefaultExperiment::DEFAULT
         },
         ..info!("Ball", "ball")
     };

@@ -105,7 +105,7 @@ impl Model for House {
         default_experiment: DefaultExperiment {
             stop_time: 86400.0,
             step_size: 60.0,
-            ..info!("", "").default_experiment
+            ..DefaultExperiment::DEFAULT
         },
         ..info!("House", "house")
     };

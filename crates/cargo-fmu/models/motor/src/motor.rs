@@ -118,7 +118,7 @@ impl Model for Motor {
         default_experiment: DefaultExperiment {
             stop_time: 0.2,
             step_size: 1e-4,
-            ..info!("", "").default_experiment
+            ..DefaultExperiment::DEFAULT
         },
         ..info!("Motor", "motor")
     };

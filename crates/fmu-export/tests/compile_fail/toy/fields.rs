@@ -6,6 +6,7 @@ pub struct Toy {
     u: f64,
     x: f64,
     n: i32,
+    list: [f64; 8],
 }
 
 fn main() {}

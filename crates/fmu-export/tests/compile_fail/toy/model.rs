@@ -10,7 +10,7 @@ impl Model for Toy {
     const INFO: Info = info!("Toy", "toy");
 
     fn new(_: &Setup) -> Result<Self, Error> {
-        Ok(Self { u: 0.0, x: 0.0, n: 0 })
+        Ok(Self { u: 0.0, x: 0.0, n: 0, list: [0.0; 8] })
     }
 }
 

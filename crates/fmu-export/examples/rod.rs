@@ -1,0 +1,7 @@
+//! The rod of the tests as a shared library, for importers that read arrays.
+
+#[path = "../tests/toys/rod.rs"]
+#[allow(dead_code, missing_docs)]
+mod rod;
+
+fmu_export::symbols!(rod::Rod);

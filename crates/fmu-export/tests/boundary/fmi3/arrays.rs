@@ -1,0 +1,223 @@
+//! Arrays: one variable in FMI 3.0, a scalar for each element in FMI 2.0.
+
+use crate::toys::Rod;
+use crate::toys::rod::{Name, PIECES};
+use fmu_export::fmi3::{reference, types::*};
+use fmu_export::*;
+use fmu_test_kit::Either;
+use fmu_test_kit::fmi3::Importer;
+use std::ffi::{CStr, c_char};
+use std::ptr::null;
+
+fn vr(name: Name) -> u32 {
+    reference(Rod::place(name) as u32)
+}
+
+fn reals<const COUNT: usize>(fmu: &Importer, names: &[Name]) -> [f64; COUNT] {
+    let (vr, mut values) = (names.iter().map(|name| vr(*name)).collect::<Vec<_>>(), [f64::NAN; COUNT]);
+    fmu.ok(fmu.fmi3GetFloat64(vr.as_ptr(), vr.len(), values.as_mut_ptr(), COUNT));
+    values
+}
+
+fn set(fmu: &Importer, name: Name, values: &[f64]) -> Status {
+    fmu.fmi3SetFloat64(&vr(name), 1, values.as_ptr(), values.len())
+}
+
+#[test]
+fn names_and_places() {
+    let names: Vec<_> = Rod::TABLE.iter().map(|of| of.name()).collect();
+    assert_eq!(names[..4], ["wall", "T[1]", "T[2]", "T[3]"]);
+    let of = |name: Name| &Rod::TABLE[Rod::place(name)];
+    assert_eq!((of(Name::der_T).name(), of(Name::der_T).name_of_array()), ("der(T[1])", "der(T)"));
+    let limits: Vec<_> =
+        Rod::TABLE.iter().filter(|of| of.name_of_array() == "limits").map(|of| of.name()).collect();
+    assert_eq!(limits, ["limits[1,1]", "limits[1,2]", "limits[2,1]", "limits[2,2]"]);
+    assert_eq!((of(Name::limits).dimensions(), of(Name::limits).length()), (&[2, 2][..], 4));
+    let second = &Rod::TABLE[Rod::place(Name::der_T) + 1];
+    assert_eq!((second.element(), second.differentiates()), (1, Some(Rod::place(Name::T) as u32 + 1)));
+    assert_eq!(Rod::STATES.len(), PIECES);
+}
+
+/// Several at once, scalars among them, in any order and repeated.
+#[test]
+fn whole_arrays_are_read_and_set() {
+    let fmu = Importer::in_mode::<Rod>(Interface::CoSimulation, Mode::StepComplete);
+    assert_eq!(reals(&fmu, &[Name::power, Name::wall, Name::power]), [10.0, 5.0, 20.0, 10.0, 5.0]);
+    fmu.ok(set(&fmu, Name::power, &[1.0, 2.0]));
+    let both = [vr(Name::wall), vr(Name::power)];
+    fmu.ok(fmu.fmi3SetFloat64(both.as_ptr(), 2, [30.0, 3.0, 4.0].as_ptr(), 3));
+    assert_eq!(reals(&fmu, &[Name::power, Name::wall]), [3.0, 4.0, 30.0]);
+    // Row by row.
+    assert_eq!(reals(&fmu, &[Name::limits]), [10.0, 25.0, 12.5, 30.0]);
+    fmu.ok(set(&fmu, Name::limits, &[1.0, 2.0, 3.0, 4.0]));
+    assert_eq!(reals(&fmu, &[Name::limits]), [1.0, 2.0, 3.0, 4.0]);
+    let of_fmi2 = fmu_test_kit::Importer::in_mode::<Rod>(Interface::CoSimulation, Mode::StepComplete);
+    let place = Rod::place(Name::limits) as u32;
+    assert_eq!(of_fmi2.get([place + 1, place + 2]), [25.0, 12.5]);
+
+    let (mut switches, mut hot, mut counted) = ([7_i64; 2], [7; PIECES], [7; 2]);
+    fmu.ok(fmu.fmi3SetInt64(&vr(Name::switches), 1, [0, 3].as_ptr(), 2));
+    fmu.ok(fmu.fmi3GetInt64(&vr(Name::switches), 1, switches.as_mut_ptr(), 2));
+    fmu.ok(fmu.fmi3GetBoolean(&vr(Name::hot), 1, hot.as_mut_ptr(), PIECES));
+    fmu.ok(fmu.fmi3GetInt32(&vr(Name::counted), 1, counted.as_mut_ptr(), 2));
+    assert_eq!((switches, hot, counted), ([0, 3], [0; PIECES], [1, 2]));
+    fmu.step(0.0, 0.01);
+    fmu.ok(fmu.fmi3GetBoolean(&vr(Name::hot), 1, hot.as_mut_ptr(), PIECES));
+    assert_eq!(hot, [1; PIECES]);
+
+    let texts = [c"one".as_ptr(), c"two".as_ptr()];
+    fmu.ok(fmu.fmi3SetString(&vr(Name::labels), 1, texts.as_ptr(), 2));
+    let mut read: [*const c_char; 2] = [null(); 2];
+    fmu.ok(fmu.fmi3GetString(&vr(Name::reports), 1, read.as_mut_ptr(), 2));
+    // SAFETY: texts of the FMU's, until the next call.
+    let read = read.map(|text| unsafe { CStr::from_ptr(text) });
+    assert_eq!(read, [c"one is warm", c"two is warm"]);
+}
+
+#[test]
+fn states_and_their_derivatives_are_in_the_same_order() {
+    let fmu = Importer::in_mode::<Rod>(Interface::ModelExchange, Mode::ContinuousTime);
+    let states: [f64; PIECES] = std::array::from_fn(|piece| 3.0 * piece as f64);
+    fmu.ok(fmu.set_states(states.as_ptr(), PIECES));
+    assert_eq!(reals(&fmu, &[Name::T]), states);
+    assert_eq!(reals::<PIECES>(&fmu, &[Name::der_T]), fmu.derivatives());
+    let other = fmu_test_kit::Importer::in_mode::<Rod>(Interface::ModelExchange, Mode::ContinuousTime);
+    other.ok(other.set_states(states.as_ptr(), PIECES));
+    assert_eq!(other.derivatives::<PIECES>(), fmu.derivatives());
+}
+
+/// Seeds and sensitivities of whole arrays.
+#[test]
+fn partial_derivatives_of_arrays() {
+    let fmu = Importer::in_mode::<Rod>(Interface::ModelExchange, Mode::ContinuousTime);
+    let unknowns = [vr(Name::mean), vr(Name::der_T)];
+    let knowns = [vr(Name::T), vr(Name::wall)];
+    let mut seed = [0.0; PIECES + 1];
+    (seed[1], seed[PIECES]) = (1.0, 2.0);
+    let mut found = [f64::NAN; PIECES + 1];
+    let call = |found: &mut [f64], seeds| {
+        let (seed, count) = (seed.as_ptr(), found.len());
+        let (unknowns, knowns) = (unknowns.as_ptr(), knowns.as_ptr());
+        fmu.fmi3GetDirectionalDerivative(unknowns, 2, knowns, 2, seed, seeds, found.as_mut_ptr(), count)
+    };
+    fmu.ok(call(&mut found, PIECES + 1));
+    let capacity = |piece: usize| 2.0 + 0.125 * piece as f64;
+    let expected = [0.125, 1.5 / capacity(0), -1.0 / capacity(1), 0.5 / capacity(2), 0.0, 0.0, 0.0, 0.0, 0.0];
+    assert_eq!(found, expected);
+    fmu.refused_with(&["there are 9 knowns, the array has 2 elements"], |_| call(&mut [0.0; PIECES + 1], 2));
+    fmu.refused_with(&["there are 9 unknowns, the array has 2 elements"], |_| {
+        call(&mut [0.0; 2], PIECES + 1)
+    });
+
+    let fmu = Importer::in_mode::<Rod>(Interface::CoSimulation, Mode::StepComplete);
+    let (vr, mut rates) = ([vr(Name::means), vr(Name::T)], [f64::NAN; PIECES + 2]);
+    fmu.ok(fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 2, [1, 1].as_ptr(), rates.as_mut_ptr(), PIECES + 2));
+    assert_eq!(rates[2..], reals::<PIECES>(&fmu, &[Name::der_T]));
+    assert_eq!(rates[1], rates[6..].iter().sum::<f64>() / 4.0);
+}
+
+#[test]
+fn refusals_name_the_element() {
+    let fmu = Importer::in_mode::<Rod>(Interface::CoSimulation, Mode::Instantiated);
+    fmu.refused_with(&["fmi3SetFloat64: capacities[3] must not be below 0.1, it is 0.05"], |fmu| {
+        set(fmu, Name::capacities, &[1.0, 1.0, 0.05, 1.0, 1.0, 1.0, 1.0, 1.0])
+    });
+    fmu.ok(set(&fmu, Name::capacities, &[1.0; PIECES]));
+    fmu.refused_with(&["T[2] must be a finite number"], |fmu| {
+        set(fmu, Name::T, &[1.0, f64::NAN, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    });
+    fmu.ok(set(&fmu, Name::T, &[1.0; PIECES]));
+    for count in [0, 1, PIECES - 1, PIECES + 1] {
+        let words = format!("there are 8 values, the array has {count} elements");
+        fmu.refused_with(&[&words], |fmu| set(fmu, Name::T, &[0.0; PIECES + 1][..count]));
+    }
+    let element = vr(Name::T) + 2;
+    fmu.refused_with(&["there is no variable with value reference 4"], |fmu| {
+        fmu.fmi3SetFloat64(&element, 1, &1.0, 1)
+    });
+    fmu.initialize(0.0);
+    fmu.refused_with(&["hot[1] cannot be set in state"], |fmu| {
+        fmu.fmi3SetBoolean(&vr(Name::hot), 1, [1; PIECES].as_ptr(), PIECES)
+    });
+}
+
+macro_rules! rack {
+    ($($name:ident: $type:ty, $kind:expr, $get:ident $set:ident;)+) => {
+        /// Two of every number that FMI 3.0 has.
+        #[derive(Clone, Default)]
+        struct Rack {
+            $($name: [$type; 2],)+
+            bytes: [Vec<u8>; 2],
+        }
+
+        variables! { for Rack, names Shelf;
+            $(
+                /// Two
+                $name = input(&{ $kind }) in $name;
+            )+
+            /// Two
+            bytes = input(&BINARY) in bytes;
+        }
+
+        #[test]
+        fn numbers_of_every_type() {
+            let fmu = Importer::in_mode::<Rack>(Interface::CoSimulation, Mode::StepComplete);
+            $({
+                let vr = reference(Rack::place(Shelf::$name) as u32);
+                let (values, mut read) = ([<$type>::MAX, <$type>::MIN], [<$type>::default(); 2]);
+                fmu.ok(fmu.$set(&vr, 1, values.as_ptr(), 2));
+                fmu.ok(fmu.$get(&vr, 1, read.as_mut_ptr(), 2));
+                assert_eq!(read, values, stringify!($name));
+                fmu.refused_with(&["there are 2 values, the array has 1"], |fmu| fmu.$set(&vr, 1, values.as_ptr(), 1));
+            })+
+            let other = Importer::in_mode::<Rack>(Interface::CoSimulation, Mode::StepComplete);
+            other.restore(&fmu.bytes());
+            assert_eq!(other.bytes(), fmu.bytes());
+        }
+    };
+}
+
+rack! {
+    float64: f64, NUMBER, fmi3GetFloat64 fmi3SetFloat64;
+    float32: f32, Type::float32("", &units::ONE), fmi3GetFloat32 fmi3SetFloat32;
+    int8: i8, Type::whole("", BaseType::Int8), fmi3GetInt8 fmi3SetInt8;
+    uint8: u8, Type::whole("", BaseType::UInt8), fmi3GetUInt8 fmi3SetUInt8;
+    int16: i16, Type::whole("", BaseType::Int16), fmi3GetInt16 fmi3SetInt16;
+    uint16: u16, Type::whole("", BaseType::UInt16), fmi3GetUInt16 fmi3SetUInt16;
+    int32: i32, INTEGER, fmi3GetInt32 fmi3SetInt32;
+    uint32: u32, Type::whole("", BaseType::UInt32), fmi3GetUInt32 fmi3SetUInt32;
+    int64: i64, Type::whole("", BaseType::Int64), fmi3GetInt64 fmi3SetInt64;
+    uint64: u64, Type::whole("", BaseType::UInt64), fmi3GetUInt64 fmi3SetUInt64;
+}
+
+impl Model for Rack {
+    const INFO: Info = Info { guid: "{rack}", ..info!("Rack", "rack") };
+
+    fn new(_: &Setup) -> Result<Self, Error> {
+        Ok(Self::default())
+    }
+}
+
+impl CoSimulation for Rack {
+    fn step(&mut self, _: Step) -> Result<Stepped, Error> {
+        Ok(Stepped::Done)
+    }
+}
+
+offer!(Rack: CoSimulation);
+
+#[test]
+fn bytes_of_two() {
+    let fmu = Importer::in_mode::<Rack>(Interface::CoSimulation, Mode::StepComplete);
+    let vr = reference(Rack::place(Shelf::bytes) as u32);
+    let (sizes, values) = ([3, 1], [c"abc", c"d"].map(|text| text.as_ptr().cast()));
+    fmu.ok(fmu.fmi3SetBinary(&vr, 1, sizes.as_ptr(), values.as_ptr(), 2));
+    let (mut sizes, mut read) = ([0; 2], [null::<u8>(); 2]);
+    fmu.ok(fmu.fmi3GetBinary(&vr, 1, sizes.as_mut_ptr(), read.as_mut_ptr(), 2));
+    // SAFETY: as many bytes of the FMU's, until the next call.
+    let read = [0, 1].map(|k| unsafe { std::slice::from_raw_parts(read[k], sizes[k]) });
+    assert_eq!(read, [&b"abc"[..], b"d"]);
+    fmu.refused_with(&["bytes[2]", "NULL"], |fmu| {
+        fmu.fmi3SetBinary(&vr, 1, [0, 1].as_ptr(), [c"".as_ptr().cast(), null()].as_ptr(), 2)
+    });
+}

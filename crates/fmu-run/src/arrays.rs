@@ -1,0 +1,225 @@
+//! Arrays of FMI 3.0, whose elements are variables here: the FMU knows the array only, by one value reference, and takes
+//! and gives all its values at once (section 2.2.7.2).
+
+use fmi_abi::BaseType;
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// So many elements at the most are offered as variables.
+const MOST: usize = 1 << 20;
+
+/// The arrays of an FMU. Their elements have numbers of their own for value references, behind those of all variables.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Arrays {
+    all: Vec<Array>,
+    /// By their value references, their places here.
+    by_reference: HashMap<u32, usize>,
+    /// The number of the first element, and for each the array's place and which of its elements it is.
+    first: u32,
+    elements: Vec<(usize, usize)>,
+}
+
+/// An array.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Array {
+    pub reference: u32,
+    pub base: BaseType,
+    sizes: Vec<usize>,
+    start: Vec<String>,
+}
+
+impl Array {
+    /// With its sizes and start values: one for each element, or for all (section 2.4.7.5.1).
+    pub fn new(reference: u32, base: BaseType, sizes: Vec<usize>, start: &[&str]) -> Self {
+        let start = start.iter().map(|start| (*start).to_owned()).collect();
+        Self { reference, base, sizes, start }
+    }
+
+    fn length(&self) -> Option<usize> {
+        let length = self.sizes.iter().try_fold(1_usize, |length, size| length.checked_mul(*size));
+        length.filter(|length| *length <= MOST)
+    }
+
+    /// Of an element.
+    pub fn start(&self, number: usize) -> Option<&str> {
+        match &self.start[..] {
+            [one] => Some(one),
+            all => all.get(number).map(String::as_str),
+        }
+    }
+
+    /// Of an element, as FMI 2.0 calls it (section 2.2.9 there): indices count from 1 and belong to the variable.
+    pub fn name(&self, array: &str, number: usize) -> String {
+        let mut rest = number;
+        let mut indices: Vec<_> = self
+            .sizes
+            .iter()
+            .rev()
+            .map(|size| {
+                let index = rest % size + 1;
+                rest /= size;
+                index.to_string()
+            })
+            .collect();
+        indices.reverse();
+        let end = if array.starts_with("der(") { array.find([',', ')']) } else { None };
+        let (variable, behind) = array.split_at(end.unwrap_or(array.len()));
+        format!("{variable}[{}]{behind}", indices.join(","))
+    }
+}
+
+/// What a call has to pass for variables of which some are elements: whole arrays.
+#[derive(Debug, Default)]
+pub(crate) struct Whole {
+    /// Value references as the FMU has them.
+    pub references: Vec<u32>,
+    /// The number of their values, and where among them that of each variable is.
+    pub count: usize,
+    pub places: Vec<usize>,
+    /// Where the values of each array begin.
+    pub arrays: Vec<(usize, usize)>,
+}
+
+impl Whole {
+    /// Whether the variables are all elements of their arrays.
+    pub fn is_complete(&self) -> bool {
+        let mut named = vec![false; self.count];
+        self.places.iter().for_each(|place| named[*place] = true);
+        named.iter().all(|named| *named)
+    }
+}
+
+impl Arrays {
+    /// None yet, of an FMU with no value reference beyond this.
+    pub fn after(largest: u32) -> Self {
+        Self { first: largest.saturating_add(1), ..Self::default() }
+    }
+
+    pub fn all(&self) -> &[Array] {
+        &self.all
+    }
+
+    /// One more, and the numbers of its elements; `None` if it has too many.
+    pub fn push(&mut self, array: Array) -> Option<Range<u32>> {
+        let length = array.length()?;
+        let begin = u32::try_from(self.elements.len()).ok()?.checked_add(self.first)?;
+        let end = begin.checked_add(u32::try_from(length).ok()?)?;
+        if self.elements.len() + length > MOST {
+            return None;
+        }
+        let place = self.all.len();
+        self.by_reference.insert(array.reference, place);
+        self.elements.extend((0..length).map(|number| (place, number)));
+        self.all.push(array);
+        Some(begin..end)
+    }
+
+    /// The number of values that a variable of the FMU has.
+    pub fn length(&self, reference: u32) -> usize {
+        self.by_reference.get(&reference).and_then(|place| self.all[*place].length()).unwrap_or(1)
+    }
+
+    /// The numbers of the elements of an array of the FMU; of a scalar its own value reference.
+    pub fn elements(&self, reference: u32) -> Range<u32> {
+        let Some(place) = self.by_reference.get(&reference) else {
+            return reference..reference.saturating_add(1);
+        };
+        let begin = self.elements.partition_point(|(array, _)| array < place) as u32 + self.first;
+        begin..begin + self.length(reference) as u32
+    }
+
+    /// The array that a number is an element of, by its place, and which.
+    #[inline]
+    pub fn find(&self, reference: u32) -> Option<(usize, usize)> {
+        self.elements.get(reference.checked_sub(self.first)? as usize).copied()
+    }
+
+    /// Whether an element is among these.
+    #[inline]
+    pub fn among(&self, references: &[u32]) -> bool {
+        !self.elements.is_empty() && references.iter().any(|reference| *reference >= self.first)
+    }
+
+    /// The whole arrays of the elements among these variables.
+    pub fn whole(&self, references: &[u32]) -> Whole {
+        let mut whole = Whole::default();
+        let mut begins = HashMap::new();
+        for reference in references {
+            let Some((array, number)) = self.find(*reference) else {
+                whole.references.push(*reference);
+                whole.places.push(whole.count);
+                whole.count += 1;
+                continue;
+            };
+            let begin = *begins.entry(array).or_insert_with(|| {
+                let begin = whole.count;
+                whole.references.push(self.all[array].reference);
+                whole.arrays.push((array, begin));
+                whole.count += self.all[array].length().unwrap_or_default();
+                begin
+            });
+            whole.places.push(begin + number);
+        }
+        whole
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::description::Description;
+
+    const TEXT: &str = r#"<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="{}">
+        <ModelExchange modelIdentifier="m"/>
+        <ModelVariables>
+            <UInt64 name="n" valueReference="7" causality="structuralParameter" start="3"/>
+            <Float64 name="x" valueReference="2" causality="output" start="1 2 3"><Dimension valueReference="7"/></Float64>
+            <Float64 name="der(x)" valueReference="4"><Dimension valueReference="7"/></Float64>
+            <Int8 name="m" valueReference="3" start="5"><Dimension start="2"/><Dimension start="3"/></Int8>
+            <String name="s" valueReference="9"><Dimension start="2"/><Start value="a b"/><Start value=""/></String>
+            <Float64 name="huge" valueReference="8" start="0"><Dimension start="4000000000"/></Float64>
+            <Float64 name="more" valueReference="6" start="0"><Dimension start="4294967296"/><Dimension start="4294967296"/></Float64>
+            <Float64 name="unsized" valueReference="5"><Dimension valueReference="70"/></Float64>
+            <Float64 name="y" valueReference="1" causality="output"/>
+        </ModelVariables>
+        <ModelStructure>
+            <Output valueReference="2" dependencies="3 1"/>
+            <ContinuousStateDerivative valueReference="4"/>
+        </ModelStructure>
+    </fmiModelDescription>"#;
+
+    #[test]
+    fn elements_are_variables() {
+        let description = Description::parse(TEXT).unwrap();
+        let names: Vec<_> = description.variables.iter().map(|of| of.name.as_str()).collect();
+        let expected = "n x[1] x[2] x[3] der(x[1]) der(x[2]) der(x[3]) m[1,1] m[1,2] m[1,3] m[2,1] m[2,2] m[2,3] s[1] s[2] y";
+        assert_eq!(names.join(" "), expected);
+        assert_eq!(description.states, 3);
+        let of = |name| description.variable(name).unwrap();
+        let start = |name| of(name).start.as_deref();
+        assert_eq!(
+            [start("x[3]"), start("m[2,2]"), start("s[1]"), start("s[2]")],
+            [Some("3"), Some("5"), Some("a b"), Some("")]
+        );
+        let mut references: Vec<_> = description.variables.iter().map(|of| of.reference).collect();
+        references.sort_unstable();
+        references.dedup();
+        assert_eq!(references.len(), names.len(), "each has its own");
+        let known: Vec<_> = (1..=2).flat_map(|i| (1..=3).map(move |j| format!("m[{i},{j}]"))).collect();
+        let known = known.iter().map(|name| of(name).reference).chain([1]).collect();
+        assert_eq!(of("x[2]").depends_on, Some(known));
+    }
+
+    #[test]
+    fn whole_arrays_are_passed() {
+        let description = Description::parse(TEXT).unwrap();
+        let references: Vec<_> = ["x[3]", "y", "x[1]", "x[3]"]
+            .iter()
+            .map(|name| description.variable(name).unwrap().reference)
+            .collect();
+        let whole = description.arrays.whole(&references);
+        assert_eq!((whole.references.clone(), whole.count), (vec![2, 1], 4));
+        assert_eq!(whole.places, [2, 3, 0, 2]);
+        assert!(!whole.is_complete() && description.arrays.among(&references));
+        assert!(!description.arrays.among(&[1, 2, 7]));
+    }
+}
