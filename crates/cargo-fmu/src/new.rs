@@ -150,6 +150,11 @@ crate-type = ["cdylib", "rlib"]
 [dependencies]
 fmu-export = {export}
 
+# A small library, which asks for little of the system it runs on.
+[profile.release]
+lto = true
+strip = true
+
 [lints.rust]
 missing_docs = "warn"
 unsafe_code = "deny"

@@ -9,6 +9,9 @@ use std::process::{Command, Stdio};
 /// The program that is cargo with a linker for every system.
 pub const ZIGBUILD: &str = "cargo-zigbuild";
 
+/// The linker for Windows that Debian and others have.
+const MINGW: &str = "x86_64-w64-mingw32-gcc";
+
 /// What `--all-targets` compiles for.
 pub const TARGETS: [&str; 5] = [
     "x86_64-unknown-linux-gnu",
@@ -28,7 +31,7 @@ pub fn check_targets(targets: &[String], all: bool) -> Result<()> {
     for target in targets.iter().filter(|target| !has_std(target)) {
         missing.push(format!("Rust's library for it: rustup target add {target}"));
     }
-    if all && !has_zigbuild() {
+    if all && !runs(ZIGBUILD) {
         missing.push(
             "cargo-zigbuild, which links for other systems: pip install cargo-zigbuild (brings zig), or \
              cargo install cargo-zigbuild (and zig from ziglang.org)"
@@ -43,10 +46,9 @@ pub fn check_targets(targets: &[String], all: bool) -> Result<()> {
 
 /// The cargo that compiles for this target, and how it writes the target.
 ///
-/// A single target that cargo can link for by itself, as its configuration may say, is left to cargo where there is no
-/// cargo-zigbuild.
+/// What cargo can link by itself, as its configuration may say, is left to it where there is no cargo-zigbuild.
 pub fn rustc_for(target: Option<&str>) -> (OsString, Option<String>) {
-    match target.filter(|target| is_foreign(target) && has_zigbuild()) {
+    match target.filter(|target| needs_zigbuild(target) && runs(ZIGBUILD)) {
         Some(target) if target.contains("-linux-gnu") => (ZIGBUILD.into(), Some(format!("{target}.{GLIBC}"))),
         Some(target) => (ZIGBUILD.into(), Some(target.to_owned())),
         // Inside `cargo run` this names the cargo that is running.
@@ -54,10 +56,15 @@ pub fn rustc_for(target: Option<&str>) -> (OsString, Option<String>) {
     }
 }
 
-/// For another system or processor than this machine's, but for what every compiler can make.
-fn is_foreign(target: &str) -> bool {
-    let own = Platform::host().ok();
-    !target.starts_with("wasm") && (own.is_none() || Platform::of_target(target).ok() != own)
+/// For another system or processor than this machine's, or for an old glibc; but for what every compiler can make, and
+/// where MinGW is, whose libraries ask for less of Windows.
+fn needs_zigbuild(target: &str) -> bool {
+    match target {
+        "x86_64-pc-windows-gnu" => !runs(MINGW),
+        _ if target.starts_with("wasm") => false,
+        _ if target.contains("-linux-gnu") => true,
+        _ => Platform::host().ok() != Platform::of_target(target).ok(),
+    }
 }
 
 /// Whether the compiler has the standard library of a target. Where that cannot be asked, cargo will say it.
@@ -71,8 +78,8 @@ fn has_std(target: &str) -> bool {
         })
 }
 
-fn has_zigbuild() -> bool {
-    let mut command = Command::new(ZIGBUILD);
+fn runs(program: &str) -> bool {
+    let mut command = Command::new(program);
     let status = command.arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
     status.is_ok_and(|status| status.success())
 }
