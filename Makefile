@@ -27,6 +27,11 @@ CARGO ?= cargo
 # CI and users build what Cargo.lock says
 LOCKED ?= --locked
 
+# What the page in the FMU runs, and C sources are made of.
+WEBASSEMBLY := wasm32-unknown-unknown
+HAS_WEBASSEMBLY = ls "$$(rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
+ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
+
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
@@ -68,7 +73,8 @@ demo: need-rust need-python
 	@$(VENV)/bin/prw simulate --fmu $(FMU) $(if $(INPUT),--input "$(INPUT)") $(ARGS)
 
 fmu: need-rust
-	@$(CARGO) run $(LOCKED) --release --bin build_fmu
+	@$(ADD_WEBASSEMBLY) || echo 'note: the page in the FMU goes in without *Try it*, which needs: rustup target add $(WEBASSEMBLY)'
+	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- $$($(HAS_WEBASSEMBLY) && echo --live-page)
 
 test: test-rust test-python test-fmu test-closed-loop test-importers test-examples
 
@@ -160,7 +166,7 @@ release: need-rust $(DIST_VENV)/dist.stamp
 
 # The library as WebAssembly, and that as C: for targets that have a C compiler and no Rust.
 source-fmu: need-rust $(VENV)/wasm2c.stamp
-	@ls "$$(rustc --print target-libdir --target wasm32-unknown-unknown)" 2>/dev/null | grep -q libstd || rustup target add wasm32-unknown-unknown
+	@$(ADD_WEBASSEMBLY)
 	@$(WITH_WASM2C) $(CARGO) run $(LOCKED) --release --bin build_fmu -- --c-sources
 
 test-source-fmu: source-fmu fmu $(VENV)/test.stamp

@@ -75,7 +75,8 @@ pub fn check_tools(wasm2c: &OsStr) -> Result<()> {
     check_target(WEBASSEMBLY)
 }
 
-fn check_target(target: &str) -> Result<()> {
+/// Fails where Rust's library for the target is missing, with how to install it.
+pub fn check_target(target: &str) -> Result<()> {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let done = Command::new(rustc).args(["--print", "target-libdir", "--target", target]).output();
     let folder = done.context("cannot start rustc")?.stdout;

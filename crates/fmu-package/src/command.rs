@@ -1,11 +1,13 @@
 //! The command `build_fmu`, the same for every model.
 
-use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources, check_tools};
+use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources, check_target, check_tools};
 use crate::cargo::LibraryBuild;
 use crate::changes::Changes;
 use crate::connectors::{Terminal, terminals};
+use crate::content::ContentFile;
 use crate::files::write_atomically;
 use crate::library::check_platform;
+use crate::live::{self, Runnable};
 use crate::pack::{Library, Parts, pack};
 use crate::packages::Neighbourhood;
 use crate::platform::Platform;
@@ -20,6 +22,7 @@ use std::ffi::OsString;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
 /// The options that every `build_fmu` has. A model with more flattens them into its own.
 #[derive(clap::Args, Clone, Debug, Default)]
@@ -45,6 +48,9 @@ pub struct BuildOptions {
     /// Make the FMU of C sources instead, for targets with no Rust (FMI 2.0, in the folder source; needs wasm2c)
     #[arg(long, conflicts_with_all = ["target", "binary", "describe"])]
     pub c_sources: bool,
+    /// Let the page in the FMU run it: put the library as WebAssembly into documentation/index.html
+    #[arg(long, conflicts_with = "describe")]
+    pub live_page: bool,
     /// Accept a library for another processor than its platform names (with FMI 2.0, importers on ARM look in linux64)
     #[arg(long, requires = "binary")]
     pub any_processor: bool,
@@ -81,6 +87,8 @@ pub struct Builder {
     pub start_from: Option<PathBuf>,
     /// Whether they are the ones of the description that is kept with the sources.
     pub is_default: bool,
+    /// Scripts for the page that runs the FMU, besides those of every model (see the README in the folder `page`).
+    pub page_scripts: Vec<&'static str>,
     /// Environment variables that tell the build script of them; removed where the value is `None`.
     pub environment: Vec<(&'static str, Option<OsString>)>,
 }
@@ -104,6 +112,7 @@ impl Builder {
             start: Vec::new(),
             start_from: None,
             is_default: true,
+            page_scripts: Vec::new(),
             environment: Vec::new(),
         }
     }
@@ -167,6 +176,13 @@ impl Builder {
         for library in &libraries {
             check_library(library, &guid, options.any_processor)?;
         }
+        let with_page = match options.live_page {
+            true => {
+                Some(self.live_page::<M>(options.tunable, &guid, &describe(Fmi::V2, &guid)?, &content)?)
+            }
+            false => None,
+        };
+        let content = with_page.as_ref().map_or(&content, |(_, content)| content);
         let folder = match &options.out {
             Some(folder) => folder.clone(),
             None => Neighbourhood::of(&self.sources.folder)?.workspace.join("target/fmu"),
@@ -179,7 +195,7 @@ impl Builder {
                 Fmi::V3 => folder.join("fmi3"),
             };
             let fmu = folder.join(format!("{identifier}.fmu"));
-            let (libraries, sources, content) = (&libraries, &sources, &content);
+            let (libraries, sources) = (&libraries, &sources);
             // FMI Library calls those of FMI 2.0 a fatal mismatch (and goes on).
             let terminals = terminals.as_deref().filter(|_| *fmi == Fmi::V3);
             let parts = Parts { fmi: *fmi, identifier, description, terminals, libraries, sources, content };
@@ -252,6 +268,22 @@ impl Builder {
         c_sources(&wasm2c, &module, identifier)
     }
 
+    /// The content with the page that runs the FMU; the folder has it.
+    fn live_page<M: Exported>(
+        &self,
+        tunable: bool,
+        guid: &str,
+        description: &str,
+        content: &[ContentFile],
+    ) -> Result<(TempDir, Vec<ContentFile>)> {
+        check_target(WEBASSEMBLY).context("a page that runs the FMU is made with Rust's WebAssembly")?;
+        let path = self.compile(tunable, Some(WEBASSEMBLY), &LINKING)?;
+        let module = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        check_guid(&module, guid, &path)?;
+        let runnable = Runnable { description, module: &module };
+        live::with_page(content, (M::INFO.name, M::INFO.description), &runnable, &self.page_scripts)
+    }
+
     fn compile(&self, tunable: bool, target: Option<&str>, arguments: &[&str]) -> Result<PathBuf> {
         let mut environment = self.environment.clone();
         environment.push(("FMU_TUNABLE", tunable.then(|| OsString::from("1"))));
@@ -273,8 +305,12 @@ fn check_library(library: &Library, guid: &str, any_processor: bool) -> Result<(
     let bytes = fs::read(path)
         .with_context(|| format!("cannot read {}, the library for {platform}", path.display()))?;
     check_platform(&bytes, *platform, any_processor).with_context(|| path.display().to_string())?;
+    check_guid(&bytes, guid, path)
+}
+
+fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
     ensure!(
-        bytes.windows(guid.len()).any(|window| window == guid.as_bytes()),
+        library.windows(guid.len()).any(|window| window == guid.as_bytes()),
         "{} was not compiled from these sources and parameters (the guid {guid} is not in it); compile it again",
         path.display()
     );
