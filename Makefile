@@ -35,7 +35,7 @@ ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -47,6 +47,7 @@ help:
 	@echo 'make test                    check and test everything'
 	@echo 'make test-python             check the Python, with ruff and mypy'
 	@echo 'make test-newest-fmpy        the tests with FMPy again, with its newest version'
+	@echo 'make test-page               the page in the FMU, in Chromium, Firefox and WebKit, which it installs'
 	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
 	@echo 'make profile                 count the instructions of a step, with callgrind'
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
@@ -105,6 +106,10 @@ test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check
 	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication
+
+# In browsers that were never here before, from a file. What needs none is in tests/fmpy/test_page.py.
+test-page: $(VENV)/test.stamp fmu
+	$(PY) -m pytest -q -s -p no:cacheprovider tests/page
 
 # Ratios of one run; quiet the machine first.
 bench: $(VENV)/test.stamp closed-loop-fmus source-fmu

@@ -270,6 +270,7 @@ async function live(packed) {
   const begin = description.startTime;
   const follow = (/** @type {Record<string, number>} */ inputs) => addOn.follow(inputs, session.targets, description.step);
   const end = () => begin + (session.motion ? Math.min(session.motion.length, MOST_ROWS * description.step) : Math.min(MOST_BY_HAND, MOST_ROWS * description.step));
+  const recorded = () => Math.max(session.table.end, session.timeOf(session.known - 1));
   const isWide = () => session.motion || !(description.step < 0.1);
 
   const sliders = new Fields((one, value) => byHand(one.name, Number(value)));
@@ -301,7 +302,7 @@ async function live(packed) {
     begin,
     table: session.table,
     span: (now) => (isWide() ? [begin, end()] : [Math.max(begin, now - WINDOW), Math.max(begin + WINDOW, now)]),
-    recorded: () => (session.motion ? end() : Math.max(session.table.end, session.timeOf(session.known - 1))),
+    recorded: () => (session.motion ? end() : recorded()),
     limit: end,
     advance: (now) => {
       const until = session.motion ? end() : Math.max(now, session.timeOf(session.known - 1));
@@ -361,7 +362,8 @@ async function live(packed) {
     return made;
   };
   const save = () => {
-    while (session.advance(session.motion ? end() : session.table.end, follow) < (session.motion ? end() : 0) - session.description.step) {}
+    const until = session.motion ? end() : recorded();
+    while (session.advance(until, follow) < until - description.step) {}
     const link = element("a", { href: URL.createObjectURL(new Blob([session.csv()], { type: "text/csv" })), download: `${description.identifier}.csv` });
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);

@@ -40,8 +40,8 @@ class Player {
     this.element = element("div", { class: "live-player" }, this.side, this.plots.element);
     new ResizeObserver(() => this.ask()).observe(this.element);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.ask());
-    new IntersectionObserver(([entry]) => {
-      this.isSeen = entry.isIntersecting;
+    new IntersectionObserver((entries) => {
+      this.isSeen = entries[entries.length - 1].isIntersecting;
       this.ask();
     }).observe(this.element);
     this.setPlaying(!matchMedia("(prefers-reduced-motion: reduce)").matches);
@@ -86,7 +86,7 @@ class Player {
   /** @param {number} stamp ms */
   frame(stamp) {
     this.isAsked = false;
-    if (!this.isSeen) {
+    if (!this.isSeen && this.isPlaying) {
       this.last = 0;
       return;
     }
