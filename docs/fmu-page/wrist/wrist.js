@@ -316,7 +316,7 @@ class Wrist {
     const { rotation, scale, centre } = this.camera();
     const angle = (/** @type {string} */ name) => table.at(name, time);
     const turns = rotations(angle);
-    /** @type {{near: number, points: number[], corners: number[], colour: number[], light: number}[]} */
+    /** @type {{near: number, points: number[], corners: number[], colour: number[], light: number, isReversed: boolean}[]} */
     const seen = [];
     const twist = this.factor(table);
     const lamp = this.parts.lamp;
@@ -350,7 +350,7 @@ class Wrist {
         const sign = (area > 0 ? -1 : 1) / (Math.hypot(x, y, z) || 1);
         const turn = turns[body.turn];
         const light = sign * (lamp[0] * (turn[0] * x + turn[1] * y + turn[2] * z) + lamp[1] * (turn[3] * x + turn[4] * y + turn[5] * z) + lamp[2] * (turn[6] * x + turn[7] * y + turn[8] * z));
-        seen.push({ near: near / corners.length, points: placed, corners, colour, light });
+        seen.push({ near: near / corners.length, points: placed, corners, colour, light, isReversed: area > 0 });
       }
     };
     this.bodies.forEach(add);
@@ -364,30 +364,36 @@ class Wrist {
       }
     }
     seen.sort((one, other) => one.near - other.near);
-    pen.lineWidth = 0.8;
-    pen.lineJoin = "round";
-    const paint = () => {
-      pen.fill();
-      pen.stroke();
-      pen.beginPath();
-    };
     let shade = "";
     pen.beginPath();
-    for (const { points, corners, colour, light } of seen) {
+    for (const { points, corners, colour, light, isReversed } of seen) {
       const bright = 0.62 + 0.38 * Math.max(0, light);
       const own = `rgb(${Math.round(bright * colour[0])},${Math.round(bright * colour[1])},${Math.round(bright * colour[2])})`;
       // Neighbours of one shade are painted together, all turning the same way.
       if (own !== shade) {
-        paint();
-        pen.fillStyle = pen.strokeStyle = shade = own;
+        pen.fill();
+        pen.beginPath();
+        pen.fillStyle = shade = own;
       }
-      pen.moveTo(points[3 * corners[0]], points[3 * corners[0] + 1]);
-      for (let k = 1; k < corners.length; k++) {
-        pen.lineTo(points[3 * corners[k]], points[3 * corners[k] + 1]);
+      // A little larger than they are, lest the ground shines through between them; strokes would take much longer.
+      let [x, y] = [0, 0];
+      for (const corner of corners) {
+        x += points[3 * corner] / corners.length;
+        y += points[3 * corner + 1] / corners.length;
+      }
+      for (let k = 0; k < corners.length; k++) {
+        const corner = 3 * corners[isReversed ? corners.length - 1 - k : k];
+        const [dx, dy] = [points[corner] - x, points[corner + 1] - y];
+        const larger = 1 + 0.6 / (Math.hypot(dx, dy) || 1);
+        if (k) {
+          pen.lineTo(x + larger * dx, y + larger * dy);
+        } else {
+          pen.moveTo(x + larger * dx, y + larger * dy);
+        }
       }
       pen.closePath();
     }
-    paint();
+    pen.fill();
     this.label(pen, width, twist);
   }
 
