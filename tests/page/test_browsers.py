@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 import pytest
 import toolchain
-from built import ROOT
 from fmpy import read_model_description
 from fmu_run import Fmu
 
@@ -33,7 +32,16 @@ BROWSERS = {
     "chromium": lambda home, width: [
         *("chromium", "--headless=new", "--no-sandbox", f"--user-data-dir={home}", f"--window-size={width},1000"),
     ],
-    "firefox": lambda home, width: ["firefox-esr", "--headless", "--profile", str(home), "--width", str(width)],
+    "firefox": lambda home, width: [
+        "firefox-esr",
+        "--headless",
+        "--profile",
+        str(home),
+        "--width",
+        str(width),
+        "--height",
+        "1000",
+    ],
     "webkit": lambda home, width: [
         "xvfb-run",
         "-a",
