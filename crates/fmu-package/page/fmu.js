@@ -74,7 +74,7 @@ function variable(element, types, units) {
     min: number("min", -Infinity),
     max: number("max", Infinity),
     nominal: number("nominal", 1),
-    unit: (display ? of("displayUnit") : of("unit")) || "",
+    unit: ((display ? of("displayUnit") : of("unit")) || "").replace(/^1$/, ""),
     factor: Number(display?.getAttribute("factor") || 1),
     offset: Number(display?.getAttribute("offset") || 0),
     items: [...(declared?.querySelectorAll("Item") || [])].map((item) => ({
