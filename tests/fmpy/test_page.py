@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import re
 import struct
 import zipfile
@@ -90,6 +91,13 @@ def test_it_is_small_and_loads_nothing(testbed, page):
     (live,) = LIVE.findall(page)
     assert len(live) < 500e3 and len(zlib.compress(live.encode(), 9)) < 250e3
     assert not re.search(r"https?:|fetch\(|XMLHttp|import\(|@import|url\(|WebSocket| src=", PACKED.sub("", live))
+
+
+def test_the_shaper_knows_the_pole_of_pitch():
+    script = (ROOT / "docs" / "fmu-page" / "wrist" / "testbed.js").read_text(encoding="utf-8")
+    (pole,) = re.findall(r"const PITCH_POLE = \{ real: (\S+), imaginary: (\S+) \}", script)
+    numbers = json.loads((ROOT / "docs" / "fmu-page" / "figures" / "numbers.json").read_text(encoding="utf-8"))
+    assert [float(part) for part in pole] == pytest.approx(numbers["poles"]["pitch"][1], abs=5e-4)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -117,7 +117,9 @@ def still(run: Run, instant: float) -> Image.Image:
     picture.figure.set_dpi(STILL_DPI)
     for ground in (picture.figure, picture.scene):
         ground.set_facecolor("none")
-    picture.note.set_visible(False)
+    # The page has the words, in letters of its own size and colours.
+    for words in picture.figure.texts:
+        words.set_text("")
     pixels = picture.at(instant)
     return pixels.crop((0, 0, pixels.width, round(SCENE * pixels.height)))
 
