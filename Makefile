@@ -27,10 +27,15 @@ CARGO ?= cargo
 # CI and users build what Cargo.lock says
 LOCKED ?= --locked
 
+# What the page in the FMU runs, and C sources are made of.
+WEBASSEMBLY := wasm32-unknown-unknown
+HAS_WEBASSEMBLY = ls "$$(rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
+ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
+
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -42,6 +47,7 @@ help:
 	@echo 'make test                    check and test everything'
 	@echo 'make test-python             check the Python, with ruff and mypy'
 	@echo 'make test-newest-fmpy        the tests with FMPy again, with its newest version'
+	@echo 'make test-page               the page in the FMU, in Chromium, Firefox and WebKit, which it installs'
 	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
 	@echo 'make profile                 count the instructions of a step, with callgrind'
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
@@ -68,7 +74,8 @@ demo: need-rust need-python
 	@$(VENV)/bin/prw simulate --fmu $(FMU) $(if $(INPUT),--input "$(INPUT)") $(ARGS)
 
 fmu: need-rust
-	@$(CARGO) run $(LOCKED) --release --bin build_fmu
+	@$(ADD_WEBASSEMBLY) || echo 'note: the page in the FMU goes in without *Try it*, which needs: rustup target add $(WEBASSEMBLY)'
+	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- $$($(HAS_WEBASSEMBLY) && echo --live-page)
 
 test: test-rust test-python test-fmu test-closed-loop test-importers test-examples
 
@@ -99,6 +106,10 @@ test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check
 	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication
+
+# In browsers that were never here before, from a file. What needs none is in tests/fmpy/test_page.py.
+test-page: $(VENV)/test.stamp fmu
+	$(PY) -m pytest -q -s -p no:cacheprovider tests/page
 
 # Ratios of one run; quiet the machine first.
 bench: $(VENV)/test.stamp closed-loop-fmus source-fmu
@@ -162,7 +173,7 @@ release: need-rust $(DIST_VENV)/dist.stamp
 
 # The library as WebAssembly, and that as C: for targets that have a C compiler and no Rust.
 source-fmu: need-rust $(VENV)/wasm2c.stamp
-	@ls "$$(rustc --print target-libdir --target wasm32-unknown-unknown)" 2>/dev/null | grep -q libstd || rustup target add wasm32-unknown-unknown
+	@$(ADD_WEBASSEMBLY)
 	@$(WITH_WASM2C) $(CARGO) run $(LOCKED) --release --bin build_fmu -- --c-sources
 
 test-source-fmu: source-fmu fmu $(VENV)/test.stamp

@@ -51,6 +51,11 @@ fn run(options: &Options) -> Result<()> {
         start: fingerprint::start(&parameter_file::read(&file)?),
         is_default: other.is_none(),
         start_from: Some(file),
+        page_scripts: vec![
+            include_str!("docs/fmu-page/wrist/wrist.js"),
+            concat!("WRIST = ", include_str!("docs/fmu-page/wrist/wrist.json"), ";\n"),
+            include_str!("docs/fmu-page/wrist/testbed.js"),
+        ],
         environment: vec![("PRW_PARAMETERS", other.map(Into::into))],
         ..Builder::new(env!("CARGO_PKG_NAME"), PROJECT, env!("FMU_SOURCES"))
     };

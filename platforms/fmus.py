@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sysconfig
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -29,6 +30,8 @@ from toolchain import say, toolchain
 #: The program that packs a model's FMUs.
 PACKERS = {MODEL: "build_fmu", CONTROLLER: "build_controller"}
 SYSTEM = "prw_closed_loop"
+#: The page that runs the FMU, which is also a file of its own.
+PAGE = "documentation/index.html"
 
 Folders = Mapping[str, tuple[Target, ...]]
 
@@ -47,6 +50,8 @@ def make(libraries: Path, out: Path, scratch: Path) -> None:
             arm.rename(out / f"{model}-linux-arm64.fmu")
     say(f"packing {MODEL} as C sources, and {SYSTEM}")
     _sources(scratch).rename(out / f"{MODEL}-source.fmu")
+    with zipfile.ZipFile(out / f"{MODEL}.fmu") as archive:
+        (out / f"{MODEL}.html").write_bytes(archive.read(PAGE))
     arguments = [f"--testbed={out / MODEL}.fmu", f"--controller={out / CONTROLLER}.fmu", f"--out={scratch}"]
     _run(_program("build_closed_loop"), *arguments, what=SYSTEM)
     (scratch / f"{SYSTEM}.ssp").rename(out / f"{SYSTEM}.ssp")
@@ -81,7 +86,12 @@ def _pack(model: str, fmi: int, folders: Folders, libraries: dict[Target, Path],
         parts = [libraries[target] for target in targets]
         path = parts[0] if len(parts) == 1 else universal(scratch / f"{model}-{folder}.dylib", parts)
         options += (f"--binary={folder}={path}",)
-    _run(_program(PACKERS[model]), f"--fmi={fmi}", f"--out={scratch}", *options, what=f"the FMU {model}")
+    environment: Mapping[str, str] = os.environ
+    if model == MODEL:
+        _, environment, _ = prepare(WEBASSEMBLY)
+        options += ("--live-page",)
+    command = (_program(PACKERS[model]), f"--fmi={fmi}", f"--out={scratch}", *options)
+    _run(*command, what=f"the FMU {model}", environment=environment)
     return scratch / ("fmi3" if fmi == 3 else "") / f"{model}.fmu"
 
 

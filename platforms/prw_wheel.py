@@ -14,6 +14,11 @@ from targets import MODEL, ROOT
 
 PACKAGE = ROOT / "python" / "prw"
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
+#: The scripts that an animation as a page is made of (prw.moving).
+PAGES = (
+    *(Path("crates/fmu-package/page", name) for name in ("live.css", "player.js", "plot.js")),
+    *(Path("docs/fmu-page/wrist", name) for name in ("animation.js", "wrist.js", "wrist.json")),
+)
 #: The first time that a zip can hold: the same sources give the same bytes.
 EPOCH = "315532800"
 
@@ -32,11 +37,14 @@ def build(fmu: Path, out: Path) -> Path:
     with tempfile.TemporaryDirectory() as folder:
         copy, made = Path(folder, "sources"), Path(folder, "made")
         inside = copy / "src" / "prw" / "fmu"
-        ignored = shutil.ignore_patterns("__pycache__", "*.egg-info", "fmu")
+        ignored = shutil.ignore_patterns("__pycache__", "*.egg-info", "fmu", "page")
         shutil.copytree(PACKAGE / "src", copy / "src", ignore=ignored)
         inside.mkdir()
         for path in (PACKAGE / "pyproject.toml", PACKAGE / "README.md", *(ROOT / name for name in LICENCES)):
             shutil.copyfile(path, copy / path.name)
+        (copy / "src" / "prw" / "page").mkdir()
+        for path in PAGES:
+            shutil.copyfile(ROOT / path, copy / "src" / "prw" / "page" / path.name)
         shutil.copyfile(fmu, inside / f"{MODEL}.fmu")
         command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(made), str(copy)]
         environment = {**os.environ, "SOURCE_DATE_EPOCH": EPOCH}

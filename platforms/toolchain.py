@@ -25,6 +25,8 @@ PACKAGES = {
     "arm-linux-gnueabihf-gcc": ["gcc-arm-linux-gnueabihf", "libc6-dev-armhf-cross"],
     "qemu-arm": ["qemu-user"],
     "clang": ["clang"],
+    "chromium": ["chromium"],
+    "firefox-esr": ["firefox-esr"],
     "/usr/lib/wine/wine64": ["wine64"],
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import json
 import re
 import subprocess
 import sys
@@ -90,11 +92,18 @@ def test_still_stands_on_no_ground() -> None:
     assert 0.15 < np.mean(pixels[:, :, 3] == 255) < 0.6
 
 
-def test_page_needs_nothing_else(tmp_path: Path) -> None:
-    animate(swing(), tmp_path / "run.html", speed=1.0)
+def test_page_has_the_run_and_needs_nothing_else(tmp_path: Path) -> None:
+    run = swing()
+    animate(run, tmp_path / "run.html", speed=0.5, captions=[(0.0, "</script>")])
     page = (tmp_path / "run.html").read_text()
-    assert page.count("data:image/png;base64") == round(0.5 * RATES[".html"]) + 1
+    assert len(page) < 100_000 and page.count("</script>") == 1
     assert not re.search(r"https?:|<link|@import| src=", page)
+    told = json.loads(re.findall(r"^animation\((.*)\);$", page, flags=re.M)[0])
+    assert told["speed"] == 0.5 and told["captions"] == [[0.0, "</script>"]]
+    columns = {name: np.frombuffer(base64.b64decode(text)) for name, text in told["columns"].items()}
+    np.testing.assert_array_equal(columns["time"], run.time)
+    for name, course in angles_and_torques(run).items():
+        np.testing.assert_array_equal(columns[name], course)
 
 
 def test_movie(tmp_path: Path) -> None:

@@ -61,7 +61,9 @@ def test_the_pages_are_up_to_date(which):
 
 def test_the_page_travels_in_the_fmu(fmu, page):
     with zipfile.ZipFile(fmu) as archive:
-        assert archive.read("documentation/index.html").decode() == page
+        # What runs the FMU is put in before its end: test_page.py.
+        beginning = page[: page.index("</body>")]
+        assert archive.read("documentation/index.html").decode().startswith(beginning)
         for icon in (ICON, ICON_SVG):
             assert archive.read(icon.as_posix()) == (ROOT / TESTBED.content / icon).read_bytes()
     assert fmu.stat().st_size < 2e6

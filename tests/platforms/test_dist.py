@@ -32,7 +32,15 @@ def names(fmu) -> set[str]:
 
 
 def test_all_of_it_and_no_more():
-    expected = {*MODEL_FMUS, SYSTEM, f"{MODEL}-cross-check.zip", "RELEASE_NOTES.md", "compilers.txt", SUMS}
+    expected = {
+        *MODEL_FMUS,
+        SYSTEM,
+        f"{MODEL}.html",
+        f"{MODEL}-cross-check.zip",
+        "RELEASE_NOTES.md",
+        "compilers.txt",
+        SUMS,
+    }
     expected |= {f"{product.name}.cdx.json" for product in PRODUCTS}
     expected |= {path.name for path in (prw_wheel(), *map(wheel, TARGETS))}
     assert {path.name for path in DIST.iterdir()} == expected
@@ -51,6 +59,14 @@ def test_it_is_one_version():
     for name in MODEL_FMUS:
         with zipfile.ZipFile(DIST / name) as archive:
             assert f'version="{version()}"'.encode() in archive.read("modelDescription.xml"), name
+
+
+def test_the_page_runs_the_fmu():
+    page = (DIST / f"{MODEL}.html").read_bytes()
+    assert b"\nlive([{ description: " in page
+    for name in (f"{MODEL}.fmu", ARM, FMI3):
+        with zipfile.ZipFile(DIST / name) as archive:
+            assert archive.read("documentation/index.html") == page, name
 
 
 def test_each_compiler_is_named():

@@ -1,5 +1,6 @@
 //! An FMU's sources in C: the library, compiled to WebAssembly, made into C by wasm2c, and the functions of FMI around it.
 
+use crate::cross::check_targets;
 use anyhow::{Context, Result, bail, ensure};
 use fmu_export::fmi2::ALLOWED;
 use std::ffi::OsStr;
@@ -72,18 +73,7 @@ pub fn c_sources(wasm2c: &OsStr, module: &Path, identifier: &str) -> Result<CSou
 /// What is missing, and how to install it.
 pub fn check_tools(wasm2c: &OsStr) -> Result<()> {
     check_version(wasm2c)?;
-    check_target(WEBASSEMBLY)
-}
-
-fn check_target(target: &str) -> Result<()> {
-    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let done = Command::new(rustc).args(["--print", "target-libdir", "--target", target]).output();
-    let folder = done.context("cannot start rustc")?.stdout;
-    let folder = Path::new(String::from_utf8_lossy(&folder).trim()).to_owned();
-    // Without rustup there is no folder, with it at times an empty one.
-    let is_there = fs::read_dir(folder).is_ok_and(|mut files| files.next().is_some());
-    ensure!(is_there, "Rust's library for {target} is missing; install it with: rustup target add {target}");
-    Ok(())
+    check_targets(&[WEBASSEMBLY.to_owned()], false)
 }
 
 fn check_version(wasm2c: &OsStr) -> Result<()> {
@@ -279,8 +269,9 @@ mod tests {
     #[test]
     fn a_missing_target_is_named() {
         assert_eq!(
-            error(check_target("wasm64-unknown-unknown")),
-            "Rust's library for wasm64-unknown-unknown is missing; install it with: rustup target add \
+            error(check_targets(&["wasm64-unknown-unknown".to_owned()], false)),
+            "to compile for other systems, there is still to be installed:
+  Rust's library for wasm64-unknown-unknown: rustup target add \
              wasm64-unknown-unknown"
         );
     }

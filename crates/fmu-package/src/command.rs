@@ -4,9 +4,11 @@ use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources, chec
 use crate::cargo::LibraryBuild;
 use crate::changes::Changes;
 use crate::connectors::{Terminal, terminals};
+use crate::content::ContentFile;
 use crate::cross::{TARGETS, check_targets};
 use crate::files::write_atomically;
 use crate::library::check_platform;
+use crate::live::{self, Runnable};
 use crate::pack::{Library, Parts, pack};
 use crate::packages::Neighbourhood;
 use crate::platform::Platform;
@@ -24,6 +26,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use tempfile::TempDir;
 use zip::ZipArchive;
 
 /// The options that every `build_fmu` has. A model with more flattens them into its own.
@@ -53,6 +56,9 @@ pub struct BuildOptions {
     /// Make the FMU of C sources instead, for targets with no Rust (FMI 2.0, in the folder source; needs wasm2c)
     #[arg(long, conflicts_with_all = ["target", "binary", "describe"])]
     pub c_sources: bool,
+    /// Let the page in the FMU run it: put the library as WebAssembly into documentation/index.html
+    #[arg(long, conflicts_with = "describe")]
+    pub live_page: bool,
     /// Accept a library for another processor than its platform names (with FMI 2.0, importers on ARM look in linux64)
     #[arg(long, requires = "binary")]
     pub any_processor: bool,
@@ -67,6 +73,7 @@ impl BuildOptions {
             (self.describe, "--describe"),
             (self.all_targets, "--all-targets"),
             (self.c_sources, "--c-sources"),
+            (self.live_page, "--live-page"),
             (self.any_processor, "--any-processor"),
         ];
         let mut arguments: Vec<OsString> =
@@ -133,6 +140,8 @@ pub struct Builder {
     pub start_from: Option<PathBuf>,
     /// Whether they are the ones of the description that is kept with the sources.
     pub is_default: bool,
+    /// Scripts for the page that runs the FMU, besides those of every model (see the README in the folder `page`).
+    pub page_scripts: Vec<&'static str>,
     /// Environment variables that tell the build script of them; removed where the value is `None`.
     pub environment: Vec<(&'static str, Option<OsString>)>,
 }
@@ -156,6 +165,7 @@ impl Builder {
             start: Vec::new(),
             start_from: None,
             is_default: true,
+            page_scripts: Vec::new(),
             environment: Vec::new(),
         }
     }
@@ -222,6 +232,13 @@ impl Builder {
         if versions.contains(&Fmi::V2) {
             join_for_macos(&mut libraries)?;
         }
+        let with_page = match options.live_page {
+            true => {
+                Some(self.live_page::<M>(options.tunable, &guid, &describe(Fmi::V2, &guid)?, &content)?)
+            }
+            false => None,
+        };
+        let content = with_page.as_ref().map_or(&content, |(_, content)| content);
         let folder = match &options.out {
             Some(folder) => folder.clone(),
             None => Neighbourhood::of(&self.sources.folder)?.workspace.join("target/fmu"),
@@ -234,7 +251,7 @@ impl Builder {
                 Fmi::V3 => folder.join("fmi3"),
             };
             let fmu = folder.join(format!("{identifier}.fmu"));
-            let (libraries, sources, content) = (&libraries, &sources, &content);
+            let (libraries, sources) = (&libraries, &sources);
             // FMI Library calls those of FMI 2.0 a fatal mismatch (and goes on).
             let terminals = terminals.as_deref().filter(|_| *fmi == Fmi::V3);
             let parts = Parts { fmi: *fmi, identifier, description, terminals, libraries, sources, content };
@@ -341,6 +358,23 @@ impl Builder {
         c_sources(&wasm2c, &module, identifier)
     }
 
+    /// The content with the page that runs the FMU; the folder has it.
+    fn live_page<M: Exported>(
+        &self,
+        tunable: bool,
+        guid: &str,
+        description: &str,
+        content: &[ContentFile],
+    ) -> Result<(TempDir, Vec<ContentFile>)> {
+        check_targets(&[WEBASSEMBLY.to_owned()], false)
+            .context("a page that runs the FMU is made with Rust's WebAssembly")?;
+        let path = self.compile(tunable, Some(WEBASSEMBLY), &LINKING)?;
+        let module = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        check_guid(&module, guid, &path)?;
+        let runnable = Runnable { description, module: &module };
+        live::with_page(content, (M::INFO.name, M::INFO.description), &runnable, &self.page_scripts)
+    }
+
     fn compile(&self, tunable: bool, target: Option<&str>, arguments: &[&str]) -> Result<PathBuf> {
         let mut environment = self.environment.clone();
         // For crates without a build script; one of `build_script` says the same.
@@ -370,6 +404,11 @@ fn check_library(library: &Library, guid: &str, any_processor: bool) -> Result<(
         "{} has no functions of FMI; its crate needs `export_fmu!(...)` in src/lib.rs (`offer!` makes none)",
         path.display()
     );
+    check_guid(&bytes, guid, path)
+}
+
+fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
+    let has = |text: &str| library.windows(text.len()).any(|window| window == text.as_bytes());
     ensure!(
         has(guid) || !has(NO_GUID),
         "{} has no guid, as its crate's build.rs does not call fmu_package::build_script, or INFO does not begin with info!",

@@ -29,7 +29,7 @@ const GLIBC: &str = "2.17";
 pub fn check_targets(targets: &[String], all: bool) -> Result<()> {
     let mut missing = Vec::new();
     for target in targets.iter().filter(|target| !has_std(target)) {
-        missing.push(format!("Rust's library for it: rustup target add {target}"));
+        missing.push(format!("Rust's library for {target}: rustup target add {target}"));
     }
     if all && !runs(ZIGBUILD) {
         missing.push(

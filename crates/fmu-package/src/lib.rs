@@ -16,7 +16,7 @@
 //! | files | `xml`, `files` |
 //! | the description | `changes`, `check`, `sample`, `memory`, `structure`, `definitions`, `describe`, `fmi2`, `fmi3` |
 //! | the FMU | `connectors`, `version`, `platform`, `cargo`, `pack` |
-//! | the command | `library`, `universal`, `cross`, `c_sources`, `terminal`, `command` |
+//! | the command | `library`, `universal`, `cross`, `c_sources`, `live`, `terminal`, `command` |
 
 #![cfg_attr(not(feature = "command"), allow(rustdoc::broken_intra_doc_links))]
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -72,6 +72,8 @@ mod command;
 mod cross;
 #[cfg(feature = "command")]
 mod library;
+#[cfg(feature = "command")]
+mod live;
 #[cfg(feature = "command")]
 pub mod terminal;
 #[cfg(feature = "command")]

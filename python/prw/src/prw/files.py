@@ -1,4 +1,4 @@
-"""Writing result files so that a reader never meets half of one."""
+"""Writing result files so that a reader never meets half of one; and the files of the pages."""
 
 from __future__ import annotations
 
@@ -9,6 +9,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from prw.errors import UserError
+
+#: The scripts of the pages, in the wheel, and where a clone has them.
+_INSIDE = Path(__file__).parent / "page"
+_CLONE = Path(os.path.normpath(_INSIDE / "../../../../.."))
+PAGE_FOLDERS = ("crates/fmu-package/page", "docs/fmu-page/wrist")
+
+
+def page_file(name: str) -> Path:
+    """A script, style sheet or table of the pages that show the wrist."""
+    places = [_INSIDE / name, *(_CLONE / folder / name for folder in PAGE_FOLDERS)]
+    return next((path for path in places if path.is_file()), places[0])
 
 
 @contextlib.contextmanager

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import base64
-import io
+import html
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,27 +15,31 @@ from PIL import Image
 
 from prw.errors import UserError
 from prw.extras import need
+from prw.files import page_file
+from prw.motion import Array
 
+#: What the page is put together of, in this order.
+SCRIPTS = ("plot.js", "player.js", "wrist.js", "animation.js")
 PAGE = """<!DOCTYPE html>
 <html lang="en">
+<head>
 <meta charset="utf-8">
-<title>The pitch-roll wrist testbed</title>
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
 <style>
-body { max-width: WIDTHpx; margin: auto; } img { width: 100%; } input { width: 85%; } button { width: 12%; }
-</style>
-<img id="picture" alt="The testbed, moving"><button id="play">pause</button>
-<input id="place" type="range" max="LAST" value="0">
+:root {{ color-scheme: light dark; }}
+body {{ margin: 0 auto; padding: 0 1rem; max-width: 90rem; background: Canvas; color: CanvasText; font: 1rem/1.5 system-ui, sans-serif; }}
+{style}</style>
+</head>
+<body>
 <script>
-const pictures = PICTURES;
-const [picture, play, place] = ["picture", "play", "place"].map((id) => document.getElementById(id));
-let playing = true;
-const show = () => { picture.src = pictures[place.value]; };
-const pause = (wanted) => { playing = !wanted; play.textContent = playing ? "pause" : "play"; };
-play.onclick = () => pause(playing);
-place.oninput = () => { pause(true); show(); };
-setInterval(() => { if (playing) { place.value = (Number(place.value) + 1) % pictures.length; show(); } }, WAIT);
-show();
+(() => {{
+"use strict";
+{scripts}WRIST = {parts};
+animation({run});
+}})();
 </script>
+</body>
 </html>
 """
 
@@ -53,18 +58,19 @@ def write_gif(path: Path, pictures: Iterable[Image.Image], rate: int, colours: I
     )
 
 
-def write_page(path: Path, pictures: Iterable[Image.Image], rate: int) -> None:
-    """Write an HTML page with all pictures, `rate` a second, a button and a slider."""
-    parts, width = [], 0
-    for one in pictures:
-        file, width = io.BytesIO(), one.width
-        one.convert("RGB").quantize(128, dither=Image.Dither.NONE).save(file, format="PNG", optimize=True)
-        parts.append("data:image/png;base64," + base64.b64encode(file.getvalue()).decode())
-    # The pictures last: nothing in them is taken for a name.
-    values = {"WIDTH": width, "LAST": len(parts) - 1, "WAIT": 1000 / rate, "PICTURES": json.dumps(parts)}
-    page = PAGE
-    for name, value in values.items():
-        page = page.replace(name, str(value))
+def write_page(path: Path, title: str, courses: Mapping[str, Array], speed: float, captions: Sequence[Any]) -> None:
+    """Write an HTML page that shows the courses, among them `time`, with the wrist in three dimensions, to be turned."""
+    files = {name: page_file(name).read_text(encoding="utf-8") for name in (*SCRIPTS, "live.css", "wrist.json")}
+    columns = {name: base64.b64encode(np.asarray(one, "<f8").tobytes()).decode() for name, one in courses.items()}
+    run = {"title": title, "columns": columns, "speed": speed, "captions": [list(one) for one in captions]}
+    page = PAGE.format(
+        title=html.escape(title),
+        style=files["live.css"],
+        scripts="".join(files[name] for name in SCRIPTS),
+        parts=files["wrist.json"].strip(),
+        # What a caption says must not end the script.
+        run=json.dumps(run).replace("<", "\\u003c"),
+    )
     path.write_text(page, encoding="utf-8")
 
 

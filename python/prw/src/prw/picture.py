@@ -68,8 +68,8 @@ class Panel(NamedTuple):
 
 
 PANELS = (
-    Panel("Motors", 180 / np.pi, 0, "{:.0f}°", {"theta1": ("θ₁", BLUE), "theta2": ("θ₂", VERMILION)}),
-    Panel("Wrist", 180 / np.pi, 0, "{:.0f}°", {"pitch": ("pitch", GREEN), "roll": ("roll", PURPLE)}),
+    Panel("Motors (°)", 180 / np.pi, 0, "{:.0f}°", {"theta1": ("θ₁", BLUE), "theta2": ("θ₂", VERMILION)}),
+    Panel("Wrist (°)", 180 / np.pi, 0, "{:.0f}°", {"pitch": ("pitch", GREEN), "roll": ("roll", PURPLE)}),
     Panel("Torque (N m)", 1.0, 1, "{:.1f}", {"tau1": ("τ₁", BLUE), "tau2": ("τ₂", VERMILION)}),
 )
 
@@ -90,7 +90,8 @@ def drawn(
     """The animation of `count` pictures, `rate` a second, `speed` times as fast as the run, written to `target`; see
     `prw.animate`."""
     time = run.time
-    picture = _Picture(time, angles_and_torques(run), speed, captions)
+    courses = angles_and_torques(run)
+    picture = _Picture(time, courses, speed, captions)
     instants = np.linspace(time[0], time[-1], max(count, 2))
 
     def draw(number: int) -> list[Any]:
@@ -104,7 +105,7 @@ def drawn(
             if target.suffix.lower() == ".gif":
                 write_gif(temporary, pictures, rate, _colours())
             elif target.suffix.lower() == ".html":
-                write_page(temporary, pictures, rate)
+                write_page(temporary, "The pitch-roll wrist testbed", {"time": time} | courses, speed, captions)
             else:
                 write_movie(temporary, pictures, rate)
     return animation
@@ -116,7 +117,9 @@ def still(run: Run, instant: float) -> Image.Image:
     picture.figure.set_dpi(STILL_DPI)
     for ground in (picture.figure, picture.scene):
         ground.set_facecolor("none")
-    picture.note.set_visible(False)
+    # The page has the words, in letters of its own size and colours.
+    for words in picture.figure.texts:
+        words.set_text("")
     pixels = picture.at(instant)
     return pixels.crop((0, 0, pixels.width, round(SCENE * pixels.height)))
 
@@ -179,7 +182,7 @@ class _Picture:
 
     def _panel(self, number: int, panel: Panel) -> list[Moving]:
         """Axes with the whole courses, pale, and what is to be moved on them."""
-        axis = self.figure.add_axes((0.055 + 0.328 * number, 0.085, 0.265, 0.2))
+        axis = self.figure.add_axes((0.055 + 0.328 * number, 0.105, 0.265, 0.18))
         axis.set_title(panel.title)
         values = {name: panel.factor * self.courses[name] for name in panel.curves}
         moving = []
@@ -194,6 +197,7 @@ class _Picture:
         axis.set(xlim=(self.time[0], self.time[-1]), ylim=(-1.15 * peak, 1.15 * peak))
         axis.locator_params(axis="y", nbins=4)
         axis.tick_params(labelsize=8, length=2)
+        axis.set_xlabel("time (s)", fontsize=8, labelpad=1)
         return moving
 
     def draw(self, instant: float) -> None:

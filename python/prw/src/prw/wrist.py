@@ -1,24 +1,29 @@
 """The testbed in three dimensions: bodies of flat faces, and where they are at an instant.
 
-The frame is that of eq. (4a): X, the pitch axis, along the input shafts from motor 1 to motor 2; Y, the roll axis, up
-to the gripper; Z to the viewer. Lengths are to please the eye: the roller-carriers have a radius of 0.8.
+What they are made of is in wrist.json, which the pages that show the wrist read, too. The frame is that of eq. (4a): X,
+the pitch axis, along the input shafts from motor 1 to motor 2; Y, the roll axis, up to the gripper; Z to the viewer. Lengths are to please the eye: the roller-carriers have a radius of 0.8.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.colors import to_rgb
 from numpy.typing import ArrayLike
 
-from prw.plots import BLUE, GREEN, PURPLE, VERMILION
+from prw.files import page_file
+from prw.plots import BLUE, GREEN, VERMILION
 
 Array = np.ndarray
-STEEL, DARK, PALE = "#b9c0c7", "#3a4149", "#f1f3f5"
-#: Strands of a coupling, and sides of what is round.
-STRANDS, ROUND = 6, 24
+#: What the bodies are made of.
+PARTS: dict[str, Any] = json.loads(page_file("wrist.json").read_text(encoding="utf-8"))
+COLOURS: dict[str, str] = PARTS["colours"]
+STEEL, DARK, PALE = COLOURS["steel"], COLOURS["dark"], COLOURS["pale"]
+#: Sides of what is round.
+ROUND: int = PARTS["round"]
 
 
 class Face(NamedTuple):
@@ -62,18 +67,23 @@ class Wrist:
             (-1, ("theta1", "theta3", "theta5"), BLUE),
             (1, ("theta2", "theta4", "theta6"), VERMILION),
         ):
-            motor, middle, carrier = (at[name] for name in angles)
-            faces += self._coupling(side * 3.4, side * 2.9, motor, middle, colour)
-            faces += self._coupling(side * 2.45, side * 1.95, middle, carrier, colour)
+            angle = {turns: at[name] for turns, name in zip(("motor", "middle", "carrier"), angles)}
+            for coupling in PARTS["couplings"]:
+                x0, x1 = (side * x for x in coupling["x"])
+                faces += self._coupling(x0, x1, angle[coupling["from"]], angle[coupling["to"]], colour)
         return faces
 
     def _coupling(self, x0: float, x1: float, outer: float, inner: float, colour: str) -> list[Face]:
         """Strands from disc to disc: straight at rest, a twisted bundle under torque."""
-        phase = 2 * np.pi * np.arange(STRANDS) / STRANDS
+        count, radius, width = (PARTS["coupling"][name] for name in ("strands", "radius", "width"))
+        phase = 2 * np.pi * np.arange(count) / count
         ends = phase + outer, phase + outer + self.twist * (inner - outer)
-        width, faces = 0.17, []
+        faces = []
         for begin, end in zip(*ends):
-            corners = [_around(x0, 0.36, [begin - width, begin + width]), _around(x1, 0.36, [end + width, end - width])]
+            corners = [
+                _around(x0, radius, [begin - width, begin + width]),
+                _around(x1, radius, [end + width, end - width]),
+            ]
             faces.append(Face(np.vstack(corners), to_rgb(colour)))
         return faces
 
@@ -85,36 +95,25 @@ def _side(motor: int, side: int, colour: str) -> Iterable[Part]:
     def turning(name: str, *bodies: list[Face]) -> Part:
         return Part([face for body in bodies for face in body], lambda at: about_x(at[name]))
 
-    def lathe(x0: float, x1: float, radius: float, colours: Sequence[str]) -> list[Face]:
-        return _lathe([(side * x0, 0), (side * x0, radius), (side * x1, radius), (side * x1, 0)], colours)
-
-    yield Part(_lathe([(side * x, r) for x, r in ((3.72, 0), (3.72, 0.66), (4.5, 0.66), (4.5, 0))], [STEEL]), _still)
-    marked = [colour] * 3 + [PALE] * 3
-    yield turning(
-        shaft, lathe(3.52, 3.7, 0.66, marked), lathe(4.52, 4.66, 0.56, marked), lathe(3.4, 3.47, 0.42, [DARK])
-    )
-    yield turning(
-        middle, lathe(2.9, 2.83, 0.42, [DARK]), lathe(2.8, 2.55, 0.5, marked), lathe(2.52, 2.45, 0.42, [DARK])
-    )
-    rollers = [face for number in range(7) for face in _roller(side, 2 * np.pi * number / 7)]
-    yield turning(
-        carrier,
-        lathe(1.95, 1.88, 0.42, [DARK]),
-        lathe(1.88, 0.84, 0.1, [STEEL]),
-        lathe(0.84, 0.74, 0.8, marked),
-        rollers,
-    )
+    turns = {"motor": shaft, "middle": middle, "carrier": carrier}
+    for shape in PARTS["side"]:
+        profile = [(side * x, radius) for x, radius in shape["lathe"]]
+        body = _lathe(profile, [colour if name == "side" else COLOURS[name] for name in shape["colours"]])
+        yield turning(turns[shape["turns"]], body) if shape["turns"] else Part(body, _still)
+    count = PARTS["rollers"]["count"]
+    yield turning(carrier, [face for k in range(count) for face in _roller(side, 2 * np.pi * k / count)])
 
 
 def _ring() -> Iterable[Part]:
     """The central ring, which pitches: of rectangular section, about Z."""
     angle = np.linspace(0, 2 * np.pi, 2 * ROUND + 1)
-    section = [(0.97, 0.2), (1.13, 0.2), (1.13, -0.2), (0.97, -0.2)]
+    ring = PARTS["ring"]
+    section = [(ring["radius"] * radius, z) for radius, z in ring["section"]]
     faces = []
     for (r0, z0), (r1, z1) in zip(section, section[1:] + section[:1]):
         for a, b in zip(angle, angle[1:]):
             edge = [(r0, a, z0), (r0, b, z0), (r1, b, z1), (r1, a, z1)]
-            corners = np.array([[1.25 * r * np.cos(t), 1.25 * r * np.sin(t), z] for r, t, z in edge])
+            corners = np.array([[r * np.cos(t), r * np.sin(t), z] for r, t, z in edge])
             faces.append(Face(corners, to_rgb(GREEN)))
     yield Part(faces, lambda at: about_x(at["pitch"]))
 
@@ -126,12 +125,14 @@ def _output() -> Iterable[Part]:
     def stood(profile: Sequence[tuple[float, float]], colours: Sequence[str], lobes: float = 0) -> list[Face]:
         return [Face(face.corners @ upright.T, face.colour) for face in _lathe(profile, colours, lobes)]
 
-    faces = stood([(-1.6, 0.07), (1.7, 0.07)], [STEEL])
-    faces += stood([(0.34, 0.1), (0.52, 0.42), (0.74, 0.6), (0.86, 0.6), (0.86, 0.0)], [PURPLE], lobes=0.16)
-    faces += stood([(-1.55, 0), (-1.55, 0.4), (-1.85, 0.4), (-1.85, 0)], [PURPLE] * 3 + [PALE] * 3)
-    faces += _box((-0.48, 1.6, -0.17), (0.48, 1.78, 0.17), PURPLE)
-    for side in (-1, 1):
-        faces += _box((side * 0.48, 1.78, -0.17), (side * 0.3, 2.25, 0.17), PURPLE)
+    faces: list[Face] = []
+    for shape in PARTS["output"]:
+        colours = [COLOURS[name] for name in shape["colours"]]
+        if "box" in shape:
+            low, high = shape["box"]
+            faces += _box(low, high, colours[0])
+        else:
+            faces += stood(shape["lathe"], colours, shape.get("lobes", 0))
     yield Part(faces, lambda at: about_x(at["pitch"]) @ about_y(at["roll"]))
 
 
@@ -152,7 +153,7 @@ def _lathe(profile: Sequence[tuple[float, float]], colours: Sequence[str], lobes
     wave = 1 + lobes * np.cos(4 * angle)
     points = [np.array(profile[0])]
     for begin, end in zip(np.array(profile), np.array(profile[1:])):
-        pieces = max(round(abs(end[0] - begin[0]) / 0.25), 1)
+        pieces = max(round(abs(end[0] - begin[0]) / PARTS["piece"]), 1)
         points += [begin + (end - begin) * k / pieces for k in range(1, pieces + 1)]
     rings = [_around(x, 1, angle) * np.column_stack([np.ones_like(wave), r * wave, r * wave]) for x, r in points]
     shades = [to_rgb(colours[k * len(colours) // ROUND]) for k in range(ROUND)]
@@ -165,11 +166,12 @@ def _lathe(profile: Sequence[tuple[float, float]], colours: Sequence[str], lobes
 
 def _roller(side: int, angle: float) -> list[Face]:
     """A conical roller on the carrier of a side, pointing at the centre of the wrist."""
-    axis = np.array([side * 0.72, 0.62, 0.0])
+    of = PARTS["rollers"]
+    axis = np.array([side * of["axis"][0], of["axis"][1], 0.0])
     across = np.array([axis[1], -axis[0], 0.0]) / np.linalg.norm(axis)
     turn = np.linspace(0, 2 * np.pi, 7)
     circle = np.outer(np.cos(turn), across) + np.outer(np.sin(turn), [0, 0, 1])
-    outer, inner = axis + 0.15 * circle, 0.62 * axis + 0.1 * circle
+    outer, inner = axis + of["radius"][0] * circle, of["inner"] * axis + of["radius"][1] * circle
     faces = [np.array([outer[k], outer[k + 1], inner[k + 1], inner[k]]) for k in range(6)] + [inner[:-1]]
     return [Face(face @ about_x(angle).T, to_rgb(STEEL)) for face in faces]
 

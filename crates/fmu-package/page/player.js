@@ -1,0 +1,125 @@
+// What is seen of a run, and how it is played: a view, courses, and the buttons and the slider below.
+
+/**
+ * A picture of an instant, beside the courses.
+ * @typedef {{element: HTMLElement, draw(table: Table, time: number): void}} View
+ */
+
+/** How fast, as in the list. */
+const SPEEDS = new Map([["2", "2 × real time"], ["1", "real time"], ["0.5", "1/2 × real time"], ["0.2", "1/5 × real time"], ["0.05", "1/20 × real time"], ["0.01", "1/100 × real time"], ["Infinity", "at once"]]);
+
+class Player {
+  /**
+   * `span` is what the courses show, `advance` calculates until a time and tells how far that went. Beyond `recorded` a
+   * run that goes on is calculated, until `limit`.
+   * @param {{plots: (seek: (time: number) => void) => Plots, view: View | null, begin: number, isLooping?: boolean, table: Table,
+   *   span(now: number): [number, number], recorded(): number, limit(): number, advance?(now: number): number}} options
+   */
+  constructor(options) {
+    this.options = options;
+    this.now = options.begin;
+    this.speed = 1;
+    this.isPlaying = false;
+    this.last = 0;
+    this.isAsked = false;
+    this.isSeen = true;
+    this.plots = options.plots((time) => this.seek(time));
+    this.play = element("button", { type: "button", class: "live-play" });
+    this.play.addEventListener("click", () => this.setPlaying(!this.isPlaying));
+    this.place = element("input", { type: "range", min: "0", max: "1000", step: "1", value: "0", "aria-label": "Time", class: "live-time" });
+    this.place.addEventListener("input", () => {
+      this.seek(options.begin + ((options.recorded() - options.begin) * Number(this.place.value)) / 1000);
+    });
+    this.clock = element("span", { class: "live-clock" });
+    this.pace = element("select", { "aria-label": "Speed" });
+    this.pace.append(...[...SPEEDS].map(([value, text]) => element("option", { value }, text)));
+    this.pace.value = "1";
+    this.pace.addEventListener("change", () => this.setSpeed(Number(this.pace.value)));
+    this.bar = element("div", { class: "live-bar" }, this.play, this.place, this.clock, this.pace);
+    this.side = element("div", { class: "live-side" }, ...(options.view ? [options.view.element] : []), this.bar);
+    this.element = element("div", { class: "live-player" }, this.side, this.plots.element);
+    new ResizeObserver(() => this.ask()).observe(this.element);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.ask());
+    new IntersectionObserver((entries) => {
+      this.isSeen = entries[entries.length - 1].isIntersecting;
+      this.ask();
+    }).observe(this.element);
+    this.setPlaying(!matchMedia("(prefers-reduced-motion: reduce)").matches);
+  }
+
+  /** @param {number} speed */
+  setSpeed(speed) {
+    this.speed = speed;
+    if (!SPEEDS.has(String(speed))) {
+      this.pace.append(element("option", { value: String(speed) }, `${Number(speed.toPrecision(2))} × real time`));
+    }
+    this.pace.value = String(speed);
+    this.setPlaying(true);
+  }
+
+  /** @param {boolean} isPlaying */
+  setPlaying(isPlaying) {
+    if (isPlaying && !this.isPlaying && this.now >= this.options.limit() - 1e-9) {
+      this.now = this.options.begin;
+    }
+    this.isPlaying = isPlaying;
+    this.play.textContent = isPlaying ? "Pause" : "Play";
+    this.last = 0;
+    this.ask();
+  }
+
+  /** @param {number} time */
+  seek(time) {
+    this.setPlaying(false);
+    this.now = time;
+    this.ask();
+  }
+
+  /** Draws with the next picture of the screen. */
+  ask() {
+    if (!this.isAsked) {
+      this.isAsked = true;
+      requestAnimationFrame((stamp) => this.frame(stamp));
+    }
+  }
+
+  /** @param {number} stamp ms */
+  frame(stamp) {
+    this.isAsked = false;
+    if (!this.isSeen && this.isPlaying) {
+      this.last = 0;
+      return;
+    }
+    const passed = this.last ? Math.min(stamp - this.last, 100) / 1000 : 0;
+    this.last = stamp;
+    const { begin, table, view } = this.options;
+    const [limit, before] = [this.options.limit(), this.now];
+    if (this.isPlaying) {
+      this.now = this.speed === Infinity ? limit : Math.min(this.now + passed * this.speed, limit);
+    }
+    const reached = this.options.advance?.(this.now) ?? limit;
+    const isBehind = reached < this.now - 1e-9;
+    // Where what is new is calculated too slowly, it waits; where a run is calculated anew, the picture stays.
+    if (isBehind && this.isPlaying && this.speed !== Infinity) {
+      this.now = Math.max(before, reached);
+    }
+    if (table.count && !(isBehind && reached < before - 1e-9)) {
+      this.plots.draw(table, this.now, ...this.options.span(this.now));
+      view?.draw(table, this.now);
+    }
+    this.place.value = String(Math.round((1000 * (this.now - begin)) / (this.options.recorded() - begin || 1)));
+    const text = `${this.now.toFixed(3)} s`;
+    this.clock.textContent = text;
+    this.place.setAttribute("aria-valuetext", text);
+    if (this.isPlaying && this.now >= limit - 1e-9 && !isBehind) {
+      if (this.options.isLooping) {
+        this.now = begin;
+      } else {
+        this.setPlaying(false);
+      }
+    }
+    if (this.isPlaying || isBehind) {
+      this.ask();
+    }
+  }
+}

@@ -1,0 +1,303 @@
+// Courses over time, on canvas.
+
+/**
+ * A course: the column it is in, what it is called, a name of `--curve-N`, and what turns its unit into the one shown.
+ * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number}} Curve
+ * @typedef {{title: string, unit: string, curves: Curve[]}} Panel
+ */
+
+/** Columns of numbers of one length that grow together; the first is the time. */
+class Table {
+  /** @param {string[]} names */
+  constructor(names) {
+    this.count = 0;
+    /** @type {Map<string, Float64Array>} */
+    this.columns = new Map(["time", ...names].map((name) => [name, new Float64Array(4096)]));
+  }
+
+  /** @param {string} name */
+  column(name) {
+    const column = this.columns.get(name);
+    if (!column) {
+      throw new Error(`there is no ${name}`);
+    }
+    return column;
+  }
+
+  /** Room for one more row. */
+  grow() {
+    if (this.count === this.column("time").length) {
+      for (const [name, column] of this.columns) {
+        const longer = new Float64Array(2 * column.length);
+        longer.set(column);
+        this.columns.set(name, longer);
+      }
+    }
+  }
+
+  /** The last time, s. */
+  get end() {
+    return this.count ? this.column("time")[this.count - 1] : 0;
+  }
+
+  /** The last row at or before a time. @param {number} time */
+  row(time) {
+    const times = this.column("time");
+    let [low, high] = [0, this.count];
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      [low, high] = times[middle] <= time ? [middle, high] : [low, middle];
+    }
+    return low;
+  }
+
+  /** The value at a time, between rows on a line. @param {string} name @param {number} time */
+  at(name, time) {
+    const [times, values, row] = [this.column("time"), this.column(name), this.row(time)];
+    if (row + 1 >= this.count || time <= times[row]) {
+      return values[row];
+    }
+    return values[row] + ((time - times[row]) / (times[row + 1] - times[row])) * (values[row + 1] - values[row]);
+  }
+}
+
+/** Multiples of 1, 2 or 5 times a power of ten, at most about `count` of them. @param {number} low @param {number} high @param {number} count */
+function ticks(low, high, count) {
+  const raw = (high - low) / count;
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = power * ([1, 2, 5].find((factor) => factor * power >= raw) || 10);
+  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const found = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
+    found.push({ place: k * step, text: (k * step).toFixed(digits).replace("-", "\u2212") });
+  }
+  return found;
+}
+
+/** A number for reading. @param {number} value @param {number} scale the largest there is */
+function shown(value, scale) {
+  const digits = Math.max(0, Math.min(6, 2 - Math.floor(Math.log10(Math.max(scale, 1e-9)))));
+  const text = value.toFixed(digits);
+  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "\u2212");
+}
+
+/** @template {keyof HTMLElementTagNameMap} T @param {T} tag @param {Record<string, string>} [attributes] @param {...(Node | string)} children */
+function element(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+/** The sizes of canvases, told when they change: to ask costs a layout. @type {WeakMap<Element, {width: number, height: number}>} */
+const SIZES = new WeakMap();
+const RESIZED = new ResizeObserver((entries) => entries.forEach(({ target, contentRect }) => SIZES.set(target, contentRect)));
+
+/** The size of an element, px. @param {HTMLElement} of */
+function sizeOf(of) {
+  let size = SIZES.get(of);
+  if (!size) {
+    size = { width: of.clientWidth, height: of.clientHeight };
+    SIZES.set(of, size);
+    RESIZED.observe(of);
+  }
+  return size;
+}
+
+/** A canvas to draw on anew, as fine as the screen. @param {HTMLCanvasElement} canvas */
+function sharp(canvas) {
+  const ratio = window.devicePixelRatio || 1;
+  const { width, height } = sizeOf(canvas);
+  const [fineWidth, fineHeight] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== fineWidth || canvas.height !== fineHeight) {
+    [canvas.width, canvas.height] = [fineWidth, fineHeight];
+  }
+  const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, width, height);
+  return { pen, width, height };
+}
+
+/** The colours of the style sheet, read once for light and for dark. @type {Map<string, string>} */
+const COLOURS = new Map();
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => COLOURS.clear());
+
+/** @param {Element} place @param {string} name */
+function colourAt(place, name) {
+  let colour = COLOURS.get(name);
+  if (!colour) {
+    colour = getComputedStyle(place).getPropertyValue(`--${name}`).trim() || "#808080";
+    COLOURS.set(name, colour);
+  }
+  return colour;
+}
+
+/** Panels of courses, one below the other, with the time on the last. */
+class Plots {
+  /** @param {Panel[]} panels @param {(time: number) => void} seek called where a panel is touched */
+  constructor(panels, seek) {
+    this.panels = panels.map((panel) => this.panel(panel, seek));
+    this.element = element("div", { class: "live-plots" }, ...this.panels.map((panel) => panel.figure));
+    this.span = { begin: 0, end: 1 };
+  }
+
+  /** @param {Panel} panel @param {(time: number) => void} seek */
+  panel(panel, seek) {
+    const keys = panel.curves.map((curve) => {
+      const value = element("span", { class: "live-number" });
+      return { value, key: element("span", { class: "live-key", style: `--colour: var(--${curve.colour})` }, curve.label, " ", value) };
+    });
+    const unit = panel.unit ? ` (${panel.unit})` : "";
+    const caption = element("figcaption", {}, element("b", {}, panel.title + unit), " ", ...keys.map(({ key }) => key));
+    const names = panel.curves.map((curve) => curve.label).join(", ");
+    const canvas = element("canvas", { role: "img", "aria-label": `${panel.title}${unit}: ${names} over time` });
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      seek(this.timeAt(event.offsetX, sizeOf(canvas).width));
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (canvas.hasPointerCapture(event.pointerId)) {
+        seek(this.timeAt(event.offsetX, sizeOf(canvas).width));
+      }
+    });
+    return { panel, canvas, values: keys.map(({ value }) => value), figure: element("figure", {}, caption, canvas), peak: 0 };
+  }
+
+  /** @param {number} x @param {number} width */
+  timeAt(x, width) {
+    const { begin, end } = this.span;
+    return begin + (end - begin) * Math.min(1, Math.max(0, (x - LEFT) / (width - LEFT - RIGHT)));
+  }
+
+  /** The courses from `begin` to `end`, those after `now` pale. @param {Table} table @param {number} now @param {number} begin @param {number} end */
+  draw(table, now, begin, end) {
+    this.span = { begin, end };
+    const colour = (/** @type {string} */ name) => colourAt(this.element, name);
+    for (const [place, shownPanel] of this.panels.entries()) {
+      this.drawPanel(shownPanel, table, now, colour, place === this.panels.length - 1);
+    }
+  }
+
+  /** @param {ReturnType<Plots["panel"]>} what @param {Table} table @param {number} now @param {(name: string) => string} colour @param {boolean} isLast */
+  drawPanel({ panel, canvas, values }, table, now, colour, isLast) {
+    const { pen, width, height } = sharp(canvas);
+    const { begin, end } = this.span;
+    const [first, last] = [table.row(begin), Math.min(table.row(end) + 1, table.count - 1)];
+    const [low, high] = range(panel, table, first, last);
+    const bottom = height - (isLast ? 34 : 20);
+    const x = (/** @type {number} */ time) => LEFT + ((time - begin) / (end - begin)) * (width - LEFT - RIGHT);
+    const y = (/** @type {number} */ value) => bottom - ((value - low) / (high - low)) * (bottom - 6);
+    pen.font = "12px system-ui, sans-serif";
+    pen.lineWidth = 1;
+    pen.strokeStyle = colour("grid");
+    pen.fillStyle = colour("soft");
+    pen.textAlign = "right";
+    pen.textBaseline = "middle";
+    for (const tick of ticks(low, high, 5)) {
+      line(pen, [LEFT, y(tick.place)], [width - RIGHT, y(tick.place)]);
+      pen.fillText(tick.text, LEFT - 6, y(tick.place));
+    }
+    pen.textAlign = "center";
+    pen.textBaseline = "top";
+    for (const tick of ticks(begin, end, Math.min(8, width / 60))) {
+      line(pen, [x(tick.place), 6], [x(tick.place), bottom]);
+      pen.fillText(tick.text, x(tick.place), bottom + 5);
+    }
+    if (isLast) {
+      pen.fillText("time (s)", (LEFT + width - RIGHT) / 2, bottom + 20);
+    }
+    pen.lineJoin = "round";
+    for (const [place, curve] of panel.curves.entries()) {
+      const column = table.column(curve.name);
+      const value = (/** @type {number} */ row) => y(curve.factor * column[row] + (curve.offset || 0));
+      const until = Math.min(table.row(now), last);
+      pen.strokeStyle = colour(curve.colour);
+      pen.globalAlpha = 0.35;
+      course(pen, table.column("time"), x, value, until, last);
+      pen.globalAlpha = 1;
+      pen.lineWidth = 1.8;
+      pen.setLineDash(place % 2 ? [5, 3] : []);
+      course(pen, table.column("time"), x, value, first, until);
+      pen.setLineDash([]);
+      pen.lineWidth = 1;
+      if (table.count) {
+        const here = curve.factor * table.at(curve.name, now) + (curve.offset || 0);
+        pen.fillStyle = colour(curve.colour);
+        pen.beginPath();
+        pen.arc(x(Math.min(now, table.end)), y(here), 3.5, 0, 2 * Math.PI);
+        pen.fill();
+        const text = shown(here, Math.max(Math.abs(low), Math.abs(high)));
+        if (values[place].textContent !== text) {
+          values[place].textContent = text;
+        }
+      }
+    }
+  }
+}
+
+/** Room beside a panel's axes, px. */
+const [LEFT, RIGHT] = [46, 10];
+
+/** Least and largest value of these rows, and a little more. @param {Panel} panel @param {Table} table @param {number} first @param {number} last */
+function range(panel, table, first, last) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const { name, factor, offset = 0 } of panel.curves) {
+    const column = table.column(name);
+    for (let row = first; row <= last; row++) {
+      const value = factor * column[row] + offset;
+      low = value < low ? value : low;
+      high = value > high ? value : high;
+    }
+  }
+  if (!(low <= high)) {
+    return [-1, 1];
+  }
+  const least = 1e-3 * Math.max(Math.abs(low), Math.abs(high), 1e-3);
+  const margin = Math.max(0.08 * (high - low), least);
+  return [low - margin, high + margin];
+}
+
+/** @param {CanvasRenderingContext2D} pen @param {number[]} from @param {number[]} to */
+function line(pen, from, to) {
+  pen.beginPath();
+  pen.moveTo(from[0], from[1]);
+  pen.lineTo(to[0], to[1]);
+  pen.stroke();
+}
+
+/**
+ * A course from row to row; where there are many in a pixel, their extremes.
+ * @param {CanvasRenderingContext2D} pen @param {Float64Array} times
+ * @param {(time: number) => number} x @param {(row: number) => number} y @param {number} first @param {number} last
+ */
+function course(pen, times, x, y, first, last) {
+  if (!(last > first)) {
+    return;
+  }
+  pen.beginPath();
+  pen.moveTo(x(times[first]), y(first));
+  for (let row = first + 1; row <= last; ) {
+    const pixel = Math.floor(x(times[row]));
+    let [low, high] = [Infinity, -Infinity];
+    let next = row;
+    for (; next <= last && Math.floor(x(times[next])) === pixel; next++) {
+      const here = y(next);
+      low = here < low ? here : low;
+      high = here > high ? here : high;
+    }
+    if (next - row > 2) {
+      const isRising = y(next - 1) > y(row);
+      pen.lineTo(pixel, isRising ? low : high);
+      pen.lineTo(pixel + 0.5, isRising ? high : low);
+      pen.lineTo(x(times[next - 1]), y(next - 1));
+    } else {
+      for (let k = row; k < next; k++) {
+        pen.lineTo(x(times[k]), y(k));
+      }
+    }
+    row = next;
+  }
+  pen.stroke();
+}

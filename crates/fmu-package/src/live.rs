@@ -1,0 +1,130 @@
+//! The page that runs the FMU: `documentation/index.html` with the library as WebAssembly in it, and the scripts in the folder
+//! `page`.
+
+use crate::content::ContentFile;
+use anyhow::{Context, Result};
+use flate2::Compression;
+use flate2::write::DeflateEncoder;
+use quick_xml::escape::escape;
+use std::fmt::Write as _;
+use std::fs;
+use std::io::Write as _;
+use tempfile::TempDir;
+
+/// The page's place in an FMU.
+const PAGE: &str = "documentation/index.html";
+
+/// The page where a model has none.
+const PLAIN: &str = include_str!("../page/page.html");
+const STYLE: &str = include_str!("../page/live.css");
+const SCRIPTS: [&str; 4] = [
+    include_str!("../page/plot.js"),
+    include_str!("../page/player.js"),
+    include_str!("../page/fmu.js"),
+    include_str!("../page/live.js"),
+];
+
+/// What a browser needs to run an FMU.
+pub(crate) struct Runnable<'a> {
+    /// The text of `modelDescription.xml` of FMI 2.0.
+    pub description: &'a str,
+    /// The library, as a WebAssembly module.
+    pub module: &'a [u8],
+}
+
+/// The content with the page that runs the FMU, which is in the folder as long as that is there.
+pub(crate) fn with_page(
+    content: &[ContentFile],
+    (title, about): (&str, &str),
+    runnable: &Runnable,
+    scripts: &[&str],
+) -> Result<(TempDir, Vec<ContentFile>)> {
+    let own = content.iter().find(|file| file.name == PAGE);
+    let page = match own {
+        Some(file) => {
+            fs::read_to_string(&file.path).with_context(|| format!("cannot read {}", file.path.display()))?
+        }
+        None => PLAIN.replace("{{ title }}", &escape(title)).replace("{{ description }}", &escape(about)),
+    };
+    let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
+    let path = folder.path().join("index.html");
+    fs::write(&path, live(&page, runnable, scripts)?).context("cannot write the page")?;
+    let mut content: Vec<_> = content.iter().filter(|file| file.name != PAGE).cloned().collect();
+    content.push(ContentFile { name: PAGE.to_owned(), path });
+    Ok((folder, content))
+}
+
+/// The page with the FMU, which its scripts show at its top.
+fn live(page: &str, runnable: &Runnable, scripts: &[&str]) -> Result<String> {
+    let mut text = format!("<style>\n{STYLE}</style>\n<script>\n(() => {{\n\"use strict\";\n");
+    for script in SCRIPTS.iter().chain(scripts) {
+        text += script;
+    }
+    let description = base64(&deflated(runnable.description.as_bytes())?);
+    let module = base64(&deflated(runnable.module)?);
+    writeln!(text, "live([{{ description: \"{description}\", module: \"{module}\" }}]);\n}})();\n</script>")?;
+    // At the end, when there is what it is put into.
+    let end = page.rfind("</body>").unwrap_or(page.len());
+    Ok(format!("{}{text}{}", &page[..end], &page[end..]))
+}
+
+/// Compressed, as browsers call `deflate-raw`.
+fn deflated(bytes: &[u8]) -> Result<Vec<u8>> {
+    let mut encoder = DeflateEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(bytes)?;
+    Ok(encoder.finish()?)
+}
+
+/// The bytes in base 64 (RFC 4648, section 4).
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let word =
+            (0..3).fold(0, |word, place| word << 8 | u32::from(chunk.get(place).copied().unwrap_or(0)));
+        for place in 0..4 {
+            let digit = DIGITS[(word >> (18 - 6 * place) & 63) as usize];
+            text.push(if place <= chunk.len() { char::from(digit) } else { '=' });
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The examples of RFC 4648, section 10.
+    #[test]
+    fn bytes_in_base_64() {
+        for (bytes, text) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foob", "Zm9vYg=="),
+            ("fooba", "Zm9vYmE="),
+            ("foobar", "Zm9vYmFy"),
+        ] {
+            assert_eq!(base64(bytes.as_bytes()), text);
+        }
+    }
+
+    #[test]
+    fn scripts_come_last_in_a_page() {
+        let runnable = Runnable { description: "<fmiModelDescription/>", module: b"\0asm" };
+        let page = live("<body><p>text</p></body></html>", &runnable, &["const ownScript = 1;\n"]).unwrap();
+        assert!(page.starts_with("<body><p>text</p><style>") && page.ends_with("</script>\n</body></html>"));
+        let places = ["async function live(", "const ownScript", "live([{ description: \""];
+        assert!(places.map(|part| page.find(part).unwrap()).is_sorted());
+    }
+
+    #[test]
+    fn a_model_without_a_page_gets_one() {
+        let runnable = Runnable { description: "", module: b"" };
+        let (_folder, content) = with_page(&[], ("A & B", "Two <models>"), &runnable, &[]).unwrap();
+        let page = fs::read_to_string(&content[0].path).unwrap();
+        assert_eq!(content[0].name, PAGE);
+        assert!(page.contains("<h1>A &amp; B</h1>\n<p>Two &lt;models&gt;</p>") && page.contains("<script>"));
+    }
+}

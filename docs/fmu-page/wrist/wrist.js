@@ -1,0 +1,423 @@
+// The wrist in three dimensions, made of what wrist.json says; how its motors move, and which courses are drawn.
+
+/**
+ * A face of a body: places of its corners, its colour, whether it is seen from one side only.
+ * @typedef {{corners: number[], colour: number[], isClosed: boolean}} Face
+ * @typedef {{points: number[], faces: Face[], turn: string}} Solid
+ * @typedef {{turns?: string | null, lathe?: number[][], box?: number[][], colours: string[], lobes?: number}} Shape
+ */
+
+/** @typedef {{
+ *   colours: Record<string, string>, side: Shape[], output: Shape[], couplings: {from: string, to: string, x: number[]}[],
+ *   coupling: {strands: number, radius: number, width: number},
+ *   rollers: {count: number, axis: number[], radius: number[], inner: number, colour: string},
+ *   ring: {radius: number, section: number[][], colour: string},
+ *   round: number, piece: number, shown_twist: number, most_twisted: number, azimuth: number, elevation: number, lamp: number[],
+ * }} Parts */
+
+/** What wrist.json says; set where the scripts are put together. @type {Parts} */
+let WRIST;
+
+/** The angles that the picture shows. */
+const SHOWN = ["theta1", "theta2", "theta3", "theta4", "theta5", "theta6", "pitch", "roll"];
+const SHAFTS = [
+  { side: -1, colour: "blue", motor: "theta1", middle: "theta3", carrier: "theta5" },
+  { side: 1, colour: "vermilion", motor: "theta2", middle: "theta4", carrier: "theta6" },
+];
+const DEGREE = Math.PI / 180;
+
+/** @type {Panel[]} */
+const WRIST_PANELS = [
+  { title: "Motors", unit: "deg", curves: [{ name: "theta1", label: "\u03b8\u2081", colour: "curve-1", factor: 1 / DEGREE }, { name: "theta2", label: "\u03b8\u2082", colour: "curve-2", factor: 1 / DEGREE }] },
+  { title: "Wrist", unit: "deg", curves: [{ name: "pitch", label: "pitch", colour: "curve-3", factor: 1 / DEGREE }, { name: "roll", label: "roll", colour: "curve-4", factor: 1 / DEGREE }] },
+  { title: "Torques", unit: "N m", curves: [{ name: "tau1", label: "\u03c4\u2081", colour: "curve-1", factor: 1 }, { name: "tau2", label: "\u03c4\u2082", colour: "curve-2", factor: 1 }] },
+];
+
+/** The bodies of the wrist. @param {Parts} parts @returns {Solid[]} */
+function bodies(parts) {
+  const rgb = (/** @type {string} */ name) => [1, 3, 5].map((place) => parseInt(parts.colours[name].slice(place, place + 2), 16));
+  const round = parts.round;
+
+  /** Turned about X from points (x, radius), in stripes of the colours. @param {Shape} shape @param {string} own @returns {Solid} */
+  const lathe = ({ lathe: profile = [], colours, lobes = 0, turns }, own) => {
+    const points = [profile[0]];
+    for (let k = 1; k < profile.length; k++) {
+      const [begin, end] = [profile[k - 1], profile[k]];
+      const pieces = Math.max(Math.round(Math.abs(end[0] - begin[0]) / parts.piece), 1);
+      for (let piece = 1; piece <= pieces; piece++) {
+        points.push(begin.map((value, axis) => value + ((end[axis] - value) * piece) / pieces));
+      }
+    }
+    const made = points.flatMap(([x, radius]) =>
+      Array.from({ length: round }, (_, k) => {
+        const [angle, wave] = [(2 * Math.PI * k) / round, 1 + lobes * Math.cos((8 * Math.PI * k) / round)];
+        return [x, radius * wave * Math.cos(angle), radius * wave * Math.sin(angle)];
+      }).flat(),
+    );
+    const colourOf = (/** @type {number} */ k) => rgb(((name) => (name === "side" ? own : name))(colours[Math.floor((k * colours.length) / round)]));
+    /** @type {Face[]} */
+    const faces = [];
+    const isClosed = profile[profile.length - 1][1] === 0;
+    for (let ring = 0; ring + 1 < points.length; ring++) {
+      // What is flat is one face for each stripe.
+      const width = points[ring][0] === points[ring + 1][0] ? round / Math.max(colours.length, 2) : 1;
+      for (let k = 0; k < round; k += width) {
+        const arc = Array.from({ length: width + 1 }, (_, step) => (k + step) % round);
+        const inner = points[ring][1] === 0 ? [arc[0]] : arc;
+        const outer = points[ring + 1][1] === 0 ? [arc[0]] : arc;
+        faces.push({ corners: [...inner.map((place) => ring * round + place), ...outer.map((place) => (ring + 1) * round + place).reverse()], colour: colourOf(k), isClosed });
+      }
+    }
+    return outward({ points: made, faces, turn: turns ?? "" });
+  };
+
+  /** @param {Shape} shape @returns {Solid} */
+  const box = ({ box: corners = [], colours, turns }) => {
+    const points = Array.from({ length: 8 }, (_, number) => [0, 1, 2].map((axis) => corners[(number >> axis) & 1][axis])).flat();
+    const sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    return outward({ points, faces: sides.map((side) => ({ corners: side, colour: rgb(colours[0]), isClosed: true })), turn: turns ?? "" });
+  };
+
+  /** @type {Solid[]} */
+  const all = [];
+  for (const shaft of SHAFTS) {
+    const turn = (/** @type {string | null | undefined} */ name) => (name ? shaft[/** @type {"motor"} */ (name)] : "");
+    for (const shape of parts.side) {
+      const mirrored = { ...shape, turns: turn(shape.turns), lathe: shape.lathe?.map(([x, radius]) => [shaft.side * x, radius]) };
+      all.push(lathe(mirrored, shaft.colour));
+    }
+    all.push({ ...rollers(parts, shaft.side, rgb(parts.rollers.colour)), turn: shaft.carrier });
+  }
+  all.push(ring(parts, rgb(parts.ring.colour)));
+  for (const shape of parts.output) {
+    const body = shape.box ? box(shape) : lathe(shape, "");
+    if (shape.lathe) {
+      // From a body about X to one about Y.
+      const { points } = body;
+      for (let k = 0; k < points.length; k += 3) {
+        [points[k], points[k + 1], points[k + 2]] = [points[k + 1], points[k], -points[k + 2]];
+      }
+    }
+    all.push({ ...body, turn: "output" });
+  }
+  return all;
+}
+
+/** With corners that run about the outside, by the sign of the volume. @param {Solid} body */
+function outward(body) {
+  const at = (/** @type {number} */ place) => body.points.slice(3 * place, 3 * place + 3);
+  let volume = 0;
+  for (const { corners } of body.faces) {
+    const first = at(corners[0]);
+    for (let k = 2; k < corners.length; k++) {
+      const [second, third] = [at(corners[k - 1]), at(corners[k])];
+      volume += first[0] * (second[1] * third[2] - second[2] * third[1]) + first[1] * (second[2] * third[0] - second[0] * third[2]) + first[2] * (second[0] * third[1] - second[1] * third[0]);
+    }
+  }
+  if (volume < 0) {
+    body.faces.forEach((face) => face.corners.reverse());
+  }
+  return body;
+}
+
+/** The conical rollers on a side, which point at the centre. @param {Parts} parts @param {number} side @param {number[]} colour */
+function rollers({ rollers: of }, side, colour) {
+  /** @type {number[]} */
+  const points = [];
+  /** @type {Face[]} */
+  const faces = [];
+  const [axis, length] = [[side * of.axis[0], of.axis[1]], Math.hypot(of.axis[0], of.axis[1])];
+  const across = [axis[1] / length, -axis[0] / length];
+  for (let number = 0; number < of.count; number++) {
+    const [cos, sin] = [Math.cos((2 * Math.PI * number) / of.count), Math.sin((2 * Math.PI * number) / of.count)];
+    const first = points.length / 3;
+    for (const [share, radius] of [[1, of.radius[0]], [of.inner, of.radius[1]]]) {
+      for (let k = 0; k < 6; k++) {
+        const [c, s] = [radius * Math.cos((Math.PI * k) / 3), radius * Math.sin((Math.PI * k) / 3)];
+        const [x, y, z] = [share * axis[0] + c * across[0], share * axis[1] + c * across[1], s];
+        points.push(x, cos * y - sin * z, sin * y + cos * z);
+      }
+    }
+    for (let k = 0; k < 6; k++) {
+      const next = (k + 1) % 6;
+      faces.push({ corners: [first + k, first + next, first + 6 + next, first + 6 + k], colour, isClosed: false });
+    }
+    faces.push({ corners: [6, 7, 8, 9, 10, 11].map((place) => first + place), colour, isClosed: false });
+  }
+  return { points, faces };
+}
+
+/** The central ring, which pitches: of rectangular section, about Z. @param {Parts} parts @param {number[]} colour @returns {Solid} */
+function ring({ ring: of, round }, colour) {
+  const sectors = 2 * round;
+  const points = Array.from({ length: sectors }, (_, k) => {
+    const angle = (2 * Math.PI * k) / sectors;
+    return of.section.flatMap(([radius, z]) => [of.radius * radius * Math.cos(angle), of.radius * radius * Math.sin(angle), z]);
+  }).flat();
+  /** @type {Face[]} */
+  const faces = [];
+  for (let k = 0; k < sectors; k++) {
+    for (let edge = 0; edge < 4; edge++) {
+      const [here, next] = [4 * k, 4 * ((k + 1) % sectors)];
+      faces.push({ corners: [here + edge, next + edge, next + ((edge + 1) % 4), here + ((edge + 1) % 4)], colour, isClosed: true });
+    }
+  }
+  return outward({ points, faces, turn: "pitch" });
+}
+
+/** The strands of a coupling, from disc to disc: straight at rest, a twisted bundle under torque. @param {Parts} parts @param {number[]} x @param {number} outer @param {number} inner @param {number} twist */
+function strands({ coupling: of }, x, outer, inner, twist) {
+  const points = [];
+  for (let k = 0; k < of.strands; k++) {
+    const begin = (2 * Math.PI * k) / of.strands + outer;
+    const end = begin + twist * (inner - outer);
+    for (const [place, angle] of [[x[0], begin - of.width], [x[0], begin + of.width], [x[1], end + of.width], [x[1], end - of.width]]) {
+      points.push(place, of.radius * Math.cos(angle), of.radius * Math.sin(angle));
+    }
+  }
+  return points;
+}
+
+/** What the twist is multiplied with so that it is seen: 1, 2 or 5 times a power of ten. @param {Parts} parts @param {Table} table */
+function enlargement(parts, table) {
+  let most = 1e-6;
+  for (const { motor, middle, carrier } of SHAFTS) {
+    for (const [outer, inner] of [[motor, middle], [middle, carrier]].map((pair) => pair.map((name) => table.column(name)))) {
+      for (let row = 0; row < table.count; row++) {
+        most = Math.max(most, Math.abs(outer[row] - inner[row]));
+      }
+    }
+  }
+  const factor = Math.max(1, Math.min(parts.shown_twist / most, parts.most_twisted));
+  const power = 10 ** Math.floor(Math.log10(factor));
+  return power * (factor >= 5 * power ? 5 : factor >= 2 * power ? 2 : 1);
+}
+
+/** Rotations (3, 3) by what turns. @param {(name: string) => number} angle @returns {Record<string, number[]>} */
+function rotations(angle) {
+  /** @type {Record<string, number[]>} */
+  const all = { "": [1, 0, 0, 0, 1, 0, 0, 0, 1] };
+  for (const name of SHOWN) {
+    const [c, s] = [Math.cos(angle(name)), Math.sin(angle(name))];
+    all[name] = [1, 0, 0, 0, c, -s, 0, s, c];
+  }
+  const [c, s] = [Math.cos(angle("roll")), Math.sin(angle("roll"))];
+  all.output = multiplied(all.pitch, [c, 0, s, 0, 1, 0, -s, 0, c]);
+  return all;
+}
+
+/** @param {number[]} a @param {number[]} b */
+function multiplied(a, b) {
+  return [0, 1, 2].flatMap((row) => [0, 1, 2].map((column) => a[3 * row] * b[column] + a[3 * row + 1] * b[3 + column] + a[3 * row + 2] * b[6 + column]));
+}
+
+/** The wrist on a canvas, faces from the farthest to the nearest. */
+class Wrist {
+  /** @param {Parts} parts @param {((motor: string, by: number) => void) | null} move turns a motor, rad */
+  constructor(parts, move) {
+    this.parts = parts;
+    this.bodies = bodies(parts);
+    this.azimuth = parts.azimuth + 90;
+    this.elevation = parts.elevation;
+    this.twist = 0;
+    /** What is drawn, to be drawn again from elsewhere. @type {[Table, number] | null} */
+    this.last = null;
+    this.element = element("canvas", {
+      class: "live-scene", role: "img", tabindex: "0",
+      "aria-label": `The wrist in three dimensions. Arrow keys turn it${move ? "; motors are turned by the sliders below, or by dragging them" : ""}.`,
+    });
+    this.listen(move);
+    this.settled = { key: "", factor: 1 };
+  }
+
+  /** @param {((motor: string, by: number) => void) | null} move */
+  listen(move) {
+    const canvas = this.element;
+    let held = "";
+    /** @param {number} x @param {number} y */
+    const motorAt = (x, y) => (move && SHAFTS.find(({ side }) => {
+      const [centre, edge] = [this.project([side * 4.1, 0, 0]), this.project([side * 4.1, 0.8, 0])];
+      return Math.hypot(x - centre[0], y - centre[1]) < Math.max(24, Math.hypot(edge[0] - centre[0], edge[1] - centre[1]));
+    })?.motor) || "";
+    canvas.addEventListener("pointerdown", (event) => {
+      held = motorAt(event.offsetX, event.offsetY);
+      canvas.setPointerCapture(event.pointerId);
+    });
+    // A finger on a motor turns it; elsewhere, up and down scrolls the page.
+    canvas.addEventListener("touchstart", (event) => {
+      const box = canvas.getBoundingClientRect();
+      const [touch] = event.touches;
+      if (motorAt(touch.clientX - box.left, touch.clientY - box.top)) {
+        event.preventDefault();
+      }
+    }, { passive: false });
+    canvas.addEventListener("pointermove", (event) => {
+      if (!canvas.hasPointerCapture(event.pointerId)) {
+        canvas.style.cursor = motorAt(event.offsetX, event.offsetY) ? "ns-resize" : "grab";
+      } else if (held) {
+        move?.(held, 0.01 * (event.movementY + event.movementX));
+      } else {
+        this.turn(-0.4 * event.movementX, 0.4 * event.movementY);
+      }
+    });
+    canvas.addEventListener("keydown", (event) => {
+      const steps = /** @type {Record<string, number[]>} */ ({ ArrowLeft: [5, 0], ArrowRight: [-5, 0], ArrowUp: [0, 5], ArrowDown: [0, -5] })[event.key];
+      if (steps) {
+        event.preventDefault();
+        this.turn(steps[0], steps[1]);
+      }
+    });
+  }
+
+  /** @param {number} azimuth deg @param {number} elevation deg */
+  turn(azimuth, elevation) {
+    this.azimuth += azimuth;
+    this.elevation = Math.max(-89, Math.min(89, this.elevation + elevation));
+    if (this.last) {
+      this.draw(...this.last);
+    }
+  }
+
+  /** @param {number} twist what the couplings' twist is multiplied with; 0: as it fits */
+  enlarge(twist) {
+    this.twist = twist;
+    this.turn(0, 0);
+  }
+
+  /** The twist's factor: what is chosen, or as the run asks for. @param {Table} table */
+  factor(table) {
+    const key = `${table.count} ${table.column("theta3")[table.count - 1]}`;
+    if (key !== this.settled.key && !this.twist) {
+      this.settled = { key, factor: enlargement(this.parts, table) };
+    }
+    return this.twist || this.settled.factor;
+  }
+
+  /** Where a point is on the canvas, and how near. @param {number[]} point */
+  project([x, y, z]) {
+    const { rotation, scale, centre } = this.camera();
+    const near = rotation[6] * x + rotation[7] * y + rotation[8] * z;
+    const size = (scale * DISTANCE) / (DISTANCE - near);
+    return [centre[0] + size * (rotation[0] * x + rotation[1] * y + rotation[2] * z), centre[1] - size * (rotation[3] * x + rotation[4] * y + rotation[5] * z), near];
+  }
+
+  camera() {
+    const [azimuth, elevation] = [this.azimuth * DEGREE, this.elevation * DEGREE];
+    const [ca, sa, ce, se] = [Math.cos(azimuth), Math.sin(azimuth), Math.cos(elevation), Math.sin(elevation)];
+    const rotation = multiplied([1, 0, 0, 0, ce, -se, 0, se, ce], [ca, 0, -sa, 0, 1, 0, sa, 0, ca]);
+    const { width, height } = sizeOf(this.element);
+    return { rotation, scale: Math.min(width / 10.3, height / 5.2), centre: [0.47 * width, 0.53 * height] };
+  }
+
+  /** @param {Table} table @param {number} time */
+  draw(table, time) {
+    this.last = [table, time];
+    const { pen, width } = sharp(this.element);
+    const { rotation, scale, centre } = this.camera();
+    const angle = (/** @type {string} */ name) => table.at(name, time);
+    const turns = rotations(angle);
+    /** @type {{near: number, points: number[], corners: number[], colour: number[], light: number, isReversed: boolean}[]} */
+    const seen = [];
+    const twist = this.factor(table);
+    const lamp = this.parts.lamp;
+    /** @param {Solid} body */
+    const add = (body) => {
+      const turned = multiplied(rotation, turns[body.turn]);
+      const { points } = body;
+      const placed = new Array(points.length);
+      for (let k = 0; k < points.length; k += 3) {
+        const [x, y, z] = [points[k], points[k + 1], points[k + 2]];
+        const near = turned[6] * x + turned[7] * y + turned[8] * z;
+        const size = (scale * DISTANCE) / (DISTANCE - near);
+        placed[k] = centre[0] + size * (turned[0] * x + turned[1] * y + turned[2] * z);
+        placed[k + 1] = centre[1] - size * (turned[3] * x + turned[4] * y + turned[5] * z);
+        placed[k + 2] = near;
+      }
+      for (const { corners, colour, isClosed } of body.faces) {
+        let [area, near, x, y, z] = [0, 0, 0, 0, 0];
+        for (let k = 0, before = corners[corners.length - 1]; k < corners.length; before = corners[k++]) {
+          const [a, b] = [3 * before, 3 * corners[k]];
+          area += placed[a] * placed[b + 1] - placed[b] * placed[a + 1];
+          near += placed[b + 2];
+          // Newell's normal, in the body.
+          x += (points[a + 1] - points[b + 1]) * (points[a + 2] + points[b + 2]);
+          y += (points[a + 2] - points[b + 2]) * (points[a] + points[b]);
+          z += (points[a] - points[b]) * (points[a + 1] + points[b + 1]);
+        }
+        if (isClosed && area > 0) {
+          continue;
+        }
+        const sign = (area > 0 ? -1 : 1) / (Math.hypot(x, y, z) || 1);
+        const turn = turns[body.turn];
+        const light = sign * (lamp[0] * (turn[0] * x + turn[1] * y + turn[2] * z) + lamp[1] * (turn[3] * x + turn[4] * y + turn[5] * z) + lamp[2] * (turn[6] * x + turn[7] * y + turn[8] * z));
+        seen.push({ near: near / corners.length, points: placed, corners, colour, light, isReversed: area > 0 });
+      }
+    };
+    this.bodies.forEach(add);
+    for (const shaft of SHAFTS) {
+      for (const { from, to, x } of this.parts.couplings) {
+        const [outer, inner] = [angle(shaft[/** @type {"motor"} */ (from)]), angle(shaft[/** @type {"motor"} */ (to)])];
+        const points = strands(this.parts, x.map((place) => shaft.side * place), outer, inner, twist);
+        const colour = [1, 3, 5].map((place) => parseInt(this.parts.colours[shaft.colour].slice(place, place + 2), 16));
+        const faces = Array.from({ length: points.length / 12 }, (_, k) => ({ corners: [0, 1, 2, 3].map((corner) => 4 * k + corner), colour, isClosed: false }));
+        add({ points, faces, turn: "" });
+      }
+    }
+    seen.sort((one, other) => one.near - other.near);
+    let shade = "";
+    pen.beginPath();
+    for (const { points, corners, colour, light, isReversed } of seen) {
+      const bright = 0.62 + 0.38 * Math.max(0, light);
+      const own = `rgb(${Math.round(bright * colour[0])},${Math.round(bright * colour[1])},${Math.round(bright * colour[2])})`;
+      // Neighbours of one shade are painted together, all turning the same way.
+      if (own !== shade) {
+        pen.fill();
+        pen.beginPath();
+        pen.fillStyle = shade = own;
+      }
+      // A little larger than they are, lest the ground shines through between them; strokes would take much longer.
+      let [x, y] = [0, 0];
+      for (const corner of corners) {
+        x += points[3 * corner] / corners.length;
+        y += points[3 * corner + 1] / corners.length;
+      }
+      for (let k = 0; k < corners.length; k++) {
+        const corner = 3 * corners[isReversed ? corners.length - 1 - k : k];
+        const [dx, dy] = [points[corner] - x, points[corner + 1] - y];
+        const larger = 1 + 0.6 / (Math.hypot(dx, dy) || 1);
+        if (k) {
+          pen.lineTo(x + larger * dx, y + larger * dy);
+        } else {
+          pen.moveTo(x + larger * dx, y + larger * dy);
+        }
+      }
+      pen.closePath();
+    }
+    pen.fill();
+    this.label(pen, width, twist);
+  }
+
+  /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} twist */
+  label(pen, width, twist) {
+    pen.font = "13px system-ui, sans-serif";
+    pen.textBaseline = "alphabetic";
+    pen.lineWidth = 3;
+    pen.strokeStyle = colourAt(this.element, "tint");
+    const words = (/** @type {string} */ text, /** @type {number[]} */ [x, y], /** @type {string} */ colour, /** @type {CanvasTextAlign} */ align) => {
+      pen.textAlign = align;
+      pen.fillStyle = colourAt(this.element, colour);
+      const half = align === "center" ? pen.measureText(text).width / 2 + 4 : 0;
+      const place = Math.min(Math.max(x, half), width - half);
+      pen.strokeText(text, place, y);
+      pen.fillText(text, place, y);
+    };
+    words("motor 1", this.project([-4.1, 0.95, 0]), "curve-1", "center");
+    words("motor 2", this.project([4.1, 0.95, 0]), "curve-2", "center");
+    words("ring: pitch", [width - 8, 20], "curve-3", "right");
+    words("gripper: roll", [width - 8, 38], "curve-4", "right");
+    words(`couplings\u2019 twist \u00d7 ${twist}`, [8, 20], "soft", "left");
+  }
+}
+
+/** From the viewer to the centre. */
+const DISTANCE = 20;

@@ -1,0 +1,127 @@
+"""What the page in the FMU runs, without a browser: the same model, with the same bits in its answers, and no more than that."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import struct
+import zipfile
+import zlib
+
+import numpy as np
+import pytest
+from built import ROOT
+from fmpy import read_model_description
+from fmu_run import Fmu
+from test_references import NAMES
+from wasmtime import Engine, FuncType, Linker, Module, Store, ValType
+
+from prw.checking.experiments import read_experiments
+from tools.documentation.pages import TESTBED
+
+PAGE = "documentation/index.html"
+LIVE = re.compile(r"<style>\n\.live,.*</script>\n?", re.S)
+PACKED = re.compile(r'live\(\[\{ description: "([^"]*)", module: "([^"]*)" \}\]\);')
+OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
+
+
+@pytest.fixture(scope="module")
+def page(testbed) -> str:
+    with zipfile.ZipFile(testbed) as archive:
+        page = archive.read(PAGE).decode()
+    if "<script" not in page:
+        pytest.skip("the page does not run the FMU: rustup target add wasm32-unknown-unknown, then make fmu")
+    return page
+
+
+@pytest.fixture(scope="module")
+def packed(page) -> list[bytes]:
+    """The description and the module in the page."""
+    (parts,) = PACKED.findall(page)
+    return [zlib.decompress(base64.b64decode(part), wbits=-15) for part in parts]
+
+
+class WebAssembly:
+    """The module's functions of FMI 2.0, called as the page calls them."""
+
+    def __init__(self, module: bytes, guid: str):
+        engine = Engine()
+        self.store, self.messages = Store(engine), []
+        linker, number = Linker(engine), ValType.i32()
+        linker.define_func("fmu", "fmu_log", FuncType([number] * 3, []), lambda *_: self.messages.append(_))
+        self.functions = linker.instantiate(self.store, Module(engine, module)).exports(self.store)
+        self.room = self.call("fmu_room", 4096)
+        self.write(0, b"page\0", guid.encode() + b"\0")
+        self.component = self.call("fmi2Instantiate", self.room, 1, self.room + 5, 0, self.room + 1024, 0, 0)
+        assert self.component
+
+    def call(self, name: str, *values: float) -> int:
+        return self.functions[name](self.store, *values)
+
+    def write(self, place: int, *parts: bytes) -> None:
+        self.functions["memory"].write(self.store, b"".join(parts), self.room + place)
+
+    def does(self, name: str, *values: float) -> None:
+        assert self.call(name, self.component, *values) == 0, name
+
+    def set(self, kind: str, letter: str, values: dict[int, float]) -> None:
+        self.write(
+            0, struct.pack(f"<{len(values)}I", *values), struct.pack(f"<{len(values)}{letter}", *values.values())
+        )
+        self.does(f"fmi2Set{kind}", self.room, len(values), self.room + 4 * len(values))
+
+    def get(self, references: list[int]) -> bytes:
+        self.write(0, struct.pack(f"<{len(references)}I", *references))
+        self.does("fmi2GetReal", self.room, len(references), self.room + 1024)
+        start = self.room + 1024
+        return bytes(self.functions["memory"].read(self.store, start, start + 8 * len(references)))
+
+
+def test_the_page_is_that_of_the_sources_and_the_fmu(testbed, page, packed):
+    """Nothing is changed in it; the FMU for 3.0 has that for 2.0, whose functions the module has."""
+    assert LIVE.sub("", page) == (ROOT / TESTBED.path).read_text(encoding="utf-8")
+    with zipfile.ZipFile(testbed.parents[testbed.parent.name == "fmi3"] / testbed.name) as archive:
+        assert archive.read("modelDescription.xml") == packed[0]
+    guid = read_model_description(str(testbed), validate=False).guid
+    assert guid.encode() in packed[0] and guid.encode() in packed[1]
+
+
+def test_it_is_small_and_loads_nothing(testbed, page):
+    (live,) = LIVE.findall(page)
+    assert len(live) < 500e3 and len(zlib.compress(live.encode(), 9)) < 250e3
+    assert not re.search(r"https?:|fetch\(|XMLHttp|import\(|@import|url\(|WebSocket| src=", PACKED.sub("", live))
+
+
+def test_the_shaper_knows_the_pole_of_pitch():
+    script = (ROOT / "docs" / "fmu-page" / "wrist" / "testbed.js").read_text(encoding="utf-8")
+    (pole,) = re.findall(r"const PITCH_POLE = \{ real: (\S+), imaginary: (\S+) \}", script)
+    numbers = json.loads((ROOT / "docs" / "fmu-page" / "figures" / "numbers.json").read_text(encoding="utf-8"))
+    assert [float(part) for part in pole] == pytest.approx(numbers["poles"]["pitch"][1], abs=5e-4)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_module_has_the_librarys_bits(fmu, packed, name):
+    experiment = next(one for one in read_experiments(fmu) if one.name == name)
+    description = read_model_description(str(fmu))
+    variables = {one.name: one for one in description.modelVariables}
+    module = WebAssembly(packed[1], description.guid)
+    module.does("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0)
+    for kind, letter in (("Real", "d"), ("Integer", "i"), ("Boolean", "i")):
+        of_kind = {k: v for k, v in experiment.parameters.items() if variables[k].type == kind}
+        module.set(kind, letter, {variables[k].valueReference: v for k, v in of_kind.items()})
+    module.does("fmi2EnterInitializationMode")
+    module.does("fmi2ExitInitializationMode")
+    inputs = ("theta1", "theta2", "omega1", "omega2")
+    times = 1e-3 * np.arange(round(experiment.stop_time / 1e-3) + 1)
+    courses = np.column_stack([np.interp(times, experiment.inputs["time"], experiment.inputs[name]) for name in inputs])
+    with Fmu(fmu) as loaded:
+        library = loaded.instances(start=dict(experiment.parameters))
+        for k, row in enumerate(courses):
+            module.set("Real", "d", {variables[name].valueReference: value for name, value in zip(inputs, row)})
+            library.set(inputs, row)
+            there = module.get([variables[name].valueReference for name in OUTPUTS])
+            assert there == library.get(OUTPUTS)[0].astype("<f8").tobytes(), f"at {times[k]} s"
+            if k + 1 < len(times):
+                module.does("fmi2DoStep", times[k], times[k + 1] - times[k], 1)
+                library.step(to=times[k + 1])

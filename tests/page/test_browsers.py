@@ -1,0 +1,157 @@
+"""The page in the FMU, opened from a file in real browsers: what they calculate has the library's bits, and nothing is asked of
+a network."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import queue
+import shutil
+import subprocess
+import sys
+import threading
+import zipfile
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import toolchain
+from fmpy import read_model_description
+from fmu_run import Fmu
+
+from prw.checking.experiments import read_experiments
+
+INPUTS = ("theta1", "theta2", "omega1", "omega2")
+WEBKIT = "/usr/lib/x86_64-linux-gnu/webkit2gtk-4.1/MiniBrowser"
+#: What starts a browser that was never here before, for a window of 360, 1000 and 2000 px.
+BROWSERS = {
+    "chromium": lambda home, width: [
+        *("chromium", "--headless=new", "--no-sandbox", f"--user-data-dir={home}", f"--window-size={width},1000"),
+    ],
+    "firefox": lambda home, width: [
+        "firefox-esr",
+        "--headless",
+        "--profile",
+        str(home),
+        "--width",
+        str(width),
+        "--height",
+        "1000",
+    ],
+    "webkit": lambda home, width: [
+        "xvfb-run",
+        "-a",
+        "-s",
+        f"-screen 0 {width}x1000x24",
+        WEBKIT,
+        "--private",
+        f"--geometry={width}x1000",
+    ],
+}
+WIDTHS = {"chromium": 360, "firefox": 1000, "webkit": 2000}
+
+
+def pytest_configure() -> None:
+    """Installs the browsers where that is possible."""
+    toolchain.need("chromium", "firefox-esr")
+
+
+@pytest.fixture(scope="module")
+def reports() -> Iterator[tuple[str, queue.Queue[Any]]]:
+    """Where pages tell what they have seen, and what they have told."""
+    told: queue.Queue[Any] = queue.Queue()
+
+    class Listener(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            told.put(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
+            self.send_response(204)
+            self.end_headers()
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Listener)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}/", told
+    server.shutdown()
+
+
+@pytest.fixture(scope="module", params=BROWSERS)
+def told(request: pytest.FixtureRequest, fmu: Path, reports: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """What a browser says of the page."""
+    folder = tmp_path_factory.mktemp(request.param)
+    command = BROWSERS[request.param](folder / "home", WIDTHS[request.param])
+    if not shutil.which(command[0]) or (request.param == "webkit" and not shutil.which(WEBKIT)):
+        pytest.skip(f"{request.param} is not installed")
+    (folder / "home").mkdir()
+    page = folder / "index.html"
+    page.write_text(with_visitor(fmu, reports[0]), encoding="utf-8")
+    with subprocess.Popen([*command, page.as_uri()], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:
+        try:
+            return reports[1].get(timeout=180)
+        finally:
+            browser.terminate()
+
+
+def with_visitor(fmu: Path, report: str) -> str:
+    """The page with the reference experiments among its motions, and with one who visits it."""
+    with zipfile.ZipFile(fmu) as archive:
+        page = archive.read("documentation/index.html").decode()
+    experiments = read_experiments(fmu)
+    motions = []
+    for one in experiments:
+        times = 1e-3 * np.arange(round(one.stop_time / 1e-3) + 1)
+        rows = np.column_stack([np.interp(times, one.inputs["time"], one.inputs[name]) for name in INPUTS])
+        motions.append({"id": one.name, "length": one.stop_time, "rows": rows.tolist()})
+    given = (
+        f"MOTIONS.push(...{json.dumps(motions)}.map(({{id, length, rows}}) => ({{id, title: id, length, "
+        "inputs: (time, inputs) => [inputs.theta1, inputs.theta2, inputs.omega1, inputs.omega2] = "
+        "rows[Math.round(time / 1e-3)]})));\n"
+    )
+    begin, end = page.index("live([{ description"), page.rindex("</body>")
+    settings = {one.name: {name: float(value) for name, value in one.parameters.items()} for one in experiments}
+    values = f"window.settings = {json.dumps(settings)}; window.report = {json.dumps(report)};"
+    visitor = Path(__file__).with_name("inside.js").read_text(encoding="utf-8")
+    return f"{page[:begin]}{given}{page[begin:end]}<script>{values}\n{visitor}</script>{page[end:]}"
+
+
+def test_the_browser_has_the_librarys_bits(fmu: Path, told: Any) -> None:
+    """Over the reference experiments, the motions of the page, and one by hand: as its CSV has them."""
+    assert told["errors"] == []
+    assert {one.name for one in read_experiments(fmu)} | {"tour", "fig4", "chirp", "hand"} <= set(told["runs"])
+    with Fmu(fmu) as loaded:
+        for name, run in told["runs"].items():
+            header, *lines = csv.reader(io.StringIO(run["csv"]))
+            rows = np.array(lines, dtype=np.float64)
+            assert header[:5] == ["time", *INPUTS] and len(rows) > 400, name
+            types = {one: loaded.variables[one].type for one in run["parameters"]}
+            start = {k: v if types[k] in ("Real", "Float64") else int(v) for k, v in run["parameters"].items()}
+            start = {k: bool(v) if types[k] == "Boolean" else v for k, v in start.items()}
+            library = loaded.instances(start=start)
+            for number, row in enumerate(rows):
+                library.set(INPUTS, row[1:5])
+                np.testing.assert_array_equal(library.get(header[5:])[0], row[5:], f"{name}, {row[0]} s")
+                if number + 1 < len(rows):
+                    library.step(to=rows[number + 1, 0])
+
+
+def test_it_asks_for_nothing_and_fits(fmu: Path, told: Any) -> None:
+    assert told["requests"] == 0
+    assert not told["wide"]
+    assert told["guid"] == read_model_description(str(fmu)).guid
+    print(
+        told["agent"],
+        f"{told['first']:.0f} ms to the first movement, {told['frames']:.0f} frames a second",
+        file=sys.stderr,
+    )
+
+
+def test_by_hand_and_what_the_fmu_refuses(told: Any) -> None:
+    assert told["motion"] == "hand"
+    assert not told["reduced"] or told["waits"]
+    assert "k1 must not be below" in told["refusal"]
+    assert "motion=hand" in told["link"] and "k1=114.59" in told["link"] and "theta1=0.5235" in told["link"]
