@@ -26,7 +26,7 @@ pub fn program(finding: &Finding, setting: &Setting, description: &Description) 
         let _ = writeln!(text, "static size_t *n{slot};\nstatic char *b{slot};");
     }
     text.push_str(
-        "static char resources[5000];\nstatic Callbacks callbacks = {say2, calloc, free, NULL, NULL};\n\n",
+        "static char resources[5000];\nstatic __attribute__((unused)) Callbacks callbacks = {say2, calloc, free, NULL, NULL};\n\n",
     );
     let mut writer = Writer { fmi3: setting.fmi3, next: 0, threads: String::new() };
     let mut bodies = String::new();

@@ -33,7 +33,7 @@ static void *function(const char *name) {
 }
 
 /* An array that ends where memory ends: what is read or written beyond it is a crash. */
-static void *guarded(const void *bytes, size_t size) {
+static __attribute__((unused)) void *guarded(const void *bytes, size_t size) {
     size_t page = (size_t)sysconf(_SC_PAGESIZE), length = ((size + page - 1) / page + 1) * page;
     char *map = mmap(NULL, length, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (map == MAP_FAILED) { perror("mmap"); exit(3); }
@@ -43,7 +43,7 @@ static void *guarded(const void *bytes, size_t size) {
     return array;
 }
 
-static void say2(void *environment, const char *name, int status, const char *category, const char *text, ...) {
+static __attribute__((unused)) void say2(void *environment, const char *name, int status, const char *category, const char *text, ...) {
     va_list list;
     (void)environment; (void)name;
     printf("    log: status %d, category %s: ", status, category ? category : "NULL");
@@ -53,13 +53,13 @@ static void say2(void *environment, const char *name, int status, const char *ca
     printf("\n");
 }
 
-static void say3(void *environment, int status, const char *category, const char *text) {
+static __attribute__((unused)) void say3(void *environment, int status, const char *category, const char *text) {
     (void)environment;
     printf("    log: status %d, category %s: %s\n", status, category ? category : "NULL", text ? text : "NULL");
 }
 
 /* Shows numbers that a call wrote; f is for floating-point, the width is in bytes. */
-static void show(const void *array, size_t count, char kind, size_t width) {
+static __attribute__((unused)) void show(const void *array, size_t count, char kind, size_t width) {
     size_t i;
     for (i = 0; i < count; i++) {
         const char *at = (const char *)array + i * width;
@@ -78,7 +78,7 @@ static void show(const void *array, size_t count, char kind, size_t width) {
     }
 }
 
-static void measure(void) {
+static __attribute__((unused)) void measure(void) {
     long pages = 0, all = 0;
     FILE *file = fopen("/proc/self/statm", "r");
     if (file) { if (fscanf(file, "%ld %ld", &all, &pages) != 2) pages = 0; fclose(file); }
