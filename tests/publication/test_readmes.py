@@ -45,7 +45,7 @@ def test_links_are_found() -> None:
 
 def test_the_published_crates() -> None:
     names = {folder.name for folder in published()}
-    assert names == {"cargo-fmu", "fmi-abi", "fmu-export", "fmu-package", "fmu-run", "fmu-system"}, (
+    assert names == {"cargo-fmu", "fmi-abi", "fmu-check", "fmu-export", "fmu-package", "fmu-run", "fmu-system"}, (
         "a package without `publish = false`"
     )
 

@@ -17,6 +17,7 @@ use clap::Parser;
 use fmu_package::{BuildOptions, terminal};
 use project::{Place, Project};
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// What cargo starts with `fmu` as its first argument.
@@ -44,9 +45,20 @@ enum Command {
     },
     /// Make the FMUs and simulate one: a table (CSV) and a picture (SVG) of the outputs
     Run(run::Options),
+    /// Make the FMUs and attack them: which promises of the standard do they break?
+    Check {
+        #[command(flatten)]
+        place: Place,
+        /// Check this FMU, of whatever origin, instead of making any; repeat it for several
+        #[arg(long)]
+        fmu: Vec<PathBuf>,
+        #[command(flatten)]
+        check: fmu_check::Options,
+    },
 }
 
 fn main() -> ExitCode {
+    fmu_check::work_if_asked();
     let Cargo::Fmu(command) = Cargo::parse();
     match carry_out(&command) {
         Ok(true) => ExitCode::SUCCESS,
@@ -56,6 +68,7 @@ fn main() -> ExitCode {
     }
 }
 
+/// Tells whether all went well.
 fn carry_out(command: &Command) -> Result<bool> {
     match command {
         Command::New(options) => new::new(options).map(|()| true),
@@ -63,5 +76,6 @@ fn carry_out(command: &Command) -> Result<bool> {
             builder::build(&Project::find(place)?, build, Purpose::Use, own)
         }
         Command::Run(options) => run::run(options),
+        Command::Check { place, fmu, check } => run::check(place, fmu, check),
     }
 }

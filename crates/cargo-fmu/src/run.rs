@@ -10,6 +10,7 @@ use fmu_run::{BaseType, Batch, Course, Description, Fmu, Interface, Start, Varia
 use notify::{RecursiveMode, Watcher};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
@@ -83,6 +84,31 @@ pub fn run(options: &Options) -> Result<bool> {
     }
 }
 
+/// Builds and attacks, or attacks what is there; tells whether nothing was found that is to fail.
+pub fn check(place: &Place, given: &[PathBuf], options: &fmu_check::Options) -> Result<bool> {
+    let mut fmus = given.to_vec();
+    if fmus.is_empty() {
+        let project = Project::find(place)?;
+        let folder = project.workspace.join("target/fmu");
+        let begin = std::time::SystemTime::now();
+        let build = BuildOptions { out: Some(folder.clone()), ..BuildOptions::default() };
+        if !builder::build(&project, &build, Purpose::Use, &[])? {
+            return Ok(false);
+        }
+        fmus.extend([folder.clone(), folder.join("fmi3")].iter().filter_map(|folder| newest(folder, begin)));
+    }
+    // All are checked, whatever is found in the first.
+    let mut good = true;
+    for fmu in &fmus {
+        let folder = fmu.parent().and_then(Path::file_name).unwrap_or_default();
+        // Reports of several FMUs would have the same names.
+        let out = options.out.as_ref().filter(|_| fmus.len() > 1).map(|out| out.join(folder));
+        let options = fmu_check::Options { out: out.or(options.out.clone()), ..options.clone() };
+        good &= fmu_check::command(fmu, &options) == ExitCode::SUCCESS;
+    }
+    Ok(good)
+}
+
 fn once(options: &Options) -> Result<bool> {
     let project = Project::find(&options.place)?;
     let folder = project.workspace.join("target/fmu");
@@ -91,25 +117,25 @@ fn once(options: &Options) -> Result<bool> {
     if !builder::build(&project, &build, Purpose::Trial, &[])? {
         return Ok(false);
     }
-    let fmu = newest(&folder, begin).with_context(|| format!("there is no new FMU in {}", short(&folder)))?;
+    let fmu = newest(&folder, begin).or_else(|| newest(&folder.join("fmi3"), begin));
+    let fmu = fmu.with_context(|| format!("there is no new FMU in {}", short(&folder)))?;
     simulate(options, &fmu, &folder)?;
     Ok(true)
 }
 
-/// The FMU that was just made, that for FMI 2.0 if there are both.
+/// The FMU in a folder that was just made.
 fn newest(folder: &Path, since: std::time::SystemTime) -> Option<PathBuf> {
     let made = |path: &PathBuf| {
-        let is_new =
-            |data: fs::Metadata| data.modified().is_ok_and(|time| time + Duration::from_secs(2) > since);
+        let is_new = |data: fs::Metadata| {
+            // Files may know whole seconds only.
+            data.modified().is_ok_and(|time| time + Duration::from_secs(2) > since)
+        };
         path.extension().is_some_and(|suffix| suffix == "fmu") && fs::metadata(path).is_ok_and(is_new)
     };
-    let in_folder = |folder: PathBuf| {
-        let mut made: Vec<_> =
-            fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path()).filter(made).collect();
-        made.sort_by_key(|path| fs::metadata(path).and_then(|data| data.modified()).ok());
-        made.pop()
-    };
-    in_folder(folder.to_owned()).or_else(|| in_folder(folder.join("fmi3")))
+    let mut made: Vec<_> =
+        fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path()).filter(made).collect();
+    made.sort_by_key(|path| fs::metadata(path).and_then(|data| data.modified()).ok());
+    made.pop()
 }
 
 fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<()> {

@@ -1,0 +1,455 @@
+//! What no importer ought to do, and some do: a crash or a hang is fragile, where the standard does not forbid it.
+
+use super::refusals::unknown_reference;
+use crate::checker::{Checker, Claim};
+use crate::description::{kind_of, type_name};
+use crate::finding::{Grade, Judge};
+use crate::script::{Arg, End, Kind, NOBODY, Script, Step};
+use crate::worker::functions::signatures;
+use crate::writer::{Course, Value, Writer, readable};
+use fmi_abi::{Interface, Mode};
+use std::sync::Arc;
+
+/// Plays scripts until three of them have crashed or hung; the rest is more of the same.
+fn all(checker: &Checker, claim: &Claim, scripts: impl IntoIterator<Item = Script>) -> anyhow::Result<()> {
+    let nothing: Judge = Arc::new(|_| None);
+    let (mut crashes, mut hangs) = (0, 0);
+    for script in scripts {
+        match checker.judge(claim, script, Arc::clone(&nothing))?.end {
+            End::Hang(_) => hangs += 1,
+            End::Done => {}
+            _ => crashes += 1,
+        }
+        if crashes >= 40 || hangs >= 2 {
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn claim(checker: &Checker, name: &str) -> Claim {
+    let promise = "Whatever it is given, the FMU answers with a status and leaves the process alive.";
+    Claim::new(name, Grade::Fragile, checker.section("2.1.3", "2.2.1"), promise)
+}
+
+/// NULL for the instance that is to be freed, which is allowed.
+pub fn free_null(checker: &Checker) -> anyhow::Result<()> {
+    let section = checker.section("2.1.5", "2.3.1");
+    let mut writer = checker.writer();
+    writer.forbidden = true;
+    writer.add(Step::Free(NOBODY));
+    let of_free = Claim {
+        ends: Some(Grade::Violation),
+        ..Claim::new(
+            "life_cycle.free-null",
+            Grade::Violation,
+            section,
+            "Freeing an instance that is NULL is ignored.",
+        )
+    };
+    let nothing: Judge = Arc::new(|_| None);
+    checker.judge(&of_free, writer.script, nothing)?;
+    Ok(())
+}
+
+/// NULL for the instance, NULL for arrays, unknown references, sizes that do not fit.
+pub fn calls(checker: &Checker) -> anyhow::Result<()> {
+    let standard = checker.description.standard;
+    for course in &checker.courses {
+        let offered = |name: &str| {
+            let modes = [
+                Mode::Instantiated,
+                Mode::Initialization,
+                Mode::StepComplete,
+                Mode::Event,
+                Mode::ContinuousTime,
+            ];
+            let rule = signatures(standard).iter().find(|of| of.rule.name == name);
+            rule.and_then(|of| {
+                modes
+                    .into_iter()
+                    .rev()
+                    .find(|mode| of.rule.standard.contain(standard, course.interface, *mode))
+            })
+        };
+        let mut of_null = Vec::new();
+        let mut nulls = Vec::new();
+        for signature in signatures(standard) {
+            let name = &signature.rule.name[4..];
+            let Some(mode) = offered(signature.rule.name) else { continue };
+            let states = name.to_lowercase().contains("fmustate");
+            if states && !checker.saves(course.interface) {
+                continue;
+            }
+            let plain = |of: &str| match of {
+                "usize" | "fmi2ValueReference" | "fmi3ValueReference" => Arg::Whole(0),
+                of if of.starts_with('*')
+                    || of.contains("state")
+                    || of.contains("State")
+                    || of.contains("String") =>
+                {
+                    Arg::Null
+                }
+                of if of.contains("Real") || of.contains("Float64") => Arg::real(0.0),
+                _ => Arg::Whole(0),
+            };
+            let args: Vec<Arg> = signature.arguments.iter().map(|argument| plain(argument.of)).collect();
+            let mut writer = checker.writer();
+            writer.forbidden(None, name, args);
+            of_null.push(writer.script);
+            // Each array NULL where one value is asked for.
+            let pointers = signature.arguments.iter().filter(|argument| argument.of.starts_with('*')).count();
+            for null in 0..pointers {
+                let mut at = 0;
+                let args = signature.arguments.iter().map(|argument| {
+                    if argument.of == "usize" {
+                        return Arg::Whole(1);
+                    }
+                    if !argument.of.starts_with('*') {
+                        return if argument.of.contains("FMU") { Arg::Null } else { plain(argument.of) };
+                    }
+                    at += 1;
+                    match at - 1 == null {
+                        true => Arg::Null,
+                        false if argument.of.starts_with("*const") && argument.name.contains("vr") => {
+                            let of_type = checker.description.variables.iter().find(|variable| {
+                                variable.size == Some(1)
+                                    && variable
+                                        .base
+                                        .is_some_and(|base| name.ends_with(type_name(standard, base)))
+                            });
+                            Arg::In(
+                                Kind::U32,
+                                vec![of_type.map_or(0, |variable| u64::from(variable.reference))],
+                            )
+                        }
+                        false if argument.of.starts_with("*const") => Arg::In(Kind::F64, vec![0]),
+                        false => Arg::Out(Kind::F64, 4),
+                    }
+                });
+                let args: Vec<Arg> = args.collect();
+                let mut writer = checker.writer();
+                to_mode(&mut writer, course, mode);
+                writer.forbidden(Some(0), name, args);
+                nulls.push(writer.script);
+            }
+        }
+        all(checker, &claim(checker, "hostile.null-instance"), of_null)?;
+        all(checker, &claim(checker, "hostile.null"), nulls)?;
+        references(checker, course)?;
+    }
+    Ok(())
+}
+
+fn to_mode(writer: &mut Writer, course: &Course, mode: Mode) {
+    match mode {
+        Mode::Instantiated => {
+            writer.make(0, course.interface);
+        }
+        Mode::Initialization => {
+            writer.make(0, course.interface);
+            writer.enter(0);
+        }
+        Mode::Event => {
+            writer.make(0, course.interface);
+            writer.enter(0);
+            writer.call(0, "ExitInitializationMode", vec![]);
+        }
+        _ => {
+            writer.begin(0, course);
+        }
+    }
+}
+
+/// References that no variable has, in all functions; in FMI 3.0 sizes that do not fit.
+fn references(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let fmi3 = checker.fmi3();
+    let types: &[(&str, Kind)] = if fmi3 {
+        &[
+            ("Float64", Kind::F64),
+            ("Float32", Kind::F32),
+            ("Int8", Kind::I8),
+            ("UInt8", Kind::U8),
+            ("Int16", Kind::I16),
+            ("UInt16", Kind::U16),
+            ("Int32", Kind::I32),
+            ("UInt32", Kind::U32),
+            ("Int64", Kind::I64),
+            ("UInt64", Kind::U64),
+            ("Boolean", Kind::U8),
+            ("String", Kind::Pointer),
+        ]
+    } else {
+        &[("Real", Kind::F64), ("Integer", Kind::I32), ("Boolean", Kind::I32), ("String", Kind::Pointer)]
+    };
+    let mut wrong = Vec::new();
+    for reference in [unknown_reference(checker), u64::from(u32::MAX), 1 << 31, 1 << 20] {
+        if description.variables.iter().any(|variable| u64::from(variable.reference) == reference) {
+            continue;
+        }
+        for (name, kind) in types {
+            for get in [true, false] {
+                let mut writer = checker.writer();
+                writer.begin(0, course);
+                let values = match (get, kind) {
+                    (true, _) => Arg::Out(*kind, 1),
+                    (false, Kind::Pointer) => Arg::Texts(vec![Some(b"text".to_vec())]),
+                    (false, _) => Arg::In(*kind, vec![0]),
+                };
+                let mut args = vec![Arg::In(Kind::U32, vec![reference]), Arg::Whole(1), values];
+                if fmi3 {
+                    args.push(Arg::Whole(1));
+                }
+                writer.forbidden(Some(0), &format!("{}{name}", if get { "Get" } else { "Set" }), args);
+                wrong.push(writer.script);
+            }
+        }
+    }
+    all(checker, &claim(checker, "hostile.references"), wrong)?;
+    let mut sizes = Vec::new();
+    for place in readable(description) {
+        let variable = &description.variables[place];
+        let (Some(base), Some(size)) = (variable.base, variable.size) else { continue };
+        let (name, kind) = (type_name(description.standard, base), kind_of(description.standard, base));
+        if !fmi3 || kind == Kind::Pointer || sizes.len() > 60 {
+            continue;
+        }
+        for count in [0, size - 1, size + 1] {
+            for get in [true, false] {
+                let mut writer = checker.writer();
+                to_mode(&mut writer, course, Mode::Initialization);
+                let values = if get { Arg::Out(kind, count) } else { Arg::In(kind, vec![0; count]) };
+                let reference = Arg::In(Kind::U32, vec![u64::from(variable.reference)]);
+                let args = vec![reference, Arg::Whole(1), values, Arg::Whole(count as i64)];
+                writer.forbidden(Some(0), &format!("{}{name}", if get { "Get" } else { "Set" }), args);
+                sizes.push(writer.script);
+            }
+        }
+    }
+    if course.interface == Interface::ModelExchange {
+        let states = description.states_count().unwrap_or(0);
+        for (function, right, get) in [
+            ("GetContinuousStates", states, true),
+            ("GetNominalsOfContinuousStates", states, true),
+            ("SetContinuousStates", states, false),
+            (if fmi3 { "GetContinuousStateDerivatives" } else { "GetDerivatives" }, states, true),
+            ("GetEventIndicators", description.event_indicators.unwrap_or(0), true),
+        ] {
+            for count in [right.saturating_sub(1), right + 1] {
+                if count == right {
+                    continue;
+                }
+                let mut writer = checker.writer();
+                writer.begin(0, course);
+                let values =
+                    if get { Arg::Out(Kind::F64, count) } else { Arg::In(Kind::F64, vec![0; count]) };
+                writer.forbidden(Some(0), function, vec![values, Arg::Whole(count as i64)]);
+                sizes.push(writer.script);
+            }
+        }
+    }
+    all(checker, &claim(checker, "hostile.sizes"), sizes)
+}
+
+/// Numbers that are none, too great or too small, and texts that are none, for parameters and inputs.
+pub fn values(checker: &Checker) -> anyhow::Result<()> {
+    let description = &checker.description;
+    for course in &checker.courses {
+        let mut scripts = Vec::new();
+        let settable: Vec<usize> = readable(description)
+            .into_iter()
+            .filter(|place| {
+                let variable = &description.variables[*place];
+                !variable.clocked
+                    && (variable.causality == "input"
+                        || variable.initial == "exact"
+                            && variable.variability != "constant"
+                            && variable.causality != "structuralParameter")
+            })
+            .collect();
+        let play = |writer: &mut Writer, inputs: &[(usize, Value)], parameters: &[(usize, Value)]| {
+            writer.make(0, course.interface);
+            writer.enter(0);
+            writer.forbidden = true;
+            writer.set(0, parameters);
+            writer.set(0, inputs);
+            writer.leave(0, course);
+            for point in course.points.iter().take(3) {
+                let point = crate::writer::Point { inputs: inputs.to_vec(), ..point.clone() };
+                writer.point(0, course, &point);
+                writer.ask(0, course.interface);
+            }
+            writer.free(0);
+            writer.forbidden = false;
+        };
+        for number in [f64::NAN, f64::INFINITY, 1e308, -1e308, 5e-324, 0.0, -1.0, 1e9] {
+            for input in [true, false] {
+                let these = |want: bool| -> Vec<(usize, Value)> {
+                    settable
+                        .iter()
+                        .filter(|place| {
+                            let variable = &description.variables[**place];
+                            variable.is_float() && (variable.causality == "input") == want && want == input
+                        })
+                        .map(|place| {
+                            (
+                                *place,
+                                Value::Numbers(vec![number; description.variables[*place].size.unwrap_or(1)]),
+                            )
+                        })
+                        .collect()
+                };
+                let (inputs, parameters) = (these(true), these(false));
+                if inputs.is_empty() && parameters.is_empty() {
+                    continue;
+                }
+                let mut writer = checker.writer();
+                play(&mut writer, &inputs, &parameters);
+                scripts.push(writer.script);
+            }
+        }
+        for (place, base) in
+            settable.iter().filter_map(|place| Some((*place, description.variables[*place].base?)))
+        {
+            let size = description.variables[place].size.unwrap_or(1);
+            let kind = kind_of(description.standard, base);
+            let tries: Vec<Value> = match kind {
+                Kind::Pointer if type_name(description.standard, base) == "String" => {
+                    [&b""[..], b"%s%n%s%n%s%n", b"\xff\xfe no UTF-8", &[b'x'; 100_000]]
+                        .map(|text| Value::Texts(vec![text.to_vec(); size]))
+                        .to_vec()
+                }
+                Kind::Pointer => {
+                    vec![Value::Texts(vec![Vec::new(); size]), Value::Texts(vec![vec![7; 100_000]; size])]
+                }
+                kind if kind.is_float() => continue,
+                // Numbers of things: a great one asks for much memory, which there may not be.
+                Kind::I8 | Kind::U8 => [0.0, 127.0].map(|number| Value::Numbers(vec![number; size])).to_vec(),
+                Kind::I16 | Kind::U16 => {
+                    [0.0, 32767.0].map(|number| Value::Numbers(vec![number; size])).to_vec()
+                }
+                Kind::U32 | Kind::U64 | Kind::Size => {
+                    [0.0, 4294967295.0].map(|number| Value::Numbers(vec![number; size])).to_vec()
+                }
+                _ => [0.0, -1.0, 2147483647.0, -2147483648.0]
+                    .map(|number| Value::Numbers(vec![number; size]))
+                    .to_vec(),
+            };
+            for value in tries {
+                let of = vec![(place, value)];
+                let mut writer = checker.writer();
+                let input = description.variables[place].causality == "input"
+                    && course.interface == Interface::CoSimulation;
+                if input {
+                    play(&mut writer, &of, &[])
+                } else {
+                    play(&mut writer, &[], &of)
+                }
+                scripts.push(writer.script);
+            }
+        }
+        scripts.truncate(120);
+        all(checker, &claim(checker, "hostile.values"), scripts)?;
+    }
+    Ok(())
+}
+
+/// Times and steps that are none, too great or too small.
+pub fn times(checker: &Checker) -> anyhow::Result<()> {
+    for course in &checker.courses {
+        let mut scripts = Vec::new();
+        let start = checker.description.start_time;
+        let size = course.points.first().map_or(1e-3, |point| point.size).max(1e-9);
+        for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, 1e12 * size, -size, 0.0, 5e-324] {
+            let mut writer = checker.writer();
+            writer.begin(0, course);
+            writer.forbidden = true;
+            match course.interface {
+                Interface::CoSimulation => {
+                    writer.step(0, start, number);
+                }
+                Interface::ModelExchange => {
+                    writer.call(0, "SetTime", vec![Arg::real(number)]);
+                    writer.ask(0, course.interface);
+                    writer.call(0, "EnterEventMode", vec![]);
+                    writer.update(0, 1);
+                }
+            }
+            writer.read(0);
+            writer.free(0);
+            scripts.push(writer.script);
+            let mut writer = checker.writer();
+            writer.make(0, course.interface);
+            writer.forbidden = true;
+            let experiment =
+                vec![Arg::Whole(0), Arg::real(0.0), Arg::real(number), Arg::Whole(0), Arg::real(0.0)];
+            if checker.fmi3() {
+                writer.call(0, "EnterInitializationMode", experiment);
+            } else {
+                writer.call(0, "SetupExperiment", experiment);
+                writer.call(0, "EnterInitializationMode", vec![]);
+            }
+            writer.leave(0, course);
+            if course.interface == Interface::CoSimulation {
+                writer.step(0, number, size);
+            }
+            writer.read(0);
+            writer.free(0);
+            scripts.push(writer.script);
+        }
+        all(checker, &claim(checker, "hostile.times"), scripts)?;
+    }
+    Ok(())
+}
+
+/// Bytes that are no state, and some that almost are.
+pub fn bytes(checker: &Checker) -> anyhow::Result<()> {
+    for course in checker.courses.iter().filter(|course| checker.serializes(course.interface)) {
+        let mut writer = checker.writer();
+        writer.begin(0, course);
+        writer.save(0, 0);
+        let [_, saved] = writer.serialize(0, 0);
+        let run = checker.play(&writer.script)?;
+        let Some(crate::script::Written::Numbers(_, bytes)) = run.written(saved) else { continue };
+        let mut tries: Vec<Vec<u64>> =
+            vec![Vec::new(), vec![0; 8], vec![0; bytes.len()], vec![255; bytes.len()]];
+        tries.push(bytes[..bytes.len() / 2].to_vec());
+        tries.push([bytes.clone(), bytes.clone()].concat());
+        let mut random = checker.seed | 1;
+        for _ in 0..20 {
+            let mut damaged = bytes.clone();
+            for _ in 0..3 {
+                random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                if !damaged.is_empty() {
+                    let at = (random >> 33) as usize % damaged.len();
+                    damaged[at] = random >> 20 & 0xff;
+                }
+            }
+            tries.push(damaged);
+        }
+        let name = if checker.fmi3() { "DeserializeFMUState" } else { "DeSerializeFMUstate" };
+        let set = if checker.fmi3() { "SetFMUState" } else { "SetFMUstate" };
+        let scripts: Vec<Script> = tries
+            .into_iter()
+            .map(|bytes| {
+                let mut writer = checker.writer();
+                writer.begin(0, course);
+                writer.forbidden = true;
+                let count = bytes.len() as i64;
+                writer.call(0, name, vec![Arg::In(Kind::U8, bytes), Arg::Whole(count), Arg::StateOut(1)]);
+                writer.call(0, set, vec![Arg::State(1)]);
+                writer.ask(0, course.interface);
+                if course.interface == Interface::CoSimulation
+                    && let Some(point) = course.points.first()
+                {
+                    writer.step(0, point.time, point.size);
+                }
+                writer.free(0);
+                writer.script
+            })
+            .collect();
+        all(checker, &claim(checker, "hostile.bytes"), scripts)?;
+    }
+    Ok(())
+}

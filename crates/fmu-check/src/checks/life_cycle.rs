@@ -1,0 +1,391 @@
+//! The life of an instance in every order that the standard allows.
+
+use crate::checker::{Checker, Claim, refused, refused_one};
+use crate::finding::{Grade, Judge};
+use crate::script::{Arg, Kind, Step};
+use crate::writer::{Course, Writer};
+use fmi_abi::Interface;
+use std::sync::Arc;
+
+fn play(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
+    let script = writer.script;
+    let claim = Claim::new(
+        "life_cycle.refused",
+        Grade::Violation,
+        checker.section("4.2.4 and 3.2.3", "2.3"),
+        "A call that the state machine allows, with arguments that are right, succeeds.",
+    );
+    let copy = script.clone();
+    let judge: Judge = Arc::new(move |run| {
+        let ids: Vec<u32> = copy
+            .iter()
+            .filter(|numbered| matches!(numbered.step, Step::Call { .. }))
+            .map(|numbered| numbered.id)
+            .collect();
+        let makes = copy.iter().filter(|numbered| matches!(numbered.step, Step::Make(..)));
+        // Discard is an answer for what needs a smaller step.
+        let error = |id: &&u32| run.status(**id).is_some_and(|status| status > 2);
+        makes
+            .filter_map(|numbered| refused_one(&copy, run, numbered.id))
+            .next()
+            .or_else(|| ids.iter().find(error).and_then(|id| refused(&copy, run, &[*id])))
+    });
+    checker.judge(&claim, script, judge)?;
+    Ok(())
+}
+
+/// Orders that importers are seen to use, and those at the edges.
+pub fn orders(checker: &Checker) -> anyhow::Result<()> {
+    for course in &checker.courses {
+        let interface = course.interface;
+        let mut orders: Vec<Writer> = Vec::new();
+        let mut order = |write: &dyn Fn(&mut Writer)| {
+            let mut writer = checker.writer();
+            write(&mut writer);
+            orders.push(writer);
+        };
+        let points = |writer: &mut Writer, of: usize, count: usize| {
+            for point in course.points.iter().take(count) {
+                writer.point(of, course, point);
+            }
+        };
+        order(&|writer| {
+            writer.make(0, interface);
+            writer.free(0);
+        });
+        order(&|writer| {
+            writer.make(0, interface);
+            writer.enter(0);
+            writer.ask(0, interface);
+            writer.free(0);
+        });
+        order(&|writer| {
+            writer.begin(0, course);
+            writer.call(0, "Terminate", vec![]);
+            writer.ask(0, interface);
+            writer.free(0);
+        });
+        order(&|writer| {
+            writer.begin(0, course);
+            points(writer, 0, usize::MAX);
+            writer.call(0, "Terminate", vec![]);
+            writer.ask(0, interface);
+            writer.call(0, "Reset", vec![]);
+            writer.enter(0);
+            writer.leave(0, course);
+            points(writer, 0, usize::MAX);
+            writer.ask(0, interface);
+            writer.free(0);
+        });
+        order(&|writer| {
+            writer.make(0, interface);
+            writer.call(0, "Reset", vec![]);
+            writer.enter(0);
+            writer.call(0, "Reset", vec![]);
+            writer.call(0, "Reset", vec![]);
+            writer.enter(0);
+            writer.leave(0, course);
+            writer.call(0, "Reset", vec![]);
+            writer.enter(0);
+            writer.leave(0, course);
+            points(writer, 0, 2);
+            writer.free(0);
+        });
+        if checker.several(interface) {
+            order(&|writer| {
+                for of in 0..4 {
+                    writer.begin(of, course);
+                }
+                writer.free(0);
+                points(writer, 1, 2);
+                writer.free(3);
+                points(writer, 2, 2);
+                writer.free(2);
+                writer.free(1);
+            });
+        }
+        // Texts with spaces and beyond ASCII; a stop time and a tolerance.
+        order(&|writer| {
+            let mut how = writer.how(interface);
+            how.name = Some("a long name, with Gödel in it %s #1#".to_owned());
+            writer.add(Step::Make(0, how));
+            let stop = course.end + 1.0 + course.end.abs();
+            let start = Arg::real(writer.description.start_time);
+            let experiment = vec![Arg::Whole(1), Arg::real(1e-6), start, Arg::Whole(1), Arg::real(stop)];
+            if writer.fmi3() {
+                writer.call(0, "EnterInitializationMode", experiment);
+            } else {
+                writer.call(0, "SetupExperiment", experiment);
+                writer.call(0, "EnterInitializationMode", vec![]);
+            }
+            writer.leave(0, course);
+            points(writer, 0, 3);
+            writer.free(0);
+        });
+        // Categories, all and each, in every mode.
+        order(&|writer| {
+            let categories: Vec<Option<Vec<u8>>> = writer
+                .description
+                .log_categories
+                .iter()
+                .map(|name| Some(name.clone().into_bytes()))
+                .collect();
+            let log = |writer: &mut Writer| {
+                writer.call(0, "SetDebugLogging", vec![Arg::Whole(1), Arg::Whole(0), Arg::Null]);
+                if !categories.is_empty() {
+                    let count = categories.len() as i64;
+                    writer.call(
+                        0,
+                        "SetDebugLogging",
+                        vec![Arg::Whole(1), Arg::Whole(count), Arg::Texts(categories.clone())],
+                    );
+                    for category in &categories {
+                        writer.call(
+                            0,
+                            "SetDebugLogging",
+                            vec![Arg::Whole(1), Arg::Whole(1), Arg::Texts(vec![category.clone()])],
+                        );
+                    }
+                }
+            };
+            writer.make(0, interface);
+            log(writer);
+            writer.enter(0);
+            log(writer);
+            writer.leave(0, course);
+            log(writer);
+            points(writer, 0, 2);
+            log(writer);
+            writer.free(0);
+        });
+        if interface == Interface::ModelExchange {
+            // An event at every point, as importers may enter Event Mode at any time.
+            order(&|writer| {
+                writer.begin(0, course);
+                for point in &course.points {
+                    writer.point(0, course, point);
+                    if point.updates == 0 {
+                        writer.call(0, "EnterEventMode", vec![]);
+                        // Whether more are needed is not known here: those that an event here needed are enough.
+                        writer.update(0, 3);
+                        writer.call(0, "EnterContinuousTimeMode", vec![]);
+                    }
+                }
+                writer.ask(0, interface);
+                writer.free(0);
+            });
+        }
+        if interface == Interface::CoSimulation && checker.can(interface, &["hasEventMode"]) && checker.fmi3()
+        {
+            order(&|writer| {
+                let mut how = writer.how(interface);
+                how.event_mode = true;
+                writer.add(Step::Make(0, how));
+                writer.enter(0);
+                writer.call(0, "ExitInitializationMode", vec![]);
+                writer.update(0, 3);
+                writer.call(0, "EnterStepMode", vec![]);
+                let start = writer.description.start_time;
+                let size = course.points.first().map_or(1e-3, |point| point.size);
+                writer.step(0, start, size);
+                writer.call(0, "EnterEventMode", vec![]);
+                writer.update(0, 3);
+                writer.call(0, "EnterStepMode", vec![]);
+                writer.ask(0, interface);
+                writer.call(0, "Terminate", vec![]);
+                writer.free(0);
+            });
+        }
+        for writer in orders {
+            play(checker, writer)?;
+        }
+        token(checker, course)?;
+    }
+    super::hostile::free_null(checker)
+}
+
+/// The library of another description is not this one's.
+fn token(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let mut writer = checker.writer();
+    let mut how = writer.how(course.interface);
+    how.token = Some("no token of this FMU".to_owned());
+    writer.forbidden = true;
+    let id = writer.add(Step::Make(0, how));
+    let claim = Claim::new(
+        "life_cycle.token",
+        Grade::Note,
+        checker.section("2.1.5", "2.3.1"),
+        "An instance is made for the guid or instantiationToken of the description only, so that a library and a description \
+         that do not belong together are found out.",
+    );
+    let judge: Judge = Arc::new(move |run| {
+        (run.status(id) == Some(1)).then(|| "an instance is made for another one".to_owned())
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}
+
+/// Calls in an order that chance chooses among what is allowed.
+pub fn random(checker: &Checker) -> anyhow::Result<()> {
+    let mut state = checker.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let mut pick = |below: usize| {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 33) as usize % below
+    };
+    for course in &checker.courses {
+        for _ in 0..20 {
+            let mut writer = checker.writer();
+            // Nothing, initializing, in the course at a point, terminated.
+            let (mut mode, mut at) = (0, 0);
+            let mut saved: Option<(i32, usize)> = None;
+            writer.make(0, course.interface);
+            for _ in 0..40 {
+                match (mode, pick(10)) {
+                    (0, 0..=6) => {
+                        writer.enter(0);
+                        mode = 1;
+                    }
+                    (1, 0..=4) => {
+                        writer.leave(0, course);
+                        (mode, at) = (2, 0);
+                    }
+                    (2, 0..=4) if at < course.points.len() => {
+                        writer.point(0, course, &course.points[at]);
+                        at += 1;
+                    }
+                    (2, 5) => {
+                        writer.call(0, "Terminate", vec![]);
+                        mode = 3;
+                    }
+                    (_, 6) if pick(3) == 0 => {
+                        writer.call(0, "Reset", vec![]);
+                        (mode, at) = (0, 0);
+                    }
+                    (_, 7) if checker.saves(course.interface) => {
+                        writer.save(0, 0);
+                        saved = Some((mode, at));
+                    }
+                    (_, 8) => {
+                        if let Some(of) = saved {
+                            writer.restore(0, 0);
+                            (mode, at) = of;
+                        }
+                    }
+                    (1..=3, _) => {
+                        writer.ask(0, course.interface);
+                    }
+                    _ => {}
+                }
+            }
+            if saved.is_some() && pick(2) == 0 {
+                writer.drop_state(0, 0);
+            }
+            writer.free(0);
+            play(checker, writer)?;
+        }
+    }
+    Ok(())
+}
+
+/// Time events lie ahead, and come to an end.
+pub fn events(checker: &Checker) -> anyhow::Result<()> {
+    let Some(course) = checker.courses.iter().find(|course| course.interface == Interface::ModelExchange)
+    else {
+        return Ok(());
+    };
+    let section = checker.section("3.2.2", "2.3.5");
+    let mut writer = checker.writer();
+    let mut asked: Vec<(u32, f64)> = Vec::new();
+    let of_updates = |writer: &Writer, ids: &[u32], time: f64| -> Vec<(u32, f64)> {
+        let update = |id: &&u32| {
+            writer.script.iter().any(|numbered| {
+                numbered.id == **id && crate::finding::step_name(&numbered.step).ends_with("DiscreteStates")
+            })
+        };
+        ids.iter().filter(update).map(|id| (*id, time)).collect()
+    };
+    let ids = writer.begin(0, course);
+    asked.extend(of_updates(&writer, &ids, checker.description.start_time));
+    for point in &course.points {
+        let mut ids = writer.point(0, course, point);
+        if point.updates == 0 {
+            writer.call(0, "EnterEventMode", vec![]);
+            ids.extend(writer.update(0, 3));
+            writer.call(0, "EnterContinuousTimeMode", vec![]);
+        }
+        asked.extend(of_updates(&writer, &ids, point.time));
+    }
+    let fmi3 = checker.fmi3();
+    let claim = Claim::new(
+        "life_cycle.next-event-time",
+        Grade::Fragile,
+        section,
+        "The next time event lies ahead of the time: importers integrate up to it.",
+    );
+    let judge: Judge = Arc::new(move |run| {
+        asked.iter().find_map(|(id, time)| {
+            let event = event_of(run, *id, fmi3)?;
+            let past = !event.0 && event.1? <= time - 1e-12 * (1.0 + time.abs());
+            past.then(|| format!("at {time:?} the next event is at {:?}", event.1.unwrap_or_default()))
+        })
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    let claim = Claim::new(
+        "life_cycle.late-event",
+        Grade::Note,
+        section,
+        "After events were passed by, the next one lies ahead.",
+    );
+    // One who comes late, too, is told of an event that lies ahead.
+    let late = course.end.abs() * 10.0 + 10.0;
+    let mut writer = checker.writer();
+    writer.begin(0, course);
+    writer.forbidden = true;
+    writer.call(0, "SetTime", vec![Arg::real(late)]);
+    writer.call(0, "EnterEventMode", vec![]);
+    let ids = writer.update(0, 3);
+    let judge: Judge = Arc::new(move |run| {
+        let last = *ids.last()?;
+        let event = event_of(run, last, fmi3)?;
+        let past = !event.0 && event.1? <= late;
+        past.then(|| {
+            format!(
+                "after events were passed by, at {late:?} the next event is at {:?}",
+                event.1.unwrap_or_default()
+            )
+        })
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    // An event that needs more and more updates never ends.
+    let mut writer = checker.writer();
+    writer.make(0, course.interface);
+    writer.enter(0);
+    writer.call(0, "ExitInitializationMode", vec![]);
+    let ids = writer.update(0, 100);
+    let claim = Claim::new(
+        "life_cycle.event-iteration",
+        Grade::Fragile,
+        section,
+        "The iteration of an event comes to an end.",
+    );
+    let judge: Judge = Arc::new(move |run| {
+        let all = ids.iter().all(|id| event_of(run, *id, fmi3).is_some_and(|event| event.0));
+        all.then(|| "after 100 updates of the discrete states another one is needed".to_owned())
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}
+
+/// Whether an update needs another one, and the next time event.
+pub fn event_of(run: &crate::script::Run, id: u32, fmi3: bool) -> Option<(bool, Option<f64>)> {
+    let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
+    if fmi3 {
+        let flag =
+            |place: usize| outcome.written.get(place).is_some_and(|of| of.numbers().first() == Some(&1.0));
+        let next = outcome.written.get(5)?.numbers().first().copied();
+        return Some((flag(0), next.filter(|_| flag(4))));
+    }
+    let crate::script::Written::Numbers(Kind::U64, words) = outcome.written.first()? else { return None };
+    let [flags, _, defined, time] = words[..] else { return None };
+    Some((flags as u32 != 0, (defined as u32 != 0).then(|| f64::from_bits(time))))
+}

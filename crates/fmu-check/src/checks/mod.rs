@@ -1,0 +1,68 @@
+//! The checks, by topics.
+
+pub mod dependencies;
+pub mod derivatives;
+pub mod functions;
+pub mod hostile;
+pub mod life_cycle;
+pub mod logs;
+pub mod package;
+pub mod refusals;
+pub mod reset;
+pub mod resources;
+pub mod results;
+pub mod start_values;
+pub mod states;
+
+use crate::checker::Checker;
+
+/// A check: its topic and what it does.
+pub type Check = (&'static str, fn(&Checker) -> anyhow::Result<()>);
+
+/// All topics with the checks of the library.
+pub const ALL: &[Check] = &[
+    ("life_cycle", life_cycle::orders),
+    ("states", states::restore),
+    ("hostile", hostile::values),
+    ("resources", resources::cycles),
+    ("results", results::repeat),
+    ("functions", functions::present),
+    ("start_values", start_values::starts),
+    ("start_values", start_values::set),
+    ("states", states::serialized),
+    ("reset", reset::reset),
+    ("derivatives", derivatives::directional),
+    ("derivatives", derivatives::vectors),
+    ("dependencies", dependencies::missing),
+    ("dependencies", dependencies::initial),
+    ("refusals", refusals::change_nothing),
+    ("results", results::instances),
+    ("results", results::reading),
+    ("results", results::threads),
+    ("results", results::cut),
+    ("results", results::time),
+    ("life_cycle", life_cycle::random),
+    ("life_cycle", life_cycle::events),
+    ("logs", logs::switches),
+    ("hostile", hostile::calls),
+    ("hostile", hostile::times),
+    ("hostile", hostile::bytes),
+];
+
+/// The topics that can be asked for.
+pub const TOPICS: [&str; 14] = [
+    "description",
+    "package",
+    "functions",
+    "start_values",
+    "life_cycle",
+    "states",
+    "derivatives",
+    "dependencies",
+    "results",
+    "reset",
+    "refusals",
+    "logs",
+    "resources",
+    "hostile",
+];

@@ -1,0 +1,258 @@
+//! The ZIP, its folders, the names of the libraries, and what these need.
+
+use crate::description::{Description, Offer};
+use crate::finding::{Finding, Grade};
+use fmi_abi::Standard;
+use object::Object as _;
+use std::collections::BTreeSet;
+use std::env::consts::{ARCH, DLL_SUFFIX, OS};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// An FMU, unpacked.
+pub struct Unpacked {
+    /// Where.
+    pub folder: tempfile::TempDir,
+    /// What is wrong with the ZIP.
+    pub found: Vec<Finding>,
+}
+
+/// Unpacks an FMU.
+///
+/// # Errors
+/// When it cannot be.
+pub fn unpack(path: &Path) -> anyhow::Result<Unpacked> {
+    let file = File::open(path)
+        .map_err(|error| anyhow::anyhow!("{}: cannot be opened ({error})", path.display()))?;
+    let mut archive = zip::ZipArchive::new(file)
+        .map_err(|error| anyhow::anyhow!("{}: is no FMU, which is a ZIP file ({error})", path.display()))?;
+    let folder = tempfile::Builder::new().prefix("fmu-check-").tempdir()?;
+    let mut found = Vec::new();
+    let mut tell = |name: &str, grade, promise: &str, seen: String| {
+        found.push(Finding::of_files(name, grade, "2.3 of FMI 2.0, 2.5.1 of FMI 3.0", promise, seen));
+    };
+    let mut names = BTreeSet::new();
+    for place in 0..archive.len() {
+        let entry = archive.by_index_raw(place)?;
+        let name = entry.name()?.into_owned();
+        if entry.enclosed_name().is_none() || name.contains('\\') {
+            tell(
+                "package.paths",
+                Grade::Violation,
+                "Entries lie within the ZIP's folder, with / between folders.",
+                name.clone(),
+            );
+        }
+        if !matches!(entry.compression(), zip::CompressionMethod::Stored | zip::CompressionMethod::Deflated) {
+            let seen = format!("{name} is compressed by {}", entry.compression());
+            tell("package.compression", Grade::Violation, "Entries are stored or deflated.", seen);
+        }
+        if !names.insert(name.to_lowercase()) {
+            tell(
+                "package.names",
+                Grade::Fragile,
+                "No two entries have names that some systems take for one.",
+                name,
+            );
+        }
+    }
+    archive
+        .extract(folder.path())
+        .map_err(|error| anyhow::anyhow!("{}: cannot be unpacked ({error})", path.display()))?;
+    Ok(Unpacked { folder, found })
+}
+
+/// The folders of `binaries/` for this machine.
+fn folders(standard: Standard) -> Vec<String> {
+    let system = if OS == "macos" { "darwin" } else { OS };
+    let tuple = format!("{ARCH}-{system}");
+    let short = format!("{}{}", if system == "windows" { "win" } else { system }, usize::BITS);
+    match (standard, ARCH) {
+        (Standard::Fmi3, _) => vec![tuple],
+        (Standard::Fmi2, "x86_64" | "x86") => vec![short, tuple],
+        (Standard::Fmi2, _) => vec![tuple, short],
+    }
+}
+
+/// The library for this machine.
+pub fn library(folder: &Path, standard: Standard, offer: &Offer) -> Option<PathBuf> {
+    let name = format!("{}{DLL_SUFFIX}", offer.identifier);
+    folders(standard)
+        .iter()
+        .map(|of| folder.join("binaries").join(of).join(&name))
+        .find(|path| path.is_file())
+}
+
+/// Names that a library exports.
+pub fn exported(library: &Path) -> Option<Vec<String>> {
+    let bytes = std::fs::read(library).ok()?;
+    let file = object::File::parse(bytes.as_slice()).ok()?;
+    let of_exports = file.exports().ok()?;
+    let strip = |name: &[u8]| {
+        let name = String::from_utf8_lossy(name).into_owned();
+        if OS == "macos" { name.trim_start_matches('_').to_owned() } else { name }
+    };
+    Some(of_exports.flatten().filter_map(|export| export.name().name().map(strip)).collect())
+}
+
+/// What the folders and libraries have to say.
+pub fn look(folder: &Path, description: &Description) -> Vec<Finding> {
+    let mut found = Vec::new();
+    let section = description.section("2.3", "2.5.1");
+    let mut tell = |name: &str, grade, promise: &str, seen: String| {
+        found.push(Finding::of_files(name, grade, section, promise, seen));
+    };
+    let known: &[&str] = match description.standard {
+        Standard::Fmi2 => &["win32", "win64", "linux32", "linux64", "darwin32", "darwin64"],
+        Standard::Fmi3 => &[],
+    };
+    let platforms = std::fs::read_dir(folder.join("binaries")).into_iter().flatten().flatten();
+    for platform in platforms.filter(|entry| entry.path().is_dir()) {
+        let name = platform.file_name().to_string_lossy().into_owned();
+        let tuple = name.split_once('-');
+        if description.standard == Standard::Fmi3 && tuple.is_none() {
+            tell(
+                "package.platforms",
+                Grade::Violation,
+                "The folders of binaries are called <arch>-<sys>.",
+                format!("binaries/{name}"),
+            );
+        }
+        let (is_windows, is_mac) =
+            (name.contains("win") && !name.contains("darwin"), name.contains("darwin"));
+        let end = if is_windows {
+            ".dll"
+        } else if is_mac {
+            ".dylib"
+        } else {
+            ".so"
+        };
+        let standard_folder = tuple.is_some() || known.contains(&name.as_str());
+        for offer in [&description.co_simulation, &description.model_exchange].into_iter().flatten() {
+            let file = platform.path().join(format!("{}{end}", offer.identifier));
+            if !file.is_file()
+                && standard_folder
+                && (description.standard == Standard::Fmi2) == known.contains(&name.as_str())
+            {
+                let seen = format!("binaries/{name} has no {}{end}", offer.identifier);
+                tell(
+                    "package.library",
+                    Grade::Violation,
+                    "The library is called <modelIdentifier> with the ending of the platform.",
+                    seen,
+                );
+            }
+        }
+        for file in std::fs::read_dir(platform.path()).into_iter().flatten().flatten() {
+            needs(&file.path(), &name, &mut tell);
+        }
+    }
+    found.dedup_by(|one, other| one.name == other.name && one.seen == other.seen);
+    found
+}
+
+/// What a library needs of the system.
+fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&str, Grade, &str, String)) {
+    let Ok(bytes) = std::fs::read(path) else { return };
+    let Ok(file) = object::File::parse(bytes.as_slice()) else { return };
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let machine = match file.architecture() {
+        object::Architecture::X86_64 => "x86_64",
+        object::Architecture::I386 => "x86",
+        object::Architecture::Aarch64 => "aarch64",
+        object::Architecture::Arm => "aarch32",
+        _ => return,
+    };
+    let wanted = match platform {
+        "linux64" | "win64" | "darwin64" => &["x86_64", "aarch64"][..],
+        "linux32" | "win32" => &["x86", "aarch32"],
+        other => &[other.split('-').next().unwrap_or_default()],
+    };
+    let universal = platform.contains("darwin");
+    if !universal && !wanted.contains(&machine) && platform.contains(['-', '6', '3']) {
+        tell(
+            "package.machine",
+            Grade::Violation,
+            "A library is for the machine that its folder is named after.",
+            format!("binaries/{platform}/{name} is for {machine}"),
+        );
+    }
+    if matches!(file, object::File::Elf64(_) | object::File::Elf32(_)) {
+        glibc(&bytes, platform, &name, tell);
+    }
+    let libraries: BTreeSet<String> = file
+        .import_libraries()
+        .map(|libraries| {
+            libraries.flatten().map(|library| String::from_utf8_lossy(library.name()).into_owned()).collect()
+        })
+        .unwrap_or_default();
+    let folder = path.parent().unwrap_or(path);
+    let of_system = |library: &str| {
+        let lower = library.to_lowercase();
+        let linux = [
+            "libc.so",
+            "libm.so",
+            "libdl.so",
+            "libpthread.so",
+            "librt.so",
+            "libgcc_s.so",
+            "libstdc++.so",
+            "ld-linux",
+            "libutil.so",
+        ];
+        let windows = [
+            "kernel32",
+            "kernelbase",
+            "ntdll",
+            "msvcrt",
+            "api-ms-win",
+            "user32",
+            "advapi32",
+            "ws2_32",
+            "shell32",
+            "ole32",
+            "bcrypt",
+            "shlwapi",
+            "ucrtbase",
+        ];
+        let mac = ["/usr/lib/", "/system/library/"];
+        linux.iter().chain(&windows).any(|known| lower.starts_with(known))
+            || mac.iter().any(|known| lower.starts_with(known))
+            || lower.is_empty()
+    };
+    let foreign: Vec<&String> =
+        libraries.iter().filter(|library| !of_system(library) && !folder.join(library).exists()).collect();
+    if !foreign.is_empty() {
+        let list: Vec<&str> = foreign.iter().map(|name| name.as_str()).collect();
+        tell(
+            "package.needs",
+            Grade::Note,
+            "What a library needs is in the FMU or on every machine of its platform.",
+            format!("binaries/{platform}/{name} needs {}", list.join(", ")),
+        );
+    }
+}
+
+/// The newest version of glibc that it needs.
+fn glibc(bytes: &[u8], platform: &str, name: &str, tell: &mut impl FnMut(&str, Grade, &str, String)) {
+    let marker = b"GLIBC_2.";
+    let mut newest = (0, 0);
+    for place in
+        bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker).map(|(place, _)| place)
+    {
+        let digits = bytes[place + marker.len()..]
+            .iter()
+            .take_while(|byte| byte.is_ascii_digit())
+            .map(|byte| *byte as char);
+        let minor: u32 = digits.collect::<String>().parse().unwrap_or(0);
+        newest = newest.max((2, minor));
+    }
+    if newest >= (2, 29) {
+        tell(
+            "package.glibc",
+            Grade::Note,
+            "A library for Linux runs on systems that are some years old.",
+            format!("binaries/{platform}/{name} needs glibc {}.{}", newest.0, newest.1),
+        );
+    }
+}

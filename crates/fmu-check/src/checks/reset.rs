@@ -1,0 +1,97 @@
+//! Reset equals new.
+
+use crate::checker::{Checker, Claim, refused};
+use crate::finding::{Grade, Judge};
+use crate::writer::difference;
+use std::sync::Arc;
+
+/// After a course and a reset, what is read and what the course gives are those of a new instance.
+pub fn reset(checker: &Checker) -> anyhow::Result<()> {
+    let section = checker.section("2.1.6", "2.3.1");
+    for course in &checker.courses {
+        // A reset instance in one process, a new one in another.
+        for terminated in [true, false] {
+            let mut writer = checker.writer();
+            let ask = |writer: &mut crate::writer::Writer, of: usize| {
+                let mut reads = writer.read(of);
+                writer.leave(of, course);
+                for point in &course.points {
+                    writer.point(of, course, point);
+                    reads.extend(writer.ask(of, course.interface));
+                }
+                reads
+            };
+            writer.make(0, course.interface);
+            writer.enter(0);
+            let first = ask(&mut writer, 0);
+            if terminated {
+                writer.call(0, "Terminate", vec![]);
+            }
+            let reset = writer.call(0, "Reset", vec![]);
+            let enter = writer.enter(0);
+            let second = ask(&mut writer, 0);
+            let claim = Claim::new(
+                "reset.incomplete",
+                Grade::Violation,
+                section,
+                "After a reset the instance is as if it were new: all variables have their default values.",
+            );
+            let (description, script) = (checker.description.clone(), writer.script.clone());
+            let judge: Judge = Arc::new(move |run| {
+                if let Some(why) = refused(&script, run, &[reset, enter]) {
+                    return Some(why);
+                }
+                let (name, before, after) = difference(&description, run, &first, &second)?;
+                Some(format!("{name} of the new instance was {before}, after the reset it is {after}"))
+            });
+            checker.judge(&claim, writer.script, judge)?;
+        }
+        changed(checker, course)?;
+    }
+    Ok(())
+}
+
+/// What was set before the reset is gone after it.
+fn changed(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let mut values = Vec::new();
+    for place in crate::writer::readable(description) {
+        let variable = &description.variables[place];
+        let settable = variable.initial == "exact" && variable.variability != "constant"
+            || variable.causality == "input";
+        if settable && variable.is_float() && !variable.clocked && !variable.starts().is_empty() {
+            let numbers = variable
+                .starts()
+                .iter()
+                .map(|start| crate::checker::near(variable, *start, 1.0 / 64.0))
+                .collect();
+            values.push((place, crate::writer::Value::Numbers(numbers)));
+        }
+    }
+    let mut writer = checker.writer();
+    writer.make(0, course.interface);
+    writer.enter(0);
+    let first = writer.read(0);
+    writer.call(0, "Reset", vec![]);
+    writer.set(0, &values);
+    writer.enter(0);
+    writer.leave(0, course);
+    writer.call(0, "Reset", vec![]);
+    writer.enter(0);
+    let second = writer.read(0);
+    let claim = Claim::new(
+        "reset.values",
+        Grade::Violation,
+        checker.section("2.1.6", "2.3.1"),
+        "After a reset all variables have their default values, whatever was set before.",
+    );
+    let description = description.clone();
+    let judge: Judge = Arc::new(move |run| {
+        let (name, before, after) = difference(&description, run, &first, &second)?;
+        Some(format!(
+            "{name} of the new instance was {before}, after values were set and a reset it is {after}"
+        ))
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}

@@ -1,0 +1,181 @@
+//! What is left after many simulations, and what belongs to the whole process.
+
+use crate::checker::{Checker, Claim};
+use crate::finding::{Grade, Judge};
+use crate::script::{Numbered, Step};
+use crate::writer::{Course, Writer};
+use std::sync::Arc;
+
+/// Simulations, states and calls again and again.
+pub fn cycles(checker: &Checker) -> anyhow::Result<()> {
+    for course in &checker.courses {
+        let whole = |writer: &mut Writer| {
+            writer.begin(0, course);
+            for point in course.points.iter().take(3) {
+                writer.point(0, course, point);
+            }
+            writer.ask(0, course.interface);
+            writer.call(0, "Terminate", vec![]);
+            writer.free(0);
+        };
+        measured(checker, "instances made, run and freed", |_| {}, whole)?;
+        measured(
+            checker,
+            "resets",
+            |writer| {
+                writer.make(0, course.interface);
+            },
+            |writer| {
+                writer.enter(0);
+                writer.leave(0, course);
+                for point in course.points.iter().take(2) {
+                    writer.point(0, course, point);
+                }
+                writer.ask(0, course.interface);
+                writer.call(0, "Reset", vec![]);
+            },
+        )?;
+        if checker.saves(course.interface) {
+            measured(
+                checker,
+                "states saved and freed",
+                |writer| states_before(writer, course),
+                |writer| {
+                    states(checker, writer, course);
+                },
+            )?;
+        }
+        settings(checker, course)?;
+    }
+    Ok(())
+}
+
+fn states_before(writer: &mut Writer, course: &Course) {
+    writer.begin(0, course);
+    for point in course.points.iter().take(2) {
+        writer.point(0, course, point);
+    }
+}
+
+fn states(checker: &Checker, writer: &mut Writer, course: &Course) {
+    writer.save(0, 0);
+    writer.save(0, 0);
+    writer.restore(0, 0);
+    if checker.serializes(course.interface) {
+        writer.serialize(0, 0);
+        writer.deserialize(0, 0, 1);
+        writer.restore(0, 1);
+        writer.drop_state(0, 1);
+    }
+    writer.ask(0, course.interface);
+    writer.drop_state(0, 0);
+}
+
+fn measured(
+    checker: &Checker,
+    what: &'static str,
+    before: impl Fn(&mut Writer),
+    cycle: impl Fn(&mut Writer),
+) -> anyhow::Result<()> {
+    let mut writer = checker.writer();
+    before(&mut writer);
+    let mut steps: Vec<Numbered> = Vec::new();
+    let begin = writer.script.len();
+    cycle(&mut writer);
+    steps.extend(writer.script.drain(begin..));
+    let repeat = |times: usize| Step::Repeat(times, steps.clone());
+    let warm = writer.add(repeat(200));
+    let first = writer.add(Step::Measure);
+    let times = writer.add(repeat(10_000));
+    let last = writer.add(Step::Measure);
+    let last_of_cycle: Vec<u32> = steps.iter().map(|numbered| numbered.id).collect();
+    let section = checker.section("2.1.5", "2.3.1");
+    let done = move |run: &crate::script::Run| {
+        let (one, two) = (run.of(warm)?.measured.as_ref()?.times, run.of(times)?.measured.as_ref()?.times);
+        (one >= 50 && two >= 50).then_some(two)
+    };
+    let memory: Judge = Arc::new(move |run| {
+        let times = done(run)?;
+        let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
+        let grown = two.memory.saturating_sub(one.memory);
+        // Where the C library counts, a block is 32 bytes at least, and a few may stay for itself; elsewhere pages are all that can be seen.
+        let enough = if one.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) };
+        (grown > enough).then(|| {
+            format!("{grown} bytes are left after {times} {what}: {} for each", grown / times as u64)
+        })
+    });
+    let claim = Claim::new(
+        "resources.memory",
+        Grade::Violation,
+        section,
+        "What was allocated for an instance or a state is freed with it.",
+    );
+    let script = writer.script.clone();
+    let limit = checker.setting.repetitions * 3.0 + checker.limit;
+    let run = checker.play_for(&script, limit)?;
+    if run.end != crate::script::End::Done {
+        let nothing: Judge = Arc::new(|_| None);
+        checker.judge(&Claim::new("resources.cycles", Grade::Violation, section, ""), script, nothing)?;
+        return Ok(());
+    }
+    checker.always(&script, &run);
+    let tell = |claim: Claim, judge: Judge| {
+        if let Some(seen) = judge(&run) {
+            checker.add(claim.finding(seen, script.clone(), judge));
+        }
+    };
+    tell(claim, memory);
+    let threads: Judge = Arc::new(move |run| {
+        let times = done(run)?;
+        let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
+        (two.threads > one.threads + 2)
+            .then(|| format!("{} threads are left after {times} {what}", two.threads - one.threads))
+    });
+    let promise = "Threads end with the instance that they were started for.";
+    tell(Claim::new("resources.threads", Grade::Violation, section, promise), threads);
+    let files: Judge = Arc::new(move |run| {
+        let times = done(run)?;
+        let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
+        (two.files > one.files + 2)
+            .then(|| format!("{} files are left open after {times} {what}", two.files - one.files))
+    });
+    let promise = "Files are closed with the instance that they were opened for.";
+    tell(Claim::new("resources.files", Grade::Violation, section, promise), files);
+    let inner = steps.clone();
+    let again: Judge = Arc::new(move |run| {
+        let times = run.of(times)?.measured.as_ref()?.times;
+        let why = crate::checker::refused(&inner, run, &last_of_cycle[1..])
+            .or_else(|| crate::checker::refused_one(&inner, run, last_of_cycle[0]))?;
+        (times > 1).then(|| format!("after {} {what}: {why}", times - 1))
+    });
+    let promise = "What works once works again, however often.";
+    tell(Claim::new("resources.cycles", Grade::Violation, section, promise), again);
+    Ok(())
+}
+
+/// Rounding, locale, folder, signals: as before.
+fn settings(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let mut writer = checker.writer();
+    // The library is loaded with the first call.
+    writer.add(Step::Version(if checker.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned()));
+    let first = writer.add(Step::Measure);
+    writer.begin(0, course);
+    for point in &course.points {
+        writer.point(0, course, point);
+    }
+    writer.ask(0, course.interface);
+    let last = writer.add(Step::Measure);
+    let claim = Claim::new(
+        "resources.settings",
+        Grade::Violation,
+        checker.section("2.1", "2.2.1"),
+        "Functions do not change global settings: floating-point control, locale, working directory, signals.",
+    );
+    let judge: Judge = Arc::new(move |run| {
+        let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
+        let (was, is) = one.settings.iter().zip(&two.settings).find(|(was, is)| was != is)?;
+        Some(format!("{was} has become {is}"))
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}

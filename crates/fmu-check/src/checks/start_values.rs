@@ -1,0 +1,300 @@
+//! Start values are what the description says; what is set is what is read; values are of their types and within their
+//! ranges.
+
+use crate::checker::{Checker, Claim, near};
+use crate::description::kind_of;
+use crate::finding::{Grade, Judge};
+use crate::script::{Kind, Written};
+use crate::writer::{Value, readable, value_of};
+use fmi_abi::BaseType;
+use std::sync::Arc;
+
+/// The values of the variables in Initialization Mode, before anything is set.
+pub fn starts(checker: &Checker) -> anyhow::Result<()> {
+    for course in &checker.courses {
+        let description = &checker.description;
+        let mut writer = checker.writer();
+        writer.make(0, course.interface);
+        writer.enter(0);
+        let reads = writer.read(0);
+        let all = reads.clone();
+        let claim = Claim::new(
+            "start_values.start",
+            Grade::Violation,
+            checker.section("2.2.7", "2.4.7.4"),
+            "Variables with initial = exact and inputs have their start values when the initialization begins.",
+        );
+        let variables = description.variables.clone();
+        let judge: Judge = Arc::new(move |run| {
+            for (place, variable) in variables.iter().enumerate() {
+                let fixed = variable.initial == "exact" || variable.causality == "input";
+                let (true, Some(base)) =
+                    (fixed && !variable.start.is_empty() && !variable.clocked, variable.base)
+                else {
+                    continue;
+                };
+                // A parameter may be the start of a state that has the same reference: a start value for each is not known.
+                let Some(value) = value_of(run, &all, place) else { continue };
+                let wrong = match &value {
+                    Written::Texts(texts) if base == BaseType::String => texts
+                        .iter()
+                        .zip(&variable.start)
+                        .any(|(text, start)| text.as_deref() != Some(start.as_bytes())),
+                    Written::Texts(_) => false,
+                    Written::Numbers(kind, bits) => {
+                        let starts = variable.starts();
+                        starts.len() == bits.len()
+                            && bits.iter().zip(&starts).any(|(bits, start)| {
+                                let (is, must) = (kind.number(*bits), kind.number(kind.bits(*start)));
+                                // The text may have fewer digits than the number.
+                                (is - must).abs() > 1e-9 * must.abs() || is.is_nan() != must.is_nan()
+                            })
+                    }
+                };
+                if wrong {
+                    return Some(format!(
+                        "{} starts with {}, the description says {}",
+                        variable.name,
+                        value.show(0),
+                        variable.start.join(" ")
+                    ));
+                }
+            }
+            None
+        });
+        checker.judge(&claim, writer.script.clone(), judge)?;
+        values(checker, course)?;
+        constants(checker, course)?;
+    }
+    Ok(())
+}
+
+/// What is read in the whole course is written at all, of its type and within its range.
+fn values(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let mut writer = checker.writer();
+    writer.begin(0, course);
+    let mut reads = vec![writer.read(0)];
+    for point in &course.points {
+        writer.point(0, course, point);
+        reads.push(writer.read(0));
+    }
+    let section = checker.section("2.2.7", "2.4.7");
+    let variables = description.variables.clone();
+    let standard = description.standard;
+    type Test = Arc<dyn Fn(&crate::description::Variable, &Written) -> Option<String> + Send + Sync>;
+    let tests: Vec<(&str, Grade, &str, Test)> = vec![
+        (
+            "start_values.unwritten",
+            Grade::Violation,
+            "A function that answers OK has written all values that it was asked for.",
+            Arc::new(|_, value| {
+                let Written::Numbers(kind, bits) = value else { return None };
+                let untouched = u64::from_ne_bytes([0xa5; 8]) >> (64 - 8 * kind.size());
+                (kind.size() >= 4 && bits.contains(&untouched)).then(|| "nothing was written".to_owned())
+            }),
+        ),
+        (
+            "start_values.boolean",
+            Grade::Violation,
+            "A Boolean is true or false: 1 or 0.",
+            Arc::new(|variable, value| {
+                let wrong = variable.base == Some(BaseType::Boolean)
+                    && value.numbers().iter().any(|number| ![0.0, 1.0].contains(number));
+                wrong.then(|| value.show(0))
+            }),
+        ),
+        (
+            "start_values.range",
+            Grade::Violation,
+            "Whole numbers and enumerations that are outputs or local stay within their min and max.",
+            Arc::new(|variable, value| {
+                let whole = variable.base.is_some_and(|base| !base.is_float())
+                    && ["local", "output"].contains(&variable.causality.as_str());
+                let (min, max) =
+                    (variable.min.unwrap_or(f64::NEG_INFINITY), variable.max.unwrap_or(f64::INFINITY));
+                let wrong = whole && value.numbers().iter().any(|number| *number < min || *number > max);
+                wrong.then(|| format!("{}, but lies between {min} and {max}", value.show(0)))
+            }),
+        ),
+        (
+            "start_values.text",
+            Grade::Violation,
+            "A text is not NULL.",
+            Arc::new(|variable, value| {
+                let wrong = variable.base == Some(BaseType::String)
+                    && matches!(value, Written::Texts(texts) if texts.contains(&None));
+                wrong.then(|| "NULL".to_owned())
+            }),
+        ),
+        (
+            "results.not-finite",
+            Grade::Note,
+            "Inputs near their start values give results that are numbers.",
+            Arc::new(|variable, value| {
+                let wrong = variable.is_float() && value.numbers().iter().any(|number| !number.is_finite());
+                wrong.then(|| value.show(0))
+            }),
+        ),
+    ];
+    let _ = standard;
+    let run = checker.play(&writer.script)?;
+    checker.always(&writer.script, &run);
+    for (name, grade, promise, test) in tests {
+        let (variables, reads) = (variables.clone(), reads.clone());
+        let judge: Judge = Arc::new(move |run| {
+            for reads in &reads {
+                for (place, variable) in variables.iter().enumerate() {
+                    if variable.clocked {
+                        continue;
+                    }
+                    if let Some(value) = value_of(run, reads, place)
+                        && let Some(why) = test(variable, &value)
+                    {
+                        return Some(format!("{} is {why}", variable.name));
+                    }
+                }
+            }
+            None
+        });
+        if let Some(seen) = judge(&run) {
+            let claim = Claim::new(name, grade, section, promise);
+            checker.add(claim.finding(seen, writer.script.clone(), judge));
+        }
+    }
+    Ok(())
+}
+
+/// Constants and fixed parameters do not change while time goes on.
+fn constants(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let fixed: Vec<usize> = readable(description)
+        .into_iter()
+        .filter(|place| {
+            let variable = &description.variables[*place];
+            let tunable = description.variables.iter().any(|other| {
+                other.variability == "tunable" || other.causality == "input" && other.variability == "fixed"
+            });
+            variable.variability == "constant"
+                || !tunable && variable.variability == "fixed" && variable.causality != "input"
+                || variable.causality == "parameter"
+        })
+        .collect();
+    if fixed.is_empty() || course.points.is_empty() {
+        return Ok(());
+    }
+    let mut writer = checker.writer();
+    writer.begin(0, course);
+    let first = writer.read_these(0, &fixed);
+    for point in &course.points {
+        writer.point(0, course, point);
+    }
+    let last = writer.read_these(0, &fixed);
+    let claim = Claim::new(
+        "start_values.fixed",
+        Grade::Violation,
+        checker.section("2.2.7", "2.4.7.4"),
+        "Constants and parameters that nobody sets do not change after the initialization.",
+    );
+    let description = description.clone();
+    let judge: Judge = Arc::new(move |run| {
+        let (name, before, after) = crate::writer::difference(&description, run, &first, &last)?;
+        Some(format!("{name} was {before} and has become {after}"))
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}
+
+/// What is set before the initialization ends is what is read.
+pub fn set(checker: &Checker) -> anyhow::Result<()> {
+    let description = &checker.description;
+    for course in &checker.courses {
+        let mut values: Vec<(usize, Value)> = Vec::new();
+        for place in readable(description) {
+            let variable = &description.variables[place];
+            let settable = variable.causality == "input"
+                || variable.causality == "parameter"
+                    && ["fixed", "tunable"].contains(&variable.variability.as_str());
+            if !settable
+                || variable.clocked
+                || variable.start.is_empty()
+                || description.aliases(place).count() > 1
+            {
+                continue;
+            }
+            let starts = variable.starts();
+            let base = variable.base.unwrap_or(BaseType::Real);
+            let value = match base {
+                BaseType::Real | BaseType::Float32 => {
+                    let kind = kind_of(description.standard, base);
+                    Value::Numbers(
+                        starts
+                            .iter()
+                            .map(|start| kind.number(kind.bits(near(variable, *start, 1.0 / 64.0))))
+                            .collect(),
+                    )
+                }
+                // A count that is greater by one may be too much for the model; what it is now is not.
+                BaseType::String => {
+                    Value::Texts(variable.start.iter().map(|text| text.clone().into_bytes()).collect())
+                }
+                BaseType::Binary => continue,
+                _ => Value::Numbers(starts),
+            };
+            if matches!(&value, Value::Numbers(numbers) if numbers.is_empty()) {
+                continue;
+            }
+            values.push((place, value));
+        }
+        let claim = Claim::new(
+            "start_values.set",
+            Grade::Violation,
+            checker.section("2.1.7", "2.2.7.2"),
+            "What is set is what is read, in Initialization Mode and before.",
+        );
+        for within in [true, false] {
+            let mut writer = checker.writer();
+            writer.make(0, course.interface);
+            if within {
+                writer.enter(0);
+            }
+            let sets = writer.set(0, &values);
+            if !within {
+                writer.enter(0);
+            }
+            let places: Vec<usize> = values.iter().map(|(place, _)| *place).collect();
+            let reads = writer.read_these(0, &places);
+            let (values, description) = (values.clone(), description.clone());
+            let judge: Judge = Arc::new(move |run| {
+                if sets.iter().any(|id| run.status(*id).is_none_or(|status| status > 1)) {
+                    return None;
+                }
+                for (place, value) in &values {
+                    let Some(read) = value_of(run, &reads, *place) else { continue };
+                    let same = match (&read, value) {
+                        (Written::Numbers(kind, bits), Value::Numbers(numbers)) => {
+                            bits.iter().zip(numbers).all(|(bits, number)| {
+                                *bits == kind.bits(*number)
+                                    || *kind == Kind::F64 && kind.number(*bits) == *number
+                            })
+                        }
+                        (Written::Texts(texts), Value::Texts(set)) => {
+                            texts.iter().zip(set).all(|(text, set)| text.as_ref() == Some(set))
+                        }
+                        _ => true,
+                    };
+                    if !same {
+                        return Some(format!(
+                            "{} was set to {value:?} and reads {}",
+                            description.variables[*place].name,
+                            read.show(0)
+                        ));
+                    }
+                }
+                None
+            });
+            checker.judge(&claim, writer.script, judge)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,279 @@
+//! Saved states: what follows a restored one is what followed the first time, in the same instance, after a reset, from
+//! bytes, and in a fresh process.
+
+use crate::checker::{Checker, Claim, refused};
+use crate::finding::{Grade, Judge};
+use crate::script::{Step, Written};
+use crate::writer::{Course, Read, Writer, difference};
+use std::sync::Arc;
+
+/// Where in a course states are saved: at its beginning, after a point, near its end.
+fn places(course: &Course) -> Vec<usize> {
+    let count = course.points.len();
+    let mut places = vec![0, 1, count / 2];
+    places.retain(|place| *place < count);
+    places.dedup();
+    places
+}
+
+/// From a point of the course to its end, reading after each.
+fn rest(writer: &mut Writer, of: usize, course: &Course, from: usize) -> (Vec<u32>, Vec<Read>) {
+    let (mut ids, mut reads) = (Vec::new(), Vec::new());
+    for point in &course.points[from..] {
+        ids.extend(writer.point(of, course, point));
+        reads.extend(writer.ask(of, course.interface));
+    }
+    (ids, reads)
+}
+
+fn up_to(writer: &mut Writer, of: usize, course: &Course, to: usize) {
+    writer.begin(of, course);
+    for point in &course.points[..to] {
+        writer.point(of, course, point);
+    }
+}
+
+fn same(checker: &Checker, what: &'static str, one: Vec<Read>, other: Vec<Read>) -> Judge {
+    let description = checker.description.clone();
+    Arc::new(move |run| {
+        let (name, before, after) = difference(&description, run, &one, &other)?;
+        Some(format!("{name} was {before}, {what} it is {after}"))
+    })
+}
+
+/// Saved, gone on, restored, gone on: the same; twice; and saving changes nothing.
+pub fn restore(checker: &Checker) -> anyhow::Result<()> {
+    let section = checker.section("2.1.8", "2.2.7.4");
+    for course in checker.courses.iter().filter(|course| checker.saves(course.interface)) {
+        for place in places(course) {
+            let mut writer = checker.writer();
+            up_to(&mut writer, 0, course, place);
+            let before = writer.ask(0, course.interface);
+            writer.save(0, 0);
+            let after = writer.ask(0, course.interface);
+            let (_, first) = rest(&mut writer, 0, course, place);
+            writer.restore(0, 0);
+            let at_once = writer.ask(0, course.interface);
+            let (_, second) = rest(&mut writer, 0, course, place);
+            writer.restore(0, 0);
+            let (_, third) = rest(&mut writer, 0, course, place);
+            let script = writer.script;
+            let claim = |name: &str, promise: &str| Claim::new(name, Grade::Violation, section, promise);
+            let changed = claim("states.changed-by-saving", "Saving a state copies it and changes nothing.");
+            let run = checker.judge(
+                &changed,
+                script.clone(),
+                same(checker, "after the state was saved", before.clone(), after),
+            )?;
+            let judges = [
+                (
+                    claim("states.restore-values", "A restored state has the values that it was saved with."),
+                    same(checker, "after the state was restored", before, at_once),
+                ),
+                (
+                    claim(
+                        "states.restore",
+                        "The simulation that goes on from a restored state is the one that went on from it before.",
+                    ),
+                    same(checker, "from the restored state", first.clone(), second),
+                ),
+                (
+                    claim("states.twice", "A state can be restored again: restoring it does not change it."),
+                    same(checker, "from the state restored a second time", first, third),
+                ),
+            ];
+            for (claim, judge) in judges {
+                if let Some(seen) = judge(&run) {
+                    checker.add(claim.finding(seen, script.clone(), judge));
+                    break;
+                }
+            }
+        }
+        modes(checker, course)?;
+        reused(checker, course)?;
+        free_null(checker, course)?;
+    }
+    Ok(())
+}
+
+/// A state of one mode, restored in another.
+fn modes(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let mut writer = checker.writer();
+    writer.make(0, course.interface);
+    writer.save(0, 0);
+    writer.enter(0);
+    writer.save(0, 1);
+    writer.leave(0, course);
+    let (_, first) = rest(&mut writer, 0, course, 0);
+    writer.call(0, "Terminate", vec![]);
+    // Back to the initialization, then to the beginning.
+    let back = writer.restore(0, 1);
+    let mut ids = writer.leave(0, course);
+    let (more, second) = rest(&mut writer, 0, course, 0);
+    ids.extend(more);
+    let again = writer.restore(0, 0);
+    writer.enter(0);
+    writer.leave(0, course);
+    let (more, third) = rest(&mut writer, 0, course, 0);
+    ids.extend(more);
+    ids.extend([back, again]);
+    let claim = Claim::new(
+        "states.modes",
+        Grade::Violation,
+        checker.section("2.1.8", "2.2.7.4"),
+        "A state that was saved before or in Initialization Mode can be restored later, and is in that mode.",
+    );
+    let (script, one) = (
+        writer.script.clone(),
+        same(checker, "from the state of Initialization Mode", first.clone(), second),
+    );
+    let two = same(checker, "from the state of the new instance", first, third);
+    let judge: Judge =
+        Arc::new(move |run| refused(&script, run, &ids).or_else(|| one(run)).or_else(|| two(run)));
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}
+
+/// A handle that is used for another state, and two states side by side.
+fn reused(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let count = course.points.len();
+    if count < 3 {
+        return Ok(());
+    }
+    let mut writer = checker.writer();
+    up_to(&mut writer, 0, course, 1);
+    writer.save(0, 0);
+    writer.save(0, 1);
+    writer.point(0, course, &course.points[1]);
+    let values = writer.ask(0, course.interface);
+    writer.save(0, 1);
+    let (_, first) = rest(&mut writer, 0, course, 2);
+    writer.restore(0, 0);
+    writer.restore(0, 1);
+    let again = writer.ask(0, course.interface);
+    let (_, second) = rest(&mut writer, 0, course, 2);
+    writer.restore(0, 0);
+    writer.point(0, course, &course.points[1]);
+    let from_first = writer.ask(0, course.interface);
+    writer.drop_state(0, 0);
+    writer.drop_state(0, 1);
+    let claim = Claim::new(
+        "states.several",
+        Grade::Violation,
+        checker.section("2.1.8", "2.2.7.4"),
+        "There may be several states of an instance, and a handle may be used for a later one.",
+    );
+    let judges = [
+        same(checker, "from the state in a used handle", values.clone(), again),
+        same(checker, "from the state in a used handle", first, second),
+        same(checker, "from the other state", values, from_first),
+    ];
+    let judge: Judge = Arc::new(move |run| judges.iter().find_map(|judge| judge(run)));
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}
+
+/// NULL is ignored, and a freed state leaves NULL.
+fn free_null(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let section = checker.section("2.1.8", "2.2.7.4");
+    let mut writer = checker.writer();
+    writer.begin(0, course);
+    writer.save(0, 0);
+    let freed = writer.drop_state(0, 0);
+    let nothing = writer.drop_state(0, 1);
+    let claim = Claim::new(
+        "states.free",
+        Grade::Violation,
+        section,
+        "Freeing a state leaves NULL in its handle; freeing NULL is ignored.",
+    );
+    let judge: Judge = Arc::new(move |run| {
+        if run.status(nothing).is_some_and(|status| status > 1) {
+            return Some("freeing a state that is NULL is refused".to_owned());
+        }
+        let left = run.status(freed) == Some(0) && run.written(freed)?.numbers() != [0.0];
+        left.then(|| "the handle of a freed state is not NULL".to_owned())
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}
+
+/// From bytes: in the same instance, in a new one, in a fresh process.
+pub fn serialized(checker: &Checker) -> anyhow::Result<()> {
+    let section = checker.section("2.1.8", "2.2.7.4");
+    for course in checker.courses.iter().filter(|course| checker.serializes(course.interface)) {
+        for place in places(course) {
+            for fresh in [false, true] {
+                let mut writer = checker.writer();
+                up_to(&mut writer, 0, course, place);
+                let before = writer.ask(0, course.interface);
+                writer.save(0, 0);
+                let [size, bytes] = writer.serialize(0, 0);
+                let (_, first) = rest(&mut writer, 0, course, place);
+                if fresh {
+                    writer.add(Step::FreshProcess);
+                } else {
+                    writer.drop_state(0, 0);
+                    writer.free(0);
+                }
+                // As much as needed for states to be taken: both procedures that are in use, made and initialized.
+                if place == 0 && fresh {
+                    writer.make(1, course.interface);
+                } else {
+                    writer.begin(1, course);
+                }
+                let read = writer.deserialize(1, 0, 1);
+                let set = writer.restore(1, 1);
+                let at_once = writer.ask(1, course.interface);
+                let (_, second) = rest(&mut writer, 1, course, place);
+                let script = writer.script.clone();
+                let name = if fresh { "states.fresh-process" } else { "states.serialized" };
+                let promise = if fresh {
+                    "Serialized bytes, read in a fresh process, are the state: its values and what follows."
+                } else {
+                    "Serialized bytes, read by another instance, are the state: its values and what follows."
+                };
+                let one = same(checker, "from the bytes", before, at_once);
+                let two = same(checker, "from the bytes", first, second);
+                let judge: Judge = Arc::new(move |run| {
+                    if run.status(bytes).is_none_or(|status| status > 1)
+                        || run.status(size).is_none_or(|status| status > 1)
+                    {
+                        return None;
+                    }
+                    refused(&script, run, &[read, set]).or_else(|| one(run)).or_else(|| two(run))
+                });
+                checker.judge(&Claim::new(name, Grade::Violation, section, promise), writer.script, judge)?;
+            }
+        }
+        again(checker, course)?;
+    }
+    Ok(())
+}
+
+/// Serializing twice gives the same bytes, and serializing what was read gives them, too.
+fn again(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let mut writer = checker.writer();
+    up_to(&mut writer, 0, course, course.points.len() / 2);
+    writer.save(0, 0);
+    let [_, first] = writer.serialize(0, 0);
+    writer.deserialize(0, 0, 1);
+    let [_, second] = writer.serialize(0, 1);
+    let claim = Claim::new(
+        "states.bytes",
+        Grade::Note,
+        checker.section("2.1.8", "2.2.7.4"),
+        "A state read from bytes gives the same bytes again; others show that something is lost, or memory that nobody wrote.",
+    );
+    let judge: Judge = Arc::new(move |run| {
+        let (one, two) = (run.written(first)?, run.written(second)?);
+        match (one, two) {
+            (Written::Numbers(_, one), Written::Numbers(_, two)) if one.len() != two.len() => {
+                Some(format!("{} bytes, and {} of the same state", one.len(), two.len()))
+            }
+            _ => one.differ(two).map(|place| format!("byte {place} of {} differs", one.numbers().len())),
+        }
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}

@@ -1,0 +1,631 @@
+//! The model description, read for what it promises. `fmu-run` reads what it needs to run an FMU; here it is all that can
+//! be held against the library, arrays and clocks too, and what is wrong is told instead of refused.
+
+use crate::script::Kind;
+use fmi_abi::{BaseType, Interface, Standard};
+use roxmltree::{Document, Node};
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+/// A variable.
+#[derive(Clone, Debug)]
+pub struct Variable {
+    /// Its name.
+    pub name: String,
+    /// Its value reference.
+    pub reference: u32,
+    /// Its type; `None` for clocks.
+    pub base: Option<BaseType>,
+    /// `input`, `output` and so on; `local` if nothing is said.
+    pub causality: String,
+    /// `fixed`, `continuous` and so on, with the standard's default.
+    pub variability: String,
+    /// `exact`, `approx` or `calculated`, with the standard's default; empty for those that have none.
+    pub initial: String,
+    /// Its start values as they are written; none if there is none.
+    pub start: Vec<String>,
+    /// How many values it has; `None` if that cannot be known from the text.
+    pub size: Option<usize>,
+    /// Its smallest value.
+    pub min: Option<f64>,
+    /// Its largest value.
+    pub max: Option<f64>,
+    /// Its nominal value.
+    pub nominal: f64,
+    /// The name of its unit.
+    pub unit: Option<String>,
+    /// The name of its declared type.
+    pub declared_type: Option<String>,
+    /// It is the derivative of this variable: by place.
+    pub derivative_of: Option<usize>,
+    /// It is set by clocks.
+    pub clocked: bool,
+    /// It may not be set twice at one time.
+    pub once_per_instant: bool,
+}
+
+/// An unknown of the model structure.
+#[derive(Clone, Debug)]
+pub struct Unknown {
+    /// The variable, by place.
+    pub variable: usize,
+    /// What it depends on, by places, with kinds; `None` if nothing is said.
+    pub dependencies: Option<Vec<(usize, String)>>,
+}
+
+/// What it offers for a type of interface.
+#[derive(Clone, Debug)]
+pub struct Offer {
+    /// The name of its library.
+    pub identifier: String,
+    attributes: HashMap<String, String>,
+}
+
+impl Offer {
+    /// A positive number among its attributes.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.attributes
+            .get(name)?
+            .trim()
+            .parse()
+            .ok()
+            .filter(|number: &f64| *number > 0.0 && number.is_finite())
+    }
+
+    /// Whether a capability is declared; those of FMI 2.0 and 3.0 may be spelled differently.
+    pub fn can(&self, names: &[&str]) -> bool {
+        names.iter().any(|name| matches!(self.attributes.get(*name).map(String::as_str), Some("true" | "1")))
+    }
+}
+
+/// The model description.
+#[derive(Clone, Debug)]
+pub struct Description {
+    /// The edition of the standard.
+    pub standard: Standard,
+    /// `fmiVersion` as it is written.
+    pub version: String,
+    /// The name of the model.
+    pub model_name: String,
+    /// `guid` of FMI 2.0, `instantiationToken` of FMI 3.0.
+    pub token: String,
+    /// What it offers.
+    pub co_simulation: Option<Offer>,
+    /// What it offers.
+    pub model_exchange: Option<Offer>,
+    /// In the order of the text.
+    pub variables: Vec<Variable>,
+    /// Of the model structure.
+    pub outputs: Vec<Unknown>,
+    /// Of the model structure.
+    pub derivatives: Vec<Unknown>,
+    /// Of the model structure.
+    pub initial_unknowns: Vec<Unknown>,
+    /// How many event indicators there are.
+    pub event_indicators: Option<usize>,
+    /// Their names.
+    pub log_categories: Vec<String>,
+    /// Where it starts.
+    pub start_time: f64,
+    /// Where it stops, if it is said.
+    pub stop_time: Option<f64>,
+    /// The size of its steps, if it is said.
+    pub step_size: Option<f64>,
+    /// What is wrong in it: the name of a finding, the section, a sentence.
+    pub wrong: Vec<(&'static str, &'static str, String)>,
+}
+
+impl Description {
+    /// Reads it.
+    ///
+    /// # Errors
+    /// A sentence, when nothing can be done with it.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let document =
+            Document::parse(text).map_err(|error| format!("modelDescription.xml is no XML: {error}"))?;
+        let root = document.root_element();
+        let version = root.attribute("fmiVersion").unwrap_or_default().to_owned();
+        let standard = match version.as_str() {
+            "2.0" => Standard::Fmi2,
+            version if version.starts_with("3.") => Standard::Fmi3,
+            other => return Err(format!("its fmiVersion is {other:?}; FMI 2.0 and 3.0 can be checked")),
+        };
+        let offer = |name: &str| {
+            child(root, name).map(|node| Offer {
+                identifier: node.attribute("modelIdentifier").unwrap_or_default().to_owned(),
+                attributes: node
+                    .attributes()
+                    .map(|of| (of.name().to_owned(), of.value().to_owned()))
+                    .collect(),
+            })
+        };
+        let token = if standard == Standard::Fmi2 { "guid" } else { "instantiationToken" };
+        let mut wrong = Vec::new();
+        let variables = variables(root, standard, &mut wrong);
+        let experiment = child(root, "DefaultExperiment");
+        let time = |name: &str| -> Option<f64> { experiment?.attribute(name)?.trim().parse().ok() };
+        let mut description = Self {
+            standard,
+            version,
+            model_name: root.attribute("modelName").unwrap_or_default().to_owned(),
+            token: root.attribute(token).unwrap_or_default().to_owned(),
+            co_simulation: offer("CoSimulation"),
+            model_exchange: offer("ModelExchange"),
+            variables,
+            outputs: Vec::new(),
+            derivatives: Vec::new(),
+            initial_unknowns: Vec::new(),
+            event_indicators: None,
+            log_categories: elements(root, "LogCategories")
+                .filter_map(|node| Some(node.attribute("name")?.to_owned()))
+                .collect(),
+            start_time: time("startTime").unwrap_or(0.0),
+            stop_time: time("stopTime"),
+            step_size: time("stepSize").filter(|size| *size > 0.0 && size.is_finite()),
+            wrong,
+        };
+        description.structure(root);
+        description.judge(root);
+        Ok(description)
+    }
+
+    /// What it offers for this type of interface.
+    pub fn offer(&self, interface: Interface) -> Option<&Offer> {
+        match interface {
+            Interface::CoSimulation => self.co_simulation.as_ref(),
+            Interface::ModelExchange => self.model_exchange.as_ref(),
+        }
+    }
+
+    fn structure(&mut self, root: Node) {
+        let by_reference: HashMap<u32, usize> =
+            self.variables.iter().enumerate().rev().map(|(place, of)| (of.reference, place)).collect();
+        let (count, standard) = (self.variables.len(), self.standard);
+        let mut lost = Vec::new();
+        let mut find = |text: &str| {
+            let number: Option<u32> = text.parse().ok();
+            let found = match standard {
+                Standard::Fmi2 => {
+                    number.map(|number| (number as usize).wrapping_sub(1)).filter(|place| *place < count)
+                }
+                Standard::Fmi3 => number.and_then(|number| by_reference.get(&number).copied()),
+            };
+            if found.is_none() {
+                lost.push(format!("ModelStructure refers to {text:?}, which is no variable"));
+            }
+            found
+        };
+        let attribute = if standard == Standard::Fmi2 { "index" } else { "valueReference" };
+        let mut unknown = |node: Node| -> Option<Unknown> {
+            let variable = find(node.attribute(attribute)?.trim())?;
+            let kinds: Vec<String> = node
+                .attribute("dependenciesKind")
+                .unwrap_or_default()
+                .split_whitespace()
+                .map(str::to_owned)
+                .collect();
+            let dependencies = node.attribute("dependencies").map(|list| {
+                let kind = |place: usize| kinds.get(place).cloned().unwrap_or_else(|| "dependent".to_owned());
+                let found = list.split_whitespace().enumerate();
+                found.filter_map(|(place, text)| Some((find(text)?, kind(place)))).collect()
+            });
+            Some(Unknown { variable, dependencies })
+        };
+        if let Some(structure) = child(root, "ModelStructure") {
+            let mut list = |group: &str, of_fmi3: &str| -> Vec<Unknown> {
+                match standard {
+                    Standard::Fmi2 => elements(structure, group).filter_map(&mut unknown).collect(),
+                    Standard::Fmi3 => structure
+                        .children()
+                        .filter(|node| node.has_tag_name(of_fmi3))
+                        .filter_map(&mut unknown)
+                        .collect(),
+                }
+            };
+            self.outputs = list("Outputs", "Output");
+            self.derivatives = list("Derivatives", "ContinuousStateDerivative");
+            self.initial_unknowns = list("InitialUnknowns", "InitialUnknown");
+            let indicators = list("none", "EventIndicator");
+            self.event_indicators = match standard {
+                Standard::Fmi2 => {
+                    root.attribute("numberOfEventIndicators").map_or(Some(0), |text| text.parse().ok())
+                }
+                Standard::Fmi3 => {
+                    indicators.iter().map(|unknown| self.variables[unknown.variable].size).sum()
+                }
+            };
+        }
+        let section = self.section("2.2.8", "2.4.8");
+        self.wrong.extend(lost.into_iter().map(|why| ("description.structure", section, why)));
+    }
+
+    /// The section of the standard at hand.
+    pub fn section(&self, of_fmi2: &'static str, of_fmi3: &'static str) -> &'static str {
+        if self.standard == Standard::Fmi2 { of_fmi2 } else { of_fmi3 }
+    }
+
+    /// What the text itself has wrong.
+    fn judge(&mut self, root: Node) {
+        let mut wrong = Vec::new();
+        let structure = self.section("2.2.8", "2.4.8");
+        let attributes = self.section("2.2.7", "2.4.7.4");
+        if self.token.is_empty() {
+            wrong.push((
+                "description.token",
+                self.section("2.2.1", "2.4.1"),
+                "guid or instantiationToken is missing or empty".to_owned(),
+            ));
+        }
+        for offer in [&self.co_simulation, &self.model_exchange].into_iter().flatten() {
+            let mut letters = offer.identifier.chars();
+            let good = letters.next().is_some_and(|first| first.is_ascii_alphabetic() || first == '_')
+                && letters.all(|letter| letter.is_ascii_alphanumeric() || letter == '_');
+            if !good {
+                wrong.push((
+                    "description.identifier",
+                    self.section("2.1.1", "2.2.2"),
+                    format!("modelIdentifier {:?} is no name in C", offer.identifier),
+                ));
+            }
+        }
+        let outputs: HashSet<usize> = self.outputs.iter().map(|unknown| unknown.variable).collect();
+        let units: HashSet<&str> =
+            elements(root, "UnitDefinitions").filter_map(|node| node.attribute("name")).collect();
+        let types: HashSet<&str> =
+            elements(root, "TypeDefinitions").filter_map(|node| node.attribute("name")).collect();
+        let mut names = HashSet::new();
+        let mut references = HashSet::new();
+        for (place, variable) in self.variables.iter().enumerate() {
+            let name = &variable.name;
+            if !names.insert(name) {
+                wrong.push(("description.names", attributes, format!("two variables are called {name:?}")));
+            }
+            if self.standard == Standard::Fmi3 && !references.insert(variable.reference) {
+                let why =
+                    format!("value reference {} of {name} is that of another variable", variable.reference);
+                wrong.push(("description.references", "2.4.7.4", why));
+            }
+            if variable.causality == "output" && !outputs.contains(&place) && !variable.clocked {
+                wrong.push((
+                    "description.structure",
+                    structure,
+                    format!("output {name} is not among the outputs of ModelStructure"),
+                ));
+            }
+            if variable.causality != "output" && outputs.contains(&place) {
+                wrong.push((
+                    "description.structure",
+                    structure,
+                    format!("{name} is no output, and is among those of ModelStructure"),
+                ));
+            }
+            if let Some(unit) = &variable.unit
+                && !units.contains(unit.as_str())
+            {
+                wrong.push((
+                    "description.units",
+                    self.section("2.2.2", "2.4.3"),
+                    format!("{name} is in {unit:?}, which is no unit of UnitDefinitions"),
+                ));
+            }
+            if let Some(of) = &variable.declared_type
+                && !types.contains(of.as_str())
+            {
+                wrong.push((
+                    "description.types",
+                    self.section("2.2.3", "2.4.4"),
+                    format!("{name} is of type {of:?}, which is none of TypeDefinitions"),
+                ));
+            }
+            let needs_start = ["exact", "approx"].contains(&variable.initial.as_str())
+                || variable.causality == "input" && variable.base.is_some();
+            if needs_start
+                && variable.start.is_empty()
+                && variable.causality != "independent"
+                && !variable.clocked
+            {
+                wrong.push((
+                    "description.start",
+                    attributes,
+                    format!("{name} ({}) has no start value", variable.causality),
+                ));
+            }
+            if variable.initial == "calculated" && !variable.start.is_empty() && variable.base.is_some() {
+                wrong.push((
+                    "description.start",
+                    attributes,
+                    format!("{name} is calculated and has a start value"),
+                ));
+            }
+            if let (Some(min), Some(max)) = (variable.min, variable.max)
+                && min > max
+            {
+                wrong.push((
+                    "description.range",
+                    attributes,
+                    format!("{name} has a min of {min} and a max of {max}"),
+                ));
+            }
+            for number in variable.starts() {
+                if variable.min.is_some_and(|min| number < min)
+                    || variable.max.is_some_and(|max| number > max)
+                {
+                    wrong.push((
+                        "description.range",
+                        attributes,
+                        format!("the start value of {name}, {number}, is outside its min and max"),
+                    ));
+                }
+            }
+            if variable
+                .base
+                .is_some_and(|base| ![BaseType::String, BaseType::Binary, BaseType::Boolean].contains(&base))
+                && variable.start.iter().any(|text| {
+                    text.parse::<f64>().is_err() && !["INF", "-INF", "NaN"].contains(&text.as_str())
+                })
+            {
+                wrong.push((
+                    "description.start",
+                    attributes,
+                    format!("the start value of {name}, {:?}, is no number", variable.start.join(" ")),
+                ));
+            }
+        }
+        let listed: HashSet<usize> = self.derivatives.iter().map(|unknown| unknown.variable).collect();
+        for unknown in &self.derivatives {
+            if self.variables[unknown.variable].derivative_of.is_none() {
+                let name = &self.variables[unknown.variable].name;
+                wrong.push((
+                    "description.structure",
+                    structure,
+                    format!("{name} is among the derivatives, and is not declared to be one"),
+                ));
+            }
+        }
+        // A derivative that is not listed may be one that is no state's (section 2.2.8 of FMI 2.0).
+        let _ = listed;
+        if self.stop_time.is_some_and(|stop| stop <= self.start_time) {
+            wrong.push((
+                "description.experiment",
+                self.section("2.2.5", "2.4.6"),
+                "the default experiment stops before it starts".to_owned(),
+            ));
+        }
+        self.wrong.extend(wrong);
+    }
+
+    /// The variables that a place of the same type and reference stands for.
+    pub fn aliases(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
+        let of = &self.variables[place];
+        let (reference, kind) = (of.reference, of.base.map(|base| kind_of(self.standard, base)));
+        self.variables.iter().enumerate().filter_map(move |(place, other)| {
+            let same =
+                other.reference == reference && other.base.map(|base| kind_of(self.standard, base)) == kind;
+            same.then_some(place)
+        })
+    }
+
+    /// The continuous states, by places, in the order of their derivatives.
+    pub fn states(&self) -> Vec<usize> {
+        self.derivatives.iter().filter_map(|unknown| self.variables[unknown.variable].derivative_of).collect()
+    }
+
+    /// How many numbers the vector of states has.
+    pub fn states_count(&self) -> Option<usize> {
+        self.derivatives.iter().map(|unknown| self.variables[unknown.variable].size).sum()
+    }
+}
+
+impl Variable {
+    /// Its start values as numbers; none where they are none.
+    pub fn starts(&self) -> Vec<f64> {
+        self.start
+            .iter()
+            .map_while(|text| match text.as_str() {
+                "true" => Some(1.0),
+                "false" => Some(0.0),
+                "INF" => Some(f64::INFINITY),
+                "-INF" => Some(f64::NEG_INFINITY),
+                other => other.parse().ok(),
+            })
+            .collect()
+    }
+
+    /// Whether it is a floating-point number.
+    pub fn is_float(&self) -> bool {
+        self.base.is_some_and(BaseType::is_float)
+    }
+}
+
+/// The end of the names of the functions of a type.
+pub fn type_name(standard: Standard, base: BaseType) -> &'static str {
+    match (standard, base) {
+        (Standard::Fmi2, BaseType::Real) => "Real",
+        (Standard::Fmi2, BaseType::Boolean) => "Boolean",
+        (Standard::Fmi2, BaseType::String) => "String",
+        (Standard::Fmi2, _) => "Integer",
+        (_, BaseType::Real) => "Float64",
+        (_, BaseType::Float32) => "Float32",
+        (_, BaseType::Integer) => "Int32",
+        (_, BaseType::Int8) => "Int8",
+        (_, BaseType::UInt8) => "UInt8",
+        (_, BaseType::Int16) => "Int16",
+        (_, BaseType::UInt16) => "UInt16",
+        (_, BaseType::UInt32) => "UInt32",
+        (_, BaseType::Int64 | BaseType::Enumeration) => "Int64",
+        (_, BaseType::UInt64) => "UInt64",
+        (_, BaseType::Boolean) => "Boolean",
+        (_, BaseType::String) => "String",
+        (_, BaseType::Binary) => "Binary",
+    }
+}
+
+/// How values of a type lie in memory.
+pub fn kind_of(standard: Standard, base: BaseType) -> Kind {
+    match type_name(standard, base) {
+        "Real" | "Float64" => Kind::F64,
+        "Float32" => Kind::F32,
+        "Int8" => Kind::I8,
+        "UInt8" => Kind::U8,
+        "Int16" => Kind::I16,
+        "UInt16" => Kind::U16,
+        "UInt32" => Kind::U32,
+        "Int64" => Kind::I64,
+        "UInt64" => Kind::U64,
+        "String" | "Binary" => Kind::Pointer,
+        "Boolean" if standard == Standard::Fmi3 => Kind::U8,
+        _ => Kind::I32,
+    }
+}
+
+fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
+    node.children().find(|child| child.has_tag_name(name))
+}
+
+fn elements<'a>(node: Node<'a, 'a>, group: &str) -> impl Iterator<Item = Node<'a, 'a>> {
+    child(node, group).into_iter().flat_map(|group| group.children()).filter(Node::is_element)
+}
+
+fn base_of(standard: Standard, name: &str) -> Option<BaseType> {
+    Some(match (standard, name) {
+        (Standard::Fmi2, "Real") | (Standard::Fmi3, "Float64") => BaseType::Real,
+        (Standard::Fmi2, "Integer") | (Standard::Fmi3, "Int32") => BaseType::Integer,
+        (_, "Boolean") => BaseType::Boolean,
+        (_, "String") => BaseType::String,
+        (_, "Enumeration") => BaseType::Enumeration,
+        (Standard::Fmi3, "Float32") => BaseType::Float32,
+        (Standard::Fmi3, "Int8") => BaseType::Int8,
+        (Standard::Fmi3, "UInt8") => BaseType::UInt8,
+        (Standard::Fmi3, "Int16") => BaseType::Int16,
+        (Standard::Fmi3, "UInt16") => BaseType::UInt16,
+        (Standard::Fmi3, "UInt32") => BaseType::UInt32,
+        (Standard::Fmi3, "Int64") => BaseType::Int64,
+        (Standard::Fmi3, "UInt64") => BaseType::UInt64,
+        (Standard::Fmi3, "Binary") => BaseType::Binary,
+        _ => return None,
+    })
+}
+
+/// What `initial` is where nothing is said: the table of section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0.
+fn default_initial(causality: &str, variability: &str) -> &'static str {
+    match (causality, variability) {
+        ("parameter" | "structuralParameter", _) => "exact",
+        ("local" | "output", "constant") => "exact",
+        ("calculatedParameter" | "output" | "local", _) => "calculated",
+        _ => "",
+    }
+}
+
+fn variables(
+    root: Node,
+    standard: Standard,
+    wrong: &mut Vec<(&'static str, &'static str, String)>,
+) -> Vec<Variable> {
+    let types: HashMap<&str, Node> =
+        elements(root, "TypeDefinitions").filter_map(|node| Some((node.attribute("name")?, node))).collect();
+    let section = if standard == Standard::Fmi2 { "2.2.7" } else { "2.4.7" };
+    let nodes: Vec<Node> = elements(root, "ModelVariables").collect();
+    let by_reference: BTreeMap<u32, usize> = nodes
+        .iter()
+        .enumerate()
+        .rev()
+        .filter_map(|(place, node)| Some((node.attribute("valueReference")?.parse().ok()?, place)))
+        .collect();
+    let mut found: Vec<Variable> = Vec::new();
+    let mut sizes: HashMap<u32, Option<usize>> = HashMap::new();
+    for node in &nodes {
+        let name = node.attribute("name").unwrap_or_default().to_owned();
+        let Some(reference) = node.attribute("valueReference").and_then(|text| text.trim().parse().ok())
+        else {
+            wrong.push(("description.references", section, format!("{name} has no value reference")));
+            continue;
+        };
+        let of_type = match standard {
+            Standard::Fmi2 => {
+                node.children().find(|child| base_of(standard, child.tag_name().name()).is_some())
+            }
+            Standard::Fmi3 => Some(*node),
+        };
+        let Some(of_type) = of_type else {
+            wrong.push(("description.types", section, format!("{name} has no type")));
+            continue;
+        };
+        let base = base_of(standard, of_type.tag_name().name());
+        let declared_type = of_type.attribute("declaredType").map(str::to_owned);
+        let declared = declared_type.as_ref().and_then(|name| types.get(name.as_str()));
+        let of_both = |name: &str| {
+            of_type.attribute(name).or_else(|| {
+                let node = declared?;
+                node.attribute(name).or_else(|| node.children().find_map(|child| child.attribute(name)))
+            })
+        };
+        let number = |name: &str| of_both(name).and_then(|text| text.trim().parse::<f64>().ok());
+        let causality = node.attribute("causality").unwrap_or("local").to_owned();
+        let variability = node.attribute("variability").map_or_else(
+            || {
+                let fixed = ["parameter", "calculatedParameter", "structuralParameter"];
+                if fixed.contains(&causality.as_str()) && standard == Standard::Fmi3 {
+                    "fixed".to_owned()
+                } else if base.is_some_and(BaseType::is_float) {
+                    "continuous".to_owned()
+                } else {
+                    "discrete".to_owned()
+                }
+            },
+            str::to_owned,
+        );
+        let initial = node
+            .attribute("initial")
+            .map_or_else(|| default_initial(&causality, &variability).to_owned(), str::to_owned);
+        let mut size = Some(1_usize);
+        for dimension in node.children().filter(|child| child.has_tag_name("Dimension")) {
+            let fixed = dimension.attribute("start").and_then(|text| text.parse::<usize>().ok());
+            let other = dimension.attribute("valueReference").and_then(|text| text.parse::<u32>().ok());
+            let of_other = other.and_then(|reference| sizes.get(&reference).copied().flatten());
+            size = size.zip(fixed.or(of_other)).map(|(one, other)| one * other);
+        }
+        let mut start: Vec<String> = match (base, of_type.attribute("start")) {
+            (Some(BaseType::String | BaseType::Binary) | None, Some(text)) => vec![text.to_owned()],
+            (_, Some(text)) => text.split_whitespace().map(str::to_owned).collect(),
+            (_, None) => Vec::new(),
+        };
+        if start.is_empty() {
+            let starts = node.children().filter(|child| child.has_tag_name("Start"));
+            start = starts.filter_map(|child| Some(child.attribute("value")?.to_owned())).collect();
+        }
+        if let (Some(size), 1, true) =
+            (size, start.len(), node.children().any(|child| child.has_tag_name("Dimension")))
+        {
+            start = vec![start[0].clone(); size];
+        }
+        // What says how large others are.
+        if base.is_some_and(|base| base == BaseType::UInt64) {
+            sizes.insert(reference, start.first().and_then(|text| text.parse().ok()));
+        }
+        let derivative_of = of_type.attribute("derivative").and_then(|text| {
+            let number: u32 = text.trim().parse().ok()?;
+            match standard {
+                Standard::Fmi2 => (number as usize).checked_sub(1),
+                Standard::Fmi3 => by_reference.get(&number).copied(),
+            }
+        });
+        found.push(Variable {
+            name,
+            reference,
+            base,
+            causality,
+            variability,
+            initial,
+            start,
+            size,
+            min: number("min"),
+            max: number("max"),
+            nominal: number("nominal").filter(|nominal| *nominal > 0.0).unwrap_or(1.0),
+            unit: of_both("unit").map(str::to_owned),
+            declared_type,
+            derivative_of,
+            clocked: node.attribute("clocks").is_some(),
+            once_per_instant: node.attribute("canHandleMultipleSetPerTimeInstant") == Some("false"),
+        });
+    }
+    found
+}

@@ -1,0 +1,180 @@
+//! Whether a script keeps to the standard: a finding must not come from a call that may not be made there.
+
+use crate::description::Description;
+use crate::script::{Arg, NOBODY, Numbered, Step};
+use crate::worker::functions::signature;
+use fmi_abi::{Interface, Mode, Standard};
+use std::collections::HashMap;
+
+#[derive(Clone, Copy)]
+struct State {
+    interface: Interface,
+    mode: Mode,
+    time: f64,
+    event_mode: bool,
+    set_up: bool,
+    updated: bool,
+}
+
+/// The first call that may not be made where it is, by its number; forbidden calls apart, which change nothing.
+pub fn first_illegal(description: &Description, script: &[Numbered]) -> Option<u32> {
+    walk(description, script, &mut Course::default())
+}
+
+/// Where all instances, states and bytes are.
+#[derive(Default)]
+struct Course {
+    instances: HashMap<usize, State>,
+    slots: HashMap<usize, (usize, State)>,
+    bytes: HashMap<usize, State>,
+}
+
+fn walk(description: &Description, script: &[Numbered], course: &mut Course) -> Option<u32> {
+    let standard = description.standard;
+    for Numbered { id, forbidden, step } in script {
+        let Course { instances, slots, bytes } = &mut *course;
+        if *forbidden {
+            continue;
+        }
+        let good = match step {
+            Step::Make(place, make) => {
+                let interface =
+                    if make.co_simulation { Interface::CoSimulation } else { Interface::ModelExchange };
+                let once = description
+                    .offer(interface)
+                    .is_some_and(|offer| offer.can(&["canBeInstantiatedOnlyOncePerProcess"]));
+                let state = State {
+                    interface,
+                    mode: Mode::Instantiated,
+                    time: 0.0,
+                    event_mode: make.event_mode,
+                    set_up: standard == Standard::Fmi3,
+                    updated: false,
+                };
+                let free = !instances.contains_key(place) && (!once || instances.is_empty());
+                instances.insert(*place, state);
+                free
+            }
+            Step::Free(place) if *place == NOBODY => true,
+            Step::Free(place) => {
+                slots.retain(|_, (owner, _)| owner != place);
+                instances.remove(place).is_some()
+            }
+            Step::Call { of, function, args } => {
+                let Some((place, state)) = of.and_then(|place| Some((place, instances.get_mut(&place)?)))
+                else {
+                    return Some(*id);
+                };
+                let allowed = signature(function)
+                    .is_some_and(|of| of.rule.standard.contain(standard, state.interface, state.mode));
+                let real = |place: usize| match args.get(place) {
+                    Some(Arg::Real(bits)) => f64::from_bits(*bits),
+                    _ => 0.0,
+                };
+                let mut good = allowed;
+                match &function[4..] {
+                    "SetupExperiment" => {
+                        state.set_up = true;
+                        state.time = real(2);
+                    }
+                    "EnterInitializationMode" => {
+                        good &= state.set_up;
+                        state.mode = Mode::Initialization;
+                        if standard == Standard::Fmi3 {
+                            state.time = real(2);
+                        }
+                    }
+                    "ExitInitializationMode" => {
+                        state.updated = false;
+                        state.mode = if state.interface == Interface::ModelExchange || state.event_mode {
+                            Mode::Event
+                        } else {
+                            Mode::StepComplete
+                        };
+                    }
+                    "UpdateDiscreteStates" | "NewDiscreteStates" => state.updated = true,
+                    "EnterEventMode" => {
+                        state.updated = false;
+                        state.mode = Mode::Event;
+                    }
+                    "EnterContinuousTimeMode" => {
+                        good &= state.updated;
+                        state.mode = Mode::ContinuousTime;
+                    }
+                    "EnterStepMode" => {
+                        good &= state.updated;
+                        state.mode = Mode::StepComplete;
+                    }
+                    "DoStep" => {
+                        good &=
+                            (real(0) - state.time).abs() <= 1e-9 * (1.0 + state.time.abs()) && real(1) > 0.0;
+                        state.time = real(0) + real(1);
+                    }
+                    "SetTime" => {
+                        good &= real(0) >= state.time - 1e-12;
+                        state.time = real(0);
+                    }
+                    "Terminate" => state.mode = Mode::Terminated,
+                    "Reset" => {
+                        state.mode = Mode::Instantiated;
+                        state.set_up = standard == Standard::Fmi3;
+                    }
+                    "GetFMUstate" | "GetFMUState" => {
+                        if let Some(Arg::StateOut(slot)) = args.first() {
+                            slots.insert(*slot, (place, *state));
+                        }
+                    }
+                    "SetFMUstate" | "SetFMUState" => match args.first() {
+                        Some(Arg::State(slot)) => match slots.get(slot) {
+                            Some((owner, saved)) if *owner == place => *state = *saved,
+                            _ => good = false,
+                        },
+                        _ => good = false,
+                    },
+                    "FreeFMUstate" | "FreeFMUState" => {
+                        if let Some(Arg::StateOut(slot)) = args.first() {
+                            slots.remove(slot);
+                        }
+                    }
+                    "SerializedFMUstateSize"
+                    | "SerializedFMUStateSize"
+                    | "SerializeFMUstate"
+                    | "SerializeFMUState" => match args.first() {
+                        Some(Arg::State(slot)) if slots.contains_key(slot) => {
+                            if let Some(Arg::SavedOut(to)) = args.get(1) {
+                                bytes.insert(*to, slots[slot].1);
+                            }
+                        }
+                        _ => good = false,
+                    },
+                    "DeSerializeFMUstate" | "DeserializeFMUState" => match (args.first(), args.get(2)) {
+                        (Some(Arg::Saved(from)), Some(Arg::StateOut(slot))) if bytes.contains_key(from) => {
+                            slots.insert(*slot, (place, bytes[from]));
+                        }
+                        _ => good = false,
+                    },
+                    _ => {}
+                }
+                good
+            }
+            // What is allowed twice is allowed again.
+            Step::Repeat(_, steps) => {
+                walk(description, steps, course).is_none() && walk(description, steps, course).is_none()
+            }
+            Step::Parallel(scripts) => {
+                // Each thread has instances of its own.
+                scripts.iter().all(|script| first_illegal(description, script).is_none())
+            }
+            Step::FreshProcess => {
+                instances.clear();
+                slots.clear();
+                true
+            }
+            Step::Version(_) | Step::Measure => true,
+        };
+        if !good {
+            return Some(*id);
+        }
+    }
+    None
+}

@@ -1,0 +1,327 @@
+#![doc = include_str!("../README.md")]
+//!
+//! ## Inside
+//!
+//! A check writes scripts (`writer`), sequences of calls as data (`script`), has them played by a process of its own
+//! (`run`, `worker`) and judges what came of them. What is found is shortened (`shrink`) as long as it keeps to the
+//! standard (`legal`), and written as programs (`reproduce`). `unsafe` is in `worker` alone: the process that may be lost.
+
+mod checker;
+mod checks;
+mod description;
+mod finding;
+mod legal;
+mod report;
+mod reproduce;
+mod run;
+mod script;
+mod shrink;
+#[allow(unsafe_code, reason = "the library under attack is loaded and called here")]
+mod worker;
+mod writer;
+
+pub use finding::{Finding, Grade};
+pub use report::Report;
+pub use worker::work_if_asked;
+
+use anyhow::Context as _;
+use checker::{Checker, TimeOver, find_course};
+use description::Description;
+use fmi_abi::Interface;
+use std::io::{IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+/// How an FMU is checked.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Options {
+    /// Checks these topics alone, with commas between: description, package, functions, start_values, life_cycle,
+    /// states, derivatives, dependencies, results, reset, refusals, logs, resources, hostile.
+    #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(checks::TOPICS))]
+    pub only: Vec<String>,
+    /// Seconds for all of it.
+    #[arg(long, default_value_t = 120.0)]
+    pub time: f64,
+    /// Seconds for one script; longer is a hang.
+    #[arg(long, default_value_t = 10.0)]
+    pub limit: f64,
+    /// Megabytes of memory that the FMU may use.
+    #[arg(long, default_value_t = 8192)]
+    pub memory: u64,
+    /// Chooses the order of calls that chance chooses.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Writes report.html, report.json, junit.xml and a program in C and one in Python for each finding to this folder.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
+    /// Writes the report as JSON to the standard output.
+    #[arg(long)]
+    pub json: bool,
+    /// Fails for findings of this grade and worse.
+    #[arg(long, value_enum, default_value_t = FailOn::Violation)]
+    pub fail_on: FailOn,
+    /// Seconds of each of the simulations that are repeated to see what is left behind.
+    #[arg(long, default_value_t = 1.5)]
+    pub repeat: f64,
+    /// Leaves scripts as long as they are.
+    #[arg(long)]
+    pub no_shrink: bool,
+    /// Runs an FMU that starts another program, which must be installed.
+    #[arg(long)]
+    pub execution_tool: bool,
+}
+
+/// From which grade on a command fails.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum FailOn {
+    /// The standard says must.
+    Violation,
+    /// It hurts.
+    Fragile,
+    /// Good to know.
+    Note,
+    /// Not at all.
+    Never,
+}
+
+/// Checks an FMU, tells what is found and writes the reports. The exit status: 0 for nothing that is to fail, 1 for
+/// findings of a grade that is to fail, 2 if it could not be checked.
+///
+/// The program must call [`work_if_asked`] before anything else: it is started anew for every sequence of calls.
+pub fn command(fmu: &Path, options: &Options) -> ExitCode {
+    let progress = !options.json && std::io::stderr().is_terminal();
+    match check(fmu, options, progress).and_then(|report| {
+        if options.json {
+            println!("{}", report.json()?);
+        } else {
+            print!("{}", report.terminal(std::io::stdout().is_terminal()));
+        }
+        if let Some(folder) = &options.out {
+            report.write(folder).with_context(|| format!("{}: cannot be written", folder.display()))?;
+        }
+        Ok(report)
+    }) {
+        Ok(report) => {
+            let worst = report.findings.iter().map(|finding| finding.grade).max();
+            let fails = match options.fail_on {
+                FailOn::Violation => worst >= Some(Grade::Violation),
+                FailOn::Fragile => worst >= Some(Grade::Fragile),
+                FailOn::Note => worst >= Some(Grade::Note),
+                FailOn::Never => false,
+            };
+            ExitCode::from(u8::from(fails))
+        }
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Checks an FMU, with a line on the standard error that says how far it is.
+///
+/// # Errors
+/// When it is no FMU of FMI 2.0 or 3.0, or has no library for this machine.
+pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
+    let begin = Instant::now();
+    let unpacked = checks::package::unpack(path)?;
+    let folder = unpacked.folder.path();
+    let text = std::fs::read(folder.join("modelDescription.xml")).with_context(|| {
+        format!("{}: there is no modelDescription.xml in it; it is no FMU", path.display())
+    })?;
+    let text = String::from_utf8_lossy(&text);
+    let description = Description::parse(text.trim_start_matches('\u{feff}'))
+        .map_err(|why| anyhow::anyhow!("{}: {why}", path.display()))?;
+    let wanted = |topic: &str| options.only.is_empty() || options.only.iter().any(|only| only == topic);
+    let mut of_files = Vec::new();
+    if wanted("package") {
+        of_files.extend(unpacked.found);
+        of_files.extend(checks::package::look(folder, &description));
+    }
+    if wanted("description") {
+        for (name, section, seen) in &description.wrong {
+            let promise = "The model description keeps to the standard.";
+            of_files.push(Finding::of_files(name, Grade::Violation, section, promise, seen.clone()));
+        }
+    }
+    let setting = setting(path, options, folder, &description)?;
+    let deadline = begin + Duration::from_secs_f64(options.time.max(1.0));
+    let scratch = tempfile::Builder::new().prefix("fmu-check-").tempdir()?;
+    let mut checker = Checker::new(description, setting, scratch, options.seed, options.limit, deadline);
+    of_files.into_iter().for_each(|finding| checker.add(finding));
+    for (place, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
+        if checker.setting.libraries[place].is_none() {
+            continue;
+        }
+        let mut course = find_course(&checker, interface)?;
+        if let Err((_, script)) = &course {
+            no_course(&checker, script.clone())?;
+            // One that reads or writes beyond arrays may have more to show where there is room for it.
+            if ["arrays.read-beyond", "arrays.written-beyond"].iter().any(|name| checker.has(name)) {
+                checker.setting.soft = true;
+                course = find_course(&checker, interface)?;
+            }
+        }
+        match course {
+            Ok(course) => checker.courses.push(course),
+            Err((why, _)) => checker.unreached(format!("{interface}: no simulation of it succeeds ({why})")),
+        }
+    }
+    attack(&checker, progress, &wanted)?;
+    let mut findings = checker.take();
+    // What shows in every call, whatever it is made for, and what keeps others from being checked.
+    let always = |finding: &Finding| {
+        ["arrays", "logs"].contains(&finding.topic())
+            || [
+                "functions.status",
+                "package.unloadable",
+                "life_cycle.course",
+                "life_cycle.crash",
+                "life_cycle.hang",
+            ]
+            .contains(&finding.name.as_str())
+    };
+    findings.retain(|finding| options.only.is_empty() || wanted(finding.topic()) || always(finding));
+    findings.sort_by(|one, other| other.grade.cmp(&one.grade).then_with(|| one.name.cmp(&other.name)));
+    shorten(&checker, &mut findings, options, progress);
+    let mut report = Report::new(path, &checker, findings);
+    report.seconds = begin.elapsed().as_secs_f64();
+    Ok(report)
+}
+
+/// Where the libraries are.
+fn setting(
+    fmu: &Path,
+    options: &Options,
+    folder: &Path,
+    description: &Description,
+) -> anyhow::Result<script::Setting> {
+    let path = fmu.display();
+    let mut libraries = [None, None];
+    let offers = [&description.co_simulation, &description.model_exchange];
+    if offers.iter().all(|offer| offer.is_none()) {
+        anyhow::bail!(
+            "{path}: it has neither Co-Simulation nor Model Exchange, which are what can be checked"
+        );
+    }
+    for (place, offer) in offers.into_iter().enumerate() {
+        let Some(offer) = offer else { continue };
+        if offer.can(&["needsExecutionTool"]) && !options.execution_tool {
+            anyhow::bail!(
+                "{path}: it starts another program (needsExecutionTool); to check it all the same, give --execution-tool"
+            );
+        }
+        libraries[place] = checks::package::library(folder, description.standard, offer);
+    }
+    if libraries.iter().all(Option::is_none) {
+        let binaries = std::fs::read_dir(folder.join("binaries")).into_iter().flatten().flatten();
+        let others: Vec<String> =
+            binaries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        let others = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
+        anyhow::bail!("{path}: it has no library for this machine; it has: {others}");
+    }
+    Ok(script::Setting {
+        fmi3: description.standard == fmi_abi::Standard::Fmi3,
+        libraries,
+        resources: folder.join("resources"),
+        memory: options.memory << 20,
+        soft: false,
+        repetitions: options.repeat,
+    })
+}
+
+/// A simulation as the standard has it fails: that is the finding.
+fn no_course(checker: &Checker, script: script::Script) -> anyhow::Result<()> {
+    let claim = checker::Claim::new(
+        "life_cycle.course",
+        Grade::Violation,
+        checker.section("4.2.4 and 3.2.3", "2.3"),
+        "A simulation with the numbers of the description succeeds.",
+    );
+    let copy = script.clone();
+    let judge: finding::Judge = std::sync::Arc::new(move |run| {
+        let ids: Vec<u32> = copy.iter().map(|numbered| numbered.id).collect();
+        let makes: Vec<u32> = copy
+            .iter()
+            .filter(|numbered| matches!(numbered.step, script::Step::Make(..)))
+            .map(|numbered| numbered.id)
+            .collect();
+        let rest: Vec<u32> = ids.into_iter().filter(|id| !makes.contains(id)).collect();
+        let of_makes = makes.iter().find_map(|id| checker::refused_one(&copy, run, *id));
+        of_makes.or_else(|| checker::refused(&copy, run, &rest))
+    });
+    checker.judge(&claim, script, judge)?;
+    Ok(())
+}
+
+/// All checks that are wanted, several at a time.
+fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + Sync)) -> anyhow::Result<()> {
+    let checks: Vec<_> = checks::ALL.iter().filter(|(topic, _)| wanted(topic)).collect();
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let failure = Mutex::new(None);
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from).min(8) {
+            scope.spawn(|| {
+                while let Some((topic, check)) = checks.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    match check(checker) {
+                        Ok(()) => {}
+                        Err(error) if error.is::<TimeOver>() => {
+                            checker.unreached(format!("{topic}: the time was over"))
+                        }
+                        Err(error) => {
+                            *failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(error);
+                        }
+                    }
+                    let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                    if progress {
+                        let left = checker.deadline.saturating_duration_since(Instant::now()).as_secs();
+                        eprint!(
+                            "\r{done} of {} checks, {} scripts played, {left} s left: {topic:20}",
+                            checks.len(),
+                            checker.played()
+                        );
+                        let _ = std::io::stderr().flush();
+                    }
+                }
+            });
+        }
+    });
+    if progress {
+        eprint!("\r{:79}\r", "");
+    }
+    match failure.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
+        Some(error) => Err(error),
+        None => Ok(()),
+    }
+}
+
+fn shorten(checker: &Checker, findings: &mut [Finding], options: &Options, progress: bool) {
+    let count = findings.len();
+    let next = AtomicUsize::new(0);
+    let slots: Vec<Mutex<&mut Finding>> = findings.iter_mut().map(Mutex::new).collect();
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from).min(8) {
+            scope.spawn(|| {
+                while let Some(slot) = slots.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let mut finding = slot.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                    if !options.no_shrink {
+                        checker.shorten(&mut finding);
+                    }
+                    if progress {
+                        eprint!("\rthe shortest calls for {count} findings: {:40}", finding.name);
+                        let _ = std::io::stderr().flush();
+                    }
+                    if finding.judge.is_some() {
+                        reproduce::programs(&mut finding, &checker.setting, &checker.description);
+                    }
+                }
+            });
+        }
+    });
+    if progress {
+        eprint!("\r{:79}\r", "");
+    }
+}

@@ -1,0 +1,19 @@
+//! `fmu-check model.fmu`: attacks an FMU and says, graded, which promises it breaks.
+
+use clap::Parser as _;
+use std::process::ExitCode;
+
+#[derive(clap::Parser)]
+#[command(name = "fmu-check", version, about, long_about = None)]
+struct Arguments {
+    /// The FMU
+    fmu: std::path::PathBuf,
+    #[command(flatten)]
+    options: fmu_check::Options,
+}
+
+fn main() -> ExitCode {
+    fmu_check::work_if_asked();
+    let Arguments { fmu, options } = Arguments::parse();
+    fmu_check::command(&fmu, &options)
+}

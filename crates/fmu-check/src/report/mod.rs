@@ -1,0 +1,183 @@
+//! The report: for a terminal, as a page, as JSON, as JUnit.
+
+mod page;
+
+use crate::checker::Checker;
+use crate::finding::{Finding, Grade};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// What was found in an FMU.
+#[derive(Clone, serde::Serialize)]
+pub struct Report {
+    /// The file.
+    pub fmu: String,
+    /// The name of the model.
+    pub model: String,
+    /// The edition of the standard.
+    pub standard: String,
+    /// The types of interface that were checked.
+    pub interfaces: Vec<String>,
+    /// How many sequences of calls were played.
+    pub scripts: u64,
+    /// How long it took.
+    pub seconds: f64,
+    /// Chose what was chosen at random.
+    pub seed: u64,
+    /// What could not be checked, and why.
+    pub unreached: Vec<String>,
+    /// The worst first.
+    pub findings: Vec<Finding>,
+}
+
+impl Report {
+    pub(crate) fn new(path: &Path, checker: &Checker, findings: Vec<Finding>) -> Self {
+        Self {
+            fmu: path.display().to_string(),
+            model: checker.description.model_name.clone(),
+            standard: checker.description.standard.to_string(),
+            interfaces: checker.courses.iter().map(|course| course.interface.to_string()).collect(),
+            scripts: checker.played(),
+            seconds: 0.0,
+            seed: checker.seed,
+            unreached: checker.take_unreached(),
+            findings,
+        }
+    }
+
+    /// How many findings there are of a grade.
+    pub fn count(&self, grade: Grade) -> usize {
+        self.findings.iter().filter(|finding| finding.grade == grade).count()
+    }
+
+    /// In a sentence.
+    fn summary(&self) -> String {
+        let many =
+            |count: usize, one: &str, more: &str| format!("{count} {}", if count == 1 { one } else { more });
+        format!(
+            "{}, {} fragile, {}",
+            many(self.count(Grade::Violation), "violation", "violations"),
+            self.count(Grade::Fragile),
+            many(self.count(Grade::Note), "note", "notes")
+        )
+    }
+
+    /// For a terminal.
+    pub fn terminal(&self, colours: bool) -> String {
+        let mut text = String::new();
+        let _ = writeln!(
+            text,
+            "{} ({}, {}): {}",
+            self.fmu,
+            self.standard,
+            self.interfaces.join(" and "),
+            self.summary()
+        );
+        for finding in &self.findings {
+            let (on, off) = match (colours, finding.grade) {
+                (false, _) => ("", ""),
+                (true, Grade::Violation) => ("\u{1b}[31m", "\u{1b}[0m"),
+                (true, Grade::Fragile) => ("\u{1b}[33m", "\u{1b}[0m"),
+                (true, Grade::Note) => ("\u{1b}[36m", "\u{1b}[0m"),
+            };
+            let _ = writeln!(
+                text,
+                "{on}{:9}{off} {:26} {}",
+                finding.grade.name(),
+                finding.name,
+                short(&finding.seen, 160)
+            );
+            let more = match finding.more.len() {
+                0 => String::new(),
+                count => format!("; and {count} more"),
+            };
+            let calls = match finding.steps {
+                (0, 0) => String::new(),
+                (_, steps) => format!("; {steps} calls show it"),
+            };
+            let _ = writeln!(text, "{:36} section {}{calls}{more}", "", finding.section);
+        }
+        for what in &self.unreached {
+            let _ = writeln!(text, "not checked: {what}");
+        }
+        let _ =
+            writeln!(text, "{} sequences of calls, {:.1} s, seed {}", self.scripts, self.seconds, self.seed);
+        text
+    }
+
+    /// As JSON.
+    ///
+    /// # Errors
+    /// None that is known.
+    pub fn json(&self) -> serde_json::Result<String> {
+        serde_json::to_string_pretty(self)
+    }
+
+    /// As JUnit: a test for each finding, notes passed with what they say.
+    pub fn junit(&self) -> String {
+        let escape = |text: &str| {
+            let printable =
+                text.chars().filter(|letter| !letter.is_control() || *letter == '\n').collect::<String>();
+            printable.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+        };
+        let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
+        let failures = self.count(Grade::Violation) + self.count(Grade::Fragile);
+        let _ = writeln!(
+            text,
+            "<testsuite name=\"{}\" tests=\"{}\" failures=\"{failures}\" time=\"{:.3}\">",
+            escape(&format!("fmu-check {}", self.model)),
+            self.findings.len().max(1),
+            self.seconds
+        );
+        if self.findings.is_empty() {
+            let _ = writeln!(text, "  <testcase classname=\"fmu-check\" name=\"no findings\"/>");
+        }
+        for finding in &self.findings {
+            let _ = writeln!(
+                text,
+                "  <testcase classname=\"fmu-check.{}\" name=\"{}\">",
+                finding.topic(),
+                finding.name
+            );
+            let body = escape(&format!(
+                "{}\nSection {}: {}\n{}",
+                finding.seen,
+                finding.section,
+                finding.promise,
+                finding.more.join("\n")
+            ));
+            let (grade, seen) = (finding.grade.name(), escape(&finding.seen));
+            if finding.grade == Grade::Note {
+                let _ = writeln!(text, "    <system-out>{body}</system-out>");
+            } else {
+                let _ = writeln!(text, "    <failure type=\"{grade}\" message=\"{seen}\">{body}</failure>");
+            }
+            let _ = writeln!(text, "  </testcase>");
+        }
+        text.push_str("</testsuite>\n");
+        text
+    }
+
+    /// Writes all of it to a folder.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn write(&self, folder: &Path) -> anyhow::Result<()> {
+        std::fs::create_dir_all(folder)?;
+        std::fs::write(folder.join("report.json"), self.json()?)?;
+        std::fs::write(folder.join("junit.xml"), self.junit())?;
+        std::fs::write(folder.join("report.html"), page::page(self))?;
+        for finding in self.findings.iter().filter(|finding| !finding.c.is_empty()) {
+            std::fs::write(folder.join(format!("{}.c", finding.name)), &finding.c)?;
+            std::fs::write(folder.join(format!("{}.py", finding.name)), &finding.python)?;
+        }
+        Ok(())
+    }
+}
+
+fn short(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((place, _)) => format!("{}...", &text[..place]),
+        None => text.to_owned(),
+    }
+}

@@ -1,0 +1,89 @@
+//! The report as one page that needs nothing else.
+
+use super::Report;
+use crate::finding::Grade;
+use std::fmt::Write as _;
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// The page.
+pub fn page(report: &Report) -> String {
+    let mut text = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\n\
+         <title>fmu-check: {}</title>\n<style>\n\
+         body {{ font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 60rem; padding: 0 1rem; color: #222; background: #fff }}\n\
+         h1 {{ font-size: 1.5rem }} h2 {{ font-size: 1.05rem; margin: 0 }} code, pre {{ font: 13px/1.4 ui-monospace, monospace }}\n\
+         pre {{ overflow: auto; background: #f4f4f4; padding: .8rem; max-height: 30rem }}\n\
+         section {{ border-left: .4rem solid; padding: .2rem 0 .2rem 1rem; margin: 1.2rem 0 }} p {{ margin: .3rem 0 }}\n\
+         .violation {{ border-color: #b3261e }} .fragile {{ border-color: #b26a00 }} .note {{ border-color: #3567a8 }}\n\
+         .grade {{ float: right; font-weight: 600 }}\n\
+         @media (prefers-color-scheme: dark) {{ body {{ color: #ddd; background: #181818 }} pre {{ background: #242424 }} }}\n\
+         </style></head><body>\n<h1>{}</h1>\n<p>{}, {}, {}: <strong>{}</strong></p>\n",
+        escape(&report.model),
+        escape(&report.model),
+        escape(&report.fmu),
+        report.standard,
+        report.interfaces.join(" and "),
+        report.summary()
+    );
+    let _ = writeln!(
+        text,
+        "<p>{} sequences of calls were played in processes of their own, in {:.1} s, with seed {}.</p>",
+        report.scripts, report.seconds, report.seed
+    );
+    for (grade, what) in [
+        (Grade::Violation, "Violation: the standard says must."),
+        (Grade::Fragile, "Fragile: nothing forbids it, but it hurts."),
+        (Grade::Note, "Note: good to know."),
+    ] {
+        let findings: Vec<_> = report.findings.iter().filter(|finding| finding.grade == grade).collect();
+        if findings.is_empty() {
+            continue;
+        }
+        let _ = writeln!(text, "<p><em>{what}</em></p>");
+        for finding in findings {
+            let name = grade.name();
+            let _ = write!(
+                text,
+                "<section class=\"{name}\"><span class=\"grade\">{name}</span><h2>{}</h2>\n<p>{}</p>\n<p>Section {} of {}: {}</p>\n",
+                finding.name,
+                escape(&finding.seen),
+                finding.section,
+                report.standard,
+                escape(&finding.promise)
+            );
+            if !finding.more.is_empty() {
+                let _ = writeln!(text, "<details><summary>{} more</summary><ul>", finding.more.len());
+                for more in &finding.more {
+                    let _ = writeln!(text, "<li>{}</li>", escape(more));
+                }
+                text.push_str("</ul></details>\n");
+            }
+            for (language, program) in [("C", &finding.c), ("Python", &finding.python)] {
+                if !program.is_empty() {
+                    let _ = writeln!(
+                        text,
+                        "<details><summary>{} calls that show it, in {language}</summary><pre>{}</pre></details>",
+                        finding.steps.1,
+                        escape(program)
+                    );
+                }
+            }
+            text.push_str("</section>\n");
+        }
+    }
+    if report.findings.is_empty() {
+        text.push_str("<p>Nothing was found.</p>\n");
+    }
+    if !report.unreached.is_empty() {
+        text.push_str("<p>Not checked:</p><ul>\n");
+        for what in &report.unreached {
+            let _ = writeln!(text, "<li>{}</li>", escape(what));
+        }
+        text.push_str("</ul>\n");
+    }
+    text.push_str("</body></html>\n");
+    text
+}

@@ -1,0 +1,113 @@
+//! The shortest sequence of calls that still shows a finding.
+
+use crate::description::Description;
+use crate::legal::first_illegal;
+use crate::script::{Numbered, Script, Step};
+
+/// Calls that belong together: they are left out together or not at all.
+fn units(script: &Script) -> Vec<Vec<u32>> {
+    let name = |numbered: &Numbered| match &numbered.step {
+        Step::Call { function, .. } => function.get(4..).unwrap_or_default().to_owned(),
+        _ => String::new(),
+    };
+    let mut units: Vec<Vec<u32>> = Vec::new();
+    let mut open = false;
+    for numbered in script {
+        let function = name(numbered);
+        let goes_on = match function.as_str() {
+            "NewDiscreteStates" | "UpdateDiscreteStates" => open,
+            "EnterContinuousTimeMode" | "EnterStepMode" => std::mem::replace(&mut open, false),
+            "EnterInitializationMode" | "SerializeFMUstate" | "SerializeFMUState" => {
+                units.last().is_some_and(|unit| {
+                    let last = unit.last().copied();
+                    script.iter().find(|other| Some(other.id) == last).is_some_and(|other| {
+                        ["SetupExperiment", "SerializedFMUstateSize", "SerializedFMUStateSize"]
+                            .contains(&name(other).as_str())
+                    })
+                })
+            }
+            _ => false,
+        };
+        if ["EnterEventMode", "ExitInitializationMode"].contains(&function.as_str()) {
+            open = true;
+        }
+        match units.last_mut() {
+            Some(unit) if goes_on => unit.push(numbered.id),
+            _ => units.push(vec![numbered.id]),
+        }
+    }
+    units
+}
+
+/// What a step is, but for the instance it is of; nothing for what only reads.
+fn content(step: &Step) -> Option<String> {
+    match step {
+        Step::Call { function, args, .. } => {
+            let reads = function[4..].starts_with("Get") && !function.to_lowercase().ends_with("fmustate");
+            (!reads).then(|| format!("{function} {args:?}"))
+        }
+        Step::Repeat(..) | Step::Parallel(_) | Step::Measure | Step::Version(_) => None,
+        Step::Make(..) | Step::Free(_) | Step::FreshProcess => None,
+    }
+}
+
+/// The same units of compared simulations are left out together: one that lacks a call differs for that alone.
+fn together(script: &Script, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
+    let of = |id: &u32| {
+        script.iter().find(|numbered| numbered.id == *id).and_then(|numbered| content(&numbered.step))
+    };
+    let mut groups: Vec<(Vec<String>, Vec<u32>)> = Vec::new();
+    for unit in units {
+        let key: Vec<String> = unit.iter().filter_map(of).collect();
+        match groups.iter_mut().find(|(other, _)| !key.is_empty() && *other == key) {
+            Some((_, ids)) => ids.extend(unit),
+            None => groups.push((key, unit)),
+        }
+    }
+    groups.into_iter().map(|(_, ids)| ids).collect()
+}
+
+/// Leaves out what is not needed for `shows` to hold, as long as the rest keeps to the standard. Calls of `pinned`
+/// functions stay.
+pub fn shrink(
+    description: &Description,
+    script: &Script,
+    pinned: &[&str],
+    mut shows: impl FnMut(&Script) -> bool,
+) -> Script {
+    let legal = first_illegal(description, script).is_none();
+    let mut best = script.clone();
+    let mut units = together(script, units(script));
+    let stays = |id: &u32| {
+        script.iter().any(|numbered| match &numbered.step {
+            Step::Call { function, .. } => {
+                numbered.id == *id && pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name))
+            }
+            Step::FreshProcess => numbered.id == *id && !pinned.is_empty(),
+            _ => false,
+        })
+    };
+    units.retain(|unit| !unit.iter().any(stays));
+    let mut size = units.len() / 2;
+    while size > 0 {
+        let mut end = units.len();
+        let mut shorter = false;
+        while end > 0 {
+            let begin = end.saturating_sub(size);
+            let without: Vec<u32> = units[begin..end].concat();
+            let tried: Script =
+                best.iter().filter(|numbered| !without.contains(&numbered.id)).cloned().collect();
+            let keeps = !legal || first_illegal(description, &tried).is_none();
+            if keeps && tried.len() < best.len() && shows(&tried) {
+                best = tried;
+                units.drain(begin..end);
+                shorter = true;
+            }
+            end = begin;
+        }
+        if size > 1 || !shorter {
+            size /= 2;
+        }
+    }
+    best
+}

@@ -1,0 +1,86 @@
+//! What the process uses, and what belongs to all of it.
+
+use crate::script::Measured;
+
+/// What it is now.
+pub fn now() -> Measured {
+    let (memory, exact) = memory();
+    let entries = |folder: &str| std::fs::read_dir(folder).map_or(0, Iterator::count);
+    Measured {
+        memory,
+        exact,
+        threads: entries("/proc/self/task"),
+        files: entries("/proc/self/fd"),
+        settings: settings(),
+        times: 0,
+    }
+}
+
+#[cfg(unix)]
+fn memory() -> (u64, bool) {
+    /// As `malloc.h` of glibc 2.33 has it.
+    #[repr(C)]
+    struct Info {
+        arena: usize,
+        free_chunks: usize,
+        fast_blocks: usize,
+        mapped: usize,
+        mapped_bytes: usize,
+        most: usize,
+        fast_bytes: usize,
+        used_bytes: usize,
+        free_bytes: usize,
+        keep: usize,
+    }
+    let this = libloading::os::unix::Library::this();
+    // SAFETY: the function of this name has this type; older libraries lack it.
+    let info = unsafe { this.get::<unsafe extern "C" fn() -> Info>(b"mallinfo2") };
+    if let Ok(function) = info {
+        // SAFETY: see above.
+        let info = unsafe { function() };
+        return ((info.used_bytes + info.mapped_bytes) as u64, true);
+    }
+    let statm = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
+    let pages: u64 = statm.split_whitespace().nth(1).and_then(|pages| pages.parse().ok()).unwrap_or(0);
+    (pages * 4096, false)
+}
+
+#[cfg(not(unix))]
+fn memory() -> (u64, bool) {
+    (0, false)
+}
+
+/// Rounding, locale, folder and signals: an FMU must leave them as they are.
+fn settings() -> Vec<String> {
+    let mut found = Vec::new();
+    found.push(format!("working directory {}", std::env::current_dir().unwrap_or_default().display()));
+    #[cfg(target_arch = "x86_64")]
+    {
+        let mut word = 0_u32;
+        // SAFETY: stores the control word of SSE, which every x86-64 has.
+        unsafe { std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut word, options(nostack)) };
+        // Without the flags of what has happened.
+        found.push(format!("floating-point control word {:#x}", word & !0x3f));
+    }
+    #[cfg(unix)]
+    {
+        // SAFETY: asks for the name.
+        let locale = unsafe { super::functions::text(libc::setlocale(libc::LC_ALL, std::ptr::null())) };
+        found.push(format!("locale {}", String::from_utf8_lossy(&locale.unwrap_or_default())));
+        for (name, signal) in [
+            ("SIGSEGV", libc::SIGSEGV),
+            ("SIGFPE", libc::SIGFPE),
+            ("SIGINT", libc::SIGINT),
+            ("SIGABRT", libc::SIGABRT),
+        ] {
+            // SAFETY: asks for what is set.
+            let handler = unsafe {
+                let mut action: libc::sigaction = std::mem::zeroed();
+                libc::sigaction(signal, std::ptr::null(), &mut action);
+                action.sa_sigaction
+            };
+            found.push(format!("handler of {name} {handler:#x}"));
+        }
+    }
+    found
+}

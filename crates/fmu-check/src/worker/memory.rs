@@ -1,0 +1,154 @@
+//! Arrays that end where memory ends: what is read or written beyond them is a crash, what is written before them is seen.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// How many bytes after an array may be touched: none, so that it is a crash, or some, so that it is seen.
+pub static AFTER: AtomicUsize = AtomicUsize::new(0);
+
+/// Memory is kept for the next array: in repetitions there is no time to map it anew.
+pub static KEEP: AtomicBool = AtomicBool::new(false);
+
+/// What memory is filled with before a call.
+pub const FILL: u8 = 0xa5;
+
+#[cfg(unix)]
+mod pages {
+    use super::{AFTER, KEEP, Ordering};
+    use std::ptr::null_mut;
+    use std::sync::{Mutex, PoisonError};
+
+    /// Lengths and addresses of what is kept.
+    static KEPT: Mutex<Vec<(usize, usize)>> = Mutex::new(Vec::new());
+
+    /// Pages of which the last may not be touched.
+    pub struct Pages {
+        map: *mut u8,
+        length: usize,
+    }
+
+    fn page() -> usize {
+        // SAFETY: asks for a number.
+        usize::try_from(unsafe { libc::sysconf(libc::_SC_PAGESIZE) }).unwrap_or(4096)
+    }
+
+    impl Pages {
+        pub fn new(size: usize) -> Self {
+            let page = page();
+            let length = (size.div_ceil(page) + 1) * page;
+            let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(place) = kept.iter().position(|(other, _)| *other == length) {
+                return Self { map: kept.swap_remove(place).1 as *mut u8, length };
+            }
+            // SAFETY: new memory, the last page of which is closed.
+            let map = unsafe {
+                let map = libc::mmap(
+                    null_mut(),
+                    length,
+                    libc::PROT_READ | libc::PROT_WRITE,
+                    libc::MAP_PRIVATE | libc::MAP_ANON,
+                    -1,
+                    0,
+                );
+                assert!(map != libc::MAP_FAILED, "no memory for an array of {size} bytes");
+                libc::mprotect(map.cast::<u8>().add(length - page).cast(), page, libc::PROT_NONE);
+                map.cast::<u8>()
+            };
+            Self { map, length }
+        }
+
+        /// All that may be touched.
+        pub fn open(&self) -> (*mut u8, usize) {
+            (self.map, self.length - page())
+        }
+    }
+
+    impl Drop for Pages {
+        fn drop(&mut self) {
+            // Where there is room after arrays, memory that is gone can be read as well.
+            if KEEP.load(Ordering::Relaxed) {
+                KEPT.lock().unwrap_or_else(PoisonError::into_inner).push((self.length, self.map as usize));
+            } else if AFTER.load(Ordering::Relaxed) == 0 {
+                // SAFETY: mapped in `new`, and nobody is given it for longer than a call.
+                unsafe { libc::munmap(self.map.cast(), self.length) };
+            }
+        }
+    }
+}
+
+#[cfg(not(unix))]
+mod pages {
+    /// Without pages that may not be touched: what is written beyond an array is seen after the call.
+    pub struct Pages(Box<[std::cell::UnsafeCell<u8>]>);
+
+    impl Pages {
+        pub fn new(size: usize) -> Self {
+            Self((0..size + 128).map(|_| std::cell::UnsafeCell::new(0)).collect())
+        }
+
+        pub fn open(&self) -> (*mut u8, usize) {
+            (self.0.as_ptr().cast_mut().cast(), self.0.len())
+        }
+    }
+}
+
+/// An array for one call.
+pub struct Guarded {
+    pages: pages::Pages,
+    begin: usize,
+    size: usize,
+    before: Vec<u8>,
+}
+
+impl Guarded {
+    /// An array with these bytes.
+    pub fn new(bytes: &[u8]) -> Self {
+        let after = match cfg!(unix) {
+            true => AFTER.load(Ordering::Relaxed),
+            false => 64,
+        };
+        // A page more than needed, so that there is something before an array, too.
+        let pages = pages::Pages::new(bytes.len() + after + 64);
+        let (map, open) = pages.open();
+        let begin = open - bytes.len() - after;
+        // SAFETY: `open` bytes may be written, and the array lies within them.
+        unsafe {
+            map.write_bytes(FILL, open);
+            map.add(begin).copy_from_nonoverlapping(bytes.as_ptr(), bytes.len());
+        }
+        Self { pages, begin, size: bytes.len(), before: bytes.to_vec() }
+    }
+
+    /// Room for so many bytes.
+    pub fn room(size: usize) -> Self {
+        Self::new(&vec![FILL; size])
+    }
+
+    /// Where it begins.
+    pub fn address(&self) -> u64 {
+        self.pages.open().0.wrapping_add(self.begin) as u64
+    }
+
+    fn all(&self) -> &[u8] {
+        let (map, open) = self.pages.open();
+        // SAFETY: so many bytes are initialized, and no call is under way.
+        unsafe { std::slice::from_raw_parts(map, open) }
+    }
+
+    /// Its bytes now.
+    pub fn bytes(&self) -> &[u8] {
+        &self.all()[self.begin..self.begin + self.size]
+    }
+
+    /// What happened that must not: bytes around it that were written, or its own if it was for reading.
+    pub fn damage(&self, for_reading: bool) -> Option<String> {
+        let all = self.all();
+        if let Some(place) = all[..self.begin].iter().rposition(|byte| *byte != FILL) {
+            return Some(format!("{} bytes before an array", self.begin - place));
+        }
+        if all[self.begin + self.size..].iter().any(|byte| *byte != FILL) {
+            return Some("bytes after an array".to_owned());
+        }
+        (for_reading && self.bytes() != self.before)
+            .then(|| "an array that is for reading (const)".to_owned())
+    }
+}

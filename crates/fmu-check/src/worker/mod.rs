@@ -1,0 +1,636 @@
+//! The process that loads the library and plays a script. It may be lost at any step: what came of each is written down
+//! before the next.
+
+pub mod functions;
+mod measure;
+mod memory;
+
+use crate::script::{Arg, Kind, Make, Message, NOBODY, Numbered, Outcome, Script, Setting, Step, Written};
+use fmi_abi::c_types::{c_char, c_int, c_void};
+use fmi_abi::fmi2::types::{fmi2CallbackFunctions, fmi2CallbackLogger};
+use fmi_abi::fmi3::types::fmi3LogMessageCallback;
+use memory::{FILL, Guarded};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::ffi::CString;
+use std::fs::File;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// The variable that names the job of a worker.
+pub const VARIABLE: &str = "FMU_CHECK_JOB";
+
+/// The exit status of a worker that has a fault of its own.
+pub const OWN_FAULT: i32 = 97;
+
+/// The exit status of a worker that has played its script.
+pub const PLAYED: i32 = 96;
+
+/// What a worker is given.
+#[derive(Serialize, Deserialize)]
+pub struct Job {
+    /// What all scripts have in common.
+    pub setting: Setting,
+    /// The steps.
+    pub script: Script,
+    /// Serialized bytes of processes before.
+    pub bytes: HashMap<usize, Vec<u8>>,
+    /// Where to write what came of it, a line for each step.
+    pub outcomes: PathBuf,
+}
+
+/// The last line that a worker writes.
+#[derive(Serialize, Deserialize)]
+pub struct Last {
+    /// Serialized bytes.
+    pub bytes: HashMap<usize, Vec<u8>>,
+}
+
+/// If this process was started as a worker, it works and ends here. A program that offers checks must call this before
+/// anything else.
+pub fn work_if_asked() {
+    let Some(job) = std::env::var_os(VARIABLE) else { return };
+    let status = match work(Path::new(&job)) {
+        Ok(()) => PLAYED,
+        Err(error) => {
+            eprintln!("{error}");
+            OWN_FAULT
+        }
+    };
+    // Without what the library has for the end of a process: it is not what is tested.
+    #[cfg(unix)]
+    // SAFETY: ends the process.
+    unsafe {
+        libc::_exit(status)
+    }
+    #[cfg(not(unix))]
+    std::process::exit(status)
+}
+
+fn work(job: &Path) -> Result<(), String> {
+    let read = std::fs::read(job).map_err(|error| error.to_string())?;
+    let job: Job = serde_json::from_slice(&read).map_err(|error| error.to_string())?;
+    limit(job.setting.memory);
+    if job.setting.soft {
+        memory::AFTER.store(4096, std::sync::atomic::Ordering::Relaxed);
+    }
+    let file =
+        File::options().create(true).append(true).open(&job.outcomes).map_err(|error| error.to_string())?;
+    let player = Player {
+        setting: job.setting,
+        libraries: Mutex::default(),
+        instances: Mutex::default(),
+        states: Mutex::default(),
+        bytes: Mutex::new(job.bytes),
+        sizes: Mutex::default(),
+        file: Mutex::new(file),
+    };
+    player.play(&job.script, true);
+    player.write(&Last { bytes: std::mem::take(&mut locked(&player.bytes)) });
+    Ok(())
+}
+
+/// What the process may use.
+fn limit(memory: u64) {
+    #[cfg(unix)]
+    {
+        let set = |what, value| {
+            let limit = libc::rlimit { rlim_cur: value, rlim_max: value };
+            // SAFETY: sets a limit of this process.
+            unsafe { libc::setrlimit(what, &limit) };
+        };
+        set(libc::RLIMIT_CORE, 0);
+        #[cfg(target_os = "linux")]
+        {
+            set(libc::RLIMIT_AS, memory as _);
+            // SAFETY: ends with the process that started it.
+            unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
+        }
+    }
+    let _ = memory;
+}
+
+fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What was said, with the environment it came with.
+static SAID: Mutex<Vec<(usize, Message)>> = Mutex::new(Vec::new());
+
+/// An instance: its handle and the environment it was given.
+struct Instance {
+    handle: usize,
+    environment: usize,
+    co_simulation: bool,
+    /// Of FMI 2.0, where they must live as long as it.
+    _callbacks: Option<Box<fmi2CallbackFunctions>>,
+}
+
+/// The next environment.
+static ENVIRONMENTS: AtomicUsize = AtomicUsize::new(0x10_0000);
+
+// SAFETY: the callbacks are only read.
+unsafe impl Send for Instance {}
+
+struct Player {
+    setting: Setting,
+    /// Of Co-Simulation and Model Exchange, when they are loaded.
+    libraries: Mutex<[Option<&'static libloading::Library>; 2]>,
+    instances: Mutex<HashMap<usize, Instance>>,
+    states: Mutex<HashMap<usize, usize>>,
+    bytes: Mutex<HashMap<usize, Vec<u8>>>,
+    sizes: Mutex<HashMap<usize, usize>>,
+    file: Mutex<File>,
+}
+
+unsafe extern "C" {
+    fn calloc(count: usize, size: usize) -> *mut c_void;
+    fn free(memory: *mut c_void);
+}
+
+/// # Safety
+/// The texts end with zeros, or the process may be lost.
+unsafe fn remember(environment: *mut c_void, status: c_int, category: *const c_char, text: *const c_char) {
+    // SAFETY: the caller's promise.
+    let [category, text] = [category, text].map(|pointer| unsafe { functions::text(pointer) });
+    let mut said = locked(&SAID);
+    if said.len() < 1000 {
+        said.push((environment as usize, Message { status, category, text, at_home: true }));
+    }
+}
+
+/// The logger of FMI 2.0 without its `...`.
+type PlainLogger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char);
+
+/// Without its `...`, which stable Rust cannot define: named arguments travel the same way.
+unsafe extern "C" fn log_of_fmi2(
+    environment: *mut c_void,
+    _instance_name: *const c_char,
+    status: c_int,
+    category: *const c_char,
+    text: *const c_char,
+) {
+    // SAFETY: section 2.1.5 of FMI 2.0: the texts end with zeros.
+    unsafe { remember(environment, status, category, text) }
+}
+
+unsafe extern "C" fn log_of_fmi3(
+    environment: *mut c_void,
+    status: c_int,
+    category: *const c_char,
+    text: *const c_char,
+) {
+    // SAFETY: section 2.3.1 of FMI 3.0 says the same.
+    unsafe { remember(environment, status, category, text) }
+}
+
+/// What is kept for a call.
+enum Kept {
+    /// An array for reading.
+    In(Guarded),
+    /// An array that is written.
+    Out(Guarded, Kind, usize),
+    State(Guarded, usize),
+    Size(Guarded, usize),
+    Saved(Guarded, usize),
+}
+
+impl Player {
+    fn write(&self, of: &impl Serialize) {
+        let mut line = serde_json::to_vec(of).unwrap_or_default();
+        line.push(b'\n');
+        // An importer whose disk is full has other worries.
+        let _ = locked(&self.file).write_all(&line);
+    }
+
+    fn play(&self, script: &[Numbered], tell: bool) -> Vec<Outcome> {
+        let mut outcomes = Vec::new();
+        for numbered in script {
+            let mut outcome = Outcome { id: numbered.id, ..Outcome::default() };
+            match &numbered.step {
+                Step::Repeat(times, steps) => {
+                    let begin = Instant::now();
+                    memory::KEEP.store(true, Ordering::Relaxed);
+                    let (mut done, mut last) = (0, Vec::new());
+                    while done < *times && begin.elapsed().as_secs_f64() < self.setting.repetitions {
+                        last = self.play(steps, false);
+                        done += 1;
+                        if last.iter().any(|outcome| outcome.status.is_some_and(|status| status > 2)) {
+                            break;
+                        }
+                    }
+                    memory::KEEP.store(false, Ordering::Relaxed);
+                    outcome.measured = Some(crate::script::Measured { times: done, ..Default::default() });
+                    if tell {
+                        last.iter().for_each(|outcome| self.write(outcome));
+                    }
+                }
+                Step::Parallel(scripts) => std::thread::scope(|scope| {
+                    let plays: Vec<_> =
+                        scripts.iter().map(|script| scope.spawn(|| self.play(script, tell))).collect();
+                    for play in plays {
+                        let _ = play.join();
+                    }
+                }),
+                step => self.one(step, &mut outcome),
+            }
+            if tell {
+                self.write(&outcome);
+            } else {
+                outcomes.push(outcome);
+            }
+        }
+        outcomes
+    }
+
+    fn one(&self, step: &Step, outcome: &mut Outcome) {
+        match step {
+            Step::Make(place, make) => self.make(*place, make, outcome),
+            Step::Free(place) => {
+                let nobody = (*place == NOBODY).then_some(Instance {
+                    handle: 0,
+                    environment: 0,
+                    co_simulation: self.setting.libraries[0].is_some(),
+                    _callbacks: None,
+                });
+                let Some(instance) = nobody.or_else(|| locked(&self.instances).remove(place)) else { return };
+                let name = self.named("FreeInstance");
+                if let Some(address) = self.find(instance.co_simulation, &name) {
+                    // SAFETY: the functions of both standards for this have this type.
+                    unsafe {
+                        let function: unsafe extern "C" fn(*mut c_void) = std::mem::transmute(address);
+                        function(instance.handle as *mut c_void);
+                    }
+                    outcome.status = Some(0);
+                } else {
+                    outcome.missing = true;
+                }
+                outcome.log = messages(instance.environment);
+            }
+            Step::Version(name) => match self.find(self.setting.libraries[0].is_some(), name) {
+                Some(address) => {
+                    // SAFETY: these functions have no arguments and return a text.
+                    outcome.text = unsafe {
+                        let function: unsafe extern "C" fn() -> *const c_char = std::mem::transmute(address);
+                        functions::text(function())
+                    };
+                }
+                None => outcome.missing = true,
+            },
+            Step::Call { of, function, args } => self.call(*of, function, args, outcome),
+            Step::Measure => outcome.measured = Some(measure::now()),
+            Step::Repeat(..) | Step::Parallel(_) | Step::FreshProcess => {}
+        }
+    }
+
+    fn named(&self, end: &str) -> String {
+        format!("{}{end}", if self.setting.fmi3 { "fmi3" } else { "fmi2" })
+    }
+
+    fn find(&self, co_simulation: bool, name: &str) -> Option<*const c_void> {
+        let place = usize::from(!co_simulation);
+        let mut libraries = locked(&self.libraries);
+        if libraries[place].is_none() {
+            let path = self.setting.libraries[place].as_ref()?;
+            if place == 1 && self.setting.libraries[0].as_ref() == Some(path) && libraries[0].is_some() {
+                libraries[1] = libraries[0];
+            } else {
+                // SAFETY: this is what the process is for.
+                match unsafe { libloading::Library::new(path) } {
+                    Ok(library) => libraries[place] = Some(Box::leak(Box::new(library))),
+                    Err(error) => {
+                        let why = std::error::Error::source(&error)
+                            .map_or_else(|| error.to_string(), |source| source.to_string());
+                        self.write(&Unloadable { unloadable: why });
+                        std::process::exit(PLAYED)
+                    }
+                }
+            }
+        }
+        // SAFETY: only the address is asked for.
+        let found = unsafe { libraries[place]?.get::<*const c_void>(name.as_bytes()) };
+        found.ok().map(|symbol| *symbol).filter(|address| !address.is_null())
+    }
+
+    fn make(&self, place: usize, make: &Make, outcome: &mut Outcome) {
+        // Texts are gone after the call: what is needed of them must have been copied.
+        let text = |text: &Option<String>| {
+            text.as_ref()
+                .map(|text| Guarded::new(CString::new(text.as_str()).unwrap_or_default().as_bytes_with_nul()))
+        };
+        let (name, token) = (text(&make.name), text(&make.token));
+        let resources = make.resources.then(|| Guarded::new(location(&self.setting).as_bytes_with_nul()));
+        let word =
+            |text: &Option<Guarded>| text.as_ref().map_or(0, Guarded::address) as usize as *const c_char;
+        // No two are the same; nobody may look at what is there.
+        let environment = ENVIRONMENTS.fetch_add(16, Ordering::Relaxed) as *mut c_void;
+        let mut callbacks = None;
+        let logger: PlainLogger = log_of_fmi2;
+        let log: fmi3LogMessageCallback = log_of_fmi3;
+        let name_of = match (self.setting.fmi3, make.co_simulation) {
+            (false, _) => "fmi2Instantiate",
+            (true, true) => "fmi3InstantiateCoSimulation",
+            (true, false) => "fmi3InstantiateModelExchange",
+        };
+        let Some(address) = self.find(make.co_simulation, name_of) else {
+            outcome.missing = true;
+            return;
+        };
+        let logging = make.logging;
+        // SAFETY: the functions are those of the names; each has the type that the standard gives it.
+        let handle = unsafe {
+            match (self.setting.fmi3, make.co_simulation) {
+                (false, co_simulation) => {
+                    let given = &**callbacks.insert(Box::new(fmi2CallbackFunctions {
+                        logger: Some(std::mem::transmute::<PlainLogger, fmi2CallbackLogger>(logger)),
+                        allocate_memory: Some(calloc),
+                        free_memory: Some(free),
+                        step_finished: None,
+                        component_environment: environment,
+                    }));
+                    type Function = unsafe extern "C" fn(
+                        *const c_char,
+                        c_int,
+                        *const c_char,
+                        *const c_char,
+                        *const fmi2CallbackFunctions,
+                        c_int,
+                        c_int,
+                    ) -> *mut c_void;
+                    let function: Function = std::mem::transmute(address);
+                    let kind = c_int::from(co_simulation);
+                    function(word(&name), kind, word(&token), word(&resources), given, 0, logging.into())
+                }
+                (true, false) => {
+                    type Function = unsafe extern "C" fn(
+                        *const c_char,
+                        *const c_char,
+                        *const c_char,
+                        bool,
+                        bool,
+                        *mut c_void,
+                        Option<fmi3LogMessageCallback>,
+                    ) -> *mut c_void;
+                    let function: Function = std::mem::transmute(address);
+                    function(
+                        word(&name),
+                        word(&token),
+                        word(&resources),
+                        false,
+                        logging,
+                        environment,
+                        Some(log),
+                    )
+                }
+                (true, true) => {
+                    type Function = unsafe extern "C" fn(
+                        *const c_char,
+                        *const c_char,
+                        *const c_char,
+                        bool,
+                        bool,
+                        bool,
+                        bool,
+                        *const u32,
+                        usize,
+                        *mut c_void,
+                        Option<fmi3LogMessageCallback>,
+                        *const c_void,
+                    ) -> *mut c_void;
+                    let function: Function = std::mem::transmute(address);
+                    function(
+                        word(&name),
+                        word(&token),
+                        word(&resources),
+                        false,
+                        logging,
+                        make.event_mode,
+                        false,
+                        std::ptr::null(),
+                        0,
+                        environment,
+                        Some(log),
+                        std::ptr::null(),
+                    )
+                }
+            }
+        };
+        for text in [name, token, resources].iter().flatten() {
+            outcome.damage.extend(text.damage(true));
+        }
+        outcome.status = Some(i32::from(!handle.is_null()));
+        outcome.log = messages(environment as usize);
+        let instance = Instance {
+            handle: handle as usize,
+            environment: environment as usize,
+            co_simulation: make.co_simulation,
+            _callbacks: callbacks,
+        };
+        let before = match handle.is_null() {
+            true => locked(&self.instances).remove(&place),
+            false => locked(&self.instances).insert(place, instance),
+        };
+        // What an instance that was not freed was given stays.
+        std::mem::forget(before);
+    }
+
+    fn call(&self, of: Option<usize>, function: &str, args: &[Arg], outcome: &mut Outcome) {
+        let (handle, environment, co_simulation) = match of {
+            Some(place) => match locked(&self.instances).get(&place) {
+                Some(instance) => (instance.handle, instance.environment, instance.co_simulation),
+                // It was not made: there is nothing to call.
+                None => return,
+            },
+            None => (0, 0, self.setting.libraries[0].is_some()),
+        };
+        let Some(address) = self.find(co_simulation, function) else {
+            outcome.missing = true;
+            return;
+        };
+        let mut kept = Vec::new();
+        let words: Vec<u64> = args.iter().map(|arg| self.word(arg, &mut kept)).collect();
+        // SAFETY: this is what the process is for.
+        let status = unsafe { functions::call(address, function, handle as *mut c_void, &words) };
+        outcome.status = Some(status);
+        let succeeded = status == 0 || status == 1;
+        for kept in &kept {
+            match kept {
+                Kept::In(array) => outcome.damage.extend(array.damage(true)),
+                Kept::Out(array, kind, count) => {
+                    outcome.damage.extend(array.damage(false));
+                    outcome.written.push(read(array, *kind, *count, succeeded));
+                }
+                Kept::State(array, slot) => {
+                    outcome.damage.extend(array.damage(false));
+                    let handle = word_of(array);
+                    outcome.written.push(Written::Numbers(Kind::U8, vec![u64::from(handle != 0)]));
+                    locked(&self.states).insert(*slot, handle as usize);
+                }
+                Kept::Size(array, slot) => {
+                    outcome.damage.extend(array.damage(false));
+                    let size = word_of(array);
+                    outcome.written.push(Written::Numbers(Kind::Size, vec![size]));
+                    if succeeded {
+                        locked(&self.sizes).insert(*slot, (size as usize).min(1 << 30));
+                    }
+                }
+                Kept::Saved(array, slot) => {
+                    outcome.damage.extend(array.damage(false));
+                    let bytes = array.bytes().to_vec();
+                    outcome.written.push(Written::Numbers(
+                        Kind::U8,
+                        bytes.iter().map(|byte| u64::from(*byte)).collect(),
+                    ));
+                    locked(&self.bytes).insert(*slot, bytes);
+                }
+            }
+        }
+        if function == "fmi3GetBinary" && succeeded {
+            // Pointers and sizes, to be read together.
+            let arrays: Vec<_> = kept
+                .iter()
+                .filter_map(|kept| if let Kept::Out(array, ..) = kept { Some(array) } else { None })
+                .collect();
+            if let [sizes, pointers] = arrays[..] {
+                let words = |array: &Guarded| -> Vec<usize> {
+                    array
+                        .bytes()
+                        .chunks_exact(8)
+                        .map(|word| usize::from_ne_bytes(word.try_into().unwrap_or_default()))
+                        .collect()
+                };
+                let blobs = words(pointers).into_iter().zip(words(sizes)).map(|(pointer, size)| {
+                    // SAFETY: the FMU says that so many bytes are there.
+                    (pointer != 0 && size < 1 << 30)
+                        .then(|| unsafe { std::slice::from_raw_parts(pointer as *const u8, size) }.to_vec())
+                });
+                outcome.written = vec![Written::Texts(blobs.collect())];
+            }
+        }
+        outcome.log = messages(environment);
+    }
+
+    fn word(&self, arg: &Arg, kept: &mut Vec<Kept>) -> u64 {
+        let mut input = |bytes: &[u8]| {
+            let array = Guarded::new(bytes);
+            let address = array.address();
+            kept.push(Kept::In(array));
+            address
+        };
+        match arg {
+            Arg::Real(bits) => *bits,
+            Arg::Whole(number) => *number as u64,
+            Arg::Null => 0,
+            Arg::Misaligned => input(&[FILL; 64]) + 1,
+            Arg::In(kind, bits) => {
+                let bytes: Vec<u8> =
+                    bits.iter().flat_map(|bits| bits.to_ne_bytes().into_iter().take(kind.size())).collect();
+                input(&bytes)
+            }
+            Arg::Texts(texts) => {
+                let pointers: Vec<u64> = texts
+                    .iter()
+                    .map(|text| text.as_ref().map_or(0, |text| input(&[text.as_slice(), &[0]].concat())))
+                    .collect();
+                let bytes: Vec<u8> =
+                    pointers.iter().flat_map(|word| (*word as usize).to_ne_bytes()).collect();
+                input(&bytes)
+            }
+            Arg::Blobs(blobs) => {
+                let pointers: Vec<u64> = blobs.iter().map(|blob| input(blob)).collect();
+                let bytes: Vec<u8> =
+                    pointers.iter().flat_map(|word| (*word as usize).to_ne_bytes()).collect();
+                input(&bytes)
+            }
+            Arg::Saved(slot) => input(&locked(&self.bytes).get(slot).cloned().unwrap_or_default()),
+            Arg::SavedSize(slot) => {
+                let size = locked(&self.sizes).get(slot).copied();
+                size.unwrap_or_else(|| locked(&self.bytes).get(slot).map_or(0, Vec::len)) as u64
+            }
+            Arg::State(slot) => locked(&self.states).get(slot).copied().unwrap_or(0) as u64,
+            Arg::Out(kind, count) => {
+                let array = Guarded::room(kind.size() * count);
+                let address = array.address();
+                kept.push(Kept::Out(array, *kind, *count));
+                address
+            }
+            Arg::StateOut(slot) => {
+                let handle = locked(&self.states).get(slot).copied().unwrap_or(0);
+                let array = Guarded::new(&handle.to_ne_bytes());
+                let address = array.address();
+                kept.push(Kept::State(array, *slot));
+                address
+            }
+            Arg::SizeOut(slot) => {
+                let array = Guarded::new(&0_usize.to_ne_bytes());
+                let address = array.address();
+                kept.push(Kept::Size(array, *slot));
+                address
+            }
+            Arg::SavedOut(slot) => {
+                let size = locked(&self.sizes).get(slot).copied().unwrap_or(0);
+                let array = Guarded::room(size);
+                let address = array.address();
+                kept.push(Kept::Saved(array, *slot));
+                address
+            }
+        }
+    }
+}
+
+/// The loader's reason, as the only line.
+#[derive(Serialize, Deserialize)]
+pub struct Unloadable {
+    /// What it says.
+    pub unloadable: String,
+}
+
+fn word_of(array: &Guarded) -> u64 {
+    array.bytes().try_into().map(usize::from_ne_bytes).unwrap_or_default() as u64
+}
+
+fn read(array: &Guarded, kind: Kind, count: usize, succeeded: bool) -> Written {
+    let words = array.bytes().chunks_exact(kind.size()).take(count).map(|bytes| {
+        let mut word = [0; 8];
+        word[..bytes.len()].copy_from_slice(bytes);
+        u64::from_le_bytes(word)
+    });
+    if kind == Kind::Pointer {
+        let untouched = u64::from_ne_bytes([FILL; 8]);
+        let texts = words.map(|word| {
+            let written = succeeded && word != untouched;
+            // SAFETY: where the call succeeded, the pointers that were written are those of texts.
+            if written { unsafe { functions::text(word as usize as *const c_char) } } else { None }
+        });
+        return Written::Texts(texts.collect());
+    }
+    Written::Numbers(kind, words.collect())
+}
+
+/// What was said with this environment, and with one that nobody was given.
+fn messages(environment: usize) -> Vec<Message> {
+    let mut said = locked(&SAID);
+    let mut own = Vec::new();
+    said.retain(|(from, message)| {
+        if *from == environment {
+            own.push(message.clone());
+        }
+        *from != environment
+    });
+    own
+}
+
+/// The folder as importers write it: a URI in FMI 2.0 (section 2.1.5), a path with an end in FMI 3.0 (section 2.3.1).
+fn location(setting: &Setting) -> CString {
+    let path = setting.resources.display().to_string();
+    let text = if setting.fmi3 {
+        format!("{path}{}", std::path::MAIN_SEPARATOR)
+    } else {
+        let path = path.replace('\\', "/");
+        format!("file://{}{path}", if path.starts_with('/') { "" } else { "/" })
+    };
+    CString::new(text).unwrap_or_default()
+}

@@ -1,0 +1,469 @@
+//! Writes scripts: the calls of an importer that does what the standard says, with the numbers of this FMU.
+
+use crate::description::{Description, kind_of, type_name};
+use crate::script::{Arg, Kind, Make, Numbered, Run, Script, Step, Written, steps_itself};
+use fmi_abi::{BaseType, Interface, Standard};
+
+/// A value for a variable.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Numbers, one for each element.
+    Numbers(Vec<f64>),
+    /// Texts or bytes.
+    Texts(Vec<Vec<u8>>),
+}
+
+/// What a call read: the step's number and whose values it wrote, by places, with how many each has.
+#[derive(Clone, Debug)]
+pub struct Read {
+    /// The step.
+    pub id: u32,
+    /// The variables.
+    pub of: Vec<(usize, usize)>,
+}
+
+/// The variables of a type, with how many values each has.
+type Group = (&'static str, Kind, Vec<(usize, usize)>);
+
+/// One point of a course.
+#[derive(Clone, Debug, Default)]
+pub struct Point {
+    /// Where the step begins; in Model Exchange where the states are set.
+    pub time: f64,
+    /// How long it is.
+    pub size: f64,
+    /// What is set before.
+    pub inputs: Vec<(usize, Value)>,
+    /// Model Exchange: what the states are set to.
+    pub states: Vec<f64>,
+    /// Model Exchange: so many updates of the discrete states in an event here; 0 for no event.
+    pub updates: usize,
+}
+
+/// A simulation that goes well, as data.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// By which type of interface.
+    pub interface: Interface,
+    /// Updates of the discrete states after the initialization.
+    pub updates: usize,
+    /// The points.
+    pub points: Vec<Point>,
+    /// The time at the end.
+    pub end: f64,
+}
+
+/// Writes a script.
+pub struct Writer<'a> {
+    /// What the FMU promises.
+    pub description: &'a Description,
+    /// What has been written.
+    pub script: Script,
+    /// The next number.
+    pub next: u32,
+    /// What is written is forbidden.
+    pub forbidden: bool,
+}
+
+impl<'a> Writer<'a> {
+    /// An empty script.
+    pub fn new(description: &'a Description) -> Self {
+        Self { description, script: Vec::new(), next: 0, forbidden: false }
+    }
+
+    /// Whether the standard is 3.0.
+    pub fn fmi3(&self) -> bool {
+        self.description.standard == Standard::Fmi3
+    }
+
+    /// Adds a step.
+    pub fn add(&mut self, step: Step) -> u32 {
+        let id = self.next;
+        self.next += 1;
+        self.script.push(Numbered { id, forbidden: self.forbidden, step });
+        id
+    }
+
+    /// Adds a call of a function, named without `fmi2` or `fmi3`.
+    pub fn call(&mut self, of: usize, function: &str, args: Vec<Arg>) -> u32 {
+        let function = format!("{}{function}", if self.fmi3() { "fmi3" } else { "fmi2" });
+        self.add(Step::Call { of: Some(of), function, args })
+    }
+
+    /// A call that the standard forbids, or whose arguments it forbids.
+    pub fn forbidden(&mut self, of: Option<usize>, function: &str, args: Vec<Arg>) -> u32 {
+        let function = format!("{}{function}", if self.fmi3() { "fmi3" } else { "fmi2" });
+        let before = std::mem::replace(&mut self.forbidden, true);
+        let id = self.add(Step::Call { of, function, args });
+        self.forbidden = before;
+        id
+    }
+
+    /// How instances are made.
+    pub fn how(&self, interface: Interface) -> Make {
+        Make {
+            co_simulation: steps_itself(interface),
+            name: Some("instance".to_owned()),
+            token: Some(self.description.token.clone()),
+            logging: true,
+            event_mode: false,
+            resources: true,
+        }
+    }
+
+    /// A new instance.
+    pub fn make(&mut self, of: usize, interface: Interface) -> u32 {
+        let how = self.how(interface);
+        self.add(Step::Make(of, how))
+    }
+
+    /// Frees an instance.
+    pub fn free(&mut self, of: usize) -> u32 {
+        self.add(Step::Free(of))
+    }
+
+    /// Enters Initialization Mode.
+    pub fn enter(&mut self, of: usize) -> u32 {
+        let start = Arg::real(self.description.start_time);
+        let experiment = vec![Arg::Whole(0), Arg::real(0.0), start, Arg::Whole(0), Arg::real(0.0)];
+        if self.fmi3() {
+            self.call(of, "EnterInitializationMode", experiment)
+        } else {
+            self.call(of, "SetupExperiment", experiment);
+            self.call(of, "EnterInitializationMode", vec![])
+        }
+    }
+
+    /// So many updates of the discrete states; their numbers.
+    pub fn update(&mut self, of: usize, times: usize) -> Vec<u32> {
+        let flag = || Arg::Out(Kind::U8, 1);
+        (0..times)
+            .map(|_| {
+                if self.fmi3() {
+                    let args = vec![flag(), flag(), flag(), flag(), flag(), Arg::Out(Kind::F64, 1)];
+                    self.call(of, "UpdateDiscreteStates", args)
+                } else {
+                    // The five flags and the time of fmi2EventInfo, with the gap that C leaves between them.
+                    self.call(of, "NewDiscreteStates", vec![Arg::Out(Kind::U64, 4)])
+                }
+            })
+            .collect()
+    }
+
+    /// Leaves Initialization Mode, for the mode in which time goes on.
+    pub fn leave(&mut self, of: usize, course: &Course) -> Vec<u32> {
+        let mut ids = vec![self.call(of, "ExitInitializationMode", vec![])];
+        if course.interface == Interface::ModelExchange {
+            ids.extend(self.update(of, course.updates));
+            ids.push(self.call(of, "EnterContinuousTimeMode", vec![]));
+        }
+        ids
+    }
+
+    /// From nothing to the mode in which time goes on.
+    pub fn begin(&mut self, of: usize, course: &Course) -> Vec<u32> {
+        let mut ids = vec![self.make(of, course.interface), self.enter(of)];
+        ids.extend(self.leave(of, course));
+        ids
+    }
+
+    /// Sets values: a call for each type.
+    pub fn set(&mut self, of: usize, values: &[(usize, Value)]) -> Vec<u32> {
+        let mut ids = Vec::new();
+        let standard = self.description.standard;
+        let mut types: Vec<&str> = Vec::new();
+        for (place, _) in values {
+            if let Some(base) = self.description.variables[*place].base
+                && !types.contains(&type_name(standard, base))
+            {
+                types.push(type_name(standard, base));
+            }
+        }
+        for name in types {
+            let of_type = |place: usize| {
+                self.description.variables[place].base.is_some_and(|base| type_name(standard, base) == name)
+            };
+            let these: Vec<_> = values.iter().filter(|(place, _)| of_type(*place)).collect();
+            let references = these
+                .iter()
+                .map(|(place, _)| u64::from(self.description.variables[*place].reference))
+                .collect();
+            let count = these.len() as i64;
+            let kind =
+                kind_of(standard, self.description.variables[these[0].0].base.unwrap_or(BaseType::Real));
+            let mut args = vec![Arg::In(Kind::U32, references), Arg::Whole(count)];
+            let mut total = 0;
+            if kind == Kind::Pointer {
+                let texts: Vec<Vec<u8>> = these
+                    .iter()
+                    .flat_map(|(_, value)| match value {
+                        Value::Texts(texts) => texts.clone(),
+                        Value::Numbers(_) => Vec::new(),
+                    })
+                    .collect();
+                total = texts.len();
+                if name == "Binary" {
+                    args.push(Arg::In(Kind::Size, texts.iter().map(|blob| blob.len() as u64).collect()));
+                    args.push(Arg::Blobs(texts));
+                } else {
+                    args.push(Arg::Texts(texts.into_iter().map(Some).collect()));
+                }
+            } else {
+                let numbers: Vec<u64> = these
+                    .iter()
+                    .flat_map(|(_, value)| match value {
+                        Value::Numbers(numbers) => numbers.iter().map(|number| kind.bits(*number)).collect(),
+                        Value::Texts(_) => Vec::new(),
+                    })
+                    .collect();
+                total += numbers.len();
+                args.push(Arg::In(kind, numbers));
+            }
+            if self.fmi3() {
+                args.push(Arg::Whole(total as i64));
+            }
+            ids.push(self.call(of, &format!("Set{name}"), args));
+        }
+        ids
+    }
+
+    /// Reads the variables at these places: a call for each type.
+    pub fn read_these(&mut self, of: usize, places: &[usize]) -> Vec<Read> {
+        let standard = self.description.standard;
+        let mut groups: Vec<Group> = Vec::new();
+        for place in places {
+            let variable = &self.description.variables[*place];
+            let (Some(base), Some(size)) = (variable.base, variable.size) else { continue };
+            let name = type_name(standard, base);
+            let at = groups.iter().position(|group| group.0 == name).unwrap_or_else(|| {
+                groups.push((name, kind_of(standard, base), Vec::new()));
+                groups.len() - 1
+            });
+            groups[at].2.push((*place, size));
+        }
+        let mut reads = Vec::new();
+        for (name, kind, group) in groups {
+            let references = group
+                .iter()
+                .map(|(place, _)| u64::from(self.description.variables[*place].reference))
+                .collect();
+            let total: usize = group.iter().map(|(_, size)| size).sum();
+            let mut args = vec![Arg::In(Kind::U32, references), Arg::Whole(group.len() as i64)];
+            if name == "Binary" {
+                args.push(Arg::Out(Kind::Size, total));
+            }
+            args.push(Arg::Out(kind, total));
+            if self.fmi3() {
+                args.push(Arg::Whole(total as i64));
+            }
+            let id = self.call(of, &format!("Get{name}"), args);
+            reads.push(Read { id, of: group });
+        }
+        reads
+    }
+
+    /// Reads all variables.
+    pub fn read(&mut self, of: usize) -> Vec<Read> {
+        let all = readable(self.description);
+        self.read_these(of, &all)
+    }
+
+    /// Goes on to the time of a point, in Model Exchange, or takes the step, in Co-Simulation.
+    pub fn point(&mut self, of: usize, course: &Course, point: &Point) -> Vec<u32> {
+        let mut ids = Vec::new();
+        match course.interface {
+            Interface::CoSimulation => {
+                ids.extend(self.set(of, &point.inputs));
+                ids.push(self.step(of, point.time, point.size));
+            }
+            Interface::ModelExchange => {
+                ids.push(self.call(of, "SetTime", vec![Arg::real(point.time)]));
+                if !point.states.is_empty() {
+                    ids.push(self.set_states(of, &point.states));
+                }
+                ids.extend(self.set(of, &point.inputs));
+                let flag = || {
+                    Arg::Out(
+                        if self.description.standard == Standard::Fmi3 { Kind::U8 } else { Kind::I32 },
+                        1,
+                    )
+                };
+                let args = vec![Arg::Whole(0), flag(), flag()];
+                ids.push(self.call(of, "CompletedIntegratorStep", args));
+                if point.updates > 0 {
+                    ids.push(self.call(of, "EnterEventMode", vec![]));
+                    ids.extend(self.update(of, point.updates));
+                    ids.push(self.call(of, "EnterContinuousTimeMode", vec![]));
+                }
+            }
+        }
+        ids
+    }
+
+    /// A step of Co-Simulation.
+    pub fn step(&mut self, of: usize, time: f64, size: f64) -> u32 {
+        let mut args = vec![Arg::real(time), Arg::real(size), Arg::Whole(0)];
+        if self.fmi3() {
+            let flag = || Arg::Out(Kind::U8, 1);
+            args.extend([flag(), flag(), flag(), Arg::Out(Kind::F64, 1)]);
+        }
+        self.call(of, "DoStep", args)
+    }
+
+    /// Sets the continuous states.
+    pub fn set_states(&mut self, of: usize, states: &[f64]) -> u32 {
+        let bits = states.iter().map(|number| number.to_bits()).collect();
+        self.call(of, "SetContinuousStates", vec![Arg::In(Kind::F64, bits), Arg::Whole(states.len() as i64)])
+    }
+
+    /// Reads a vector of so many numbers.
+    pub fn vector(&mut self, of: usize, function: &str, count: usize) -> u32 {
+        self.call(of, function, vec![Arg::Out(Kind::F64, count), Arg::Whole(count as i64)])
+    }
+
+    /// Reads the derivatives of the states.
+    pub fn derivatives(&mut self, of: usize, count: usize) -> u32 {
+        let name = if self.fmi3() { "GetContinuousStateDerivatives" } else { "GetDerivatives" };
+        self.vector(of, name, count)
+    }
+
+    /// Everything that can be asked: variables, and in Model Exchange the vectors.
+    pub fn ask(&mut self, of: usize, interface: Interface) -> Vec<Read> {
+        let mut reads = self.read(of);
+        if interface == Interface::ModelExchange {
+            let states = self.description.states_count().unwrap_or(0);
+            if states > 0 {
+                reads.push(Read { id: self.vector(of, "GetContinuousStates", states), of: Vec::new() });
+                reads.push(Read { id: self.derivatives(of, states), of: Vec::new() });
+            }
+            if let Some(count) = self.description.event_indicators.filter(|count| *count > 0) {
+                reads.push(Read { id: self.vector(of, "GetEventIndicators", count), of: Vec::new() });
+            }
+        }
+        reads
+    }
+
+    fn state_name(&self, of_fmi2: &str, of_fmi3: &str) -> String {
+        if self.fmi3() { of_fmi3 } else { of_fmi2 }.to_owned()
+    }
+
+    /// Saves the state.
+    pub fn save(&mut self, of: usize, slot: usize) -> u32 {
+        let name = self.state_name("GetFMUstate", "GetFMUState");
+        self.call(of, &name, vec![Arg::StateOut(slot)])
+    }
+
+    /// Restores it.
+    pub fn restore(&mut self, of: usize, slot: usize) -> u32 {
+        let name = self.state_name("SetFMUstate", "SetFMUState");
+        self.call(of, &name, vec![Arg::State(slot)])
+    }
+
+    /// Frees it.
+    pub fn drop_state(&mut self, of: usize, slot: usize) -> u32 {
+        let name = self.state_name("FreeFMUstate", "FreeFMUState");
+        self.call(of, &name, vec![Arg::StateOut(slot)])
+    }
+
+    /// Serializes it: the size, the bytes.
+    pub fn serialize(&mut self, of: usize, slot: usize) -> [u32; 2] {
+        let size = self.state_name("SerializedFMUstateSize", "SerializedFMUStateSize");
+        let bytes = self.state_name("SerializeFMUstate", "SerializeFMUState");
+        [
+            self.call(of, &size, vec![Arg::State(slot), Arg::SizeOut(slot)]),
+            self.call(of, &bytes, vec![Arg::State(slot), Arg::SavedOut(slot), Arg::SavedSize(slot)]),
+        ]
+    }
+
+    /// Makes a state of the bytes.
+    pub fn deserialize(&mut self, of: usize, bytes: usize, slot: usize) -> u32 {
+        let name = self.state_name("DeSerializeFMUstate", "DeserializeFMUState");
+        self.call(of, &name, vec![Arg::Saved(bytes), Arg::SavedSize(bytes), Arg::StateOut(slot)])
+    }
+}
+
+/// The variables that can be read at any time: no clocks, none whose size is not known.
+pub fn readable(description: &Description) -> Vec<usize> {
+    (0..description.variables.len())
+        .filter(|place| {
+            let variable = &description.variables[*place];
+            variable.base.is_some() && variable.size.is_some()
+        })
+        .collect()
+}
+
+/// The first difference between what was read here and there: the variable and both values.
+pub fn difference(
+    description: &Description,
+    run: &Run,
+    one: &[Read],
+    other: &[Read],
+) -> Option<(String, String, String)> {
+    for (one, other) in one.iter().zip(other) {
+        let (of_one, of_other) = (run.of(one.id)?, run.of(other.id)?);
+        if of_one.status != of_other.status {
+            let show =
+                |status: Option<i32>| format!("status {}", status.map_or("none".to_owned(), status_name));
+            return Some(("a call".to_owned(), show(of_one.status), show(of_other.status)));
+        }
+        // After an error nothing is promised of what was written.
+        if of_one.status.is_none_or(|status| status > 1) {
+            continue;
+        }
+        for (first, second) in of_one.written.iter().zip(&of_other.written) {
+            if let Some(place) = first.differ(second) {
+                return Some((name_at(description, one, place), first.show(place), second.show(place)));
+            }
+        }
+    }
+    None
+}
+
+/// Whose value is at a place of what was read.
+pub fn name_at(description: &Description, read: &Read, place: usize) -> String {
+    let mut rest = place;
+    for (variable, size) in &read.of {
+        if rest < *size {
+            let name = &description.variables[*variable].name;
+            return if *size == 1 { name.clone() } else { format!("{name}[{rest}]") };
+        }
+        rest -= size;
+    }
+    format!("number {}", place + 1)
+}
+
+/// The value of a variable in what was read.
+pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Written> {
+    for read in reads {
+        let mut begin = 0;
+        for (place, size) in &read.of {
+            if *place == variable {
+                let outcome = run.of(read.id)?;
+                if outcome.status.is_none_or(|status| status > 1) {
+                    return None;
+                }
+                return Some(match outcome.written.first()? {
+                    Written::Numbers(kind, bits) => {
+                        Written::Numbers(*kind, bits.get(begin..begin + size)?.to_vec())
+                    }
+                    Written::Texts(texts) => Written::Texts(texts.get(begin..begin + size)?.to_vec()),
+                });
+            }
+            begin += size;
+        }
+    }
+    None
+}
+
+/// The name of a status.
+pub fn status_name(status: i32) -> String {
+    match status {
+        0 => "OK".to_owned(),
+        1 => "Warning".to_owned(),
+        2 => "Discard".to_owned(),
+        3 => "Error".to_owned(),
+        4 => "Fatal".to_owned(),
+        5 => "Pending".to_owned(),
+        other => other.to_string(),
+    }
+}

@@ -1,0 +1,364 @@
+//! FMUs with one fault each, put in by hand: every one is found, under its own name. Without a fault nothing is.
+
+#![cfg(unix)]
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tempfile::TempDir;
+use zip::write::SimpleFileOptions;
+
+/// The variables of the wagon: name, type, causality, variability, start, in the order of their references from 1.
+const VARIABLES: [(&str, &str, &str, &str, &str); 13] = [
+    ("mass", "Real", "parameter", "fixed", "2"),
+    ("spring", "Real", "parameter", "fixed", "40"),
+    ("damper", "Real", "parameter", "fixed", "3"),
+    ("force", "Real", "input", "continuous", "0"),
+    ("x", "Real", "local", "continuous", ""),
+    ("v", "Real", "local", "continuous", ""),
+    ("der_x", "Real", "local", "continuous", ""),
+    ("der_v", "Real", "local", "continuous", ""),
+    ("y", "Real", "output", "continuous", ""),
+    ("count", "Integer", "output", "discrete", ""),
+    ("fast", "Boolean", "output", "discrete", ""),
+    ("label", "String", "parameter", "fixed", "wagon"),
+    ("time", "Real", "independent", "continuous", ""),
+];
+
+/// The unknowns and what they depend on: outputs, derivatives, initial unknowns.
+const STRUCTURE: [&[(u32, &str)]; 3] = [
+    &[(9, "4 5"), (10, ""), (11, "")],
+    &[(7, "6"), (8, "4 5 6")],
+    &[(7, ""), (8, "1 4"), (9, "4"), (10, ""), (11, "")],
+];
+
+fn description(fmi: u32) -> String {
+    let (begin, capabilities) = if fmi == 2 {
+        (
+            "fmiVersion=\"2.0\" modelName=\"wagon\" guid=\"wagon\" numberOfEventIndicators=\"1\"",
+            "canGetAndSetFMUstate=\"true\" canSerializeFMUstate=\"true\" providesDirectionalDerivative=\"true\"",
+        )
+    } else {
+        (
+            "fmiVersion=\"3.0\" modelName=\"wagon\" instantiationToken=\"wagon\"",
+            "canGetAndSetFMUState=\"true\" canSerializeFMUState=\"true\" providesDirectionalDerivatives=\"true\" \
+             providesAdjointDerivatives=\"true\"",
+        )
+    };
+    let mut text = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription {begin}>\n\
+         <ModelExchange modelIdentifier=\"wagon\" {capabilities}/>\n\
+         <CoSimulation modelIdentifier=\"wagon\" canHandleVariableCommunicationStepSize=\"true\" {capabilities}/>\n\
+         <LogCategories><Category name=\"logStatusError\"/></LogCategories>\n\
+         <DefaultExperiment startTime=\"0\" stopTime=\"1\" stepSize=\"0.01\"/>\n<ModelVariables>\n"
+    );
+    for (place, (name, kind, causality, variability, start)) in VARIABLES.iter().enumerate() {
+        let reference = place + 1;
+        let mut own = String::new();
+        if !start.is_empty() && *kind != "String" {
+            let _ = write!(own, " start=\"{start}\"");
+        }
+        if let Some(state) = name.strip_prefix("der_") {
+            let _ = write!(own, " derivative=\"{}\"", if state == "x" { 5 } else { 6 });
+        }
+        if *name == "count" {
+            own.push_str(" min=\"0\" max=\"500\"");
+        }
+        let common = format!(
+            "name=\"{name}\" valueReference=\"{reference}\" causality=\"{causality}\" variability=\"{variability}\""
+        );
+        let _ = match (fmi, *kind) {
+            (2, "String") => {
+                writeln!(text, "<ScalarVariable {common}><String start=\"{start}\"/></ScalarVariable>")
+            }
+            (2, kind) => writeln!(text, "<ScalarVariable {common}><{kind}{own}/></ScalarVariable>"),
+            (_, "String") => writeln!(text, "<String {common}><Start value=\"{start}\"/></String>"),
+            (_, "Real") => writeln!(text, "<Float64 {common}{own}/>"),
+            (_, "Integer") => writeln!(text, "<Int32 {common}{own}/>"),
+            (_, kind) => writeln!(text, "<{kind} {common}{own}/>"),
+        };
+    }
+    text.push_str("</ModelVariables>\n<ModelStructure>\n");
+    let of_fmi3 = ["Output", "ContinuousStateDerivative", "InitialUnknown"];
+    for (group, (name, unknowns)) in
+        ["Outputs", "Derivatives", "InitialUnknowns"].iter().zip(STRUCTURE).enumerate()
+    {
+        let list = unknowns.iter().fold(String::new(), |mut list, (unknown, dependencies)| {
+            let _ = match fmi {
+                2 => writeln!(list, "<Unknown index=\"{unknown}\" dependencies=\"{dependencies}\"/>"),
+                _ => writeln!(
+                    list,
+                    "<{} valueReference=\"{unknown}\" dependencies=\"{dependencies}\"/>",
+                    of_fmi3[group]
+                ),
+            };
+            list
+        });
+        text.push_str(&if fmi == 2 { format!("<{name}>{list}</{name}>\n") } else { list });
+    }
+    if fmi == 3 {
+        text.push_str("<EventIndicator valueReference=\"6\"/>\n");
+    }
+    text.push_str("</ModelStructure>\n</fmiModelDescription>\n");
+    text
+}
+
+/// The FMU with a fault in its library, and with its description changed.
+fn fmu(folder: &Path, fmi: u32, mutant: &str, change: impl Fn(String) -> String) -> PathBuf {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mutants/wagon.c");
+    let library = folder.join("wagon.library");
+    let defined = if mutant == "WITHOUT_NOMINALS" {
+        "-DWITHOUT_NOMINALS".to_owned()
+    } else {
+        format!("-DMUTANT=M_{mutant}")
+    };
+    let status = Command::new(std::env::var_os("CC").unwrap_or_else(|| "cc".into()))
+        .args(["-O1", "-shared", "-fPIC", &format!("-DFMI={fmi}"), &defined, "-o"])
+        .args([&library, &source])
+        .args(["-lm", "-lpthread"])
+        .status()
+        .expect("a C compiler");
+    assert!(status.success(), "{mutant} does not compile");
+    let path = folder.join("wagon.fmu");
+    let mut zip = zip::ZipWriter::new(std::fs::File::create(&path).expect("a file"));
+    let mut add = |name: &str, bytes: &[u8]| {
+        zip.start_file(name, SimpleFileOptions::default()).expect("an entry");
+        zip.write_all(bytes).expect("an entry");
+    };
+    add("modelDescription.xml", change(description(fmi)).as_bytes());
+    let system = if cfg!(target_os = "macos") { "darwin" } else { "linux" };
+    let binaries = match fmi {
+        2 => format!("{system}64"),
+        _ => format!("{}-{system}", std::env::consts::ARCH),
+    };
+    let name = format!("binaries/{binaries}/wagon{}", std::env::consts::DLL_SUFFIX);
+    add(&name, &std::fs::read(&library).expect("the library"));
+    zip.finish().expect("a ZIP");
+    path
+}
+
+/// What is found: the names with what was seen.
+fn found(fmu: &Path, options: &[&str]) -> (Vec<(String, String)>, serde_json::Value) {
+    let output = Command::new(env!("CARGO_BIN_EXE_fmu-check"))
+        .arg(fmu)
+        .args(options)
+        .arg("--json")
+        .output()
+        .expect("runs");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
+    let text =
+        |finding: &serde_json::Value, name: &str| finding[name].as_str().unwrap_or_default().to_owned();
+    let findings = report["findings"].as_array().expect("a list");
+    (findings.iter().map(|finding| (text(finding, "name"), text(finding, "seen"))).collect(), report)
+}
+
+fn caught(fmi: u32, mutant: &str, topic: &str, name: &str, change: impl Fn(String) -> String) {
+    let folder = TempDir::new().expect("a folder");
+    let path = fmu(folder.path(), fmi, mutant, change);
+    let (found, report) = found(&path, &["--only", topic, "--no-shrink", "--limit", "3", "--repeat", "0.3"]);
+    assert!(
+        found.iter().any(|(other, _)| other == name),
+        "{mutant} is not found as {name}: {found:?} {}",
+        report["unreached"]
+    );
+}
+
+macro_rules! mutants {
+    ($($fmi:literal $mutant:ident $topic:literal $name:literal;)+) => { $(
+        #[test]
+        fn $mutant() {
+            caught($fmi, stringify!($mutant), $topic, $name, |text| text);
+        }
+    )+ };
+}
+
+mutants! {
+    2 half_set "refusals" "refusals.changed";
+    3 discard_changes "refusals" "refusals.changed";
+    2 step_refused_halfway "refusals" "refusals.changed";
+    2 getter_changes "results" "results.reading";
+    3 reading_once "results" "results.reading";
+    2 lossy_state "states" "states.restore-values";
+    3 state_without_event "states" "states.restore";
+    2 bytes_with_address "states" "states.fresh-process.crash";
+    3 bytes_without_input "states" "states.serialized";
+    2 restore_consumes "states" "states.twice";
+    3 save_changes "states" "states.changed-by-saving";
+    2 handle_not_reused "states" "states.several";
+    3 freed_handle_stays "states" "states.free";
+    3 adjoint_off "derivatives" "derivatives.adjoint";
+    2 directional_sign "derivatives" "derivatives.directional";
+    3 directional_not_linear "derivatives" "derivatives.linear";
+    2 derivative_changes "derivatives" "derivatives.changed";
+    3 vector_swapped "derivatives" "derivatives.vectors";
+    2 nominal_zero "derivatives" "derivatives.nominals";
+    2 write_past "start_values" "arrays.written-beyond";
+    3 write_before "start_values" "arrays.written-beyond";
+    2 read_past "start_values" "arrays.read-beyond";
+    3 write_const "start_values" "arrays.const";
+    2 name_kept "results" "arrays.read-beyond";
+    2 shared_static "results" "results.instances";
+    3 racing_static "results" "results.threads";
+    2 address_in_result "results" "results.process";
+    3 unwritten_memory "results" "results.process";
+    2 time_lags "results" "results.time";
+    3 last_time_wrong "results" "results.last-successful-time";
+    2 leak_instance "resources" "resources.memory";
+    3 leak_state "resources" "resources.memory";
+    2 leak_step "resources" "resources.memory";
+    3 file_left "resources" "resources.files";
+    2 thread_left "resources" "resources.threads";
+    3 rounding_changed "resources" "resources.settings";
+    2 locale_changed "resources" "resources.settings";
+    3 second_run_refused "resources" "resources.cycles";
+    2 reset_without_count "reset" "reset.incomplete";
+    3 reset_keeps_parameter "reset" "reset.values";
+    2 event_in_the_past "life_cycle" "life_cycle.next-event-time";
+    3 events_without_end "life_cycle" "life_cycle.event-iteration";
+    2 start_value "start_values" "start_values.start";
+    3 set_ignored "start_values" "start_values.set";
+    2 boolean_two "start_values" "start_values.boolean";
+    3 output_unwritten "start_values" "start_values.unwritten";
+    2 whole_out_of_range "start_values" "start_values.range";
+    3 parameter_drifts "start_values" "start_values.fixed";
+    2 text_latin1 "start_values" "start_values.utf8";
+    2 version_wrong "functions" "functions.version";
+    3 state_not_supported "functions" "functions.capability";
+    2 status_unknown "results" "functions.status";
+    3 free_null_crashes "life_cycle" "life_cycle.free-null.crash";
+    2 terminate_refused "life_cycle" "life_cycle.refused";
+    3 reset_refused "reset" "reset.incomplete";
+    2 get_after_end_refused "life_cycle" "life_cycle.refused";
+    3 crash_amid "results" "results.crash";
+    3 token_ignored "life_cycle" "life_cycle.token";
+    2 category_unknown "refusals" "logs.category";
+    3 log_latin1 "refusals" "logs.text";
+    3 silent "refusals" "logs.silent";
+    3 log_when_off "logs" "logs.off";
+    2 endless_step "hostile" "hostile.times.hang";
+    3 null_crashes "hostile" "hostile.null.crash";
+    2 bytes_crash "hostile" "hostile.bytes.crash";
+    3 reference_crashes "hostile" "hostile.references.crash";
+    2 reference_exits "hostile" "hostile.references.exit";
+}
+
+#[test]
+fn function_missing() {
+    caught(2, "WITHOUT_NOMINALS", "functions", "functions.missing", |text| text);
+}
+
+#[test]
+fn dependency_of_an_output_missing() {
+    caught(2, "none", "dependencies", "dependencies.missing", |text| {
+        text.replace("index=\"9\" dependencies=\"4 5\"", "index=\"9\" dependencies=\"5\"")
+    });
+}
+
+#[test]
+fn dependency_of_a_derivative_missing() {
+    caught(3, "none", "dependencies", "dependencies.missing", |text| {
+        text.replace("dependencies=\"4 5 6\"", "dependencies=\"4 6\"")
+    });
+}
+
+#[test]
+fn initial_dependency_missing() {
+    let change = |text: String| {
+        text.replace("valueReference=\"9\" dependencies=\"4\"", "valueReference=\"9\" dependencies=\"\"")
+    };
+    caught(3, "none", "dependencies", "dependencies.initial", change);
+}
+
+#[test]
+fn descriptions() {
+    for (name, from, to) in [
+        ("description.units", "<Real start=\"2\"", "<Real unit=\"stone\" start=\"2\""),
+        ("description.structure", "<Unknown index=\"9\" dependencies=\"4 5\"/>", ""),
+        ("description.start", "<Real start=\"2\"/>", "<Real/>"),
+        ("description.range", "<Real start=\"2\"", "<Real min=\"3\" start=\"2\""),
+        ("description.types", "<Real start=\"2\"", "<Real declaredType=\"Weight\" start=\"2\""),
+        ("description.names", "name=\"spring\"", "name=\"mass\""),
+    ] {
+        caught(2, "none", "description", name, |text| {
+            assert!(text.contains(from), "{from}");
+            text.replacen(from, to, 1)
+        });
+    }
+}
+
+/// Nothing is found in the wagon, whatever is looked at.
+fn clean(fmi: u32) {
+    let folder = TempDir::new().expect("a folder");
+    let path = fmu(folder.path(), fmi, "none", |text| text);
+    let (found, report) = found(&path, &["--repeat", "0.3"]);
+    // How old a system may be is that of the compiler; that fixed parameters can be set in the end is not.
+    let found: Vec<_> = found.iter().filter(|(name, _)| name != "package.glibc").collect();
+    assert!(found.is_empty(), "{found:#?}");
+    assert_eq!(report["unreached"].as_array().map(Vec::len), Some(0), "{}", report["unreached"]);
+    assert_eq!(report["interfaces"].as_array().map(Vec::len), Some(2));
+}
+
+#[test]
+fn none_in_fmi2() {
+    clean(2);
+}
+
+#[test]
+fn none_in_fmi3() {
+    clean(3);
+}
+
+/// The shortest calls are few, and both programs show the fault without this tool.
+#[test]
+fn programs_show_it() {
+    let folder = TempDir::new().expect("a folder");
+    for (mutant, topic, name, most) in [
+        ("lossy_state", "states", "states.restore-values", 14),
+        ("write_past", "start_values", "arrays.written-beyond", 6),
+        ("bytes_with_address", "states", "states.fresh-process.crash", 14),
+    ] {
+        let path = fmu(folder.path(), 2, mutant, |text| text);
+        let out = folder.path().join("out");
+        let (_, report) = found(&path, &["--only", topic, "--out", &out.to_string_lossy()]);
+        let finding =
+            report["findings"].as_array().and_then(|all| all.iter().find(|finding| finding["name"] == name));
+        let finding = finding.unwrap_or_else(|| panic!("{mutant}: {report:#}"));
+        let steps = finding["steps"][1].as_u64().expect("a number");
+        assert!(steps <= most, "{mutant}: {steps} calls");
+        for file in ["report.html", "report.json", "junit.xml"] {
+            assert!(std::fs::read_to_string(out.join(file)).expect(file).contains(name), "{file}");
+        }
+        let unpacked = folder.path().join("unpacked");
+        zip::ZipArchive::new(std::fs::File::open(&path).expect("it"))
+            .expect("a ZIP")
+            .extract(&unpacked)
+            .expect("a folder");
+        let program = folder.path().join("repro");
+        let status = Command::new("cc")
+            .arg("-o")
+            .arg(&program)
+            .arg(out.join(format!("{name}.c")))
+            .args(["-ldl", "-lpthread"])
+            .status();
+        assert!(status.expect("a C compiler").success(), "{name}.c");
+        let of_c = Command::new(&program).arg(&unpacked).output().expect("runs");
+        let of_python = Command::new("python3")
+            .arg(out.join(format!("{name}.py")))
+            .arg(&unpacked)
+            .output()
+            .expect("runs");
+        for (language, output) in [("C", of_c), ("Python", of_python)] {
+            let text = String::from_utf8_lossy(&output.stdout).into_owned()
+                + &String::from_utf8_lossy(&output.stderr);
+            let crashes = name != "states.restore-values";
+            assert_eq!(text.contains("ended by signal"), crashes, "{mutant} in {language}: {text}");
+            if !crashes {
+                // What was read before and after differs.
+                let read: Vec<&str> = text.lines().filter(|line| line.starts_with("fmi2GetReal")).collect();
+                assert!(read.len() >= 2 && read[0] != read[read.len() - 1], "{mutant} in {language}: {text}");
+            }
+        }
+    }
+}

@@ -1,0 +1,649 @@
+/* A wagon on a spring as an FMU of FMI 2.0 or, with -DFMI=3, of 3.0: without faults, or with the one that -DMUTANT=M_name
+   puts in. It needs no headers of FMI: nothing here is taken from what is tested. */
+#define _GNU_SOURCE
+#include <fcntl.h>
+#include <locale.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#ifndef FMI
+#define FMI 2
+#endif
+
+enum {
+    M_none, M_half_set, M_getter_changes, M_lossy_state, M_state_without_event, M_bytes_with_address, M_bytes_without_input,
+    M_restore_consumes, M_save_changes, M_handle_not_reused, M_freed_handle_stays, M_adjoint_off, M_directional_sign,
+    M_directional_not_linear, M_derivative_changes, M_write_past, M_write_before, M_read_past, M_write_const,
+    M_shared_static, M_racing_static, M_leak_instance, M_leak_state, M_leak_step, M_file_left, M_thread_left,
+    M_reset_without_count, M_reset_keeps_parameter, M_address_in_result, M_unwritten_memory, M_event_in_the_past,
+    M_events_without_end, M_start_value, M_set_ignored, M_boolean_two, M_output_unwritten, M_whole_out_of_range,
+    M_parameter_drifts, M_version_wrong, M_state_not_supported, M_status_unknown, M_free_null_crashes,
+    M_terminate_refused, M_reset_refused, M_get_after_end_refused, M_second_run_refused, M_category_unknown, M_log_latin1,
+    M_silent, M_log_when_off, M_endless_step, M_null_crashes, M_bytes_crash, M_reference_crashes, M_reference_exits,
+    M_vector_swapped, M_nominal_zero, M_time_lags, M_last_time_wrong, M_name_kept, M_rounding_changed, M_locale_changed,
+    M_discard_changes, M_step_refused_halfway, M_reading_once, M_text_latin1, M_token_ignored, M_crash_amid
+};
+#ifndef MUTANT
+#define MUTANT M_none
+#endif
+#define IS(name) (MUTANT == M_##name)
+
+#if FMI == 3
+#define API(name) fmi3##name
+typedef bool Flag;
+typedef void (*Logger)(void *, int, const char *, const char *);
+#else
+#define API(name) fmi2##name
+typedef int Flag;
+typedef void (*Logger)(void *, const char *, int, const char *, const char *, ...);
+typedef struct {
+    Logger logger;
+    void *allocate, *release, *finished, *environment;
+} Callbacks;
+typedef struct {
+    Flag again, terminate, nominals, values, defined;
+    double next;
+} Event;
+#endif
+
+enum { MASS = 1, SPRING, DAMPER, FORCE, X, V, DER_X, DER_V, Y, COUNT, FAST, LABEL, TIME };
+enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, EVENT = 8, CONTINUOUS = 16, TERMINATED = 32 };
+
+typedef struct {
+    double time, mass, spring, damper, force, x, v, next;
+    int count, fast, mode, steps;
+    char label[32];
+} State;
+
+typedef struct {
+    State s;
+    int cs, logging;
+    Logger log;
+    void *environment;
+    const char *given;
+    char name[64];
+    double *scratch;
+} Model;
+
+static State shared;
+static int runs;
+static double racing;
+
+static void start(State *s) {
+    double mass = s->mass;
+    int count = s->count;
+    memset(s, 0, sizeof *s);
+    s->mass = IS(reset_keeps_parameter) && mass > 0 ? mass : 2;
+    s->spring = IS(start_value) ? 40.5 : 40;
+    s->damper = 3;
+    s->next = 0.05;
+    s->mode = INSTANTIATED;
+    strcpy(s->label, "wagon");
+    if (IS(reset_without_count)) s->count = count;
+}
+
+static int say(Model *m, int status, const char *text) {
+    const char *category = IS(category_unknown) ? "unheard of" : "logStatusError";
+    if (IS(log_latin1)) text = "refus\xe9";
+    if (!m->log || !m->logging || IS(silent)) return status;
+#if FMI == 3
+    m->log(m->environment, status, category, text);
+#else
+    m->log(m->environment, m->name, status, category, text);
+#endif
+    return status;
+}
+
+static int no(Model *m, const char *text) { return say(m, 3, text); }
+
+#define ALLOW(modes)                                                                  \
+    Model *m = c;                                                                     \
+    if (!m) return 3;                                                                 \
+    if (!(m->s.mode & (modes))) return no(m, "not allowed here");
+
+static double slope(const Model *m) { return (m->s.force - m->s.spring * m->s.x - m->s.damper * m->s.v) / m->s.mass; }
+
+static void *idle(void *nothing) { pause(); return nothing; }
+
+static void *make(const char *name, const char *token, int cs, int logging, Logger log, void *environment) {
+    Model *m = calloc(1, sizeof *m);
+    start(&m->s);
+    m->cs = cs; m->log = log; m->logging = logging; m->environment = environment;
+    snprintf(m->name, sizeof m->name, "%s", name ? name : "");
+    m->given = name;
+    if (!name || !*name || !token || (strcmp(token, "wagon") && !IS(token_ignored))) {
+        m->logging = 1;
+        no(m, "no name or another token");
+        free(m);
+        return NULL;
+    }
+    m->scratch = malloc(sizeof *m->scratch);
+    if (!IS(unwritten_memory)) *m->scratch = 0;
+    if (IS(leak_instance) && !malloc(24)) return NULL;
+    if (IS(file_left)) (void)!open("/dev/null", O_RDONLY);
+    if (IS(thread_left)) { pthread_t thread; pthread_create(&thread, NULL, idle, NULL); pthread_detach(thread); }
+    if (IS(second_run_refused) && runs++ > 300) { free(m->scratch); free(m); return NULL; }
+    return m;
+}
+
+/* A real variable, or NaN for a reference that is none. */
+static double get(Model *m, uint32_t vr, bool *known) {
+    const State *s = &m->s;
+    double y = 2 * s->force + s->x + *m->scratch * 1e-3;
+    if (IS(address_in_result)) y += (double)((uintptr_t)m >> 12 & 0xfff) * 1e-9;
+    *known = true;
+    switch (vr) {
+    case MASS: return s->mass;
+    case SPRING: return s->spring;
+    case DAMPER: return s->damper;
+    case FORCE: return s->force;
+    case X: return s->x;
+    case V: return IS(shared_static) ? shared.v : s->v;
+    case DER_X: return s->v;
+    case DER_V: return slope(m);
+    case Y:
+        if (IS(racing_static)) { racing = y; usleep(20); y = racing; }
+        if (IS(getter_changes)) m->s.x += 1e-9;
+        if (IS(reading_once) && m->s.steps > 3) m->s.steps = 0, m->s.v += 1e-6;
+        return y;
+    case TIME: return IS(time_lags) && s->time > 0.03 ? s->time - 0.01 : s->time;
+    default: *known = false; return 0;
+    }
+}
+
+static int settable(const Model *m, uint32_t vr) {
+    (void)m;
+    return vr >= MASS && vr <= FORCE;
+}
+
+static int get_reals(void *c, const uint32_t *vr, size_t n, double *value) {
+    ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS | TERMINATED)
+    size_t i;
+    bool known;
+    if (IS(get_after_end_refused) && m->s.mode == TERMINATED) return no(m, "it is over");
+    if (n && (!vr || !value) && !IS(null_crashes)) return no(m, "an array is NULL");
+    if (IS(crash_amid) && m->s.steps == 7) abort();
+    for (i = 0; i < n; i++) {
+        get(m, vr[i], &known);
+        if (IS(reference_crashes) && !known) *(volatile int *)8 = 0;
+        if (IS(reference_exits) && !known) exit(3);
+        if (!known) return no(m, "an unknown reference");
+    }
+    for (i = 0; i < n; i++) value[i] = get(m, vr[i], &known);
+    if (IS(write_const) && n) *(uint32_t *)vr = 0;
+    if (IS(write_past)) value[n] = 0;
+    if (IS(write_before)) value[-1] = 0;
+    return IS(status_unknown) && m->s.steps == 2 ? 17 : 0;
+}
+
+static int set_reals(void *c, const uint32_t *vr, size_t n, const double *value) {
+    ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS)
+    size_t i;
+    if (n && (!vr || !value)) return no(m, "an array is NULL");
+    for (i = 0; i < n; i++) {
+        if (IS(half_set) && vr[i] == FORCE) m->s.force = value[i];
+        if (!settable(m, vr[i])) return no(m, "it cannot be set");
+        if (vr[i] != FORCE && !(m->s.mode & (INSTANTIATED | INITIALIZATION))) return no(m, "a fixed parameter");
+        if (!isfinite(value[i]) || (vr[i] == MASS && value[i] <= 0)) {
+            if (IS(discard_changes)) { m->s.x += 1; return say(m, 2, "no such value"); }
+            return no(m, "no such value");
+        }
+    }
+    if (IS(read_past) && n && value[n] == 1e99) return 3;
+    for (i = 0; i < n; i++) switch (vr[i]) {
+        case MASS: m->s.mass = value[i]; break;
+        case SPRING: m->s.spring = value[i]; break;
+        case DAMPER: if (!IS(set_ignored)) m->s.damper = value[i]; break;
+        default: m->s.force = value[i]; break;
+    }
+    return 0;
+}
+
+static int get_count(void *c, const uint32_t *vr, size_t n, int32_t *value) {
+    ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS | TERMINATED)
+    size_t i;
+    if (n && (!vr || !value)) return no(m, "an array is NULL");
+    for (i = 0; i < n; i++) if (vr[i] != COUNT) return no(m, "an unknown reference");
+    for (i = 0; i < n; i++) if (!IS(output_unwritten)) value[i] = m->s.count + (IS(whole_out_of_range) ? 999 : 0);
+    return 0;
+}
+
+static int get_fast(void *c, const uint32_t *vr, size_t n, Flag *value) {
+    ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS | TERMINATED)
+    size_t i;
+    if (n && (!vr || !value)) return no(m, "an array is NULL");
+    for (i = 0; i < n; i++) if (vr[i] != FAST) return no(m, "an unknown reference");
+    for (i = 0; i < n; i++) {
+        unsigned char two = IS(boolean_two) ? 2 : (unsigned char)(m->s.fast != 0);
+        memset(&value[i], 0, sizeof value[i]);
+        memcpy(&value[i], &two, 1);
+    }
+    return 0;
+}
+
+static int get_label(void *c, const uint32_t *vr, size_t n, const char **value) {
+    ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS | TERMINATED)
+    size_t i;
+    if (n && (!vr || !value)) return no(m, "an array is NULL");
+    for (i = 0; i < n; i++) if (vr[i] != LABEL) return no(m, "an unknown reference");
+    for (i = 0; i < n; i++) value[i] = IS(text_latin1) ? "wag\xf6n" : m->s.label;
+    return 0;
+}
+
+static int set_label(void *c, const uint32_t *vr, size_t n, const char *const *value) {
+    ALLOW(INSTANTIATED | INITIALIZATION)
+    size_t i;
+    if (n && (!vr || !value)) return no(m, "an array is NULL");
+    for (i = 0; i < n; i++)
+        if (vr[i] != LABEL || !value[i] || strlen(value[i]) >= sizeof m->s.label) return no(m, "no such text");
+    for (i = 0; i < n; i++) strcpy(m->s.label, value[i]);
+    return 0;
+}
+
+static int set_none(void *c, const uint32_t *vr, size_t n, const void *value) {
+    ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT)
+    (void)vr; (void)value;
+    return n ? no(m, "it cannot be set") : 0;
+}
+
+/* Runge and Kutta's method, in steps that events and ends cut. */
+static void integrate(Model *m, double end) {
+    State *s = &m->s;
+    while (s->time < end - 1e-12) {
+        double stop = s->next < end ? s->next : end;
+        int count = (int)ceil((stop - s->time) / 1e-3 - 1e-6), i;
+        double h = count > 0 ? (stop - s->time) / count : 0;
+        for (i = 0; i < count; i++) {
+            double x = s->x, v = s->v, kx[4], kv[4];
+            int j;
+            for (j = 0; j < 4; j++) {
+                double w = j == 0 ? 0 : j == 3 ? h : h / 2;
+                s->x = x + (j ? w * kx[j - 1] : 0);
+                s->v = v + (j ? w * kv[j - 1] : 0);
+                kx[j] = s->v;
+                kv[j] = slope(m);
+            }
+            s->x = x + h / 6 * (kx[0] + 2 * kx[1] + 2 * kx[2] + kx[3]);
+            s->v = v + h / 6 * (kv[0] + 2 * kv[1] + 2 * kv[2] + kv[3]);
+        }
+        s->time = stop;
+        if (s->time >= s->next - 1e-12) { s->count++; s->next = 0.05 * (s->count + 1); }
+    }
+    s->time = end;
+    s->fast = s->v > 0.5;
+}
+
+static int step(void *c, double point, double size) {
+    ALLOW(STEP)
+    if (IS(endless_step) && !(size < 1e9)) for (;;) usleep(1000);
+    if (IS(step_refused_halfway) && !(size > 0)) m->s.x += 0.01;
+    if (!isfinite(point) || !isfinite(size) || !(size > 0) || size > 1e4) return no(m, "no such step");
+    if (fabs(point - m->s.time) > 1e-9 * (1 + fabs(point))) return no(m, "another time");
+    integrate(m, point + size);
+    m->s.steps++;
+    shared = m->s;
+    if (IS(parameter_drifts)) m->s.damper += 1e-6;
+    if (IS(leak_step) && !malloc(40)) return 3;
+    if (IS(rounding_changed)) __asm__ volatile("ldmxcsr %0" : : "m"((unsigned){0x9fc0}));
+    if (IS(locale_changed)) setlocale(LC_ALL, "C.UTF-8");
+    if (IS(name_kept)) m->s.count += m->given[0] == 'z';
+    if (IS(log_when_off) && m->log) {
+#if FMI == 3
+        m->log(m->environment, 0, "logStatusError", "a step");
+#else
+        m->log(m->environment, m->name, 0, "logStatusError", "a step");
+#endif
+    }
+    return 0;
+}
+
+static int enter(void *c, double from) {
+    ALLOW(INSTANTIATED)
+    if (!isfinite(from) || fabs(from) > 1e9) return no(m, "no such time");
+    m->s.time = from;
+    m->s.next = from + 0.05;
+    m->s.mode = INITIALIZATION;
+    return 0;
+}
+
+static int update(Model *m, Flag *again, double *next) {
+    if (m->s.time >= m->s.next - 1e-12) {
+        m->s.count++;
+        m->s.next += 0.05;
+        if (m->s.next <= m->s.time) m->s.next = m->s.time + 0.05;
+    }
+    m->s.fast = m->s.v > 0.5;
+    shared = m->s;
+    *again = IS(events_without_end);
+    *next = IS(event_in_the_past) ? m->s.next - 0.06 : m->s.next;
+    return 0;
+}
+
+#if FMI == 3
+#define EXPORT(name) int fmi3##name
+const char *fmi3GetVersion(void) { return IS(version_wrong) ? "2.0" : "3.0"; }
+
+void *fmi3InstantiateModelExchange(const char *name, const char *token, const char *resources, bool visible, bool logging,
+                                   void *environment, Logger log) {
+    (void)resources; (void)visible;
+    return make(name, token, 0, logging, log, environment);
+}
+void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible, bool logging,
+                                  bool event_mode, bool early, const uint32_t *vr, size_t n, void *environment, Logger log,
+                                  void *intermediate) {
+    (void)resources; (void)visible; (void)early; (void)vr; (void)n; (void)intermediate;
+    return event_mode ? NULL : make(name, token, 1, logging, log, environment);
+}
+void *fmi3InstantiateScheduledExecution(void) { return NULL; }
+#define FREE fmi3FreeInstance
+#define SIZES , size_t nvalues
+#define SIZES_RIGHT if (c && nvalues != n) return no(c, "sizes that differ");
+#else
+#define EXPORT(name) int fmi2##name
+const char *fmi2GetVersion(void) { return IS(version_wrong) ? "2.1" : "2.0"; }
+const char *fmi2GetTypesPlatform(void) { return "default"; }
+void *fmi2Instantiate(const char *name, int type, const char *token, const char *resources, const Callbacks *callbacks,
+                      int visible, int logging) {
+    (void)resources; (void)visible;
+    return callbacks ? make(name, token, type == 1, logging, callbacks->logger, callbacks->environment) : NULL;
+}
+#define FREE fmi2FreeInstance
+#define SIZES
+#define SIZES_RIGHT
+#endif
+
+void FREE(void *c) {
+    Model *m = c;
+    if (IS(free_null_crashes)) *(volatile char *)m = *(volatile char *)m;
+    if (m) free(m->scratch);
+    free(m);
+}
+
+EXPORT(SetDebugLogging)(void *c, Flag on, size_t n, const char *const *categories) {
+    ALLOW(63)
+    size_t i;
+    if (n && !categories) return no(m, "an array is NULL");
+    for (i = 0; i < n; i++) if (!categories[i] || strcmp(categories[i], "logStatusError")) return no(m, "an unknown category");
+    m->logging = on;
+    return 0;
+}
+
+EXPORT(ExitInitializationMode)(void *c) {
+    ALLOW(INITIALIZATION)
+    m->s.mode = m->cs ? STEP : EVENT;
+    return 0;
+}
+EXPORT(Terminate)(void *c) {
+    ALLOW(STEP | EVENT | CONTINUOUS)
+    if (IS(terminate_refused) && m->s.steps > 1) return no(m, "not yet");
+    m->s.mode = TERMINATED;
+    return 0;
+}
+EXPORT(Reset)(void *c) {
+    ALLOW(63)
+    if (IS(reset_refused) && m->s.mode == TERMINATED) return no(m, "it is over");
+    start(&m->s);
+    return 0;
+}
+EXPORT(EnterEventMode)(void *c) { ALLOW(CONTINUOUS | EVENT) m->s.mode = EVENT; return 0; }
+EXPORT(EnterContinuousTimeMode)(void *c) { ALLOW(EVENT) m->s.mode = CONTINUOUS; return 0; }
+EXPORT(CompletedIntegratorStep)(void *c, Flag no_set, Flag *event, Flag *terminate) {
+    ALLOW(CONTINUOUS)
+    (void)no_set;
+    if (!event || !terminate) return no(m, "a flag is NULL");
+    m->s.steps++;
+    *event = 0; *terminate = 0;
+    return 0;
+}
+EXPORT(SetTime)(void *c, double time) {
+    ALLOW(CONTINUOUS)
+    if (!isfinite(time)) return no(m, "no such time");
+    m->s.time = time;
+    return 0;
+}
+EXPORT(SetContinuousStates)(void *c, const double *x, size_t n) {
+    ALLOW(CONTINUOUS)
+    if (n != 2 || !x || !isfinite(x[0]) || !isfinite(x[1])) return no(m, "no such states");
+    m->s.x = x[0]; m->s.v = x[1];
+    shared = m->s;
+    return 0;
+}
+EXPORT(GetContinuousStates)(void *c, double *x, size_t n) {
+    ALLOW(62)
+    if (n != 2 || !x) return no(m, "there are two states");
+    x[0] = m->s.x; x[1] = m->s.v;
+    return 0;
+}
+#if FMI == 3
+EXPORT(GetContinuousStateDerivatives)(void *c, double *x, size_t n) {
+#else
+EXPORT(GetDerivatives)(void *c, double *x, size_t n) {
+#endif
+    ALLOW(62)
+    if (n != 2 || !x) return no(m, "there are two states");
+    x[IS(vector_swapped)] = m->s.v; x[!IS(vector_swapped)] = slope(m);
+    return 0;
+}
+EXPORT(GetEventIndicators)(void *c, double *z, size_t n) {
+    ALLOW(62)
+    if (n != 1 || !z) return no(m, "there is one event indicator");
+    z[0] = m->s.v - 0.5;
+    return 0;
+}
+#ifndef WITHOUT_NOMINALS
+EXPORT(GetNominalsOfContinuousStates)(void *c, double *x, size_t n) {
+    ALLOW(63)
+    if (n != 2 || !x) return no(m, "there are two states");
+    x[0] = IS(nominal_zero) ? 0 : 1; x[1] = 1;
+    return 0;
+}
+#endif
+
+/* States. */
+static char *secret[4096];
+static unsigned secrets;
+
+static int save(void *c, void **state) {
+    ALLOW(63)
+    State *saved;
+    if (!state) return no(m, "a handle is NULL");
+    if (IS(state_not_supported)) return no(m, "not supported");
+    saved = *state ? *state : malloc(sizeof *saved);
+    if (!(IS(handle_not_reused) && *state)) *saved = m->s;
+    if (IS(lossy_state)) saved->v = (float)saved->v;
+    if (IS(state_without_event)) saved->next = -1;
+    if (IS(save_changes)) m->s.x += 1e-6;
+    if (IS(leak_state) && !malloc(16)) return 3;
+    *state = saved;
+    return 0;
+}
+static int restore(void *c, void *state) {
+    ALLOW(63)
+    double next = m->s.next;
+    if (!state) return no(m, "a state is NULL");
+    m->s = *(State *)state;
+    if (IS(state_without_event)) m->s.next = next;
+    if (IS(restore_consumes)) ((State *)state)->x = 0;
+    shared = m->s;
+    return 0;
+}
+static int drop(void *c, void **state) {
+    ALLOW(63)
+    if (!state) return 0;
+    free(*state);
+    if (!IS(freed_handle_stays)) *state = NULL;
+    return 0;
+}
+static int size_of(void *c, void *state, size_t *size) {
+    ALLOW(63)
+    if (!state || !size) return no(m, "NULL");
+    *size = sizeof(State) + 8;
+    return 0;
+}
+static int serialize(void *c, void *state, char *bytes, size_t size) {
+    ALLOW(63)
+    State copy;
+    if (!state || !bytes || size < sizeof copy + 8) return no(m, "no room");
+    copy = *(State *)state;
+    if (IS(bytes_without_input)) copy.force = 0;
+    memset(bytes, 0, size);
+    memcpy(bytes, "wagon001", 8);
+    if (IS(bytes_with_address)) {
+        unsigned number = secrets++ % 4096;
+        secret[number] = malloc(sizeof copy);
+        memcpy(secret[number], &copy, sizeof copy);
+        memcpy(bytes + 8, &secret[number], sizeof(char *));
+    } else memcpy(bytes + 8, &copy, sizeof copy);
+    return 0;
+}
+static int deserialize(void *c, const char *bytes, size_t size, void **state) {
+    ALLOW(63)
+    State copy;
+    if (!state || !bytes || (size != sizeof copy + 8 && !IS(bytes_crash))) return no(m, "no state");
+    if (IS(bytes_crash)) { memcpy(&copy, bytes + 8, sizeof copy); }
+    if (memcmp(bytes, "wagon001", 8)) return no(m, "no state");
+    if (IS(bytes_with_address)) { char *from; memcpy(&from, bytes + 8, sizeof from); memcpy(&copy, from, sizeof copy); }
+    else memcpy(&copy, bytes + 8, sizeof copy);
+    /* Only what can be is taken. */
+    copy.label[sizeof copy.label - 1] = 0;
+    if (!isfinite(copy.time) || !isfinite(copy.x) || !isfinite(copy.v) || !(copy.next > copy.time - 1) || !(copy.next < 1e9) ||
+        !(copy.mass > 0) || !(fabs(copy.time) < 1e9)) return no(m, "no state");
+    if (!*state) *state = malloc(sizeof copy);
+    memcpy(*state, &copy, sizeof copy);
+    return 0;
+}
+
+/* d(unknown)/d(known). */
+static double partial(const Model *m, uint32_t unknown, uint32_t known) {
+    const State *s = &m->s;
+    switch (unknown) {
+    case X: return known == X;
+    case V: case DER_X: return known == V;
+    case DER_V: return (known == FORCE ? 1 : known == X ? -s->spring : known == V ? -s->damper : 0) / s->mass;
+    case Y: return known == FORCE ? IS(directional_sign) ? -2 : 2 : known == X;
+    default: return NAN;
+    }
+}
+static int directional(void *c, const uint32_t *unknown, size_t nu, const uint32_t *known, size_t nk, const double *seed,
+                       double *out, bool adjoint) {
+    ALLOW(62)
+    size_t i, j;
+    double *sums;
+    if ((nu && !unknown) || (nk && !known) || ((adjoint ? nu : nk) && !seed) || ((adjoint ? nk : nu) && !out)) return no(m, "NULL");
+    for (i = 0; i < nu; i++) if (isnan(partial(m, unknown[i], X))) return no(m, "an unknown that is none");
+    for (j = 0; j < nk; j++) if (known[j] != X && known[j] != V && known[j] != FORCE) return no(m, "a known that is none");
+    sums = calloc(nu + nk + 1, sizeof *sums);
+    for (i = 0; i < nu; i++)
+        for (j = 0; j < nk; j++) {
+            double d = partial(m, unknown[i], known[j]);
+            if (adjoint && IS(adjoint_off)) d *= 1 + 1e-9;
+            sums[adjoint ? j : i] += d * seed[adjoint ? i : j];
+        }
+    if (IS(directional_not_linear) && nk > 1 && seed[0] != 0 && seed[1] != 0) sums[0] += 1;
+    memcpy(out, sums, (adjoint ? nk : nu) * sizeof *out);
+    free(sums);
+    if (IS(derivative_changes)) m->s.x += 1e-8;
+    return 0;
+}
+
+#if FMI == 3
+EXPORT(EnterInitializationMode)(void *c, bool defined, double tolerance, double from, bool stops, double stop) {
+    (void)defined; (void)tolerance; (void)stops; (void)stop;
+    return enter(c, from);
+}
+EXPORT(GetFloat64)(void *c, const uint32_t *vr, size_t n, double *value, size_t nvalues) { SIZES_RIGHT return get_reals(c, vr, n, value); }
+EXPORT(SetFloat64)(void *c, const uint32_t *vr, size_t n, const double *value, size_t nvalues) { SIZES_RIGHT return set_reals(c, vr, n, value); }
+EXPORT(GetInt32)(void *c, const uint32_t *vr, size_t n, int32_t *value, size_t nvalues) { SIZES_RIGHT return get_count(c, vr, n, value); }
+EXPORT(GetBoolean)(void *c, const uint32_t *vr, size_t n, bool *value, size_t nvalues) { SIZES_RIGHT return get_fast(c, vr, n, value); }
+EXPORT(GetString)(void *c, const uint32_t *vr, size_t n, const char **value, size_t nvalues) { SIZES_RIGHT return get_label(c, vr, n, value); }
+EXPORT(SetString)(void *c, const uint32_t *vr, size_t n, const char *const *value, size_t nvalues) { SIZES_RIGHT return set_label(c, vr, n, value); }
+#define NONE(type)                                                                                                                   \
+    EXPORT(Get##type)(void *c, const uint32_t *vr, size_t n, void *value, size_t nvalues) { ALLOW(63) (void)vr; (void)value; (void)nvalues; return n ? no(m, "there are none") : 0; } \
+    EXPORT(Set##type)(void *c, const uint32_t *vr, size_t n, const void *value, size_t nvalues) { (void)nvalues; return set_none(c, vr, n, value); }
+NONE(Float32) NONE(Int8) NONE(UInt8) NONE(Int16) NONE(UInt16) NONE(UInt32) NONE(Int64) NONE(UInt64)
+EXPORT(SetInt32)(void *c, const uint32_t *vr, size_t n, const int32_t *value, size_t nvalues) { (void)nvalues; return set_none(c, vr, n, value); }
+EXPORT(SetBoolean)(void *c, const uint32_t *vr, size_t n, const bool *value, size_t nvalues) { (void)nvalues; return set_none(c, vr, n, value); }
+EXPORT(UpdateDiscreteStates)(void *c, bool *again, bool *terminate, bool *nominals, bool *values, bool *defined, double *next) {
+    ALLOW(EVENT)
+    if (!again || !terminate || !nominals || !values || !defined || !next) return no(m, "a flag is NULL");
+    *terminate = *nominals = *values = false;
+    *defined = true;
+    return update(m, again, next);
+}
+EXPORT(DoStep)(void *c, double point, double size, bool no_set, bool *event, bool *terminate, bool *early, double *last) {
+    int status;
+    (void)no_set;
+    if (c && (!event || !terminate || !early || !last)) return no(c, "a flag is NULL");
+    status = step(c, point, size);
+    if (status) return status;
+    *event = *terminate = *early = false;
+    *last = IS(last_time_wrong) ? point : point + size;
+    return 0;
+}
+EXPORT(GetFMUState)(void *c, void **state) { return save(c, state); }
+EXPORT(SetFMUState)(void *c, void *state) { return restore(c, state); }
+EXPORT(FreeFMUState)(void *c, void **state) { return drop(c, state); }
+EXPORT(SerializedFMUStateSize)(void *c, void *state, size_t *size) { return size_of(c, state, size); }
+EXPORT(SerializeFMUState)(void *c, void *state, char *bytes, size_t size) { return serialize(c, state, bytes, size); }
+EXPORT(DeserializeFMUState)(void *c, const char *bytes, size_t size, void **state) { return deserialize(c, bytes, size, state); }
+EXPORT(GetDirectionalDerivative)(void *c, const uint32_t *u, size_t nu, const uint32_t *k, size_t nk, const double *seed, size_t ns, double *out, size_t no_) {
+    if (c && (ns != nk || no_ != nu)) return no(c, "sizes that differ");
+    return directional(c, u, nu, k, nk, seed, out, false);
+}
+EXPORT(GetAdjointDerivative)(void *c, const uint32_t *u, size_t nu, const uint32_t *k, size_t nk, const double *seed, size_t ns, double *out, size_t no_) {
+    if (c && (ns != nu || no_ != nk)) return no(c, "sizes that differ");
+    return directional(c, u, nu, k, nk, seed, out, true);
+}
+EXPORT(GetNumberOfContinuousStates)(void *c, size_t *n) { ALLOW(63) if (!n) return no(m, "NULL"); *n = 2; return 0; }
+EXPORT(GetNumberOfEventIndicators)(void *c, size_t *n) { ALLOW(63) if (!n) return no(m, "NULL"); *n = 1; return 0; }
+#define REFUSED(name) EXPORT(name)(void *c) { return c ? no(c, "not supported") : 3; }
+REFUSED(GetBinary) REFUSED(SetBinary) REFUSED(GetClock) REFUSED(SetClock) REFUSED(GetNumberOfVariableDependencies)
+REFUSED(GetVariableDependencies) REFUSED(EnterConfigurationMode) REFUSED(ExitConfigurationMode) REFUSED(GetIntervalDecimal)
+REFUSED(GetIntervalFraction) REFUSED(GetShiftDecimal) REFUSED(GetShiftFraction) REFUSED(SetIntervalDecimal)
+REFUSED(SetIntervalFraction) REFUSED(SetShiftDecimal) REFUSED(SetShiftFraction) REFUSED(EvaluateDiscreteStates)
+REFUSED(EnterStepMode) REFUSED(GetOutputDerivatives) REFUSED(ActivateModelPartition)
+#else
+EXPORT(SetupExperiment)(void *c, int defined, double tolerance, double from, int stops, double stop) {
+    ALLOW(INSTANTIATED)
+    (void)defined; (void)tolerance; (void)stops; (void)stop;
+    if (!isfinite(from) || fabs(from) > 1e9) return no(m, "no such time");
+    m->s.time = from;
+    return 0;
+}
+EXPORT(EnterInitializationMode)(void *c) { return enter(c, c ? ((Model *)c)->s.time : 0); }
+EXPORT(GetReal)(void *c, const uint32_t *vr, size_t n, double *value) { return get_reals(c, vr, n, value); }
+EXPORT(SetReal)(void *c, const uint32_t *vr, size_t n, const double *value) { return set_reals(c, vr, n, value); }
+EXPORT(GetInteger)(void *c, const uint32_t *vr, size_t n, int32_t *value) { return get_count(c, vr, n, value); }
+EXPORT(SetInteger)(void *c, const uint32_t *vr, size_t n, const int32_t *value) { return set_none(c, vr, n, value); }
+EXPORT(GetBoolean)(void *c, const uint32_t *vr, size_t n, int *value) { return get_fast(c, vr, n, value); }
+EXPORT(SetBoolean)(void *c, const uint32_t *vr, size_t n, const int *value) { return set_none(c, vr, n, value); }
+EXPORT(GetString)(void *c, const uint32_t *vr, size_t n, const char **value) { return get_label(c, vr, n, value); }
+EXPORT(SetString)(void *c, const uint32_t *vr, size_t n, const char *const *value) { return set_label(c, vr, n, value); }
+EXPORT(NewDiscreteStates)(void *c, Event *event) {
+    ALLOW(EVENT)
+    if (!event) return no(m, "NULL");
+    memset(event, 0, sizeof *event);
+    event->defined = 1;
+    return update(m, &event->again, &event->next);
+}
+EXPORT(DoStep)(void *c, double point, double size, int no_set) { (void)no_set; return step(c, point, size); }
+EXPORT(CancelStep)(void *c) { return c ? no(c, "no step is under way") : 3; }
+EXPORT(GetFMUstate)(void *c, void **state) { return save(c, state); }
+EXPORT(SetFMUstate)(void *c, void *state) { return restore(c, state); }
+EXPORT(FreeFMUstate)(void *c, void **state) { return drop(c, state); }
+EXPORT(SerializedFMUstateSize)(void *c, void *state, size_t *size) { return size_of(c, state, size); }
+EXPORT(SerializeFMUstate)(void *c, void *state, char *bytes, size_t size) { return serialize(c, state, bytes, size); }
+EXPORT(DeSerializeFMUstate)(void *c, const char *bytes, size_t size, void **state) { return deserialize(c, bytes, size, state); }
+EXPORT(GetDirectionalDerivative)(void *c, const uint32_t *u, size_t nu, const uint32_t *k, size_t nk, const double *seed, double *out) {
+    return directional(c, u, nu, k, nk, seed, out, false);
+}
+#define REFUSED(name) EXPORT(name)(void *c) { return c ? no(c, "not supported") : 3; }
+REFUSED(SetRealInputDerivatives) REFUSED(GetRealOutputDerivatives) REFUSED(GetStatus) REFUSED(GetRealStatus)
+REFUSED(GetIntegerStatus) REFUSED(GetBooleanStatus) REFUSED(GetStringStatus)
+#endif
