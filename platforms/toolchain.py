@@ -27,6 +27,8 @@ PACKAGES = {
     "clang": ["clang"],
     "chromium": ["chromium"],
     "firefox-esr": ["firefox-esr"],
+    "xvfb-run": ["xvfb", "xauth"],
+    "/usr/lib/x86_64-linux-gnu/webkit2gtk-4.1/MiniBrowser": ["libwebkit2gtk-4.1-0"],
     "/usr/lib/wine/wine64": ["wine64"],
 }
 

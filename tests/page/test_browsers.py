@@ -6,8 +6,9 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import queue
-import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -55,11 +56,6 @@ BROWSERS = {
 WIDTHS = {"chromium": 360, "firefox": 1000, "webkit": 2000}
 
 
-def pytest_configure() -> None:
-    """Installs the browsers where that is possible."""
-    toolchain.need("chromium", "firefox-esr")
-
-
 @pytest.fixture(scope="module")
 def reports() -> Iterator[tuple[str, queue.Queue[Any]]]:
     """Where pages tell what they have seen, and what they have told."""
@@ -85,16 +81,17 @@ def told(request: pytest.FixtureRequest, fmu: Path, reports: Any, tmp_path_facto
     """What a browser says of the page."""
     folder = tmp_path_factory.mktemp(request.param)
     command = BROWSERS[request.param](folder / "home", WIDTHS[request.param])
-    if not shutil.which(command[0]) or (request.param == "webkit" and not shutil.which(WEBKIT)):
-        pytest.skip(f"{request.param} is not installed")
+    toolchain.need(command[0], *([WEBKIT] if WEBKIT in command else []))
     (folder / "home").mkdir()
     page = folder / "index.html"
     page.write_text(with_visitor(fmu, reports[0]), encoding="utf-8")
-    with subprocess.Popen([*command, page.as_uri()], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:
+    # With all that it starts, it is a group of its own to be ended.
+    quiet: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+    with subprocess.Popen([*command, page.as_uri()], **quiet) as browser:
         try:
             return reports[1].get(timeout=180)
         finally:
-            browser.terminate()
+            os.killpg(browser.pid, signal.SIGTERM)
 
 
 def with_visitor(fmu: Path, report: str) -> str:
