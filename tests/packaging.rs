@@ -220,11 +220,13 @@ fn wrong_requests_are_refused_in_one_line() {
     let file = parameter_file(folder.path(), "\"value\": 2.11", "\"value\": -2.11");
     let extreme = tempfile::tempdir().unwrap();
     let extreme = parameter_file(extreme.path(), "\"value\": 2.11", "\"value\": 1e306");
-    // The header of a universal library of macOS, for Intel alone and without content.
-    let library = folder.path().join("a.dylib");
-    let header = [0xcafe_babe_u32, 1, 0x0100_0007, 3, 0x1000, 0, 12];
-    fs::write(&library, header.map(u32::to_be_bytes).concat()).unwrap();
-    let library = library.to_str().unwrap();
+    // The header of a universal library of macOS, for Intel alone, with nothing else or a function of FMI.
+    let header = [0xcafe_babe_u32, 1, 0x0100_0007, 3, 0x1000, 0, 12].map(u32::to_be_bytes).concat();
+    let [empty, library] = [("empty", &b""[..]), ("a", b"fmi2Instantiate")].map(|(name, content)| {
+        let library = folder.path().join(name).with_extension("dylib");
+        fs::write(&library, [&header, content].concat()).unwrap();
+        library.to_str().unwrap().to_owned()
+    });
     for (arguments, message) in [
         (&["--parameters", file.as_str()][..], "mine.json: in SI units: k1 must be > 0, it is -120.89"),
         (
@@ -242,6 +244,7 @@ fn wrong_requests_are_refused_in_one_line() {
             "was not compiled from these sources and parameters",
         ),
         (&["--binary", &format!("darwin64={library}")], "was not compiled from these sources and parameters"),
+        (&["--binary", &format!("darwin64={empty}")], "has no functions of FMI"),
         (&["--target", "sparc"], "no FMU platform is known for the target 'sparc'"),
     ] {
         let text = errors(&build_fmu(arguments, &out));
