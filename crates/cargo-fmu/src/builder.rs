@@ -30,7 +30,8 @@ pub fn build(project: &Project, options: &BuildOptions, purpose: Purpose, own: &
     Ok(status.success())
 }
 
-fn cargo() -> OsString {
+/// The cargo that has started this program.
+pub fn cargo() -> OsString {
     std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
 }
 
@@ -45,11 +46,11 @@ fn own_program(project: &Project, name: &str) -> Command {
 fn generated_program(project: &Project, options: &BuildOptions, purpose: Purpose) -> Result<Option<Command>> {
     let sources = Sources::of_package(&project.folder).fingerprint()?;
     let variant = Variant { sources: sources.clone(), start: Vec::new(), tunable: options.tunable };
-    let package = Package::write(project, purpose)?;
+    let package = write_package(project, purpose)?;
     let mut command = Command::new(cargo());
     command
         .args(["build", "--release", "--message-format", "json-render-diagnostics", "--manifest-path"])
-        .arg(package.folder.join("Cargo.toml"))
+        .arg(package.join("Cargo.toml"))
         .arg("--target-dir")
         .arg(project.target.join("cargo-fmu"))
         // Where the configuration of cargo is looked for.
@@ -110,28 +111,21 @@ fn program_name(project: &Project) -> String {
     format!("packs-{}", project.name)
 }
 
-/// The package of the program.
-struct Package {
-    folder: PathBuf,
-}
-
-impl Package {
-    fn write(project: &Project, purpose: Purpose) -> Result<Self> {
-        let folder = project.target.join("cargo-fmu").join(&project.name);
-        fs::create_dir_all(folder.join("src"))
-            .with_context(|| format!("cannot make {}", folder.display()))?;
-        write(&folder.join("Cargo.toml"), &manifest(project, purpose)?)?;
-        write(&folder.join("src/main.rs"), &program(project))?;
-        let lock = folder.join("Cargo.lock");
-        let known = folder.join("Cargo.lock.model");
-        let of_model = fs::read_to_string(project.workspace.join("Cargo.lock")).unwrap_or_default();
-        // Cargo goes on from there with what the program needs besides.
-        if !lock.is_file() || fs::read_to_string(&known).ok().as_deref() != Some(of_model.as_str()) {
-            fs::write(&lock, locked(&of_model, &tested())?)?;
-            fs::write(&known, of_model)?;
-        }
-        Ok(Self { folder })
+/// Writes the package of the program, and tells its folder.
+fn write_package(project: &Project, purpose: Purpose) -> Result<PathBuf> {
+    let folder = project.target.join("cargo-fmu").join(&project.name);
+    fs::create_dir_all(folder.join("src")).with_context(|| format!("cannot make {}", folder.display()))?;
+    write(&folder.join("Cargo.toml"), &manifest(project, purpose)?)?;
+    write(&folder.join("src/main.rs"), &program(project))?;
+    let lock = folder.join("Cargo.lock");
+    let known = folder.join("Cargo.lock.model");
+    let of_model = fs::read_to_string(project.workspace.join("Cargo.lock")).unwrap_or_default();
+    // Cargo goes on from there with what the program needs besides.
+    if !lock.is_file() || fs::read_to_string(&known).ok().as_deref() != Some(of_model.as_str()) {
+        fs::write(&lock, locked(&of_model, &tested())?)?;
+        fs::write(&known, of_model)?;
     }
+    Ok(folder)
 }
 
 /// The versions of other packages that this command was tested with, where it comes from a clone.
@@ -232,7 +226,7 @@ fn program(project: &Project) -> String {
 }
 
 /// A file that is right already stays untouched, so that cargo sees no change.
-fn write(path: &Path, text: &str) -> Result<()> {
+pub fn write(path: &Path, text: &str) -> Result<()> {
     if fs::read_to_string(path).ok().as_deref() == Some(text) {
         return Ok(());
     }

@@ -1,9 +1,8 @@
 //! Begins a model: a crate of its own, from one of those that come with this command.
 
-use crate::builder::tested;
+use crate::builder::{cargo, tested, write};
 use anyhow::{Context, Result, bail, ensure};
 use fmu_package::terminal::short;
-use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -62,7 +61,7 @@ pub fn new(options: &Options) -> Result<()> {
     };
     let export = dependency()?;
     // Cargo knows what may be a name, and of the workspace and the repository around.
-    let cargo: OsString = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let cargo = cargo();
     let mut command = Command::new(&cargo);
     command.args(["new", "--quiet", "--lib", "--edition", "2024", "--name", &name]).arg(folder);
     let output =
@@ -104,10 +103,6 @@ pub fn new(options: &Options) -> Result<()> {
         },
     );
     Ok(())
-}
-
-fn write(path: &Path, text: &str) -> Result<()> {
-    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// Whether another folder's `Cargo.lock` is in force.

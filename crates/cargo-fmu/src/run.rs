@@ -153,7 +153,7 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<()> {
     let table = options.input.as_deref().map(Table::read).transpose()?;
     let time = times(options, description, table.as_ref())?;
     let courses = match &table {
-        Some(table) => table.at(&time)?,
+        Some(table) => table.at(&time),
         None => Vec::new(),
     };
     let shown = shown(&options.show, description)?;
@@ -304,7 +304,7 @@ impl Table {
     }
 
     /// The inputs at these times, straight lines between the given ones.
-    fn at(&self, times: &[f64]) -> Result<Vec<(String, Vec<f64>)>> {
+    fn at(&self, times: &[f64]) -> Vec<(String, Vec<f64>)> {
         let value = |values: &[f64], time: f64| {
             let after = self.time.partition_point(|given| *given <= time).clamp(1, self.time.len() - 1);
             let (begin, end) = (self.time[after - 1], self.time[after]);
@@ -312,6 +312,6 @@ impl Table {
             values[after - 1] + part * (values[after] - values[after - 1])
         };
         let course = |values: &[f64]| times.iter().map(|time| value(values, *time)).collect();
-        Ok(self.inputs.iter().map(|(name, values)| (name.clone(), course(values))).collect())
+        self.inputs.iter().map(|(name, values)| (name.clone(), course(values))).collect()
     }
 }

@@ -685,13 +685,25 @@ impl Instance {
         if self.arrays.among(unknowns) || self.arrays.among(knowns) {
             return self.directional_derivative_of_elements(unknowns, knowns, seed, result);
         }
+        self.directional_derivative_of_variables(unknowns, knowns, seed, result)
+    }
+
+    /// The call, with a value for each scalar and for each element of an array.
+    fn directional_derivative_of_variables(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        result: &mut [f64],
+    ) -> Result<(), Refusal> {
         let (unknown, m) = (unknowns.as_ptr(), unknowns.len());
         let (known, n) = (knowns.as_ptr(), knowns.len());
-        let (seed, result) = (seed.as_ptr(), result.as_mut_ptr());
+        let (seed, seed_count) = (seed.as_ptr(), seed.len());
+        let (result, count) = (result.as_mut_ptr(), result.len());
         call!(
             self,
             fmi2GetDirectionalDerivative(unknown, m, known, n, seed, result),
-            fmi3GetDirectionalDerivative(unknown, m, known, n, seed, n, result, m)
+            fmi3GetDirectionalDerivative(unknown, m, known, n, seed, seed_count, result, count)
         )
     }
 
@@ -707,15 +719,8 @@ impl Instance {
         let (of_unknowns, of_knowns) = (self.arrays.whole(unknowns), self.arrays.whole(knowns));
         let (mut seeds, mut results) = (vec![0.0; of_knowns.count], vec![0.0; of_unknowns.count]);
         of_knowns.places.iter().zip(seed).for_each(|(place, seed)| seeds[*place] += seed);
-        let (unknown, m) = (of_unknowns.references.as_ptr(), of_unknowns.references.len());
-        let (known, n) = (of_knowns.references.as_ptr(), of_knowns.references.len());
-        let (seed, seed_count) = (seeds.as_ptr(), seeds.len());
-        let (sensitivity, count) = (results.as_mut_ptr(), results.len());
-        call!(
-            self,
-            fmi2GetDirectionalDerivative(unknown, m, known, n, seed, sensitivity),
-            fmi3GetDirectionalDerivative(unknown, m, known, n, seed, seed_count, sensitivity, count)
-        )?;
+        let (unknowns, knowns) = (&of_unknowns.references, &of_knowns.references);
+        self.directional_derivative_of_variables(unknowns, knowns, &seeds, &mut results)?;
         of_unknowns.places.iter().zip(result).for_each(|(place, value)| *value = results[*place]);
         Ok(())
     }

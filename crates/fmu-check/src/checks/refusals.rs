@@ -106,32 +106,21 @@ fn attacks(checker: &Checker, interface: Interface, time: f64, size: f64, states
                 Some(if fmi3 { Grade::Violation } else { Grade::Fragile }),
             );
         }
-        if variable.causality == "output" && variable.initial == "calculated" && !seen.contains(&"output") {
-            seen.push("output");
+        let is_fixed = variable.causality == "parameter" && variable.variability == "fixed";
+        let (once, what) = if variable.causality == "output" && variable.initial == "calculated" {
+            ("output", format!("a value for the output {}", variable.name))
+        } else if is_fixed {
+            let what = format!("a value for the fixed parameter {} after the initialization", variable.name);
+            (name_of_fixed(name), what)
+        } else {
+            continue;
+        };
+        if !seen.contains(&once) {
+            seen.push(once);
             let first = input_of(checker, kind);
             let references: Vec<u64> = first.into_iter().chain([reference]).collect();
             let bits = vec![other; references.len()];
-            add(
-                &format!("Set{name}"),
-                set(references, kind, bits),
-                format!("a value for the output {}", variable.name),
-                Some(Grade::Note),
-            );
-        }
-        if variable.causality == "parameter"
-            && variable.variability == "fixed"
-            && !seen.contains(&name_of_fixed(name))
-        {
-            seen.push(name_of_fixed(name));
-            let first = input_of(checker, kind);
-            let references: Vec<u64> = first.into_iter().chain([reference]).collect();
-            let bits = vec![other; references.len()];
-            add(
-                &format!("Set{name}"),
-                set(references, kind, bits),
-                format!("a value for the fixed parameter {} after the initialization", variable.name),
-                Some(Grade::Note),
-            );
+            add(&format!("Set{name}"), set(references, kind, bits), what, Some(Grade::Note));
         }
     }
     let float = if fmi3 { "Float64" } else { "Real" };
