@@ -157,7 +157,8 @@ fn found(fmu: &Path, options: &[&str]) -> (Vec<(String, String)>, serde_json::Va
 fn caught(fmi: u32, mutant: &str, topic: &str, name: &str, change: impl Fn(String) -> String) {
     let folder = TempDir::new().expect("a folder");
     let path = fmu(folder.path(), fmi, mutant, change);
-    let (found, report) = found(&path, &["--only", topic, "--no-shrink", "--limit", "3", "--repeat", "0.3"]);
+    // Enough for 50 cycles on a busy machine; fewer are not judged.
+    let (found, report) = found(&path, &["--only", topic, "--no-shrink", "--limit", "3", "--repeat", "1.5"]);
     assert!(
         found.iter().any(|(other, _)| other == name),
         "{mutant} is not found as {name}: {found:?} {}",
