@@ -12,6 +12,7 @@ use crate::sample::{FactorSample, Point, Sampler};
 use anyhow::{Result, bail, ensure};
 use fmu_export::fmi3::independent;
 use fmu_export::{BaseType, Causality, Exported, Initial, Value, Variability, Variable};
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 
 /// The lists of unknowns, each unknown with what it depends on.
@@ -179,7 +180,7 @@ fn find<M: Exported>(is_it: impl Fn(&Variable<M>) -> bool) -> Vec<u32> {
 /// Adds to what was found by trying what the model declares, or what cannot be ruled out.
 fn with_declared<M: Exported>(found: Unknown, knowns: &[u32]) -> Result<Unknown> {
     let unknown = variable::<M>(found.vr);
-    let declared: Option<Vec<u32>> = unknown.dependencies().map(Iterator::collect);
+    let declared: Option<HashSet<u32>> = unknown.dependencies().map(Iterator::collect);
     let (time, of_time) = independent::<M>();
     let names_time = unknown.depends_on_time() == Some(true);
     let is_declared = |known: u32| {
@@ -196,8 +197,9 @@ fn with_declared<M: Exported>(found: Unknown, knowns: &[u32]) -> Result<Unknown>
     let is_tried = |vr: u32| {
         known::<M>(vr).is_none_or(|known| !matches!(known.base(), BaseType::String | BaseType::Binary))
     };
-    let kind = |known: u32| match found.dependencies.iter().find(|(found, _)| *found == known) {
-        Some((_, kind)) if M::INFO.smooth => Some(*kind),
+    let kinds: HashMap<u32, DependencyKind> = found.dependencies.iter().copied().collect();
+    let kind = |known: u32| match kinds.get(&known) {
+        Some(kind) if M::INFO.smooth => Some(*kind),
         None if M::INFO.smooth && declared.is_none() && is_tried(known) => None,
         _ => is_declared(known).then_some(DependencyKind::Dependent),
     };
@@ -229,19 +231,29 @@ fn by_derivative<M: Exported>(
         let factors: Option<Vec<_>> = samples.map(|sample| Some((sample, partial(sample)?))).collect();
         factors.filter(|factors| !factors.is_empty())
     };
-    let mut list = Vec::new();
-    for &unknown in unknowns {
-        let mut dependencies = Vec::new();
-        for &known in knowns {
-            let kind = match partials(unknown, known) {
-                Some(factors) => factor_kind(&factors),
-                None => sampler.reactions(known, &[unknown])?.of(0).map(|_| DependencyKind::Dependent),
-            };
-            dependencies.extend(kind.map(|kind| (known, kind)));
+    let mut list: Vec<Unknown> = unknowns.iter().map(none_known).collect();
+    for &known in knowns {
+        let mut others = Vec::new();
+        for unknown in &mut list {
+            match partials(unknown.vr, known) {
+                Some(factors) => {
+                    unknown.dependencies.extend(factor_kind(&factors).map(|kind| (known, kind)));
+                }
+                None => others.push(unknown),
+            }
         }
-        list.push(Unknown { vr: unknown, dependencies });
+        let places: Vec<u32> = others.iter().map(|unknown| unknown.vr).collect();
+        let reactions = sampler.reactions(known, &places)?;
+        for (place, unknown) in others.into_iter().enumerate() {
+            let kind = reactions.of(place).map(|_| DependencyKind::Dependent);
+            unknown.dependencies.extend(kind.map(|kind| (known, kind)));
+        }
     }
     Ok(list)
+}
+
+fn none_known(vr: &u32) -> Unknown {
+    Unknown { vr: *vr, dependencies: Vec::new() }
 }
 
 /// The kind of dependency that has these factors; `None` if they are all zero.
@@ -269,8 +281,7 @@ fn factor_kind<M>(factors: &[(&FactorSample<M>, f64)]) -> Option<DependencyKind>
 
 /// Dependencies during initialization, from the values; `fixed` and `tunable` are not allowed there.
 fn by_value<M: Exported>(sampler: &mut Sampler<M>, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
-    let unknown = |vr: &u32| Unknown { vr: *vr, dependencies: Vec::new() };
-    let mut list: Vec<Unknown> = unknowns.iter().map(unknown).collect();
+    let mut list: Vec<Unknown> = unknowns.iter().map(none_known).collect();
     for &known in knowns {
         let reactions = sampler.reactions(known, unknowns)?;
         for (place, unknown) in list.iter_mut().enumerate() {
@@ -323,7 +334,8 @@ impl<M: Exported> Sampler<M> {
         let time = known_of.is_none_or(|known| known.causality() == Causality::Independent);
         let is_known = |of: &Variable<M>| known_of.is_some_and(|known| known.name() == of.name());
         let value = |model: &M, vr: u32| variable::<M>(vr).value(model).unwrap_or(Value::Real(0.0));
-        for _ in 0..16 {
+        let points = if unknowns.is_empty() { 0 } else { 16 };
+        for _ in 0..points {
             let (point, before) = self.draw(None, true, |_| true)?;
             let (changed, after) = self.draw(Some(&point), time, is_known)?;
             if changed == point {
