@@ -2,6 +2,9 @@
 
 mod base_type;
 pub mod c_types;
+#[cfg(feature = "calls")]
+#[allow(unsafe_code, reason = "a function is called at an address")]
+pub mod calls;
 pub mod fmi2;
 pub mod fmi3;
 mod log_category;

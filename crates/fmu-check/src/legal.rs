@@ -2,7 +2,7 @@
 
 use crate::description::Description;
 use crate::script::{Arg, NOBODY, Numbered, Step};
-use crate::worker::functions::signature;
+use fmi_abi::calls::signature;
 use fmi_abi::{Interface, Mode, Standard};
 use std::collections::HashMap;
 

@@ -73,8 +73,23 @@ pub trait Either: Send {
     where
         Self: Sized;
 
+    /// Calls the function of this name with arguments as words; those that are not there are 0 or NULL.
+    ///
+    /// # Safety
+    /// The words are what the function takes, as in C.
+    ///
+    /// # Panics
+    /// When there is none.
+    unsafe fn call(&self, name: &str, words: &[u64]) -> Status;
+
     /// Calls the function of this name, with zeros and NULL for arguments.
-    fn call_zeros(&self, name: &str) -> Status;
+    ///
+    /// # Panics
+    /// When there is none.
+    fn call_with_zeros(&self, name: &str) -> Status {
+        // SAFETY: nothing to follow.
+        unsafe { self.call(name, &[]) }
+    }
 
     /// The messages since the last call of this.
     fn take_log(&self) -> Vec<Message>;
@@ -167,7 +182,7 @@ pub trait Either: Send {
     where
         Self: Sized,
     {
-        Self::functions().iter().map(|name| (*name, self.call_zeros(name))).collect()
+        Self::functions().iter().map(|name| (*name, self.call_with_zeros(name))).collect()
     }
 
     /// Asserts OK.

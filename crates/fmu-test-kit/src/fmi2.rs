@@ -2,6 +2,7 @@
 
 use crate::importer::{Log, importer, remember};
 use crate::{Arguments, Borrowed, Either, Message, Updated, either, library::functions_of};
+use fmi_abi::calls;
 pub use fmi_abi::fmi2::Functions;
 use fmi_abi::fmi2::types::*;
 use fmu_export::Mode::{self, *};
@@ -149,8 +150,9 @@ impl Either for Importer {
         }
     }
 
-    fn call_zeros(&self, name: &str) -> Status {
-        self.call_with_zeros(name)
+    unsafe fn call(&self, name: &str, words: &[u64]) -> Status {
+        // SAFETY: the function of this name, and the caller's promise.
+        Status::from_c(unsafe { calls::call(self.address_of(name), name, self.instance.cast(), words) })
     }
 
     fn take_log(&self) -> Vec<Message> {

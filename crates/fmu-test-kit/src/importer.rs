@@ -4,7 +4,6 @@ use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmu_export::{Category, Exported, Interface, Status};
 use std::ffi::{CStr, CString};
 use std::ops::Deref;
-use std::ptr::{null, null_mut};
 use std::sync::Mutex;
 
 /// What the logger was told.
@@ -136,25 +135,6 @@ impl<F> Drop for Borrowed<F> {
     }
 }
 
-/// 0, or NULL.
-pub(crate) trait Zero {
-    const ZERO: Self;
-}
-
-macro_rules! zero {
-    ($($type:ty: $zero:expr),+) => { $(impl Zero for $type { const ZERO: Self = $zero; })+ };
-}
-
-zero!(u8: 0, i32: 0, u32: 0, usize: 0, f64: 0.0);
-
-impl<T> Zero for *const T {
-    const ZERO: Self = null();
-}
-
-impl<T> Zero for *mut T {
-    const ZERO: Self = null_mut();
-}
-
 /// The importer of a standard. The module has `make`, for instances, and `functions_of` a model.
 macro_rules! importer {
     (
@@ -257,13 +237,9 @@ macro_rules! importer {
                 }
             )+
 
-            /// Calls the one of this name, with zeros and NULL for arguments.
-            ///
-            /// # Panics
-            /// When there is none.
-            pub fn call_with_zeros(&self, name: &str) -> Status {
+            fn address_of(&self, name: &str) -> *const c_void {
                 match name {
-                    $(stringify!($function) => self.$function($(<$type as $crate::importer::Zero>::ZERO),*),)+
+                    $(stringify!($function) => self.functions.$function as *const c_void,)+
                     _ => panic!("there is no function {name}"),
                 }
             }

@@ -95,3 +95,5 @@ macro_rules! fmi2_functions {
 }
 
 fmi2_functions!(crate::table);
+#[cfg(feature = "calls")]
+pub(crate) use fmi2_functions as functions;

@@ -177,3 +177,5 @@ macro_rules! fmi3_functions {
 }
 
 fmi3_functions!(crate::table);
+#[cfg(feature = "calls")]
+pub(crate) use fmi3_functions as functions;

@@ -3,7 +3,7 @@
 use crate::checker::{Checker, Claim, refused_one};
 use crate::finding::{Finding, Grade, Judge};
 use crate::script::{Arg, End, Kind, Step};
-use crate::worker::functions::{fmi2, fmi3, signatures};
+use fmi_abi::calls::{fmi2, fmi3, signatures};
 use fmi_abi::{Interface, Standard};
 use std::sync::Arc;
 

@@ -5,8 +5,8 @@ use crate::checker::{Checker, Claim};
 use crate::description::{kind_of, type_name};
 use crate::finding::{Grade, Judge};
 use crate::script::{Arg, End, Kind, NOBODY, Script, Step};
-use crate::worker::functions::signatures;
 use crate::writer::{Course, Value, Writer, readable};
+use fmi_abi::calls::signatures;
 use fmi_abi::{Interface, Mode};
 use std::sync::Arc;
 
@@ -109,9 +109,9 @@ pub fn calls(checker: &Checker) -> anyhow::Result<()> {
                         return if argument.of.contains("FMU") { Arg::Null } else { plain(argument.of) };
                     }
                     at += 1;
-                    match at - 1 == null {
-                        true => Arg::Null,
-                        false if argument.of.starts_with("*const") && argument.name.contains("vr") => {
+                    match argument.pointee() {
+                        _ if at - 1 == null => Arg::Null,
+                        Some(("ValueReference", true)) => {
                             let of_type = checker.description.variables.iter().find(|variable| {
                                 variable.size == Some(1)
                                     && variable
@@ -123,8 +123,8 @@ pub fn calls(checker: &Checker) -> anyhow::Result<()> {
                                 vec![of_type.map_or(0, |variable| u64::from(variable.reference))],
                             )
                         }
-                        false if argument.of.starts_with("*const") => Arg::In(Kind::F64, vec![0]),
-                        false => Arg::Out(Kind::F64, 4),
+                        Some((_, true)) => Arg::In(Kind::F64, vec![0]),
+                        _ => Arg::Out(Kind::F64, 4),
                     }
                 });
                 let args: Vec<Arg> = args.collect();

@@ -5,7 +5,7 @@ use super::{Names, head, library, phases};
 use crate::description::Description;
 use crate::finding::Finding;
 use crate::script::{Arg, Kind, NOBODY, Numbered, Setting, Step};
-use crate::worker::functions::signature;
+use fmi_abi::calls::signature;
 use std::fmt::Write as _;
 
 /// The program.

@@ -65,7 +65,7 @@ fn settings() -> Vec<String> {
     #[cfg(unix)]
     {
         // SAFETY: asks for the name.
-        let locale = unsafe { super::functions::text(libc::setlocale(libc::LC_ALL, std::ptr::null())) };
+        let locale = unsafe { super::text_at(libc::setlocale(libc::LC_ALL, std::ptr::null())) };
         found.push(format!("locale {}", String::from_utf8_lossy(&locale.unwrap_or_default())));
         for (name, signal) in [
             ("SIGSEGV", libc::SIGSEGV),

@@ -1,18 +1,18 @@
 //! The process that loads the library and plays a script. It may be lost at any step: what came of each is written down
 //! before the next.
 
-pub mod functions;
 mod measure;
 mod memory;
 
 use crate::script::{Arg, Kind, Make, Message, NOBODY, Numbered, Outcome, Script, Setting, Step, Written};
 use fmi_abi::c_types::{c_char, c_int, c_void};
+use fmi_abi::calls;
 use fmi_abi::fmi2::types::{fmi2CallbackFunctions, fmi2CallbackLogger};
 use fmi_abi::fmi3::types::fmi3LogMessageCallback;
 use memory::{FILL, Guarded};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::ffi::CString;
+use std::ffi::{CStr, CString};
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -155,7 +155,7 @@ unsafe extern "C" {
 /// The texts end with zeros, or the process may be lost.
 unsafe fn remember(environment: *mut c_void, status: c_int, category: *const c_char, text: *const c_char) {
     // SAFETY: the caller's promise.
-    let [category, text] = [category, text].map(|pointer| unsafe { functions::text(pointer) });
+    let [category, text] = [category, text].map(|pointer| unsafe { text_at(pointer) });
     let mut said = locked(&SAID);
     if said.len() < 1000 {
         said.push((environment as usize, Message { status, category, text, at_home: true }));
@@ -275,7 +275,7 @@ impl Player {
                     // SAFETY: these functions have no arguments and return a text.
                     outcome.text = unsafe {
                         let function: unsafe extern "C" fn() -> *const c_char = std::mem::transmute(address);
-                        functions::text(function())
+                        text_at(function())
                     };
                 }
                 None => outcome.missing = true,
@@ -453,7 +453,7 @@ impl Player {
         let mut kept = Vec::new();
         let words: Vec<u64> = args.iter().map(|arg| self.word(arg, &mut kept)).collect();
         // SAFETY: this is what the process is for.
-        let status = unsafe { functions::call(address, function, handle as *mut c_void, &words) };
+        let status = unsafe { calls::call(address, function, handle as *mut c_void, &words) };
         outcome.status = Some(status);
         let succeeded = status == 0 || status == 1;
         for kept in &kept {
@@ -603,7 +603,7 @@ fn read(array: &Guarded, kind: Kind, count: usize, succeeded: bool) -> Written {
         let texts = words.map(|word| {
             let written = succeeded && word != untouched;
             // SAFETY: where the call succeeded, the pointers that were written are those of texts.
-            if written { unsafe { functions::text(word as usize as *const c_char) } } else { None }
+            if written { unsafe { text_at(word as usize as *const c_char) } } else { None }
         });
         return Written::Texts(texts.collect());
     }
@@ -633,4 +633,13 @@ fn location(setting: &Setting) -> CString {
         format!("file://{}{path}", if path.starts_with('/') { "" } else { "/" })
     };
     CString::new(text).unwrap_or_default()
+}
+
+/// A text that a function returns or passes, NULL or not.
+///
+/// # Safety
+/// It ends with a zero, or the process may be lost.
+pub unsafe fn text_at(pointer: *const c_char) -> Option<Vec<u8>> {
+    // SAFETY: the caller's promise.
+    (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) }.to_bytes().to_vec())
 }

@@ -5,7 +5,7 @@ use arbitrary::{Result, Unstructured};
 use fmu_export::fmi2::types::*;
 use fmu_export::{BaseType, Causality, Exported, Standard};
 use std::ffi::CStr;
-use std::ptr::{null, null_mut};
+use std::ptr::null;
 
 /// The value references that functions have a use for.
 pub struct Variables {
@@ -268,22 +268,13 @@ impl CallArguments {
         if self.endless { usize::MAX } else { count }
     }
 
-    /// The pointer to pass for the array at this place of the function's arguments.
-    pub fn pointer<T>(&self, place: usize, values: &[T]) -> *const T {
-        match self.faults[place] {
-            Fault::Null => null(),
+    /// The address to pass for an array with elements of this size that is at this place among the function's arrays.
+    pub fn address(&self, place: usize, array: usize, size: usize) -> usize {
+        match self.faults[place % self.faults.len()] {
+            Fault::Null => 0,
             // Never followed: the FMU refuses it. Bytes are never misaligned, and then there is no fault.
-            Fault::Misaligned if align_of::<T>() > 1 => values.as_ptr().wrapping_byte_add(1),
-            _ => values.as_ptr(),
-        }
-    }
-
-    /// The pointer to pass for an array that the function writes.
-    pub fn output<T>(&self, place: usize, values: &mut [T]) -> *mut T {
-        match self.faults[place] {
-            Fault::Null => null_mut(),
-            Fault::Misaligned if align_of::<T>() > 1 => values.as_mut_ptr().wrapping_byte_add(1),
-            _ => values.as_mut_ptr(),
+            Fault::Misaligned if size > 1 => array + 1,
+            _ => array,
         }
     }
 }

@@ -1,9 +1,10 @@
-//! One call of a function that works on an instance, and what a standard says of its functions.
+//! One call of a function that works on an instance: what each argument is, is read off the standard's list.
 
 use super::arguments::CallArguments;
-use crate::Either;
+use super::standards::Caller;
 use crate::serialized::fnv1a;
-use fmu_export::{Standard, Status};
+use fmi_abi::calls::{Argument, signature};
+use fmu_export::Status;
 use std::ffi::{CStr, c_char};
 
 /// A function with its arguments.
@@ -18,29 +19,6 @@ pub struct Call {
 pub struct Answer {
     pub status: Status,
     pub values: Vec<u64>,
-}
-
-/// A standard as the careless importer speaks it.
-#[allow(missing_docs, reason = "names of functions")]
-pub trait Caller: Either + Sized {
-    const STANDARD: Standard;
-    /// What importers call most in Co-Simulation.
-    const STEPS: &'static [&'static str];
-    /// What they call most in Model Exchange.
-    const INTEGRATION: &'static [&'static str];
-    /// From a reset to the end of the initialization.
-    const BEGINNING: &'static [&'static str];
-    /// For Co-Simulation and for Model Exchange.
-    const INSTANTIATE: [&'static str; 2];
-    const FREE: &'static str;
-    /// Of saved states: get, set, free, size, serialize, de-serialize.
-    const HANDLES: [&'static str; 6];
-
-    /// Checks what needs no instance; the names of the functions.
-    fn check_version(&self) -> &'static [&'static str];
-
-    /// Calls the function with these arguments.
-    fn call(&self, function: &'static str, out: &mut Outputs) -> Status;
 }
 
 /// The functions of saved states have handles besides arguments: the session calls them.
@@ -59,72 +37,236 @@ impl Call {
     /// Calls the function. Panics if it answers what it must not: a status that no function here has, a value that is no
     /// finite number, more values than were asked for.
     pub fn run<F: Caller>(&self, fmu: &F) -> Answer {
-        let mut out = Outputs { arguments: &self.arguments, values: Vec::new() };
-        let (name, status) = (self.function, fmu.call(self.function, &mut out));
+        let (name, a) = (self.function, &self.arguments);
+        let list = signature(name).expect("a function of the standard").arguments;
+        let mut arrays: Vec<Array> = Vec::new();
+        let mut flags = a.flags.iter().cycle();
+        let word = |argument: &Argument| {
+            if let Some(pointee) = argument.pointee() {
+                let mut array = Array::new(pointee, argument.name, list, name, a);
+                let address = a.address(arrays.len(), array.elements.address(), array.elements.size);
+                arrays.push(array);
+                return address as u64;
+            }
+            match (argument.of, argument.name) {
+                ("usize", of) => self.count(of) as u64,
+                (_, "tolerance") => a.numbers[2].to_bits(),
+                (_, "stop_time") => (a.numbers[0] + a.numbers[2]).to_bits(),
+                (_, "step_size") => a.numbers[1].to_bits(),
+                (of, _) if of.ends_with("Real") || of.ends_with("Float64") => a.numbers[0].to_bits(),
+                // At times none.
+                (of, _) if of.ends_with("Boolean") => match flags.next() {
+                    Some(0 | 2) => 0,
+                    other => other.map_or(0, |flag| *flag as u64),
+                },
+                _ => a.kind as u64,
+            }
+        };
+        let words: Vec<u64> = list.iter().map(word).collect();
+        // SAFETY: a function of this name, with pointers to as many values as the counts say, and one more: they live as long
+        // as `arrays`. What is NULL, misaligned or endless is refused and not followed.
+        let status = unsafe { fmu.call(name, &words) };
         let discards = (name.ends_with("Status") || name.ends_with("DoStep")) && status == Status::Discard;
         assert!(discards || [Status::Ok, Status::Error].contains(&status), "{name} answers {status:?}");
+        let mut values = Vec::new();
+        for place in 0..arrays.len() {
+            let array = &arrays[place];
+            let Some(count) = array.written else { continue };
+            assert!(array.elements.end_untouched(count), "too much: {self:?}");
+            if status == Status::Ok {
+                let before = place.checked_sub(1).map(|place| &arrays[place].elements);
+                array.values(count, before, &mut values);
+            }
+        }
         if name.ends_with("DoStep") && status == Status::Ok {
-            let [point, size, _] = self.arguments.numbers;
+            let [point, size, _] = a.numbers;
             assert!(size > 0.0 && (point + size).is_finite(), "time does not pass: {self:?}");
+            if let [_, _, early, end] = values[..] {
+                let end = f64::from_bits(end);
+                assert!(end >= point && end <= point + size, "{end}: {self:?}");
+                assert!(early == 0 || end < point + size, "not early: {self:?}");
+            }
         }
-        Answer { status, values: out.values }
+        Answer { status, values }
     }
-}
 
-/// What a call wrote.
-pub struct Outputs<'a> {
-    pub arguments: &'a CallArguments,
-    pub values: Vec<u64>,
-}
-
-impl<'a> Outputs<'a> {
-    /// Calls with an array of `count` values to write: nothing is written behind it. `fault` is the place of what may be
-    /// wrong with the pointer.
-    pub fn array<T: Clone + PartialEq>(
-        &mut self,
-        (fault, count): (usize, usize),
-        untouched: T,
-        call: impl FnOnce(*mut T) -> Status,
-        bits: impl Fn(&T) -> u64,
-    ) -> Status {
-        let mut array = vec![untouched.clone(); count.max(1) + 1];
-        let status = call(self.arguments.output(fault, &mut array));
-        assert!(array[count..].iter().all(|value| *value == untouched), "too much: {:?}", self.arguments);
-        if status == Status::Ok {
-            self.values.extend(array[..count].iter().map(bits));
+    /// The number to pass for the size of this name.
+    fn count(&self, of: &str) -> usize {
+        let (a, adjoint) = (&self.arguments, self.function.contains("Adjoint"));
+        match of {
+            "n_known" => a.known.len(),
+            "n_seed" if !adjoint => a.known_values,
+            "n_sensitivity" if adjoint => a.known_values,
+            "n_seed" | "n_sensitivity" => a.count(a.values),
+            // At times another number of values.
+            "n_value" => a.count(a.values).saturating_add((a.kind == 3).into()),
+            _ => a.count(a.vr.len()),
         }
-        status
-    }
-
-    /// The same with real numbers.
-    pub fn reals(&mut self, places: (usize, usize), call: impl FnOnce(*mut f64) -> Status) -> Status {
-        self.array(places, f64::INFINITY, call, |value| finite(*value))
-    }
-
-    /// The same with texts.
-    pub fn texts(&mut self, call: impl FnOnce(*mut *const c_char) -> Status) -> Status {
-        let places = (1, self.arguments.values);
-        self.array(places, UNTOUCHED_TEXT.as_ptr(), call, |text| {
-            assert!(!text.is_null() && *text != UNTOUCHED_TEXT.as_ptr(), "no text");
-            // SAFETY: a string of the FMU's, valid until the next call.
-            let bytes = unsafe { CStr::from_ptr(*text) }.to_bytes();
-            assert!(std::str::from_utf8(bytes).is_ok(), "no UTF-8: {bytes:?}");
-            u64::from_le_bytes(fnv1a(bytes))
-        })
     }
 }
 
-static UNTOUCHED_TEXT: &CStr = c"untouched";
+/// What is in an array before the FMU writes.
+const UNTOUCHED: u8 = 0xa5;
+
+/// Numbers or pointers of one size, with two more behind them, aligned for any of them.
+struct Elements {
+    size: usize,
+    memory: Vec<u64>,
+}
+
+impl Elements {
+    fn new(size: usize, count: usize, bits: impl Iterator<Item = u64>) -> Self {
+        let mut bytes: Vec<u8> = bits.flat_map(|bits| bits.to_le_bytes().into_iter().take(size)).collect();
+        bytes.resize((count + 2).next_multiple_of(8) * size, UNTOUCHED);
+        let (words, _) = bytes.as_chunks();
+        Self { size, memory: words.iter().map(|word| u64::from_le_bytes(*word)).collect() }
+    }
+
+    fn address(&mut self) -> usize {
+        self.memory.as_mut_ptr().expose_provenance()
+    }
+
+    /// The bits of the element at this place.
+    fn bits(&self, place: usize) -> u64 {
+        let at = place * self.size;
+        let shifted = self.memory[at / 8] >> (8 * (at % 8));
+        if self.size == 8 { shifted } else { shifted & ((1 << (8 * self.size)) - 1) }
+    }
+
+    fn untouched(&self) -> u64 {
+        u64::from_le_bytes([UNTOUCHED; 8]) >> (64 - 8 * self.size)
+    }
+
+    /// Whether nothing is written behind so many.
+    fn end_untouched(&self, count: usize) -> bool {
+        let all = 8 * self.memory.len() / self.size;
+        (count..all).all(|place| self.bits(place) == self.untouched())
+    }
+}
+
+/// An array that a function reads or writes.
+struct Array {
+    /// The type of its elements, without the standard's name.
+    of: &'static str,
+    elements: Elements,
+    /// How many may be written, if any.
+    written: Option<usize>,
+    /// What the elements point to.
+    _bytes: Vec<u8>,
+}
+
+impl Array {
+    /// For the argument of this name, which points to such elements.
+    fn new(
+        (of, to_read): (&'static str, bool),
+        name: &str,
+        list: &[Argument],
+        function: &str,
+        a: &CallArguments,
+    ) -> Self {
+        let size = match of {
+            "Boolean" if function.starts_with("fmi2") => 4,
+            "Int8" | "UInt8" | "Boolean" | "Clock" => 1,
+            "Int16" | "UInt16" => 2,
+            "Float64" | "Real" | "Int64" | "UInt64" | "String" | "Binary" | "usize" => 8,
+            _ => 4,
+        };
+        let mut bytes = Vec::new();
+        if !to_read {
+            let count = match list.iter().rfind(|other| other.of == "usize").map(|of| of.name) {
+                _ if of == "EventInfo" => EVENT_INFO / size,
+                Some("n_value") => a.values,
+                Some("n_sensitivity") if function.contains("Adjoint") => a.known_values,
+                Some("n_sensitivity") => a.values,
+                Some(_) => a.vr.len(),
+                None => 1,
+            };
+            let elements = Elements::new(size, count, std::iter::empty());
+            return Self { of, elements, written: Some(count), _bytes: bytes };
+        }
+        let address = |text: *const c_char| text.expose_provenance() as u64;
+        // As many as any count may say.
+        let room = a.values.max(a.known_values).max(a.vr.len()) + 2;
+        let bits: Vec<u64> = match (of, name) {
+            ("ValueReference", "known") => a.known.iter().map(|vr| u64::from(*vr)).collect(),
+            ("ValueReference", _) => a.vr.iter().map(|vr| u64::from(*vr)).collect(),
+            ("String", "categories") => a.categories.iter().map(|text| address(*text)).collect(),
+            ("String", _) => a.texts.iter().map(|text| address(*text)).collect(),
+            // Some are longer than any variable here allows.
+            ("usize", _) => a.integers.iter().map(|n| *n as u64 % (LONGEST + 1)).collect(),
+            ("Binary", _) => {
+                bytes = a.reals.iter().flat_map(|value| value.to_le_bytes()).collect();
+                bytes.resize(bytes.len() + LONGEST as usize, 7);
+                vec![bytes.as_ptr().expose_provenance() as u64; room]
+            }
+            (_, "order") => a.orders.iter().map(|order| *order as u64).collect(),
+            ("Real" | "Float64", _) => a.reals.iter().map(|value| value.to_bits()).collect(),
+            ("Float32", _) => a.reals.iter().map(|value| (*value as f32).to_bits().into()).collect(),
+            _ => a.integers.iter().map(|value| *value as u64).collect(),
+        };
+        let rest = match of {
+            "String" | "usize" => 0,
+            _ => bits.first().copied().unwrap_or_default(),
+        };
+        let count = bits.len().max(room);
+        let bits = bits.into_iter().chain(std::iter::repeat(rest)).take(count);
+        Self { of, elements: Elements::new(size, count, bits), written: None, _bytes: bytes }
+    }
+
+    /// Adds what was written, `sizes` being the array before it.
+    fn values(&self, count: usize, sizes: Option<&Elements>, values: &mut Vec<u64>) {
+        if self.of == "EventInfo" {
+            let bits = |place| self.elements.bits(place);
+            values.extend((0..5).map(|place| truth(bits(place))));
+            values.push(finite(f64::from_bits(bits(6) | bits(7) << 32)));
+            return;
+        }
+        for place in 0..count {
+            let bits = self.elements.bits(place);
+            assert!(self.elements.size < 4 || bits != self.elements.untouched(), "no value");
+            values.push(match self.of {
+                "Real" | "Float64" => finite(f64::from_bits(bits)),
+                "Float32" => {
+                    finite(f32::from_bits(bits as u32).into());
+                    bits
+                }
+                "Boolean" | "Clock" => truth(bits),
+                "String" => {
+                    assert!(bits != 0, "no text");
+                    // SAFETY: a string of the FMU's, valid until the next call.
+                    let text = unsafe { CStr::from_ptr(std::ptr::with_exposed_provenance(bits as usize)) }
+                        .to_bytes();
+                    assert!(std::str::from_utf8(text).is_ok(), "no UTF-8: {text:?}");
+                    u64::from_le_bytes(fnv1a(text))
+                }
+                "Binary" => {
+                    let size = sizes.expect("their sizes come before").bits(place) as usize;
+                    // SAFETY: as many bytes of the FMU's, valid until the next call.
+                    let bytes = unsafe {
+                        std::slice::from_raw_parts(std::ptr::with_exposed_provenance(bits as usize), size)
+                    };
+                    u64::from_le_bytes(fnv1a(bytes))
+                }
+                _ => bits,
+            });
+        }
+    }
+}
+
+/// The longest bytes that are set.
+const LONGEST: u64 = 24;
+
+/// The bytes of `fmi2EventInfo`: five truth values, a gap, a number.
+const EVENT_INFO: usize = size_of::<fmu_export::fmi2::types::fmi2EventInfo>();
 
 /// The bits of a number, which is one.
-pub fn finite(value: f64) -> u64 {
+fn finite(value: f64) -> u64 {
     assert!(value.is_finite(), "{value} is no number to answer");
     value.to_bits()
 }
 
 /// The bits of a truth value, which is one.
-pub fn truth(flag: impl Into<i64>) -> u64 {
-    let flag = flag.into();
-    assert!([0, 1].contains(&flag), "{flag} is no truth value");
-    flag as u64
+fn truth(flag: u64) -> u64 {
+    assert!(flag <= 1, "{flag} is no truth value");
+    flag
 }

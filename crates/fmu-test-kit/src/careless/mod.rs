@@ -9,16 +9,16 @@
 
 mod arguments;
 mod call;
-mod fmi2;
-mod fmi3;
+mod standards;
 
 use crate::serialized::{fnv1a, sealed, time};
 use crate::{Arguments, Importer, Message};
 use arbitrary::{Result, Unstructured};
 use arguments::CallArguments;
+pub use call::has_handles;
 use call::{Answer, Call};
-pub use call::{Caller, has_handles};
 use fmu_export::{Exported, Interface, Standard, Status};
+pub use standards::Caller;
 use std::collections::BTreeMap;
 use std::ffi::{CString, c_void};
 use std::marker::PhantomData;
@@ -255,7 +255,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
     fn initialize(&mut self, index: usize) {
         let Some(slot) = &mut self.instances[index] else { return };
         // With 0 for all times, which are not limited.
-        let begin = |function: &&'static str| (*function, slot.fmu.call_zeros(function));
+        let begin = |function: &&'static str| (*function, slot.fmu.call_with_zeros(function));
         let statuses: Vec<_> = F::BEGINNING.iter().map(begin).collect();
         slot.start_over();
         for (function, status) in statuses {

@@ -1,7 +1,7 @@
 //! The functions of both standards, called by their names with arguments as words: the one place that knows their types.
 
-use fmi_abi::c_types::{c_char, c_int, c_void};
-use fmi_abi::{Rule, Standard};
+use crate::c_types::{c_int, c_void};
+use crate::{Rule, Standard};
 
 /// The name and the type of an argument.
 #[derive(Debug)]
@@ -10,6 +10,18 @@ pub struct Argument {
     pub name: &'static str,
     /// Its type, as `fmi-abi` writes it.
     pub of: &'static str,
+}
+
+impl Argument {
+    /// What it points to, without the name of the standard, and whether that is only read; `None` if it is no pointer.
+    pub fn pointee(&self) -> Option<(&'static str, bool)> {
+        // Macros may have put a space behind the star.
+        let (mutability, of) = self.of.strip_prefix('*')?.trim_start().split_once(' ')?;
+        Some((
+            of.strip_prefix("fmi2").or_else(|| of.strip_prefix("fmi3")).unwrap_or(of),
+            mutability == "const",
+        ))
+    }
 }
 
 /// A function that works on an instance.
@@ -76,8 +88,7 @@ macro_rules! calls {
         /// Calls the function of this name at this address.
         ///
         /// # Safety
-        /// The address is that of a function of this name as the standard declares it, or of one that breaks the
-        /// standard: that is what this program is for, in a process that may be lost.
+        /// The address is that of a function of this name as the standard declares it, and the words are what it takes.
         pub unsafe fn call(address: *const c_void, name: &str, instance: *mut c_void, words: &[u64]) -> c_int {
             let mut words = words.iter().copied();
             match name {
@@ -99,16 +110,16 @@ macro_rules! calls {
 
 /// FMI 2.0.
 pub mod fmi2 {
-    use super::*;
-    use fmi_abi::fmi2::{Function, types::*};
-    fmi_abi::fmi2_functions!(calls);
+    use super::{Argument, FromWord, Signature, c_int, c_void};
+    use crate::fmi2::{Function, types::*};
+    crate::fmi2::functions!(calls);
 }
 
 /// FMI 3.0.
 pub mod fmi3 {
-    use super::*;
-    use fmi_abi::fmi3::{Function, types::*};
-    fmi_abi::fmi3_functions!(calls);
+    use super::{Argument, FromWord, Signature, c_int, c_void};
+    use crate::fmi3::{Function, types::*};
+    crate::fmi3::functions!(calls);
 }
 
 /// The functions of a standard that work on an instance.
@@ -138,13 +149,4 @@ pub unsafe fn call(address: *const c_void, name: &str, instance: *mut c_void, wo
             fmi2::call(address, name, instance, words)
         }
     }
-}
-
-/// A text that a function returns or passes, NULL or not.
-///
-/// # Safety
-/// It ends with a zero, or the process may be lost.
-pub unsafe fn text(pointer: *const c_char) -> Option<Vec<u8>> {
-    // SAFETY: the caller's promise.
-    (!pointer.is_null()).then(|| unsafe { std::ffi::CStr::from_ptr(pointer) }.to_bytes().to_vec())
 }
