@@ -1,14 +1,15 @@
 // The FMU of this page, to be tried: motions, inputs by hand, parameters, what comes of them.
 
 /**
- * Inputs over time, by name; `table` has what was so far.
+ * Inputs over time, by name; `table` has what was so far. With the next row, a motion may write into it what it knows besides.
  * @typedef {{id: string, title: string, length: number, begin?(): void, inputs(time: number, inputs: Record<string, number>, table: Table): void}} Motion
  */
 
 /**
- * What a model has beside sliders and courses. `follow` leads inputs to where the sliders are; `move` of a view moves a slider.
+ * What a model has beside sliders and courses. Besides outputs, variables that are `recorded` are in the table, and columns that are
+ * `written` by motions. `follow` leads inputs to where the sliders are; `move` of a view moves a slider.
  * @typedef {{
- *   start: Record<string, number>, sliders: {name: string, label: string, reach: number}[], recorded: string[], motions: Motion[],
+ *   start: Record<string, number>, sliders: {name: string, label: string, reach: number}[], recorded: string[], written: string[], motions: Motion[],
  *   panels: Panel[], isMinor(name: string): boolean,
  *   follow(inputs: Record<string, number>, targets: Map<string, number>, size: number): void,
  *   view(move: (name: string, by: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, HTMLInputElement | HTMLSelectElement>},
@@ -26,14 +27,15 @@ const BY_HAND = "hand";
 
 /** A run of the FMU, calculated as far as it is asked for, and anew when something changes. */
 class Session {
-  /** @param {Description} description @param {WebAssembly.Module} module @param {string[]} recorded */
-  constructor(description, module, recorded) {
+  /** @param {Description} description @param {WebAssembly.Module} module @param {AddOn} addOn */
+  constructor(description, module, { recorded, written }) {
     this.description = description;
     this.module = module;
     this.inputs = description.numbers("input");
     const outputs = description.variables.filter((one) => (one.causality === "output" || recorded.includes(one.name)) && one.type !== "String");
     this.outputs = outputs.filter((one) => !this.inputs.includes(one));
-    this.table = new Table([...this.inputs, ...this.outputs].map((one) => one.name));
+    this.written = written;
+    this.table = new Table([...[...this.inputs, ...this.outputs].map((one) => one.name), ...written]);
     /** The start values that are not the FMU's. @type {Map<Variable, number | string>} */
     this.start = new Map();
     /** @type {Motion | null} */
@@ -106,10 +108,13 @@ class Session {
       for (const { name } of this.inputs) {
         now[name] = table.column(name)[row];
       }
-    } else if (this.motion) {
-      this.motion.inputs(time - this.description.startTime, now, table);
-    } else if (row > 0) {
-      follow(now);
+    } else {
+      this.written.forEach((name) => (table.column(name)[row] = NaN));
+      if (this.motion) {
+        this.motion.inputs(time - this.description.startTime, now, table);
+      } else if (row > 0) {
+        follow(now);
+      }
     }
     this.inputs.forEach(({ name }, place) => (table.column(name)[row] = values.inputs[place] = now[name]));
     fmu.set(inputs, values.inputs);
@@ -121,7 +126,7 @@ class Session {
 
   /** All rows, in the units of the FMU, every digit. */
   csv() {
-    const names = ["time", ...this.inputs.map((one) => one.name), ...this.outputs.map((one) => one.name)];
+    const names = ["time", ...this.inputs.map((one) => one.name), ...this.outputs.map((one) => one.name), ...this.written.filter((name) => !Number.isNaN(this.table.column(name)[0]))];
     const columns = names.map((name) => this.table.column(name));
     const lines = [names.map((name) => (/[",\s]/.test(name) ? `"${name.replaceAll('"', '""')}"` : name)).join(",")];
     for (let row = 0; row < this.table.count; row++) {
@@ -161,6 +166,7 @@ function plain(description) {
     start: {},
     sliders: real.map((one) => ({ name: one.name, label: one.name, reach: reach(one) })),
     recorded: [],
+    written: [],
     motions: [...motions, free],
     panels,
     isMinor: () => false,
@@ -257,7 +263,7 @@ async function live(packed) {
   );
   const { description } = own;
   const addOn = (addOns[description.identifier] || plain)(description, others);
-  const session = new Session(description, own.module, addOn.recorded);
+  const session = new Session(description, own.module, addOn);
   const find = (/** @type {string} */ name) => /** @type {Variable} */ (description.byName.get(name));
   const settable = description.variables.filter((one) => one.causality === "parameter" && one.variability !== "constant" && one.start !== null);
   const status = element("p", { class: "live-status", role: "status" });

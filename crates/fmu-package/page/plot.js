@@ -1,7 +1,8 @@
 // Courses over time, on canvas.
 
 /**
- * A course: the column it is in, what it is called, a name of `--curve-N`, and what turns its unit into the one shown.
+ * A course: the column it is in, what it is called, a name of a colour, and what turns its unit into the one shown.
+ * Where it is not a number, it is not shown.
  * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number}} Curve
  * @typedef {{title: string, unit: string, curves: Curve[]}} Panel
  */
@@ -162,7 +163,7 @@ class Plots {
         seek(this.timeAt(event.offsetX, sizeOf(canvas).width));
       }
     });
-    return { panel, canvas, values: keys.map(({ value }) => value), figure: element("figure", {}, caption, canvas), peak: 0 };
+    return { panel, canvas, keys, figure: element("figure", {}, caption, canvas), peak: 0 };
   }
 
   /** @param {number} x @param {number} width */
@@ -181,7 +182,7 @@ class Plots {
   }
 
   /** @param {ReturnType<Plots["panel"]>} what @param {Table} table @param {number} now @param {(name: string) => string} colour @param {boolean} isLast */
-  drawPanel({ panel, canvas, values }, table, now, colour, isLast) {
+  drawPanel({ panel, canvas, keys }, table, now, colour, isLast) {
     const { pen, width, height } = sharp(canvas);
     const { begin, end } = this.span;
     const [first, last] = [table.row(begin), Math.min(table.row(end) + 1, table.count - 1)];
@@ -224,13 +225,14 @@ class Plots {
       pen.lineWidth = 1;
       if (table.count) {
         const here = curve.factor * table.at(curve.name, now) + (curve.offset || 0);
+      keys[place].key.hidden = Number.isNaN(here);
         pen.fillStyle = colour(curve.colour);
         pen.beginPath();
         pen.arc(x(Math.min(now, table.end)), y(here), 3.5, 0, 2 * Math.PI);
         pen.fill();
         const text = shown(here, Math.max(Math.abs(low), Math.abs(high)));
-        if (values[place].textContent !== text) {
-          values[place].textContent = text;
+        if (keys[place].value.textContent !== text) {
+          keys[place].value.textContent = text;
         }
       }
     }
