@@ -256,10 +256,10 @@ async function live(packed) {
     return;
   }
   const [own, ...others] = await Promise.all(
-    packed.map(async ({ description, module }) => ({
-      description: new Description(new TextDecoder().decode(await unpacked(description))),
-      module: await WebAssembly.compile(await unpacked(module)),
-    })),
+    packed.map(async (one) => {
+      const [description, module] = await Promise.all([unpacked(one.description), unpacked(one.module).then((bytes) => WebAssembly.compile(bytes))]);
+      return { description: new Description(new TextDecoder().decode(description)), module };
+    }),
   );
   const { description } = own;
   const addOn = (addOns[description.identifier] || plain)(description, others);
