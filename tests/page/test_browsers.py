@@ -121,7 +121,14 @@ def with_visitor(fmu: Path, report: str) -> str:
 def test_the_browser_has_the_librarys_bits(fmu: Path, told: Any) -> None:
     """Over the reference experiments, the motions of the page, and one by hand: as its CSV has them."""
     assert told["errors"] == []
-    assert {one.name for one in read_experiments(fmu)} | {"tour", "fig4", "chirp", "closed-loop", "open-loop", "hand"} <= set(told["runs"])
+    assert {one.name for one in read_experiments(fmu)} | {
+        "tour",
+        "fig4",
+        "chirp",
+        "closed-loop",
+        "open-loop",
+        "hand",
+    } <= set(told["runs"])
     with Fmu(fmu) as loaded:
         for name, run in told["runs"].items():
             header, *lines = csv.reader(io.StringIO(run["csv"]))

@@ -218,13 +218,14 @@ class Fields {
     const size = Math.max(Math.abs(start), Math.abs(one.nominal * factor));
     const [low, high] = ends || (isLog ? [start / 10, start * 10] : [start - size, start + (isWhole ? 2 : 1) * size]);
     const [begin, end] = [Math.max(low, least), Math.min(high, most)];
+    const digits = Math.max(0, 4 - Math.floor(Math.log10(end - begin)));
     const forth = (/** @type {number} */ value) => (isLog ? Math.log(Math.max(value, 1e-300) / begin) / Math.log(end / begin) : (value - begin) / (end - begin));
     const back = (/** @type {number} */ share) => (isLog ? begin * (end / begin) ** share : begin + share * (end - begin));
     const slider = element("input", { type: "range", min: "0", max: "1", step: isWhole ? String(1 / (end - begin)) : "0.001", "aria-label": one.name });
     const field = element("input", { id, type: "number", step: isWhole ? "1" : "any" });
     const show = (/** @type {number} */ value) => {
       slider.value = String(forth(value));
-      field.value = String(Number(value.toPrecision(ends ? 4 : 6)));
+      field.value = String(ends ? Number(value.toFixed(digits)) : Number(value.toPrecision(6)));
       slider.setAttribute("aria-valuetext", `${field.value} ${one.unit}`);
     };
     const change = (/** @type {number} */ value) => this.changed(one, Math.abs(value - start) <= 1e-12 * Math.abs(start) ? startOf(one) : (value - offset) / factor);
@@ -247,13 +248,20 @@ class Fields {
   }
 }
 
+/** Why there is no section, at its place. @param {Error} error */
+function withoutIt(error) {
+  const text = `Here this page would run the FMU for you to try, but that is not possible: ${error.message}. The rest of the page is complete.`;
+  (document.querySelector("main") || document.body).prepend(element("p", { class: "note" }, text));
+}
+
 /**
  * The section, put at the top of the page.
  * @param {{description: string, module: string}[]} packed the FMU of this page, and those that are beside it
  */
 async function live(packed) {
-  if (typeof WebAssembly !== "object" || typeof DecompressionStream === "undefined") {
-    return;
+  const lacking = ["WebAssembly", "DecompressionStream"].find((name) => !(name in window));
+  if (lacking) {
+    throw new Error(`this browser has no ${lacking}`);
   }
   const [own, ...others] = await Promise.all(
     packed.map(async (one) => {
@@ -439,9 +447,9 @@ async function live(packed) {
   const about = element(
     "p",
     {},
-    `This is the FMU itself, ${description.identifier} ${description.version}, guid `,
+    `This is the FMU itself: every number below is what ${description.identifier} ${description.version} calculates, here, in your browser. Nothing is loaded and nothing leaves this page. The FMU\u2019s guid is `,
     element("code", {}, description.guid),
-    ": every number below is what it calculates, here, in your browser. Nothing is loaded and nothing leaves this page.",
+    ".",
   );
   const fields = element(
     "details",

@@ -65,7 +65,7 @@ fn live(page: &str, runnables: &[Runnable], scripts: &[&str]) -> Result<String> 
         let description = base64(&deflated(description.as_bytes())?);
         writeln!(text, "{{ description: \"{description}\", module: \"{}\" }},", base64(&deflated(module)?))?;
     }
-    text += "]);\n})();\n</script>\n";
+    text += "]).catch(withoutIt);\n})();\n</script>\n";
     // At the end, when there is what it is put into.
     let end = page.rfind("</body>").unwrap_or(page.len());
     Ok(format!("{}{text}{}", &page[..end], &page[end..]))

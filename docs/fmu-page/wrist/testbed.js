@@ -101,7 +101,7 @@ function looped(fmu, id, title, off) {
 addOns.prw_testbed = (_, others) => {
   const goals = SET_POINTS.map((name) => ({ name, label: name.replace("_", " "), colour: "soft", factor: 1 / DEGREE }));
   /** @type {HTMLSelectElement} */
-  const twist = element("select", { "aria-label": "Enlargement of the couplings\u2019 twist" }, element("option", { value: "0" }, "twist: as it fits"), ...["1", "5", "20", "50", "100"].map((value) => element("option", { value }, `twist \u00d7 ${value}`)));
+  const twist = element("select", { "aria-label": "Enlargement of the couplings\u2019 twist" }, element("option", { value: "0" }, "twist: automatic"), ...["1", "5", "20", "50", "100"].map((value) => element("option", { value }, `twist \u00d7 ${value}`)));
   return {
     start: { use_omega: 1 },
     sliders: [
