@@ -58,7 +58,13 @@ def visit(browser: Browser, address: str) -> Iterator[Any]:
     assert {url.split("#")[0] for url in seen if not url.startswith("blob:")} == {address}
 
 
+def drawn(page: Page) -> None:
+    """What was done is seen with the screen's next picture."""
+    page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
 def clock(page: Page) -> float:
+    drawn(page)
     return float(page.locator(".live-clock").inner_text().split()[0])
 
 
@@ -69,6 +75,7 @@ def middle(place: Locator) -> tuple[float, float]:
 
 
 def picture(page: Page) -> str:
+    drawn(page)
     return str(page.locator(".live-scene").evaluate("canvas => canvas.toDataURL()"))
 
 
@@ -248,6 +255,28 @@ def test_why_it_cannot_run_the_fmu(visit: Any, script: str, reason: str) -> None
     expect(page.locator("main > :first-child")).to_contain_text(reason)
     assert page.locator("canvas").count() == 0
     expect(page.locator("main h2").first).to_have_text("The testbed")
+
+
+#: The module ends its run at 0.5 s.
+ENDING = """
+const { Instance } = WebAssembly;
+WebAssembly.Instance = function (...all) {
+  const { exports } = new Instance(...all);
+  return { exports: { ...exports,
+    fmi2DoStep: (fmu, time, ...more) => time < 0.5 - 1e-9 ? exports.fmi2DoStep(fmu, time, ...more) : 2,
+    fmi2GetBooleanStatus: (_, kind, place) => (new Int32Array(exports.memory.buffer, place, 1)[0] = kind === 3, 0),
+  } };
+};
+"""
+
+
+def test_a_run_that_the_fmu_ends(visit: Any) -> None:
+    """It is no refusal, and the time stays where there is something to be seen."""
+    page = visit("#try&motion=tour&speed=2", script=ENDING)
+    expect(page.locator(".live-status")).to_have_text("The FMU has ended the run at 0.5 s.")
+    expect(page.locator(".live-error")).to_have_count(0)
+    expect(button(page, "Play")).to_be_visible()
+    assert clock(page) == 0.5
 
 
 def test_a_link_in_the_page_leads_there(visit: Any) -> None:

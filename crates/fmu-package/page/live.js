@@ -6,10 +6,10 @@
  */
 
 /**
- * What a model has beside sliders and courses. Besides outputs, variables that are `recorded` are in the table, and columns that are
+ * What a model has beside sliders and courses. `word` is for its motions. Besides outputs, variables that are `recorded` are in the table, and columns that are
  * `written` by motions. `follow` leads inputs to where the sliders are; `move` of a view moves a slider.
  * @typedef {{
- *   start: Record<string, number>, sliders: {name: string, label: string, reach: number}[], recorded: string[], written: string[], motions: Motion[],
+ *   word: string, start: Record<string, number>, sliders: {name: string, label: string, reach: number}[], recorded: string[], written: string[], motions: Motion[],
  *   panels: Panel[], isMinor(name: string): boolean,
  *   follow(inputs: Record<string, number>, targets: Map<string, number>, size: number): void,
  *   view(move: (name: string, by: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, HTMLInputElement | HTMLSelectElement>},
@@ -45,6 +45,8 @@ class Session {
     /** How many rows have their inputs already. */
     this.known = 0;
     this.error = "";
+    /** Where the FMU has ended the run, s. */
+    this.ended = Infinity;
     this.isBegun = false;
     /** The inputs at the last row. @type {Record<string, number>} */
     this.now = {};
@@ -64,6 +66,7 @@ class Session {
     this.table.count = 0;
     this.isBegun = false;
     this.error = "";
+    this.ended = Infinity;
   }
 
   /** @param {number} row */
@@ -82,7 +85,11 @@ class Session {
         this.row(follow);
       }
     } catch (refusal) {
-      this.error = refusal instanceof Error ? refusal.message : String(refusal);
+      if (refusal instanceof Ended) {
+        [this.error, this.ended] = [refusal.message, this.table.end];
+      } else {
+        this.error = `The FMU refuses this: ${refusal instanceof Error ? refusal.message : refusal}`;
+      }
       this.instance = this.connected();
       this.isBegun = false;
     }
@@ -155,14 +162,15 @@ function plain(description) {
   for (const [title, causality] of [["Inputs", "input"], ["Outputs", "output"]]) {
     const numbers = description.numbers(causality);
     for (const unit of new Set(numbers.map((one) => one.unit))) {
-      const curves = numbers.filter((one) => one.unit === unit).map(({ name, factor, offset }, place) => ({ name, label: name, colour: `curve-${(place % 6) + 1}`, factor, offset }));
+      const curves = numbers.filter((one) => one.unit === unit).map(({ name, factor, offset, type }, place) => ({ name, label: name, colour: `curve-${(place % 6) + 1}`, factor, offset, isWhole: type !== "Real" }));
       for (let first = 0; first < curves.length; first += 6) {
         panels.push({ title, unit, curves: curves.slice(first, first + 6) });
       }
     }
   }
-  const free = { id: "run", title: "Inputs at their start values", length, inputs: () => {} };
+  const free = { id: "run", title: "At their start values", length, inputs: () => {} };
   return {
+    word: "Inputs",
     start: {},
     sliders: real.map((one) => ({ name: one.name, label: one.name, reach: reach(one) })),
     recorded: [],
@@ -257,8 +265,9 @@ function withoutIt(error) {
 /**
  * The section, put at the top of the page.
  * @param {{description: string, module: string}[]} packed the FMU of this page, and those that are beside it
+ * @param {string[]} resources files of the FMU that are not in the page
  */
-async function live(packed) {
+async function live(packed, resources) {
   const lacking = ["WebAssembly", "DecompressionStream"].find((name) => !(name in window));
   if (lacking) {
     throw new Error(`this browser has no ${lacking}`);
@@ -283,7 +292,7 @@ async function live(packed) {
   }
   const begin = description.startTime;
   const follow = (/** @type {Record<string, number>} */ inputs) => addOn.follow(inputs, session.targets, description.step);
-  const end = () => begin + (session.motion ? Math.min(session.motion.length, MOST_ROWS * description.step) : Math.min(MOST_BY_HAND, MOST_ROWS * description.step));
+  const end = () => Math.min(session.ended, begin + (session.motion ? Math.min(session.motion.length, MOST_ROWS * description.step) : Math.min(MOST_BY_HAND, MOST_ROWS * description.step)));
   const recorded = () => Math.max(session.table.end, session.timeOf(session.known - 1));
   const isWide = () => session.motion || !(description.step < 0.1);
 
@@ -332,10 +341,9 @@ async function live(packed) {
   let said = "";
   /** @param {string} error */
   const say = (error) => {
-    const text = error ? `The FMU refuses this: ${error}` : "";
-    if (text !== said) {
-      said = status.textContent = text;
-      status.classList.toggle("live-error", error !== "");
+    if (error !== said) {
+      said = status.textContent = error;
+      status.classList.toggle("live-error", error !== "" && session.ended === Infinity);
     }
   };
 
@@ -438,7 +446,7 @@ async function live(packed) {
   const controls = element(
     "div",
     { class: "live-controls" },
-    element("div", { class: "live-row" }, element("label", { for: "live-motion" }, element("b", {}, "Motion")), choice),
+    ...(choice.length > 1 ? [element("div", { class: "live-row" }, element("label", { for: "live-motion" }, element("b", {}, addOn.word)), choice)] : []),
     ...inputs,
     element("div", { class: "live-buttons" }, ...(view.controls || []), button("Start again", () => choose(choice.value)), button("Save as CSV", save), button("Link to this", share)),
     status,
@@ -449,7 +457,7 @@ async function live(packed) {
     {},
     `This is the FMU itself: every number below is what ${description.identifier} ${description.version} calculates, here, in your browser. Nothing is loaded and nothing leaves this page. The FMU\u2019s guid is `,
     element("code", {}, description.guid),
-    ".",
+    `.${resources.length ? ` A page has no files: whatever the FMU reads from ${resources.join(", ")} is missing here, and what depends on it differs from what other tools show.` : ""}`,
   );
   const fields = element(
     "details",

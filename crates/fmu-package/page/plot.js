@@ -3,7 +3,7 @@
 /**
  * A course: the column it is in, what it is called, a name of a colour, and what turns its unit into the one shown.
  * Where it is not a number, it is not shown.
- * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number}} Curve
+ * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number, isWhole?: boolean}} Curve
  * @typedef {{title: string, unit: string, curves: Curve[]}} Panel
  */
 
@@ -70,7 +70,8 @@ function ticks(low, high, count) {
   const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
-    found.push({ place: k * step, text: (k * step).toFixed(digits).replace("-", "\u2212") });
+    const text = digits > 4 && k ? Number((k * step).toPrecision(6)).toExponential() : (k * step).toFixed(digits > 4 ? 0 : digits);
+    found.push({ place: k * step, text: text.replaceAll("-", "\u2212") });
   }
   return found;
 }
@@ -230,7 +231,7 @@ class Plots {
         pen.beginPath();
         pen.arc(x(Math.min(now, table.end)), y(here), 3.5, 0, 2 * Math.PI);
         pen.fill();
-        const text = shown(here, Math.max(Math.abs(low), Math.abs(high)));
+        const text = curve.isWhole ? String(Math.round(here)) : shown(here, Math.max(Math.abs(low), Math.abs(high)));
         if (keys[place].value.textContent !== text) {
           keys[place].value.textContent = text;
         }
@@ -240,7 +241,7 @@ class Plots {
 }
 
 /** Room beside a panel's axes, px. */
-const [LEFT, RIGHT] = [46, 10];
+const [LEFT, RIGHT] = [46, 16];
 
 /** Least and largest value of these rows, and a little more. @param {Panel} panel @param {Table} table @param {number} first @param {number} last */
 function range(panel, table, first, last) {
@@ -256,8 +257,8 @@ function range(panel, table, first, last) {
   if (!(low <= high)) {
     return [-1, 1];
   }
-  const least = 1e-3 * Math.max(Math.abs(low), Math.abs(high), 1e-3);
-  const margin = Math.max(0.08 * (high - low), least);
+  const most = Math.max(Math.abs(low), Math.abs(high));
+  const margin = most < 1e-12 ? 1 : Math.max(0.08 * (high - low), 1e-3 * most);
   return [low - margin, high + margin];
 }
 

@@ -48,14 +48,15 @@ pub(crate) fn with_page(
     };
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let path = folder.path().join("index.html");
-    fs::write(&path, live(&page, runnables, scripts)?).context("cannot write the page")?;
+    let resources: Vec<_> = content.iter().filter_map(|file| file.name.strip_prefix("resources/")).collect();
+    fs::write(&path, live(&page, runnables, &resources, scripts)?).context("cannot write the page")?;
     let mut content: Vec<_> = content.iter().filter(|file| file.name != PAGE).cloned().collect();
     content.push(ContentFile { name: PAGE.to_owned(), path });
     Ok((folder, content))
 }
 
 /// The page with the FMU, which its scripts show at its top, and those that they run beside it.
-fn live(page: &str, runnables: &[Runnable], scripts: &[&str]) -> Result<String> {
+fn live(page: &str, runnables: &[Runnable], resources: &[&str], scripts: &[&str]) -> Result<String> {
     let mut text = format!("<style>\n{STYLE}</style>\n<script>\n(() => {{\n\"use strict\";\n");
     for script in SCRIPTS.iter().chain(scripts) {
         text += script;
@@ -65,7 +66,7 @@ fn live(page: &str, runnables: &[Runnable], scripts: &[&str]) -> Result<String> 
         let description = base64(&deflated(description.as_bytes())?);
         writeln!(text, "{{ description: \"{description}\", module: \"{}\" }},", base64(&deflated(module)?))?;
     }
-    text += "]).catch(withoutIt);\n})();\n</script>\n";
+    writeln!(text, "], {}).catch(withoutIt);\n}})();\n</script>", serde_json::to_string(resources)?)?;
     // At the end, when there is what it is put into.
     let end = page.rfind("</body>").unwrap_or(page.len());
     Ok(format!("{}{text}{}", &page[..end], &page[end..]))
@@ -117,13 +118,18 @@ mod tests {
     fn scripts_come_last_in_a_page() {
         let runnable =
             || Runnable { description: "<fmiModelDescription/>".to_owned(), module: b"\0asm".to_vec() };
-        let page =
-            live("<body><p>text</p></body></html>", &[runnable(), runnable()], &["const ownScript = 1;\n"])
-                .unwrap();
+        let page = live(
+            "<body><p>text</p></body></html>",
+            &[runnable(), runnable()],
+            &["a.csv"],
+            &["const ownScript = 1;\n"],
+        )
+        .unwrap();
         assert!(page.starts_with("<body><p>text</p><style>") && page.ends_with("</script>\n</body></html>"));
         let places = ["async function live(", "const ownScript", "live([\n{ description: \""];
         assert!(places.map(|part| page.find(part).unwrap()).is_sorted());
         assert_eq!(page.matches("\n{ description: \"").count(), 2);
+        assert!(page.contains("\n], [\"a.csv\"]).catch("));
     }
 
     #[test]

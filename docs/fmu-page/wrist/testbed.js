@@ -103,6 +103,7 @@ addOns.prw_testbed = (_, others) => {
   /** @type {HTMLSelectElement} */
   const twist = element("select", { "aria-label": "Enlargement of the couplings\u2019 twist" }, element("option", { value: "0" }, "twist: automatic"), ...["1", "5", "20", "50", "100"].map((value) => element("option", { value }, `twist \u00d7 ${value}`)));
   return {
+    word: "Motion",
     start: { use_omega: 1 },
     sliders: [
       { name: "theta1", label: "Motor 1", reach: Math.PI / 2 },
@@ -113,7 +114,7 @@ addOns.prw_testbed = (_, others) => {
     motions: [
       ...MOTIONS,
       ...others.map(({ description, module }) => new Fmu(description, module)).flatMap((controller) => [
-        looped(controller, "closed-loop", "The controller FMU closes the loop: pitch, roll, and back", []),
+        looped(controller, "closed-loop", "The controller FMU closes the loop (grey: set points)", []),
         looped(controller, "open-loop", "The same with its gains at 0: nothing is fed back", ["Kp", "Ki", "Kd"]),
       ]),
     ],
