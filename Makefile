@@ -108,7 +108,7 @@ test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication
 
 # In browsers that were never here before, from a file. What needs none is in tests/fmpy/test_page.py.
-test-page: $(VENV)/test.stamp fmu
+test-page: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) -m pytest -q -s -p no:cacheprovider tests/page
 
 # Ratios of one run; quiet the machine first.

@@ -9,6 +9,9 @@ use prw_testbed::parameter_file;
 use std::path::{Path, PathBuf, absolute};
 use std::process::ExitCode;
 
+#[path = "crates/prw-controller/src/sources.rs"]
+mod controller;
+
 /// The folder of `Cargo.toml`.
 const PROJECT: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -56,6 +59,10 @@ fn run(options: &Options) -> Result<()> {
             concat!("WRIST = ", include_str!("docs/fmu-page/wrist/wrist.json"), ";\n"),
             include_str!("docs/fmu-page/wrist/testbed.js"),
         ],
+        page_fmus: vec![(
+            "prw_controller",
+            controller::sources(concat!(env!("CARGO_MANIFEST_DIR"), "/crates/prw-controller")),
+        )],
         environment: vec![("PRW_PARAMETERS", other.map(Into::into))],
         ..Builder::new(env!("CARGO_PKG_NAME"), PROJECT, env!("FMU_SOURCES"))
     };

@@ -4,7 +4,7 @@
 mod sources;
 
 fn main() {
-    if let Err(error) = fmu_package::build_script(&sources::sources(), Vec::new()) {
+    if let Err(error) = fmu_package::build_script(&sources::sources(env!("CARGO_MANIFEST_DIR")), Vec::new()) {
         println!("cargo::error={error:#}");
     }
 }

@@ -17,7 +17,7 @@ struct Options {
 fn main() -> ExitCode {
     let builder = Builder {
         command: "cargo run --release -p prw_controller --bin build_controller",
-        sources: sources(),
+        sources: sources(env!("CARGO_MANIFEST_DIR")),
         profile: "library",
         terminals: terminals(),
         ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"), env!("FMU_SOURCES"))

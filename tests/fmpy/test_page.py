@@ -22,7 +22,7 @@ from tools.documentation.pages import TESTBED
 
 PAGE = "documentation/index.html"
 LIVE = re.compile(r"<style>\n\.live,.*</script>\n?", re.S)
-PACKED = re.compile(r'live\(\[\{ description: "([^"]*)", module: "([^"]*)" \}\]\);')
+PACKED = re.compile(r'\{ description: "([^"]*)", module: "([^"]*)" \},')
 OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
 
 
@@ -37,9 +37,8 @@ def page(testbed) -> str:
 
 @pytest.fixture(scope="module")
 def packed(page) -> list[bytes]:
-    """The description and the module in the page."""
-    (parts,) = PACKED.findall(page)
-    return [zlib.decompress(base64.b64decode(part), wbits=-15) for part in parts]
+    """The descriptions and the modules in the page: the testbed's, the controller's."""
+    return [zlib.decompress(base64.b64decode(part), wbits=-15) for pair in PACKED.findall(page) for part in pair]
 
 
 class WebAssembly:
@@ -78,13 +77,15 @@ class WebAssembly:
         return bytes(self.functions["memory"].read(self.store, start, start + 8 * len(references)))
 
 
-def test_the_page_is_that_of_the_sources_and_the_fmu(testbed, page, packed):
-    """Nothing is changed in it; the FMU for 3.0 has that for 2.0, whose functions the module has."""
+def test_the_page_is_that_of_the_sources_and_the_fmus(testbed, page, packed):
+    """Nothing is changed in it; the FMU for 3.0 has that for 2.0, whose functions the modules have."""
     assert LIVE.sub("", page) == (ROOT / TESTBED.path).read_text(encoding="utf-8")
-    with zipfile.ZipFile(testbed.parents[testbed.parent.name == "fmi3"] / testbed.name) as archive:
-        assert archive.read("modelDescription.xml") == packed[0]
-    guid = read_model_description(str(testbed), validate=False).guid
-    assert guid.encode() in packed[0] and guid.encode() in packed[1]
+    folder = testbed.parents[testbed.parent.name == "fmi3"]
+    for place, name in enumerate([testbed.name, "prw_controller.fmu"]):
+        with zipfile.ZipFile(folder / name) as archive:
+            assert archive.read("modelDescription.xml") == packed[2 * place]
+        guid = read_model_description(str(folder / name)).guid
+        assert guid.encode() in packed[2 * place + 1]
 
 
 def test_it_is_small_and_loads_nothing(testbed, page):

@@ -21,12 +21,14 @@ from typing import Any
 import numpy as np
 import pytest
 import toolchain
+from built import built
 from fmpy import read_model_description
 from fmu_run import Fmu
 
 from prw.checking.experiments import read_experiments
 
 INPUTS = ("theta1", "theta2", "omega1", "omega2")
+CONTROLLED = {"pitch_ref", "roll_ref", "pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2"}
 WEBKIT = "/usr/lib/x86_64-linux-gnu/webkit2gtk-4.1/MiniBrowser"
 #: What starts a browser that was never here before, for a window of 360, 1000 and 2000 px.
 BROWSERS = {
@@ -109,7 +111,7 @@ def with_visitor(fmu: Path, report: str) -> str:
         "inputs: (time, inputs) => [inputs.theta1, inputs.theta2, inputs.omega1, inputs.omega2] = "
         "rows[Math.round(time / 1e-3)]})));\n"
     )
-    begin, end = page.index("live([{ description"), page.rindex("</body>")
+    begin, end = page.index("live([\n{ description"), page.rindex("</body>")
     settings = {one.name: {name: float(value) for name, value in one.parameters.items()} for one in experiments}
     values = f"window.settings = {json.dumps(settings)}; window.report = {json.dumps(report)};"
     visitor = Path(__file__).with_name("inside.js").read_text(encoding="utf-8")
@@ -119,12 +121,21 @@ def with_visitor(fmu: Path, report: str) -> str:
 def test_the_browser_has_the_librarys_bits(fmu: Path, told: Any) -> None:
     """Over the reference experiments, the motions of the page, and one by hand: as its CSV has them."""
     assert told["errors"] == []
-    assert {one.name for one in read_experiments(fmu)} | {"tour", "fig4", "chirp", "hand"} <= set(told["runs"])
+    assert {one.name for one in read_experiments(fmu)} | {
+        "tour",
+        "fig4",
+        "chirp",
+        "closed-loop",
+        "open-loop",
+        "hand",
+    } <= set(told["runs"])
     with Fmu(fmu) as loaded:
         for name, run in told["runs"].items():
             header, *lines = csv.reader(io.StringIO(run["csv"]))
             rows = np.array(lines, dtype=np.float64)
             assert header[:5] == ["time", *INPUTS] and len(rows) > 400, name
+            if "pitch_ref" in header:
+                header, rows = header[:-2], without_controller(rows, header, name)
             types = {one: loaded.variables[one].type for one in run["parameters"]}
             start = {k: v if types[k] in ("Real", "Float64") else int(v) for k, v in run["parameters"].items()}
             start = {k: bool(v) if types[k] == "Boolean" else v for k, v in start.items()}
@@ -134,6 +145,20 @@ def test_the_browser_has_the_librarys_bits(fmu: Path, told: Any) -> None:
                 np.testing.assert_array_equal(library.get(header[5:])[0], row[5:], f"{name}, {row[0]} s")
                 if number + 1 < len(rows):
                     library.step(to=rows[number + 1, 0])
+
+
+def without_controller(rows: np.ndarray, header: list[str], name: str) -> np.ndarray:
+    """The rows without the set points, which the controller FMU answers with the motors' motion that they have."""
+    off = {"Kp": 0.0, "Ki": 0.0, "Kd": 0.0} if name == "open-loop" else {}
+    read = [place for place, one in enumerate(header) if one in CONTROLLED]
+    with Fmu(built("prw_controller.fmu")) as loaded:
+        controller = loaded.instances(start=off)
+        for number, row in enumerate(rows):
+            np.testing.assert_array_equal(controller.get(INPUTS)[0], row[1:5], f"the controller, {name}, {row[0]} s")
+            controller.set([header[place] for place in read], row[read])
+            if number + 1 < len(rows):
+                controller.step(to=rows[number + 1, 0])
+    return rows[:, :-2]
 
 
 def test_it_asks_for_nothing_and_fits(fmu: Path, told: Any) -> None:

@@ -12,6 +12,8 @@ from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 COMMITTED = Path("docs/fmu-page/figures")
 #: README's first picture, and a still for the page in the FMU, which the film would double in size.
 FILM = Path("docs/wrist.gif")
+#: README's second, of the page in the FMU.
+VISIT = Path("docs/try-it.gif")
 STILL = Path("wrist.png")
 #: Within the folder of what goes into an FMU: its icon for importers, and to scale it.
 ICON = Path("model.png")
@@ -34,7 +36,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--commit",
         action="store_true",
-        help=f"also renew the copies kept with the sources, in {COMMITTED}, the icons of both FMUs, and {FILM}",
+        help=f"also renew the copies kept with the sources, in {COMMITTED}, the icons of both FMUs, {FILM}, and {VISIT} (with the browser chromium)",
     )
     parser.set_defaults(run=run)
 
@@ -67,9 +69,11 @@ def run(arguments: argparse.Namespace) -> None:
             write_svg(page.content / ICON_SVG, draw())
         from prw.animation import animate
         from prw.picture import still
+        from tools.figures import visit
         from tools.figures.film import POSE, SPEED, story
 
         run, captions = story(arguments.fmu, arguments.fmu.with_name("prw_controller.fmu"))
         write_picture(COMMITTED / STILL, still(run, POSE))
         animate(run, FILM, speed=SPEED, captions=captions)
-        print(f"renewed {COMMITTED}, the icons and {FILM}")
+        visit.film(arguments.fmu, VISIT)
+        print(f"renewed {COMMITTED}, the icons, {FILM} and {VISIT}")

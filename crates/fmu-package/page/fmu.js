@@ -21,7 +21,24 @@
  */
 
 /** What an FMU has refused, in its words. */
-class Refusal extends Error {}
+class Refusal extends Error {
+  /** @param {string} message @param {number} [status] */
+  constructor(message, status = 3) {
+    super(message);
+    this.status = status;
+  }
+}
+/** The FMU has ended the run, by itself. */
+class Ended extends Refusal {
+  /** @param {number} time s */
+  constructor(time) {
+    super(`The FMU has ended the run at ${Number(time.toPrecision(6))} s.`);
+    this.time = time;
+  }
+}
+
+/** A status, and kinds of what is asked after it (FMI 2.0, section 4.2.3). */
+const [DISCARD, LAST_SUCCESSFUL_TIME, TERMINATED] = [2, 2, 3];
 
 class Description {
   /** @param {string} text modelDescription.xml of FMI 2.0 */
@@ -183,7 +200,20 @@ class Fmu {
 
   /** A step to `time`, s. @param {number} time */
   stepTo(time) {
-    this.call("fmi2DoStep", this.time, time - this.time, 1);
+    try {
+      this.call("fmi2DoStep", this.time, time - this.time, 1);
+    } catch (refusal) {
+      if (!(refusal instanceof Refusal && refusal.status === DISCARD)) {
+        throw refusal;
+      }
+      const place = this.take(8);
+      const { buffer } = this.functions.memory;
+      if (this.functions.fmi2GetBooleanStatus(this.instance, TERMINATED, place) === 0 && new Int32Array(buffer, place, 1)[0]) {
+        this.call("fmi2GetRealStatus", LAST_SUCCESSFUL_TIME, place);
+        throw new Ended(new Float64Array(buffer, place, 1)[0]);
+      }
+      throw refusal;
+    }
     this.time = time;
   }
 
@@ -196,7 +226,7 @@ class Fmu {
       throw trap instanceof WebAssembly.RuntimeError ? new Refusal(`${name}: the FMU has failed: ${trap.message}`) : trap;
     }
     if (status > 1) {
-      throw new Refusal(this.said(name));
+      throw new Refusal(this.said(name), status);
     }
   }
 

@@ -1,14 +1,15 @@
 // The FMU of this page, to be tried: motions, inputs by hand, parameters, what comes of them.
 
 /**
- * Inputs over time, by name; `table` has what was so far.
+ * Inputs over time, by name; `table` has what was so far. With the next row, a motion may write into it what it knows besides.
  * @typedef {{id: string, title: string, length: number, begin?(): void, inputs(time: number, inputs: Record<string, number>, table: Table): void}} Motion
  */
 
 /**
- * What a model has beside sliders and courses. `follow` leads inputs to where the sliders are; `move` of a view moves a slider.
+ * What a model has beside sliders and courses. `word` is for its motions. Besides outputs, variables that are `recorded` are in the table, and columns that are
+ * `written` by motions. `follow` leads inputs to where the sliders are; `move` of a view moves a slider.
  * @typedef {{
- *   start: Record<string, number>, sliders: {name: string, label: string, reach: number}[], recorded: string[], motions: Motion[],
+ *   word: string, start: Record<string, number>, sliders: {name: string, label: string, reach: number}[], recorded: string[], written: string[], motions: Motion[],
  *   panels: Panel[], isMinor(name: string): boolean,
  *   follow(inputs: Record<string, number>, targets: Map<string, number>, size: number): void,
  *   view(move: (name: string, by: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, HTMLInputElement | HTMLSelectElement>},
@@ -26,14 +27,15 @@ const BY_HAND = "hand";
 
 /** A run of the FMU, calculated as far as it is asked for, and anew when something changes. */
 class Session {
-  /** @param {Description} description @param {WebAssembly.Module} module @param {string[]} recorded */
-  constructor(description, module, recorded) {
+  /** @param {Description} description @param {WebAssembly.Module} module @param {AddOn} addOn */
+  constructor(description, module, { recorded, written }) {
     this.description = description;
     this.module = module;
     this.inputs = description.numbers("input");
     const outputs = description.variables.filter((one) => (one.causality === "output" || recorded.includes(one.name)) && one.type !== "String");
     this.outputs = outputs.filter((one) => !this.inputs.includes(one));
-    this.table = new Table([...this.inputs, ...this.outputs].map((one) => one.name));
+    this.written = written;
+    this.table = new Table([...[...this.inputs, ...this.outputs].map((one) => one.name), ...written]);
     /** The start values that are not the FMU's. @type {Map<Variable, number | string>} */
     this.start = new Map();
     /** @type {Motion | null} */
@@ -43,6 +45,8 @@ class Session {
     /** How many rows have their inputs already. */
     this.known = 0;
     this.error = "";
+    /** Where the FMU has ended the run, s. */
+    this.ended = Infinity;
     this.isBegun = false;
     /** The inputs at the last row. @type {Record<string, number>} */
     this.now = {};
@@ -62,6 +66,7 @@ class Session {
     this.table.count = 0;
     this.isBegun = false;
     this.error = "";
+    this.ended = Infinity;
   }
 
   /** @param {number} row */
@@ -80,7 +85,11 @@ class Session {
         this.row(follow);
       }
     } catch (refusal) {
-      this.error = refusal instanceof Error ? refusal.message : String(refusal);
+      if (refusal instanceof Ended) {
+        [this.error, this.ended] = [refusal.message, this.table.end];
+      } else {
+        this.error = `The FMU refuses this: ${refusal instanceof Error ? refusal.message : refusal}`;
+      }
       this.instance = this.connected();
       this.isBegun = false;
     }
@@ -106,10 +115,13 @@ class Session {
       for (const { name } of this.inputs) {
         now[name] = table.column(name)[row];
       }
-    } else if (this.motion) {
-      this.motion.inputs(time - this.description.startTime, now, table);
-    } else if (row > 0) {
-      follow(now);
+    } else {
+      this.written.forEach((name) => (table.column(name)[row] = NaN));
+      if (this.motion) {
+        this.motion.inputs(time - this.description.startTime, now, table);
+      } else if (row > 0) {
+        follow(now);
+      }
     }
     this.inputs.forEach(({ name }, place) => (table.column(name)[row] = values.inputs[place] = now[name]));
     fmu.set(inputs, values.inputs);
@@ -121,7 +133,7 @@ class Session {
 
   /** All rows, in the units of the FMU, every digit. */
   csv() {
-    const names = ["time", ...this.inputs.map((one) => one.name), ...this.outputs.map((one) => one.name)];
+    const names = ["time", ...this.inputs.map((one) => one.name), ...this.outputs.map((one) => one.name), ...this.written.filter((name) => !Number.isNaN(this.table.column(name)[0]))];
     const columns = names.map((name) => this.table.column(name));
     const lines = [names.map((name) => (/[",\s]/.test(name) ? `"${name.replaceAll('"', '""')}"` : name)).join(",")];
     for (let row = 0; row < this.table.count; row++) {
@@ -150,17 +162,19 @@ function plain(description) {
   for (const [title, causality] of [["Inputs", "input"], ["Outputs", "output"]]) {
     const numbers = description.numbers(causality);
     for (const unit of new Set(numbers.map((one) => one.unit))) {
-      const curves = numbers.filter((one) => one.unit === unit).map(({ name, factor, offset }, place) => ({ name, label: name, colour: `curve-${(place % 6) + 1}`, factor, offset }));
+      const curves = numbers.filter((one) => one.unit === unit).map(({ name, factor, offset, type }, place) => ({ name, label: name, colour: `curve-${(place % 6) + 1}`, factor, offset, isWhole: type !== "Real" }));
       for (let first = 0; first < curves.length; first += 6) {
         panels.push({ title, unit, curves: curves.slice(first, first + 6) });
       }
     }
   }
-  const free = { id: "run", title: "Inputs at their start values", length, inputs: () => {} };
+  const free = { id: "run", title: "At their start values", length, inputs: () => {} };
   return {
+    word: "Inputs",
     start: {},
     sliders: real.map((one) => ({ name: one.name, label: one.name, reach: reach(one) })),
     recorded: [],
+    written: [],
     motions: [...motions, free],
     panels,
     isMinor: () => false,
@@ -212,13 +226,14 @@ class Fields {
     const size = Math.max(Math.abs(start), Math.abs(one.nominal * factor));
     const [low, high] = ends || (isLog ? [start / 10, start * 10] : [start - size, start + (isWhole ? 2 : 1) * size]);
     const [begin, end] = [Math.max(low, least), Math.min(high, most)];
+    const digits = Math.max(0, 4 - Math.floor(Math.log10(end - begin)));
     const forth = (/** @type {number} */ value) => (isLog ? Math.log(Math.max(value, 1e-300) / begin) / Math.log(end / begin) : (value - begin) / (end - begin));
     const back = (/** @type {number} */ share) => (isLog ? begin * (end / begin) ** share : begin + share * (end - begin));
     const slider = element("input", { type: "range", min: "0", max: "1", step: isWhole ? String(1 / (end - begin)) : "0.001", "aria-label": one.name });
     const field = element("input", { id, type: "number", step: isWhole ? "1" : "any" });
     const show = (/** @type {number} */ value) => {
       slider.value = String(forth(value));
-      field.value = String(Number(value.toPrecision(ends ? 4 : 6)));
+      field.value = String(ends ? Number(value.toFixed(digits)) : Number(value.toPrecision(6)));
       slider.setAttribute("aria-valuetext", `${field.value} ${one.unit}`);
     };
     const change = (/** @type {number} */ value) => this.changed(one, Math.abs(value - start) <= 1e-12 * Math.abs(start) ? startOf(one) : (value - offset) / factor);
@@ -241,23 +256,31 @@ class Fields {
   }
 }
 
+/** Why there is no section, at its place. @param {Error} error */
+function withoutIt(error) {
+  const text = `Here this page would run the FMU for you to try, but that is not possible: ${error.message}. The rest of the page is complete.`;
+  (document.querySelector("main") || document.body).prepend(element("p", { class: "note" }, text));
+}
+
 /**
  * The section, put at the top of the page.
  * @param {{description: string, module: string}[]} packed the FMU of this page, and those that are beside it
+ * @param {string[]} resources files of the FMU that are not in the page
  */
-async function live(packed) {
-  if (typeof WebAssembly !== "object" || typeof DecompressionStream === "undefined") {
-    return;
+async function live(packed, resources) {
+  const lacking = ["WebAssembly", "DecompressionStream"].find((name) => !(name in window));
+  if (lacking) {
+    throw new Error(`this browser has no ${lacking}`);
   }
   const [own, ...others] = await Promise.all(
-    packed.map(async ({ description, module }) => ({
-      description: new Description(new TextDecoder().decode(await unpacked(description))),
-      module: await WebAssembly.compile(await unpacked(module)),
-    })),
+    packed.map(async (one) => {
+      const [description, module] = await Promise.all([unpacked(one.description), unpacked(one.module).then((bytes) => WebAssembly.compile(bytes))]);
+      return { description: new Description(new TextDecoder().decode(description)), module };
+    }),
   );
   const { description } = own;
   const addOn = (addOns[description.identifier] || plain)(description, others);
-  const session = new Session(description, own.module, addOn.recorded);
+  const session = new Session(description, own.module, addOn);
   const find = (/** @type {string} */ name) => /** @type {Variable} */ (description.byName.get(name));
   const settable = description.variables.filter((one) => one.causality === "parameter" && one.variability !== "constant" && one.start !== null);
   const status = element("p", { class: "live-status", role: "status" });
@@ -269,7 +292,7 @@ async function live(packed) {
   }
   const begin = description.startTime;
   const follow = (/** @type {Record<string, number>} */ inputs) => addOn.follow(inputs, session.targets, description.step);
-  const end = () => begin + (session.motion ? Math.min(session.motion.length, MOST_ROWS * description.step) : Math.min(MOST_BY_HAND, MOST_ROWS * description.step));
+  const end = () => Math.min(session.ended, begin + (session.motion ? Math.min(session.motion.length, MOST_ROWS * description.step) : Math.min(MOST_BY_HAND, MOST_ROWS * description.step)));
   const recorded = () => Math.max(session.table.end, session.timeOf(session.known - 1));
   const isWide = () => session.motion || !(description.step < 0.1);
 
@@ -318,10 +341,9 @@ async function live(packed) {
   let said = "";
   /** @param {string} error */
   const say = (error) => {
-    const text = error ? `The FMU refuses this: ${error}` : "";
-    if (text !== said) {
-      said = status.textContent = text;
-      status.classList.toggle("live-error", error !== "");
+    if (error !== said) {
+      said = status.textContent = error;
+      status.classList.toggle("live-error", error !== "" && session.ended === Infinity);
     }
   };
 
@@ -424,7 +446,7 @@ async function live(packed) {
   const controls = element(
     "div",
     { class: "live-controls" },
-    element("div", { class: "live-row" }, element("label", { for: "live-motion" }, element("b", {}, "Motion")), choice),
+    ...(choice.length > 1 ? [element("div", { class: "live-row" }, element("label", { for: "live-motion" }, element("b", {}, addOn.word)), choice)] : []),
     ...inputs,
     element("div", { class: "live-buttons" }, ...(view.controls || []), button("Start again", () => choose(choice.value)), button("Save as CSV", save), button("Link to this", share)),
     status,
@@ -433,9 +455,9 @@ async function live(packed) {
   const about = element(
     "p",
     {},
-    `This is the FMU itself, ${description.identifier} ${description.version}, guid `,
+    `This is the FMU itself: every number below is what ${description.identifier} ${description.version} calculates, here, in your browser. Nothing is loaded and nothing leaves this page. The FMU\u2019s guid is `,
     element("code", {}, description.guid),
-    ": every number below is what it calculates, here, in your browser. Nothing is loaded and nothing leaves this page.",
+    `.${resources.length ? ` A page has no files: whatever the FMU reads from ${resources.join(", ")} is missing here, and what depends on it differs from what other tools show.` : ""}`,
   );
   const fields = element(
     "details",

@@ -108,7 +108,7 @@ class Player {
       view?.draw(table, this.now);
     }
     this.place.value = String(Math.round((1000 * (this.now - begin)) / (this.options.recorded() - begin || 1)));
-    const text = `${this.now.toFixed(3)} s`;
+    const text = `${this.now.toFixed(Math.max(0, Math.min(3, 5 - Math.floor(Math.log10(limit)))))} s`;
     this.clock.textContent = text;
     this.place.setAttribute("aria-valuetext", text);
     if (this.isPlaying && this.now >= limit - 1e-9 && !isBehind) {

@@ -1,8 +1,9 @@
 // Courses over time, on canvas.
 
 /**
- * A course: the column it is in, what it is called, a name of `--curve-N`, and what turns its unit into the one shown.
- * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number}} Curve
+ * A course: the column it is in, what it is called, a name of a colour, and what turns its unit into the one shown.
+ * Where it is not a number, it is not shown.
+ * @typedef {{name: string, label: string, colour: string, factor: number, offset?: number, isWhole?: boolean}} Curve
  * @typedef {{title: string, unit: string, curves: Curve[]}} Panel
  */
 
@@ -69,7 +70,8 @@ function ticks(low, high, count) {
   const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   const found = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
-    found.push({ place: k * step, text: (k * step).toFixed(digits).replace("-", "\u2212") });
+    const text = digits > 4 && k ? Number((k * step).toPrecision(6)).toExponential() : (k * step).toFixed(digits > 4 ? 0 : digits);
+    found.push({ place: k * step, text: text.replaceAll("-", "\u2212") });
   }
   return found;
 }
@@ -162,7 +164,7 @@ class Plots {
         seek(this.timeAt(event.offsetX, sizeOf(canvas).width));
       }
     });
-    return { panel, canvas, values: keys.map(({ value }) => value), figure: element("figure", {}, caption, canvas), peak: 0 };
+    return { panel, canvas, keys, figure: element("figure", {}, caption, canvas), peak: 0 };
   }
 
   /** @param {number} x @param {number} width */
@@ -181,7 +183,7 @@ class Plots {
   }
 
   /** @param {ReturnType<Plots["panel"]>} what @param {Table} table @param {number} now @param {(name: string) => string} colour @param {boolean} isLast */
-  drawPanel({ panel, canvas, values }, table, now, colour, isLast) {
+  drawPanel({ panel, canvas, keys }, table, now, colour, isLast) {
     const { pen, width, height } = sharp(canvas);
     const { begin, end } = this.span;
     const [first, last] = [table.row(begin), Math.min(table.row(end) + 1, table.count - 1)];
@@ -224,13 +226,14 @@ class Plots {
       pen.lineWidth = 1;
       if (table.count) {
         const here = curve.factor * table.at(curve.name, now) + (curve.offset || 0);
+      keys[place].key.hidden = Number.isNaN(here);
         pen.fillStyle = colour(curve.colour);
         pen.beginPath();
         pen.arc(x(Math.min(now, table.end)), y(here), 3.5, 0, 2 * Math.PI);
         pen.fill();
-        const text = shown(here, Math.max(Math.abs(low), Math.abs(high)));
-        if (values[place].textContent !== text) {
-          values[place].textContent = text;
+        const text = curve.isWhole ? String(Math.round(here)) : shown(here, Math.max(Math.abs(low), Math.abs(high)));
+        if (keys[place].value.textContent !== text) {
+          keys[place].value.textContent = text;
         }
       }
     }
@@ -238,7 +241,7 @@ class Plots {
 }
 
 /** Room beside a panel's axes, px. */
-const [LEFT, RIGHT] = [46, 10];
+const [LEFT, RIGHT] = [46, 16];
 
 /** Least and largest value of these rows, and a little more. @param {Panel} panel @param {Table} table @param {number} first @param {number} last */
 function range(panel, table, first, last) {
@@ -254,8 +257,8 @@ function range(panel, table, first, last) {
   if (!(low <= high)) {
     return [-1, 1];
   }
-  const least = 1e-3 * Math.max(Math.abs(low), Math.abs(high), 1e-3);
-  const margin = Math.max(0.08 * (high - low), least);
+  const most = Math.max(Math.abs(low), Math.abs(high));
+  const margin = most < 1e-12 ? 1 : Math.max(0.08 * (high - low), 1e-3 * most);
   return [low - margin, high + margin];
 }
 

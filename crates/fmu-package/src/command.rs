@@ -142,6 +142,9 @@ pub struct Builder {
     pub is_default: bool,
     /// Scripts for the page that runs the FMU, besides those of every model (see the README in the folder `page`).
     pub page_scripts: Vec<&'static str>,
+    /// FMUs that these scripts run beside the model's, each by its package and what it is made from. They are described as
+    /// is kept with their sources.
+    pub page_fmus: Vec<(&'static str, Sources)>,
     /// Environment variables that tell the build script of them; removed where the value is `None`.
     pub environment: Vec<(&'static str, Option<OsString>)>,
 }
@@ -166,6 +169,7 @@ impl Builder {
             start_from: None,
             is_default: true,
             page_scripts: Vec::new(),
+            page_fmus: Vec::new(),
             environment: Vec::new(),
         }
     }
@@ -368,11 +372,29 @@ impl Builder {
     ) -> Result<(TempDir, Vec<ContentFile>)> {
         check_targets(&[WEBASSEMBLY.to_owned()], false)
             .context("a page that runs the FMU is made with Rust's WebAssembly")?;
+        let runnable = |description, path: PathBuf, guid: &str| {
+            let module = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+            check_guid(&module, guid, &path)?;
+            anyhow::Ok(Runnable { description, module })
+        };
         let path = self.compile(tunable, Some(WEBASSEMBLY), &LINKING)?;
-        let module = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-        check_guid(&module, guid, &path)?;
-        let runnable = Runnable { description, module: &module };
-        live::with_page(content, (M::INFO.name, M::INFO.description), &runnable, &self.page_scripts)
+        let mut runnables = vec![runnable(description.to_owned(), path, guid)?];
+        for (package, sources) in &self.page_fmus {
+            let guid = Variant { sources: sources.fingerprint()?, start: Vec::new(), tunable: false }.guid();
+            let kept = sources.folder.join(DESCRIPTION);
+            let kept =
+                fs::read_to_string(&kept).with_context(|| format!("cannot read {}", kept.display()))?;
+            let build = LibraryBuild {
+                folder: sources.folder.clone(),
+                package,
+                profile: self.profile,
+                target: Some(WEBASSEMBLY),
+                arguments: &LINKING,
+                environment: vec![("FMU_TUNABLE", None)],
+            };
+            runnables.push(runnable(kept.replace(NO_GUID, &guid), build.run()?, &guid)?);
+        }
+        live::with_page(content, (M::INFO.name, M::INFO.description), &runnables, &self.page_scripts)
     }
 
     fn compile(&self, tunable: bool, target: Option<&str>, arguments: &[&str]) -> Result<PathBuf> {

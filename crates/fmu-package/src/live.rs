@@ -25,18 +25,18 @@ const SCRIPTS: [&str; 4] = [
 ];
 
 /// What a browser needs to run an FMU.
-pub(crate) struct Runnable<'a> {
+pub(crate) struct Runnable {
     /// The text of `modelDescription.xml` of FMI 2.0.
-    pub description: &'a str,
+    pub description: String,
     /// The library, as a WebAssembly module.
-    pub module: &'a [u8],
+    pub module: Vec<u8>,
 }
 
 /// The content with the page that runs the FMU, which is in the folder as long as that is there.
 pub(crate) fn with_page(
     content: &[ContentFile],
     (title, about): (&str, &str),
-    runnable: &Runnable,
+    runnables: &[Runnable],
     scripts: &[&str],
 ) -> Result<(TempDir, Vec<ContentFile>)> {
     let own = content.iter().find(|file| file.name == PAGE);
@@ -48,21 +48,25 @@ pub(crate) fn with_page(
     };
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let path = folder.path().join("index.html");
-    fs::write(&path, live(&page, runnable, scripts)?).context("cannot write the page")?;
+    let resources: Vec<_> = content.iter().filter_map(|file| file.name.strip_prefix("resources/")).collect();
+    fs::write(&path, live(&page, runnables, &resources, scripts)?).context("cannot write the page")?;
     let mut content: Vec<_> = content.iter().filter(|file| file.name != PAGE).cloned().collect();
     content.push(ContentFile { name: PAGE.to_owned(), path });
     Ok((folder, content))
 }
 
-/// The page with the FMU, which its scripts show at its top.
-fn live(page: &str, runnable: &Runnable, scripts: &[&str]) -> Result<String> {
+/// The page with the FMU, which its scripts show at its top, and those that they run beside it.
+fn live(page: &str, runnables: &[Runnable], resources: &[&str], scripts: &[&str]) -> Result<String> {
     let mut text = format!("<style>\n{STYLE}</style>\n<script>\n(() => {{\n\"use strict\";\n");
     for script in SCRIPTS.iter().chain(scripts) {
         text += script;
     }
-    let description = base64(&deflated(runnable.description.as_bytes())?);
-    let module = base64(&deflated(runnable.module)?);
-    writeln!(text, "live([{{ description: \"{description}\", module: \"{module}\" }}]);\n}})();\n</script>")?;
+    text += "live([\n";
+    for Runnable { description, module } in runnables {
+        let description = base64(&deflated(description.as_bytes())?);
+        writeln!(text, "{{ description: \"{description}\", module: \"{}\" }},", base64(&deflated(module)?))?;
+    }
+    writeln!(text, "], {}).catch(withoutIt);\n}})();\n</script>", serde_json::to_string(resources)?)?;
     // At the end, when there is what it is put into.
     let end = page.rfind("</body>").unwrap_or(page.len());
     Ok(format!("{}{text}{}", &page[..end], &page[end..]))
@@ -112,17 +116,25 @@ mod tests {
 
     #[test]
     fn scripts_come_last_in_a_page() {
-        let runnable = Runnable { description: "<fmiModelDescription/>", module: b"\0asm" };
-        let page = live("<body><p>text</p></body></html>", &runnable, &["const ownScript = 1;\n"]).unwrap();
+        let runnable =
+            || Runnable { description: "<fmiModelDescription/>".to_owned(), module: b"\0asm".to_vec() };
+        let page = live(
+            "<body><p>text</p></body></html>",
+            &[runnable(), runnable()],
+            &["a.csv"],
+            &["const ownScript = 1;\n"],
+        )
+        .unwrap();
         assert!(page.starts_with("<body><p>text</p><style>") && page.ends_with("</script>\n</body></html>"));
-        let places = ["async function live(", "const ownScript", "live([{ description: \""];
+        let places = ["async function live(", "const ownScript", "live([\n{ description: \""];
         assert!(places.map(|part| page.find(part).unwrap()).is_sorted());
+        assert_eq!(page.matches("\n{ description: \"").count(), 2);
+        assert!(page.contains("\n], [\"a.csv\"]).catch("));
     }
 
     #[test]
     fn a_model_without_a_page_gets_one() {
-        let runnable = Runnable { description: "", module: b"" };
-        let (_folder, content) = with_page(&[], ("A & B", "Two <models>"), &runnable, &[]).unwrap();
+        let (_folder, content) = with_page(&[], ("A & B", "Two <models>"), &[], &[]).unwrap();
         let page = fs::read_to_string(&content[0].path).unwrap();
         assert_eq!(content[0].name, PAGE);
         assert!(page.contains("<h1>A &amp; B</h1>\n<p>Two &lt;models&gt;</p>") && page.contains("<script>"));

@@ -2,10 +2,7 @@
 
 use fmu_package::Sources;
 
-/// The files that the library and its description are made from.
-pub fn sources() -> Sources {
-    Sources {
-        licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"],
-        ..Sources::of_package(env!("CARGO_MANIFEST_DIR"))
-    }
+/// The files that the library and its description are made from; the folder is that of `Cargo.toml`.
+pub fn sources(folder: &str) -> Sources {
+    Sources { licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"], ..Sources::of_package(folder) }
 }

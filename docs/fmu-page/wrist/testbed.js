@@ -68,18 +68,57 @@ const MOTIONS = [
   led("shaped", "The same move with an input shaper, for the k\u2081 and k\u2082 that are built in", 1, (time) => both(move(time, true))),
 ];
 
-addOns.prw_testbed = () => {
-  /** @type {HTMLSelectElement} */
-  const twist = element("select", { "aria-label": "Enlargement of the couplings\u2019 twist" }, element("option", { value: "0" }, "twist: as it fits"), ...["1", "5", "20", "50", "100"].map((value) => element("option", { value }, `twist \u00d7 ${value}`)));
+/** What the controller is told, and what it says. */
+const [SET_POINTS, MEASURED, MOTORS] = [["pitch_ref", "roll_ref"], ["pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2"], ["theta1", "theta2", "omega1", "omega2"]];
+
+/**
+ * The controller's FMU drives the testbed's: at each communication point, either is told what the other says there. The wrist is
+ * to pitch, to roll, and to come back.
+ * @param {Fmu} fmu the controller @param {string} id @param {string} title @param {string[]} off gains that are 0
+ * @returns {Motion}
+ */
+function looped(fmu, id, title, off) {
+  const [answers, motors] = [new Float64Array(8), new Float64Array(4)];
+  const find = (/** @type {string} */ name) => /** @type {Variable} */ (fmu.description.byName.get(name));
+  const [told, says] = [[...SET_POINTS, ...MEASURED], MOTORS].map((names) => fmu.group(names.map(find)));
   return {
+    id, title, length: 2.6,
+    begin: () => fmu.begin(new Map(off.map((gain) => [find(gain), 0]))),
+    inputs: (time, inputs, table) => {
+      const row = table.count;
+      SET_POINTS.forEach((name, axis) => (table.column(name)[row] = DEGREE * (time >= [0.1, 0.9][axis] && time < 1.7 ? [25, 50][axis] : 0)));
+      if (row > 0) {
+        [...SET_POINTS, ...MEASURED].forEach((name, place) => (answers[place] = table.column(name)[row - 1]));
+        fmu.set(told, answers);
+        fmu.stepTo(time);
+      }
+      fmu.get(says, motors);
+      MOTORS.forEach((name, place) => (inputs[name] = motors[place]));
+    },
+  };
+}
+
+addOns.prw_testbed = (_, others) => {
+  const goals = SET_POINTS.map((name) => ({ name, label: name.replace("_", " "), colour: "soft", factor: 1 / DEGREE }));
+  /** @type {HTMLSelectElement} */
+  const twist = element("select", { "aria-label": "Enlargement of the couplings\u2019 twist" }, element("option", { value: "0" }, "twist: automatic"), ...["1", "5", "20", "50", "100"].map((value) => element("option", { value }, `twist \u00d7 ${value}`)));
+  return {
+    word: "Motion",
     start: { use_omega: 1 },
     sliders: [
       { name: "theta1", label: "Motor 1", reach: Math.PI / 2 },
       { name: "theta2", label: "Motor 2", reach: Math.PI / 2 },
     ],
     recorded: ["theta5", "theta6"],
-    motions: MOTIONS,
-    panels: WRIST_PANELS,
+    written: SET_POINTS,
+    motions: [
+      ...MOTIONS,
+      ...others.map(({ description, module }) => new Fmu(description, module)).flatMap((controller) => [
+        looped(controller, "closed-loop", "The controller FMU closes the loop (grey: set points)", []),
+        looped(controller, "open-loop", "The same with its gains at 0: nothing is fed back", ["Kp", "Ki", "Kd"]),
+      ]),
+    ],
+    panels: WRIST_PANELS.map((panel) => (panel.title === "Wrist" ? { ...panel, curves: [...goals, ...panel.curves] } : panel)),
     isMinor: (name) => name.endsWith("_start"),
     follow: (inputs, targets, size) => {
       const decay = Math.exp(-FOLLOW * size);

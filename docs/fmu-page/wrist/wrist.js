@@ -234,6 +234,7 @@ class Wrist {
   listen(move) {
     const canvas = this.element;
     let held = "";
+    let last = [0, 0];
     /** @param {number} x @param {number} y */
     const motorAt = (x, y) => (move && SHAFTS.find(({ side }) => {
       const [centre, edge] = [this.project([side * 4.1, 0, 0]), this.project([side * 4.1, 0.8, 0])];
@@ -241,6 +242,7 @@ class Wrist {
     })?.motor) || "";
     canvas.addEventListener("pointerdown", (event) => {
       held = motorAt(event.offsetX, event.offsetY);
+      last = [event.clientX, event.clientY];
       canvas.setPointerCapture(event.pointerId);
     });
     // A finger on a motor turns it; elsewhere, up and down scrolls the page.
@@ -254,10 +256,15 @@ class Wrist {
     canvas.addEventListener("pointermove", (event) => {
       if (!canvas.hasPointerCapture(event.pointerId)) {
         canvas.style.cursor = motorAt(event.offsetX, event.offsetY) ? "ns-resize" : "grab";
-      } else if (held) {
-        move?.(held, 0.01 * (event.movementY + event.movementX));
+        return;
+      }
+      // Not movementX and movementY, which are 0 under a finger in Safari.
+      const [right, down] = [event.clientX - last[0], event.clientY - last[1]];
+      last = [event.clientX, event.clientY];
+      if (held) {
+        move?.(held, 0.01 * (down + right));
       } else {
-        this.turn(-0.4 * event.movementX, 0.4 * event.movementY);
+        this.turn(-0.4 * right, 0.4 * down);
       }
     });
     canvas.addEventListener("keydown", (event) => {

@@ -1,0 +1,288 @@
+"""Who visits the page in the FMU: with a mouse, a finger, the keyboard alone, and where scripts or WebAssembly are blocked."""
+
+from __future__ import annotations
+
+import csv
+import re
+import shutil
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import toolchain
+from playwright.sync_api import Browser, CDPSession, Locator, Page, expect, sync_playwright
+
+SIZE = {"width": 1000, "height": 900}
+PHONE = {"width": 360, "height": 740}
+
+
+@pytest.fixture(scope="module")
+def address(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    with zipfile.ZipFile(fmu) as archive:
+        path = archive.extract("documentation/index.html", tmp_path_factory.mktemp("page"))
+    return Path(path).as_uri()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    toolchain.need("chromium")
+    with sync_playwright() as playwright:
+        path = shutil.which("chromium")
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visit(browser: Browser, address: str) -> Iterator[Any]:
+    """Opens the page in a context of these settings; nothing but the page may be asked for, and no script may fail."""
+    seen: list[str] = []
+    contexts = []
+
+    def visit(fragment: str = "", script: str = "", **settings: Any) -> Page:
+        contexts.append(browser.new_context(**{"viewport": SIZE, **settings}))
+        page = contexts[-1].new_page()
+        page.route("**/*", lambda route: route.continue_())
+        page.on("request", lambda request: seen.append(request.url))
+        page.on("pageerror", lambda error: seen.append(f"error: {error}"))
+        if script:
+            page.add_init_script(script)
+        page.goto(address + fragment)
+        return page
+
+    yield visit
+    for context in contexts:
+        context.close()
+    assert {url.split("#")[0] for url in seen if not url.startswith("blob:")} == {address}
+
+
+def drawn(page: Page) -> None:
+    """What was done is seen with the screen's next picture."""
+    page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def clock(page: Page) -> float:
+    drawn(page)
+    return float(page.locator(".live-clock").inner_text().split()[0])
+
+
+def middle(place: Locator) -> tuple[float, float]:
+    box = place.bounding_box()
+    assert box
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def picture(page: Page) -> str:
+    drawn(page)
+    return str(page.locator(".live-scene").evaluate("canvas => canvas.toDataURL()"))
+
+
+def button(page: Page, name: str) -> Locator:
+    return page.locator(".live").get_by_role("button", name=name, exact=True)
+
+
+def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
+    """What is chosen is seen, saved, and passed on by a link."""
+    page = visit()
+    page.get_by_label("Speed").select_option("0.05")
+    page.get_by_label("Motion", exact=True).select_option("step")
+    page.wait_for_function("parseFloat(document.querySelector('.live-clock').textContent) > 0.005")
+    assert clock(page) < 0.5
+    button(page, "Pause").click()
+    stiffness = page.locator(".live-row", has_text=re.compile("^k1"))
+    expect(stiffness).to_contain_text("N.m/deg > 0")
+    stiffness.get_by_role("spinbutton").fill("1.5")
+    stiffness.get_by_role("spinbutton").press("Enter")
+    # The time by its slider, and where a course is touched.
+    time = page.get_by_label("Time", exact=True)
+    box = time.bounding_box()
+    assert box
+    page.mouse.click(box["x"] + 0.75 * box["width"], box["y"] + box["height"] / 2)
+    assert clock(page) == pytest.approx(0.75, abs=0.03)
+    page.mouse.click(*middle(page.locator(".live-plots canvas").first))
+    assert clock(page) == pytest.approx(0.48, abs=0.03)
+    expect(button(page, "Play")).to_be_visible()
+    with page.expect_download() as download:
+        button(page, "Save as CSV").click()
+    download.value.save_as(tmp_path / "run.csv")
+    with (tmp_path / "run.csv").open(newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows[0][:3] == ["time", "theta1", "theta2"] and len(rows) == 1002
+    page.get_by_label("Enlargement").select_option("5")
+    button(page, "Link to this").click()
+    expect(page.locator(".live-status")).to_contain_text("carries these settings")
+    again = visit(page.evaluate("location.hash"))
+    expect(again.get_by_label("Motion", exact=True)).to_have_value("step")
+    expect(again.locator("#live-k1")).to_have_value("1.5")
+    expect(again.get_by_label("Speed")).to_have_value("0.05")
+    expect(again.get_by_label("Enlargement")).to_have_value("5")
+    button(again, "Parameters as built in").click()
+    expect(again.locator("#live-k1")).not_to_have_value("1.5")
+    # A motor is turned where it is, the wrist beside it.
+    button(again, "Pause").click()
+    before = picture(again)
+    x, y = middle(again.locator(".live-scene"))
+    drag(again, (x, y + 120), (x + 80, y + 120))
+    assert picture(again) != before
+    again.get_by_label("Motion", exact=True).select_option("hand")
+    find_motor(again)
+    again.mouse.down()
+    again.mouse.move(*(100, 100), steps=4)
+    again.mouse.up()
+    expect(again.locator("#live-theta1")).not_to_have_value("0")
+
+
+def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move(*end, steps=4)
+    page.mouse.up()
+
+
+def find_motor(page: Page) -> tuple[float, float]:
+    """The place of motor 1 in the picture, by the cursor there; the mouse is left on it."""
+    scene = page.locator(".live-scene")
+    box = scene.bounding_box()
+    assert box
+    for x in range(10, int(box["width"] / 2), 10):
+        for y in range(20, int(box["height"]), 20):
+            page.mouse.move(box["x"] + x, box["y"] + y)
+            if scene.evaluate("canvas => canvas.style.cursor") == "ns-resize":
+                page.mouse.move(box["x"] + x + 4, box["y"] + y + 4)
+                return box["x"] + x + 4, box["y"] + y + 4
+    raise AssertionError("no motor is found")
+
+
+def swipe(touch: CDPSession, start: tuple[float, float], way: tuple[float, float]) -> None:
+    def points(share: float) -> list[dict[str, float]]:
+        return [{"x": start[0] + share * way[0], "y": start[1] + share * way[1]}]
+
+    touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": points(0)})
+    for step in range(1, 9):
+        touch.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": points(step / 8)})
+    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
+
+def test_with_a_finger_on_a_phone(visit: Any) -> None:
+    page = visit("#try&motion=hand", viewport=PHONE, has_touch=True, is_mobile=True)
+    touch = page.context.new_cdp_session(page)
+    assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+    scene = page.locator(".live-scene")
+    scene.scroll_into_view_if_needed()
+    x, y = middle(scene)
+    before = picture(page)
+    swipe(touch, (x, y + 40), (120, 0))
+    expect(page.locator("#live-theta1")).to_have_value("0")
+    assert picture(page) != before
+    swipe(touch, (x, y + 40), (-120, 0))
+    # A finger on a motor turns it, and the page stays where it is.
+    place, scrolled = find_motor(page), page.evaluate("scrollY")
+    swipe(touch, place, (0, 60))
+    page.wait_for_function("document.querySelector('#live-theta1').value > 10")
+    assert page.evaluate("scrollY") == scrolled
+    slider = page.get_by_label("theta2", exact=True)
+    slider.scroll_into_view_if_needed()
+    swipe(touch, middle(slider), (40, 0))
+    page.wait_for_function("document.querySelector('#live-theta2').value > 10")
+
+
+def test_with_the_keyboard_alone(visit: Any) -> None:
+    """Everything is reached, in its order, and seen to be; and what is reached does what it is for."""
+    page = visit("#try&motion=chirp&speed=0.01")
+    button(page, "Pause").wait_for()
+    page.keyboard.press("Tab")
+    focused = "document.activeElement"
+    reached: dict[str, None] = {}
+    name = f"(e => e.id || e.getAttribute('aria-label') || e.textContent)({focused})"
+    while page.evaluate(f"!{focused}.closest('.live')"):
+        page.keyboard.press("Tab")
+    while page.evaluate(f"!!{focused}.closest('.live')"):
+        reached[page.evaluate(name)] = None
+        assert page.evaluate(f"getComputedStyle({focused}).outlineStyle") != "none", list(reached)[-1]
+        page.keyboard.press("Tab")
+    there = page.evaluate(
+        "[...document.querySelectorAll('.live :is(button, input, select, summary, [tabindex])')]"
+        ".filter(e => e.checkVisibility()).map(e => e.id || e.getAttribute('aria-label') || e.textContent)"
+    )
+    assert list(reached) == list(dict.fromkeys(there))
+    page.get_by_label("Motion", exact=True).focus()
+    page.keyboard.press("ArrowDown")
+    expect(page.get_by_label("Motion", exact=True)).to_have_value("move")
+    button(page, "Pause").focus()
+    page.keyboard.press("Space")
+    expect(button(page, "Play")).to_be_focused()
+    before = clock(page)
+    page.get_by_label("Time", exact=True).focus()
+    page.keyboard.press("Home")
+    assert clock(page) == 0 < before
+    before_turn = picture(page)
+    page.locator(".live-scene").focus()
+    page.keyboard.press("ArrowLeft")
+    assert picture(page) != before_turn
+    page.get_by_label("theta1", exact=True).focus()
+    page.keyboard.press("PageUp")
+    expect(page.get_by_label("Motion", exact=True)).to_have_value("hand")
+
+
+def test_where_motion_is_not_wanted(visit: Any) -> None:
+    page = visit(reduced_motion="reduce")
+    button(page, "Play").wait_for()
+    page.get_by_label("Motion", exact=True).select_option("move")
+    page.wait_for_timeout(400)
+    assert clock(page) == 0
+    button(page, "Play").click()
+    page.wait_for_function("parseFloat(document.querySelector('.live-clock').textContent) > 0")
+
+
+def test_without_scripts_it_is_the_page_alone(visit: Any, address: str) -> None:
+    page = visit(java_script_enabled=False)
+    assert page.locator(".live, canvas").count() == 0
+    expect(page.locator("main > section h2").first).to_have_text("The testbed")
+
+
+@pytest.mark.parametrize(
+    ("script", "reason"),
+    [
+        ("delete window.WebAssembly", "this browser has no WebAssembly"),
+        ("delete window.DecompressionStream", "this browser has no DecompressionStream"),
+        ("WebAssembly.compile = () => Promise.reject(new Error('it is forbidden'))", "it is forbidden"),
+    ],
+)
+def test_why_it_cannot_run_the_fmu(visit: Any, script: str, reason: str) -> None:
+    page = visit(script=script)
+    expect(page.locator("main > :first-child")).to_contain_text(reason)
+    assert page.locator("canvas").count() == 0
+    expect(page.locator("main h2").first).to_have_text("The testbed")
+
+
+#: The module ends its run at 0.5 s.
+ENDING = """
+const { Instance } = WebAssembly;
+WebAssembly.Instance = function (...all) {
+  const { exports } = new Instance(...all);
+  return { exports: { ...exports,
+    fmi2DoStep: (fmu, time, ...more) => time < 0.5 - 1e-9 ? exports.fmi2DoStep(fmu, time, ...more) : 2,
+    fmi2GetBooleanStatus: (_, kind, place) => (new Int32Array(exports.memory.buffer, place, 1)[0] = kind === 3, 0),
+  } };
+};
+"""
+
+
+def test_a_run_that_the_fmu_ends(visit: Any) -> None:
+    """It is no refusal, and the time stays where there is something to be seen."""
+    page = visit("#try&motion=tour&speed=2", script=ENDING)
+    expect(page.locator(".live-status")).to_have_text("The FMU has ended the run at 0.5 s.")
+    expect(page.locator(".live-error")).to_have_count(0)
+    expect(button(page, "Play")).to_be_visible()
+    assert clock(page) == 0.5
+
+
+def test_a_link_in_the_page_leads_there(visit: Any) -> None:
+    """What is below is laid out only when it is seen."""
+    page = visit()
+    button(page, "Pause").click()
+    page.get_by_role("link", name="The equations").click()
+    page.wait_for_timeout(300)
+    assert page.locator("#equations").evaluate("e => Math.abs(e.getBoundingClientRect().top)") < 60
