@@ -107,17 +107,11 @@ pub fn new(options: &Options) -> Result<()> {
 
 /// Whether another folder's `Cargo.lock` is in force.
 fn in_workspace(folder: &Path) -> bool {
-    let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
-    let is_workspace = |manifest: PathBuf| {
-        let text = fs::read_to_string(manifest).unwrap_or_default();
-        toml::from_str::<toml::Table>(&text).is_ok_and(|manifest| {
-            let members = manifest.get("workspace").and_then(|workspace| workspace.get("members"));
-            members.is_some_and(|members| {
-                members.to_string().contains(&*folder.file_name().unwrap_or_default().to_string_lossy())
-            })
-        })
-    };
-    folder.ancestors().skip(1).map(|ancestor| ancestor.join("Cargo.toml")).any(is_workspace)
+    let mut command = Command::new(cargo());
+    command.args(["locate-project", "--workspace", "--message-format", "plain"]).current_dir(folder);
+    let root = command.output().map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned());
+    let own = fs::canonicalize(folder.join("Cargo.toml"));
+    !matches!((root.and_then(fs::canonicalize), own), (Ok(root), Ok(own)) if root == own)
 }
 
 /// fmu-export as it came with this command: beside it in a clone, of the registry otherwise.
