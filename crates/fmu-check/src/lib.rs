@@ -94,11 +94,16 @@ pub enum FailOn {
 pub fn command(fmu: &Path, options: &Options) -> ExitCode {
     let progress = !options.json && std::io::stderr().is_terminal();
     match check(fmu, options, progress).and_then(|report| {
-        if options.json {
-            println!("{}", report.json()?);
-        } else {
-            print!("{}", report.terminal(std::io::stdout().is_terminal()));
-        }
+        let text = match options.json {
+            true => format!("{}\n", report.json()?),
+            false => report.terminal(std::io::stdout().is_terminal()),
+        };
+        // Who stops reading has seen enough.
+        let written = std::io::stdout().write_all(text.as_bytes());
+        written.or_else(|error| match error.kind() {
+            std::io::ErrorKind::BrokenPipe => Ok(()),
+            _ => Err(error).context("the report cannot be written to the standard output"),
+        })?;
         if let Some(folder) = &options.out {
             report.write(folder).with_context(|| format!("{}: cannot be written", folder.display()))?;
         }
