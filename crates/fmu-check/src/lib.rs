@@ -178,6 +178,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
             || [
                 "functions.status",
                 "package.unloadable",
+                "package.symbols",
                 "life_cycle.course",
                 "life_cycle.crash",
                 "life_cycle.hang",
@@ -229,6 +230,7 @@ fn setting(
         resources: folder.join("resources"),
         memory: options.memory << 20,
         soft: false,
+        now: false,
         repetitions: options.repeat,
     })
 }

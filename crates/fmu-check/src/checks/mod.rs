@@ -38,6 +38,8 @@ pub const ALL: &[Check] = &[
     ("refusals", refusals::change_nothing),
     ("results", results::instances),
     ("results", results::reading),
+    ("results", results::name),
+    ("results", results::early_returns),
     ("results", results::threads),
     ("results", results::cut),
     ("results", results::time),

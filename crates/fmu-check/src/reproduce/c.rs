@@ -90,8 +90,9 @@ impl Writer {
                     ),
                     (true, true) => format!(
                         "((void *(*)(const char *, const char *, const char *, bool, bool, bool, bool, const uint32_t *, size_t, void *, void *, void *))\
-                         function(\"fmi3InstantiateCoSimulation\"))({name}, {token}, {resources}, false, {logging}, {}, false, NULL, 0, NULL, (void *)say3, NULL)",
-                        u8::from(make.event_mode)
+                         function(\"fmi3InstantiateCoSimulation\"))({name}, {token}, {resources}, false, {logging}, {}, {}, NULL, 0, NULL, (void *)say3, NULL)",
+                        u8::from(make.event_mode),
+                        u8::from(make.early_return)
                     ),
                 };
                 let _ = writeln!(

@@ -39,7 +39,7 @@ static __attribute__((unused)) void *guarded(const void *bytes, size_t size) {
     if (map == MAP_FAILED) { perror("mmap"); exit(3); }
     mprotect(map + length - page, page, PROT_NONE);
     char *array = map + length - page - size;
-    if (bytes) memcpy(array, bytes, size); else memset(array, 0xa5, size);
+    if (bytes) memcpy(array, bytes, size); else memset(array, 0x5a, size);
     return array;
 }
 

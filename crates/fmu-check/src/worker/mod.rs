@@ -9,7 +9,8 @@ use crate::script::{Arg, Kind, Make, Message, NOBODY, Numbered, Outcome, Script,
 use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmi_abi::fmi2::types::{fmi2CallbackFunctions, fmi2CallbackLogger};
 use fmi_abi::fmi3::types::fmi3LogMessageCallback;
-use memory::{FILL, Guarded};
+pub use memory::FILL;
+use memory::Guarded;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::ffi::CString;
@@ -60,10 +61,11 @@ pub fn work_if_asked() {
             OWN_FAULT
         }
     };
-    // Without what the library has for the end of a process: it is not what is tested.
+    // Without what the library has for the end of a process: it is not what is tested. What it has printed is kept.
     #[cfg(unix)]
-    // SAFETY: ends the process.
+    // SAFETY: writes what the C library still has, and ends the process.
     unsafe {
+        libc::fflush(std::ptr::null_mut());
         libc::_exit(status)
     }
     #[cfg(not(unix))]
@@ -168,13 +170,16 @@ type PlainLogger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *cons
 /// Without its `...`, which stable Rust cannot define: named arguments travel the same way.
 unsafe extern "C" fn log_of_fmi2(
     environment: *mut c_void,
-    _instance_name: *const c_char,
+    instance_name: *const c_char,
     status: c_int,
     category: *const c_char,
     text: *const c_char,
 ) {
-    // SAFETY: section 2.1.5 of FMI 2.0: the texts end with zeros.
-    unsafe { remember(environment, status, category, text) }
+    // SAFETY: section 2.1.5 of FMI 2.0: the texts end with zeros. The name is read as importers that show it do.
+    unsafe {
+        std::hint::black_box(functions::text(instance_name));
+        remember(environment, status, category, text);
+    }
 }
 
 unsafe extern "C" fn log_of_fmi3(
@@ -408,7 +413,7 @@ impl Player {
                         false,
                         logging,
                         make.event_mode,
-                        false,
+                        make.early_return,
                         std::ptr::null(),
                         0,
                         environment,
