@@ -417,11 +417,19 @@ impl Checker {
             "results" | "life_cycle" => &["SetTime", "DoStep", "CompletedIntegratorStep"],
             _ => &[],
         };
-        // Of what comes up in any topic it is one call that shows it.
-        let pinned = if finding.name == "life_cycle.refused" { &[] } else { pinned };
+        // Where nothing is compared, one call shows it.
+        let alone = [
+            "life_cycle.refused",
+            "life_cycle.states-changed",
+            "results.early-return",
+            "results.early-unsaid",
+            "start_values.inputs",
+        ]
+        .contains(&finding.name.as_str());
+        let pinned = if alone { &[] } else { pinned };
         // With the first script that is shorter the sentence may tell other numbers.
         let mut seen = finding.seen.clone();
-        let short = shrink(&self.description, &finding.script, pinned, |tried| {
+        let short = shrink(&self.description, &finding.script, pinned, !alone, |tried| {
             left -= 1;
             if left < 0 || Instant::now() > self.deadline {
                 return false;

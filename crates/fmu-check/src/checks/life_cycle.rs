@@ -410,8 +410,8 @@ fn changed_states(checker: &Checker, course: &Course, section: &'static str) -> 
         writer.call(0, "EnterEventMode", vec![]);
         // Entering Event Mode where nothing happens is allowed, too.
         let updates = writer.update(0, point.updates.max(3));
-        let after = writer.vector(0, "GetContinuousStates", count);
         writer.call(0, "EnterContinuousTimeMode", vec![]);
+        let after = writer.vector(0, "GetContinuousStates", count);
         asked.push((point.time, before, updates, after));
     }
     let claim = Claim::new(

@@ -2,6 +2,7 @@
 
 pub mod dependencies;
 pub mod derivatives;
+pub mod early_returns;
 pub mod functions;
 pub mod hostile;
 pub mod life_cycle;
@@ -39,7 +40,7 @@ pub const ALL: &[Check] = &[
     ("results", results::instances),
     ("results", results::reading),
     ("results", results::name),
-    ("results", results::early_returns),
+    ("results", early_returns::told),
     ("results", results::threads),
     ("results", results::cut),
     ("results", results::time),

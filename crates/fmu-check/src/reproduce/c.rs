@@ -207,7 +207,10 @@ impl Writer {
                         _ => 'u',
                     };
                     let guard = if *kind == Kind::Pointer { "if (status < 2) " } else { "" };
-                    if name != "fmi3GetBinary" {
+                    if name == "fmi2NewDiscreteStates" {
+                        // Of fmi2EventInfo the five flags, then the time.
+                        let _ = writeln!(after, "{indent}    printf(\" ->\"); show(a{number}, 5, 'i', 4); show((char *)a{number} + 24, 1, 'f', 8);");
+                    } else if name != "fmi3GetBinary" {
                         let _ = writeln!(after, "{indent}    printf(\" ->\"); {guard}show(a{number}, {count}, '{letter}', sizeof({c}));");
                     }
                     format!("a{number}")

@@ -160,7 +160,10 @@ fn step(
                     }
                     Arg::Out(kind, count) => {
                         let _ = writeln!(text, "{indent}{name} = room({})", kind.size() * count);
-                        if function != "fmi3GetBinary" {
+                        if function == "fmi2NewDiscreteStates" {
+                            // Of fmi2EventInfo the five flags, then the time.
+                            shown.extend([format!("({name}, \"i\", 5)"), format!("({name} + 24, \"d\", 1)")]);
+                        } else if function != "fmi3GetBinary" {
                             shown.push(format!("({name}, \"{}\", {count})", letter(*kind)));
                         }
                         format!("c_void_p({name})")

@@ -164,20 +164,26 @@ unsafe fn remember(environment: *mut c_void, status: c_int, category: *const c_c
     }
 }
 
-/// The logger of FMI 2.0 without its `...`.
-type PlainLogger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char);
+/// The logger of FMI 2.0 with the first of its `...` as an argument.
+type PlainLogger =
+    unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, *const c_char);
 
-/// Without its `...`, which stable Rust cannot define: named arguments travel the same way.
+/// Without its `...`, which stable Rust cannot define: named arguments travel the same way, but for Apple's ARM. The format
+/// `%s`, which takes any text as it is, stands for its argument.
 unsafe extern "C" fn log_of_fmi2(
     environment: *mut c_void,
     instance_name: *const c_char,
     status: c_int,
     category: *const c_char,
     text: *const c_char,
+    first: *const c_char,
 ) {
+    let all_named_alike = !cfg!(all(target_vendor = "apple", target_arch = "aarch64"));
     // SAFETY: section 2.1.5 of FMI 2.0: the texts end with zeros. The name is read as importers that show it do.
     unsafe {
         std::hint::black_box(functions::text(instance_name));
+        let plain = functions::text(text).as_deref() == Some(b"%s") && all_named_alike;
+        let text = if plain { first } else { text };
         remember(environment, status, category, text);
     }
 }
