@@ -344,7 +344,7 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
     let judge: Judge = Arc::new(move |run| {
         asked.iter().find_map(|(id, time)| {
             let event = event_of(run, *id, fmi3)?;
-            let past = !event.0 && event.1? <= time - 1e-12 * (1.0 + time.abs());
+            let past = !event.0 && event.1? <= *time;
             past.then(|| format!("at {time:?} the next event is at {:?}", event.1.unwrap_or_default()))
         })
     });

@@ -252,6 +252,7 @@ mutants! {
     3 reset_keeps_text "reset" "reset.values";
     2 directional_imprecise "derivatives" "derivatives.precision";
     3 directional_added "derivatives" "derivatives.directional";
+    3 event_again_now "life_cycle" "life_cycle.next-event-time";
     2 event_moves_silently "life_cycle" "life_cycle.states-changed";
     2 last_step_refused "life_cycle" "life_cycle.refused";
     3 early_time_wrong "results" "results.early-return";

@@ -30,7 +30,7 @@ enum {
     M_discard_changes, M_step_refused_halfway, M_reading_once, M_text_latin1, M_token_ignored, M_crash_amid,
     M_text_cut, M_text_leaks, M_reset_keeps_text, M_directional_imprecise, M_directional_added, M_event_moves_silently,
     M_event_loses_input, M_early_time_wrong, M_early_unsaid, M_name_in_result, M_reference_once, M_start_time_ignored, M_last_step_refused,
-    M_step_overshoots, M_step_adds, M_lossy_when_late, M_step_prints, M_symbol_missing, M_start_in_mode_ignored,
+    M_step_overshoots, M_step_adds, M_lossy_when_late, M_step_prints, M_symbol_missing, M_start_in_mode_ignored, M_event_again_now,
     M_name_gone
 };
 #ifndef MUTANT
@@ -333,7 +333,7 @@ static int enter(void *c, double from, double stop) {
 }
 
 static int update(Model *m, Flag *again, double *next) {
-    if (m->s.time >= m->s.next - 1e-12) {
+    if (IS(event_again_now) ? m->s.time > m->s.next : m->s.time >= m->s.next - 1e-12) {
         m->s.count++;
         m->s.next += 0.05;
         if (m->s.next <= m->s.time) m->s.next = m->s.time + 0.05;
