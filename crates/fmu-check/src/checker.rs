@@ -10,7 +10,7 @@ use crate::writer::{Course, Point, Value, Writer, status_name};
 use fmi_abi::{Interface, Standard};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// The time for all checks is over.
@@ -417,11 +417,19 @@ impl Checker {
             "results" | "life_cycle" => &["SetTime", "DoStep", "CompletedIntegratorStep"],
             _ => &[],
         };
-        // Of what comes up in any topic it is one call that shows it.
-        let pinned = if finding.name == "life_cycle.refused" { &[] } else { pinned };
+        // Where nothing is compared, one call shows it.
+        let alone = [
+            "life_cycle.refused",
+            "life_cycle.states-changed",
+            "results.early-return",
+            "results.early-unsaid",
+            "start_values.inputs",
+        ]
+        .contains(&finding.name.as_str());
+        let pinned = if alone { &[] } else { pinned };
         // With the first script that is shorter the sentence may tell other numbers.
         let mut seen = finding.seen.clone();
-        let short = shrink(&self.description, &finding.script, pinned, |tried| {
+        let short = shrink(&self.description, &finding.script, pinned, !alone, |tried| {
             left -= 1;
             if left < 0 || Instant::now() > self.deadline {
                 return false;
@@ -540,6 +548,9 @@ pub fn near(variable: &crate::description::Variable, start: f64, by: f64) -> f64
     variable.max.map_or(number, |max| number.min(max))
 }
 
+/// A course that takes longer is played too often.
+const LONG: Duration = Duration::from_millis(250);
+
 /// A simulation that goes well: in Co-Simulation steps with changing inputs, in Model Exchange an integration by Euler's
 /// method with its events, found by playing it point by point.
 pub fn find_course(
@@ -556,17 +567,27 @@ pub fn find_course(
         let internal =
             description.co_simulation.as_ref().and_then(|offer| offer.number("fixedInternalStepSize"));
         let size = internal.map_or(size, |internal| internal * (size / internal).round().clamp(1.0, 100.0));
-        let mut course =
-            Course { points: steps(description, start, size, 12, true), end: start + 12.0 * size, ..course };
-        for discrete in [true, false] {
-            course.points = steps(description, start, size, 12, discrete);
+        // To the end of the default experiment, where steps may have several sizes and that takes no time.
+        let times = ((range / size - 4.0) / 8.0).round();
+        let far = checker.can(interface, &["canHandleVariableCommunicationStepSize"]) && times > 1.0;
+        for (reach, discrete) in [(times, true), (times, false), (1.0, true), (1.0, false)] {
+            if reach > 1.0 && !far {
+                continue;
+            }
+            let sizes: Vec<f64> =
+                (0..12).map(|number| if number < 4 { size } else { reach * size }).collect();
+            course.points = steps(description, start, &sizes, discrete);
             let mut writer = checker.writer();
             let mut ids = writer.begin(0, &course);
             let mut good = 0;
             for point in &course.points {
                 ids.extend(writer.point(0, &course, point));
             }
+            let begin = Instant::now();
             let run = checker.play(&writer.script)?;
+            if reach > 1.0 && (run.end != End::Done || begin.elapsed() > LONG) {
+                continue;
+            }
             if run.end != End::Done {
                 return Ok(Err((ending(&run, &writer.script).unwrap_or_default(), writer.script)));
             }
@@ -605,7 +626,7 @@ pub fn find_course(
                 course.end = course.points.last().map_or(start, |point| point.time + point.size);
                 return Ok(Ok(course));
             }
-            if !discrete {
+            if !discrete && reach == 1.0 {
                 return Ok(Err((why, writer.script)));
             }
         }
@@ -618,6 +639,8 @@ pub fn find_course(
     } else {
         range / 10.0
     };
+    // First every point, then some on the way to the end of the default experiment, and those with events.
+    let (near, far, most) = if count > 0 { (6, range / 160.0, 166) } else { (14, small, 14) };
     // How many updates the first event needs.
     let mut next_event = None;
     for updates in 1..=10 {
@@ -651,9 +674,17 @@ pub fn find_course(
     let mut states: Vec<f64> = Vec::new();
     let mut slopes: Vec<f64> = Vec::new();
     let mut event_now = false;
-    for number in 0..14 {
+    let begin = Instant::now();
+    for number in 0..most {
+        if course.points.len() > 20 || number >= near && begin.elapsed() > 16 * LONG {
+            break;
+        }
         // The first point is where the integration begins.
-        let mut size = if number == 0 { 0.0 } else { small };
+        let mut size = match number {
+            0 => 0.0,
+            _ if number < near => small,
+            _ => far,
+        };
         if let Some(next) = next_event.filter(|next| *next > time) {
             // Time events are reached at once where nothing is integrated.
             if next <= time + size || count == 0 && number > 0 && number % 3 == 0 {
@@ -668,7 +699,7 @@ pub fn find_course(
         let mut point = Point {
             time,
             size,
-            inputs: input_values(description, number, false),
+            inputs: input_values(description, if number < near { number } else { near + number / 20 }, false),
             states: states.clone(),
             updates: 0,
         };
@@ -745,8 +776,10 @@ pub fn find_course(
         let now = vector(2);
         event_now = before.iter().zip(&now).any(|(before, now)| (*before > 0.0) != (*now > 0.0));
         before = now;
-        course.points.push(point);
-        course.end = time;
+        if number < near || number % 20 == 0 || point.updates > 0 {
+            course.points.push(point);
+            course.end = time;
+        }
         if states.iter().chain(&slopes).any(|number| !number.is_finite() || number.abs() > 1e100) {
             break;
         }
@@ -755,10 +788,11 @@ pub fn find_course(
 }
 
 /// Steps of Co-Simulation.
-pub fn steps(description: &Description, start: f64, size: f64, count: usize, discrete: bool) -> Vec<Point> {
+pub fn steps(description: &Description, start: f64, sizes: &[f64], discrete: bool) -> Vec<Point> {
     let mut time = start;
-    (0..count)
-        .map(|number| {
+    let points = sizes.iter().enumerate();
+    points
+        .map(|(number, &size)| {
             let point =
                 Point { time, size, inputs: input_values(description, number, discrete), ..Point::default() };
             time += size;

@@ -434,6 +434,11 @@ impl Variable {
     pub fn is_float(&self) -> bool {
         self.base.is_some_and(BaseType::is_float)
     }
+
+    /// Whether it is a number or a truth value, no text and no bytes.
+    pub fn is_number(&self) -> bool {
+        !matches!(self.base, None | Some(BaseType::String | BaseType::Binary))
+    }
 }
 
 /// The end of the names of the functions of a type.

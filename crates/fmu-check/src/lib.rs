@@ -183,6 +183,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
             || [
                 "functions.status",
                 "package.unloadable",
+                "package.symbols",
                 "life_cycle.course",
                 "life_cycle.crash",
                 "life_cycle.hang",
@@ -234,6 +235,7 @@ fn setting(
         resources: folder.join("resources"),
         memory: options.memory << 20,
         soft: false,
+        now: false,
         repetitions: options.repeat,
     })
 }

@@ -43,6 +43,7 @@ fn one(
         .env("MALLOC_PERTURB_", (1 + phase * 90).to_string())
         // Freed blocks that each thread keeps would count as in use (mallinfo2 of glibc).
         .env("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0")
+        .envs(setting.now.then_some(("LD_BIND_NOW", "1")))
         .current_dir(at("here"))
         .stdin(Stdio::null())
         .stdout(said.try_clone()?)

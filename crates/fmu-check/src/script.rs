@@ -125,6 +125,8 @@ pub struct Make {
     pub logging: bool,
     /// Whether the importer handles events (FMI 3.0).
     pub event_mode: bool,
+    /// Whether steps may return early (FMI 3.0).
+    pub early_return: bool,
     /// Whether its environment is told where its resources are.
     pub resources: bool,
 }
@@ -203,6 +205,14 @@ impl Written {
             Self::Numbers(kind, bits) => bits.iter().map(|bits| kind.number(*bits)).collect(),
             Self::Texts(_) => Vec::new(),
         }
+    }
+
+    /// So many of the values from a place on.
+    pub fn part(&self, begin: usize, size: usize) -> Option<Self> {
+        Some(match self {
+            Self::Numbers(kind, bits) => Self::Numbers(*kind, bits.get(begin..begin + size)?.to_vec()),
+            Self::Texts(texts) => Self::Texts(texts.get(begin..begin + size)?.to_vec()),
+        })
     }
 
     /// What is at a place, for people.
@@ -331,6 +341,8 @@ pub struct Setting {
     pub memory: u64,
     /// There is room after arrays, so that it can be seen what is written there.
     pub soft: bool,
+    /// All symbols are looked up when the library is loaded, as some importers do.
+    pub now: bool,
     /// Seconds of repetitions at most.
     pub repetitions: f64,
 }

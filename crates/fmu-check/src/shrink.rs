@@ -68,16 +68,17 @@ fn together(script: &Script, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
 }
 
 /// Leaves out what is not needed for `shows` to hold, as long as the rest keeps to the standard. Calls of `pinned`
-/// functions stay.
+/// functions stay; what is the same in simulations that are compared goes together.
 pub fn shrink(
     description: &Description,
     script: &Script,
     pinned: &[&str],
+    compared: bool,
     mut shows: impl FnMut(&Script) -> bool,
 ) -> Script {
     let legal = first_illegal(description, script).is_none();
     let mut best = script.clone();
-    let mut units = together(script, units(script));
+    let mut units = if compared { together(script, units(script)) } else { units(script) };
     let stays = |id: &u32| {
         script.iter().any(|numbered| match &numbered.step {
             Step::Call { function, .. } => {

@@ -1,5 +1,6 @@
 //! Writes scripts: the calls of an importer that does what the standard says, with the numbers of this FMU.
 
+use crate::checker::near;
 use crate::description::{Description, kind_of, type_name};
 use crate::script::{Arg, Kind, Make, Numbered, Run, Script, Step, Written, steps_itself};
 use fmi_abi::{BaseType, Interface, Standard};
@@ -11,6 +12,20 @@ pub enum Value {
     Numbers(Vec<f64>),
     /// Texts or bytes.
     Texts(Vec<Vec<u8>>),
+}
+
+impl Value {
+    /// The first of it, for people.
+    pub fn show(&self) -> String {
+        match self {
+            Self::Numbers(numbers) => {
+                numbers.first().map_or("nothing".to_owned(), |number| format!("{number:?}"))
+            }
+            Self::Texts(texts) => texts
+                .first()
+                .map_or("nothing".to_owned(), |text| format!("{:?}", String::from_utf8_lossy(text))),
+        }
+    }
 }
 
 /// What a call read: the step's number and whose values it wrote, by places, with how many each has.
@@ -107,6 +122,7 @@ impl<'a> Writer<'a> {
             token: Some(self.description.token.clone()),
             logging: true,
             event_mode: false,
+            early_return: false,
             resources: true,
         }
     }
@@ -131,6 +147,18 @@ impl<'a> Writer<'a> {
         } else {
             self.call(of, "SetupExperiment", experiment);
             self.call(of, "EnterInitializationMode", vec![])
+        }
+    }
+
+    /// The same with another start time.
+    pub fn start_at(&mut self, time: f64) {
+        for numbered in &mut self.script {
+            if let Step::Call { function, args, .. } = &mut numbered.step
+                && ["SetupExperiment", "EnterInitializationMode"].contains(&&function[4..])
+                && let Some(start) = args.get_mut(2)
+            {
+                *start = Arg::real(time);
+            }
         }
     }
 
@@ -382,6 +410,54 @@ impl<'a> Writer<'a> {
     }
 }
 
+/// Other values than at the start that a variable may well take: a text beyond ASCII, bytes with zeros among them, the next
+/// number, the other truth value.
+pub fn other_values(description: &Description, place: usize) -> Option<Value> {
+    let variable = &description.variables[place];
+    let starts = variable.starts();
+    Some(match variable.base? {
+        BaseType::Real | BaseType::Float32 => {
+            let kind = kind_of(description.standard, variable.base?);
+            let near = |start: &f64| kind.number(kind.bits(near(variable, *start, 1.0 / 64.0)));
+            Value::Numbers(starts.iter().map(near).collect())
+        }
+        BaseType::String => Value::Texts(vec!["Gödel, Escher, Bach".into(); variable.start.len()]),
+        BaseType::Binary => {
+            let bytes = (0..300).map(|byte| (byte % 256) as u8).collect();
+            Value::Texts(vec![bytes; variable.start.len()])
+        }
+        BaseType::Boolean => Value::Numbers(starts.iter().map(|start| 1.0 - start).collect()),
+        BaseType::Enumeration if variable.max.is_none() => return None,
+        _ => {
+            let other = |start: &f64| match variable.max.is_some_and(|max| start + 1.0 > max) {
+                true => start - 1.0,
+                false => start + 1.0,
+            };
+            let others: Vec<f64> = starts.iter().map(other).collect();
+            let inside = |number: &f64| variable.min.is_none_or(|min| *number >= min);
+            if !others.iter().all(inside) {
+                return None;
+            }
+            Value::Numbers(others)
+        }
+    })
+}
+
+/// What is read is what was set.
+pub fn is_read(read: &Written, value: &Value) -> bool {
+    match (read, value) {
+        (Written::Numbers(kind, bits), Value::Numbers(numbers)) => {
+            bits.iter().zip(numbers).all(|(bits, number)| {
+                *bits == kind.bits(*number) || *kind == Kind::F64 && kind.number(*bits) == *number
+            })
+        }
+        (Written::Texts(texts), Value::Texts(set)) => {
+            texts.iter().zip(set).all(|(text, set)| text.as_ref() == Some(set))
+        }
+        _ => true,
+    }
+}
+
 /// The variables that can be read at any time: no clocks, none whose size is not known.
 pub fn readable(description: &Description) -> Vec<usize> {
     (0..description.variables.len())
@@ -442,12 +518,7 @@ pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Written> {
                 if outcome.status.is_none_or(|status| status > 1) {
                     return None;
                 }
-                return Some(match outcome.written.first()? {
-                    Written::Numbers(kind, bits) => {
-                        Written::Numbers(*kind, bits.get(begin..begin + size)?.to_vec())
-                    }
-                    Written::Texts(texts) => Written::Texts(texts.get(begin..begin + size)?.to_vec()),
-                });
+                return outcome.written.first()?.part(begin, *size);
             }
             begin += size;
         }

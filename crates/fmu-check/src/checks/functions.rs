@@ -2,10 +2,32 @@
 
 use crate::checker::{Checker, Claim, refused_one};
 use crate::finding::{Finding, Grade, Judge};
-use crate::script::{Arg, End, Kind, Step};
+use crate::script::{Arg, End, Kind, Setting, Step};
 use fmi_abi::calls::{fmi2, fmi3, signatures};
 use fmi_abi::{Interface, Standard};
 use std::sync::Arc;
+
+/// Whether all that the library needs is found, also what is needed late.
+fn symbols(checker: &Checker) -> anyhow::Result<()> {
+    let mut writer = checker.writer();
+    writer.add(Step::Version(if checker.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned()));
+    let [late, now] = [false, true].map(|now| {
+        let setting = Setting { now, ..checker.setting.clone() };
+        crate::run::play(&setting, &writer.script, checker.limit, &checker.scratch)
+    });
+    if let (End::Done, End::Unloadable(why)) = (late?.end, now?.end) {
+        let claim = Claim::new(
+            "package.symbols",
+            Grade::Fragile,
+            checker.section("2.3", "2.5.1"),
+            "All functions that the library needs are in it or in the system: importers that look them up at once cannot load \
+             it, and others crash later.",
+        );
+        let nothing: Judge = Arc::new(|_| None);
+        checker.add(claim.finding(why, writer.script, nothing));
+    }
+    Ok(())
+}
 
 /// Whether every function that must be there is there.
 pub fn present(checker: &Checker) -> anyhow::Result<()> {
@@ -51,6 +73,7 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
         let seen = format!("the library lacks {}", missing.join(", "));
         checker.add(Finding::of_files("functions.missing", Grade::Violation, section, promise, seen));
     }
+    symbols(checker)?;
     version(checker)?;
     for course in &checker.courses {
         capabilities(checker, course.interface)?;

@@ -3,7 +3,7 @@
 use crate::checker::{Checker, Claim, refused, refused_one};
 use crate::finding::{Grade, Judge};
 use crate::script::{Arg, Kind, Step};
-use crate::writer::{Course, Writer};
+use crate::writer::{Course, Point, Writer};
 use fmi_abi::Interface;
 use std::sync::Arc;
 
@@ -122,6 +122,24 @@ pub fn orders(checker: &Checker) -> anyhow::Result<()> {
             points(writer, 0, 3);
             writer.free(0);
         });
+        // Up to the stop time, which the last step meets.
+        if interface == Interface::CoSimulation {
+            order(&|writer| {
+                writer.make(0, interface);
+                let start = Arg::real(writer.description.start_time);
+                let experiment =
+                    vec![Arg::Whole(0), Arg::real(0.0), start, Arg::Whole(1), Arg::real(course.end)];
+                if writer.fmi3() {
+                    writer.call(0, "EnterInitializationMode", experiment);
+                } else {
+                    writer.call(0, "SetupExperiment", experiment);
+                    writer.call(0, "EnterInitializationMode", vec![]);
+                }
+                writer.leave(0, course);
+                points(writer, 0, usize::MAX);
+                writer.free(0);
+            });
+        }
         // Categories, all and each, in every mode.
         order(&|writer| {
             let categories: Vec<Option<Vec<u8>>> = writer
@@ -294,6 +312,7 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
         return Ok(());
     };
     let section = checker.section("3.2.2", "2.3.5");
+    changed_states(checker, course, section)?;
     let mut writer = checker.writer();
     let mut asked: Vec<(u32, f64)> = Vec::new();
     let of_updates = |writer: &Writer, ids: &[u32], time: f64| -> Vec<(u32, f64)> {
@@ -325,7 +344,7 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
     let judge: Judge = Arc::new(move |run| {
         asked.iter().find_map(|(id, time)| {
             let event = event_of(run, *id, fmi3)?;
-            let past = !event.0 && event.1? <= time - 1e-12 * (1.0 + time.abs());
+            let past = !event.0 && event.1? <= *time;
             past.then(|| format!("at {time:?} the next event is at {:?}", event.1.unwrap_or_default()))
         })
     });
@@ -371,6 +390,57 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
     let judge: Judge = Arc::new(move |run| {
         let all = ids.iter().all(|id| event_of(run, *id, fmi3).is_some_and(|event| event.0));
         all.then(|| "after 100 updates of the discrete states another one is needed".to_owned())
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}
+
+/// An event that changes states says so: else importers go on with those that they have.
+fn changed_states(checker: &Checker, course: &Course, section: &'static str) -> anyhow::Result<()> {
+    let count = checker.description.states_count().unwrap_or(0);
+    if count == 0 {
+        return Ok(());
+    }
+    let mut writer = checker.writer();
+    writer.begin(0, course);
+    let mut asked = Vec::new();
+    for point in &course.points {
+        writer.point(0, course, &Point { updates: 0, ..point.clone() });
+        let before = writer.vector(0, "GetContinuousStates", count);
+        writer.call(0, "EnterEventMode", vec![]);
+        // Entering Event Mode where nothing happens is allowed, too.
+        let updates = writer.update(0, point.updates.max(3));
+        writer.call(0, "EnterContinuousTimeMode", vec![]);
+        let after = writer.vector(0, "GetContinuousStates", count);
+        asked.push((point.time, before, updates, after));
+    }
+    let claim = Claim::new(
+        "life_cycle.states-changed",
+        Grade::Violation,
+        section,
+        "An event that changes continuous states says valuesOfContinuousStatesChanged: else importers do not read them.",
+    );
+    let fmi3 = checker.fmi3();
+    let judge: Judge = Arc::new(move |run| {
+        asked.iter().find_map(|(time, before, updates, after)| {
+            let said = |id: &u32| {
+                let Some(outcome) = run.of(*id).filter(|of| of.status.is_some_and(|status| status <= 1))
+                else {
+                    return true;
+                };
+                match outcome.written.first() {
+                    Some(_) if fmi3 => outcome.written[3].numbers() == [1.0],
+                    // The fourth flag of fmi2EventInfo.
+                    Some(crate::script::Written::Numbers(Kind::U64, words)) => words[1] >> 32 != 0,
+                    _ => true,
+                }
+            };
+            let (was, is) = (run.written(*before)?, run.written(*after)?);
+            let good = [before, after].iter().all(|id| run.status(**id).is_some_and(|status| status <= 1));
+            let place = was.differ(is).filter(|_| good && !updates.iter().any(said))?;
+            let (was, is) = (was.show(place), is.show(place));
+            Some(format!("at {time:?} state {} was {was}, after the event it is {is}", place + 1))
+        })
     });
     checker.judge(&claim, writer.script, judge)?;
     Ok(())

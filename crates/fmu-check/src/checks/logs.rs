@@ -2,7 +2,7 @@
 
 use crate::checker::{Checker, Claim};
 use crate::finding::{Grade, Judge};
-use crate::script::{Message, Numbered, Outcome, Run, Script, Step};
+use crate::script::{Arg, Message, Numbered, Outcome, Run, Script, Step};
 use std::sync::Arc;
 
 type Test = Arc<dyn Fn(&Message) -> Option<String> + Send + Sync>;
@@ -55,13 +55,12 @@ pub fn look(checker: &Checker, script: &Script, run: &Run, numbered: &Numbered, 
         (
             "logs.format",
             Grade::Note,
-            if fmi3 {
-                "A message is a text, not a format of printf: conversions in it stay."
-            } else {
-                "A message may be a format of printf with arguments, but not all importers fill them in: they show the \
-                 format."
-            },
+            "A message is a text, not a format of printf: conversions in it stay.",
             Arc::new(move |message| {
+                // In FMI 2.0 it is such a format, and its arguments follow.
+                if !fmi3 {
+                    return None;
+                }
                 let text = String::from_utf8_lossy(message.text.as_deref()?).into_owned();
                 let conversions =
                     ["%s", "%d", "%i", "%u", "%g", "%f", "%e", "%x", "%lf", "%ld", "%lu", "%zu", "%.", "%p"];
@@ -119,6 +118,7 @@ pub fn look(checker: &Checker, script: &Script, run: &Run, numbered: &Numbered, 
 /// With logging off no message, and switched on and off at any time.
 pub fn switches(checker: &Checker) -> anyhow::Result<()> {
     let section = checker.section("2.1.5", "2.3.1");
+    let fmi3 = checker.fmi3();
     for course in &checker.courses {
         for by_call in [false, true] {
             let mut writer = checker.writer();
@@ -126,7 +126,6 @@ pub fn switches(checker: &Checker) -> anyhow::Result<()> {
             how.logging = by_call;
             let mut ids = vec![writer.add(Step::Make(0, how))];
             if by_call {
-                use crate::script::Arg;
                 writer.call(0, "SetDebugLogging", vec![Arg::Whole(0), Arg::Whole(0), Arg::Null]);
                 ids.clear();
             }
@@ -146,11 +145,13 @@ pub fn switches(checker: &Checker) -> anyhow::Result<()> {
             );
             let judge: Judge = Arc::new(move |run| {
                 let message = ids.iter().find_map(|id| {
-                    run.of(*id).filter(|of| of.status.is_none_or(|status| status < 2))?.log.first()
+                    // Of a refusal, FMI 3.0 says both that there must be a message and that there must be none.
+                    let of = run.of(*id).filter(|of| of.status.is_none_or(|status| status < 2))?;
+                    // In FMI 2.0 it is debug messages that are off.
+                    of.log.iter().find(|message| fmi3 || message.status < 2)
                 })?;
                 let text = String::from_utf8_lossy(message.text.as_deref().unwrap_or_default()).into_owned();
-                // In FMI 2.0 it is debug messages that are off.
-                (message.status < 2).then(|| format!("{text:?}"))
+                Some(format!("{text:?}"))
             });
             checker.judge(&claim, writer.script, judge)?;
         }

@@ -2,6 +2,7 @@
 
 pub mod dependencies;
 pub mod derivatives;
+pub mod early_returns;
 pub mod functions;
 pub mod hostile;
 pub mod life_cycle;
@@ -38,6 +39,8 @@ pub const ALL: &[Check] = &[
     ("refusals", refusals::change_nothing),
     ("results", results::instances),
     ("results", results::reading),
+    ("results", results::name),
+    ("results", early_returns::told),
     ("results", results::threads),
     ("results", results::cut),
     ("results", results::time),

@@ -54,28 +54,41 @@ pub fn reset(checker: &Checker) -> anyhow::Result<()> {
 /// What was set before the reset is gone after it.
 fn changed(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<()> {
     let description = &checker.description;
-    let mut values = Vec::new();
+    let (mut values, mut others) = (Vec::new(), Vec::new());
     for place in crate::writer::readable(description) {
         let variable = &description.variables[place];
         let settable = variable.initial == "exact" && variable.variability != "constant"
             || variable.causality == "input";
-        if settable && variable.is_float() && !variable.clocked && !variable.starts().is_empty() {
-            let numbers = variable
-                .starts()
-                .iter()
-                .map(|start| crate::checker::near(variable, *start, 1.0 / 64.0))
-                .collect();
-            values.push((place, crate::writer::Value::Numbers(numbers)));
+        if settable && !variable.clocked && !variable.start.is_empty() {
+            let list = if variable.is_float() { &mut values } else { &mut others };
+            list.extend(crate::writer::other_values(description, place).map(|value| (place, value)));
         }
     }
+    // What a model may refuse apart, and not for long.
+    after_values(checker, course, &values, true)?;
+    for other in others.chunks(1).take(40) {
+        after_values(checker, course, other, false)?;
+    }
+    Ok(())
+}
+
+fn after_values(
+    checker: &Checker,
+    course: &crate::writer::Course,
+    values: &[(usize, crate::writer::Value)],
+    initialized: bool,
+) -> anyhow::Result<()> {
+    let description = &checker.description;
     let mut writer = checker.writer();
     writer.make(0, course.interface);
     writer.enter(0);
     let first = writer.read(0);
     writer.call(0, "Reset", vec![]);
-    writer.set(0, &values);
-    writer.enter(0);
-    writer.leave(0, course);
+    writer.set(0, values);
+    if initialized {
+        writer.enter(0);
+        writer.leave(0, course);
+    }
     writer.call(0, "Reset", vec![]);
     writer.enter(0);
     let second = writer.read(0);

@@ -2,8 +2,9 @@
 
 use crate::checker::{Checker, Claim};
 use crate::finding::{Grade, Judge};
-use crate::script::{Numbered, Step};
-use crate::writer::{Course, Writer};
+use crate::script::{End, Numbered, Step};
+use crate::writer::{Course, Value, Writer};
+use fmi_abi::BaseType;
 use std::sync::Arc;
 
 /// Simulations, states and calls again and again.
@@ -19,6 +20,23 @@ pub fn cycles(checker: &Checker) -> anyhow::Result<()> {
             writer.free(0);
         };
         measured(checker, "instances made, run and freed", |_| {}, whole)?;
+        let variables = checker.description.variables.iter().enumerate();
+        let texts: Vec<(usize, Value)> = variables
+            .filter(|(_, of)| of.base == Some(BaseType::String) && of.size == Some(1) && !of.clocked)
+            .filter(|(_, of)| of.causality == "input" || of.causality == "parameter" && of.initial == "exact")
+            .filter_map(|(place, of)| {
+                Some((place, Value::Texts(vec![of.start.first()?.clone().into_bytes()])))
+            })
+            .collect();
+        if !texts.is_empty() {
+            let make = |writer: &mut Writer| {
+                writer.make(0, course.interface);
+            };
+            let set = |writer: &mut Writer| {
+                writer.set(0, &texts);
+            };
+            measured(checker, "texts set", make, set)?;
+        }
         measured(
             checker,
             "resets",
@@ -176,6 +194,15 @@ fn settings(checker: &Checker, course: &Course) -> anyhow::Result<()> {
         let (was, is) = one.settings.iter().zip(&two.settings).find(|(was, is)| was != is)?;
         Some(format!("{was} has become {is}"))
     });
-    checker.judge(&claim, writer.script, judge)?;
+    let run = checker.judge(&claim, writer.script.clone(), judge)?;
+    let judge: Judge = Arc::new(move |run| {
+        let line = run.said.lines().find(|line| !line.trim().is_empty())?;
+        (run.end == End::Done).then(|| format!("{:?}", line.chars().take(80).collect::<String>()))
+    });
+    if let Some(seen) = judge(&run) {
+        let promise = "What is to be said goes to the logger: the standard output is the importer's.";
+        let claim = Claim::new("logs.printed", Grade::Note, checker.section("2.1.5", "2.3.1"), promise);
+        checker.add(claim.finding(seen, writer.script, judge));
+    }
     Ok(())
 }

@@ -1,12 +1,12 @@
 //! Start values are what the description says; what is set is what is read; values are of their types and within their
 //! ranges.
 
-use crate::checker::{Checker, Claim, near};
-use crate::description::kind_of;
+use crate::checker::{Checker, Claim};
 use crate::finding::{Grade, Judge};
-use crate::script::{Kind, Written};
-use crate::writer::{Value, readable, value_of};
-use fmi_abi::BaseType;
+use crate::script::Written;
+use crate::worker::FILL;
+use crate::writer::{Course, Value, Writer, is_read, other_values, readable, value_of};
+use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
 
 /// The values of the variables in Initialization Mode, before anything is set.
@@ -90,7 +90,7 @@ fn values(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<(
             "A function that answers OK has written all values that it was asked for.",
             Arc::new(|_, value| {
                 let Written::Numbers(kind, bits) = value else { return None };
-                let untouched = u64::from_ne_bytes([0xa5; 8]) >> (64 - 8 * kind.size());
+                let untouched = u64::from_ne_bytes([FILL; 8]) >> (64 - 8 * kind.size());
                 (kind.size() >= 4 && bits.contains(&untouched)).then(|| "nothing was written".to_owned())
             }),
         ),
@@ -205,96 +205,181 @@ fn constants(checker: &Checker, course: &crate::writer::Course) -> anyhow::Resul
     Ok(())
 }
 
-/// What is set before the initialization ends is what is read.
+/// What is set is what is read: before and in Initialization Mode, amid the simulation, and after it.
 pub fn set(checker: &Checker) -> anyhow::Result<()> {
     let description = &checker.description;
     for course in &checker.courses {
-        let mut values: Vec<(usize, Value)> = Vec::new();
-        for place in readable(description) {
-            let variable = &description.variables[place];
-            let settable = variable.causality == "input"
-                || variable.causality == "parameter"
-                    && ["fixed", "tunable"].contains(&variable.variability.as_str());
-            if !settable
-                || variable.clocked
-                || variable.start.is_empty()
-                || description.aliases(place).count() > 1
-            {
-                continue;
-            }
-            let starts = variable.starts();
-            let base = variable.base.unwrap_or(BaseType::Real);
-            let value = match base {
-                BaseType::Real | BaseType::Float32 => {
-                    let kind = kind_of(description.standard, base);
-                    Value::Numbers(
-                        starts
-                            .iter()
-                            .map(|start| kind.number(kind.bits(near(variable, *start, 1.0 / 64.0))))
-                            .collect(),
-                    )
-                }
-                // A count that is greater by one may be too much for the model; what it is now is not.
-                BaseType::String => {
-                    Value::Texts(variable.start.iter().map(|text| text.clone().into_bytes()).collect())
-                }
-                BaseType::Binary => continue,
-                _ => Value::Numbers(starts),
-            };
-            if matches!(&value, Value::Numbers(numbers) if numbers.is_empty()) {
-                continue;
-            }
-            values.push((place, value));
-        }
-        let claim = Claim::new(
-            "start_values.set",
-            Grade::Violation,
-            checker.section("2.1.7", "2.2.7.2"),
-            "What is set is what is read, in Initialization Mode and before.",
-        );
-        for within in [true, false] {
-            let mut writer = checker.writer();
-            writer.make(0, course.interface);
-            if within {
-                writer.enter(0);
-            }
-            let sets = writer.set(0, &values);
-            if !within {
-                writer.enter(0);
-            }
-            let places: Vec<usize> = values.iter().map(|(place, _)| *place).collect();
-            let reads = writer.read_these(0, &places);
-            let (values, description) = (values.clone(), description.clone());
-            let judge: Judge = Arc::new(move |run| {
-                if sets.iter().any(|id| run.status(*id).is_none_or(|status| status > 1)) {
-                    return None;
-                }
-                for (place, value) in &values {
-                    let Some(read) = value_of(run, &reads, *place) else { continue };
-                    let same = match (&read, value) {
-                        (Written::Numbers(kind, bits), Value::Numbers(numbers)) => {
-                            bits.iter().zip(numbers).all(|(bits, number)| {
-                                *bits == kind.bits(*number)
-                                    || *kind == Kind::F64 && kind.number(*bits) == *number
-                            })
-                        }
-                        (Written::Texts(texts), Value::Texts(set)) => {
-                            texts.iter().zip(set).all(|(text, set)| text.as_ref() == Some(set))
-                        }
-                        _ => true,
-                    };
-                    if !same {
-                        return Some(format!(
-                            "{} was set to {value:?} and reads {}",
-                            description.variables[*place].name,
-                            read.show(0)
-                        ));
-                    }
-                }
-                None
+        let places: Vec<usize> = readable(description)
+            .into_iter()
+            .filter(|place| {
+                let variable = &description.variables[*place];
+                let settable = variable.causality == "input"
+                    || variable.initial == "exact" && variable.variability != "constant";
+                settable
+                    && !variable.clocked
+                    && !variable.start.is_empty()
+                    && description.aliases(*place).count() == 1
+            })
+            .collect();
+        let near: Vec<(usize, Value)> = places
+            .iter()
+            .filter(|place| description.variables[**place].is_float())
+            .filter_map(|place| Some((*place, other_values(description, *place)?)))
+            .collect();
+        when(checker, course, &near)?;
+        // Together what every model takes; alone what it may refuse.
+        let alone = places
+            .iter()
+            .filter(|place| !description.variables[**place].is_float())
+            .take(40)
+            .flat_map(|place| {
+                // Longer than buffers are.
+                let long =
+                    Value::Texts(vec![b"long ".repeat(100); description.variables[*place].start.len()]);
+                let long = (description.variables[*place].base == Some(BaseType::String)).then_some(long);
+                other_values(description, *place).into_iter().chain(long).map(|value| vec![(*place, value)])
             });
-            checker.judge(&claim, writer.script, judge)?;
+        for values in std::iter::once(near).filter(|near| !near.is_empty()).chain(alone) {
+            for within in [true, false] {
+                let mut writer = checker.writer();
+                writer.make(0, course.interface);
+                if within {
+                    writer.enter(0);
+                }
+                let sets = writer.set(0, &values);
+                if !within {
+                    writer.enter(0);
+                }
+                what_was_set(checker, writer, values.clone(), sets)?;
+            }
         }
+        // At a communication point, where event modes are not needed for it.
+        for place in places {
+            let variable = &description.variables[place];
+            let late = match course.interface {
+                Interface::CoSimulation => variable.causality == "input" || variable.variability == "tunable",
+                Interface::ModelExchange => variable.causality == "input" && variable.is_float(),
+            };
+            let late = late && (variable.is_float() || variable.variability != "discrete");
+            if let Some(value) =
+                other_values(description, place).filter(|_| late && !variable.once_per_instant)
+            {
+                let values = vec![(place, value)];
+                let mut writer = checker.writer();
+                writer.begin(0, course);
+                for point in course.points.iter().take(2) {
+                    writer.point(0, course, point);
+                }
+                let sets = writer.set(0, &values);
+                what_was_set(checker, writer, values, sets)?;
+            }
+        }
+        inputs(checker, course)?;
     }
+    Ok(())
+}
+
+/// Start values count, whether they are set before Initialization Mode or in it, and whatever is read in between.
+fn when(checker: &Checker, course: &Course, values: &[(usize, Value)]) -> anyhow::Result<()> {
+    if values.is_empty() {
+        return Ok(());
+    }
+    let mut writer = checker.writer();
+    let (mut sets, mut reads) = (Vec::new(), [Vec::new(), Vec::new()]);
+    for (of, reads) in reads.iter_mut().enumerate() {
+        writer.make(of, course.interface);
+        if of == 1 {
+            writer.enter(of);
+            writer.read(of);
+        }
+        sets.extend(writer.set(of, values));
+        if of == 0 {
+            writer.enter(of);
+        }
+        reads.extend(writer.read(of));
+        writer.leave(of, course);
+        reads.extend(writer.ask(of, course.interface));
+        writer.free(of);
+    }
+    let claim = Claim::new(
+        "start_values.when",
+        Grade::Violation,
+        checker.section("2.1.7", "2.2.7.2"),
+        "Start values that are set in Initialization Mode lead to what they lead to when they are set before it.",
+    );
+    let [before, within] = reads;
+    let description = checker.description.clone();
+    let judge: Judge = Arc::new(move |run| {
+        if sets.iter().any(|id| run.status(*id).is_none_or(|status| status > 1)) {
+            return None;
+        }
+        let (name, one, other) = crate::writer::difference(&description, run, &before, &within)?;
+        Some(format!(
+            "{name} is {one} with values set before Initialization Mode, {other} with those set in it"
+        ))
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}
+
+fn what_was_set(
+    checker: &Checker,
+    mut writer: Writer<'_>,
+    values: Vec<(usize, Value)>,
+    sets: Vec<u32>,
+) -> anyhow::Result<()> {
+    let places: Vec<usize> = values.iter().map(|(place, _)| *place).collect();
+    let reads = writer.read_these(0, &places);
+    let claim = Claim::new(
+        "start_values.set",
+        Grade::Violation,
+        checker.section("2.1.7", "2.2.7.2"),
+        "What is set is what is read.",
+    );
+    let description = checker.description.clone();
+    let judge: Judge = Arc::new(move |run| {
+        if sets.iter().any(|id| run.status(*id).is_none_or(|status| status > 1)) {
+            return None;
+        }
+        values.iter().find_map(|(place, value)| {
+            let read = value_of(run, &reads, *place).filter(|read| !is_read(read, value))?;
+            let name = &description.variables[*place].name;
+            Some(format!("{name} was set to {} and reads {}", value.show(), read.show(0)))
+        })
+    });
+    checker.judge(&claim, writer.script, judge)?;
+    Ok(())
+}
+
+/// What inputs were set to stays, through steps and events.
+fn inputs(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let mut writer = checker.writer();
+    writer.begin(0, course);
+    let mut asked = Vec::new();
+    for point in &course.points {
+        let ids = writer.point(0, course, point);
+        let places: Vec<usize> = point.inputs.iter().map(|(place, _)| *place).collect();
+        asked.push((ids, writer.read_these(0, &places), point.inputs.clone()));
+    }
+    let claim = Claim::new(
+        "start_values.inputs",
+        Grade::Violation,
+        checker.section("2.1.7", "2.2.7.2"),
+        "An input keeps the value that it was set to until it is set anew.",
+    );
+    let description = checker.description.clone();
+    let judge: Judge = Arc::new(move |run| {
+        asked.iter().find_map(|(ids, reads, inputs)| {
+            if ids.iter().any(|id| run.status(*id).is_none_or(|status| status > 1)) {
+                return None;
+            }
+            inputs.iter().find_map(|(place, value)| {
+                let read = value_of(run, reads, *place).filter(|read| !is_read(read, value))?;
+                let name = &description.variables[*place].name;
+                Some(format!("{name} was set to {} and has become {}", value.show(), read.show(0)))
+            })
+        })
+    });
+    checker.judge(&claim, writer.script, judge)?;
     Ok(())
 }

@@ -10,8 +10,9 @@ use std::sync::Arc;
 /// Where in a course states are saved: at its beginning, after a point, near its end.
 fn places(course: &Course) -> Vec<usize> {
     let count = course.points.len();
-    let mut places = vec![0, 1, count / 2];
+    let mut places = vec![0, 1, count / 2, count.saturating_sub(2)];
     places.retain(|place| *place < count);
+    places.sort_unstable();
     places.dedup();
     places
 }

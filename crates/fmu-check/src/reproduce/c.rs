@@ -90,8 +90,9 @@ impl Writer {
                     ),
                     (true, true) => format!(
                         "((void *(*)(const char *, const char *, const char *, bool, bool, bool, bool, const uint32_t *, size_t, void *, void *, void *))\
-                         function(\"fmi3InstantiateCoSimulation\"))({name}, {token}, {resources}, false, {logging}, {}, false, NULL, 0, NULL, (void *)say3, NULL)",
-                        u8::from(make.event_mode)
+                         function(\"fmi3InstantiateCoSimulation\"))({name}, {token}, {resources}, false, {logging}, {}, {}, NULL, 0, NULL, (void *)say3, NULL)",
+                        u8::from(make.event_mode),
+                        u8::from(make.early_return)
                     ),
                 };
                 let _ = writeln!(
@@ -206,7 +207,10 @@ impl Writer {
                         _ => 'u',
                     };
                     let guard = if *kind == Kind::Pointer { "if (status < 2) " } else { "" };
-                    if name != "fmi3GetBinary" {
+                    if name == "fmi2NewDiscreteStates" {
+                        // Of fmi2EventInfo the five flags, then the time.
+                        let _ = writeln!(after, "{indent}    printf(\" ->\"); show(a{number}, 5, 'i', 4); show((char *)a{number} + 24, 1, 'f', 8);");
+                    } else if name != "fmi3GetBinary" {
                         let _ = writeln!(after, "{indent}    printf(\" ->\"); {guard}show(a{number}, {count}, '{letter}', sizeof({c}));");
                     }
                     format!("a{number}")

@@ -10,7 +10,7 @@ int main(int count, char **arguments) {
         alarm(20);
         snprintf(resources, sizeof resources, resources_format, full);
         snprintf(path, sizeof path, "%s/%s", full, library_name);
-        library = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
+        library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
         if (!library) { printf("%s\n", dlerror()); return 3; }
         load(arguments[3]);
         phases[atoi(arguments[2])]();

@@ -39,14 +39,14 @@ static __attribute__((unused)) void *guarded(const void *bytes, size_t size) {
     if (map == MAP_FAILED) { perror("mmap"); exit(3); }
     mprotect(map + length - page, page, PROT_NONE);
     char *array = map + length - page - size;
-    if (bytes) memcpy(array, bytes, size); else memset(array, 0xa5, size);
+    if (bytes) memcpy(array, bytes, size); else memset(array, 0x5a, size);
     return array;
 }
 
 static __attribute__((unused)) void say2(void *environment, const char *name, int status, const char *category, const char *text, ...) {
     va_list list;
-    (void)environment; (void)name;
-    printf("    log: status %d, category %s: ", status, category ? category : "NULL");
+    (void)environment;
+    printf("    log of %s: status %d, category %s: ", name ? name : "NULL", status, category ? category : "NULL");
     va_start(list, text);
     if (text) vprintf(text, list);
     va_end(list);

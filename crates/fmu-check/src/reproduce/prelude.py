@@ -28,7 +28,7 @@ def guarded(content):
 
 
 def room(size):
-    return guarded(b"\xa5" * size)
+    return guarded(b"\x5a" * size)
 
 
 def pointers(addresses):

@@ -83,8 +83,9 @@ fn step(
                     "\"fmi3InstantiateModelExchange\", {name}, {token}, {resources}, c_bool(False), c_bool({logging}), None, say3"
                 ),
                 (true, true) => format!(
-                    "\"fmi3InstantiateCoSimulation\", {name}, {token}, {resources}, c_bool(False), c_bool({logging}), c_bool({}), c_bool(False), None, c_size_t(0), None, say3, None",
-                    if make.event_mode { "True" } else { "False" }
+                    "\"fmi3InstantiateCoSimulation\", {name}, {token}, {resources}, c_bool(False), c_bool({logging}), c_bool({}), c_bool({}), None, c_size_t(0), None, say3, None",
+                    u8::from(make.event_mode),
+                    u8::from(make.early_return)
                 ),
             };
             let _ = writeln!(text, "{indent}c[{place}] = call({made}, result=c_void_p)");
@@ -159,7 +160,10 @@ fn step(
                     }
                     Arg::Out(kind, count) => {
                         let _ = writeln!(text, "{indent}{name} = room({})", kind.size() * count);
-                        if function != "fmi3GetBinary" {
+                        if function == "fmi2NewDiscreteStates" {
+                            // Of fmi2EventInfo the five flags, then the time.
+                            shown.extend([format!("({name}, \"i\", 5)"), format!("({name} + 24, \"d\", 1)")]);
+                        } else if function != "fmi3GetBinary" {
                             shown.push(format!("({name}, \"{}\", {count})", letter(*kind)));
                         }
                         format!("c_void_p({name})")

@@ -9,7 +9,7 @@ pub static AFTER: AtomicUsize = AtomicUsize::new(0);
 pub static KEEP: AtomicBool = AtomicBool::new(false);
 
 /// What memory is filled with before a call.
-pub const FILL: u8 = 0xa5;
+pub const FILL: u8 = 0x5a;
 
 #[cfg(unix)]
 mod pages {

@@ -9,7 +9,8 @@ use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmi_abi::calls;
 use fmi_abi::fmi2::types::{fmi2CallbackFunctions, fmi2CallbackLogger};
 use fmi_abi::fmi3::types::fmi3LogMessageCallback;
-use memory::{FILL, Guarded};
+pub use memory::FILL;
+use memory::Guarded;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::ffi::{CStr, CString};
@@ -60,10 +61,11 @@ pub fn work_if_asked() {
             OWN_FAULT
         }
     };
-    // Without what the library has for the end of a process: it is not what is tested.
+    // Without what the library has for the end of a process: it is not what is tested. What it has printed is kept.
     #[cfg(unix)]
-    // SAFETY: ends the process.
+    // SAFETY: writes what the C library still has, and ends the process.
     unsafe {
+        libc::fflush(std::ptr::null_mut());
         libc::_exit(status)
     }
     #[cfg(not(unix))]
@@ -162,19 +164,28 @@ unsafe fn remember(environment: *mut c_void, status: c_int, category: *const c_c
     }
 }
 
-/// The logger of FMI 2.0 without its `...`.
-type PlainLogger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char);
+/// The logger of FMI 2.0 with the first of its `...` as an argument.
+type PlainLogger =
+    unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, *const c_char);
 
-/// Without its `...`, which stable Rust cannot define: named arguments travel the same way.
+/// Without its `...`, which stable Rust cannot define: named arguments travel the same way, but for Apple's ARM. The format
+/// `%s`, which takes any text as it is, stands for its argument.
 unsafe extern "C" fn log_of_fmi2(
     environment: *mut c_void,
-    _instance_name: *const c_char,
+    instance_name: *const c_char,
     status: c_int,
     category: *const c_char,
     text: *const c_char,
+    first: *const c_char,
 ) {
-    // SAFETY: section 2.1.5 of FMI 2.0: the texts end with zeros.
-    unsafe { remember(environment, status, category, text) }
+    let all_named_alike = !cfg!(all(target_vendor = "apple", target_arch = "aarch64"));
+    // SAFETY: section 2.1.5 of FMI 2.0: the texts end with zeros. The name is read as importers that show it do.
+    unsafe {
+        std::hint::black_box(text_at(instance_name));
+        let plain = text_at(text).as_deref() == Some(b"%s") && all_named_alike;
+        let text = if plain { first } else { text };
+        remember(environment, status, category, text);
+    }
 }
 
 unsafe extern "C" fn log_of_fmi3(
@@ -408,7 +419,7 @@ impl Player {
                         false,
                         logging,
                         make.event_mode,
-                        false,
+                        make.early_return,
                         std::ptr::null(),
                         0,
                         environment,

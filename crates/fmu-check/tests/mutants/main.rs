@@ -34,6 +34,7 @@ const STRUCTURE: [&[(u32, &str)]; 3] = [
 ];
 
 fn description(fmi: u32) -> String {
+    let events = if fmi == 2 { "" } else { " hasEventMode=\"true\"" };
     let (begin, capabilities) = if fmi == 2 {
         (
             "fmiVersion=\"2.0\" modelName=\"wagon\" guid=\"wagon\" numberOfEventIndicators=\"1\"",
@@ -49,7 +50,7 @@ fn description(fmi: u32) -> String {
     let mut text = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription {begin}>\n\
          <ModelExchange modelIdentifier=\"wagon\" {capabilities}/>\n\
-         <CoSimulation modelIdentifier=\"wagon\" canHandleVariableCommunicationStepSize=\"true\" {capabilities}/>\n\
+         <CoSimulation modelIdentifier=\"wagon\" canHandleVariableCommunicationStepSize=\"true\" {capabilities}{events}/>\n\
          <LogCategories><Category name=\"logStatusError\"/></LogCategories>\n\
          <DefaultExperiment startTime=\"0\" stopTime=\"1\" stepSize=\"0.01\"/>\n<ModelVariables>\n"
     );
@@ -205,7 +206,7 @@ mutants! {
     2 address_in_result "results" "results.process";
     3 unwritten_memory "results" "results.process";
     2 time_lags "results" "results.time";
-    3 last_time_wrong "results" "results.last-successful-time";
+    3 last_time_wrong "results" "results.time";
     2 leak_instance "resources" "resources.memory";
     3 leak_state "resources" "resources.memory";
     2 leak_step "resources" "resources.memory";
@@ -243,11 +244,38 @@ mutants! {
     2 bytes_crash "hostile" "hostile.bytes.crash";
     3 reference_crashes "hostile" "hostile.references.crash";
     2 reference_exits "hostile" "hostile.references.exit";
+    2 text_cut "start_values" "start_values.set";
+    2 event_loses_input "start_values" "start_values.inputs";
+    3 start_in_mode_ignored "start_values" "start_values.when";
+    2 text_leaks "resources" "resources.memory";
+    2 step_prints "resources" "logs.printed";
+    3 reset_keeps_text "reset" "reset.values";
+    2 directional_imprecise "derivatives" "derivatives.precision";
+    3 directional_added "derivatives" "derivatives.directional";
+    3 event_again_now "life_cycle" "life_cycle.next-event-time";
+    2 event_moves_silently "life_cycle" "life_cycle.states-changed";
+    2 last_step_refused "life_cycle" "life_cycle.refused";
+    3 early_time_wrong "results" "results.early-return";
+    3 early_unsaid "results" "results.early-unsaid";
+    2 name_in_result "results" "results.name";
+    3 reference_once "results" "results.repeated";
+    3 start_time_ignored "results" "results.time";
+    2 step_overshoots "results" "results.time";
+    2 step_adds "results" "results.cut";
+    3 lossy_when_late "states" "states.restore-values";
+    2 name_gone "life_cycle" "arrays.read-beyond";
 }
 
 #[test]
 fn function_missing() {
     caught(2, "WITHOUT_NOMINALS", "functions", "functions.missing", |text| text);
+}
+
+/// Elsewhere it is not linked in the first place.
+#[cfg(target_os = "linux")]
+#[test]
+fn symbol_missing() {
+    caught(2, "symbol_missing", "functions", "package.symbols", |text| text);
 }
 
 #[test]

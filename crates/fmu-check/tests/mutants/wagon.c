@@ -27,7 +27,11 @@ enum {
     M_terminate_refused, M_reset_refused, M_get_after_end_refused, M_second_run_refused, M_category_unknown, M_log_latin1,
     M_silent, M_log_when_off, M_endless_step, M_null_crashes, M_bytes_crash, M_reference_crashes, M_reference_exits,
     M_vector_swapped, M_nominal_zero, M_time_lags, M_last_time_wrong, M_name_kept, M_rounding_changed, M_locale_changed,
-    M_discard_changes, M_step_refused_halfway, M_reading_once, M_text_latin1, M_token_ignored, M_crash_amid
+    M_discard_changes, M_step_refused_halfway, M_reading_once, M_text_latin1, M_token_ignored, M_crash_amid,
+    M_text_cut, M_text_leaks, M_reset_keeps_text, M_directional_imprecise, M_directional_added, M_event_moves_silently,
+    M_event_loses_input, M_early_time_wrong, M_early_unsaid, M_name_in_result, M_reference_once, M_start_time_ignored, M_last_step_refused,
+    M_step_overshoots, M_step_adds, M_lossy_when_late, M_step_prints, M_symbol_missing, M_start_in_mode_ignored, M_event_again_now,
+    M_name_gone
 };
 #ifndef MUTANT
 #define MUTANT M_none
@@ -57,19 +61,22 @@ enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, EVENT = 8, CONTINUOUS = 1
 
 typedef struct {
     double time, mass, spring, damper, force, x, v, next;
+    double first_spring, stop;
     int count, fast, mode, steps;
     char label[32];
 } State;
 
 typedef struct {
     State s;
-    int cs, logging;
+    int cs, logging, early, events;
     Logger log;
     void *environment;
     const char *given;
     char name[64];
-    double *scratch;
+    double *scratch, began;
 } Model;
+
+extern int nobody_has_it(void);
 
 static State shared;
 static int runs;
@@ -78,13 +85,18 @@ static double racing;
 static void start(State *s) {
     double mass = s->mass;
     int count = s->count;
+    char label[sizeof s->label];
+    memcpy(label, s->label, sizeof label);
     memset(s, 0, sizeof *s);
     s->mass = IS(reset_keeps_parameter) && mass > 0 ? mass : 2;
     s->spring = IS(start_value) ? 40.5 : 40;
     s->damper = 3;
+    s->first_spring = s->spring;
     s->next = 0.05;
     s->mode = INSTANTIATED;
     strcpy(s->label, "wagon");
+    if (IS(reset_keeps_text) && mass > 0) memcpy(s->label, label, sizeof label);
+    s->stop = INFINITY;
     if (IS(reset_without_count)) s->count = count;
 }
 
@@ -95,7 +107,7 @@ static int say(Model *m, int status, const char *text) {
 #if FMI == 3
     m->log(m->environment, status, category, text);
 #else
-    m->log(m->environment, m->name, status, category, text);
+    m->log(m->environment, IS(name_gone) ? m->given : m->name, status, category, text);
 #endif
     return status;
 }
@@ -107,7 +119,7 @@ static int no(Model *m, const char *text) { return say(m, 3, text); }
     if (!m) return 3;                                                                 \
     if (!(m->s.mode & (modes))) return no(m, "not allowed here");
 
-static double slope(const Model *m) { return (m->s.force - m->s.spring * m->s.x - m->s.damper * m->s.v) / m->s.mass; }
+static double slope(const Model *m) { return (m->s.force - (IS(start_in_mode_ignored) ? m->s.first_spring : m->s.spring) * (m->s.x + 1e-3 * IS(start_in_mode_ignored)) - m->s.damper * m->s.v) / m->s.mass; }
 
 static void *idle(void *nothing) { pause(); return nothing; }
 
@@ -146,13 +158,13 @@ static double get(Model *m, uint32_t vr, bool *known) {
     case X: return s->x;
     case V: return IS(shared_static) ? shared.v : s->v;
     case DER_X: return s->v;
-    case DER_V: return slope(m);
+    case DER_V: return slope(m) + (IS(name_in_result) ? 1e-9 * (double)strlen(m->name) : 0);
     case Y:
         if (IS(racing_static)) { racing = y; usleep(20); y = racing; }
         if (IS(getter_changes)) m->s.x += 1e-9;
         if (IS(reading_once) && m->s.steps > 3) m->s.steps = 0, m->s.v += 1e-6;
         return y;
-    case TIME: return IS(time_lags) && s->time > 0.03 ? s->time - 0.01 : s->time;
+    case TIME: if (IS(start_time_ignored)) return s->time - m->began; return IS(time_lags) && s->time > 0.03 ? s->time - 0.01 : s->time;
     default: *known = false; return 0;
     }
 }
@@ -175,7 +187,7 @@ static int get_reals(void *c, const uint32_t *vr, size_t n, double *value) {
         if (IS(reference_exits) && !known) exit(3);
         if (!known) return no(m, "an unknown reference");
     }
-    for (i = 0; i < n; i++) value[i] = get(m, vr[i], &known);
+    for (i = 0; i < n; i++) if (!(IS(reference_once) && i && vr[i] == vr[i - 1])) value[i] = get(m, vr[i], &known);
     if (IS(write_const) && n) *(uint32_t *)vr = 0;
     if (IS(write_past)) value[n] = 0;
     if (IS(write_before)) value[-1] = 0;
@@ -198,7 +210,7 @@ static int set_reals(void *c, const uint32_t *vr, size_t n, const double *value)
     if (IS(read_past) && n && value[n] == 1e99) return 3;
     for (i = 0; i < n; i++) switch (vr[i]) {
         case MASS: m->s.mass = value[i]; break;
-        case SPRING: m->s.spring = value[i]; break;
+        case SPRING: m->s.spring = value[i]; if (m->s.mode == INSTANTIATED) m->s.first_spring = value[i]; break;
         case DAMPER: if (!IS(set_ignored)) m->s.damper = value[i]; break;
         default: m->s.force = value[i]; break;
     }
@@ -243,6 +255,8 @@ static int set_label(void *c, const uint32_t *vr, size_t n, const char *const *v
     for (i = 0; i < n; i++)
         if (vr[i] != LABEL || !value[i] || strlen(value[i]) >= sizeof m->s.label) return no(m, "no such text");
     for (i = 0; i < n; i++) strcpy(m->s.label, value[i]);
+    if (IS(text_cut)) m->s.label[8] = 0;
+    if (IS(text_leaks) && !malloc(40)) return 3;
     return 0;
 }
 
@@ -256,7 +270,7 @@ static int set_none(void *c, const uint32_t *vr, size_t n, const void *value) {
 static void integrate(Model *m, double end) {
     State *s = &m->s;
     while (s->time < end - 1e-12) {
-        double stop = s->next < end ? s->next : end;
+        double stop = s->next < end && !(m->events && m->early) ? s->next : end;
         int count = (int)ceil((stop - s->time) / 1e-3 - 1e-6), i;
         double h = count > 0 ? (stop - s->time) / count : 0;
         for (i = 0; i < count; i++) {
@@ -273,7 +287,7 @@ static void integrate(Model *m, double end) {
             s->v = v + h / 6 * (kv[0] + 2 * kv[1] + 2 * kv[2] + kv[3]);
         }
         s->time = stop;
-        if (s->time >= s->next - 1e-12) { s->count++; s->next = 0.05 * (s->count + 1); }
+        if (s->time >= s->next - 1e-12 && !(m->events && m->early)) { s->count++; s->next = 0.05 * (s->count + 1); }
     }
     s->time = end;
     s->fast = s->v > 0.5;
@@ -285,7 +299,11 @@ static int step(void *c, double point, double size) {
     if (IS(step_refused_halfway) && !(size > 0)) m->s.x += 0.01;
     if (!isfinite(point) || !isfinite(size) || !(size > 0) || size > 1e4) return no(m, "no such step");
     if (fabs(point - m->s.time) > 1e-9 * (1 + fabs(point))) return no(m, "another time");
-    integrate(m, point + size);
+    if (IS(last_step_refused) && point + size >= m->s.stop) return no(m, "it is over");
+    if (IS(step_prints)) puts("a step");
+    if (IS(symbol_missing) && size == 0.123) return nobody_has_it();
+    if (IS(step_adds)) m->s.x += 1e-7;
+    integrate(m, IS(step_overshoots) ? point + 1e-3 * ceil(size / 1e-3 - 1e-9) : point + size);
     m->s.steps++;
     shared = m->s;
     if (IS(parameter_drifts)) m->s.damper += 1e-6;
@@ -303,21 +321,25 @@ static int step(void *c, double point, double size) {
     return 0;
 }
 
-static int enter(void *c, double from) {
+static int enter(void *c, double from, double stop) {
     ALLOW(INSTANTIATED)
     if (!isfinite(from) || fabs(from) > 1e9) return no(m, "no such time");
     m->s.time = from;
     m->s.next = from + 0.05;
+    m->s.stop = stop;
+    m->began = from;
     m->s.mode = INITIALIZATION;
     return 0;
 }
 
 static int update(Model *m, Flag *again, double *next) {
-    if (m->s.time >= m->s.next - 1e-12) {
+    if (IS(event_again_now) ? m->s.time > m->s.next : m->s.time >= m->s.next - 1e-12) {
         m->s.count++;
         m->s.next += 0.05;
         if (m->s.next <= m->s.time) m->s.next = m->s.time + 0.05;
+        if (IS(event_moves_silently)) m->s.v += 0.01;
     }
+    if (IS(event_loses_input)) m->s.force = 0;
     m->s.fast = m->s.v > 0.5;
     shared = m->s;
     *again = IS(events_without_end);
@@ -337,8 +359,10 @@ void *fmi3InstantiateModelExchange(const char *name, const char *token, const ch
 void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible, bool logging,
                                   bool event_mode, bool early, const uint32_t *vr, size_t n, void *environment, Logger log,
                                   void *intermediate) {
-    (void)resources; (void)visible; (void)early; (void)vr; (void)n; (void)intermediate;
-    return event_mode ? NULL : make(name, token, 1, logging, log, environment);
+    Model *m = make(name, token, 1, logging, log, environment);
+    (void)resources; (void)visible; (void)vr; (void)n; (void)intermediate;
+    if (m) { m->early = early; m->events = event_mode; }
+    return m;
 }
 void *fmi3InstantiateScheduledExecution(void) { return NULL; }
 #define FREE fmi3FreeInstance
@@ -376,11 +400,12 @@ EXPORT(SetDebugLogging)(void *c, Flag on, size_t n, const char *const *categorie
 
 EXPORT(ExitInitializationMode)(void *c) {
     ALLOW(INITIALIZATION)
-    m->s.mode = m->cs ? STEP : EVENT;
+    m->s.mode = m->cs && !m->events ? STEP : EVENT;
     return 0;
 }
 EXPORT(Terminate)(void *c) {
     ALLOW(STEP | EVENT | CONTINUOUS)
+    if (IS(name_gone)) say(m, 0, "the end");
     if (IS(terminate_refused) && m->s.steps > 1) return no(m, "not yet");
     m->s.mode = TERMINATED;
     return 0;
@@ -391,7 +416,12 @@ EXPORT(Reset)(void *c) {
     start(&m->s);
     return 0;
 }
-EXPORT(EnterEventMode)(void *c) { ALLOW(CONTINUOUS | EVENT) m->s.mode = EVENT; return 0; }
+EXPORT(EnterEventMode)(void *c) {
+    ALLOW(CONTINUOUS | EVENT | STEP)
+    if (m->s.mode == STEP && !m->events) return no(m, "no event mode was agreed upon");
+    m->s.mode = EVENT;
+    return 0;
+}
 EXPORT(EnterContinuousTimeMode)(void *c) { ALLOW(EVENT) m->s.mode = CONTINUOUS; return 0; }
 EXPORT(CompletedIntegratorStep)(void *c, Flag no_set, Flag *event, Flag *terminate) {
     ALLOW(CONTINUOUS)
@@ -456,7 +486,7 @@ static int save(void *c, void **state) {
     if (IS(state_not_supported)) return no(m, "not supported");
     saved = *state ? *state : malloc(sizeof *saved);
     if (!(IS(handle_not_reused) && *state)) *saved = m->s;
-    if (IS(lossy_state)) saved->v = (float)saved->v;
+    if (IS(lossy_state) || (IS(lossy_when_late) && m->s.time > 0.4)) saved->v = (float)saved->v;
     if (IS(state_without_event)) saved->next = -1;
     if (IS(save_changes)) m->s.x += 1e-6;
     if (IS(leak_state) && !malloc(16)) return 3;
@@ -543,10 +573,11 @@ static int directional(void *c, const uint32_t *unknown, size_t nu, const uint32
         for (j = 0; j < nk; j++) {
             double d = partial(m, unknown[i], known[j]);
             if (adjoint && IS(adjoint_off)) d *= 1 + 1e-9;
+            if (IS(directional_imprecise)) d *= 1 + 1e-6;
             sums[adjoint ? j : i] += d * seed[adjoint ? i : j];
         }
     if (IS(directional_not_linear) && nk > 1 && seed[0] != 0 && seed[1] != 0) sums[0] += 1;
-    memcpy(out, sums, (adjoint ? nk : nu) * sizeof *out);
+    for (i = 0; i < (adjoint ? nk : nu); i++) out[i] = sums[i] + (IS(directional_added) ? out[i] : 0);
     free(sums);
     if (IS(derivative_changes)) m->s.x += 1e-8;
     return 0;
@@ -554,8 +585,8 @@ static int directional(void *c, const uint32_t *unknown, size_t nu, const uint32
 
 #if FMI == 3
 EXPORT(EnterInitializationMode)(void *c, bool defined, double tolerance, double from, bool stops, double stop) {
-    (void)defined; (void)tolerance; (void)stops; (void)stop;
-    return enter(c, from);
+    (void)defined; (void)tolerance;
+    return enter(c, from, stops ? stop : INFINITY);
 }
 EXPORT(GetFloat64)(void *c, const uint32_t *vr, size_t n, double *value, size_t nvalues) { SIZES_RIGHT return get_reals(c, vr, n, value); }
 EXPORT(SetFloat64)(void *c, const uint32_t *vr, size_t n, const double *value, size_t nvalues) { SIZES_RIGHT return set_reals(c, vr, n, value); }
@@ -580,10 +611,14 @@ EXPORT(DoStep)(void *c, double point, double size, bool no_set, bool *event, boo
     int status;
     (void)no_set;
     if (c && (!event || !terminate || !early || !last)) return no(c, "a flag is NULL");
-    status = step(c, point, size);
+    Model *m = c;
+    bool stops = m && m->events && m->early && m->s.next < point + size - 1e-9 && m->s.next > point + 1e-9;
+    status = step(c, point, stops ? m->s.next - point : size);
     if (status) return status;
-    *event = *terminate = *early = false;
-    *last = IS(last_time_wrong) ? point : point + size;
+    *event = m->events && m->early && m->s.time >= m->s.next - 1e-12;
+    *terminate = false;
+    *early = stops && !IS(early_unsaid);
+    *last = IS(last_time_wrong) ? point : stops && !IS(early_time_wrong) ? m->s.next : point + size;
     return 0;
 }
 EXPORT(GetFMUState)(void *c, void **state) { return save(c, state); }
@@ -602,21 +637,23 @@ EXPORT(GetAdjointDerivative)(void *c, const uint32_t *u, size_t nu, const uint32
 }
 EXPORT(GetNumberOfContinuousStates)(void *c, size_t *n) { ALLOW(63) if (!n) return no(m, "NULL"); *n = 2; return 0; }
 EXPORT(GetNumberOfEventIndicators)(void *c, size_t *n) { ALLOW(63) if (!n) return no(m, "NULL"); *n = 1; return 0; }
+EXPORT(EnterStepMode)(void *c) { ALLOW(EVENT) if (!m->cs) return no(m, "not in Model Exchange"); m->s.mode = STEP; return 0; }
 #define REFUSED(name) EXPORT(name)(void *c) { return c ? no(c, "not supported") : 3; }
 REFUSED(GetBinary) REFUSED(SetBinary) REFUSED(GetClock) REFUSED(SetClock) REFUSED(GetNumberOfVariableDependencies)
 REFUSED(GetVariableDependencies) REFUSED(EnterConfigurationMode) REFUSED(ExitConfigurationMode) REFUSED(GetIntervalDecimal)
 REFUSED(GetIntervalFraction) REFUSED(GetShiftDecimal) REFUSED(GetShiftFraction) REFUSED(SetIntervalDecimal)
 REFUSED(SetIntervalFraction) REFUSED(SetShiftDecimal) REFUSED(SetShiftFraction) REFUSED(EvaluateDiscreteStates)
-REFUSED(EnterStepMode) REFUSED(GetOutputDerivatives) REFUSED(ActivateModelPartition)
+REFUSED(GetOutputDerivatives) REFUSED(ActivateModelPartition)
 #else
 EXPORT(SetupExperiment)(void *c, int defined, double tolerance, double from, int stops, double stop) {
     ALLOW(INSTANTIATED)
-    (void)defined; (void)tolerance; (void)stops; (void)stop;
+    (void)defined; (void)tolerance;
     if (!isfinite(from) || fabs(from) > 1e9) return no(m, "no such time");
     m->s.time = from;
+    m->s.stop = stops ? stop : INFINITY;
     return 0;
 }
-EXPORT(EnterInitializationMode)(void *c) { return enter(c, c ? ((Model *)c)->s.time : 0); }
+EXPORT(EnterInitializationMode)(void *c) { return enter(c, c ? ((Model *)c)->s.time : 0, c ? ((Model *)c)->s.stop : 0); }
 EXPORT(GetReal)(void *c, const uint32_t *vr, size_t n, double *value) { return get_reals(c, vr, n, value); }
 EXPORT(SetReal)(void *c, const uint32_t *vr, size_t n, const double *value) { return set_reals(c, vr, n, value); }
 EXPORT(GetInteger)(void *c, const uint32_t *vr, size_t n, int32_t *value) { return get_count(c, vr, n, value); }
