@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import cross_check
-from libraries import prepare, target_folder, universal
+from libraries import prepare, target_folder
 from targets import (
     ARM_FOLDERS,
     CONTROLLER,
@@ -83,9 +83,8 @@ def _library(folder: Path, model: str, target: Target) -> Path:
 def _pack(model: str, fmi: int, folders: Folders, libraries: dict[Target, Path], scratch: Path, *options: str) -> Path:
     """An FMU for this version of FMI with a library in each of these folders of `binaries/`."""
     for folder, targets in folders.items():
-        parts = [libraries[target] for target in targets]
-        path = parts[0] if len(parts) == 1 else universal(scratch / f"{model}-{folder}.dylib", parts)
-        options += (f"--binary={folder}={path}",)
+        # It joins those for macOS itself.
+        options += (f"--binary={folder}={libraries[targets[0]]}",)
     environment: Mapping[str, str] = os.environ
     if model == MODEL:
         _, environment, _ = prepare(WEBASSEMBLY)

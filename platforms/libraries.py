@@ -93,18 +93,6 @@ def target_folder() -> Path:
     return Path(json.loads(metadata)["target_directory"])
 
 
-def universal(destination: Path, libraries: list[Path]) -> Path:
-    """Joins macOS libraries for several processors."""
-    from fat_macho import FatWriter
-
-    writer = FatWriter()
-    for library in libraries:
-        writer.add(library.read_bytes())
-    destination.parent.mkdir(parents=True, exist_ok=True)
-    writer.write_to(str(destination))
-    return destination
-
-
 def compile_all(folder: Path, targets: Sequence[Target]) -> None:
     """Puts the libraries of all models for these targets in FOLDER/TRIPLE."""
     for number, each in enumerate(targets, start=1):

@@ -11,7 +11,8 @@ use std::fs;
 /// Where a part begins: at multiples of the largest pages there are.
 const ALIGNMENT: u32 = 14;
 
-/// Puts both libraries of macOS, if there are such, into the place of the one for Intel, where importers on ARM look, too.
+/// Puts both libraries of macOS, if there are such, into the place of the one for Intel, where importers on ARM look, too;
+/// what is there may be for both already.
 pub fn join_for_macos(libraries: &mut [Library]) -> Result<()> {
     let find = |architecture| {
         let platform = Platform::of(architecture, "macos").ok()?;
@@ -22,6 +23,9 @@ pub fn join_for_macos(libraries: &mut [Library]) -> Result<()> {
     for place in [intel, arm] {
         let path = &libraries[place].path;
         parts.push(fs::read(path).with_context(|| format!("cannot read {}", path.display()))?);
+    }
+    if parts[0].starts_with(&FAT_MAGIC.to_be_bytes()) {
+        return Ok(());
     }
     let path = libraries[intel].path.with_extension("universal.dylib");
     let joined = joined(&parts).context("the libraries for macOS")?;
@@ -48,4 +52,24 @@ fn joined(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
         file[4 * place..4 * place + 4].copy_from_slice(object::bytes_of(&word));
     }
     Ok(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_for_both_already_stays() {
+        let folder = std::env::temp_dir().join(format!("universal-{}", std::process::id()));
+        fs::create_dir_all(&folder).expect("a folder");
+        let mut libraries = Vec::new();
+        for (architecture, bytes) in [("x86_64", FAT_MAGIC.to_be_bytes()), ("aarch64", [0; 4])] {
+            let path = folder.join(architecture);
+            fs::write(&path, bytes).expect("a file");
+            libraries.push(Library { platform: Platform::of(architecture, "macos").expect("known"), path });
+        }
+        join_for_macos(&mut libraries).expect("nothing is joined");
+        assert_eq!(libraries[0].path, folder.join("x86_64"));
+        fs::remove_dir_all(&folder).expect("a folder");
+    }
 }

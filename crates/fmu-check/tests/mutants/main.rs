@@ -159,7 +159,7 @@ fn caught(fmi: u32, mutant: &str, topic: &str, name: &str, change: impl Fn(Strin
     let folder = TempDir::new().expect("a folder");
     let path = fmu(folder.path(), fmi, mutant, change);
     // Enough for 50 cycles on a busy machine; fewer are not judged.
-    let (found, report) = found(&path, &["--only", topic, "--no-shrink", "--limit", "3", "--repeat", "1.5"]);
+    let (found, report) = found(&path, &["--only", topic, "--no-shrink", "--limit", "3", "--repeat", "0.6"]);
     assert!(
         found.iter().any(|(other, _)| other == name),
         "{mutant} is not found as {name}: {found:?} {}",
