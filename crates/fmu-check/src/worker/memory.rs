@@ -11,6 +11,13 @@ pub static KEEP: AtomicBool = AtomicBool::new(false);
 /// What memory is filled with before a call.
 pub const FILL: u8 = 0x5a;
 
+/// As much of it as a page.
+static FILLED: [u8; 4096] = [FILL; 4096];
+
+fn untouched(bytes: &[u8]) -> bool {
+    bytes.chunks(FILLED.len()).all(|part| *part == FILLED[..part.len()])
+}
+
 #[cfg(unix)]
 mod pages {
     use super::{AFTER, KEEP, Ordering};
@@ -142,10 +149,11 @@ impl Guarded {
     /// What happened that must not: bytes around it that were written, or its own if it was for reading.
     pub fn damage(&self, for_reading: bool) -> Option<String> {
         let all = self.all();
-        if let Some(place) = all[..self.begin].iter().rposition(|byte| *byte != FILL) {
+        if !untouched(&all[..self.begin]) {
+            let place = all[..self.begin].iter().rposition(|byte| *byte != FILL).unwrap_or_default();
             return Some(format!("{} bytes before an array", self.begin - place));
         }
-        if all[self.begin + self.size..].iter().any(|byte| *byte != FILL) {
+        if !untouched(&all[self.begin + self.size..]) {
             return Some("bytes after an array".to_owned());
         }
         (for_reading && self.bytes() != self.before)
