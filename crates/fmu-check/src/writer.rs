@@ -140,8 +140,17 @@ impl<'a> Writer<'a> {
 
     /// Enters Initialization Mode.
     pub fn enter(&mut self, of: usize) -> u32 {
-        let start = Arg::real(self.description.start_time);
-        let experiment = vec![Arg::Whole(0), Arg::real(0.0), start, Arg::Whole(0), Arg::real(0.0)];
+        self.enter_with(of, None, self.description.start_time, None)
+    }
+
+    /// The same with this tolerance, start time and stop time.
+    pub fn enter_with(&mut self, of: usize, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> u32 {
+        let defined = |number: Option<f64>| {
+            [Arg::Whole(number.is_some().into()), Arg::real(number.unwrap_or_default())]
+        };
+        let mut experiment = defined(tolerance).to_vec();
+        experiment.push(Arg::real(start));
+        experiment.extend(defined(stop));
         if self.fmi3() {
             self.call(of, "EnterInitializationMode", experiment)
         } else {

@@ -382,14 +382,7 @@ pub fn times(checker: &Checker) -> anyhow::Result<()> {
             let mut writer = checker.writer();
             writer.make(0, course.interface);
             writer.forbidden = true;
-            let experiment =
-                vec![Arg::Whole(0), Arg::real(0.0), Arg::real(number), Arg::Whole(0), Arg::real(0.0)];
-            if checker.fmi3() {
-                writer.call(0, "EnterInitializationMode", experiment);
-            } else {
-                writer.call(0, "SetupExperiment", experiment);
-                writer.call(0, "EnterInitializationMode", vec![]);
-            }
+            writer.enter_with(0, None, number, None);
             writer.leave(0, course);
             if course.interface == Interface::CoSimulation {
                 writer.step(0, number, size);

@@ -110,14 +110,7 @@ pub fn orders(checker: &Checker) -> anyhow::Result<()> {
             how.name = Some("a long name, with Gödel in it %s #1#".to_owned());
             writer.add(Step::Make(0, how));
             let stop = course.end + 1.0 + course.end.abs();
-            let start = Arg::real(writer.description.start_time);
-            let experiment = vec![Arg::Whole(1), Arg::real(1e-6), start, Arg::Whole(1), Arg::real(stop)];
-            if writer.fmi3() {
-                writer.call(0, "EnterInitializationMode", experiment);
-            } else {
-                writer.call(0, "SetupExperiment", experiment);
-                writer.call(0, "EnterInitializationMode", vec![]);
-            }
+            writer.enter_with(0, Some(1e-6), writer.description.start_time, Some(stop));
             writer.leave(0, course);
             points(writer, 0, 3);
             writer.free(0);
@@ -126,15 +119,7 @@ pub fn orders(checker: &Checker) -> anyhow::Result<()> {
         if interface == Interface::CoSimulation {
             order(&|writer| {
                 writer.make(0, interface);
-                let start = Arg::real(writer.description.start_time);
-                let experiment =
-                    vec![Arg::Whole(0), Arg::real(0.0), start, Arg::Whole(1), Arg::real(course.end)];
-                if writer.fmi3() {
-                    writer.call(0, "EnterInitializationMode", experiment);
-                } else {
-                    writer.call(0, "SetupExperiment", experiment);
-                    writer.call(0, "EnterInitializationMode", vec![]);
-                }
+                writer.enter_with(0, None, writer.description.start_time, Some(course.end));
                 writer.leave(0, course);
                 points(writer, 0, usize::MAX);
                 writer.free(0);
@@ -344,8 +329,8 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
     let judge: Judge = Arc::new(move |run| {
         asked.iter().find_map(|(id, time)| {
             let event = event_of(run, *id, fmi3)?;
-            let past = !event.0 && event.1? <= *time;
-            past.then(|| format!("at {time:?} the next event is at {:?}", event.1.unwrap_or_default()))
+            let past = !event.again && event.next? <= *time;
+            past.then(|| format!("at {time:?} the next event is at {:?}", event.next.unwrap_or_default()))
         })
     });
     checker.judge(&claim, writer.script, judge)?;
@@ -366,11 +351,11 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
     let judge: Judge = Arc::new(move |run| {
         let last = *ids.last()?;
         let event = event_of(run, last, fmi3)?;
-        let past = !event.0 && event.1? <= late;
+        let past = !event.again && event.next? <= late;
         past.then(|| {
             format!(
                 "after events were passed by, at {late:?} the next event is at {:?}",
-                event.1.unwrap_or_default()
+                event.next.unwrap_or_default()
             )
         })
     });
@@ -388,7 +373,7 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
         "The iteration of an event comes to an end.",
     );
     let judge: Judge = Arc::new(move |run| {
-        let all = ids.iter().all(|id| event_of(run, *id, fmi3).is_some_and(|event| event.0));
+        let all = ids.iter().all(|id| event_of(run, *id, fmi3).is_some_and(|event| event.again));
         all.then(|| "after 100 updates of the discrete states another one is needed".to_owned())
     });
     checker.judge(&claim, writer.script, judge)?;
@@ -423,18 +408,8 @@ fn changed_states(checker: &Checker, course: &Course, section: &'static str) -> 
     let fmi3 = checker.fmi3();
     let judge: Judge = Arc::new(move |run| {
         asked.iter().find_map(|(time, before, updates, after)| {
-            let said = |id: &u32| {
-                let Some(outcome) = run.of(*id).filter(|of| of.status.is_some_and(|status| status <= 1))
-                else {
-                    return true;
-                };
-                match outcome.written.first() {
-                    Some(_) if fmi3 => outcome.written[3].numbers() == [1.0],
-                    // The fourth flag of fmi2EventInfo.
-                    Some(crate::script::Written::Numbers(Kind::U64, words)) => words[1] >> 32 != 0,
-                    _ => true,
-                }
-            };
+            // What did not succeed is another finding.
+            let said = |id: &u32| event_of(run, *id, fmi3).is_none_or(|event| event.states_changed);
             let (was, is) = (run.written(*before)?, run.written(*after)?);
             let good = [before, after].iter().all(|id| run.status(**id).is_some_and(|status| status <= 1));
             let place = was.differ(is).filter(|_| good && !updates.iter().any(said))?;
@@ -446,16 +421,30 @@ fn changed_states(checker: &Checker, course: &Course, section: &'static str) -> 
     Ok(())
 }
 
-/// Whether an update needs another one, and the next time event.
-pub fn event_of(run: &crate::script::Run, id: u32, fmi3: bool) -> Option<(bool, Option<f64>)> {
+/// What an update says.
+struct Event {
+    /// It needs another one.
+    again: bool,
+    states_changed: bool,
+    /// The next time event.
+    next: Option<f64>,
+}
+
+/// What a successful update says.
+fn event_of(run: &crate::script::Run, id: u32, fmi3: bool) -> Option<Event> {
     let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
     if fmi3 {
         let flag =
             |place: usize| outcome.written.get(place).is_some_and(|of| of.numbers().first() == Some(&1.0));
         let next = outcome.written.get(5)?.numbers().first().copied();
-        return Some((flag(0), next.filter(|_| flag(4))));
+        return Some(Event { again: flag(0), states_changed: flag(3), next: next.filter(|_| flag(4)) });
     }
+    // Of fmi2EventInfo: five flags, two to a word, and the time.
     let crate::script::Written::Numbers(Kind::U64, words) = outcome.written.first()? else { return None };
-    let [flags, _, defined, time] = words[..] else { return None };
-    Some((flags as u32 != 0, (defined as u32 != 0).then(|| f64::from_bits(time))))
+    let [again, changed, defined, time] = words[..] else { return None };
+    Some(Event {
+        again: again as u32 != 0,
+        states_changed: changed >> 32 != 0,
+        next: (defined as u32 != 0).then(|| f64::from_bits(time)),
+    })
 }
