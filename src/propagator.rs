@@ -12,10 +12,9 @@
 //! the last bit, and tiny steps lose nothing to `exp(A h)` being close to 1.
 
 use crate::decoupled::{Decoupled, Subsystem};
-use crate::number::Number;
+use crate::number::{Number, TwoFloat};
 use crate::pair::PitchRoll;
 use nalgebra::{Matrix3, Vector3};
-use twofloat::TwoFloat;
 
 /// The step matrices of one subsystem for one step size.
 #[derive(Clone, Copy, Debug, PartialEq)]
