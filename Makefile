@@ -13,7 +13,7 @@ DIST_VENV := .venv-dist
 WITH_WASM2C := WASM2C='$(CURDIR)/$(VENV)/bin/wasm2c'
 PY   := $(VENV)/bin/python
 # What is imported is compiled then; all of it takes longer than to install it.
-PIP_INSTALL := $(PY) -m pip install --progress-bar off --no-compile
+PIP_INSTALL := env -u MAKEFLAGS $(PY) -m pip install --progress-bar off --no-compile
 # A process for each core; `.venv/bin/python -m pytest -x FILE` runs a part.
 PYTEST := $(PY) -m pytest -q -p no:cacheprovider -n auto --dist worksteal
 FMU  := target/fmu/prw_testbed.fmu
@@ -23,7 +23,8 @@ SOURCE_FMU := target/fmu/source/prw_testbed.fmu
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-CARGO ?= cargo
+# Without MAKEFLAGS: make closes its job server to cargo, and cargo warns that it cannot be reached.
+CARGO ?= env -u MAKEFLAGS cargo
 # CI and users build what Cargo.lock says
 LOCKED ?= --locked
 
@@ -267,7 +268,7 @@ $(DIST_VENV)/test.stamp: $(DIST_VENV)/dist.stamp requirements/test-platforms.txt
 	@touch $@
 
 need-rust:
-	@command -v $(CARGO) >/dev/null || \
+	@command -v $(lastword $(CARGO)) >/dev/null || \
 	  $(call stop,Rust is missing; install it with rustup (https://rustup.rs))
 	@command -v cc >/dev/null || \
 	  $(call stop,the C compiler that Rust links with is missing; on Debian: apt install gcc libc6-dev)
