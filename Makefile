@@ -13,7 +13,7 @@ DIST_VENV := .venv-dist
 WITH_WASM2C := WASM2C='$(CURDIR)/$(VENV)/bin/wasm2c'
 PY   := $(VENV)/bin/python
 # What is imported is compiled then; all of it takes longer than to install it.
-PIP_INSTALL := $(PY) -m pip install --progress-bar off --no-compile
+PIP_INSTALL := env -u MAKEFLAGS $(PY) -m pip install --progress-bar off --no-compile
 # A process for each core; `.venv/bin/python -m pytest -x FILE` runs a part.
 PYTEST := $(PY) -m pytest -q -p no:cacheprovider -n auto --dist worksteal
 FMU  := target/fmu/prw_testbed.fmu
@@ -23,7 +23,8 @@ SOURCE_FMU := target/fmu/source/prw_testbed.fmu
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-CARGO ?= cargo
+# Without MAKEFLAGS: make closes its job server to cargo, and cargo warns that it cannot be reached.
+CARGO ?= env -u MAKEFLAGS cargo
 # CI and users build what Cargo.lock says
 LOCKED ?= --locked
 
@@ -35,7 +36,7 @@ ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -44,7 +45,7 @@ help:
 	@echo '                             or add ARGS=--degrees)'
 	@echo 'make fmu                     build the FMU                          -> $(FMU)'
 	@echo '                             and that for FMI 3.0                   -> target/fmu/fmi3/prw_testbed.fmu'
-	@echo 'make test                    check and test everything'
+	@echo 'make test                    check and test all that needs no browser and no other platform'
 	@echo 'make test-python             check the Python, with ruff and mypy'
 	@echo 'make test-newest-fmpy        the tests with FMPy again, with its newest version'
 	@echo 'make test-page               the page in the FMU, in Chromium, Firefox and WebKit, which it installs'
@@ -59,6 +60,7 @@ help:
 	@echo 'make release                 all that a release has -> dist/: FMUs and Python wheels for Linux, Windows and macOS,'
 	@echo '                             Intel and ARM, reference experiments, checksums, release notes'
 	@echo 'make source-fmu              the FMU as C sources, for real-time targets -> $(SOURCE_FMU)'
+	@echo 'make test-source-fmu         compile them with every compiler that is here, compare with the library'
 	@echo 'make test-platforms          make it and run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make it twice and compare every byte'
 	@echo 'make study                   set up prw identify, excite, sweep and check  (see python/prw/tutorial.md)'
@@ -105,7 +107,7 @@ test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check
-	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication
+	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication tests/scripts
 
 # In browsers that were never here before, from a file. What needs none is in tests/fmpy/test_page.py.
 test-page: $(VENV)/test.stamp closed-loop-fmus
@@ -267,7 +269,7 @@ $(DIST_VENV)/test.stamp: $(DIST_VENV)/dist.stamp requirements/test-platforms.txt
 	@touch $@
 
 need-rust:
-	@command -v $(CARGO) >/dev/null || \
+	@command -v $(lastword $(CARGO)) >/dev/null || \
 	  $(call stop,Rust is missing; install it with rustup (https://rustup.rs))
 	@command -v cc >/dev/null || \
 	  $(call stop,the C compiler that Rust links with is missing; on Debian: apt install gcc libc6-dev)
