@@ -78,7 +78,7 @@ fn generated_program(project: &Project, options: &BuildOptions, purpose: Purpose
     }
     let program = program.context("cargo has not said where the program is")?;
     let mut command = Command::new(program);
-    let elsewhere = options.describe || options.c_sources || options.all_targets;
+    let elsewhere = options.describe || options.guid || options.c_sources || options.all_targets;
     if !elsewhere && options.target.is_empty() && options.binary.is_empty() {
         let library = library.context("cargo has not said where the library is")?;
         let mut binary = OsString::from(format!("{}=", fmu_package::Platform::host()?));

@@ -44,6 +44,9 @@ pub struct BuildOptions {
     /// Write only modelDescription.xml of FMI 2.0, into the folder modelDescription of the sources or DIR
     #[arg(long, conflicts_with_all = ["target", "binary"])]
     pub describe: bool,
+    /// Print only the guid, which libraries that are compiled elsewhere get from the environment variable FMU_GUID
+    #[arg(long, conflicts_with = "describe")]
+    pub guid: bool,
     /// Compile for this Rust target instead of this machine; repeat it for several
     #[arg(long, value_name = "TRIPLE")]
     pub target: Vec<String>,
@@ -71,6 +74,7 @@ impl BuildOptions {
         let flags = [
             (self.tunable, "--tunable"),
             (self.describe, "--describe"),
+            (self.guid, "--guid"),
             (self.all_targets, "--all-targets"),
             (self.c_sources, "--c-sources"),
             (self.live_page, "--live-page"),
@@ -184,6 +188,10 @@ impl Builder {
             _ => M::INFO.identifier.to_owned(),
         };
         let guid = variant.guid();
+        if options.guid {
+            println!("{guid}");
+            return Ok(());
+        }
         let sources = match options.c_sources {
             true => self.c_sources(options.tunable, M::INFO.identifier)?,
             false => CSources::new(),
@@ -421,8 +429,7 @@ fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
     );
     ensure!(
         has(guid) || !has(NO_GUID),
-        "{path} has no guid: compile it with FMU_GUID={guid} in the environment, as this program and `cargo fmu build` do, \
-         and let INFO begin with info!",
+        "{path} has no guid: compile it with FMU_GUID={guid} in the environment, and let INFO begin with info!",
     );
     ensure!(
         has(guid),
