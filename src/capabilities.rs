@@ -2,11 +2,11 @@
 
 use crate::fmu::TestbedFmu;
 use crate::instant::Instant;
-use crate::motor::Motions;
+use crate::motor::{Inputs, Motions};
 use crate::pair::Pair;
 use crate::parameters::{InvalidParameter, Parameters};
 use crate::start::Start;
-use crate::testbed::Testbed;
+use crate::testbed::{State, Testbed};
 use crate::variables::Name;
 use fmu_export::{
     CoSimulation, DefaultExperiment, Error, Experiment, Info, InputDerivatives, Model, ModelExchange,
@@ -115,66 +115,51 @@ impl OutputDerivatives for TestbedFmu {
     }
 }
 
-/// Those of eq. (11), by states and inputs, whatever a state starts from; by parameters, of all that is calculated.
-///
-/// While initializing, the states follow from the motors or are given.
+/// The derivatives of the values that a getter returns, while initializing and later. In Co-Simulation the rates that
+/// are estimated from the angles react to an angle, and until the start is over the states react to it too. Else these
+/// are A, B, C and D of eq. (11).
 impl Partials for TestbedFmu {
     fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
-        let is_given = !self.start.is_over && !self.start.at_rest;
-        Some(match (unit_instant(known), started_by(known)) {
-            (Some(unit), _) => self.at(unknown, &unit),
-            (_, Some(state)) if is_given => self.partial(unknown, state)?,
-            _ => self.change(unknown, &self.unit_change(known)),
+        Some(match self.reaction(known) {
+            Some(reaction) => self.at(unknown, &reaction),
+            None => self.change(unknown, &self.unit_change(known)),
         })
     }
-
-    fn initial_partial(&self, unknown: Name, known: Name) -> Option<f64> {
-        let Some(mut change) = unit_instant(known) else { return self.partial(unknown, known) };
-        if self.start.at_rest {
-            change.x = self.start.from(change.motors.angle);
-        }
-        for motor in 0..2 {
-            if !self.takes_omega(motor) {
-                change.motors.rate[motor] = 0.0;
-            }
-        }
-        Some(self.at(unknown, &change))
-    }
-}
-
-/// The instant with 1 at a state or input and 0 elsewhere.
-fn unit_instant(known: Name) -> Option<Instant> {
-    let mut unit = Instant::default();
-    *match known {
-        Name::theta1 => &mut unit.motors.angle[0],
-        Name::theta2 => &mut unit.motors.angle[1],
-        Name::omega1 => &mut unit.motors.rate[0],
-        Name::omega2 => &mut unit.motors.rate[1],
-        Name::theta3 => &mut unit.x[0],
-        Name::theta4 => &mut unit.x[1],
-        Name::theta5 => &mut unit.x[2],
-        Name::theta6 => &mut unit.x[3],
-        Name::omega5 => &mut unit.x[4],
-        Name::omega6 => &mut unit.x[5],
-        _ => return None,
-    } = 1.0;
-    Some(unit)
-}
-
-/// The state that starts at the value of a parameter.
-fn started_by(parameter: Name) -> Option<Name> {
-    Some(match parameter {
-        Name::theta3_start => Name::theta3,
-        Name::theta4_start => Name::theta4,
-        Name::theta5_start => Name::theta5,
-        Name::theta6_start => Name::theta6,
-        Name::omega5_start => Name::omega5,
-        Name::omega6_start => Name::omega6,
-        _ => return None,
-    })
 }
 
 impl TestbedFmu {
+    /// The change of the instant when an input, a state, or a parameter that a state starts from is set to a value
+    /// that is larger by 1. `None` for the parameters of the equations.
+    fn reaction(&self, known: Name) -> Option<Instant> {
+        let (mut inputs, mut x) = ([Inputs::default(); 2], State::default());
+        let mut start = Start { state: State::default(), ..self.start };
+        *match known {
+            Name::theta1 => &mut inputs[0].theta,
+            Name::theta2 => &mut inputs[1].theta,
+            Name::omega1 => &mut inputs[0].omega,
+            Name::omega2 => &mut inputs[1].omega,
+            Name::theta3 => &mut x[0],
+            Name::theta4 => &mut x[1],
+            Name::theta5 => &mut x[2],
+            Name::theta6 => &mut x[3],
+            Name::omega5 => &mut x[4],
+            Name::omega6 => &mut x[5],
+            Name::theta3_start => &mut start.state[0],
+            Name::theta4_start => &mut start.state[1],
+            Name::theta5_start => &mut start.state[2],
+            Name::theta6_start => &mut start.state[3],
+            Name::omega5_start => &mut start.state[4],
+            Name::omega6_start => &mut start.state[5],
+            _ => return None,
+        } = 1.0;
+        let motors = self.testbed.motors.reaction(inputs);
+        if !start.is_over {
+            let followed = start.from(motors.theta());
+            x = std::array::from_fn(|i| x[i] + followed[i]);
+        }
+        Some(Instant { x, motors: self.motions(&motors) })
+    }
+
     /// What a variable would be at an instant. All but parameters are linear in it.
     fn at(&self, variable: Name, instant: &Instant) -> f64 {
         let Instant { x, motors } = instant;

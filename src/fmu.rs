@@ -2,7 +2,7 @@
 
 use crate::decoupled::Decoupled;
 use crate::instant::{Instant, torques};
-use crate::motor::{Motion, Motions};
+use crate::motor::{Motion, Motions, Motors};
 use crate::pair::Sides;
 use crate::start::Start;
 use crate::testbed::Testbed;
@@ -36,22 +36,16 @@ impl TestbedFmu {
         self.testbed.system()
     }
 
-    /// The motion of the motors now. Model Exchange takes theta and omega as they are set (u of eq. (11));
+    /// The motion of these motors now. Model Exchange takes theta and omega as they are set (u of eq. (11));
     /// Co-Simulation knows the motors by their samples.
     #[inline]
-    fn motions(&self) -> Motions {
-        let motors = &self.testbed.motors;
+    pub(crate) fn motions(&self, motors: &Motors) -> Motions {
         match self.interface {
             Interface::CoSimulation => motors.now(),
             Interface::ModelExchange => {
                 Motion { angle: motors.theta(), rate: motors.omega(), ..Motions::default() }
             }
         }
-    }
-
-    /// Whether a motor's rate is what is set for it.
-    pub(crate) fn takes_omega(&self, motor: usize) -> bool {
-        self.interface == Interface::ModelExchange || self.testbed.motors.takes_omega(motor)
     }
 
     /// Sensor torques. Most often they are read right after a step: all else is a call, which keeps this short.
@@ -68,7 +62,8 @@ impl TestbedFmu {
     #[cold]
     #[inline(never)]
     fn torques_otherwise(&self) -> Sides {
-        torques(&self.testbed.state, &self.motions(), self.system())
+        let Testbed { motors, state, .. } = &self.testbed;
+        torques(state, &self.motions(motors), self.system())
     }
 
     /// Until the testbed has started, its state follows the motors, or what is given. Called after either was set.
@@ -82,6 +77,6 @@ impl TestbedFmu {
     /// State and motors now.
     #[inline]
     pub(crate) fn now(&self) -> Instant {
-        Instant { x: self.testbed.state, motors: self.motions() }
+        Instant { x: self.testbed.state, motors: self.motions(&self.testbed.motors) }
     }
 }

@@ -257,6 +257,18 @@ impl Motors {
         Motions::new(now(0), now(1))
     }
 
+    /// The reaction of these motors to a change of their inputs: their motions are linear in the inputs, in
+    /// earlier samples and in given rates, so here the latter are 0.
+    pub fn reaction(&self, inputs: [Inputs; 2]) -> Self {
+        Self {
+            inputs,
+            is_sampled: [true; 2],
+            given_rate: self.given_rate.map(|rate| rate.and(Some(0.0))),
+            earlier: Default::default(),
+            ..*self
+        }
+    }
+
     /// The jumps from the ends of the last paths to the current samples, rad. The first samples jump
     /// from nowhere.
     #[inline]

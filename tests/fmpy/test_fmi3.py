@@ -158,28 +158,3 @@ def test_a_state_can_be_saved_and_restored(testbed3):
     instance.doStep(0.01, 0.02)
     assert instance.getFloat64(outputs) == once
     instance.freeFMUState(state)
-
-
-@pytest.mark.parametrize("parameter", ["k1", "c2", "J2", "H3"])
-def test_partial_derivatives_by_parameters(testbed3, parameter):
-    """After a step, against differences: torques and state derivatives at the same state and inputs."""
-    instance, references = testbed3
-    instance.setBoolean([references["start_at_rest"]], [False])
-    instance.setFloat64([references[name] for name in ("theta1", "theta2", "omega1")], [0.2, -0.1, 1.0])
-    instance.exitInitializationMode()
-    instance.doStep(0.0, 0.01)
-    unknowns = [references[name] for name in (*OUTPUTS, "der(omega5)", "der(omega6)")]
-    known = references[parameter]
-    (value,) = instance.getFloat64([known])
-
-    def at(share: float):
-        instance.setFloat64([known], [value * share])
-        return np.array(instance.getFloat64(unknowns))
-
-    difference = (at(1 + 1e-4) - at(1 - 1e-4)) / (2e-4 * value)
-    at(1.0)
-    exact = instance.getDirectionalDerivative(unknowns, [known], [1.0], len(unknowns))
-    assert np.any(exact)
-    np.testing.assert_allclose(exact, difference, rtol=1e-6, atol=1e-9 * np.max(np.abs(exact)))
-    adjoint = [instance.getAdjointDerivative([unknown], [known], [1.0], 1)[0] for unknown in unknowns]
-    assert adjoint == exact

@@ -179,17 +179,3 @@ def test_state_can_be_kept_and_replayed(instance):
     instance.fmi.freeFMUstate(restored)
     assert_same(first, second)
     assert_same(first, third)
-
-
-def test_directional_derivatives_are_the_matrices(instance, model):
-    states, inputs = (
-        ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6"),
-        ("theta1", "theta2", "omega1", "omega2"),
-    )
-    expected = np.block([[model.a, model.b_angle, model.b_rate], [model.c, model.d_angle, model.d_rate]])
-    instance.start()
-    references = {name: v.valueReference for name, v in instance.variables.items()}
-    unknowns = [references[f"der({name})"] for name in states] + [references["tau1"], references["tau2"]]
-    for column, name in enumerate((*states, *inputs)):
-        found = instance.fmi.getDirectionalDerivative(unknowns, [references[name]], [2.0])
-        np.testing.assert_allclose(found, 2 * expected[:, column], rtol=1e-11, atol=1e-10, err_msg=name)

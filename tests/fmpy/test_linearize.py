@@ -55,10 +55,16 @@ def test_names_and_units(fmu):
 
 
 def test_the_point_of_operation_does_not_matter(fmu):
-    start = {"start_at_rest": False, "theta3_start": 1.0, "omega6_start": -30.0, "theta1": 0.5, "use_omega": True}
+    start = {"theta3_start": 1.0, "omega6_start": -30.0, "theta1": 0.5}
     here, there = linearize(fmu=fmu), linearize(start, fmu=fmu)
     for name in "ABCD":
         np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
+
+
+def test_given_flags_count(fmu):
+    """On the first sample the estimated rates are 0, and at rest the states follow the motors."""
+    model = linearize({"use_omega": False, "start_at_rest": True}, fmu=fmu, fmi_type="CoSimulation", outputs=["pitch"])
+    np.testing.assert_array_equal(model.D, [[0.5, 0.5, 0.0, 0.0]])
 
 
 def test_transfer_matrices(fmu, model):

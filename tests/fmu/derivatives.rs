@@ -1,90 +1,153 @@
 //! Derivatives that the FMU offers: with respect to variables (section 2.1.9) and to time (4.2.1).
 
 use crate::exact::{
-    INPUTS, STATES, UNKNOWNS, jacobian, parameters, real_parameters, set_parameters, start_at,
+    INPUTS, STARTS, STATES, UNKNOWNS, jacobian, parameters, real_parameters, set_parameters, start_at,
 };
 use crate::in_mode;
 use crate::{TABLE, new, vr};
+use fmu_export::Causality::Parameter;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
-use fmu_export::Mode::*;
+use fmu_export::Mode::{self, *};
+use fmu_package::structure::ModelStructure;
 use fmu_test_kit::checks::output_derivatives_fit_steps;
-use fmu_test_kit::serialized::with_mode;
-use fmu_test_kit::{Either, Random};
-use prw_testbed::Parameters;
+use fmu_test_kit::{Either, Importer as Fmu, Random, fmi3};
 use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
+use std::sync::LazyLock;
 
-fn knowns() -> Vec<u32> {
-    [&STATES[..], &INPUTS].concat()
+/// What the description lists for FMI 2.0.
+static STRUCTURE: LazyLock<ModelStructure> =
+    LazyLock::new(|| ModelStructure::of::<TestbedFmu>(false).unwrap());
+
+/// Central differences of the values that getters return, and what rounding may do to them. All but the parameters of
+/// the equations act linearly.
+fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f64)> {
+    let [value] = fmu.get([known]);
+    let is_linear = [&INPUTS[..], &STATES, &STARTS].concat().contains(&known);
+    let width = if is_linear { 1.0 } else { 1e-4 * value };
+    let state = fmu.save();
+    let [above, below] = [value + width, value - width].map(|value| {
+        fmu.ok(fmu.set_state(state));
+        if let Some(place) = STATES.iter().position(|state| *state == known) {
+            let mut x = fmu.states::<6>();
+            x[place] = value;
+            fmu.ok(fmu.set_states(x.as_ptr(), 6));
+        } else {
+            fmu.set(&[known], &[value]);
+        }
+        fmu.read(unknowns)
+    });
+    fmu.ok(fmu.set_state(state));
+    fmu.forget(state);
+    let ends = above.into_iter().zip(below);
+    ends.map(|(a, b)| ((a - b) / (2.0 * width), 1e-10 * (a.abs() + b.abs()) / width)).collect()
 }
 
-/// Pair by pair A, B, C and D, in every mode after the initialization that has directional derivatives, at whatever point
-/// and wherever the motor rates come from. (While initializing: `tests/fmpy/test_initial_derivatives.py`.)
-#[test]
-fn pair_by_pair() {
-    for seed in 0..20 {
-        let p = if seed == 0 { Parameters::BUILT_IN } else { parameters(seed) };
-        let expected = jacobian(&p);
-        for (interface, mode) in [
-            (CoSimulation, StepComplete),
-            (CoSimulation, Terminated),
-            (ModelExchange, Event),
-            (ModelExchange, ContinuousTime),
-        ] {
-            let fmu = new(interface);
-            set_parameters(&fmu, &p);
-            fmu.set(&[vr(Name::theta1), vr(Name::omega2)], &[0.3, -2.0]);
-            start_at(&fmu, [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
-            fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &i32::from(seed % 2 == 1)));
-            fmu.restore(&with_mode(fmu.bytes(), mode));
-            for (row, unknown) in UNKNOWNS.into_iter().enumerate() {
-                for (column, known) in knowns().into_iter().enumerate() {
-                    let found = fmu.directional(&[unknown], &[known], &[1.0])[0];
-                    let expected = expected[(row, column)];
-                    let names = [unknown, known].map(|vr| TABLE[vr as usize].name());
-                    let error = (found - expected).abs();
-                    assert!(
-                        error <= 1e-13 * expected.abs(),
-                        "{names:?} in {mode}: {found} is not {expected}"
-                    );
-                }
-            }
+/// Every derivative is that of the values here; what is not declared is 0, but for states that follow their start.
+fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
+    let structure = &*STRUCTURE;
+    let (unknowns, listed) = match mode {
+        Initialization => ([&UNKNOWNS[..], &STATES].concat(), vec![&structure.initial_unknowns]),
+        _ => (UNKNOWNS.to_vec(), vec![&structure.outputs, &structure.derivatives]),
+    };
+    let declares = |unknown: u32, known: u32| {
+        let mut listed = listed.iter().copied().flatten().filter(|of| of.vr == unknown);
+        listed.any(|of| of.dependencies.iter().any(|(vr, _)| *vr == known))
+    };
+    // No function sets states in Co-Simulation.
+    let states = if matches!(mode, Event | ContinuousTime) { &STATES[..] } else { &[] };
+    for known in [&INPUTS, states].concat().into_iter().chain(real_parameters()) {
+        let is_listed = mode == Initialization || started && TABLE[known as usize].causality() != Parameter;
+        for (unknown, (expected, rounding)) in unknowns.iter().zip(differences(fmu, &unknowns, known)) {
+            let found = fmu.partial(*unknown, known);
+            let names = [*unknown, known].map(|vr| TABLE[vr as usize].name());
+            assert!(
+                (found - expected).abs() <= 1e-6 * expected.abs() + rounding,
+                "{label}, {mode}: {names:?}: {found}, differences give {expected}"
+            );
+            assert!(!is_listed || found == 0.0 || declares(*unknown, known), "{label}, {mode}: {names:?}");
         }
     }
 }
 
-/// Real parameters are knowns too, while initializing and, for CasADi, later: their derivatives against differences of
-/// the values, with the error of a central difference of this width.
-#[test]
-fn with_respect_to_parameters() {
-    const WIDTH: f64 = 1e-4;
-    for seed in 1..10 {
-        let mut random = Random(seed);
-        let mode = if seed % 3 == 0 { ContinuousTime } else { Initialization };
-        let fmu = in_mode(if seed % 3 == 1 { CoSimulation } else { ModelExchange }, mode);
-        if mode == Initialization {
-            set_parameters(&fmu, &parameters(seed));
-            fmu.ok(fmu.fmi2SetBoolean(&vr(Name::use_omega), 1, &1));
-            start_at(&fmu, std::array::from_fn(|_| random.between(-1.0, 1.0)));
+/// Before the first step and after uneven ones: with no angle set, with one and with all, in another instance, at the end.
+fn co_simulation<F: Either>(use_omega: bool, at_rest: bool, with_rates: bool) {
+    let label = format!("use_omega {use_omega}, start_at_rest {at_rest}, derivatives {with_rates}");
+    let p = parameters(7);
+    let (mut random, jacobian) = (Random(8), jacobian(&p));
+    let mut fmu = F::in_mode::<TestbedFmu>(CoSimulation, Instantiated);
+    set_parameters(&fmu, &p);
+    fmu.ok(fmu.set_boolean(vr(Name::use_omega), use_omega.into()));
+    start_at(&fmu, [0.1, -0.2, 0.3, 0.4, -1.0, 2.0]);
+    fmu.ok(fmu.set_boolean(vr(Name::start_at_rest), at_rest.into()));
+    fmu.enter_initialization(0.0, None);
+    let mut draw = || [(); 4].map(|()| random.between(-1.0, 1.0));
+    fmu.set(&INPUTS, &draw());
+    fit_differences(&fmu, Initialization, false, &label);
+    fmu.ok(fmu.exit_initialization_mode());
+    let mut time = 0.0;
+    for (step, size) in [0.001, 0.003, 0.002, 0.002, 0.004].into_iter().enumerate() {
+        let label = format!("{label}, after {step} steps");
+        let fits = |fmu: &F| fit_differences(fmu, StepComplete, step > 0, &label);
+        fits(&fmu);
+        fmu.set(&INPUTS[..1], &draw()[..1]);
+        fits(&fmu);
+        fmu.set(&INPUTS, &draw());
+        if with_rates {
+            fmu.give_rates(&THETA, &draw()[..2]);
         }
-        fmu.set(&INPUTS, &[(); 4].map(|()| random.between(-1.0, 1.0)));
-        for known in real_parameters() {
-            // What is 0 is tried elsewhere.
-            let [start] = fmu.get([known]).map(|start| if start == 0.0 { 0.1 } else { start });
-            let values = |value: f64| {
-                fmu.set(&[known], &[value]);
-                fmu.get(UNKNOWNS)
-            };
-            let (above, below) = (values(start * (1.0 + WIDTH)), values(start * (1.0 - WIDTH)));
-            let now = values(start);
-            let found = fmu.directional(&UNKNOWNS, &[known], &[1.0]);
-            for (i, unknown) in UNKNOWNS.into_iter().enumerate() {
-                let expected = (above[i] - below[i]) / (2.0 * WIDTH * start);
-                let tolerance = 1e-6 * (expected.abs() + now[i].abs() / start.abs());
-                let names = [unknown, known].map(|vr| TABLE[vr as usize].name());
-                assert!((found[i] - expected).abs() <= tolerance, "{names:?}: {} {expected}", found[i]);
+        let restored = F::in_mode::<TestbedFmu>(CoSimulation, Instantiated);
+        restored.restore(&fmu.bytes());
+        fmu = restored;
+        fits(&fmu);
+        for (row, unknown) in UNKNOWNS.into_iter().enumerate() {
+            for (column, state) in STATES.into_iter().enumerate() {
+                let (found, expected) = (fmu.partial(unknown, state), jacobian[(row, column)]);
+                assert!((found - expected).abs() <= 1e-13 * expected.abs(), "{label}: {found} {expected}");
             }
         }
+        fmu.step(time, size);
+        time += size;
+    }
+    let all = |fmu: &F| UNKNOWNS.map(|unknown| INPUTS.map(|known| fmu.partial(unknown, known)));
+    let before = all(&fmu);
+    fmu.ok(fmu.terminate());
+    assert_eq!(all(&fmu), before, "{label}, terminated");
+}
+
+/// While the states follow their start, and after that.
+fn model_exchange<F: Either>(use_omega: bool, at_rest: bool) {
+    let label = format!("use_omega {use_omega}, start_at_rest {at_rest}");
+    let mut random = Random(9);
+    let mut draw = || [(); 6].map(|()| random.between(-1.0, 1.0));
+    let fmu = F::in_mode::<TestbedFmu>(ModelExchange, Initialization);
+    set_parameters(&fmu, &parameters(10));
+    fmu.ok(fmu.set_boolean(vr(Name::use_omega), use_omega.into()));
+    start_at(&fmu, draw());
+    fmu.ok(fmu.set_boolean(vr(Name::start_at_rest), at_rest.into()));
+    fmu.set(&INPUTS, &draw()[..4]);
+    fit_differences(&fmu, Initialization, false, &label);
+    fmu.ok(fmu.exit_initialization_mode());
+    fit_differences(&fmu, Event, false, &label);
+    fmu.enter_continuous_time();
+    fit_differences(&fmu, ContinuousTime, true, &label);
+    fmu.ok(fmu.set_states(draw().as_ptr(), 6));
+    fmu.set(&INPUTS, &draw()[..4]);
+    fit_differences(&fmu, ContinuousTime, true, &label);
+    fmu.ok(fmu.enter_event_mode());
+    fit_differences(&fmu, Event, true, &label);
+}
+
+/// In every mode that has directional derivatives; in FMI 3.0 the adjoint ones are the same numbers.
+#[test]
+fn every_pair_fits_differences() {
+    for [use_omega, at_rest] in [[false, false], [false, true], [true, false], [true, true]] {
+        for with_rates in [false, true] {
+            co_simulation::<Fmu>(use_omega, at_rest, with_rates);
+        }
+        co_simulation::<fmi3::Importer>(use_omega, at_rest, false);
+        model_exchange::<Fmu>(use_omega, at_rest);
+        model_exchange::<fmi3::Importer>(use_omega, at_rest);
     }
 }
 

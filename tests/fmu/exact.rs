@@ -5,7 +5,7 @@
 
 use crate::{TABLE, vr};
 use fmu_export::{BaseType, Causality, Variable};
-use fmu_test_kit::{Either, Importer as Fmu, Random};
+use fmu_test_kit::{Either, Random};
 use nalgebra::SMatrix;
 use prw_testbed::Parameters;
 use prw_testbed::TestbedFmu;
@@ -97,25 +97,24 @@ pub fn distance(a: &[f64], b: &[f64]) -> f64 {
 
 /// Lets the testbed start in this state instead of at rest.
 #[track_caller]
-pub fn start_at(fmu: &Fmu, x: [f64; 6]) {
-    fmu.ok(fmu.fmi2SetBoolean(&vr(Name::start_at_rest), 1, &0));
+pub fn start_at(fmu: &dyn Either, x: [f64; 6]) {
+    fmu.ok(fmu.set_boolean(vr(Name::start_at_rest), 0));
     fmu.set(&STARTS, &x);
 }
 
-/// Sets all parameters that eq. (11) has: all at once, because they are checked together.
-pub fn set_parameters(fmu: &Fmu, p: &Parameters) {
-    let (mut reals, mut integers) = (Vec::new(), Vec::new());
+/// Sets all parameters that eq. (11) has, the Reals at once, because they are checked together.
+pub fn set_parameters(fmu: &dyn Either, p: &Parameters) {
+    let (mut reals, mut values) = (Vec::new(), Vec::new());
     for (name, value) in prw_testbed::fingerprint::start(p) {
         let vr = TABLE.iter().position(|variable| variable.name() == name).unwrap();
-        match TABLE[vr].base() {
-            BaseType::Real => reals.push((vr as u32, value.parse::<f64>().unwrap())),
-            _ => integers.push((vr as u32, value.parse::<i32>().unwrap())),
+        if TABLE[vr].base() == BaseType::Real {
+            reals.push(vr as u32);
+            values.push(value.parse().unwrap());
+        } else {
+            fmu.ok(fmu.set_integer(vr as u32, value.parse().unwrap()));
         }
     }
-    let ((real, values), (integer, counts)): ((Vec<_>, Vec<_>), (Vec<_>, Vec<_>)) =
-        (reals.into_iter().unzip(), integers.into_iter().unzip());
-    fmu.set(&real, &values);
-    fmu.ok(fmu.fmi2SetInteger(integer.as_ptr(), integer.len(), counts.as_ptr()));
+    fmu.set(&reals, &values);
 }
 
 /// The value references of the Real parameters.

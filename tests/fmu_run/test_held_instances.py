@@ -123,8 +123,9 @@ sys.stdout.write(one.get({OUTPUTS!r}).tobytes().hex() + " " + one.time.tobytes()
         other = subprocess.run([sys.executable, "-c", program], input=texts, capture_output=True, text=True, check=True)
         wrists.step(1e-3)
         assert other.stdout.split() == [wrists.get(OUTPUTS).tobytes().hex(), wrists.time.tobytes().hex()]
+        first, second = map(bytes.fromhex, texts.split())
         with pytest.raises(fmu_run.FmuError, match=r"instance 1: .*damaged"):
-            wrists.deserialize([bytes.fromhex(texts.split()[0]), bytes.fromhex(texts.split()[1])[:-1] + b"?"])
+            wrists.deserialize([first, second[:-1] + bytes([second[-1] ^ 1])])
 
 
 def test_one_drops_out_and_the_others_go_on(testbed) -> None:

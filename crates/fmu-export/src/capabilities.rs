@@ -138,8 +138,9 @@ pub struct StepCompleted {
 /// The model knows its partial derivatives (section 2.1.9 of FMI 2.0, 2.2.11 of FMI 3.0): directional and adjoint ones
 /// follow. fmu-package compares all of them with differences before it describes the model.
 pub trait Partials: Model {
-    /// The partial derivative of one Real variable with respect to another, once the model is initialized. The unknown
-    /// is an output or a state's derivative, the known an input, a state or a parameter.
+    /// The partial derivative of one Real variable with respect to another, once the model is initialized: of the value
+    /// that a getter returns when only the known has been set, at this point and before any step. The unknown is an
+    /// output or a state's derivative, the known an input, a state or a parameter.
     ///
     /// `None` if the model does not know it: the importer is then refused.
     fn partial(&self, unknown: Self::Name, known: Self::Name) -> Option<f64>;

@@ -3,8 +3,8 @@
 use crate::check::{Starts, interfaces, rounded};
 use anyhow::{Result, bail};
 use fmu_export::{
-    Attributes, Causality, Error, Experiment, Exported, Initial, Interface, Setup, Type, Value, Variability,
-    Variable,
+    Attributes, Causality, Error, Experiment, Exported, Initial, Interface, Setup, Step, Type, Value,
+    Variability, Variable,
 };
 use std::marker::PhantomData;
 
@@ -50,12 +50,14 @@ impl<M: Exported> Sampler<M> {
             is_parameter(variable) && (tunable_parameters || variable.variability() == Variability::Tunable)
         };
         let mut samples = Vec::new();
-        for fixed in 0..4 {
+        for fixed in 0..8 {
             let (point, _) = self.draw(None, true, |_| true)?;
             for tunable in 0..3 {
                 let (point, _) = self.draw(Some(&point), false, is_tunable)?;
-                for _ in 0..3 {
-                    let (_, model) = self.draw(Some(&point), true, |variable| !is_parameter(variable))?;
+                for steps in 0..3 {
+                    let (point, mut model) =
+                        self.draw(Some(&point), true, |variable| !is_parameter(variable))?;
+                    go_on(&mut model, &point, steps);
                     samples.push(FactorSample { fixed, tunable, model });
                 }
             }
@@ -121,6 +123,24 @@ pub(crate) fn model_at<M: Exported>(point: &Point, running: bool) -> Result<M, E
     set(&mut model, point, is_set)?;
     model.calculate(point.time);
     Ok(model)
+}
+
+/// Takes steps in Co-Simulation, and gives derivatives of the inputs after the first one: factors may depend on both.
+fn go_on<M: Exported>(model: &mut M, point: &Point, steps: usize) {
+    if point.interface != Interface::CoSimulation {
+        return;
+    }
+    let size = M::INFO.default_experiment.step_size;
+    for step in 0..steps {
+        // A model may reject the step: it is then as it was before.
+        let _ = model.exported_step(Step::new(point.time + step as f64 * size, size));
+    }
+    for (place, variable) in (0..).zip(M::TABLE).filter(|_| steps == 1 && M::INPUT_DERIVATIVES) {
+        if variable.causality() == Causality::Input && variable.variability() == Variability::Continuous {
+            model.exported_input_derivative(M::element(place), 1, 0.0);
+        }
+    }
+    model.calculate(point.time + steps as f64 * size);
 }
 
 fn set<M: Exported>(model: &mut M, point: &Point, which: impl Fn(&Variable<M>) -> bool) -> Result<(), Error> {

@@ -17,6 +17,9 @@ from prw.parameters import Given, values_of
 from prw.state_space import StateSpace
 from prw.testbed import existing_fmu, loaded
 
+#: With these start values, which the testbed has, its states and inputs are independent of each other in Co-Simulation.
+#: With others a motor angle also changes the rate that is estimated from it, and before the first step the states.
+INDEPENDENT = {"use_omega": True, "start_at_rest": False}
 INTERFACES = {"CoSimulation": "Co-Simulation", "ModelExchange": "Model Exchange"}
 #: The same, as `fmu_run` calls them.
 HELD: dict[str, Literal["co-simulation", "model-exchange"]] = {
@@ -39,7 +42,10 @@ def linearize(
     parameters
         Start values of parameters, states and inputs by name, in the FMU's units, or the JSON file with them that
         `prw.identify` writes; others keep their own. The
-        testbed is linear, so of these only parameters matter there.
+        testbed is linear, so of these only parameters matter there. `use_omega` is set to true and `start_at_rest` to
+        false where they are not given: A, B, C and D are then those of eq. (11), with the motors' angles and rates as
+        independent inputs. With `use_omega` false, Co-Simulation estimates the rates from the angles and ignores
+        `omega1` and `omega2`.
     fmu
         The FMU (default: the testbed's).
     outputs, fmi_type
@@ -59,8 +65,8 @@ class Linearizer:
     manager; leaving it unloads the FMU.
 
     outputs: names of y, outputs or states (default: the FMU's continuous outputs). fmi_type: "CoSimulation" or
-    "ModelExchange" (default: the first of them that has directional derivatives). Raises UserError as `linearize`
-    does.
+    "ModelExchange" (default: the first of them that has directional derivatives). The testbed's `use_omega` and
+    `start_at_rest` are set as for `linearize`. Raises UserError as `linearize` does.
     """
 
     states: tuple[str, ...]
@@ -111,7 +117,8 @@ class Linearizer:
         if self._closed:
             raise UserError(f"{self.fmu}: is closed")
         given = values_of(parameters, self.fmu, self.loaded)
-        start = {name: self._start(name, value) for name, value in given.items()}
+        start = {name: value for name, value in INDEPENDENT.items() if self._has_flag(name)}
+        start |= {name: self._start(name, value) for name, value in given.items()}
         table = np.zeros((len(self._knowns), len(self._unknowns)))
         try:
             instance = self._initialized(start)
@@ -152,6 +159,10 @@ class Linearizer:
         which = INTERFACES.get(wanted, wanted) if wanted else " or ".join(INTERFACES[name] for name in directional)
         other = f"; it does for {' and '.join(INTERFACES[name] for name in able)}" if able else ""
         raise UserError(f"{self.fmu}: offers no directional derivatives for {which} ({attribute} is not true){other}")
+
+    def _has_flag(self, name: str) -> bool:
+        variable = self.loaded.variables.get(name)
+        return variable is not None and (variable.causality, variable.type) == ("parameter", "Boolean")
 
     def _start(self, name: str, value: Any) -> Any:
         """The value, if it is one of the variable's type. Raises UserError."""
