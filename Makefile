@@ -55,6 +55,7 @@ help:
 	@echo '                             or add ARGS=--degrees)'
 	@echo 'make fmu                     build the FMU                          -> $(FMU)'
 	@echo '                             and that for FMI 3.0                   -> target/fmu/fmi3/prw_testbed.fmu'
+	@echo 'make demo-fmu                both, faster: without the page that runs the FMU, unless it is there already'
 	@echo 'make test                    check and test all that needs no browser and no other platform'
 	@echo 'make check                   check what has changed since the last commit, in a minute'
 	@echo 'make check-release           run everything below and above, and write a table -> out/release-check.md'
