@@ -36,7 +36,7 @@ ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -45,7 +45,7 @@ help:
 	@echo '                             or add ARGS=--degrees)'
 	@echo 'make fmu                     build the FMU                          -> $(FMU)'
 	@echo '                             and that for FMI 3.0                   -> target/fmu/fmi3/prw_testbed.fmu'
-	@echo 'make test                    check and test everything'
+	@echo 'make test                    check and test all that needs no browser and no other platform'
 	@echo 'make test-python             check the Python, with ruff and mypy'
 	@echo 'make test-newest-fmpy        the tests with FMPy again, with its newest version'
 	@echo 'make test-page               the page in the FMU, in Chromium, Firefox and WebKit, which it installs'
@@ -60,6 +60,7 @@ help:
 	@echo 'make release                 all that a release has -> dist/: FMUs and Python wheels for Linux, Windows and macOS,'
 	@echo '                             Intel and ARM, reference experiments, checksums, release notes'
 	@echo 'make source-fmu              the FMU as C sources, for real-time targets -> $(SOURCE_FMU)'
+	@echo 'make test-source-fmu         compile them with every compiler that is here, compare with the library'
 	@echo 'make test-platforms          make it and run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make it twice and compare every byte'
 	@echo 'make study                   set up prw identify, excite, sweep and check  (see python/prw/tutorial.md)'
