@@ -39,7 +39,7 @@ def published() -> list[Path]:
 
 
 def released() -> bool:
-    """Whether the newest section of the changelog has the day of a release."""
+    """Returns whether the newest section of the changelog has the day of a release."""
     newest = re.search(r"^## .*$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     return newest is not None and re.search(r"\(\d", newest[0]) is not None
 

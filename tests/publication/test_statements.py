@@ -40,7 +40,7 @@ def test_help_lists_every_target_that_no_other_needs() -> None:
 
 @pytest.mark.parametrize("name", [name for name in PAGES if not name.startswith(("CHANGELOG", "crates/"))])
 def test_named_paths_exist(name: str) -> None:
-    """In the tour all; in other pages those that begin with a directory of the project."""
+    """Checks all paths of the tour; of other pages, those that begin with a directory of the project."""
     kept, folders = [f"/{path}/" for path in FILES], {path.split("/")[0] for path in FILES if "/" in path}
     for path in PATH.findall(text(name)):
         if not path.startswith(MADE) and (name == "CONTRIBUTING.md" or path.split("/")[0] in folders):
@@ -48,7 +48,7 @@ def test_named_paths_exist(name: str) -> None:
 
 
 def test_the_tour_has_every_directory_and_every_file_of_the_model() -> None:
-    tree, *_, tables = re.split(r"^```\n?", text("CONTRIBUTING.md"), flags=re.MULTILINE)[1:3]
+    tree, tables = re.split(r"^```\n?", text("CONTRIBUTING.md"), flags=re.MULTILINE)[1:3]
     named = set(re.findall(r"^([\w/-]+)/ ", tree, re.MULTILINE))
     assert all((ROOT / path).is_dir() for path in named)
     for path in {path.split("/")[0] for path in FILES if "/" in path and not path.startswith(".")}:

@@ -59,7 +59,7 @@ def film(fmu: Path, path: Path) -> None:
 
 
 def _look_alike(path: Path, pictures: list[Image.Image]) -> bool:
-    """Whether a GIF shows these pictures. Chromium draws the edges of a few pixels differently from run to run."""
+    """Returns whether a GIF shows these pictures. Chromium draws the edges of a few pixels differently from run to run."""
     with Image.open(path) as kept:
         before = [np.asarray(frame.convert("RGB"), dtype=int) for frame in ImageSequence.Iterator(kept)]
     after = [np.asarray(picture.convert("RGB"), dtype=int) for picture in pictures]
