@@ -36,7 +36,8 @@ LOCKED ?= --locked
 
 # What the page in the FMU runs, and C sources are made of.
 WEBASSEMBLY := wasm32-unknown-unknown
-HAS_WEBASSEMBLY = ls "$$(rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
+# Without these variables: make closes its job server to rustc, and rustc warns that it cannot be reached.
+HAS_WEBASSEMBLY = ls "$$(env -u MAKEFLAGS -u MFLAGS rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
 ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
 
 BUILD_FMU = $(CARGO) run $(LOCKED) --release --bin build_fmu --
