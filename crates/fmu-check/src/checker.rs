@@ -3,7 +3,7 @@
 use crate::description::Description;
 use crate::finding::{Finding, Grade, Judge, ending, step_name};
 use crate::legal::first_illegal;
-use crate::run;
+use crate::run::Workers;
 use crate::script::{End, Numbered, Run, Script, Setting, Step, Written};
 use crate::shrink::shrink;
 use crate::writer::{Course, Point, Value, Writer, status_name};
@@ -11,7 +11,6 @@ use fmi_abi::{Interface, Standard};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
 
 /// The time for all checks is over.
 #[derive(Debug)]
@@ -42,8 +41,8 @@ pub struct Checker {
     pub description: Description,
     /// Where its library is.
     pub setting: Setting,
-    /// For what is written meanwhile.
-    pub scratch: TempDir,
+    /// Play the scripts.
+    pub workers: Workers,
     /// A simulation that goes well, by Co-Simulation and by Model Exchange.
     pub courses: Vec<Course>,
     /// Chooses what is chosen at random.
@@ -61,12 +60,30 @@ fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Keeps one finding of each name: the gravest, and of several such the one with the shortest call sequence, whichever
+/// check is first. Its `more` lists the observations of the others.
+fn keep(found: &mut Vec<Finding>, mut finding: Finding) {
+    let Some(kept) = found.iter_mut().find(|kept| kept.name == finding.name) else {
+        found.push(finding);
+        return;
+    };
+    let rank = |finding: &Finding| (finding.grade, std::cmp::Reverse(finding.script.len()));
+    if rank(&finding) > rank(kept) {
+        std::mem::swap(kept, &mut finding);
+    }
+    for seen in std::iter::once(finding.seen).chain(finding.more) {
+        if seen != kept.seen && !kept.more.contains(&seen) {
+            kept.more.push(seen);
+        }
+    }
+}
+
 impl Checker {
     /// An FMU whose courses are not yet known.
     pub fn new(
         description: Description,
         setting: Setting,
-        scratch: TempDir,
+        workers: Workers,
         seed: u64,
         limit: f64,
         deadline: Instant,
@@ -74,7 +91,7 @@ impl Checker {
         Self {
             description,
             setting,
-            scratch,
+            workers,
             courses: Vec::new(),
             seed,
             limit,
@@ -133,7 +150,7 @@ impl Checker {
             return Err(TimeOver.into());
         }
         *locked(&self.played) += 1;
-        let run = run::play(&self.setting, script, limit.min(left.max(0.5)), &self.scratch)?;
+        let run = self.workers.play(&self.setting, script, limit.min(left.max(0.5)))?;
         if matches!(run.end, End::Hang(seconds) if seconds < limit) {
             return Err(TimeOver.into());
         }
@@ -170,21 +187,9 @@ impl Checker {
         }
     }
 
-    /// Keeps a finding; of each name and grade the first has the script, the others are told in a line.
+    /// Keeps a finding.
     pub fn add(&self, finding: Finding) {
-        let mut found = locked(&self.found);
-        match found.iter_mut().find(|other| other.name == finding.name) {
-            Some(other) => {
-                if other.seen != finding.seen && !other.more.contains(&finding.seen) {
-                    other.more.push(finding.seen.clone());
-                }
-                if finding.grade > other.grade {
-                    let more = std::mem::take(&mut other.more);
-                    *other = Finding { more, ..finding };
-                }
-            }
-            None => found.push(finding),
-        }
+        keep(&mut locked(&self.found), finding);
     }
 
     /// Whether something of this name was found.
@@ -198,12 +203,10 @@ impl Checker {
         let hostile = script.iter().any(|numbered| numbered.forbidden);
         let limit = if hostile { self.limit.min(3.0) } else { self.limit };
         let run = self.play_for(&script, limit)?;
-        let hangs = matches!(run.end, End::Hang(_));
         if run.end != End::Done {
             self.ended(claim, &script, &run, hostile)?;
             return Ok(run);
         }
-        debug_assert!(!hangs);
         self.always(&script, &run);
         if let Some(seen) = judge(&run) {
             self.add(claim.finding(seen, script, judge));
@@ -238,7 +241,7 @@ impl Checker {
         // Whether memory beyond an array was touched: with room after it, it shows.
         if matches!(run.end, End::Crash(_)) && cfg!(unix) && !hostile {
             let soft = Setting { soft: true, ..self.setting.clone() };
-            let again = run::play(&soft, script, self.limit, &self.scratch)?;
+            let again = self.workers.play(&soft, script, self.limit)?;
             let wrote = again.outcomes.values().any(|outcome| !outcome.damage.is_empty());
             if wrote {
                 let claim = Claim::new(
@@ -434,7 +437,7 @@ impl Checker {
             if left < 0 || Instant::now() > self.deadline {
                 return false;
             }
-            let Ok(run) = run::play(&self.setting, tried, limit, &self.scratch) else { return false };
+            let Ok(run) = self.workers.play(&self.setting, tried, limit) else { return false };
             match judge(&run) {
                 Some(now) => {
                     seen = now;
@@ -799,4 +802,32 @@ pub fn steps(description: &Description, start: f64, sizes: &[f64], discrete: boo
             point
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::keep;
+    use crate::finding::{Finding, Grade};
+
+    /// A graver finding of a name takes the place of the one before, whose evidence is listed.
+    #[test]
+    fn no_evidence_is_lost() {
+        let mut found = Vec::new();
+        for (grade, seen) in [
+            (Grade::Note, "a"),
+            (Grade::Note, "b"),
+            (Grade::Violation, "c"),
+            (Grade::Fragile, "d"),
+            (Grade::Violation, "c"),
+            (Grade::Violation, "e"),
+            (Grade::Note, "b"),
+        ] {
+            keep(&mut found, Finding::of_files("topic.name", grade, "", "", seen.to_owned()));
+        }
+        keep(&mut found, Finding::of_files("topic.other", Grade::Note, "", "", "a".to_owned()));
+        let [one, other] = &found[..] else { panic!("{} findings", found.len()) };
+        assert_eq!((one.grade, one.seen.as_str()), (Grade::Violation, "c"));
+        assert_eq!(one.more, ["a", "b", "d", "e"]);
+        assert_eq!((other.grade, other.seen.as_str(), other.more.len()), (Grade::Note, "a", 0));
+    }
 }
