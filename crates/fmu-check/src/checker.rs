@@ -31,6 +31,8 @@ pub struct Event {
     pub again: bool,
     /// The model wants to end.
     pub terminate: bool,
+    /// Continuous states have changed.
+    pub states_changed: bool,
     /// The next time event.
     pub next: Option<f64>,
 }
@@ -369,26 +371,9 @@ impl Checker {
         }
     }
 
-    /// What an update of the discrete states says.
+    /// The result of a successful update of the discrete states.
     pub fn event(&self, run: &Run, id: u32) -> Option<Event> {
-        let outcome = run.of(id)?;
-        if outcome.status? > 1 {
-            return None;
-        }
-        if self.fmi3() {
-            let flag = |place: usize| {
-                outcome.written.get(place).is_some_and(|of| of.numbers().first() == Some(&1.0))
-            };
-            let next = outcome.written.get(5)?.numbers().first().copied();
-            return Some(Event { again: flag(0), terminate: flag(1), next: next.filter(|_| flag(4)) });
-        }
-        let Some(Written::Numbers(_, words)) = outcome.written.first() else { return None };
-        let [flags, _, defined, time] = words[..] else { return None };
-        Some(Event {
-            again: flags as u32 != 0,
-            terminate: flags >> 32 != 0,
-            next: (defined as u32 != 0).then(|| f64::from_bits(time)),
-        })
+        event(run, id, self.fmi3())
     }
 
     /// A shorter script for each finding, as long as there is time.
@@ -485,6 +470,23 @@ impl Claim {
         finding.judge = Some(judge);
         finding
     }
+}
+
+/// The result of a successful update of the discrete states.
+pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
+    let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
+    let (flags, time) = if fmi3 {
+        let number = |place: usize| outcome.written.get(place)?.numbers().first().copied();
+        ([0, 1, 3, 4].map(|place| number(place) == Some(1.0)), number(5)?)
+    } else {
+        // fmi2EventInfo has five flags, two to a word, and the time.
+        let Written::Numbers(_, words) = outcome.written.first()? else { return None };
+        let [first, changed, defined, time] = words[..] else { return None };
+        let flags = [first as u32 != 0, first >> 32 != 0, changed >> 32 != 0, defined as u32 != 0];
+        (flags, f64::from_bits(time))
+    };
+    let [again, terminate, states_changed, defined] = flags;
+    Some(Event { again, terminate, states_changed, next: defined.then_some(time) })
 }
 
 /// A sentence on a call that answered otherwise than OK.

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::process::{Command, ExitStatus};
 use tempfile::TempDir;
 
-/// Processes that play scripts.
+/// Processes that play call sequences.
 pub struct Workers {
     /// For the files of processes.
     scratch: TempDir,
@@ -17,11 +17,11 @@ pub struct Workers {
     idle: std::sync::Mutex<HashMap<Situation, Vec<Server>>>,
 }
 
-/// What a process is started with: whether it comes after a fresh process of the script, and whether libraries are bound
-/// at once.
+/// Conditions that a process is started with: how many processes of its call sequence come before it, and whether
+/// libraries are bound at once.
 type Situation = (usize, bool);
 
-/// What a process has left.
+/// The results of a process.
 struct Left {
     /// Its exit status; `None` if it did not end in time.
     ended: Option<ExitStatus>,
@@ -29,12 +29,12 @@ struct Left {
     outcomes: Vec<u8>,
 }
 
-/// The program again, as a worker.
+/// The command that starts this program as a worker.
 fn worker(job: &std::path::Path, (phase, now): Situation) -> anyhow::Result<Command> {
     let mut command = Command::new(std::env::current_exe()?);
     command
         .env(VARIABLE, job)
-        // What was not written is something else in every process.
+        // Memory that was not written differs between the processes of a call sequence.
         .env("MALLOC_PERTURB_", (1 + phase * 90).to_string())
         // Freed blocks that each thread keeps would count as in use (mallinfo2 of glibc).
         .env("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0")
@@ -67,7 +67,7 @@ impl Workers {
         Ok(run)
     }
 
-    /// A process that was forked for the job.
+    /// Plays a job in a process that is forked for it.
     #[cfg(target_os = "linux")]
     fn process(&self, job: &Job, situation: Situation, limit: f64) -> anyhow::Result<Left> {
         let idle = || self.idle.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -82,12 +82,12 @@ impl Workers {
                 idle().entry(situation).or_default().push(server);
                 Ok(left)
             }
-            // The library has ended the process that waits for its own.
+            // The library has ended the process that forks.
             Err(_) => Ok(Left { ended: Some(server.0.wait()?), said: Vec::new(), outcomes: Vec::new() }),
         }
     }
 
-    /// A process that was started for the job: elsewhere, not all libraries can be loaded after a fork.
+    /// Plays a job in a process that is started for it: not every system can load every library after a fork.
     #[cfg(not(target_os = "linux"))]
     fn process(&self, job: &Job, situation: Situation, limit: f64) -> anyhow::Result<Left> {
         use std::process::Stdio;
@@ -153,12 +153,12 @@ impl Server {
 #[cfg(target_os = "linux")]
 impl Drop for Server {
     fn drop(&mut self) {
-        // Its input ends with that.
+        // Waiting closes its input, which ends it.
         let _ = self.0.wait();
     }
 }
 
-/// Reads the outcomes of a process, and tells the bytes that it has serialized.
+/// Reads the outcomes of a process, and returns the bytes that it has serialized.
 fn read(
     script: &[Numbered],
     Left { ended, said, outcomes }: Left,

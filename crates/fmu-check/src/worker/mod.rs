@@ -63,7 +63,7 @@ pub fn work_if_asked() {
     end(work_from_files(Path::new(&job)))
 }
 
-/// The job of a file; its outcomes go to a file beside it.
+/// Plays the job in a file, and writes the outcomes to a file next to it.
 fn work_from_files(job: &Path) -> Result<(), String> {
     let said = |error: std::io::Error| error.to_string();
     let read = std::fs::read(job).map_err(said)?;
@@ -72,8 +72,7 @@ fn work_from_files(job: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Ends the process without what the library has for the end of a process: it is not what is tested. What it has printed
-/// is kept.
+/// Ends the process without the exit handlers of the library, which are not tested. Its buffered output is written.
 fn end(result: Result<(), String>) -> ! {
     let status = match result {
         Ok(()) => PLAYED,
@@ -83,7 +82,7 @@ fn end(result: Result<(), String>) -> ! {
         }
     };
     #[cfg(unix)]
-    // SAFETY: writes what the C library still has, and ends the process.
+    // SAFETY: writes the buffers of the C library, and ends the process.
     unsafe {
         libc::fflush(std::ptr::null_mut());
         libc::_exit(status)
@@ -92,7 +91,7 @@ fn end(result: Result<(), String>) -> ! {
     std::process::exit(status)
 }
 
-/// Plays a script; an outcome for each step, a line each, goes to the file.
+/// Plays a call sequence, and writes a line to the file for the outcome of each step.
 fn work(job: Job, file: File) {
     limit(job.setting.memory);
     if job.setting.soft {

@@ -45,7 +45,7 @@ fn play(job: &str, [said, outcomes]: [File; 2]) -> ! {
     use std::os::fd::AsRawFd as _;
     let nothing = File::open("/dev/null");
     for (file, number) in [(nothing.as_ref().unwrap_or(&said), 0), (&said, 1), (&said, 2)] {
-        // SAFETY: both are open; what is replaced belongs to the process that waits.
+        // SAFETY: `file` is open; the descriptor that is replaced stays open in the parent process.
         unsafe { libc::dup2(file.as_raw_fd(), number) };
     }
     drop((nothing, said));
@@ -73,7 +73,7 @@ fn wait(child: libc::pid_t, limit: f64) -> Option<i32> {
     }
 }
 
-/// Passes on what a process has left, and clears it away for the next.
+/// Passes on the results of a process, and clears its files for the next one.
 fn answer(ended: Option<i32>, files: &mut [File; 2]) -> std::io::Result<()> {
     let mut left = [Vec::new(), Vec::new()];
     for ((file, bytes), most) in files.iter_mut().zip(&mut left).zip([SAID, u64::MAX]) {
