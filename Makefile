@@ -133,7 +133,7 @@ test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check
-	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication tests/scripts
+	$(PYTEST) tests/check tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication tests/scripts
 
 # In browsers that were never here before, from a file. What needs none is in tests/fmpy/test_page.py.
 test-page: $(VENV)/test.stamp closed-loop-fmus
