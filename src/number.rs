@@ -4,13 +4,14 @@
 //! A [`TwoFloat`] has 32, so that the 16 that count are right. Its products are made with the fused
 //! multiply-add of the crate libm, not that of the platform: every platform gets the same bits.
 
+use crate::pair::Pair;
 use nalgebra::{ClosedAddAssign, ClosedMulAssign, ClosedSubAssign, Scalar};
 use num_traits::{One, Zero};
 use std::ops::{Div, Neg};
 use twofloat::TwoFloat;
 
-/// `f64` or [`TwoFloat`].
-pub trait Number:
+/// A number, or a [`Pair`] of numbers that take the same steps.
+pub trait Arithmetic:
     Scalar
     + Copy
     + Zero
@@ -25,7 +26,10 @@ pub trait Number:
     /// The last term that matters of the series of exp(1/4): `0.25^n / n!` is below the precision from
     /// the next one on.
     const TAYLOR_ORDER: i32;
+}
 
+/// `f64` or [`TwoFloat`].
+pub trait Number: Arithmetic {
     /// The quotient, to full precision.
     fn over(self, divisor: Self) -> Self;
 
@@ -33,9 +37,19 @@ pub trait Number:
     fn rounded(self) -> f64;
 }
 
-impl Number for f64 {
+impl Arithmetic for f64 {
     const TAYLOR_ORDER: i32 = 13;
+}
 
+impl Arithmetic for Pair {
+    const TAYLOR_ORDER: i32 = f64::TAYLOR_ORDER;
+}
+
+impl Arithmetic for TwoFloat {
+    const TAYLOR_ORDER: i32 = 21;
+}
+
+impl Number for f64 {
     fn over(self, divisor: Self) -> Self {
         self / divisor
     }
@@ -46,8 +60,6 @@ impl Number for f64 {
 }
 
 impl Number for TwoFloat {
-    const TAYLOR_ORDER: i32 = 21;
-
     /// In two steps, because the quotient of two `TwoFloat`s has 16 digits only (in version 0.8.4).
     fn over(self, divisor: Self) -> Self {
         let quotient = self / divisor;

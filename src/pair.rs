@@ -1,6 +1,7 @@
 //! Two numbers that take every step of a calculation together.
 
-use std::ops::{Add, Div, Index, IndexMut, Mul, Neg, Sub};
+use num_traits::{One, Zero};
+use std::ops::{Add, AddAssign, Div, Index, IndexMut, Mul, MulAssign, Neg, Sub, SubAssign};
 use wide::f64x2;
 
 /// A quantity of side 1 next to the same quantity of side 2 (or pitch next to roll), in one register.
@@ -68,28 +69,57 @@ impl IndexMut<usize> for Pair {
 
 /// Operators on both numbers, each with that of the other pair.
 macro_rules! operators {
+    ($($operator:ident $function:ident, $assigning:ident $assign:ident;)*) => {
+        $(
+            impl $operator for Pair {
+                type Output = Self;
+
+                #[inline]
+                fn $function(self, other: Self) -> Self {
+                    Self(self.0.$function(other.0))
+                }
+            }
+
+            impl $assigning for Pair {
+                #[inline]
+                fn $assign(&mut self, other: Self) {
+                    *self = self.$function(other);
+                }
+            }
+        )*
+    };
+}
+
+operators! {
+    Add add, AddAssign add_assign;
+    Sub sub, SubAssign sub_assign;
+    Mul mul, MulAssign mul_assign;
+}
+
+impl Div for Pair {
+    type Output = Self;
+
+    #[inline]
+    fn div(self, other: Self) -> Self {
+        Self(self.0 / other.0)
+    }
+}
+
+/// Operators with the same number for both.
+macro_rules! with_number {
     ($($operator:ident $function:ident)*) => {
-        $(impl $operator for Pair {
+        $(impl $operator<f64> for Pair {
             type Output = Self;
 
             #[inline]
-            fn $function(self, other: Self) -> Self {
-                Self(self.0.$function(other.0))
+            fn $function(self, number: f64) -> Self {
+                self.$function(Self::both(number))
             }
         })*
     };
 }
 
-operators! { Add add Sub sub Mul mul Div div }
-
-impl Mul<f64> for Pair {
-    type Output = Self;
-
-    #[inline]
-    fn mul(self, factor: f64) -> Self {
-        self * Self::both(factor)
-    }
-}
+with_number! { Mul mul Div div }
 
 impl Neg for Pair {
     type Output = Self;
@@ -97,5 +127,31 @@ impl Neg for Pair {
     #[inline]
     fn neg(self) -> Self {
         Self(-self.0)
+    }
+}
+
+impl From<f64> for Pair {
+    #[inline]
+    fn from(number: f64) -> Self {
+        Self::both(number)
+    }
+}
+
+impl Zero for Pair {
+    #[inline]
+    fn zero() -> Self {
+        Self::both(0.0)
+    }
+
+    #[inline]
+    fn is_zero(&self) -> bool {
+        *self == Self::zero()
+    }
+}
+
+impl One for Pair {
+    #[inline]
+    fn one() -> Self {
+        Self::both(1.0)
     }
 }
