@@ -179,18 +179,18 @@ impl Rounded {
             }
         }
         let [pitch, roll] = [balances[0].equations(pitch), balances[1].equations(roll)];
-        let propagated = if doublings[0] == doublings[1] {
-            // In pairs, in half the time.
-            let Propagator { growth, ramp } = Equations {
-                a: pitch.a.zip_map(&roll.a, Pair::new),
-                b_angle: pitch.b_angle.zip_map(&roll.b_angle, Pair::new),
-                b_rate: pitch.b_rate.zip_map(&roll.b_rate, Pair::new),
-            }
-            .propagate(h, doublings[0]);
-            [0, 1].map(|i| Propagator { growth: growth.map(|pair| pair[i]), ramp: ramp.map(|pair| pair[i]) })
-        } else {
-            [pitch.propagate(h, doublings[0]), roll.propagate(h, doublings[1])]
+        let pairs = Equations {
+            a: pitch.a.zip_map(&roll.a, Pair::new),
+            b_angle: pitch.b_angle.zip_map(&roll.b_angle, Pair::new),
+            b_rate: pitch.b_rate.zip_map(&roll.b_rate, Pair::new),
         };
+        // Both at once; most often they need as many doublings.
+        let of_pitch = pairs.propagate(h, doublings[0]);
+        let of_roll = if doublings[0] == doublings[1] { of_pitch } else { pairs.propagate(h, doublings[1]) };
+        let propagated = [(of_pitch, 0), (of_roll, 1)].map(|(Propagator { growth, ramp }, i)| Propagator {
+            growth: growth.map(|pair| pair[i]),
+            ramp: ramp.map(|pair| pair[i]),
+        });
         [0, 1].map(|i| Self::new(&balances[i].propagator(propagated[i])))
     }
 

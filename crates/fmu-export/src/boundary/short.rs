@@ -1,7 +1,7 @@
 //! The short ways of the C functions that every step calls, under their names and with their arguments.
 //!
-//! Each does all that is asked for and returns true, or returns false: if anything is not as usual, the long way looks closer
-//! and words what is wrong. Nothing is checked less here.
+//! Each function does all that is asked for and returns true, or returns false and has written nothing to the importer: then
+//! the long way finds out what is unusual, and reports what is wrong. Both make the same checks.
 //!
 //! # Safety
 //! The contract is that of the C functions.
