@@ -9,6 +9,7 @@ mod origin;
 mod refusal;
 mod saved_states;
 mod serialized;
+mod sorted;
 mod trial;
 mod values;
 
@@ -17,6 +18,7 @@ pub(crate) use derivatives::Direction;
 pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
 pub use trial::{SavedTrial, Trial};
 
+use self::sorted::Sorted;
 use crate::boundary::Placed;
 use crate::capabilities::Events;
 use crate::causality::Causality;
@@ -29,7 +31,6 @@ use crate::variable::{Read, ReadAt, Variable, shape_of_calculation};
 use fmi_abi::BaseType;
 use fmi_abi::Status;
 use fmi_abi::{Interface, Mode, Situation, Standard};
-use std::collections::BTreeMap;
 
 /// An instance of model `M`.
 pub(crate) struct Instance<M> {
@@ -45,7 +46,7 @@ pub(crate) struct Instance<M> {
     setup: Setup,
     state: State<M>,
     /// Why start values were refused, of the variables that have been set to no other since.
-    refused: BTreeMap<u32, String>,
+    refused: Sorted<u32, String>,
     /// The states that the importer has saved and not freed.
     kept: saved_states::Kept<M>,
     /// Where the last step began, if one may fail half way: of FMI 3.0, unless each early end and event is the
@@ -178,8 +179,8 @@ impl<M: Exported> Instance<M> {
             setup,
             before: may_fail_half_way.then(|| Box::new(state.clone())),
             state,
-            refused: BTreeMap::new(),
-            kept: BTreeMap::new(),
+            refused: Sorted::new(),
+            kept: Sorted::new(),
             texts: Vec::new(),
             bytes: Vec::new(),
             elements: Vec::with_capacity(if M::ARRAYS { M::TABLE.len() } else { 0 }),

@@ -1,16 +1,16 @@
 //! Saved states (section 2.1.8 of FMI 2.0, 2.2.7.4 of FMI 3.0).
 
 use super::origin::Origin;
+use super::sorted::Sorted;
 use super::{Instance, Outcome, State, refuse, serialized};
 use crate::export::Exported;
 use fmi_abi::{Interface, Mode};
-use std::collections::BTreeMap;
 
 /// The states that an importer keeps. It knows them by their addresses, which are only ever looked up here: one that
 /// was freed, another instance's or no state at all is no address of these, and is never followed.
 ///
 /// They are the instance's, whose end frees them (section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0).
-pub(super) type Kept<M> = BTreeMap<usize, Box<State<M>>>;
+pub(super) type Kept<M> = Sorted<usize, Box<State<M>>>;
 
 /// The handle of no state.
 const NULL: usize = 0;
@@ -53,12 +53,12 @@ impl<M: Exported> Instance<M> {
     /// Gives the state away, to be dropped.
     pub fn give(&mut self, handle: usize) -> Outcome<impl Sized + use<M>> {
         find(&mut self.kept, handle)?;
-        Ok(self.kept.remove(&handle))
+        Ok(self.kept.remove(handle))
     }
 
     /// Gives any of its states away, as long as there are some.
     pub fn give_any(&mut self) -> Option<impl Sized + use<M>> {
-        self.before.take().or_else(|| self.kept.pop_first().map(|(_, state)| state))
+        self.before.take().or_else(|| self.kept.pop())
     }
 
     pub fn serialized_size(&mut self, handle: usize) -> Outcome<usize> {
@@ -101,7 +101,7 @@ impl<M: Exported> Instance<M> {
 }
 
 fn find<M>(kept: &mut Kept<M>, handle: usize) -> Outcome<&mut State<M>> {
-    kept.get_mut(&handle).map_or_else(|| refuse_handle(handle), |state| Ok(&mut **state))
+    kept.get_mut(handle).map_or_else(|| refuse_handle(handle), |state| Ok(&mut **state))
 }
 
 #[cold]

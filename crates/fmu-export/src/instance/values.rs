@@ -230,7 +230,7 @@ impl<M: Exported> Instance<M> {
         if self.situation().is_in(STARTING) {
             for vr in vr.iter().map(|vr| vr.place()) {
                 let Err(refusal) = &set else {
-                    self.refused.remove(&vr);
+                    self.refused.remove(vr);
                     continue;
                 };
                 let message = match blamed.filter(|blamed| *blamed != vr) {
