@@ -16,7 +16,13 @@ pub struct TestbedFmu {
     pub(crate) start: Start,
     /// Sensor torques, of the last time they were calculated.
     pub(crate) torques: Sides,
+    /// The partial derivatives of all that moves with respect to angles and rates of the motors and to the states; they
+    /// follow from the parameters.
+    pub(crate) jacobian: [Moving; 10],
 }
+
+/// A number for each variable before the parameters, in the order of the table.
+pub(crate) type Moving = [f64; 22];
 
 impl Clone for TestbedFmu {
     fn clone(&self) -> Self {
@@ -25,7 +31,10 @@ impl Clone for TestbedFmu {
 
     /// Passes on to the testbed, which copies little if the parameters are the same.
     fn clone_from(&mut self, source: &Self) {
-        let Self { testbed, interface, start, torques } = source;
+        let Self { testbed, interface, start, torques, jacobian } = source;
+        if self.testbed.parameters != testbed.parameters {
+            self.jacobian = *jacobian;
+        }
         self.testbed.clone_from(testbed);
         (self.interface, self.start, self.torques) = (*interface, *start, *torques);
     }
