@@ -7,13 +7,19 @@ PYTHON ?= python3
 INPUT  ?=
 ARGS   ?=
 FUZZ_SECONDS ?= 600
+# How many rigs `make monte-carlo` simulates: without a fault, and for each fault and size.
+RIGS ?= 300
+FAULTY ?= 50
+FIGURE ?= docs/detection.svg
 
 VENV := .venv
 DIST_VENV := .venv-dist
 WITH_WASM2C := WASM2C='$(CURDIR)/$(VENV)/bin/wasm2c'
 PY   := $(VENV)/bin/python
 # What is imported is compiled then; all of it takes longer than to install it.
-PIP_INSTALL := $(PY) -m pip install --progress-bar off --no-compile
+PIP_INSTALL := env -u MAKEFLAGS $(PY) -m pip install --progress-bar off --no-compile
+# The large environments take uv a tenth of the time.
+UV_INSTALL := $(VENV)/bin/uv pip install --quiet --python $(PY)
 # A process for each core; `.venv/bin/python -m pytest -x FILE` runs a part.
 PYTEST := $(PY) -m pytest -q -p no:cacheprovider -n auto --dist worksteal
 FMU  := target/fmu/prw_testbed.fmu
@@ -23,19 +29,25 @@ SOURCE_FMU := target/fmu/source/prw_testbed.fmu
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-CARGO ?= cargo
+# Without MAKEFLAGS: make closes its job server to cargo, and cargo warns that it cannot be reached.
+CARGO ?= env -u MAKEFLAGS cargo
 # CI and users build what Cargo.lock says
 LOCKED ?= --locked
 
 # What the page in the FMU runs, and C sources are made of.
 WEBASSEMBLY := wasm32-unknown-unknown
-HAS_WEBASSEMBLY = ls "$$(rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
+# Without these variables: make closes its job server to rustc, and rustc warns that it cannot be reached.
+HAS_WEBASSEMBLY = ls "$$(env -u MAKEFLAGS -u MFLAGS rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
 ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
+
+BUILD_FMU = $(CARGO) run $(LOCKED) --release --bin build_fmu --
+# The page in the FMU that is there runs it.
+HAS_PAGE = $(PYTHON) -c 'import sys, zipfile; sys.exit(b".catch(withoutIt)" not in zipfile.ZipFile("$(FMU)").read("documentation/index.html"))' 2>/dev/null
 
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo demo-fmu check check-release test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -44,7 +56,10 @@ help:
 	@echo '                             or add ARGS=--degrees)'
 	@echo 'make fmu                     build the FMU                          -> $(FMU)'
 	@echo '                             and that for FMI 3.0                   -> target/fmu/fmi3/prw_testbed.fmu'
-	@echo 'make test                    check and test everything'
+	@echo 'make demo-fmu                both, faster: without the page that runs the FMU, unless it is there already'
+	@echo 'make test                    check and test all that needs no browser and no other platform'
+	@echo 'make check                   check what has changed since the last commit, in a minute'
+	@echo 'make check-release           run everything below and above, and write a table -> out/release-check.md'
 	@echo 'make test-python             check the Python, with ruff and mypy'
 	@echo 'make test-newest-fmpy        the tests with FMPy again, with its newest version'
 	@echo 'make test-page               the page in the FMU, in Chromium, Firefox and WebKit, which it installs'
@@ -59,6 +74,7 @@ help:
 	@echo 'make release                 all that a release has -> dist/: FMUs and Python wheels for Linux, Windows and macOS,'
 	@echo '                             Intel and ARM, reference experiments, checksums, release notes'
 	@echo 'make source-fmu              the FMU as C sources, for real-time targets -> $(SOURCE_FMU)'
+	@echo 'make test-source-fmu         compile them with every compiler that is here, compare with the library'
 	@echo 'make test-platforms          make it and run it on Linux, Windows (Wine) and ARM (QEMU), check the rest'
 	@echo 'make test-reproducible       make it twice and compare every byte'
 	@echo 'make study                   set up prw identify, excite, sweep and check  (see python/prw/tutorial.md)'
@@ -68,14 +84,26 @@ help:
 	@echo 'make clean                   remove .venv, .venv-dist, target, out and dist'
 
 # The network is waited for while the compiler works. What fails then runs again alone, for its message to come last.
+# An FMU that is up to date stays as it is: it may have the page that runs it, which `make fmu` adds.
 demo: need-rust need-python
-	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j2) $(VENV)/demo.stamp fmu || \
-	  $(MAKE) --no-print-directory $(VENV)/demo.stamp fmu
+	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j2) $(VENV)/demo.stamp demo-fmu || \
+	  $(MAKE) --no-print-directory $(VENV)/demo.stamp demo-fmu
 	@$(VENV)/bin/prw simulate --fmu $(FMU) $(if $(INPUT),--input "$(INPUT)") $(ARGS)
+
+demo-fmu: need-rust
+	@$(BUILD_FMU) $$($(HAS_PAGE) && $(HAS_WEBASSEMBLY) && echo --live-page)
 
 fmu: need-rust
 	@$(ADD_WEBASSEMBLY) || echo 'note: the page in the FMU goes in without *Try it*, which needs: rustup target add $(WEBASSEMBLY)'
-	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- $$($(HAS_WEBASSEMBLY) && echo --live-page)
+	@$(BUILD_FMU) $$($(HAS_WEBASSEMBLY) && echo --live-page)
+
+# A minute after a small change.
+check: $(VENV)/test.stamp need-rust
+	@$(PY) tools/changed.py
+
+# Hours: everything that exists.
+check-release: $(VENV)/importers.stamp need-rust
+	@$(PY) tools/release_check.py $(ARGS)
 
 test: test-rust test-python test-fmu test-closed-loop test-importers test-examples
 
@@ -105,7 +133,7 @@ test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check
-	$(PYTEST) tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication
+	$(PYTEST) tests/check tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication tests/scripts
 
 # In browsers that were never here before, from a file. What needs none is in tests/fmpy/test_page.py.
 test-page: $(VENV)/test.stamp closed-loop-fmus
@@ -191,8 +219,8 @@ study: $(VENV)/study.stamp fmu
 
 # Takes minutes; `make test` has the short version.
 monte-carlo: $(VENV)/study.stamp fmu
-	$(PY) tests/analysis/monte_carlo.py $(FMU) --out out/monte_carlo.json $(ARGS)
-	$(PY) tests/analysis/monte_carlo.py $(FMU) --faulty 50 --figure docs/detection.svg --out out/detection.json $(ARGS)
+	$(PY) tests/analysis/monte_carlo.py $(FMU) --repetitions $(RIGS) --out out/monte_carlo.json $(ARGS)
+	$(PY) tests/analysis/monte_carlo.py $(FMU) --faulty $(FAULTY) --figure $(FIGURE) --out out/detection.json $(ARGS)
 
 # libFuzzer keeps what is new in target/fuzz/corpus; crates/fmu-export/fuzz/corpus has the committed beginnings.
 fuzz: need-rust need-nightly
@@ -231,19 +259,23 @@ $(VENV)/demo.stamp: $(VENV)/made.stamp $(VENV)/fmu_run.stamp requirements/demo.t
 	@$(PIP_INSTALL) --quiet --no-deps --editable python/prw
 	@touch $@
 
-$(VENV)/study.stamp: $(VENV)/demo.stamp requirements/study.txt
+$(VENV)/uv.stamp: $(VENV)/made.stamp requirements/uv.txt
+	@$(PIP_INSTALL) --quiet -r requirements/uv.txt
+	@touch $@
+
+$(VENV)/study.stamp: $(VENV)/demo.stamp $(VENV)/uv.stamp requirements/study.txt
 	@echo 'installing the Python packages of identification and sweeps (once)'
-	@$(PIP_INSTALL) -r requirements/study.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@$(UV_INSTALL) -r requirements/study.txt
 	@touch $@
 
 $(VENV)/test.stamp: $(VENV)/study.stamp requirements/tests.txt
 	@echo 'installing the Python packages of the tests (once)'
-	@$(PIP_INSTALL) -r requirements/tests.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@$(UV_INSTALL) -r requirements/tests.txt
 	@touch $@
 
 $(VENV)/examples.stamp: $(VENV)/study.stamp requirements/examples.txt
 	@echo 'installing the Python packages of the examples (once)'
-	@$(PIP_INSTALL) -r requirements/examples.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@$(UV_INSTALL) -r requirements/examples.txt
 	@touch $@
 
 $(VENV)/wasm2c.stamp: $(VENV)/made.stamp requirements/release.txt
@@ -253,7 +285,7 @@ $(VENV)/wasm2c.stamp: $(VENV)/made.stamp requirements/release.txt
 
 $(VENV)/importers.stamp: $(VENV)/test.stamp requirements/importers.txt
 	@echo 'installing importers and co-simulation masters of others (once)'
-	@$(PIP_INSTALL) -r requirements/importers.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@$(UV_INSTALL) -r requirements/importers.txt
 	@touch $@
 
 $(DIST_VENV)/dist.stamp: $(DIST_VENV)/made.stamp requirements/release.txt
@@ -267,7 +299,7 @@ $(DIST_VENV)/test.stamp: $(DIST_VENV)/dist.stamp requirements/test-platforms.txt
 	@touch $@
 
 need-rust:
-	@command -v $(CARGO) >/dev/null || \
+	@command -v $(lastword $(CARGO)) >/dev/null || \
 	  $(call stop,Rust is missing; install it with rustup (https://rustup.rs))
 	@command -v cc >/dev/null || \
 	  $(call stop,the C compiler that Rust links with is missing; on Debian: apt install gcc libc6-dev)

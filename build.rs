@@ -1,37 +1,30 @@
-//! Bakes the parameters and the guid into the library.
-//!
-//! `PRW_PARAMETERS` names another file than Table 1 (relative to this folder), `FMU_TUNABLE=1` makes the
-//! variant with tunable parameters; `build_fmu` sets both.
+//! Compiles the parameters into the library: those of Table 1, or of the file that `PRW_PARAMETERS` names (relative to
+//! this directory; `build_fmu --parameters` sets it).
 
-#[path = "src/fingerprint.rs"]
-mod fingerprint;
 #[path = "src/parameter_file.rs"]
 mod parameter_file;
 #[allow(dead_code, reason = "the model needs the rest")]
 #[path = "src/parameters.rs"]
 mod parameters;
 
-use anyhow::Context;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 fn main() {
     if let Err(error) = run() {
-        println!("cargo::error={error:#}");
+        println!("cargo::error={error}");
     }
 }
 
-fn run() -> anyhow::Result<()> {
-    let project = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").context("cargo sets CARGO_MANIFEST_DIR")?);
+fn run() -> Result<(), String> {
+    let variable = |name| env::var_os(name).ok_or_else(|| format!("cargo does not set {name}"));
     println!("cargo::rerun-if-env-changed=PRW_PARAMETERS");
-    let file = match env::var_os("PRW_PARAMETERS") {
-        Some(file) if !file.is_empty() => project.join(file),
-        _ => project.join(fingerprint::PARAMETERS),
-    };
+    let file = env::var_os("PRW_PARAMETERS").filter(|file| !file.is_empty());
+    let file = PathBuf::from(variable("CARGO_MANIFEST_DIR")?)
+        .join(file.unwrap_or_else(|| "modelDescription/parameters.json".into()));
     println!("cargo::rerun-if-changed={}", file.display());
     let parameters = parameter_file::read(&file)?;
-    let table = Path::new(&env::var_os("OUT_DIR").context("cargo sets OUT_DIR")?).join("table_1.rs");
+    let table = Path::new(&variable("OUT_DIR")?).join("table_1.rs");
     fs::write(&table, format!("{parameters:?}"))
-        .with_context(|| format!("cannot write {}", table.display()))?;
-    fmu_package::build_script(&fingerprint::sources(project), fingerprint::start(&parameters))
+        .map_err(|error| format!("cannot write {}: {error}", table.display()))
 }

@@ -1,6 +1,6 @@
 //! Builds the FMU: compiles the library, describes the model, packs both. See `--help`.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Error, Result};
 use clap::Parser;
 use fmu_package::{BuildOptions, Builder, Terminal};
 use prw_testbed::TestbedFmu;
@@ -51,7 +51,7 @@ fn run(options: &Options) -> Result<()> {
         sources: fingerprint::sources(PROJECT),
         profile: "library",
         terminals: terminals(),
-        start: fingerprint::start(&parameter_file::read(&file)?),
+        start: fingerprint::start(&parameter_file::read(&file).map_err(Error::msg)?),
         is_default: other.is_none(),
         start_from: Some(file),
         page_scripts: vec![
@@ -64,7 +64,7 @@ fn run(options: &Options) -> Result<()> {
             controller::sources(concat!(env!("CARGO_MANIFEST_DIR"), "/crates/prw-controller")),
         )],
         environment: vec![("PRW_PARAMETERS", other.map(Into::into))],
-        ..Builder::new(env!("CARGO_PKG_NAME"), PROJECT, env!("FMU_SOURCES"))
+        ..Builder::new(env!("CARGO_PKG_NAME"), PROJECT)
     };
     builder.run::<TestbedFmu>(&options.build)
 }

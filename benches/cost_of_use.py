@@ -1,6 +1,7 @@
 """What the FMU costs besides the step: python benches/cost_of_use.py FMU. Prints a Markdown table.
 
-Times are ratios to one that every user of FMPy pays, Python's `import fmpy`; sizes are in kB.
+Times are ratios to one that every user of FMPy pays, Python's `import fmpy`; sizes are in kB. With BENCH_QUICK in the
+environment each is measured once, and nothing is built.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi2 import FMU2Slave
 
 ROOT = Path(__file__).parent.parent
-ROUNDS = 5
+QUICK = "BENCH_QUICK" in os.environ
+ROUNDS = 1 if QUICK else 5
 
 
 def shortest(work: Callable[[], object]) -> float:
@@ -72,12 +74,13 @@ def main() -> None:
     with zipfile.ZipFile(fmu) as archive:
         libraries = {entry.filename: entry.file_size for entry in archive.infolist() if "binaries/" in entry.filename}
     imported = shortest(lambda: command(sys.executable, "-c", "import fmpy"))
-    rows = {
+    rows: dict[str, Callable[[], object]] = {
         "FMPy: unpack, read, load, instantiate, initialize, free": lambda: load(fmu),
         "FMPy's simulate_fmu: the same and 2,000 steps, all outputs recorded": lambda: simulate(fmu),
-        "`make demo`, everything built": lambda: command("make", "demo"),
-        "`make fmu` after a change of src/fmu.rs": rebuild,
     }
+    if not QUICK:
+        rows["`make demo`, everything built"] = lambda: command("make", "demo")
+        rows["`make fmu` after a change of src/fmu.rs"] = rebuild
     print("| what | in times of `import fmpy` |\n|---|---|")
     for what, work in rows.items():
         print(f"| {what} | {shortest(work) / imported:.2f} |")

@@ -1,10 +1,12 @@
 """Instances in the hand beside a loop in C over as many, and closed loops beside other masters: python benches/side_by_side.py.
 
 Prints Markdown tables, measured in turn; each figure is the least of several rounds. What is compared must agree to the bit.
+With BENCH_QUICK in the environment counts are small: the tables are then meaningless.
 """
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
@@ -21,7 +23,11 @@ from tools.closed_loop import masters  # noqa: E402
 from tools.closed_loop.system import read  # noqa: E402
 
 FMUS = ROOT / "target" / "fmu"
-ROUNDS, STEP = 7, 1e-3
+STEP = 1e-3
+QUICK = "BENCH_QUICK" in os.environ
+ROUNDS, LOOPS = (1, 2) if QUICK else (7, 1000)
+#: Instances, and the steps of each.
+SIZES = ((1, 50), (8, 5)) if QUICK else ((1, 50_000), (1024, 300), (16384, 40))
 MOTORS, OUTPUTS = ("theta1", "theta2"), ("tau1", "tau2", "pitch", "roll")
 
 
@@ -67,7 +73,7 @@ def instances() -> None:
         "| testbeds | fmu_run, ns a step of one | fmu_run / C | in one call / C | in one call, two threads, throughput |"
     )
     print("|---|---|---|---|---|")
-    for count, steps in ((1, 50_000), (1024, 300), (16384, 40)):
+    for count, steps in SIZES:
         angle = 0.1 * np.sin(10 * np.pi * STEP * np.arange(steps))
         moves = np.column_stack([angle, -angle])
         np.testing.assert_array_equal(by_fmu_run(count, 1, moves)[1], in_c(count, moves)[1])
@@ -80,7 +86,7 @@ def instances() -> None:
 def loops() -> None:
     system = read(FMUS / "prw_closed_loop.ssp", FMUS / "prw_closed_loop")
     # libcosim counts nanoseconds.
-    instants, count = np.arange(system.steps + 1) * round(system.step * 1e9) / 1e9, 1000
+    instants, count = np.arange(system.steps + 1) * round(system.step * 1e9) / 1e9, LOOPS
     with fmu_run.System(FMUS / "prw_closed_loop.ssp", order="jacobi") as loop:
         gains = {"controller.pitch_ref": np.full(count, system.inputs["pitch_ref"][1])}
 
@@ -95,7 +101,7 @@ def loops() -> None:
         if master.version() is None:
             continue
         rounds = []
-        for _ in range(3):
+        for _ in range(1 if QUICK else 3):
             begin = time.perf_counter()
             rows = master.simulate(system)
             rounds.append(time.perf_counter() - begin)

@@ -19,6 +19,7 @@ from targets import (
     FOLDERS,
     MODEL,
     NATIVE_WINDOWS,
+    PACKERS,
     ROOT,
     TARGETS,
     WEBASSEMBLY,
@@ -27,8 +28,6 @@ from targets import (
 )
 from toolchain import say, toolchain
 
-#: The program that packs a model's FMUs.
-PACKERS = {MODEL: "build_fmu", CONTROLLER: "build_controller"}
 SYSTEM = "prw_closed_loop"
 #: The page that runs the FMU, which is also a file of its own.
 PAGE = "documentation/index.html"

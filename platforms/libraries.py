@@ -16,12 +16,13 @@ import sys
 import sysconfig
 import time
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import macos_linker
 import mingw_linker
 import toolchain as tools
-from targets import GLIBC, MODEL, MODELS, ROOT, WEBASSEMBLY, Target, target
+from targets import GLIBC, MODEL, MODELS, PACKERS, ROOT, WEBASSEMBLY, Target, target
 
 #: Beside the libraries: what compiled them.
 COMPILER = "compiler.txt"
@@ -30,12 +31,23 @@ COMPILER = "compiler.txt"
 def compile_library(model: str, target: Target) -> tuple[Path, str]:
     """The library of a model and what compiled it."""
     toolchain, environment, glibc = prepare(target, f"@rpath/{model}{target.suffix}")
+    environment["FMU_GUID"] = guid(model)
     command = [tools.zigbuild() if glibc else "cargo", "rustc", *toolchain.flags]
     command += ["--lib", "--crate-type", "cdylib", "--profile", "library", "--locked"]
     command += ["--no-default-features", "--package", model, "--target", target.triple + (f".{GLIBC}" if glibc else "")]
     if subprocess.run(command, cwd=ROOT, env=environment).returncode:
         raise SystemExit(f"error: {model} could not be compiled for {target.triple}; the messages are above")
     return target_folder() / target.triple / "library" / target.library(model), toolchain.description
+
+
+@cache
+def guid(model: str) -> str:
+    """The guid of a model's FMU, which is compiled into its libraries."""
+    command = ["cargo", "run", "--quiet", "--locked", "--release", "--package", model, "--bin", PACKERS[model]]
+    done = subprocess.run([*command, "--", "--guid"], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"error: the program that packs {model} could not be made; the messages are above")
+    return done.stdout.strip()
 
 
 def prepare(target: Target, name: str = "") -> tuple[tools.Toolchain, dict[str, str], bool]:

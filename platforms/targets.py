@@ -11,6 +11,8 @@ ROOT = Path(__file__).resolve().parents[1]
 MODEL = "prw_testbed"
 CONTROLLER = "prw_controller"
 MODELS = (MODEL, CONTROLLER)
+#: The program that packs a model's FMUs.
+PACKERS = {MODEL: "build_fmu", CONTROLLER: "build_controller"}
 
 #: Enterprise Linux 7 and everything since.
 GLIBC = "2.17"

@@ -23,7 +23,19 @@ def build(target: Target, out: Path) -> Path:
     """The wheel for a target, in `out`."""
     toolchain, environment, glibc = prepare(target)
     with tempfile.TemporaryDirectory(dir=out) as made:
-        command = [sys.executable, "-m", "maturin", "build", *toolchain.flags, "--target", target.triple, "--out", made]
+        command = [
+            sys.executable,
+            "-m",
+            "maturin",
+            "build",
+            "--profile",
+            "library",
+            *toolchain.flags,
+            "--target",
+            target.triple,
+            "--out",
+            made,
+        ]
         if glibc:
             command += ["--zig", "--compatibility", f"manylinux_{GLIBC.replace('.', '_')}"]
         if subprocess.run(command, cwd=PACKAGE, env=environment).returncode:

@@ -47,8 +47,9 @@ impl Model for TestbedFmu {
 
     fn new(setup: &Setup) -> Result<Self, Error> {
         let testbed = Testbed::new(Parameters::BUILT_IN)?;
-        let (start, torques, jacobian) = (Start::default(), Pair::default(), Default::default());
-        let mut fmu = Self { testbed, interface: setup.interface, start, torques, jacobian };
+        let (interface, start, two) = (setup.interface, Start::default(), [0.0; 2]);
+        let jacobian = Default::default();
+        let mut fmu = Self { testbed, interface, start, torques: two, angles: two, rates: two, jacobian };
         fmu.jacobian = fmu.jacobian();
         Ok(fmu)
     }
@@ -61,14 +62,22 @@ impl Model for TestbedFmu {
     }
 
     fn restored(&mut self) -> Result<(), Error> {
-        let times = &mut self.testbed.motors.times;
-        if !times.are_possible() {
+        let motors = &mut self.testbed.motors;
+        if !motors.times.are_possible() {
             return Err(Error::new(
                 "the samples of a saved state must be 0 to 2, the steps between them > 0",
             ));
         }
-        times.update();
+        motors.times.update();
+        motors.rates_changed();
         Ok(())
+    }
+
+    /// Until the testbed has started, its state follows the motors, or what is given.
+    fn calculate_start(&mut self) {
+        if !self.start.is_over {
+            self.testbed.state = self.start.from(self.testbed.motors.theta());
+        }
     }
 
     fn initialize(&mut self, _: &Experiment) -> Result<(), Error> {
@@ -76,27 +85,31 @@ impl Model for TestbedFmu {
         Ok(())
     }
 
-    #[inline]
     fn calculate(&mut self, _time: f64) {
-        self.torques = self.torques_now();
+        self.calculate_with(&self.motions(&self.testbed.motors));
     }
 }
 
 impl CoSimulation for TestbedFmu {
-    #[inline]
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
         if !self.testbed.step(step.size) {
-            return out_of_range();
+            return Err(Error::new(
+                "the state would leave the range of numbers; look for extreme inputs or states",
+            ));
         }
         self.start.is_over = true;
-        Ok(Stepped::Done)
+        self.calculate_with(&self.testbed.motors.path_end.clone());
+        Ok(Stepped::Calculated)
     }
-}
 
-#[cold]
-#[inline(never)]
-fn out_of_range() -> Result<Stepped, Error> {
-    Err(Error::new("the state would leave the range of numbers; look for extreme inputs or states"))
+    #[inline(always)]
+    fn step_at_once(&mut self, size: f64) -> bool {
+        if !self.testbed.step_at_once(size) {
+            return false;
+        }
+        self.calculate_with(&self.testbed.motors.path_end.clone());
+        true
+    }
 }
 
 impl ModelExchange for TestbedFmu {

@@ -17,7 +17,7 @@
 
 use crate::motor::Motion;
 use crate::number::Number;
-use crate::pair::PitchRoll;
+use crate::pair::{PitchRoll, Sides};
 use crate::parameters::{InvalidParameter, Parameters};
 use nalgebra::{Matrix3, Vector3};
 use std::ops::{Add, Mul, Sub};
@@ -58,13 +58,10 @@ impl<T: Number> Side<T> {
     }
 }
 
-impl Side {
+impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Side<T> {
     /// Rate of the massless shaft of one side, or of both in pairs, the first row of eq. (8) solved for `q_I'`.
     #[inline]
-    pub fn shaft_rate<T>(&self, q_i: T, q_ii: T, v: T, motor: Motion<T>) -> T
-    where
-        T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
-    {
+    pub fn shaft_rate(&self, q_i: T, q_ii: T, v: T, motor: Motion<T>) -> T {
         let Motion { angle: u, rate: w, .. } = motor;
         w * self.motor_share + v * self.sect_share
             - (q_i - u) * self.rate_motor
@@ -74,12 +71,26 @@ impl Side {
     /// Sensor torque of one side, or of both in pairs, eq. (9), with [`shaft_rate`](Self::shaft_rate)
     /// inserted.
     #[inline]
-    pub fn torque<T>(&self, q_i: T, q_ii: T, v: T, motor: Motion<T>) -> T
-    where
-        T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
-    {
+    pub fn torque(&self, q_i: T, q_ii: T, v: T, motor: Motion<T>) -> T {
         let Motion { angle: u, rate: w, .. } = motor;
         (q_i - u) * self.stiffness_motor - (q_i - q_ii) * self.stiffness_sect + (v - w) * self.damping
+    }
+}
+
+impl Side {
+    /// The same for both sides at once.
+    fn of_both(&self) -> Side<Sides> {
+        let Self { motor_share, sect_share, rate_motor, rate_sect, stiffness_motor, stiffness_sect, damping } =
+            *self;
+        Side {
+            motor_share: Sides::both(motor_share),
+            sect_share: Sides::both(sect_share),
+            rate_motor: Sides::both(rate_motor),
+            rate_sect: Sides::both(rate_sect),
+            stiffness_motor: Sides::both(stiffness_motor),
+            stiffness_sect: Sides::both(stiffness_sect),
+            damping: Sides::both(damping),
+        }
     }
 }
 
@@ -139,12 +150,16 @@ pub struct Decoupled {
     pub parameters: Parameters,
     /// The coupling pair, the same on both sides.
     pub side: Side,
+    /// The same, for both sides at once.
+    pub both_sides: Side<Sides>,
     /// Mean of the sides.
     pub pitch: Subsystem,
     /// Half difference of the sides.
     pub roll: Subsystem,
     /// N / 2M of eq. (1).
     pub roll_ratio: f64,
+    /// Pitch and roll of the output shaft per sum and difference of theta5 and theta6, eq. (1).
+    pub output_shaft: PitchRoll,
 }
 
 impl Decoupled {
@@ -164,7 +179,16 @@ impl Decoupled {
                 ));
             }
         }
-        Ok(Self { parameters: *p, side: Side::new(p), pitch, roll, roll_ratio: p.roll_ratio() })
+        let (side, roll_ratio) = (Side::new(p), p.roll_ratio());
+        Ok(Self {
+            parameters: *p,
+            side,
+            both_sides: side.of_both(),
+            pitch,
+            roll,
+            roll_ratio,
+            output_shaft: PitchRoll::new(0.5, roll_ratio),
+        })
     }
 
     /// The inertias of pitch and of roll.

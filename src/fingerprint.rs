@@ -1,6 +1,6 @@
 //! What the FMU of the testbed is made from; its guid is a hash of that.
 //!
-//! The build script compiles the guid into the library, `build_fmu` writes it into the model description.
+//! `build_fmu` compiles the guid into the library and writes it into the model description.
 
 use crate::parameters::{Parameters, table};
 use fmu_package::Sources;

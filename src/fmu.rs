@@ -1,7 +1,7 @@
 //! The testbed as an importer has it: with an interface type, and with what several of its variables share.
 
 use crate::decoupled::Decoupled;
-use crate::instant::{Instant, torques};
+use crate::instant::{Instant, output_shaft, torques};
 use crate::motor::{Motion, Motions, Motors};
 use crate::pair::Sides;
 use crate::start::Start;
@@ -14,8 +14,10 @@ pub struct TestbedFmu {
     pub(crate) testbed: Testbed,
     pub(crate) interface: Interface,
     pub(crate) start: Start,
-    /// Sensor torques, of the last time they were calculated.
-    pub(crate) torques: Sides,
+    /// Sensor torques, pitch and roll, pitch rate and roll rate, of the last time they were calculated.
+    pub(crate) torques: [f64; 2],
+    pub(crate) angles: [f64; 2],
+    pub(crate) rates: [f64; 2],
     /// The partial derivatives of all that moves with respect to angles and rates of the motors and to the states; they
     /// follow from the parameters.
     pub(crate) jacobian: [Moving; 10],
@@ -31,12 +33,12 @@ impl Clone for TestbedFmu {
 
     /// Passes on to the testbed, which copies little if the parameters are the same.
     fn clone_from(&mut self, source: &Self) {
-        let Self { testbed, interface, start, torques, jacobian } = source;
-        if self.testbed.parameters != testbed.parameters {
+        let Self { testbed, interface, start, torques, angles, rates, jacobian } = source;
+        if self.testbed.copy_from(testbed) {
             self.jacobian = *jacobian;
         }
-        self.testbed.clone_from(testbed);
-        (self.interface, self.start, self.torques) = (*interface, *start, *torques);
+        (self.interface, self.start) = (*interface, *start);
+        (self.torques, self.angles, self.rates) = (*torques, *angles, *rates);
     }
 }
 
@@ -57,30 +59,12 @@ impl TestbedFmu {
         }
     }
 
-    /// Sensor torques. Most often they are read right after a step: all else is a call, which keeps this short.
-    #[inline]
-    pub(crate) fn torques_now(&self) -> Sides {
-        let Testbed { motors, state, .. } = &self.testbed;
-        if self.interface == Interface::CoSimulation && motors.are_at_path_end() {
-            torques(state, &motors.path_end, self.system())
-        } else {
-            self.torques_otherwise()
-        }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn torques_otherwise(&self) -> Sides {
-        let Testbed { motors, state, .. } = &self.testbed;
-        torques(state, &self.motions(motors), self.system())
-    }
-
-    /// Until the testbed has started, its state follows the motors, or what is given. Called after either was set.
-    #[inline]
-    pub(crate) fn follow(&mut self) {
-        if !self.start.is_over {
-            self.testbed.state = self.start.from(self.testbed.motors.theta());
-        }
+    /// Calculates the outputs with the motors in this motion.
+    #[inline(always)]
+    pub(crate) fn calculate_with(&mut self, motors: &Motions) {
+        let (state, system) = (&self.testbed.state, self.testbed.system());
+        self.torques = torques(state, motors, system).array();
+        [self.angles, self.rates] = output_shaft(state, system).map(Sides::array);
     }
 
     /// State and motors now.

@@ -25,7 +25,14 @@ pub struct Instant {
 #[inline]
 pub fn torques(x: &State, motors: &Motions, system: &Decoupled) -> Sides {
     let [q_i, q_ii, v] = by_sides(x);
-    system.side.torque(q_i, q_ii, v, *motors)
+    system.both_sides.torque(q_i, q_ii, v, *motors)
+}
+
+/// Pitch and roll of the output shaft and their rates, eq. (1), rad and rad/s.
+#[inline]
+pub fn output_shaft(x: &State, system: &Decoupled) -> [PitchRoll; 2] {
+    let [_, q_ii, v] = by_sides(x);
+    [q_ii, v].map(|sides| sum_difference(sides) * system.output_shaft)
 }
 
 impl Instant {
@@ -37,7 +44,7 @@ impl Instant {
     /// Rates of the massless shafts, eq. (11a), rad/s.
     pub fn shaft_rates(&self, system: &Decoupled) -> Sides {
         let [q_i, q_ii, v] = by_sides(&self.x);
-        system.side.shaft_rate(q_i, q_ii, v, self.motors)
+        system.both_sides.shaft_rate(q_i, q_ii, v, self.motors)
     }
 
     /// Accelerations of the SECT input shafts, eq. (11a), rad/s2.

@@ -129,11 +129,13 @@ pub struct Motors {
     pub path_end: Motions,
     /// When the angles were sampled.
     pub times: SampleTimes,
+    /// Whether a rate is given for the next step, or comes from omega; see [`rates_changed`](Self::rates_changed).
+    has_rates: bool,
 }
 
 impl Motors {
     /// The angles that are set, rad.
-    #[inline]
+    #[inline(always)]
     pub fn theta(&self) -> Sides {
         Sides::new(self.inputs[0].theta, self.inputs[1].theta)
     }
@@ -183,6 +185,12 @@ impl Motors {
     pub fn use_omega_changed(&mut self) {
         self.omega_changed(0);
         self.omega_changed(1);
+        self.rates_changed();
+    }
+
+    /// After the sources of the rates have changed.
+    pub fn rates_changed(&mut self) {
+        self.has_rates = self.use_omega || self.given_rate.iter().any(Option::is_some);
     }
 
     /// Takes the derivative of theta of motor 0 or 1 at the current communication point. It precedes
@@ -191,25 +199,31 @@ impl Motors {
     pub fn set_rate(&mut self, motor: usize, rate: f64) {
         self.given_rate[motor] = Some(rate);
         self.path_end.rate[motor] = rate;
+        self.has_rates = true;
     }
 
     /// Forgets the samples: the next one is the first.
     pub fn forget_samples(&mut self) {
-        let Self { inputs, use_omega, given_rate, .. } = *self;
-        *self = Self { inputs, use_omega, given_rate, ..Self::default() };
+        let Self { inputs, use_omega, given_rate, has_rates, .. } = *self;
+        *self = Self { inputs, use_omega, given_rate, has_rates, ..Self::default() };
     }
 
-    /// Whether all rates come from parabolas, and the step size `h` is that of the last two steps.
+    /// Whether the step size `h` is that of the last two steps.
     #[inline]
     pub fn are_steady(&self, h: f64) -> bool {
-        // Together, because one branch costs more than they do.
-        let is_rate_given = self.use_omega | self.given_rate[0].is_some() | self.given_rate[1].is_some();
-        h == self.times.steady_step && !is_rate_given
+        h == self.times.steady_step
+    }
+
+    /// The motions at the current communication point after three samples or more; see [`sampled`](Self::sampled).
+    #[inline(always)]
+    pub fn steady(&self) -> Motions {
+        let motions = self.parabolas();
+        if self.has_rates { self.with_rates(motions) } else { motions }
     }
 
     /// The motions at the current communication point that the last three samples let expect.
-    #[inline]
-    pub fn parabolas(&self) -> Motions {
+    #[inline(always)]
+    fn parabolas(&self) -> Motions {
         let [inverse_last, inverse_before, inverse_mean] = self.times.inverses;
         let last = (self.theta() - self.earlier[0]) * inverse_last;
         let before = (self.earlier[0] - self.earlier[1]) * inverse_before;
@@ -222,19 +236,26 @@ impl Motors {
     /// lines through two; with one sample the motors rest).
     pub fn sampled(&self) -> Motions {
         let steady = |rate| Motion { angle: self.theta(), rate, acceleration: Sides::default() };
-        let mut motions = match self.times.count {
+        self.with_rates(match self.times.count {
             0 => steady(Sides::default()),
             1 => steady((self.theta() - self.earlier[0]) * self.times.inverses[0]),
             _ => self.parabolas(),
-        };
-        for motor in 0..2 {
+        })
+    }
+
+    /// The motions with the rates that are given or come from omega.
+    #[inline]
+    fn with_rates(&self, motions: Motions) -> Motions {
+        let [rate, acceleration] = [motions.rate, motions.acceleration].map(Sides::array);
+        let [motor1, motor2] = [0, 1].map(|motor| {
             let given = self.given_rate[motor].or(self.use_omega.then_some(self.inputs[motor].omega));
-            if let Some(rate) = given {
-                motions.rate[motor] = rate;
-                motions.acceleration[motor] = 0.0;
-            }
+            given.map_or((rate[motor], acceleration[motor]), |rate| (rate, 0.0))
+        });
+        Motions {
+            rate: Sides::new(motor1.0, motor2.0),
+            acceleration: Sides::new(motor1.1, motor2.1),
+            ..motions
         }
-        motions
     }
 
     /// Whether motor 0 or 1 is where the last step left off: the importer has set no sample since.
@@ -243,14 +264,11 @@ impl Motors {
         !self.is_sampled[motor] && self.times.count > 0
     }
 
-    /// Whether both motors are.
-    #[inline]
-    pub fn are_at_path_end(&self) -> bool {
-        self.is_at_path_end(0) & self.is_at_path_end(1)
-    }
-
     /// The motions of both motors now: the sample's, or that at the end of the path.
     pub fn now(&self) -> Motions {
+        if self.is_at_path_end(0) && self.is_at_path_end(1) {
+            return self.path_end;
+        }
         let motions = self.sampled();
         let now =
             |motor| if self.is_at_path_end(motor) { self.path_end.of(motor) } else { motions.of(motor) };
@@ -276,13 +294,16 @@ impl Motors {
         if self.times.count == 0 { Sides::default() } else { self.theta() - self.path_end.angle }
     }
 
-    /// After a step that led to `end`: the samples become earlier ones. The times are another matter.
-    #[inline]
-    pub fn go_on(&mut self, end: &Motions) {
-        self.earlier[1] = self.earlier[0];
-        self.earlier[0] = self.theta();
+    /// After a step that led from the angles `theta` to `end`: the samples become earlier ones. The times are another
+    /// matter.
+    #[inline(always)]
+    pub fn go_on(&mut self, theta: Sides, end: &Motions) {
+        self.earlier = [theta, self.earlier[0]];
         self.path_end = *end;
-        self.given_rate = [None; 2];
         self.is_sampled = [false; 2];
+        if self.has_rates {
+            self.given_rate = [None; 2];
+            self.has_rates = self.use_omega;
+        }
     }
 }

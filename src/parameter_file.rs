@@ -1,13 +1,14 @@
 //! Reads `modelDescription/parameters.json`, Table 1 of the paper as printed, or a file like it.
 //!
-//! The build script bakes the values into the library, `build_fmu` writes them into the model
-//! description; nothing is read at run time.
+//! The build script compiles the values into the library, `build_fmu` writes them into the model description;
+//! nothing is read at run time. Without derive macros, because every build of the library begins with this file.
 
 use crate::parameters::{Integer, Parameters, Real, table};
-use anyhow::{Context, Result, bail, ensure};
-use serde::Deserialize;
+use serde_core::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 use std::f64::consts::PI;
+use std::fmt;
 use std::fs;
+use std::marker::PhantomData;
 use std::path::Path;
 
 /// Turns "per degree" into "per radian". The value in SI is the printed value, read to the nearest double,
@@ -18,64 +19,127 @@ const DEG_PER_RAD: f64 = 180.0 / PI;
 ///
 /// # Errors
 /// Names the file, the parameter and what is wrong with it.
-pub fn read(file: &Path) -> Result<Parameters> {
-    let text = fs::read_to_string(file).with_context(|| format!("{}: cannot be read", file.display()))?;
-    parse(&text).with_context(|| file.display().to_string())
+pub fn read(file: &Path) -> Result<Parameters, String> {
+    let name = file.display();
+    let text = fs::read_to_string(file).map_err(|error| format!("{name}: cannot be read: {error}"))?;
+    parse(&text).map_err(|error| format!("{name}: {error}"))
 }
 
-fn parse(text: &str) -> Result<Parameters> {
-    let mut json = serde_json::Deserializer::from_str(text);
-    // With the name of the entry in which it stops.
-    let file: File = serde_path_to_error::deserialize(&mut json)?;
-    json.end()?;
-    let parameters = file.in_si_units()?;
-    parameters.check().context("in SI units")?;
+fn parse(text: &str) -> Result<Parameters, String> {
+    let File(parameters) = serde_json::from_str(text).map_err(|error| error.to_string())?;
+    parameters.check().map_err(|error| format!("in SI units: {error}"))?;
     Ok(parameters)
+}
+
+/// The parameters of a file in SI units.
+struct File(Parameters);
+
+struct FileVisitor;
+
+impl<'de> Deserialize<'de> for File {
+    fn deserialize<D: Deserializer<'de>>(file: D) -> Result<Self, D::Error> {
+        file.deserialize_map(FileVisitor)
+    }
 }
 
 macro_rules! file {
     ($($(#[$_meaning:meta])* $name:ident: $kind:ident $_compare:tt $_limit:literal, $unit:literal;)+) => {
-        #[allow(non_snake_case, reason = "the paper's symbols")]
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields, expecting = "an object with the parameters")]
-        struct File {
-            $($name: Entry<$kind>,)+
-        }
+        const NAMES: &[&str] = &[$(stringify!($name)),+];
 
-        impl File {
-            fn in_si_units(self) -> Result<Parameters> {
-                Ok(Parameters {
-                    $($name: self.$name.in_unit($unit).context(stringify!($name))? as $kind,)+
-                })
+        impl<'de> Visitor<'de> for FileVisitor {
+            type Value = File;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("an object with the parameters")
+            }
+
+            #[allow(non_snake_case, reason = "the paper's symbols")]
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<File, A::Error> {
+                $(let mut $name = None;)+
+                while let Some(key) = map.next_key::<String>()? {
+                    let named = |error: A::Error| A::Error::custom(format_args!("{key}: {error}"));
+                    match key.as_str() {
+                        $(stringify!($name) => {
+                            let entry: Entry<$kind> = map.next_value().map_err(named)?;
+                            let value = entry.in_unit($unit).map_err(A::Error::custom).map_err(named)?;
+                            fill(&mut $name, value as $kind, stringify!($name))?;
+                        })+
+                        unknown => return Err(A::Error::unknown_field(unknown, NAMES)),
+                    }
+                }
+                Ok(File(Parameters {
+                    $($name: $name.ok_or_else(|| A::Error::missing_field(stringify!($name)))?,)+
+                }))
             }
         }
     };
 }
 table!(file);
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields, expecting = "an object like { \"value\": 2.11, \"unit\": \"N.m/deg\" }")]
+/// Stores a member of an object that must not occur twice.
+fn fill<T, E: Error>(member: &mut Option<T>, value: T, name: &'static str) -> Result<(), E> {
+    match member.replace(value) {
+        None => Ok(()),
+        Some(_) => Err(E::duplicate_field(name)),
+    }
+}
+
+/// A value with its unit.
 struct Entry<T> {
     value: T,
     unit: String,
-    #[serde(rename = "meaning")]
-    _meaning: Option<String>,
+}
+
+struct EntryVisitor<T>(PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Entry<T> {
+    fn deserialize<D: Deserializer<'de>>(entry: D) -> Result<Self, D::Error> {
+        entry.deserialize_map(EntryVisitor(PhantomData))
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for EntryVisitor<T> {
+    type Value = Entry<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("an object like { \"value\": 2.11, \"unit\": \"N.m/deg\" }")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Entry<T>, A::Error> {
+        let (mut value, mut unit, mut meaning) = (None, None, None);
+        while let Some(key) = map.next_key::<String>()? {
+            match key.as_str() {
+                "value" => fill(&mut value, map.next_value()?, "value")?,
+                "unit" => fill(&mut unit, map.next_value()?, "unit")?,
+                "meaning" => fill(&mut meaning, map.next_value::<String>()?, "meaning")?,
+                unknown => return Err(A::Error::unknown_field(unknown, &["value", "unit", "meaning"])),
+            }
+        }
+        Ok(Entry {
+            value: value.ok_or_else(|| A::Error::missing_field("value"))?,
+            unit: unit.ok_or_else(|| A::Error::missing_field("unit"))?,
+        })
+    }
 }
 
 impl<T: Into<f64>> Entry<T> {
-    /// The value in an SI unit; what is per radian may be given per degree.
-    fn in_unit(self, si: &str) -> Result<f64> {
+    /// The value in an SI unit; a value per radian may be given per degree.
+    fn in_unit(self, si: &str) -> Result<f64, String> {
         let per_degree = si.strip_suffix("/rad").map(|quantity| format!("{quantity}/deg"));
         let factor = match &per_degree {
             _ if self.unit == si => 1.0,
             Some(unit) if self.unit == *unit => DEG_PER_RAD,
-            Some(unit) => bail!("the unit \"{}\" is unknown here; use \"{unit}\" or \"{si}\"", self.unit),
-            None => bail!("the unit \"{}\" is unknown here; use \"{si}\"", self.unit),
+            Some(unit) => {
+                return Err(format!(
+                    "the unit \"{}\" is unknown here; use \"{unit}\" or \"{si}\"",
+                    self.unit
+                ));
+            }
+            None => return Err(format!("the unit \"{}\" is unknown here; use \"{si}\"", self.unit)),
         };
-        // -0.0 becomes 0.0.
+        // Adding 0.0 turns -0.0 into 0.0.
         let value = self.value.into() * factor + 0.0;
-        ensure!(value.is_finite(), "the value is too large");
-        Ok(value)
+        if value.is_finite() { Ok(value) } else { Err("the value is too large".to_owned()) }
     }
 }
 
@@ -154,7 +218,6 @@ mod tests {
             match parse(&text) {
                 Ok(_) => assert_eq!(message, "", "{text}"),
                 Err(error) => {
-                    let error = format!("{error:#}");
                     assert!(
                         !message.is_empty() && error.contains(&key) && error.contains(message),
                         "{error}\n{text}"
@@ -166,7 +229,7 @@ mod tests {
 
     #[test]
     fn the_file_is_named() {
-        let error = format!("{:#}", read("no/such.json".as_ref()).unwrap_err());
+        let error = read("no/such.json".as_ref()).unwrap_err();
         assert!(error.starts_with("no/such.json: cannot be read"), "{error}");
     }
 }

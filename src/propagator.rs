@@ -12,10 +12,9 @@
 //! the last bit, and tiny steps lose nothing to `exp(A h)` being close to 1.
 
 use crate::decoupled::{Decoupled, Subsystem};
-use crate::number::Number;
+use crate::number::{Number, TwoFloat};
 use crate::pair::PitchRoll;
 use nalgebra::{Matrix3, Vector3};
-use twofloat::TwoFloat;
 
 /// The step matrices of one subsystem for one step size.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -238,17 +237,23 @@ impl StepCache {
         self.entries.iter_mut().for_each(|entry| entry.h = 0.0);
     }
 
-    /// The matrices for step size `h > 0`, computed if they are not at hand.
+    /// The matrices of the last step size.
     #[inline]
-    pub fn get(&mut self, system: &Decoupled, h: f64) -> &StepMatrices {
-        if self.current.h != h {
-            self.find_or_compute(system, h);
-        }
+    pub fn current(&self) -> &StepMatrices {
         &self.current
     }
 
-    #[cold]
-    fn find_or_compute(&mut self, system: &Decoupled, h: f64) {
+    /// Whether the [current](Self::current) matrices are those for step size `h > 0`.
+    #[inline]
+    pub fn has(&self, h: f64) -> bool {
+        self.current.h == h
+    }
+
+    /// Makes the matrices for step size `h > 0` the current ones; computes them if they are not at hand.
+    pub fn prepare(&mut self, system: &Decoupled, h: f64) {
+        if self.has(h) {
+            return;
+        }
         if let Some(found) = self.entries.iter().find(|entry| entry.h == h) {
             self.current = *found;
             return;

@@ -27,18 +27,20 @@ impl Clone for Testbed {
     fn clone(&self) -> Self {
         Self { cache: StepCache::default(), ..*self }
     }
+}
 
-    /// With the same parameters the step matrices stay good.
-    fn clone_from(&mut self, source: &Self) {
-        if self.parameters != source.parameters {
+impl Testbed {
+    /// Copies all but the step matrices, which stay good with the same parameters. Returns whether these differ.
+    pub fn copy_from(&mut self, source: &Self) -> bool {
+        let differs = self.parameters != source.parameters;
+        if differs {
             self.cache.clear();
         }
         let Self { parameters, state, motors, system, cache: _ } = *source;
         (self.parameters, self.state, self.motors, self.system) = (parameters, state, motors, system);
+        differs
     }
-}
 
-impl Testbed {
     /// A testbed at rest at angle 0.
     ///
     /// # Errors
@@ -74,20 +76,9 @@ impl Testbed {
     /// dampers as an impulse: x jumps by B2 d, B2 being the rate columns of B in eq. (11).
     ///
     /// Returns false, with nothing changed, if the state would leave the range of numbers.
-    #[inline]
     #[must_use]
     pub fn step(&mut self, h: f64) -> bool {
-        // The usual case by itself, so that it asks nothing further.
-        if self.motors.are_steady(h) {
-            self.step_from(&self.motors.parabolas(), self.motors.theta() - self.motors.path_end.angle, h)
-        } else {
-            self.step_otherwise(h)
-        }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn step_otherwise(&mut self, h: f64) -> bool {
+        self.cache.prepare(&self.system, h);
         let is_possible = self.step_from(&self.motors.sampled(), self.motors.jumps(), h);
         if is_possible {
             self.motors.times.shift(h);
@@ -95,10 +86,21 @@ impl Testbed {
         is_possible
     }
 
+    /// The same [step](Self::step), if its size is that of the last two: few questions are left. Returns false also if
+    /// it is not.
     #[inline(always)]
+    #[must_use]
+    pub fn step_at_once(&mut self, h: f64) -> bool {
+        self.motors.are_steady(h)
+            && self.cache.has(h)
+            && self.step_from(&self.motors.steady(), self.motors.theta() - self.motors.path_end.angle, h)
+    }
+
+    #[inline(always)]
+    #[expect(clippy::eq_op, reason = "the difference is NaN if the sum is not finite")]
     fn step_from(&mut self, motions: &Motions, jumps: Sides, h: f64) -> bool {
-        let Self { state, motors, system, cache, .. } = self;
-        let matrices = cache.get(system, h);
+        let Self { state, motors, cache, .. } = self;
+        let matrices = cache.current();
         let [q_i, q_ii, v] = by_sides(state);
         let u = motions.angle;
         let deviation = [sum_difference(q_i - u), sum_difference(q_ii - u), sum_difference(v)];
@@ -114,12 +116,14 @@ impl Testbed {
         // A sum is finite only if all its terms are.
         let end = motions.after(h);
         let [sum1, sum2] = ((q_i + q_ii) + v + (end.angle + end.rate)).array();
-        if !(sum1 + sum2).is_finite() {
+        let sum = sum1 + sum2;
+        // `f64::is_finite` takes twice as many instructions.
+        if (sum - sum).is_nan() {
             return false;
         }
         let ([theta3, theta4], [theta5, theta6], [omega5, omega6]) = (q_i.array(), q_ii.array(), v.array());
         *state = [theta3, theta4, theta5, theta6, omega5, omega6];
-        motors.go_on(&end);
+        motors.go_on(u, &end);
         true
     }
 }

@@ -23,32 +23,26 @@ variables! {
         start.is_over;
 
     /// Angle of motor 1
-    theta1 = input(&ANGLE) in testbed.motors.inputs[0].theta then |fmu| {
-        fmu.testbed.motors.theta_changed(0);
-        fmu.follow();
-    };
+    theta1 = input(&ANGLE) in testbed.motors.inputs[0].theta then testbed.motors.is_sampled[0];
     /// Angle of motor 2
-    theta2 = input(&ANGLE) in testbed.motors.inputs[1].theta then |fmu| {
-        fmu.testbed.motors.theta_changed(1);
-        fmu.follow();
-    };
+    theta2 = input(&ANGLE) in testbed.motors.inputs[1].theta then testbed.motors.is_sampled[1];
     /// Angular velocity of motor 1; used in Co-Simulation only if use_omega is true
     omega1 = input(&ANGULAR_VELOCITY) in testbed.motors.inputs[0].omega then |fmu| { fmu.testbed.motors.omega_changed(0) };
     /// Angular velocity of motor 2; used in Co-Simulation only if use_omega is true
     omega2 = input(&ANGULAR_VELOCITY) in testbed.motors.inputs[1].omega then |fmu| { fmu.testbed.motors.omega_changed(1) };
 
     /// Torque measured by sensor 1 between motor 1 and the SECT, eq. (9a)
-    tau1 = output(&TORQUE) by |fmu| fmu.torques[0];
+    tau1 = output(&TORQUE) from torques[0];
     /// Torque measured by sensor 2 between motor 2 and the SECT, eq. (9b)
-    tau2 = output(&TORQUE) by |fmu| fmu.torques[1];
+    tau2 = output(&TORQUE) from torques[1];
     /// Pitch angle theta7 of the output shaft, mean of theta5 and theta6, eq. (1)
-    pitch = output(&ANGLE) by |fmu| fmu.now().pitch(fmu.system());
+    pitch = output(&ANGLE) from angles[0];
     /// Roll angle theta8 of the output shaft, N/2M (theta5 - theta6), eq. (1)
-    roll = output(&ANGLE) by |fmu| fmu.now().roll(fmu.system());
+    roll = output(&ANGLE) from angles[1];
     /// Pitch rate, the derivative of theta7
-    pitch_rate = output(&ANGULAR_VELOCITY) by |fmu| fmu.now().pitch_rate(fmu.system());
+    pitch_rate = output(&ANGULAR_VELOCITY) from rates[0];
     /// Roll rate, the derivative of theta8
-    roll_rate = output(&ANGULAR_VELOCITY) by |fmu| fmu.now().roll_rate(fmu.system());
+    roll_rate = output(&ANGULAR_VELOCITY) from rates[1];
     /// Angle of the shaft between couplings 1 and 2 (motor 1 side); state
     theta3 = output(&ANGLE).state().calculated().depends_on(&[start_at_rest, theta3_start, theta1])
         in testbed.state[0] then |fmu| { fmu.start.is_over = true };
@@ -108,19 +102,19 @@ variables! {
     N = parameter(&COUNT) in testbed.parameters.N;
     // Before the other Boolean: OpenModelica 1.27.0 hands over the second one of an array as false.
     /// Start at rest wherever the motors are (theta3 = theta5 = theta1, theta4 = theta6 = theta2, rates 0); if false, start at theta3_start ... omega6_start
-    start_at_rest = parameter(&BOOLEAN) in start.at_rest then |fmu| { fmu.follow() };
+    start_at_rest = parameter(&BOOLEAN) in start.at_rest;
     /// Co-Simulation: take the motor rates from omega1 and omega2 instead of differentiating theta1 and theta2
     use_omega = parameter(&BOOLEAN) in testbed.motors.use_omega then |fmu| { fmu.testbed.motors.use_omega_changed() };
     /// theta3 at the start; used only if start_at_rest is false
-    theta3_start = parameter(&ANGLE) in start.state[0] then |fmu| { fmu.follow() };
+    theta3_start = parameter(&ANGLE) in start.state[0];
     /// theta4 at the start; used only if start_at_rest is false
-    theta4_start = parameter(&ANGLE) in start.state[1] then |fmu| { fmu.follow() };
+    theta4_start = parameter(&ANGLE) in start.state[1];
     /// theta5 at the start; used only if start_at_rest is false
-    theta5_start = parameter(&ANGLE) in start.state[2] then |fmu| { fmu.follow() };
+    theta5_start = parameter(&ANGLE) in start.state[2];
     /// theta6 at the start; used only if start_at_rest is false
-    theta6_start = parameter(&ANGLE) in start.state[3] then |fmu| { fmu.follow() };
+    theta6_start = parameter(&ANGLE) in start.state[3];
     /// omega5 at the start; used only if start_at_rest is false
-    omega5_start = parameter(&ANGULAR_VELOCITY) in start.state[4] then |fmu| { fmu.follow() };
+    omega5_start = parameter(&ANGULAR_VELOCITY) in start.state[4];
     /// omega6 at the start; used only if start_at_rest is false
-    omega6_start = parameter(&ANGULAR_VELOCITY) in start.state[5] then |fmu| { fmu.follow() };
+    omega6_start = parameter(&ANGULAR_VELOCITY) in start.state[5];
 }

@@ -12,7 +12,7 @@ FMUS = ROOT / "target" / "fmu"
 
 
 def built(name: str, target: str = "closed-loop-fmus") -> Path:
-    """What `make target` leaves under that name."""
+    """The file of that name that `make TARGET` leaves."""
     path = FMUS / name
     if not path.exists():
         pytest.exit(f"{path} is missing; build it with `make {target}`", returncode=1)

@@ -3,6 +3,7 @@
 #![allow(unsafe_code)]
 
 use fmu_test_kit::careless::random_bytes;
+use prw_testbed::{Parameters, fingerprint};
 use std::fs;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::Path;
@@ -25,7 +26,10 @@ fn build_fmu(out: &Path) -> Command {
     let library = out.with_extension("dylib");
     let mut bytes = LIBRARY.map(u32::to_be_bytes).concat();
     bytes.extend(random_bytes(0, 2 * LIMIT as usize));
-    bytes.extend(env!("FMU_GUID").as_bytes());
+    let (sources, start) =
+        (fingerprint::sources(env!("CARGO_MANIFEST_DIR")), fingerprint::start(&Parameters::BUILT_IN));
+    let variant = fmu_package::Variant { sources: sources.fingerprint().unwrap(), start, tunable: false };
+    bytes.extend(variant.guid().as_bytes());
     fs::write(&library, bytes).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
     command.arg("--binary").arg(format!("darwin64={}", library.display())).arg("--out").arg(out);

@@ -20,7 +20,7 @@ fn main() -> ExitCode {
         sources: sources(env!("CARGO_MANIFEST_DIR")),
         profile: "library",
         terminals: terminals(),
-        ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"), env!("FMU_SOURCES"))
+        ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"))
     };
     exit(builder.run::<Controller>(&Options::parse().build))
 }

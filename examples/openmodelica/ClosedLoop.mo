@@ -8,7 +8,7 @@ model ClosedLoop "The wrist goes to a pitch and a roll angle"
   parameter Real roll_ref = 1.0471975511965976 "Roll angle to go to, rad";
   prw_controller_me_FMU controller;
   prw_testbed_me_FMU testbed;
-  discrete Real y[6] "What the controller sees: the testbed as it was just before the sample";
+  discrete Real y[6](each fixed = true) "What the controller sees: the testbed as it was just before the sample";
 equation
   controller.pitch_ref = pitch_ref;
   controller.roll_ref = roll_ref;

@@ -69,7 +69,7 @@ def test_the_model_for_openmodelica_has_the_wires_of_the_ssp(closed_loop):
     )
     (inputs,) = re.findall(r"^  \{(.*?)\} = y;$", model, flags=re.M)
     outputs = [re.fullmatch(r"pre\((testbed\.\w+)\)", value)[1] for value in sampled.split(", ")]
-    assert f"  discrete Real y[{len(outputs)}] " in model
+    assert f"  discrete Real y[{len(outputs)}](each fixed = true) " in model
     wires += zip(outputs, inputs.split(", "), strict=True)
     assert sorted(wires) == sorted(tuple(wire) for wire in closed_loop.connections)
     for name, (end, value) in closed_loop.inputs.items():
@@ -80,13 +80,16 @@ def test_the_model_for_openmodelica_has_the_wires_of_the_ssp(closed_loop):
 
 
 def test_the_script_for_openmodelica_gives_each_fmu_a_folder(closed_loop):
-    """In one folder the second FMU's modelDescription.xml replaces the first one's; a relative one ends omc."""
+    """In one folder the second FMU's modelDescription.xml replaces the first one's; with a relative one `simulate` fails."""
     script = (ROOT / "examples/openmodelica/closed_loop.mos").read_text(encoding="utf-8")
     model = (ROOT / "examples/openmodelica/ClosedLoop.mo").read_text(encoding="utf-8")
     imports = dict(
-        re.findall(r'importFMU\("../../target/fmu/([\w.]+)", workdir = cd\(\) \+ "/(\w+)", fullPath = true\)', script)
+        re.findall(
+            r'importFMU\("../../../target/fmu/([\w.]+)", workdir = cd\(\) \+ "/(\w+)", fullPath = true\)', script
+        )
     )
     assert imports == {fmu: component for component, fmu in closed_loop.fmus.items()}
+    assert script.index('cd("build")') < script.index("importFMU(") < script.index('loadFile("../ClosedLoop.mo")')
     for component, fmu in closed_loop.fmus.items():
         assert script.index(f'mkdir("{component}")') < script.index(f'cd() + "/{component}"')
         assert f"  {fmu.removesuffix('.fmu')}_me_FMU {component};" in model

@@ -13,6 +13,9 @@ from built import ROOT
 from lagrange import linear_model, table_1
 from reference import at_rest, follow
 
+from prw import cli
+from tools import examples
+
 NAMES = ("lqr", "quiet_motion", "identify", "tolerances", "gains", "learned_move", "predictive_control")
 #: The eigenvalues of eq. (11) with Table 1, 1/s, those with positive imaginary parts for their pairs.
 POLES = np.array([-174.87270665, -174.36733032, -18.94465405 + 32.14568305j, -9.68285129 + 34.67786598j])
@@ -33,6 +36,15 @@ def test_the_page_has_its_code_and_figures() -> None:
         assert code in page, f"{name}: `make docs` writes the page anew"
         for figure in re.findall(r"\]\((examples/\w+\.png)\)", page):
             assert (ROOT / "docs" / figure).is_file()
+
+
+def test_the_page_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in {"EXAMPLES": ("lqr",), "PAGE": tmp_path / "page.md", "FIGURES": tmp_path}.items():
+        monkeypatch.setattr(examples, name, value)
+    assert cli.run("tools", "", [examples], ["examples"]) == 0
+    section = (tmp_path / "page.md").read_text(encoding="utf-8").split(examples.HEAD)[1].strip()
+    page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")
+    assert section.split("It prints")[0] in page and (tmp_path / "lqr.png").is_file()
 
 
 @pytest.fixture(scope="module")

@@ -117,7 +117,7 @@ def test_without_matplotlib(tmp_path, fmu):
 
     result = run("simulate")
     assert result.returncode == 0 and result.stderr == "", result.stderr
-    assert "no figure   matplotlib missing; install with: pip install 'prw[plot]'" in result.stdout
+    assert "no figure   matplotlib missing; install with: pip install matplotlib" in result.stdout
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["fig4.csv"] and "next        look at out" in result.stdout
     result = run("check", "out/fig4.csv", "--experiment", "closed_loop")
     assert result.returncode == 1 and "for a figure of both, matplotlib missing; install" in result.stderr

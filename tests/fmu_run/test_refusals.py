@@ -188,11 +188,19 @@ def test_an_fmu_that_is_closed(testbed):
 
 
 def test_units_of_declared_types(unruly, unruly3):
-    of = {"slope": "m/s", "y": "m", "gap": "mm", "odd": None, "count": None}
+    of = {"slope": "m/s", "y": "m", "gap": "mm", "count": None}
     of3 = {"y": "m", "gap": "mm", "number": None, "temper": None}
     for path, units in ((unruly, of), (unruly3, of3)):
         with fmu_run.Fmu(path) as fmu:
             assert {name: fmu.variables[name].unit for name in units} == units
+
+
+def test_a_declared_type_that_is_not_defined(unruly, tmp_path):
+    def change(name, content):
+        return content.replace(b'<Real declaredType="Length"/>', b'<Real declaredType="Forgotten"/>')
+
+    with fmu_run.Fmu(repacked(unruly, tmp_path / "forgotten.fmu", change)) as fmu:
+        assert fmu.variables["y"].unit is None and fmu.run(TIME, outputs=["y"]).ok.all()
 
 
 def test_start_values_with_units(fmu):

@@ -287,12 +287,8 @@ def test_wrong_sweeps(testbed: Path) -> None:
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, testbed: Path) -> None:
     run = prw.simulate(fmu=testbed)
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    for call, package, extra in [
-        (run.plot, "matplotlib", "plot"),
-        (run.to_pandas, "pandas", "pandas"),
-        (prw.sweep, "pyarrow", "sweep"),
-    ]:
-        with pytest.raises(prw.UserError, match=rf"{package} missing; .*pip install 'prw\[{extra}\]'"):
+    for call, package in [(run.plot, "matplotlib"), (run.to_pandas, "pandas"), (prw.sweep, "pyarrow")]:
+        with pytest.raises(prw.UserError, match=f"{package} missing; install with: pip install {package}"):
             call()
 
 

@@ -83,12 +83,13 @@ def test_the_citation_is_of_this_version_and_its_day() -> None:
     """The day is that of the release, and what is not released yet has none."""
     changelog, citation = ((ROOT / name).read_text(encoding="utf-8") for name in ("CHANGELOG.md", "CITATION.cff"))
     said = dict(re.findall(r"^(version|date-released): (.*)$", citation, re.MULTILINE))
-    (day,) = re.findall(rf"^## {re.escape(VERSION)}(?: \((.*)\))?$", changelog, re.MULTILINE)
+    (day,) = re.findall(rf"^## {re.escape(VERSION)}(?: \((?:unreleased|(.*))\))?$", changelog, re.MULTILINE)
     assert said == {"version": VERSION} | ({"date-released": day} if day else {})
 
 
 def test_the_changelog_begins_with_this_version() -> None:
     """What a release says of itself is cut out of the changelog by these headings."""
     headings = re.findall(r"^## (.*)$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
-    assert all(re.fullmatch(r"\d+\.\d+\.\d+( \(\d{4}-\d\d-\d\d\))?", heading) for heading in headings), headings
-    assert headings[0].split()[0] == VERSION
+    assert all(re.fullmatch(r"\d+\.\d+\.\d+( \((\d{4}-\d\d-\d\d|unreleased)\))?", name) for name in headings), headings
+    newest = [heading for heading in headings if not heading.endswith("(unreleased)") or heading.startswith(VERSION)]
+    assert newest[0].split()[0] == VERSION

@@ -45,7 +45,7 @@ fn own_program(project: &Project, name: &str) -> Command {
 /// Compiles the model and the program that packs it; `None` if that fails.
 fn generated_program(project: &Project, options: &BuildOptions, purpose: Purpose) -> Result<Option<Command>> {
     let sources = Sources::of_package(&project.folder).fingerprint()?;
-    let variant = Variant { sources: sources.clone(), start: Vec::new(), tunable: options.tunable };
+    let variant = Variant { sources, start: Vec::new(), tunable: options.tunable };
     let package = write_package(project, purpose)?;
     let mut command = Command::new(cargo());
     command
@@ -55,9 +55,7 @@ fn generated_program(project: &Project, options: &BuildOptions, purpose: Purpose
         .arg(project.target.join("cargo-fmu"))
         // Where the configuration of cargo is looked for.
         .current_dir(&project.folder)
-        .env("FMU_SOURCES", sources)
         .env("FMU_GUID", variant.guid())
-        .env("FMU_TUNABLE", if options.tunable { "1" } else { "0" })
         .stdin(Stdio::null())
         .stdout(Stdio::piped());
     let mut child = command.spawn().context("cannot start cargo")?;
@@ -80,7 +78,7 @@ fn generated_program(project: &Project, options: &BuildOptions, purpose: Purpose
     }
     let program = program.context("cargo has not said where the program is")?;
     let mut command = Command::new(program);
-    let elsewhere = options.describe || options.c_sources || options.all_targets;
+    let elsewhere = options.describe || options.guid || options.c_sources || options.all_targets;
     if !elsewhere && options.target.is_empty() && options.binary.is_empty() {
         let library = library.context("cargo has not said where the library is")?;
         let mut binary = OsString::from(format!("{}=", fmu_package::Platform::host()?));
@@ -220,7 +218,7 @@ fn program(project: &Project) -> String {
          let (package, folder) = ({name:?}, {folder:?});\n    \
          fmu_package::build::<Model>(&fmu_package::Builder {{\n        \
          command: \"cargo fmu build\",\n        \
-         ..fmu_package::Builder::new(package, folder, env!(\"FMU_SOURCES\"))\n    \
+         ..fmu_package::Builder::new(package, folder)\n    \
          }})\n}}\n"
     )
 }

@@ -1,6 +1,8 @@
 //! `cargo fmu` as someone uses it who begins a model.
 #![allow(missing_docs)]
 
+use serde_json::Value;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -75,7 +77,39 @@ fn grows(from: &str, arguments: &[&str], columns: &str, course: &str) -> Folder 
         assert!(text.contains(&format!("modelIdentifier=\"my_{from}\"")), "{text}");
         assert_eq!(fmu.by_name("resources/winter.csv").is_ok(), from == "house");
     }
+    for path in [format!("target/fmu/{fmu}.fmu"), format!("target/fmu/fmi3/{fmu}.fmu")] {
+        let options = ["check", "--fmu", &path, "--json", "--no-shrink", "--repeat", "0.3"];
+        let report: Value = serde_json::from_str(&folder.says(&name, &options)).unwrap();
+        assert_eq!(
+            (&report["interfaces"][0], &report["unreached"]),
+            (&"Co-Simulation".into(), &Value::Array(vec![]))
+        );
+        assert_eq!(findings(&report), listed(from), "{path}");
+    }
     folder
+}
+
+/// The observations of a report, without the names of functions, which depend on the FMI version. The version of glibc that
+/// a library needs is that of the system.
+fn findings(report: &Value) -> BTreeSet<String> {
+    let all = report["findings"].as_array().unwrap().iter();
+    let all = all.filter(|finding| finding["name"] != "package.glibc");
+    let seen = all.flat_map(|finding| {
+        let seen = std::iter::once(&finding["seen"]).chain(finding["more"].as_array().unwrap());
+        seen.map(|seen| [&finding["grade"], &finding["name"], seen].map(|text| text.as_str().unwrap()))
+    });
+    seen.map(|[grade, name, seen]| format!("{grade} {name} {}", seen.split(" with ").last().unwrap()))
+        .collect()
+}
+
+/// The notes on a model that the documentation lists.
+fn listed(model: &str) -> BTreeSet<String> {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/checking.md");
+    let page = fs::read_to_string(page).unwrap();
+    let rows = page.lines().map(|row| row.split(" | ").collect::<Vec<_>>());
+    rows.filter(|row| row.get(1) == Some(&model))
+        .map(|row| format!("note {} {}", row[0].trim_matches(['|', ' ', '`']), row[2]))
+        .collect()
 }
 
 /// 1 - e^-1 after a second.
@@ -83,13 +117,20 @@ fn grows(from: &str, arguments: &[&str], columns: &str, course: &str) -> Folder 
 fn lag() {
     let folder = grows("lag", &["--set", "u=1"], "time,x", "from 0.000000 to 0.632121 1");
     inputs_come_from_a_table(&folder);
+    check_makes_the_fmus(&folder);
     options_reach_the_program_that_packs(&folder);
 }
 
 /// It ends when it has bounced five times.
 #[test]
 fn ball() {
-    grows("ball", &[], "time,height,velocity,bounces", "ended by the FMU at t = 2.0527167766");
+    let folder = grows("ball", &[], "time,height,velocity,bounces", "ended by the FMU at t = 2.0527167766");
+    // The first FMU has a finding that fails; the second is checked all the same.
+    let fmus = ["--fmu", "target/fmu/my_ball.fmu", "--fmu", "target/fmu/fmi3/my_ball.fmu"];
+    let output =
+        folder.fmu("my-ball", &[&["check", "--only", "refusals", "--fail-on", "note"], &fmus[..]].concat());
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(!output.status.success() && said.contains("(FMI 2.0,") && said.contains("(FMI 3.0,"), "{said}");
 }
 
 #[test]
@@ -100,6 +141,16 @@ fn motor() {
 #[test]
 fn house() {
     grows("house", &[], "time,room,outside", "from -6.000000 to 2.500000 degC");
+}
+
+/// Without `--fmu` both FMUs are made first.
+fn check_makes_the_fmus(folder: &Folder) {
+    let said = folder.says("my-lag", &["check", "--only", "dependencies", "--out", "report"]);
+    assert!(said.contains("fmu/my_lag.fmu (FMI 2.0") && said.contains("fmi3/my_lag.fmu (FMI 3.0"), "{said}");
+    for report in ["fmu", "fmi3"] {
+        assert!(folder.read(&format!("my-lag/report/{report}/junit.xml")).contains("no findings"));
+    }
+    assert!(folder.refuses("my-lag", &["check", "--fmu", "Cargo.toml"]).contains("Cargo.toml"));
 }
 
 fn inputs_come_from_a_table(folder: &Folder) {

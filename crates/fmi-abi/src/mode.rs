@@ -143,6 +143,9 @@ impl Situations {
 pub struct Situation(u64);
 
 impl Situation {
+    /// In no set.
+    pub const NOWHERE: Self = Self(0);
+
     /// Of an instance.
     pub const fn new(standard: Standard, interface: Interface, mode: Mode) -> Self {
         Self(bit(standard, interface, mode))

@@ -3,7 +3,7 @@
 use crate::description::Description;
 use crate::finding::{Finding, Grade, Judge, ending, step_name};
 use crate::legal::first_illegal;
-use crate::run;
+use crate::run::Workers;
 use crate::script::{End, Numbered, Run, Script, Setting, Step, Written};
 use crate::shrink::shrink;
 use crate::writer::{Course, Point, Value, Writer, status_name};
@@ -11,7 +11,6 @@ use fmi_abi::{Interface, Standard};
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
 
 /// The time for all checks is over.
 #[derive(Debug)]
@@ -32,6 +31,8 @@ pub struct Event {
     pub again: bool,
     /// The model wants to end.
     pub terminate: bool,
+    /// Continuous states have changed.
+    pub states_changed: bool,
     /// The next time event.
     pub next: Option<f64>,
 }
@@ -42,8 +43,8 @@ pub struct Checker {
     pub description: Description,
     /// Where its library is.
     pub setting: Setting,
-    /// For what is written meanwhile.
-    pub scratch: TempDir,
+    /// Play the scripts.
+    pub workers: Workers,
     /// A simulation that goes well, by Co-Simulation and by Model Exchange.
     pub courses: Vec<Course>,
     /// Chooses what is chosen at random.
@@ -61,12 +62,30 @@ fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Keeps one finding of each name: the gravest, and of several such the one with the shortest call sequence, whichever
+/// check is first. Its `more` lists the observations of the others.
+fn keep(found: &mut Vec<Finding>, mut finding: Finding) {
+    let Some(kept) = found.iter_mut().find(|kept| kept.name == finding.name) else {
+        found.push(finding);
+        return;
+    };
+    let rank = |finding: &Finding| (finding.grade, std::cmp::Reverse(finding.script.len()));
+    if rank(&finding) > rank(kept) {
+        std::mem::swap(kept, &mut finding);
+    }
+    for seen in std::iter::once(finding.seen).chain(finding.more) {
+        if seen != kept.seen && !kept.more.contains(&seen) {
+            kept.more.push(seen);
+        }
+    }
+}
+
 impl Checker {
     /// An FMU whose courses are not yet known.
     pub fn new(
         description: Description,
         setting: Setting,
-        scratch: TempDir,
+        workers: Workers,
         seed: u64,
         limit: f64,
         deadline: Instant,
@@ -74,7 +93,7 @@ impl Checker {
         Self {
             description,
             setting,
-            scratch,
+            workers,
             courses: Vec::new(),
             seed,
             limit,
@@ -133,7 +152,7 @@ impl Checker {
             return Err(TimeOver.into());
         }
         *locked(&self.played) += 1;
-        let run = run::play(&self.setting, script, limit.min(left.max(0.5)), &self.scratch)?;
+        let run = self.workers.play(&self.setting, script, limit.min(left.max(0.5)))?;
         if matches!(run.end, End::Hang(seconds) if seconds < limit) {
             return Err(TimeOver.into());
         }
@@ -170,21 +189,9 @@ impl Checker {
         }
     }
 
-    /// Keeps a finding; of each name and grade the first has the script, the others are told in a line.
+    /// Keeps a finding.
     pub fn add(&self, finding: Finding) {
-        let mut found = locked(&self.found);
-        match found.iter_mut().find(|other| other.name == finding.name) {
-            Some(other) => {
-                if other.seen != finding.seen && !other.more.contains(&finding.seen) {
-                    other.more.push(finding.seen.clone());
-                }
-                if finding.grade > other.grade {
-                    let more = std::mem::take(&mut other.more);
-                    *other = Finding { more, ..finding };
-                }
-            }
-            None => found.push(finding),
-        }
+        keep(&mut locked(&self.found), finding);
     }
 
     /// Whether something of this name was found.
@@ -198,12 +205,10 @@ impl Checker {
         let hostile = script.iter().any(|numbered| numbered.forbidden);
         let limit = if hostile { self.limit.min(3.0) } else { self.limit };
         let run = self.play_for(&script, limit)?;
-        let hangs = matches!(run.end, End::Hang(_));
         if run.end != End::Done {
             self.ended(claim, &script, &run, hostile)?;
             return Ok(run);
         }
-        debug_assert!(!hangs);
         self.always(&script, &run);
         if let Some(seen) = judge(&run) {
             self.add(claim.finding(seen, script, judge));
@@ -238,7 +243,7 @@ impl Checker {
         // Whether memory beyond an array was touched: with room after it, it shows.
         if matches!(run.end, End::Crash(_)) && cfg!(unix) && !hostile {
             let soft = Setting { soft: true, ..self.setting.clone() };
-            let again = run::play(&soft, script, self.limit, &self.scratch)?;
+            let again = self.workers.play(&soft, script, self.limit)?;
             let wrote = again.outcomes.values().any(|outcome| !outcome.damage.is_empty());
             if wrote {
                 let claim = Claim::new(
@@ -366,26 +371,9 @@ impl Checker {
         }
     }
 
-    /// What an update of the discrete states says.
+    /// The result of a successful update of the discrete states.
     pub fn event(&self, run: &Run, id: u32) -> Option<Event> {
-        let outcome = run.of(id)?;
-        if outcome.status? > 1 {
-            return None;
-        }
-        if self.fmi3() {
-            let flag = |place: usize| {
-                outcome.written.get(place).is_some_and(|of| of.numbers().first() == Some(&1.0))
-            };
-            let next = outcome.written.get(5)?.numbers().first().copied();
-            return Some(Event { again: flag(0), terminate: flag(1), next: next.filter(|_| flag(4)) });
-        }
-        let Some(Written::Numbers(_, words)) = outcome.written.first() else { return None };
-        let [flags, _, defined, time] = words[..] else { return None };
-        Some(Event {
-            again: flags as u32 != 0,
-            terminate: flags >> 32 != 0,
-            next: (defined as u32 != 0).then(|| f64::from_bits(time)),
-        })
+        event(run, id, self.fmi3())
     }
 
     /// A shorter script for each finding, as long as there is time.
@@ -434,7 +422,7 @@ impl Checker {
             if left < 0 || Instant::now() > self.deadline {
                 return false;
             }
-            let Ok(run) = run::play(&self.setting, tried, limit, &self.scratch) else { return false };
+            let Ok(run) = self.workers.play(&self.setting, tried, limit) else { return false };
             match judge(&run) {
                 Some(now) => {
                     seen = now;
@@ -482,6 +470,23 @@ impl Claim {
         finding.judge = Some(judge);
         finding
     }
+}
+
+/// The result of a successful update of the discrete states.
+pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
+    let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
+    let (flags, time) = if fmi3 {
+        let number = |place: usize| outcome.written.get(place)?.numbers().first().copied();
+        ([0, 1, 3, 4].map(|place| number(place) == Some(1.0)), number(5)?)
+    } else {
+        // fmi2EventInfo has five flags, two to a word, and the time.
+        let Written::Numbers(_, words) = outcome.written.first()? else { return None };
+        let [first, changed, defined, time] = words[..] else { return None };
+        let flags = [first as u32 != 0, first >> 32 != 0, changed >> 32 != 0, defined as u32 != 0];
+        (flags, f64::from_bits(time))
+    };
+    let [again, terminate, states_changed, defined] = flags;
+    Some(Event { again, terminate, states_changed, next: defined.then_some(time) })
 }
 
 /// A sentence on a call that answered otherwise than OK.
@@ -799,4 +804,32 @@ pub fn steps(description: &Description, start: f64, sizes: &[f64], discrete: boo
             point
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::keep;
+    use crate::finding::{Finding, Grade};
+
+    /// A graver finding of a name takes the place of the one before, whose evidence is listed.
+    #[test]
+    fn no_evidence_is_lost() {
+        let mut found = Vec::new();
+        for (grade, seen) in [
+            (Grade::Note, "a"),
+            (Grade::Note, "b"),
+            (Grade::Violation, "c"),
+            (Grade::Fragile, "d"),
+            (Grade::Violation, "c"),
+            (Grade::Violation, "e"),
+            (Grade::Note, "b"),
+        ] {
+            keep(&mut found, Finding::of_files("topic.name", grade, "", "", seen.to_owned()));
+        }
+        keep(&mut found, Finding::of_files("topic.other", Grade::Note, "", "", "a".to_owned()));
+        let [one, other] = &found[..] else { panic!("{} findings", found.len()) };
+        assert_eq!((one.grade, one.seen.as_str()), (Grade::Violation, "c"));
+        assert_eq!(one.more, ["a", "b", "d", "e"]);
+        assert_eq!((other.grade, other.seen.as_str(), other.more.len()), (Grade::Note, "a", 0));
+    }
 }

@@ -154,8 +154,8 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     }
     let setting = setting(path, options, folder, &description)?;
     let deadline = begin + Duration::from_secs_f64(options.time.max(1.0));
-    let scratch = tempfile::Builder::new().prefix("fmu-check-").tempdir()?;
-    let mut checker = Checker::new(description, setting, scratch, options.seed, options.limit, deadline);
+    let workers = run::Workers::new()?;
+    let mut checker = Checker::new(description, setting, workers, options.seed, options.limit, deadline);
     of_files.into_iter().for_each(|finding| checker.add(finding));
     for (place, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
         if checker.setting.libraries[place].is_none() {

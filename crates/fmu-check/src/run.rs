@@ -1,72 +1,173 @@
 //! Plays scripts in processes of their own.
 
-use crate::script::{End, Outcome, Run, Script, Setting, Step};
+use crate::script::{End, Numbered, Outcome, Run, Script, Setting, Step};
+#[cfg(target_os = "linux")]
+use crate::worker::Answer;
 use crate::worker::{Job, Last, OWN_FAULT, PLAYED, Unloadable, VARIABLE};
 use anyhow::{Context as _, bail};
 use std::collections::HashMap;
-use std::fs::File;
-use std::process::{Command, ExitStatus, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, ExitStatus};
 use tempfile::TempDir;
 
-/// Plays a script: each part up to a fresh process in one of its own, `limit` seconds at most.
-pub fn play(setting: &Setting, script: &Script, limit: f64, scratch: &TempDir) -> anyhow::Result<Run> {
-    let mut run = Run::default();
-    let mut bytes = HashMap::new();
-    for (phase, part) in script.split(|numbered| numbered.step == Step::FreshProcess).enumerate() {
-        bytes = one(setting, part, bytes, limit, scratch, phase, &mut run)?;
-        if run.end != End::Done {
-            break;
-        }
-    }
-    Ok(run)
+/// Processes that play call sequences.
+pub struct Workers {
+    /// For the files of processes.
+    scratch: TempDir,
+    #[cfg(target_os = "linux")]
+    idle: std::sync::Mutex<HashMap<Situation, Vec<Server>>>,
 }
 
-fn one(
-    setting: &Setting,
-    script: &[crate::script::Numbered],
-    bytes: HashMap<usize, Vec<u8>>,
-    limit: f64,
-    scratch: &TempDir,
-    phase: usize,
-    run: &mut Run,
-) -> anyhow::Result<HashMap<usize, Vec<u8>>> {
-    let folder = tempfile::Builder::new().prefix("run-").tempdir_in(scratch.path())?;
-    let at = |name: &str| folder.path().join(name);
-    let job = Job { setting: setting.clone(), script: script.to_vec(), bytes, outcomes: at("outcomes") };
-    std::fs::write(at("job"), serde_json::to_vec(&job)?)?;
-    std::fs::create_dir(at("here"))?;
-    let said = File::create(at("said"))?;
-    let mut child = Command::new(std::env::current_exe()?)
-        .env(VARIABLE, at("job"))
-        // What was not written is something else in every process.
+/// Conditions that a process is started with: how many processes of its call sequence come before it, and whether
+/// libraries are bound at once.
+type Situation = (usize, bool);
+
+/// The results of a process.
+struct Left {
+    /// Its exit status; `None` if it did not end in time.
+    ended: Option<ExitStatus>,
+    said: Vec<u8>,
+    outcomes: Vec<u8>,
+}
+
+/// The command that starts this program as a worker.
+fn worker(job: &std::path::Path, (phase, now): Situation) -> anyhow::Result<Command> {
+    let mut command = Command::new(std::env::current_exe()?);
+    command
+        .env(VARIABLE, job)
+        // Memory that was not written differs between the processes of a call sequence.
         .env("MALLOC_PERTURB_", (1 + phase * 90).to_string())
         // Freed blocks that each thread keeps would count as in use (mallinfo2 of glibc).
         .env("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0")
-        .envs(setting.now.then_some(("LD_BIND_NOW", "1")))
-        .current_dir(at("here"))
-        .stdin(Stdio::null())
-        .stdout(said.try_clone()?)
-        .stderr(said)
-        .spawn()
-        .context("a process for the FMU cannot be started")?;
-    let begin = Instant::now();
-    let ended = loop {
-        if let Some(status) = child.try_wait()? {
-            break Some(status);
+        .envs(now.then_some(("LD_BIND_NOW", "1")));
+    Ok(command)
+}
+
+impl Workers {
+    /// Processes that are started when they are needed.
+    pub fn new() -> std::io::Result<Self> {
+        Ok(Self {
+            scratch: tempfile::Builder::new().prefix("fmu-check-").tempdir()?,
+            #[cfg(target_os = "linux")]
+            idle: std::sync::Mutex::default(),
+        })
+    }
+
+    /// Plays a script: each part up to a fresh process in one of its own, `limit` seconds at most.
+    pub fn play(&self, setting: &Setting, script: &Script, limit: f64) -> anyhow::Result<Run> {
+        let mut run = Run::default();
+        let mut bytes = HashMap::new();
+        for (phase, part) in script.split(|numbered| numbered.step == Step::FreshProcess).enumerate() {
+            let job = Job { setting: setting.clone(), script: part.to_vec(), bytes };
+            let left = self.process(&job, (phase, setting.now), limit)?;
+            bytes = read(part, left, limit, &mut run)?;
+            if run.end != End::Done {
+                break;
+            }
         }
-        if begin.elapsed().as_secs_f64() > limit {
-            child.kill()?;
-            child.wait()?;
-            break None;
+        Ok(run)
+    }
+
+    /// Plays a job in a process that is forked for it.
+    #[cfg(target_os = "linux")]
+    fn process(&self, job: &Job, situation: Situation, limit: f64) -> anyhow::Result<Left> {
+        let idle = || self.idle.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let server = idle().get_mut(&situation).and_then(Vec::pop);
+        let mut server = match server {
+            Some(server) => server,
+            None => Server::new(situation, &self.scratch)?,
+        };
+        let asked = server.ask(&format!("{limit} {}\n", serde_json::to_string(job)?));
+        match asked {
+            Ok(left) => {
+                idle().entry(situation).or_default().push(server);
+                Ok(left)
+            }
+            // The library has ended the process that forks.
+            Err(_) => Ok(Left { ended: Some(server.0.wait()?), said: Vec::new(), outcomes: Vec::new() }),
         }
-        std::thread::sleep(Duration::from_micros(500));
-    };
-    let said = std::fs::read(at("said")).unwrap_or_default();
+    }
+
+    /// Plays a job in a process that is started for it: not every system can load every library after a fork.
+    #[cfg(not(target_os = "linux"))]
+    fn process(&self, job: &Job, situation: Situation, limit: f64) -> anyhow::Result<Left> {
+        use std::process::Stdio;
+        let folder = tempfile::Builder::new().prefix("run-").tempdir_in(self.scratch.path())?;
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("job"), serde_json::to_vec(job)?)?;
+        std::fs::create_dir(at("here"))?;
+        let said = std::fs::File::create(at("said"))?;
+        let mut child = worker(&at("job"), situation)?
+            .current_dir(at("here"))
+            .stdin(Stdio::null())
+            .stdout(said.try_clone()?)
+            .stderr(said)
+            .spawn()
+            .context("a process for the FMU cannot be started")?;
+        let begin = std::time::Instant::now();
+        let ended = loop {
+            if let Some(status) = child.try_wait()? {
+                break Some(status);
+            }
+            if begin.elapsed().as_secs_f64() > limit {
+                child.kill()?;
+                child.wait()?;
+                break None;
+            }
+            std::thread::sleep(std::time::Duration::from_micros(500));
+        };
+        let [said, outcomes] = ["said", "outcomes"].map(|name| std::fs::read(at(name)).unwrap_or_default());
+        Ok(Left { ended, said, outcomes })
+    }
+}
+
+/// A process that forks one for each job.
+#[cfg(target_os = "linux")]
+struct Server(std::process::Child);
+
+#[cfg(target_os = "linux")]
+impl Server {
+    fn new(situation: Situation, scratch: &TempDir) -> anyhow::Result<Self> {
+        use std::process::Stdio;
+        let here = tempfile::tempdir_in(scratch)?.keep();
+        let mut command = worker(std::path::Path::new(""), situation)?;
+        command.current_dir(here).stdin(Stdio::piped()).stdout(Stdio::piped());
+        Ok(Self(command.spawn().context("a process for the FMU cannot be started")?))
+    }
+
+    fn ask(&mut self, job: &str) -> anyhow::Result<Left> {
+        use std::io::{BufRead as _, Read as _, Write as _};
+        use std::os::unix::process::ExitStatusExt as _;
+        let (input, output) = self.0.stdin.as_mut().zip(self.0.stdout.as_mut()).context("no pipes")?;
+        input.write_all(job.as_bytes())?;
+        let mut output = std::io::BufReader::new(output);
+        let mut line = String::new();
+        output.read_line(&mut line)?;
+        let Answer { ended, lengths } = serde_json::from_str(&line)?;
+        let [mut said, mut outcomes] = lengths.map(|length| vec![0; length]);
+        output.read_exact(&mut said)?;
+        output.read_exact(&mut outcomes)?;
+        Ok(Left { ended: ended.map(ExitStatus::from_raw), said, outcomes })
+    }
+}
+
+#[cfg(target_os = "linux")]
+impl Drop for Server {
+    fn drop(&mut self) {
+        // Waiting closes its input, which ends it.
+        let _ = self.0.wait();
+    }
+}
+
+/// Reads the outcomes of a process, and returns the bytes that it has serialized.
+fn read(
+    script: &[Numbered],
+    Left { ended, said, outcomes }: Left,
+    limit: f64,
+    run: &mut Run,
+) -> anyhow::Result<HashMap<usize, Vec<u8>>> {
     run.said.push_str(&String::from_utf8_lossy(&said));
-    let text = std::fs::read(at("outcomes")).unwrap_or_default();
     let mut last = None;
-    for line in text.split(|byte| *byte == b'\n').filter(|line| !line.is_empty()) {
+    for line in outcomes.split(|byte| *byte == b'\n').filter(|line| !line.is_empty()) {
         if let Ok(outcome) = serde_json::from_slice::<Outcome>(line) {
             run.outcomes.insert(outcome.id, outcome);
         } else if let Ok(end) = serde_json::from_slice::<Last>(line) {

@@ -21,6 +21,16 @@ pub trait CoSimulation: Model {
     /// # Errors
     /// When the step cannot be carried out; the model must then be as it was before.
     fn step(&mut self, step: Step) -> Result<Stepped, Error>;
+
+    /// Carries out a step of this size, with the same result as [`step`](Self::step), and what [`calculate`](Model::calculate)
+    /// calculates after it, if the model can do both quickly, without events and messages. If not, it returns false and has
+    /// changed nothing; then `step` is called.
+    ///
+    /// Not called before the first `step`, nor if steps may end early.
+    #[inline]
+    fn step_at_once(&mut self, _size: f64) -> bool {
+        false
+    }
 }
 
 /// Whether the steps of Co-Simulation stop at events.
@@ -63,6 +73,8 @@ impl Step {
 pub enum Stepped {
     /// At the next communication point.
     Done,
+    /// There as well, and what [`calculate`](Model::calculate) would calculate is calculated already.
+    Calculated,
     /// At an earlier time, s, which the model has reached: the importer is told. Only if
     /// [`ENDS_EARLY`](CoSimulation::ENDS_EARLY) or [`EVENTS`](CoSimulation::EVENTS) says so. In FMI 2.0 (`fmi2Discard`) it goes
     /// back to a saved state or ends the simulation. In FMI 3.0 (`earlyReturn`) it goes on from there; if it has not

@@ -22,6 +22,11 @@ pub trait Exported: Model {
         Err(Error::new("this FMU has no Co-Simulation"))
     }
     #[doc(hidden)]
+    #[inline]
+    fn exported_step_at_once(&mut self, _size: f64) -> bool {
+        false
+    }
+    #[doc(hidden)]
     fn exported_indicators(&self, _indicators: &mut [f64]) {}
     #[doc(hidden)]
     fn exported_event(&mut self, _time: f64) -> Result<Event, Error> {
@@ -144,11 +149,17 @@ macro_rules! offer {
                 <Self as $crate::Exported>::CO_SIMULATION.is_some_and(|offer| offer.ends_early)
                     || ::core::matches!(
                         stepped,
-                        ::core::result::Result::Ok($crate::Stepped::Done) | ::core::result::Result::Err(_)
+                        ::core::result::Result::Ok($crate::Stepped::Done | $crate::Stepped::Calculated)
+                            | ::core::result::Result::Err(_)
                     ),
                 "a step ended early although the model does not say `const ENDS_EARLY: bool = true`"
             );
             stepped
+        }
+
+        #[inline(always)]
+        fn exported_step_at_once(&mut self, size: f64) -> bool {
+            $crate::CoSimulation::step_at_once(self, size)
         }
     };
     (@capability ModelExchange) => {

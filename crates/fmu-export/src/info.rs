@@ -80,9 +80,9 @@ impl Info {
 }
 
 /// The [`Info`] of a model of this name and identifier, with author, version and licence as in `Cargo.toml` and the
-/// guid that fmu-package's `build_script` has made: a hash of the model's sources.
+/// guid that fmu-package passes to the compiler in the environment variable `FMU_GUID`: a hash of the model's sources.
 ///
-/// Without that build script the guid is all zeros; fmu-package does not pack such a library.
+/// Without that variable the guid is all zeros; fmu-package does not pack such a library.
 ///
 /// ```
 /// const INFO: fmu_export::Info =

@@ -45,6 +45,7 @@ pub use variable::{Index, Variable};
 
 #[doc(hidden)]
 pub use {
+    boundary::{both_offsets, offset_in, offset_of_real},
     fmi_abi::{fmi2_functions, fmi3_functions},
     instance::{SavedTrial, Trial},
     table::{

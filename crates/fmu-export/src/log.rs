@@ -128,14 +128,12 @@ impl Logger {
         }
     }
 
-    /// Takes over what a model has to say.
+    /// Takes over what a model has to say. Returns whether it said anything.
     #[inline]
-    pub fn listen(&mut self, model: &mut impl Model) {
-        if let Some(log) = model.log()
-            && !log.is_empty()
-        {
-            std::mem::take(&mut log.0).into_iter().for_each(|message| self.add(message));
-        }
+    pub fn listen(&mut self, model: &mut impl Model) -> bool {
+        let Some(log) = model.log().filter(|log| !log.is_empty()) else { return false };
+        std::mem::take(&mut log.0).into_iter().for_each(|message| self.add(message));
+        true
     }
 
     #[inline]

@@ -67,6 +67,12 @@ pub trait Model: Variables + Clone + Send + Sync {
         Ok(())
     }
 
+    /// Called after each value that is set, until the model has stepped or Continuous-Time Mode was entered: brings states
+    /// up to date whose start is [`calculated`](crate::Variable::calculated). (Not called where a place of the `memory` says
+    /// that they have started is the model's affair.)
+    #[inline]
+    fn calculate_start(&mut self) {}
+
     /// Called when the initialization begins, with all that was set before. More may be set until it ends.
     ///
     /// # Errors

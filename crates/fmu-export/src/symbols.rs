@@ -16,11 +16,8 @@ macro_rules! c_functions {
                 c: $handle
                 $(, $argument: $type)*
             ) -> fmi_abi::c_types::c_int {
-                let rule = Function::$function.rule();
                 // SAFETY: the importer keeps the contract of this module, for the instance and all arguments.
-                let status = unsafe {
-                    $crate::boundary::call::<M>(c, rule, |instance| bodies::$function(instance $(, $argument)*))
-                };
+                let status = unsafe { $crate::boundary::short::call!($function(c $(, $argument: $type)*)) };
                 status as _
             }
         )+

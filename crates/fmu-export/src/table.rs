@@ -5,7 +5,11 @@ use crate::variable::{Index, Variable, refuse};
 use std::fmt::Debug;
 
 /// The variables of a model. Implemented by [`variables!`](crate::variables).
-pub trait Variables: Sized + 'static {
+///
+/// # Safety
+/// Each offset that a function returns is that of a valid value of its type in this model, as it is now, or what the
+/// function was given for a line without one.
+pub unsafe trait Variables: Sized + 'static {
     /// The names of the lines.
     type Name: Copy + PartialEq + Debug + 'static;
 
@@ -40,6 +44,15 @@ pub trait Variables: Sized + 'static {
         let number = if Self::ARRAYS { Self::TABLE[place as usize].element() } else { 0 };
         (Self::NAMES[place as usize], number)
     }
+
+    /// The offset of the `f64` that is the value of a line, if it is simply read.
+    #[doc(hidden)]
+    fn offset_to_read(&self, line: Index, without: usize) -> usize;
+
+    /// The offset of the `f64` that a line is set in and, in the upper half, that of the `bool` that becomes true then, or
+    /// `no_mark`; if it is not simply set, `without`.
+    #[doc(hidden)]
+    fn offsets_to_set(&mut self, line: Index, no_mark: usize, without: u64) -> u64;
 
     /// Shows what the model remembers besides its variables.
     #[doc(hidden)]
@@ -399,8 +412,10 @@ macro_rules! variables {
                 $kind:tt $of:tt $( . $refinement:ident $arguments:tt )*
                 $(
                     in $first:ident $([ $at:expr ])* $( . $field:tt $([ $place:expr ])* )*
+                    $( then $mark:ident $([ $mark_at:expr ])* $( . $mark_field:tt $([ $mark_place:expr ])* )* )?
                     $( then | $changed:ident | $after:block )?
                 )?
+                $( from $from:ident $([ $from_at:expr ])* $( . $from_field:tt $([ $from_place:expr ])* )* )?
                 $( by $calculate:expr )? ;
         )+
     ) => {
@@ -429,7 +444,8 @@ macro_rules! variables {
                 };
             )+
 
-            impl $crate::Variables for $model {
+            // SAFETY: the offsets are those of references to the model's places, made just then.
+            unsafe impl $crate::Variables for $model {
                 type Name = $crate::variables!(@name $($names)?);
 
                 const LINES: &'static [$crate::Variable<Self>] = &[$({
@@ -460,6 +476,7 @@ macro_rules! variables {
                                         0,
                                         value,
                                     );
+                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
                                 value: |model, value| {
@@ -468,6 +485,7 @@ macro_rules! variables {
                                         0,
                                         value,
                                     );
+                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
                                 visit: |model, visitor| $crate::Saved::visit(
@@ -492,6 +510,7 @@ macro_rules! variables {
                                         number,
                                         value,
                                     );
+                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
                                 value: |model, number, value| {
@@ -500,26 +519,22 @@ macro_rules! variables {
                                         number,
                                         value,
                                     );
+                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
                             },
+                            true $( & $crate::variables!(@instead_of $after false) )?,
                         );
                     )?
                     $(
-                        let variable = variable.read_by(
-                            $crate::Read {
-                                shape: $crate::shape_of_calculation(|model: &$model| $crate::read(model, $calculate)),
-                                real: |model| $crate::read_real(&$crate::read(model, $calculate), 0),
-                                value: |model| $crate::read_value(&$crate::read(model, $calculate), 0),
-                            },
-                            $crate::ReadAt {
-                                reals: |model, first, values| {
-                                    $crate::read_reals(&$crate::read(model, $calculate), first, values)
-                                },
-                                value: |model, number| $crate::read_value(&$crate::read(model, $calculate), number),
-                            },
+                        let variable = $crate::variables!(
+                            @calculated variable $model,
+                            |model: &$model| ::core::clone::Clone::clone(
+                                &(*model).$from $([$from_at])* $( .$from_field $([$from_place])* )*
+                            )
                         );
                     )?
+                    $( let variable = $crate::variables!(@calculated variable $model, $calculate); )?
                     variable.finished(
                         $crate::variables!(@label $name $($label)?),
                         ::core::concat!($($text),*),
@@ -549,6 +564,55 @@ macro_rules! variables {
                         $crate::find_states(<$model as $crate::Variables>::TABLE);
                     &STATES
                 };
+
+                #[inline(always)]
+                fn offset_to_read(&self, line: $crate::Index, without: usize) -> usize {
+                    match line {
+                        $(index::$name => {
+                            let offset = without;
+                            $( let offset = $crate::offset_of_real(
+                                self,
+                                &(*self).$first $([$at])* $( .$field $([$place])* )*,
+                                without,
+                            ); )?
+                            $( let offset = $crate::offset_of_real(
+                                self,
+                                &(*self).$from $([$from_at])* $( .$from_field $([$from_place])* )*,
+                                without,
+                            ); )?
+                            $( let offset = $crate::variables!(@instead_of $calculate without); )?
+                            offset
+                        })+
+                        _ => without,
+                    }
+                }
+
+                #[inline(always)]
+                fn offsets_to_set(&mut self, line: $crate::Index, no_mark: usize, without: u64) -> u64 {
+                    let model = &raw const *self;
+                    match line {
+                        $(index::$name => {
+                            let offsets = without;
+                            $(
+                                let place = $crate::offset_of_real(
+                                    model,
+                                    &mut (*self).$first $([$at])* $( .$field $([$place])* )*,
+                                    usize::MAX,
+                                );
+                                let mark = no_mark;
+                                $(
+                                    let mark: &mut bool =
+                                        &mut (*self).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )*;
+                                    let mark = $crate::offset_in(model, mark, usize::MAX);
+                                )?
+                                let offsets = $crate::both_offsets(place, mark).unwrap_or(without);
+                                $( let offsets = $crate::variables!(@instead_of $after without); )?
+                            )?
+                            offsets
+                        })+
+                        _ => without,
+                    }
+                }
 
                 #[allow(unused_variables)]
                 fn visit_memory(&mut self, visitor: &mut dyn $crate::StateVisitor) {
@@ -581,6 +645,20 @@ macro_rules! variables {
     };
     (@refined [$($variable:tt)+] . $refinement:ident $arguments:tt $($rest:tt)*) => {
         $crate::variables!(@refined [$($variable)+ . $refinement $arguments] $($rest)*)
+    };
+    (@instead_of $before:tt $instead:expr) => { $instead };
+    (@calculated $variable:ident $model:ty, $calculate:expr) => {
+        $variable.read_by(
+            $crate::Read {
+                shape: $crate::shape_of_calculation(|model: &$model| $crate::read(model, $calculate)),
+                real: |model| $crate::read_real(&$crate::read(model, $calculate), 0),
+                value: |model| $crate::read_value(&$crate::read(model, $calculate), 0),
+            },
+            $crate::ReadAt {
+                reals: |model, first, values| $crate::read_reals(&$crate::read(model, $calculate), first, values),
+                value: |model, number| $crate::read_value(&$crate::read(model, $calculate), number),
+            },
+        )
     };
     (@label $name:ident) => { ::core::stringify!($name) };
     (@label $name:ident $label:literal) => { $label };

@@ -75,6 +75,13 @@ pub trait Scalar: Saved {
     fn set_real(&mut self, value: f64) {
         self.assign(&Value::Real(value));
     }
+
+    /// The number itself, of a type that is one.
+    #[doc(hidden)]
+    #[inline]
+    fn as_real(&self) -> Option<&f64> {
+        None
+    }
 }
 
 /// Where a variable's value may live: a [`Scalar`], or an array of such, as `[f64; 8]` or `[[f64; 2]; 3]`.
@@ -96,6 +103,13 @@ pub trait Place: Saved {
 
     /// The same, to be changed.
     fn element_mut(&mut self, number: usize) -> &mut Self::Element;
+
+    /// The number itself, of a scalar that is one.
+    #[doc(hidden)]
+    #[inline]
+    fn as_real(&self) -> Option<&f64> {
+        if Self::DIMENSIONS.is_scalar() { Scalar::as_real(self.element(0)) } else { None }
+    }
 }
 
 impl<T: Scalar> Place for T {
@@ -194,6 +208,11 @@ impl Scalar for f64 {
     #[inline]
     fn set_real(&mut self, value: f64) {
         *self = value;
+    }
+
+    #[inline]
+    fn as_real(&self) -> Option<&f64> {
+        Some(self)
     }
 }
 

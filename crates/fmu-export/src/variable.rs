@@ -44,6 +44,10 @@ pub struct Variable<M> {
     pub(crate) settable: Situations,
     /// The same for a Real that takes its value without further ado, else nowhere.
     pub(crate) takes_reals: Situations,
+    /// Of these, where nothing but its place and its mark is to be set once the model has started.
+    pub(crate) takes_at_once: Situations,
+    /// Whether nothing follows when it is set.
+    plain: bool,
     read: Option<Read<M>>,
     store: Option<Store<M>>,
     /// The same for elements of arrays only.
@@ -127,6 +131,8 @@ impl<M> Variable<M> {
             reinit: false,
             settable: Situations::NONE,
             takes_reals: Situations::NONE,
+            takes_at_once: Situations::NONE,
+            plain: false,
             read: None,
             store: None,
             read_at: None,
@@ -303,7 +309,9 @@ impl<M> Variable<M> {
         store: Store<M>,
         read_at: ReadAt<M>,
         store_at: StoreAt<M>,
+        plain: bool,
     ) -> Self {
+        self.plain = plain;
         self.store = Some(store);
         if !read.shape.dimensions.is_scalar() {
             self.store_at = Some(store_at);
@@ -339,6 +347,9 @@ impl<M> Variable<M> {
         if real && !matches!(self.causality, Causality::Parameter) {
             // A start value that is refused is remembered, which takes further ado.
             self.takes_reals = self.settable.without(crate::settable::STARTING);
+            if self.plain {
+                self.takes_at_once = self.takes_reals;
+            }
         }
         self
     }

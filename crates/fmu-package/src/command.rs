@@ -1,7 +1,7 @@
 //! The command `build_fmu`, the same for every model.
 
 use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources, check_tools};
-use crate::cargo::LibraryBuild;
+use crate::cargo::{LibraryBuild, check_that_program_is_current};
 use crate::changes::Changes;
 use crate::connectors::{Terminal, terminals};
 use crate::content::ContentFile;
@@ -44,6 +44,9 @@ pub struct BuildOptions {
     /// Write only modelDescription.xml of FMI 2.0, into the folder modelDescription of the sources or DIR
     #[arg(long, conflicts_with_all = ["target", "binary"])]
     pub describe: bool,
+    /// Print only the guid, which libraries that are compiled elsewhere get from the environment variable FMU_GUID
+    #[arg(long, conflicts_with = "describe")]
+    pub guid: bool,
     /// Compile for this Rust target instead of this machine; repeat it for several
     #[arg(long, value_name = "TRIPLE")]
     pub target: Vec<String>,
@@ -71,6 +74,7 @@ impl BuildOptions {
         let flags = [
             (self.tunable, "--tunable"),
             (self.describe, "--describe"),
+            (self.guid, "--guid"),
             (self.all_targets, "--all-targets"),
             (self.c_sources, "--c-sources"),
             (self.live_page, "--live-page"),
@@ -116,7 +120,7 @@ pub fn build<M: Exported>(builder: &Builder) -> ExitCode {
     exit(options.and_then(|options| builder.run::<M>(&options)))
 }
 
-/// How a model's FMU is built. The crate must have a [`build_script`](crate::build_script).
+/// How a model's FMU is built.
 #[derive(Clone, Debug)]
 pub struct Builder {
     /// The package of the model: `env!("CARGO_PKG_NAME")`.
@@ -125,8 +129,6 @@ pub struct Builder {
     pub command: &'static str,
     /// What the FMU is made from.
     pub sources: Sources,
-    /// What this program was compiled from: `env!("FMU_SOURCES")`.
-    pub compiled_from: &'static str,
     /// The versions that FMUs are made for if nothing else is said. The description of the first is kept with the
     /// sources.
     pub fmi: Vec<Fmi>,
@@ -145,7 +147,7 @@ pub struct Builder {
     /// FMUs that these scripts run beside the model's, each by its package and what it is made from. They are described as
     /// is kept with their sources.
     pub page_fmus: Vec<(&'static str, Sources)>,
-    /// Environment variables that tell the build script of them; removed where the value is `None`.
+    /// Environment variables for the compilation of the library; removed where the value is `None`.
     pub environment: Vec<(&'static str, Option<OsString>)>,
 }
 
@@ -155,13 +157,12 @@ const DESCRIPTION: &str = "modelDescription/modelDescription.xml";
 impl Builder {
     /// For a package in the usual layout, started as `cargo run --release --bin build_fmu`.
     ///
-    /// The arguments are `env!("CARGO_PKG_NAME")`, `env!("CARGO_MANIFEST_DIR")` and `env!("FMU_SOURCES")`.
-    pub fn new(package: &'static str, folder: &'static str, compiled_from: &'static str) -> Self {
+    /// The arguments are `env!("CARGO_PKG_NAME")` and `env!("CARGO_MANIFEST_DIR")`.
+    pub fn new(package: &'static str, folder: &'static str) -> Self {
         Self {
             package,
             command: "cargo run --release --bin build_fmu",
             sources: Sources::of_package(folder),
-            compiled_from,
             fmi: vec![Fmi::V2, Fmi::V3],
             terminals: Vec::new(),
             profile: "release",
@@ -180,12 +181,17 @@ impl Builder {
     /// When the sources have changed since this program was compiled, the model contradicts itself, the
     /// library cannot be compiled or does not belong to it, or a file cannot be written.
     pub fn run<M: Exported>(&self, options: &BuildOptions) -> Result<()> {
+        check_that_program_is_current(self.command)?;
         let variant = self.variant(options.tunable)?;
         let described = match &self.start_from {
             Some(file) if !self.is_default => short(file),
             _ => M::INFO.identifier.to_owned(),
         };
         let guid = variant.guid();
+        if options.guid {
+            println!("{guid}");
+            return Ok(());
+        }
         let sources = match options.c_sources {
             true => self.c_sources(options.tunable, M::INFO.identifier)?,
             false => CSources::new(),
@@ -298,14 +304,7 @@ impl Builder {
     }
 
     fn variant(&self, tunable: bool) -> Result<Variant> {
-        let sources = self.sources.fingerprint()?;
-        ensure!(
-            sources == self.compiled_from,
-            "the sources have changed since this program was compiled; start it with `{}`, and if that does \
-             not help, touch build.rs",
-            self.command
-        );
-        Ok(Variant { sources, start: self.start.clone(), tunable })
+        Ok(Variant { sources: self.sources.fingerprint()?, start: self.start.clone(), tunable })
     }
 
     fn libraries(&self, options: &BuildOptions) -> Result<Vec<Library>> {
@@ -390,7 +389,7 @@ impl Builder {
                 profile: self.profile,
                 target: Some(WEBASSEMBLY),
                 arguments: &LINKING,
-                environment: vec![("FMU_TUNABLE", None)],
+                environment: vec![("FMU_GUID", Some(guid.clone().into()))],
             };
             runnables.push(runnable(kept.replace(NO_GUID, &guid), build.run()?, &guid)?);
         }
@@ -399,9 +398,7 @@ impl Builder {
 
     fn compile(&self, tunable: bool, target: Option<&str>, arguments: &[&str]) -> Result<PathBuf> {
         let mut environment = self.environment.clone();
-        // For crates without a build script; one of `build_script` says the same.
         environment.push(("FMU_GUID", Some(self.variant(tunable)?.guid().into())));
-        environment.push(("FMU_TUNABLE", tunable.then(|| OsString::from("1"))));
         let build = LibraryBuild {
             folder: self.sources.folder.clone(),
             package: self.package,
@@ -432,8 +429,7 @@ fn check_guid(library: &[u8], guid: &str, path: &Path) -> Result<()> {
     );
     ensure!(
         has(guid) || !has(NO_GUID),
-        "{path} has no guid, as its crate's build.rs does not call fmu_package::build_script, or INFO does not begin \
-         with info!",
+        "{path} has no guid: compile it with FMU_GUID={guid} in the environment, and let INFO begin with info!",
     );
     ensure!(
         has(guid),

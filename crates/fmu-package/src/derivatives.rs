@@ -68,6 +68,7 @@ fn check_pair<M: Exported>(points: &[(M, f64)], running: bool, unknown: u32, kno
             let time = match variable {
                 Some(known) => {
                     known.set(&mut model, &Value::Real(at + offset));
+                    model.calculate_start();
                     model.update().ok()?;
                     *now
                 }

@@ -5,8 +5,7 @@
 //! * [`fmi2::describe`] and [`fmi3::describe`] check the model and write the description; [`structure`] has the
 //!   dependencies.
 //! * [`LibraryBuild`] compiles the library with cargo, [`pack()`] makes the FMU, [`Builder`] does all of it.
-//! * [`Fingerprint`], [`Sources`] and [`build_script`] are for the guid; they are all there is without features, for
-//!   build scripts.
+//! * [`Fingerprint`], [`Sources`] and [`Variant`] are for the guid.
 //!
 //! Each file uses only those before it:
 //!
@@ -82,7 +81,7 @@ mod universal;
 pub use content::{ContentFile, content_files};
 pub use fingerprint::Fingerprint;
 pub use sources::Sources;
-pub use variant::{NO_GUID, Variant, build_script};
+pub use variant::{NO_GUID, Variant};
 
 #[cfg(feature = "command")]
 pub use c_sources::{CSources, LINKING, WEBASSEMBLY, c_sources, check_tools};

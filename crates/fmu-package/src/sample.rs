@@ -149,6 +149,7 @@ fn set<M: Exported>(model: &mut M, point: &Point, which: impl Fn(&Variable<M>) -
             && which(variable)
         {
             variable.set(model, value);
+            model.calculate_start();
         }
     }
     model.update()

@@ -1,4 +1,4 @@
-//! What an FMU is made from, as files: hashed for its guid, watched by the build script, packed.
+//! The files that an FMU is made from: hashed for its guid, packed.
 
 use crate::content::{ContentFile, content_files};
 use crate::fingerprint::Fingerprint;
@@ -83,26 +83,6 @@ impl Sources {
             add(&file.name, &file.path)?;
         }
         Ok(fingerprint.guid())
-    }
-
-    /// What a build script must watch to run again whenever the hash changes.
-    ///
-    /// # Errors
-    /// When the folder of the content cannot be read, or cargo does not say what the package is made of.
-    pub fn watched(&self) -> Result<Vec<PathBuf>> {
-        let mut paths: Vec<PathBuf> = self.compiled()?.into_iter().map(|(_, place)| place).collect();
-        paths.extend(self.licenses.iter().map(|name| self.folder.join(name)));
-        if let Some(content) = self.content {
-            let folder = self.folder.join(content);
-            for entry in fs::read_dir(&folder).with_context(|| format!("cannot read {}", folder.display()))? {
-                let entry = entry?;
-                if !self.not_content.iter().any(|name| entry.file_name() == *name) {
-                    paths.push(entry.path());
-                }
-            }
-        }
-        paths.sort();
-        Ok(paths)
     }
 
     /// What the library is compiled from: files, and folders of which all files count but hidden ones. Each with

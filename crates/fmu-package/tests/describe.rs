@@ -326,6 +326,6 @@ fn impossible_changes_are_refused() {
 }
 
 #[test]
-fn a_library_without_build_script_has_the_guid_of_none() {
+fn a_library_that_is_compiled_without_a_guid_has_zeros() {
     assert_eq!(info!("Toy", "toy").guid, NO_GUID);
 }

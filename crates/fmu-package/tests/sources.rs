@@ -41,7 +41,6 @@ fn fingerprint(folder: &Path) -> String {
 fn whatever_is_compiled_makes_another_guid() {
     let folder = tempfile::tempdir().unwrap();
     project(folder.path());
-    let watched = Sources::of_package(folder.path().join("all/model")).watched().unwrap();
     for (file, counts) in [
         ("all/model/src/lib.rs", true),
         ("all/model/src/table.csv", true),
@@ -63,7 +62,6 @@ fn whatever_is_compiled_makes_another_guid() {
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(&path, fs::read_to_string(&path).unwrap_or_default() + "\n# more\n").unwrap();
         assert_eq!(fingerprint(folder.path()) != before, counts, "{file}");
-        assert!(!counts || watched.iter().any(|watched| path.starts_with(watched)), "{file}: {watched:?}");
     }
 }
 

@@ -13,7 +13,7 @@ fn symbols(checker: &Checker) -> anyhow::Result<()> {
     writer.add(Step::Version(if checker.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned()));
     let [late, now] = [false, true].map(|now| {
         let setting = Setting { now, ..checker.setting.clone() };
-        crate::run::play(&setting, &writer.script, checker.limit, &checker.scratch)
+        checker.workers.play(&setting, &writer.script, checker.limit)
     });
     if let (End::Done, End::Unloadable(why)) = (late?.end, now?.end) {
         let claim = Claim::new(

@@ -10,7 +10,12 @@ use fmi_abi::calls::signatures;
 use fmi_abi::{Interface, Mode};
 use std::sync::Arc;
 
-/// Plays scripts until three of them have crashed or hung; the rest is more of the same.
+/// Crashes after which further scripts would only repeat what is known.
+const CRASHES: usize = 40;
+/// Hangs after which it is not worth while to wait for more.
+const HANGS: usize = 2;
+
+/// Plays scripts until `CRASHES` of them have crashed or `HANGS` have hung.
 fn all(checker: &Checker, claim: &Claim, scripts: impl IntoIterator<Item = Script>) -> anyhow::Result<()> {
     let nothing: Judge = Arc::new(|_| None);
     let (mut crashes, mut hangs) = (0, 0);
@@ -20,7 +25,7 @@ fn all(checker: &Checker, claim: &Claim, scripts: impl IntoIterator<Item = Scrip
             End::Done => {}
             _ => crashes += 1,
         }
-        if crashes >= 40 || hangs >= 2 {
+        if crashes >= CRASHES || hangs >= HANGS {
             break;
         }
     }

@@ -1,8 +1,8 @@
 //! The life of an instance in every order that the standard allows.
 
-use crate::checker::{Checker, Claim, refused, refused_one};
+use crate::checker::{Checker, Claim, event, refused, refused_one};
 use crate::finding::{Grade, Judge};
-use crate::script::{Arg, Kind, Step};
+use crate::script::{Arg, Step};
 use crate::writer::{Course, Point, Writer};
 use fmi_abi::Interface;
 use std::sync::Arc;
@@ -328,7 +328,7 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
     );
     let judge: Judge = Arc::new(move |run| {
         asked.iter().find_map(|(id, time)| {
-            let event = event_of(run, *id, fmi3)?;
+            let event = event(run, *id, fmi3)?;
             let past = !event.again && event.next? <= *time;
             past.then(|| format!("at {time:?} the next event is at {:?}", event.next.unwrap_or_default()))
         })
@@ -350,7 +350,7 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
     let ids = writer.update(0, 3);
     let judge: Judge = Arc::new(move |run| {
         let last = *ids.last()?;
-        let event = event_of(run, last, fmi3)?;
+        let event = event(run, last, fmi3)?;
         let past = !event.again && event.next? <= late;
         past.then(|| {
             format!(
@@ -373,7 +373,7 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
         "The iteration of an event comes to an end.",
     );
     let judge: Judge = Arc::new(move |run| {
-        let all = ids.iter().all(|id| event_of(run, *id, fmi3).is_some_and(|event| event.again));
+        let all = ids.iter().all(|id| event(run, *id, fmi3).is_some_and(|event| event.again));
         all.then(|| "after 100 updates of the discrete states another one is needed".to_owned())
     });
     checker.judge(&claim, writer.script, judge)?;
@@ -409,7 +409,7 @@ fn changed_states(checker: &Checker, course: &Course, section: &'static str) -> 
     let judge: Judge = Arc::new(move |run| {
         asked.iter().find_map(|(time, before, updates, after)| {
             // What did not succeed is another finding.
-            let said = |id: &u32| event_of(run, *id, fmi3).is_none_or(|event| event.states_changed);
+            let said = |id: &u32| event(run, *id, fmi3).is_none_or(|event| event.states_changed);
             let (was, is) = (run.written(*before)?, run.written(*after)?);
             let good = [before, after].iter().all(|id| run.status(**id).is_some_and(|status| status <= 1));
             let place = was.differ(is).filter(|_| good && !updates.iter().any(said))?;
@@ -419,32 +419,4 @@ fn changed_states(checker: &Checker, course: &Course, section: &'static str) -> 
     });
     checker.judge(&claim, writer.script, judge)?;
     Ok(())
-}
-
-/// What an update says.
-struct Event {
-    /// It needs another one.
-    again: bool,
-    states_changed: bool,
-    /// The next time event.
-    next: Option<f64>,
-}
-
-/// What a successful update says.
-fn event_of(run: &crate::script::Run, id: u32, fmi3: bool) -> Option<Event> {
-    let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
-    if fmi3 {
-        let flag =
-            |place: usize| outcome.written.get(place).is_some_and(|of| of.numbers().first() == Some(&1.0));
-        let next = outcome.written.get(5)?.numbers().first().copied();
-        return Some(Event { again: flag(0), states_changed: flag(3), next: next.filter(|_| flag(4)) });
-    }
-    // Of fmi2EventInfo: five flags, two to a word, and the time.
-    let crate::script::Written::Numbers(Kind::U64, words) = outcome.written.first()? else { return None };
-    let [again, changed, defined, time] = words[..] else { return None };
-    Some(Event {
-        again: again as u32 != 0,
-        states_changed: changed >> 32 != 0,
-        next: (defined as u32 != 0).then(|| f64::from_bits(time)),
-    })
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// How many bytes after an array may be touched: none, so that it is a crash, or some, so that it is seen.
 pub static AFTER: AtomicUsize = AtomicUsize::new(0);
 
-/// Memory is kept for the next array: in repetitions there is no time to map it anew.
+/// Memory is kept for the next array: to map it again takes time in repetitions, and lets threads wait for each other.
 pub static KEEP: AtomicBool = AtomicBool::new(false);
 
 /// What memory is filled with before a call.

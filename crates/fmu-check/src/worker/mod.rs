@@ -3,6 +3,8 @@
 
 mod measure;
 mod memory;
+#[cfg(target_os = "linux")]
+mod server;
 
 use crate::script::{Arg, Kind, Make, Message, NOBODY, Numbered, Outcome, Script, Setting, Step, Written};
 use fmi_abi::c_types::{c_char, c_int, c_void};
@@ -12,11 +14,13 @@ use fmi_abi::fmi3::types::fmi3LogMessageCallback;
 pub use memory::FILL;
 use memory::Guarded;
 use serde::{Deserialize, Serialize};
+#[cfg(target_os = "linux")]
+pub use server::Answer;
 use std::collections::HashMap;
 use std::ffi::{CStr, CString};
 use std::fs::File;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -39,8 +43,6 @@ pub struct Job {
     pub script: Script,
     /// Serialized bytes of processes before.
     pub bytes: HashMap<usize, Vec<u8>>,
-    /// Where to write what came of it, a line for each step.
-    pub outcomes: PathBuf,
 }
 
 /// The last line that a worker writes.
@@ -54,16 +56,33 @@ pub struct Last {
 /// anything else.
 pub fn work_if_asked() {
     let Some(job) = std::env::var_os(VARIABLE) else { return };
-    let status = match work(Path::new(&job)) {
+    #[cfg(target_os = "linux")]
+    if job.is_empty() {
+        end(server::serve());
+    }
+    end(work_from_files(Path::new(&job)))
+}
+
+/// Plays the job in a file, and writes the outcomes to a file next to it.
+fn work_from_files(job: &Path) -> Result<(), String> {
+    let said = |error: std::io::Error| error.to_string();
+    let read = std::fs::read(job).map_err(said)?;
+    let outcomes = File::create(job.with_file_name("outcomes")).map_err(said)?;
+    work(serde_json::from_slice(&read).map_err(|error| error.to_string())?, outcomes);
+    Ok(())
+}
+
+/// Ends the process without the exit handlers of the library, which are not tested. Its buffered output is written.
+fn end(result: Result<(), String>) -> ! {
+    let status = match result {
         Ok(()) => PLAYED,
         Err(error) => {
             eprintln!("{error}");
             OWN_FAULT
         }
     };
-    // Without what the library has for the end of a process: it is not what is tested. What it has printed is kept.
     #[cfg(unix)]
-    // SAFETY: writes what the C library still has, and ends the process.
+    // SAFETY: writes the buffers of the C library, and ends the process.
     unsafe {
         libc::fflush(std::ptr::null_mut());
         libc::_exit(status)
@@ -72,15 +91,12 @@ pub fn work_if_asked() {
     std::process::exit(status)
 }
 
-fn work(job: &Path) -> Result<(), String> {
-    let read = std::fs::read(job).map_err(|error| error.to_string())?;
-    let job: Job = serde_json::from_slice(&read).map_err(|error| error.to_string())?;
+/// Plays a call sequence, and writes a line to the file for the outcome of each step.
+fn work(job: Job, file: File) {
     limit(job.setting.memory);
     if job.setting.soft {
         memory::AFTER.store(4096, std::sync::atomic::Ordering::Relaxed);
     }
-    let file =
-        File::options().create(true).append(true).open(&job.outcomes).map_err(|error| error.to_string())?;
     let player = Player {
         setting: job.setting,
         libraries: Mutex::default(),
@@ -92,7 +108,6 @@ fn work(job: &Path) -> Result<(), String> {
     };
     player.play(&job.script, true);
     player.write(&Last { bytes: std::mem::take(&mut locked(&player.bytes)) });
-    Ok(())
 }
 
 /// What the process may use.
@@ -239,13 +254,15 @@ impl Player {
                         last.iter().for_each(|outcome| self.write(outcome));
                     }
                 }
-                Step::Parallel(scripts) => std::thread::scope(|scope| {
-                    let plays: Vec<_> =
-                        scripts.iter().map(|script| scope.spawn(|| self.play(script, tell))).collect();
-                    for play in plays {
-                        let _ = play.join();
-                    }
-                }),
+                Step::Parallel(scripts) => {
+                    memory::KEEP.store(true, Ordering::Relaxed);
+                    std::thread::scope(|scope| {
+                        for script in scripts {
+                            scope.spawn(|| self.play(script, tell));
+                        }
+                    });
+                    memory::KEEP.store(false, Ordering::Relaxed);
+                }
                 step => self.one(step, &mut outcome),
             }
             if tell {

@@ -1,5 +1,5 @@
-/* A wagon on a spring as an FMU of FMI 2.0 or, with -DFMI=3, of 3.0: without faults, or with the one that -DMUTANT=M_name
-   puts in. It needs no headers of FMI: nothing here is taken from what is tested. */
+/* A wagon on a spring as an FMU of FMI 2.0 or, with -DFMI=3, of 3.0: without faults, or with the one that WAGON_FAULT names
+   in the environment; -DSYMBOL_MISSING and -DWITHOUT_NOMINALS put in two that the linker sees. It needs no headers of FMI: nothing here is taken from what is tested. */
 #define _GNU_SOURCE
 #include <fcntl.h>
 #include <locale.h>
@@ -16,27 +16,35 @@
 #define FMI 2
 #endif
 
-enum {
-    M_none, M_half_set, M_getter_changes, M_lossy_state, M_state_without_event, M_bytes_with_address, M_bytes_without_input,
-    M_restore_consumes, M_save_changes, M_handle_not_reused, M_freed_handle_stays, M_adjoint_off, M_directional_sign,
-    M_directional_not_linear, M_derivative_changes, M_write_past, M_write_before, M_read_past, M_write_const,
-    M_shared_static, M_racing_static, M_leak_instance, M_leak_state, M_leak_step, M_file_left, M_thread_left,
-    M_reset_without_count, M_reset_keeps_parameter, M_address_in_result, M_unwritten_memory, M_event_in_the_past,
-    M_events_without_end, M_start_value, M_set_ignored, M_boolean_two, M_output_unwritten, M_whole_out_of_range,
-    M_parameter_drifts, M_version_wrong, M_state_not_supported, M_status_unknown, M_free_null_crashes,
-    M_terminate_refused, M_reset_refused, M_get_after_end_refused, M_second_run_refused, M_category_unknown, M_log_latin1,
-    M_silent, M_log_when_off, M_endless_step, M_null_crashes, M_bytes_crash, M_reference_crashes, M_reference_exits,
-    M_vector_swapped, M_nominal_zero, M_time_lags, M_last_time_wrong, M_name_kept, M_rounding_changed, M_locale_changed,
-    M_discard_changes, M_step_refused_halfway, M_reading_once, M_text_latin1, M_token_ignored, M_crash_amid,
-    M_text_cut, M_text_leaks, M_reset_keeps_text, M_directional_imprecise, M_directional_added, M_event_moves_silently,
-    M_event_loses_input, M_early_time_wrong, M_early_unsaid, M_name_in_result, M_reference_once, M_start_time_ignored, M_last_step_refused,
-    M_step_overshoots, M_step_adds, M_lossy_when_late, M_step_prints, M_symbol_missing, M_start_in_mode_ignored, M_event_again_now,
-    M_name_gone
-};
-#ifndef MUTANT
-#define MUTANT M_none
-#endif
-#define IS(name) (MUTANT == M_##name)
+#define FAULTS(X) \
+    X(half_set) X(getter_changes) X(lossy_state) X(state_without_event) X(bytes_with_address) X(bytes_without_input)   \
+    X(restore_consumes) X(save_changes) X(handle_not_reused) X(freed_handle_stays) X(adjoint_off)                      \
+    X(directional_sign) X(directional_not_linear) X(derivative_changes) X(write_past) X(write_before) X(read_past)     \
+    X(write_const) X(shared_static) X(racing_static) X(leak_instance) X(leak_state) X(leak_step) X(file_left)          \
+    X(thread_left) X(reset_without_count) X(reset_keeps_parameter) X(address_in_result) X(unwritten_memory)            \
+    X(event_in_the_past) X(events_without_end) X(start_value) X(set_ignored) X(boolean_two) X(output_unwritten)        \
+    X(whole_out_of_range) X(parameter_drifts) X(version_wrong) X(state_not_supported) X(status_unknown)                \
+    X(free_null_crashes) X(terminate_refused) X(reset_refused) X(get_after_end_refused) X(second_run_refused)          \
+    X(category_unknown) X(log_latin1) X(silent) X(log_when_off) X(endless_step) X(null_crashes) X(bytes_crash)         \
+    X(reference_crashes) X(reference_exits) X(vector_swapped) X(nominal_zero) X(time_lags) X(last_time_wrong)          \
+    X(name_kept) X(rounding_changed) X(locale_changed) X(discard_changes) X(step_refused_halfway) X(reading_once)      \
+    X(text_latin1) X(token_ignored) X(crash_amid) X(text_cut) X(text_leaks) X(reset_keeps_text)                        \
+    X(directional_imprecise) X(directional_added) X(event_moves_silently) X(event_loses_input) X(early_time_wrong)     \
+    X(early_unsaid) X(name_in_result) X(reference_once) X(start_time_ignored) X(last_step_refused)                     \
+    X(step_overshoots) X(step_adds) X(lossy_when_late) X(step_prints) X(start_in_mode_ignored) X(event_again_now)      \
+    X(name_gone)                                                                                                      
+#define NUMBER(name) M_##name,
+#define NAME(name) #name,
+enum { M_none, FAULTS(NUMBER) M_all };
+static int fault;
+#define IS(name) (fault == M_##name)
+
+__attribute__((constructor)) static void choose(void) {
+    static const char *const names[] = { "none", FAULTS(NAME) };
+    const char *name = getenv("WAGON_FAULT");
+    if (!name) return;
+    while (strcmp(name, names[fault])) if (++fault == M_all) abort();
+}
 
 #if FMI == 3
 #define API(name) fmi3##name
@@ -301,7 +309,9 @@ static int step(void *c, double point, double size) {
     if (fabs(point - m->s.time) > 1e-9 * (1 + fabs(point))) return no(m, "another time");
     if (IS(last_step_refused) && point + size >= m->s.stop) return no(m, "it is over");
     if (IS(step_prints)) puts("a step");
-    if (IS(symbol_missing) && size == 0.123) return nobody_has_it();
+#ifdef SYMBOL_MISSING
+    if (size == 0.123) return nobody_has_it();
+#endif
     if (IS(step_adds)) m->s.x += 1e-7;
     integrate(m, IS(step_overshoots) ? point + 1e-3 * ceil(size / 1e-3 - 1e-9) : point + size);
     m->s.steps++;

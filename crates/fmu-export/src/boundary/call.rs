@@ -21,7 +21,7 @@ compile_error!("an FMU must not end the importer's process: build with panic = \
 /// threads that step them do not take them from each other.
 #[repr(align(128))]
 pub(crate) struct Component<M> {
-    /// Whether the importer's log callback is running: it must not call back.
+    /// Whether the importer's log callback is running: it must not call back. The instance's situation says so, too.
     pub delivering: Cell<bool>,
     pub instance: UnsafeCell<Instance<M>>,
     pub importer: ImporterLog,
@@ -42,28 +42,68 @@ pub(crate) unsafe fn call<M: Exported>(
     let Some(component) = (unsafe { c.cast::<Component<M>>().as_ref() }) else {
         return Status::Error;
     };
-    if component.delivering.get() {
-        return Status::Error;
-    }
     // SAFETY: by contract no other thread is here, and no call on this thread: none is running a body, because bodies
     // call nothing of the importer's, and none is delivering. The reference ends with this function's use of it, before
     // anything is delivered.
     let instance = unsafe { &mut *component.instance.get() };
-    let outcome = catch_unwind(AssertUnwindSafe(|| {
-        if !instance.situation().is_in(rule.accepted()) {
-            return refuse_call(instance, rule.accepted());
-        }
+    if !instance.situation().is_in(rule.accepted()) {
+        return not_allowed(component, rule);
+    }
+    let ended = catch_unwind(AssertUnwindSafe(|| {
         let outcome = body(instance);
         instance.listen();
         outcome
     }));
-    match outcome {
+    match ended {
         Ok(Ok(())) if instance.logger.is_empty() => Status::Ok,
         other => finish(component, rule.name, other),
     }
 }
 
+/// The short way of a call, if it can be gone: what it does is all that the call does, or false and nothing.
+///
+/// # Safety
+/// As above.
+#[inline(always)]
+pub(crate) unsafe fn call_at_once<M: Exported>(
+    c: *mut c_void,
+    rule: &'static Rule,
+    way: impl FnOnce(*mut Instance<M>) -> bool,
+) -> Option<Status> {
+    // SAFETY: as above.
+    let component = unsafe { c.cast::<Component<M>>().as_ref() }?;
+    let instance = component.instance.get();
+    // SAFETY: as above.
+    if !unsafe { &*instance }.situation().is_in(rule.accepted()) {
+        return None;
+    }
+    // A pointer is handed on, because of what a reference refers to the compiler may read more than what is asked for. If a
+    // part of it was written right before, the processor waits.
+    //
+    // SAFETY: as above.
+    let walk = || way(instance).then(|| unsafe { &mut *instance }.listen());
+    match catch_unwind(AssertUnwindSafe(walk)) {
+        Ok(Some(false)) => Some(Status::Ok),
+        Ok(None) => None,
+        Ok(Some(true)) => Some(finish(component, rule.name, Ok(Ok(())))),
+        Err(panic) => Some(finish(component, rule.name, Err(panic))),
+    }
+}
+
+/// A call that is not in the table of allowed calls, or comes out of the log callback: an error without a message.
 #[cold]
+#[inline(never)]
+fn not_allowed<M: Exported>(component: &Component<M>, rule: &'static Rule) -> Status {
+    if component.delivering.get() {
+        return Status::Error;
+    }
+    let refusal = catch_unwind(AssertUnwindSafe(|| {
+        // SAFETY: as in `call`, which has no use for its reference any more.
+        refuse_call(unsafe { &*component.instance.get() }, rule.accepted())
+    }));
+    finish(component, rule.name, refusal)
+}
+
 fn refuse_call<M: Exported>(instance: &Instance<M>, accepted: Situations) -> Outcome {
     let (interface, mode) = (instance.interface(), instance.mode());
     let allowed = accepted.names(instance.standard(), interface);
@@ -103,11 +143,14 @@ pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: E
                     );
                 }
             }
+            instance.while_delivering(true);
             instance.logger.take()
         };
         component.delivering.set(true);
         messages.iter().for_each(|message| component.importer.deliver(message));
         component.delivering.set(false);
+        // SAFETY: as above: what was called back is over.
+        unsafe { &mut *component.instance.get() }.while_delivering(false);
     };
     forget_panic(catch_unwind(AssertUnwindSafe(deliver)));
     if let Err(panic) = ended {

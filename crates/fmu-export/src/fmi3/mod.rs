@@ -44,7 +44,7 @@ pub const fn reference(place: u32) -> fmi3ValueReference {
 /// A [value reference](reference()) as an importer passes it.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-struct FromOne(fmi3ValueReference);
+pub(crate) struct FromOne(fmi3ValueReference);
 
 impl Reference for FromOne {
     const ARRAYS: bool = true;

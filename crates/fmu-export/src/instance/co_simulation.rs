@@ -33,7 +33,7 @@ impl<M: Exported> Instance<M> {
     #[inline]
     pub fn do_step(&mut self, point: f64, step_size: f64) -> Outcome {
         match self.step(point, step_size)? {
-            Stepped::Done => Ok(()),
+            Stepped::Done | Stepped::Calculated => Ok(()),
             early => self.ended_early(early, point + step_size),
         }
     }
@@ -70,11 +70,25 @@ impl<M: Exported> Instance<M> {
         self.listen();
         if let Some(before) = &self.before {
             self.state.clone_from(before);
+            self.enter(self.state.mode);
         }
         why
     }
 
-    #[inline]
+    /// A step that begins where the last one ended and needs no further look. If it is none, it returns false and has
+    /// changed nothing.
+    #[inline(always)]
+    pub fn step_at_once(&mut self, point: f64, step_size: f64) -> bool {
+        let end = point + step_size;
+        let is_usual = !Self::ENDS_EARLY && point == self.state.time && end > point && end <= self.latest_end;
+        if !is_usual || !self.state.model.exported_step_at_once(step_size) {
+            return false;
+        }
+        self.state.stale = false;
+        self.state.time = end;
+        true
+    }
+
     pub(super) fn step(&mut self, point: f64, step_size: f64) -> Outcome<Stepped> {
         let end = point + step_size;
         // False for what is no number, too.
@@ -109,8 +123,12 @@ impl<M: Exported> Instance<M> {
             }
         }
         let stepped = self.exported_step(point, step_size)?;
-        self.state.stale = true;
-        if let Stepped::Done = stepped {
+        self.state.stale = stepped != Stepped::Calculated;
+        if !self.state.started {
+            self.state.started = true;
+            self.enter(self.state.mode);
+        }
+        if let Stepped::Done | Stepped::Calculated = stepped {
             self.state.time = end;
             return Ok(stepped);
         }
@@ -206,6 +224,7 @@ impl<M: Exported> Instance<M> {
         self.enter(Mode::StepComplete);
     }
 
+    #[inline]
     pub fn last_successful_time(&self) -> f64 {
         self.state.time
     }

@@ -1,6 +1,7 @@
 //! Derivatives with respect to variables (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0) and to time (section 4.2.1 of FMI
 //! 2.0, 4.1.2 of FMI 3.0).
 
+use super::values::is_finite;
 use super::{Instance, Outcome, Reference, finite, independent, refuse};
 use crate::causality::{Causality, Initial, Variability};
 use crate::export::Exported;
@@ -25,21 +26,20 @@ impl<M: Exported> Instance<M> {
         }
         self.calculated();
         let initial = self.mode() == Mode::Initialization;
-        // 0 as long as all sums are finite, which they are only if all seeds are.
-        let mut none = 0.0;
+        // Finite only if all sums are, and these only if all seeds are.
+        let mut total = 0.0;
         for (column, known) in knowns.iter().enumerate() {
             self.check_known(*known, initial)?;
             let is_time = known.place() == independent::<M>().0;
             let by = (!is_time).then(|| M::element(known.place()));
             let partial = self.state.model.exported_partials(by, initial);
-            #[expect(clippy::eq_op, reason = "the difference is NaN for what is not finite")]
             let mut add = |unknown: R, seed: f64, sum: &mut f64| {
                 self.check_unknown(unknown, initial)?;
                 let Some(partial) = partial(M::element(unknown.place())) else {
                     return self.refuse_partial(unknown, *known);
                 };
                 *sum += partial * seed;
-                none += *sum - *sum;
+                total += *sum;
                 Ok(())
             };
             if ADJOINT {
@@ -50,7 +50,7 @@ impl<M: Exported> Instance<M> {
                 pairs.try_for_each(|(unknown, sum)| add(*unknown, seed[column], sum))?;
             }
         }
-        if none == 0.0 && !unknowns.is_empty() && !knowns.is_empty() {
+        if is_finite(total) && !unknowns.is_empty() && !knowns.is_empty() {
             return Ok(());
         }
         unknowns.iter().try_for_each(|unknown| self.check_unknown(*unknown, initial))?;

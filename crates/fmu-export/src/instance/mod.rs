@@ -16,6 +16,7 @@ pub(crate) use co_simulation::no_status;
 pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
 pub use trial::{SavedTrial, Trial};
 
+use crate::boundary::Placed;
 use crate::capabilities::Events;
 use crate::causality::Causality;
 use crate::export::Exported;
@@ -35,6 +36,10 @@ pub(crate) struct Instance<M> {
     /// The state of the standards' state machines, the standard and the interface type, as one bit; follows from
     /// them.
     situation: Situation,
+    /// The same once the model has started, before that nowhere: then Reals are set in their places.
+    started_in: Situation,
+    /// The latest end of a step that needs no further look; follows from the state, too.
+    latest_end: f64,
     importer: Importer,
     setup: Setup,
     state: State<M>,
@@ -104,11 +109,13 @@ struct State<M> {
     mode: Mode,
     /// Whether the model must calculate before anything is read.
     stale: bool,
+    /// Whether the model has stepped or been in Continuous-Time Mode, as far as the instance knows.
+    started: bool,
     /// Whether the model wants the simulation to end.
     ended: bool,
     time: f64,
     experiment: Experiment,
-    model: M,
+    model: Placed<M>,
 }
 
 impl<M: Clone> Clone for State<M> {
@@ -118,8 +125,9 @@ impl<M: Clone> Clone for State<M> {
 
     /// Passes on to the model, which may have a way to clone into what is there already.
     fn clone_from(&mut self, source: &Self) {
-        let Self { mode, stale, ended, time, experiment, model } = source;
-        (self.mode, self.stale, self.ended, self.time) = (*mode, *stale, *ended, *time);
+        let Self { mode, stale, started, ended, time, experiment, model } = source;
+        (self.mode, self.stale, self.started) = (*mode, *stale, *started);
+        (self.ended, self.time) = (*ended, *time);
         self.experiment = *experiment;
         self.model.clone_from(model);
     }
@@ -131,10 +139,11 @@ impl<M: Exported> State<M> {
         Ok(Self {
             mode: Mode::Instantiated,
             stale: true,
+            started: false,
             ended: false,
             time: 0.0,
             experiment: Experiment::default(),
-            model: M::new(setup)?,
+            model: Placed::new(M::new(setup)?),
         })
     }
 }
@@ -162,6 +171,8 @@ impl<M: Exported> Instance<M> {
         let mut instance = Self {
             logger: Logger::new(importer.standard, logging_on),
             situation: Situation::new(importer.standard, setup.interface, state.mode),
+            started_in: Situation::NOWHERE,
+            latest_end: f64::NEG_INFINITY,
             importer,
             setup,
             before: may_fail_half_way.then(|| Box::new(state.clone())),
@@ -197,6 +208,19 @@ impl<M: Exported> Instance<M> {
     fn enter(&mut self, mode: Mode) {
         self.state.mode = mode;
         self.situation = Situation::new(self.importer.standard, self.setup.interface, mode);
+        (self.started_in, self.latest_end) = match self.state.started {
+            true => (self.situation, self.state.experiment.stop_time.unwrap_or(f64::MAX)),
+            false => (Situation::NOWHERE, f64::NEG_INFINITY),
+        };
+    }
+
+    /// While messages are delivered nothing is allowed.
+    #[cold]
+    pub fn while_delivering(&mut self, is_delivering: bool) {
+        self.enter(self.state.mode);
+        if is_delivering {
+            self.situation = Situation::NOWHERE;
+        }
     }
 
     /// Replaces everything that a saved state holds.
@@ -212,10 +236,10 @@ impl<M: Exported> Instance<M> {
         self.enter(Mode::Fatal);
     }
 
-    /// Takes over what the model has to say.
+    /// Takes over what the model has to say. Returns whether it said anything.
     #[inline]
-    pub fn listen(&mut self) {
-        self.logger.listen(&mut self.state.model);
+    pub fn listen(&mut self) -> bool {
+        self.logger.listen(&mut *self.state.model)
     }
 
     pub fn setup_experiment(&mut self, experiment: Experiment) -> Outcome {
@@ -295,11 +319,11 @@ impl<M: Exported> Instance<M> {
     ) -> Outcome<T> {
         // A copy has nothing to say yet, and one that is dropped has been heard.
         self.listen();
-        let mut draft = self.state.model.clone();
+        let mut draft = M::clone(&self.state.model);
         let changed = change(&mut draft);
         self.logger.listen(&mut draft);
         let changed = changed.map_err(Into::into)?;
-        self.state.model = draft;
+        *self.state.model = draft;
         self.state.stale = true;
         Ok(changed)
     }
@@ -307,6 +331,11 @@ impl<M: Exported> Instance<M> {
     /// The model with all calculated that is read.
     #[inline]
     fn calculated(&mut self) -> &M {
+        self.calculated_in_place()
+    }
+
+    #[inline]
+    fn calculated_in_place(&mut self) -> &Placed<M> {
         if self.state.stale {
             self.state.stale = false;
             self.state.model.calculate(self.state.time);

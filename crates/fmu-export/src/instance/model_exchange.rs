@@ -35,7 +35,7 @@ impl<M: Exported> Instance<M> {
 
     pub fn enter_continuous_time_mode(&mut self) {
         self.state.model.exported_continuous_time_entered();
-        self.state.stale = true;
+        (self.state.stale, self.state.started) = (true, true);
         self.enter(Mode::ContinuousTime);
     }
 

@@ -87,7 +87,7 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
     check(state)?;
     state.model.restored()?;
     state.model.update()?;
-    state.stale = true;
+    (state.stale, state.started) = (true, false);
     Ok(())
 }
 

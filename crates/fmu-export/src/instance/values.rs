@@ -22,15 +22,36 @@ impl<M: Exported> Instance<M> {
             return self.get_reals_of_arrays(|number| vr[number].place(), values);
         }
         let time = self.state.time;
-        let model = self.calculated();
-        // 0 as long as all values are finite: one question at the end costs less than one for each.
-        let mut none = 0.0;
+        let model = self.calculated_in_place();
+        let mut sum = 0.0;
         for (vr, value) in vr.iter().zip(&mut *values) {
-            let read = M::TABLE[vr.place() as usize].real(model).unwrap_or(time);
-            none += read * 0.0;
+            let mut read = model.real_in_place(vr.place());
+            if read.is_nan() {
+                read = M::TABLE[vr.place() as usize].real(model).unwrap_or(time);
+            }
+            sum += read;
             value.write(read);
         }
-        if none == 0.0 { Ok(()) } else { self.get_reals_one_by_one(vr, values) }
+        if is_finite(sum) { Ok(()) } else { self.get_reals_one_by_one(vr, values) }
+    }
+
+    /// The same if nothing must be calculated, and all are simply read and finite. If not, it returns false and has
+    /// written nothing.
+    #[inline(always)]
+    pub fn get_reals_at_once<R: Reference, const N: usize>(
+        &mut self,
+        vr: &[R; N],
+        values: &mut [MaybeUninit<f64>; N],
+    ) -> bool {
+        if M::ARRAYS || self.state.stale || !vr.iter().all(|vr| (vr.place() as usize) < M::LINES.len()) {
+            return false;
+        }
+        let read = vr.map(|vr| self.state.model.real_in_place(vr.place()));
+        if !is_finite(read.iter().sum()) {
+            return false;
+        }
+        *values = read.map(MaybeUninit::new);
+        true
     }
 
     /// Elements of one array that follow each other at one go: what calculates an array is called once.
@@ -91,8 +112,35 @@ impl<M: Exported> Instance<M> {
         self.state.stale = true;
         for (vr, value) in vr.iter().zip(values) {
             M::TABLE[vr.place() as usize].set_real(&mut self.state.model, *value);
+            if !self.state.started {
+                self.state.model.calculate_start();
+            }
         }
         Ok(())
+    }
+
+    /// The same if all are simply set, and may be. If not, it returns false; then [`set_reals`](Self::set_reals) does all.
+    #[inline(always)]
+    pub fn set_reals_at_once<R: Reference, const N: usize>(
+        &mut self,
+        vr: &[R; N],
+        values: &[f64; N],
+    ) -> bool {
+        // Copied one by one, because the compiler cannot know that they are not part of the model.
+        let lines: [usize; N] = std::array::from_fn(|number| vr[number].place() as usize);
+        let values: [f64; N] = std::array::from_fn(|number| values[number]);
+        let is_taken = |line: &usize| {
+            let variable = M::TABLE.get(*line);
+            variable.is_some_and(|variable| self.started_in.is_in(variable.takes_at_once))
+        };
+        if M::ARRAYS || !lines.iter().all(is_taken) || !is_finite(values.iter().sum()) {
+            return false;
+        }
+        self.state.stale = true;
+        for (line, value) in lines.into_iter().zip(values) {
+            self.state.model.set_in_place(line as u32, value);
+        }
+        !self.state.model.missed()
     }
 
     #[cold]
@@ -213,9 +261,13 @@ impl<M: Exported> Instance<M> {
     ) -> Outcome {
         let parameters =
             vr.iter().any(|vr| M::TABLE[vr.place() as usize].causality() == Causality::Parameter);
+        let started = self.state.started;
         let set = |model: &mut M| {
             for (vr, value) in vr.iter().zip(values) {
                 M::TABLE[vr.place() as usize].set(model, &value);
+                if !started {
+                    model.calculate_start();
+                }
             }
         };
         if !parameters {
@@ -254,6 +306,14 @@ impl<M: Exported> Instance<M> {
             )
         })
     }
+}
+
+/// Whether a sum is finite: only if all its terms are. One question costs less than one for each.
+#[inline(always)]
+#[expect(clippy::eq_op, reason = "the difference is NaN if the sum is not finite")]
+pub(super) fn is_finite(sum: f64) -> bool {
+    // Takes half as many instructions as `f64::is_finite`.
+    !(sum - sum).is_nan()
 }
 
 /// Numbers must be finite, parameters in the range of their type, items those of their enumeration.

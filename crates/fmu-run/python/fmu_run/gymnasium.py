@@ -4,7 +4,7 @@
                 reward=lambda before, action, after: -abs(after[:, 0]))
     envs = VectorEnv(task, 1024)
 
-Needs the package gymnasium: pip install fmu-run[gymnasium].
+Needs the package gymnasium: pip install gymnasium.
 """
 
 from __future__ import annotations

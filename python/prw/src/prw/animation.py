@@ -55,7 +55,7 @@ def animate(
         The run lacks an output, `path` has another suffix or cannot be written, or a package is missing.
     """
     suffix = "" if path is None else suffix_of(Path(path))
-    need("plot", "matplotlib")
+    need("matplotlib")
     rate = RATES[suffix]
     length = float(run.time[-1] - run.time[0])
     if speed is None:
@@ -77,7 +77,7 @@ def suffix_of(path: Path) -> str:
     suffix = path.suffix.lower()
     if not suffix or suffix not in RATES:
         raise UserError(f"{path}: an animation is a .gif, an .mp4 or an .html")
-    need("plot", "matplotlib")
+    need("matplotlib")
     if suffix == ".mp4":
-        need("movie", "imageio_ffmpeg")
+        need("imageio_ffmpeg")
     return suffix

@@ -76,7 +76,7 @@ def write_page(path: Path, title: str, courses: Mapping[str, Array], speed: floa
 
 def write_movie(path: Path, pictures: Iterable[Image.Image], rate: int) -> None:
     """Write an MP4 of `rate` pictures a second. Raises UserError where a package is missing."""
-    need("movie", "imageio_ffmpeg")
+    need("imageio_ffmpeg")
     import imageio_ffmpeg
 
     try:

@@ -62,7 +62,7 @@ class Run(Mapping[str, Array]):
 
     def to_pandas(self) -> pandas.DataFrame:
         """The columns of `to_csv` as a DataFrame, with the time as index. Raises UserError without pandas."""
-        need("pandas", "pandas")
+        need("pandas")
         import pandas
 
         from prw.output import inputs_of
@@ -76,7 +76,7 @@ class Run(Mapping[str, Array]):
         angles: show angles, in degrees, of motors and wrist. Otherwise velocities only, as in Fig. 4. Raises UserError
         without matplotlib.
         """
-        need("plot", "matplotlib")
+        need("matplotlib")
         from prw.plots import draw_response
 
         title = f"Response to {self.motion.name}" if title is None else title

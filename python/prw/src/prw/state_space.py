@@ -72,7 +72,7 @@ class StateSpace:
 
     def to_control(self) -> control.StateSpace:
         """The same for python-control, with the signals' names. Raises UserError without the package `control`."""
-        need("control", "control")
+        need("control")
         import control
 
         names = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.outputs)}
@@ -80,7 +80,7 @@ class StateSpace:
 
     def to_scipy(self) -> scipy.signal.StateSpace:
         """The same for scipy.signal, without names. Raises UserError without the package `scipy`."""
-        need("control", "scipy")
+        need("scipy")
         import scipy.signal
 
         return scipy.signal.StateSpace(self.A, self.B, self.C, self.D)

@@ -113,7 +113,7 @@ class Agreement:
     def plot(self) -> Figure:
         """Result and reference of the outputs that do not agree, or of all if they do; save it with `.savefig(path)`.
         Raises UserError without matplotlib."""
-        need("plot", "matplotlib")
+        need("matplotlib")
         import matplotlib
 
         from prw.plots import STYLE, Panel, ShownFigure, draw_panel

@@ -113,7 +113,7 @@ def _csv(path: Path) -> dict[str, Array]:
 
 def _mat(path: Path) -> dict[str, Array]:
     """The columns of a .mat file by title."""
-    need("check", "scipy")
+    need("scipy")
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 

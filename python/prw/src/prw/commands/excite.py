@@ -75,7 +75,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw excite`. Raises UserError with one line on what is wrong."""
-    need("identify", "scipy", "threadpoolctl")
+    need("scipy", "threadpoolctl")
     angle, speed, acceleration, duration, rate = (
         number(str(getattr(arguments, name)), f"--{name}")
         for name in ("angle", "speed", "acceleration", "duration", "rate")

@@ -106,7 +106,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw identify`. Raises UserError with one line on what is wrong."""
-    need("identify", "scipy", "jinja2", "threadpoolctl")
+    need("scipy", "jinja2", "threadpoolctl")
     with said_of_options(
         estimate="estimate",
         parameters="set",

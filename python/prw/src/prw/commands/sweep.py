@@ -75,7 +75,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw sweep`. Raises UserError with one line on what is wrong."""
-    need("sweep", "pyarrow", *(["distributed"] if arguments.scheduler else []))
+    need("pyarrow", *(["distributed"] if arguments.scheduler else []))
     motion = fig4() if arguments.input is None else read_motion(arguments.input, degrees=arguments.degrees)
     threads = arguments.threads if arguments.threads is not None else os.cpu_count() or 1
     for option, number in (("--threads", threads), ("--runs", arguments.runs)):

@@ -99,7 +99,7 @@ def identify(
     UserError
         A file cannot be read, a name is not known, or the FMU refuses a value.
     """
-    need("identify", "scipy", "threadpoolctl")
+    need("scipy", "threadpoolctl")
     # They take a while to load.
     from threadpoolctl import threadpool_limits
 

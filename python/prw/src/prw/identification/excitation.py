@@ -72,7 +72,7 @@ def excite(
     UserError
         A name is not known, or a number makes no sense.
     """
-    need("identify", "scipy", "threadpoolctl")
+    need("scipy", "threadpoolctl")
     from threadpoolctl import threadpool_limits
 
     from prw.identification import design

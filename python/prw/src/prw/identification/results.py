@@ -218,7 +218,7 @@ class Identification:
     def report(self, path: str | os.PathLike[str]) -> None:
         """Write the report, one HTML page that needs nothing beside it: estimates, doubts, residuals. Raises UserError
         without jinja2, or where it cannot be written."""
-        need("identify", "jinja2")
+        need("jinja2")
         from prw.identification.report import page
 
         residuals = [self.residual(i) for i in range(len(self.experiments))]

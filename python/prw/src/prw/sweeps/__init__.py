@@ -82,9 +82,9 @@ def sweep(
     UserError
         An argument makes no sense, a file cannot be read or written, or the cluster does not answer.
     """
-    need("sweep", "pyarrow")
+    need("pyarrow")
     if scheduler:
-        need("cluster", "distributed")
+        need("distributed")
     path = existing_fmu(fmu)
     with Testbed(path) as testbed:
         values = layout(grid or {}, random or {}, runs, seed, testbed.starts)

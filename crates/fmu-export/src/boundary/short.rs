@@ -1,0 +1,180 @@
+//! The short ways of the C functions that every step calls, under their names and with their arguments.
+//!
+//! Each does all that is asked for and returns true, or returns false: if anything is not as usual, the long way looks closer
+//! and words what is wrong. Nothing is checked less here.
+//!
+//! # Safety
+//! The contract is that of the C functions.
+#![allow(non_snake_case)]
+#![allow(clippy::missing_safety_doc, reason = "the contract above is that of every function")]
+#![allow(clippy::too_many_arguments, reason = "as many as the standard has")]
+
+use crate::export::Exported;
+use crate::fmi3::FromOne;
+use crate::instance::{Instance, Reference};
+use fmi_abi::fmi3::types::fmi3Boolean;
+use std::mem::MaybeUninit;
+
+/// Whether these can be arrays of so many elements: not empty and not larger than memory, not NULL, and aligned.
+#[inline(always)]
+fn are_arrays(vr: *const u32, values: *const f64, count: usize) -> bool {
+    // Less 1, NULL and 0 have the highest bits set. References have half the size.
+    let highest = vr.addr().wrapping_sub(1) | values.addr().wrapping_sub(1) | count.wrapping_sub(1);
+    let lowest = (vr.addr() << 1 | values.addr()) & (size_of::<f64>() - 1);
+    highest >> (usize::BITS - 5) | lowest == 0
+}
+
+#[inline(always)]
+unsafe fn get<M: Exported, R: Reference>(
+    instance: &mut Instance<M>,
+    vr: *const u32,
+    values: *mut f64,
+    count: usize,
+) -> bool {
+    let (references, places): (_, *mut MaybeUninit<f64>) = (R::cast(vr), values.cast());
+    // SAFETY: not NULL, aligned, and so many by contract; `MaybeUninit` asks for no initialized values.
+    unsafe {
+        match count {
+            _ if !are_arrays(vr, values, count) => false,
+            4 => instance.get_reals_at_once::<R, 4>(&*references.cast(), &mut *places.cast()),
+            1 => instance.get_reals_at_once::<R, 1>(&*references.cast(), &mut *places.cast()),
+            2 => instance.get_reals_at_once::<R, 2>(&*references.cast(), &mut *places.cast()),
+            _ => false,
+        }
+    }
+}
+
+#[inline(always)]
+unsafe fn set<M: Exported, R: Reference>(
+    instance: &mut Instance<M>,
+    vr: *const u32,
+    values: *const f64,
+    count: usize,
+) -> bool {
+    let references = R::cast(vr);
+    // SAFETY: not NULL, aligned, and so many by contract.
+    unsafe {
+        match count {
+            _ if !are_arrays(vr, values, count) => false,
+            2 => instance.set_reals_at_once::<R, 2>(&*references.cast(), &*values.cast()),
+            1 => instance.set_reals_at_once::<R, 1>(&*references.cast(), &*values.cast()),
+            _ => false,
+        }
+    }
+}
+
+#[inline(always)]
+pub(crate) unsafe fn fmi2GetReal<M: Exported>(
+    instance: &mut Instance<M>,
+    vr: *const u32,
+    count: usize,
+    values: *mut f64,
+) -> bool {
+    // SAFETY: the caller's promise.
+    unsafe { get::<M, u32>(instance, vr, values, count) }
+}
+
+#[inline(always)]
+pub(crate) unsafe fn fmi2SetReal<M: Exported>(
+    instance: &mut Instance<M>,
+    vr: *const u32,
+    count: usize,
+    values: *const f64,
+) -> bool {
+    // SAFETY: the caller's promise.
+    unsafe { set::<M, u32>(instance, vr, values, count) }
+}
+
+#[inline(always)]
+pub(crate) unsafe fn fmi2DoStep<M: Exported>(
+    instance: &mut Instance<M>,
+    point: f64,
+    size: f64,
+    _no_set_fmu_state_prior_to_current_point: i32,
+) -> bool {
+    instance.step_at_once(point, size)
+}
+
+#[inline(always)]
+pub(crate) unsafe fn fmi3GetFloat64<M: Exported>(
+    instance: &mut Instance<M>,
+    vr: *const u32,
+    count: usize,
+    values: *mut f64,
+    value_count: usize,
+) -> bool {
+    // SAFETY: the caller's promise.
+    value_count == count && unsafe { get::<M, FromOne>(instance, vr, values, count) }
+}
+
+#[inline(always)]
+pub(crate) unsafe fn fmi3SetFloat64<M: Exported>(
+    instance: &mut Instance<M>,
+    vr: *const u32,
+    count: usize,
+    values: *const f64,
+    value_count: usize,
+) -> bool {
+    // SAFETY: the caller's promise.
+    value_count == count && unsafe { set::<M, FromOne>(instance, vr, values, count) }
+}
+
+#[inline(always)]
+pub(crate) unsafe fn fmi3DoStep<M: Exported>(
+    instance: &mut Instance<M>,
+    point: f64,
+    size: f64,
+    _no_set_fmu_state_prior_to_current_point: fmi3Boolean,
+    event_handling_needed: *mut fmi3Boolean,
+    terminate_simulation: *mut fmi3Boolean,
+    early_return: *mut fmi3Boolean,
+    last_successful_time: *mut f64,
+) -> bool {
+    let flags = [event_handling_needed, terminate_simulation, early_return];
+    let is_null = last_successful_time.is_null() || flags.iter().any(|flag| flag.is_null());
+    if is_null || !last_successful_time.is_aligned() || !instance.step_at_once(point, size) {
+        return false;
+    }
+    // SAFETY: not NULL and aligned, and values by contract.
+    unsafe {
+        flags.iter().for_each(|flag| flag.write(false.into()));
+        last_successful_time.write(instance.last_successful_time());
+    }
+    true
+}
+
+/// Calls a function's body for model `M`, after its short way if it has one.
+macro_rules! call {
+    (fmi2GetReal $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi2GetReal $arguments) };
+    (fmi2SetReal $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi2SetReal $arguments) };
+    (fmi2DoStep $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi2DoStep $arguments) };
+    (fmi3GetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi3GetFloat64 $arguments) };
+    (fmi3SetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi3SetFloat64 $arguments) };
+    (fmi3DoStep $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi3DoStep $arguments) };
+    (@at_once $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {{
+        // By itself, so that the short way needs no room on the stack for it.
+        #[cold]
+        #[inline(never)]
+        unsafe fn at_length<M: $crate::Exported>(
+            $c: *mut fmi_abi::c_types::c_void
+            $(, $argument: $type)*
+        ) -> fmi_abi::Status {
+            // SAFETY: the caller's promise.
+            unsafe { $crate::boundary::short::call!(@body $function($c $(, $argument: $type)*)) }
+        }
+        let way = move |instance: *mut $crate::instance::Instance<M>| {
+            $crate::boundary::short::$function(&mut *instance $(, $argument)*)
+        };
+        match $crate::boundary::call_at_once::<M>($c, Function::$function.rule(), way) {
+            Some(status) => status,
+            None => at_length::<M>($c $(, $argument)*),
+        }
+    }};
+    (@body $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {
+        $crate::boundary::call::<M>($c, Function::$function.rule(), |instance| {
+            bodies::$function(instance $(, $argument)*)
+        })
+    };
+    ($function:ident $arguments:tt) => { $crate::boundary::short::call!(@body $function $arguments) };
+}
+pub(crate) use call;

@@ -1,0 +1,49 @@
+"""fmu-check on the packed FMUs: nothing is found but the notes that docs/checking.md lists with their reasons."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import zipfile
+from pathlib import Path
+
+import pytest
+from built import FMUS, ROOT, built
+
+from tools.documentation.sources import read_table
+
+CHECK = FMUS.parent / "debug" / "cargo-fmu"
+
+
+def listed(model: str) -> list[tuple[str, str, str]]:
+    """The notes on an FMU in the documentation: severity, name, observation."""
+    rows = read_table(ROOT / "docs" / "checking.md", "This project's FMUs").rows
+    return [("note", name.strip("`"), observation) for name, fmu, observation, _ in rows if fmu == model]
+
+
+def needs_new_system(fmu: Path) -> bool:
+    """Whether the library needs a glibc that is newer than 2.28, which depends on the system it was linked on."""
+    with zipfile.ZipFile(fmu) as files:
+        library = files.read(next(name for name in files.namelist() if name.endswith((".so", ".dll", ".dylib"))))
+    return any(int(minor) > 28 for minor in re.findall(rb"GLIBC_2\.(\d+)", library))
+
+
+@pytest.mark.parametrize("model", ["prw_testbed", "prw_controller"])
+def test_nothing_is_found_but_what_is_listed(version: str, model: str) -> None:
+    fmu = built(f"{version}{model}.fmu")
+    command = [CHECK, "fmu", "check", "--fmu", fmu, "--json", "--no-shrink", "--repeat", "0.3"]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    report = json.loads(run.stdout)
+    assert report["interfaces"] == ["Co-Simulation", "Model Exchange"], run.stderr
+    assert report["unreached"] == []
+    # An observation begins with the function, whose name depends on the FMI version.
+    found = [
+        (finding["grade"], finding["name"], seen.split(" with ", 1)[-1])
+        for finding in report["findings"]
+        for seen in [finding["seen"], *finding["more"]]
+        if finding["name"] != "package.glibc"
+    ]
+    assert sorted(found) == sorted(listed(model))
+    assert any(finding["name"] == "package.glibc" for finding in report["findings"]) == needs_new_system(fmu)
+    assert run.returncode == 0, run.stderr

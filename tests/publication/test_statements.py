@@ -1,0 +1,80 @@
+"""Statements of pages and messages that can be computed: names of make targets, paths, dependencies, what can be installed."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from built import ROOT
+from test_readmes import FILES, PAGES, published, released
+from test_versions import own_packages, read
+
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
+RULES = dict(re.findall(r"^([\w-]+):(?!=)(.*)$", MAKEFILE, re.MULTILINE))
+HELP = set(re.findall(r"^\t@echo 'make ([\w-]+)", MAKEFILE, re.MULTILINE))
+CODE = re.compile(r"^```.*?^```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
+PATH = re.compile(r"`([\w.-]+/[\w./-]*|[\w-]+\.(?:rs|py|md|xml|lock))`")
+#: Directories that are made, not kept.
+MADE = ("out/", "dist/", "target/", ".venv")
+INSTALL = re.compile(r"(?:pip|cargo) install ([^`\n#;)]*)")
+TEXTS = [name for name in FILES if name.endswith((".md", ".py", ".rs", ".toml", ".html", ".yml", "Makefile"))]
+
+
+def text(name: str) -> str:
+    return str((ROOT / name).read_text(encoding="utf-8"))
+
+
+def test_named_targets_exist() -> None:
+    for name in TEXTS:
+        code = "\n".join(CODE.findall(text(name))) if name.endswith(".md") else text(name)
+        named = set(re.findall(r"(?:`|^|&& )make ([a-z][\w-]*)", code, re.MULTILINE))
+        assert name == "CHANGELOG.md" or named <= RULES.keys(), name
+
+
+def test_help_lists_every_target_that_no_other_needs() -> None:
+    (phony,) = re.findall(r"^\.PHONY: (.*)$", MAKEFILE, re.MULTILINE)
+    internal = {name for needed in RULES.values() for name in needed.split()}
+    assert HELP <= set(phony.split()) == RULES.keys()
+    assert set(phony.split()) - internal - {"help"} <= HELP
+
+
+@pytest.mark.parametrize("name", [name for name in PAGES if not name.startswith(("CHANGELOG", "crates/"))])
+def test_named_paths_exist(name: str) -> None:
+    """Checks all paths of the tour; of other pages, those that begin with a directory of the project."""
+    kept, folders = [f"/{path}/" for path in FILES], {path.split("/")[0] for path in FILES if "/" in path}
+    for path in PATH.findall(text(name)):
+        if not path.startswith(MADE) and (name == "CONTRIBUTING.md" or path.split("/")[0] in folders):
+            assert any(f"/{path.rstrip('/')}/" in other for other in kept), path
+
+
+def test_the_tour_has_every_directory_and_every_file_of_the_model() -> None:
+    tree, tables = re.split(r"^```\n?", text("CONTRIBUTING.md"), flags=re.MULTILINE)[1:3]
+    named = set(re.findall(r"^([\w/-]+)/ ", tree, re.MULTILINE))
+    assert all((ROOT / path).is_dir() for path in named)
+    for path in {path.split("/")[0] for path in FILES if "/" in path and not path.startswith(".")}:
+        assert any(f"{other}/".startswith(f"{path}/") for other in named), path
+    sources = {path.name for path in (ROOT / "src").glob("*.rs")} - {"lib.rs"}
+    assert sources <= set(re.findall(r"`(\w+\.rs)`", tables))
+
+
+def test_dependencies_are_as_stated() -> None:
+    needs = {name: read(manifest).get("dependencies", {}).keys() for name, manifest in own_packages().items()}
+    assert needs["fmu-export"] == {"fmi-abi"} and needs["fmi-abi"] == {"libc"}
+    assert "only dependency is `fmi-abi`, whose only one is `libc`" in text("crates/fmu-export/README.md")
+    for name in ("fmu-export", "fmu-run", "fmu-check"):
+        assert needs[name] & own_packages().keys() == {"fmi-abi"}, name
+    for home in published():
+        assert not needs[home.name] & {"prw_testbed", "prw_controller"}
+
+
+@pytest.mark.skipif(released(), reason="the packages are in their registries")
+def test_no_package_of_the_project_is_asked_of_a_registry() -> None:
+    """Anyone may register a name that is free."""
+    own = {*own_packages(), "fmu-run", "prw"}
+    for name in TEXTS:
+        for arguments in INSTALL.findall(text(name)):
+            words = [word.strip("\"'").lower().replace("_", "-") for word in arguments.split()]
+            asked = {re.split(r"[\[=<>~@]", word)[0] for word in words}
+            assert "--no-index" in words or not asked & own, f"{name}: {arguments}"
+        links = re.findall(r"docs\.rs/([\w-]+)", text(name))
+        assert name.endswith(".toml") or not own & {*links}, name

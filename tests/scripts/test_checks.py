@@ -1,0 +1,42 @@
+"""`make check` and `make check-release` choose what they run from files that change."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+from built import ROOT
+
+from tools import changed, release_check
+
+#: Targets that check nothing, that a part contains, or that run on one machine only.
+NO_PARTS = {
+    "help", "demo", "demo-fmu", "check", "check-release", "fmu", "closed-loop", "release", "source-fmu", "study", "examples", "clean",
+    "test-python",
+}  # fmt: skip
+
+
+def test_every_target_is_a_part_of_the_release_check() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    shown = set(re.findall(r"^\t@echo 'make ([\w-]+)", makefile, re.MULTILINE))
+    assert {arguments[0] for arguments in release_check.PARTS.values()} == shown - NO_PARTS
+
+
+def test_an_unknown_part_is_named() -> None:
+    command = [sys.executable, "tools/release_check.py", "tests"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 2 and "no part has the target tests; choose from test," in done.stderr
+
+
+def test_a_change_is_checked_where_it_is() -> None:
+    def lines(*names: str) -> list[str]:
+        return [" ".join(command[command[0] == sys.executable :]) for command in changed.commands(list(names))]
+
+    assert lines("docs/checking.md") == []
+    assert lines("tools/changed.py")[0] == "-m ruff check tools/changed.py"
+    model = lines("src/pair.rs", "crates/fmu-run/src/fmu.rs")
+    assert any("clippy" in line and "--package fmu-run --package prw_testbed" in line for line in model)
+    assert any("--package fmu-run --lib" in line for line in model)
+    assert any("--test stepping" in line for line in model) and any(line.endswith(" fmu") for line in model)
+    assert not any(line.endswith(" fmu") for line in lines("crates/fmu-run/src/fmu.rs"))

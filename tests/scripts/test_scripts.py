@@ -1,0 +1,114 @@
+"""Benchmarks and generators run to their end: those that `make test` starts nowhere else, with small counts."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from built import ROOT, built
+from PIL import Image, ImageSequence
+
+from prw.cli import run as run_command
+from tools import compatibility, figures
+from tools.documentation.pages import CONTROLLER, TESTBED
+from tools.figures import film, gallery, visit
+
+
+def run(*command: object, **environment: str) -> str:
+    """Runs a program, which must succeed, in the project's directory. Returns its standard output."""
+    words = [str(word) for word in command]
+    done = subprocess.run(words, cwd=ROOT, env={**os.environ, **environment}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def rows(page: str) -> dict[str, list[float]]:
+    """Returns the figures of all rows of Markdown tables, by the label of the row."""
+    found = re.findall(r"^\| ([^|]+) \|((?: *[\d.,e+]+ \|)+)$", page, re.MULTILINE)
+    return {label: [float(figure.replace(",", "")) for figure in figures.split("|")[:-1]] for label, figures in found}
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the benchmarks take the library for linux64")
+def test_the_benchmarks(fmu: Path) -> None:
+    """One test, because the benchmarks share target/bench."""
+    for name in ("prw_controller.fmu", "prw_closed_loop.ssp"):
+        built(name)
+    run("benches/run", fmu, "none", sys.executable, BENCH_QUICK="1")
+    found = rows((ROOT / "target/bench/quick.md").read_text(encoding="utf-8"))
+    assert {"testbed", "controller", "a ramp in C", "1", "8", "fmu_run, 2 threads", fmu.name} <= found.keys()
+    assert all(figure > 0 for figures in found.values() for figure in figures), found
+    if shutil.which("valgrind"):
+        ((_, counts),) = rows(run("benches/profile", fmu, sys.executable, BENCH_QUICK="1")).items()
+        assert sum(counts[1:]) < counts[0] < 10_000
+
+
+def test_the_reference_experiments_are_written(tmp_path: Path) -> None:
+    run(sys.executable, "tests/oracle/write_experiments.py", tmp_path)
+    written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()}
+    assert len(written) > 10 and all((ROOT / "modelDescription" / path).is_file() for path in written)
+
+
+def test_the_release_notes_are_printed() -> None:
+    notes = run(sys.executable, "platforms/release_notes.py")
+    assert len(notes) > 100 and notes.strip() in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_docs_are_written(tmp_path: Path) -> None:
+    for folder in ("docs", TESTBED.content, CONTROLLER.content):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    (tmp_path / TESTBED.path).unlink()
+    run(sys.executable, "-m", "tools", "docs", "--project", tmp_path)
+    assert (tmp_path / TESTBED.path).read_bytes() == (ROOT / TESTBED.path).read_bytes()
+
+
+def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Writes all that `make figures` renews, with two figures and short films; a film that shows the same stays."""
+    if shutil.which("chromium") is None:
+        pytest.skip("chromium is not installed")
+    built("prw_controller.fmu")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(film, "SPEED", 20)
+    monkeypatch.setattr(visit, "PICTURES", 2)
+    draw = gallery.figures
+    some = ("fig4_pair", "poles")
+    monkeypatch.setattr(gallery, "figures", lambda found: {k: v for k, v in draw(found).items() if k in some})
+    for path in ("docs", "modelDescription/documentation", "crates/prw-controller/modelDescription/documentation"):
+        (tmp_path / path).mkdir(parents=True)
+    assert run_command("tools", "", [figures], ["figures", "--fmu", str(fmu), "--out", "out", "--commit"]) == 0
+    written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file() and "out" not in path.parts}
+    assert len(written) == 10 and all((ROOT / path).is_file() for path in written)
+    shown = figures.VISIT.read_bytes()
+    visit.film(fmu, figures.VISIT)
+    assert figures.VISIT.read_bytes() == shown
+    # A film that differs is replaced.
+    with Image.open(figures.VISIT) as kept:
+        frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(kept)]
+    frames[1].paste("red", (0, 0, 5, 5))
+    frames[0].save(figures.VISIT, save_all=True, append_images=frames[1:])
+    changed = figures.VISIT.read_bytes()
+    visit.film(fmu, figures.VISIT)
+    assert figures.VISIT.read_bytes() != changed
+
+
+def test_compatibility_writes_the_rows_that_tests_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for path in (compatibility.SEEN, compatibility.PAGE.parent):
+        path.mkdir(parents=True)
+    before = (ROOT / compatibility.PAGE).read_text(encoding="utf-8")
+    compatibility.PAGE.write_text(before, encoding="utf-8")
+    row = dict.fromkeys(compatibility.HEADS, "x")
+    (compatibility.SEEN / "one.json").write_text(json.dumps(row), encoding="utf-8")
+    assert run_command("tools", "", [compatibility], ["compatibility"]) == 0
+    after = compatibility.PAGE.read_text(encoding="utf-8")
+    heading = f"## {compatibility.HEADING}\n"
+    table = after.split(heading)[1].split("\n## ")[0]
+    assert table.count("\n|") == 3 and "| x | x | x | x | x | x |" in table
+    rest = [text.split(heading)[0] + text.split(heading)[1].partition("\n## ")[2] for text in (before, after)]
+    assert rest[0] == rest[1]

@@ -1,0 +1,85 @@
+"""Checks what has changed since the last commit, or the last commit if nothing has; `make check`.
+
+Format and lints of the changed files, the unit tests of the changed crates, and, if the FMU may have changed, a new one
+under its core tests. `make test` runs everything.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+#: Tests of the testbed that compile no FMU.
+QUICK = ("--lib", "--test", "paper", "--test", "stepping", "--test", "fmu")
+#: Crates that the FMU is made of or made with.
+OF_THE_FMU = {"prw_testbed", "fmi-abi", "fmu-export", "fmu-package"}
+CORE = [f"tests/fmpy/test_{name}.py" for name in ("fig4", "exactness", "description")]
+
+
+def changed_files() -> list[str]:
+    """Paths from the root of the repository, without those that were deleted."""
+
+    def git(*arguments: str) -> list[str]:
+        return subprocess.run(["git", *arguments], cwd=ROOT, check=True, capture_output=True, text=True).stdout.split(
+            "\n"
+        )
+
+    names = git("diff", "--name-only", "HEAD") + git("ls-files", "--others", "--exclude-standard")
+    names = [name for name in names if name] or git("diff", "--name-only", "HEAD~1")
+    return sorted(name for name in set(names) if name and (ROOT / name).is_file())
+
+
+def crate(name: str) -> str:
+    """The Rust package that a file belongs to."""
+    for folder in (ROOT / name).parents:
+        manifest = folder / "Cargo.toml"
+        if manifest.is_file():
+            return str(tomllib.loads(manifest.read_text(encoding="utf-8"))["package"]["name"])
+    raise ValueError(f"{name} is outside of the repository")
+
+
+def commands(names: list[str]) -> list[list[str]]:
+    """The commands that check these files."""
+    rust = sorted({crate(name) for name in names if name.endswith((".rs", "Cargo.toml"))})
+    scripts = [name for name in names if name.endswith(".py")]
+    listed: list[list[str]] = []
+    if rust:
+        packages = [argument for name in rust for argument in ("--package", name)]
+        listed.append(["cargo", "fmt", "--all", "--check"])
+        listed.append(["cargo", "clippy", "--locked", "--all-targets", *packages, "--", "-D", "warnings"])
+        listed += [
+            ["cargo", "test", "--locked", "--package", name, *(QUICK if name == "prw_testbed" else ("--lib",))]
+            for name in rust
+            if name != "fmu-run-python"
+        ]
+    if scripts:
+        listed.append([sys.executable, "-m", "ruff", "check", *scripts])
+        listed.append([sys.executable, "-m", "ruff", "format", "--check", *scripts])
+        listed.append([sys.executable, "-m", "mypy"])
+    if OF_THE_FMU.intersection(rust):
+        listed.append(["make", "--no-print-directory", "fmu"])
+        listed.append([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-n", "auto", *CORE])
+    return listed
+
+
+def main() -> int:
+    """Run the commands until one fails."""
+    begin = time.monotonic()
+    names = changed_files()
+    print(f"{len(names)} changed files")
+    for command in commands(names):
+        shown = " ".join(Path(part).name if part == sys.executable else part for part in command)
+        print(f"== {shown}", flush=True)
+        if subprocess.run(command, cwd=ROOT, check=False).returncode:
+            print(f"failed: {shown}", file=sys.stderr)
+            return 1
+    print(f"checked in {time.monotonic() - begin:.0f} s; `make test` runs everything")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
