@@ -193,9 +193,8 @@ importer-fmus: closed-loop-fmus
 test-importers: $(VENV)/importers.stamp importer-fmus
 	$(PYTEST) tests/importers
 
-# The tools for other platforms have an environment of their own. What is not a Python package is installed
-# where that is possible, else named. BUILD_STD=1 compiles std with Debian's Rust, as is done without rustup;
-# only WebAssembly's is always rustup's.
+# The tools for other platforms have a separate environment. Programs that are no Python packages are installed
+# where that is possible, else named.
 release: need-rust $(DIST_VENV)/dist.stamp
 	@$(DIST_VENV)/bin/python platforms/release.py
 

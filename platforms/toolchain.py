@@ -14,9 +14,6 @@ from pathlib import Path
 
 from targets import ROOT, WEBASSEMBLY, Target
 
-#: Compiles std from Debian's sources even where rustup has it compiled.
-BUILD_STD = bool(os.environ.get("BUILD_STD"))
-
 #: The program of a Debian package.
 PACKAGES = {
     "x86_64-w64-mingw32-gcc": ["gcc-mingw-w64-x86-64"],
@@ -32,8 +29,6 @@ PACKAGES = {
     "/usr/lib/wine/wine64": ["wine64"],
 }
 
-DEBIAN_RUSTC = Path("/usr/bin/rustc")
-
 
 def say(text: str) -> None:
     """Progress, in order with what the started programs say."""
@@ -42,61 +37,43 @@ def say(text: str) -> None:
 
 @dataclass(frozen=True)
 class Toolchain:
-    """A Rust compiler that has, or can compile, the std of a target."""
+    """Rust for a target: what it is called, and what cargo needs to be told."""
 
     description: str
-    rustc: str = "rustc"
     environment: dict[str, str] = field(default_factory=dict)
     flags: tuple[str, ...] = ()
 
     @property
     def sysroot(self) -> Path:
         """Where its libraries and their sources are."""
-        return Path(_output(self.rustc, "--print", "sysroot"))
-
-
-def toolchain(target: Target) -> Toolchain:
-    """The toolchain for a target: rustup's, or else Debian's with std compiled from source."""
-    compiled = not BUILD_STD or target is WEBASSEMBLY
-    if compiled and (_has_std(target) or _rustup_adds(target)):
-        return Toolchain(_output("rustc", "--version"))
-    if target is WEBASSEMBLY:
-        raise SystemExit(f"error: Rust's std for {target.triple} is missing: rustup target add {target.triple}")
-    return _with_sources()
-
-
-def _has_std(target: Target) -> bool:
-    # Debian's rustc names a folder that does not exist, rustup's an empty one.
-    folder = Path(_output("rustc", "--print", "target-libdir", "--target", target.triple))
-    return any(folder.glob("libstd-*.rlib"))
-
-
-def _rustup_adds(target: Target) -> bool:
-    if not shutil.which("rustup"):
-        return False
-    say(f"rustup target add {target.triple}")
-    return subprocess.run(["rustup", "target", "add", target.triple], stdin=subprocess.DEVNULL).returncode == 0
+        return Path(_output("rustc", "--print", "sysroot"))
 
 
 @cache
-def _with_sources() -> Toolchain:
-    sources = Path("lib/rustlib/src/rust/library/Cargo.lock")
-    if not (DEBIAN_RUSTC.exists() and (DEBIAN_RUSTC.parents[1] / sources).exists()):
-        say("rustup has no std for this target: compiling it with Debian's Rust")
-        install(["rustc-web", "rust-web-src"], "std for another platform (or use rustup: rustup target add)")
-    version = _output(str(DEBIAN_RUSTC), "--version")
-    found = [int(part) for part in re.findall(r"\d+", version)[:2]]
-    needed = [int(part) for part in re.findall(r'rust-version = "(\d+)\.(\d+)', (ROOT / "Cargo.toml").read_text())[0]]
-    if found < needed:
-        raise SystemExit(f"error: {DEBIAN_RUSTC} is {version}, too old; Rust {needed[0]}.{needed[1]} is needed")
-    return Toolchain(
+def toolchain(target: Target) -> Toolchain:
+    """rustup's Rust. It compiles std too, without the code that prints backtraces: that is a third of a library, and
+    importers print none. WebAssembly's std has no such code."""
+    version = _output("rustc", "--version")
+    if target is WEBASSEMBLY:
+        if not any(Path(_output("rustc", "--print", "target-libdir", "--target", target.triple)).glob("libstd-*.rlib")):
+            _rustup("target", "add", target.triple)
+        return Toolchain(version)
+    built = Toolchain(
         f"{version}, std compiled with it",
-        rustc=str(DEBIAN_RUSTC),
-        # build-std is unstable; compiler and sources are of one version here.
-        environment={"RUSTC": str(DEBIAN_RUSTC), "RUSTC_BOOTSTRAP": "1"},
-        # Without the code that prints backtraces: half of the library, and an importer shows none.
+        # Cargo calls this unstable; compiler and sources are of one version.
+        environment={"RUSTC_BOOTSTRAP": "1"},
         flags=("-Zbuild-std=std,panic_unwind", "-Zbuild-std-features=panic-unwind"),
     )
+    if not (built.sysroot / "lib/rustlib/src/rust/library/Cargo.lock").exists():
+        _rustup("component", "add", "rust-src")
+    return built
+
+
+def _rustup(*arguments: str) -> None:
+    command = ["rustup", *arguments]
+    say(" ".join(command))
+    if not shutil.which("rustup") or subprocess.run(command, stdin=subprocess.DEVNULL).returncode:
+        raise SystemExit(f"error: a release needs `{' '.join(command)}`; install Rust with rustup (https://rustup.rs)")
 
 
 def need(*programs: str) -> None:

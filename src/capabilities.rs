@@ -86,7 +86,7 @@ impl Model for TestbedFmu {
     }
 
     fn calculate(&mut self, _time: f64) {
-        self.calculate_with(&self.motions(&self.testbed.motors));
+        self.calculate_with(self.motions(&self.testbed.motors));
     }
 }
 
@@ -98,7 +98,7 @@ impl CoSimulation for TestbedFmu {
             ));
         }
         self.start.is_over = true;
-        self.calculate_with(&self.testbed.motors.path_end.clone());
+        self.calculate_with(self.testbed.motors.path_end);
         Ok(Stepped::Calculated)
     }
 
@@ -107,7 +107,7 @@ impl CoSimulation for TestbedFmu {
         if !self.testbed.step_at_once(size) {
             return false;
         }
-        self.calculate_with(&self.testbed.motors.path_end.clone());
+        self.calculate_with(self.testbed.motors.path_end);
         true
     }
 }

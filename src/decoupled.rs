@@ -19,6 +19,7 @@ use crate::motor::Motion;
 use crate::number::Number;
 use crate::pair::{PitchRoll, Sides};
 use crate::parameters::{InvalidParameter, Parameters};
+use crate::propagator::Balance;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::{Add, Mul, Sub};
 
@@ -156,6 +157,8 @@ pub struct Decoupled {
     pub pitch: Subsystem,
     /// Half difference of the sides.
     pub roll: Subsystem,
+    /// The units in which pitch and roll are propagated.
+    pub balances: [Balance; 2],
     /// N / 2M of eq. (1).
     pub roll_ratio: f64,
     /// Pitch and roll of the output shaft per sum and difference of theta5 and theta6, eq. (1).
@@ -186,6 +189,7 @@ impl Decoupled {
             both_sides: side.of_both(),
             pitch,
             roll,
+            balances: [pitch.a, roll.a].map(|a| Balance::new(&a)),
             roll_ratio,
             output_shaft: PitchRoll::new(0.5, roll_ratio),
         })

@@ -61,9 +61,9 @@ impl TestbedFmu {
 
     /// Calculates the outputs with the motors in this motion.
     #[inline(always)]
-    pub(crate) fn calculate_with(&mut self, motors: &Motions) {
+    pub(crate) fn calculate_with(&mut self, motors: Motions) {
         let (state, system) = (&self.testbed.state, self.testbed.system());
-        self.torques = torques(state, motors, system).array();
+        self.torques = torques(state, &motors, system).array();
         [self.angles, self.rates] = output_shaft(state, system).map(Sides::array);
     }
 

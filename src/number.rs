@@ -4,12 +4,13 @@
 //! A [`TwoFloat`] has 32, so that the 16 that count are right. Its products use the fused multiply-add of the
 //! crate libm, not that of the platform: every platform gets the same bits.
 
+use crate::pair::Pair;
 use nalgebra::{ClosedAddAssign, ClosedMulAssign, ClosedSubAssign, Scalar};
 use num_traits::{One, Zero};
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// `f64` or [`TwoFloat`].
-pub trait Number:
+/// A number, or a [`Pair`] of numbers that take the same steps.
+pub trait Arithmetic:
     Scalar
     + Copy
     + Zero
@@ -24,7 +25,10 @@ pub trait Number:
     /// The last term that matters of the series of exp(1/4): `0.25^n / n!` is below the precision from
     /// the next one on.
     const TAYLOR_ORDER: i32;
+}
 
+/// `f64` or [`TwoFloat`].
+pub trait Number: Arithmetic {
     /// The quotient, to full precision.
     fn over(self, divisor: Self) -> Self;
 
@@ -32,9 +36,19 @@ pub trait Number:
     fn rounded(self) -> f64;
 }
 
-impl Number for f64 {
+impl Arithmetic for f64 {
     const TAYLOR_ORDER: i32 = 13;
+}
 
+impl Arithmetic for Pair {
+    const TAYLOR_ORDER: i32 = f64::TAYLOR_ORDER;
+}
+
+impl Arithmetic for TwoFloat {
+    const TAYLOR_ORDER: i32 = 21;
+}
+
+impl Number for f64 {
     fn over(self, divisor: Self) -> Self {
         self / divisor
     }
@@ -176,8 +190,6 @@ impl One for TwoFloat {
 }
 
 impl Number for TwoFloat {
-    const TAYLOR_ORDER: i32 = 21;
-
     /// Corrected once, because the product with the inverse loses a few bits.
     fn over(self, divisor: Self) -> Self {
         let inverse = divisor.inverse();

@@ -1,31 +1,36 @@
 //! Two numbers that take every step of a calculation together.
 
-use std::ops::{Add, Div, Index, IndexMut, Mul, Neg, Sub};
-use wide::f64x2;
+use num_traits::{One, Zero};
+#[cfg(target_arch = "x86_64")]
+use safe_arch::{bitxor_m128d, m128d, unpack_high_m128d, unpack_low_m128d};
+use std::ops::{Add, AddAssign, Div, DivAssign, Index, IndexMut, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A quantity of side 1 next to the same quantity of side 2 (or pitch next to roll), in one register.
+/// A quantity of side 1 next to the same quantity of side 2 (or pitch next to roll). Aligned as the registers that hold
+/// both.
 ///
-/// An array of two would be the same numbers, but the compiler then takes the sides apart.
+/// Its operators are written with the vectors of the processor: of two numbers the compiler would take the sides apart.
+/// The results are the same bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Pair(f64x2);
+#[repr(align(16))]
+pub struct Pair([f64; 2]);
 
 impl Pair {
     /// The pair of these two.
     #[inline]
     pub const fn new(first: f64, second: f64) -> Self {
-        Self(f64x2::new([first, second]))
+        Self([first, second])
     }
 
     /// Twice the same.
     #[inline]
     pub const fn both(value: f64) -> Self {
-        Self::new(value, value)
+        Self([value; 2])
     }
 
     /// The two as an array.
     #[inline]
     pub const fn array(self) -> [f64; 2] {
-        self.0.to_array()
+        self.0
     }
 }
 
@@ -39,9 +44,18 @@ pub type PitchRoll = Pair;
 /// to the matrices that they meet.
 #[inline]
 pub fn sum_difference(sides: Sides) -> PitchRoll {
-    let [side1, side2] = f64x2::transpose([sides.0; 2]);
-    // A difference is the sum with the negated number, bit for bit.
-    Pair(side1 + (side2 ^ f64x2::new([0.0, -0.0])))
+    #[cfg(target_arch = "x86_64")]
+    {
+        let sides = m128d::from(sides.0);
+        // A difference is the sum with the negated number.
+        let other = bitxor_m128d(unpack_high_m128d(sides, sides), [0.0, -0.0].into());
+        Pair((unpack_low_m128d(sides, sides) + other).into())
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        let [side1, side2] = sides.array();
+        PitchRoll::new(side1 + side2, side1 - side2)
+    }
 }
 
 /// The two sides from the quantities of pitch and roll, their mean and half difference.
@@ -55,47 +69,97 @@ impl Index<usize> for Pair {
 
     #[inline]
     fn index(&self, index: usize) -> &f64 {
-        &self.0.as_array()[index]
+        &self.0[index]
     }
 }
 
 impl IndexMut<usize> for Pair {
     #[inline]
     fn index_mut(&mut self, index: usize) -> &mut f64 {
-        &mut self.0.as_mut_array()[index]
+        &mut self.0[index]
     }
 }
 
 /// Operators on both numbers, each with that of the other pair.
 macro_rules! operators {
+    ($($operator:ident $function:ident $symbol:tt, $assigning:ident $assign:ident;)*) => {
+        $(
+            impl $operator for Pair {
+                type Output = Self;
+
+                #[inline]
+                fn $function(self, other: Self) -> Self {
+                    #[cfg(target_arch = "x86_64")]
+                    return Self((m128d::from(self.0) $symbol m128d::from(other.0)).into());
+                    #[cfg(not(target_arch = "x86_64"))]
+                    Self([self.0[0] $symbol other.0[0], self.0[1] $symbol other.0[1]])
+                }
+            }
+
+            impl $assigning for Pair {
+                #[inline]
+                fn $assign(&mut self, other: Self) {
+                    *self = *self $symbol other;
+                }
+            }
+        )*
+    };
+}
+
+operators! {
+    Add add +, AddAssign add_assign;
+    Sub sub -, SubAssign sub_assign;
+    Mul mul *, MulAssign mul_assign;
+    Div div /, DivAssign div_assign;
+}
+
+/// Operators with the same number for both.
+macro_rules! with_number {
     ($($operator:ident $function:ident)*) => {
-        $(impl $operator for Pair {
+        $(impl $operator<f64> for Pair {
             type Output = Self;
 
             #[inline]
-            fn $function(self, other: Self) -> Self {
-                Self(self.0.$function(other.0))
+            fn $function(self, number: f64) -> Self {
+                self.$function(Self::both(number))
             }
         })*
     };
 }
 
-operators! { Add add Sub sub Mul mul Div div }
-
-impl Mul<f64> for Pair {
-    type Output = Self;
-
-    #[inline]
-    fn mul(self, factor: f64) -> Self {
-        self * Self::both(factor)
-    }
-}
+with_number! { Mul mul Div div }
 
 impl Neg for Pair {
     type Output = Self;
 
     #[inline]
     fn neg(self) -> Self {
-        Self(-self.0)
+        Self([-self.0[0], -self.0[1]])
+    }
+}
+
+impl From<f64> for Pair {
+    #[inline]
+    fn from(number: f64) -> Self {
+        Self::both(number)
+    }
+}
+
+impl Zero for Pair {
+    #[inline]
+    fn zero() -> Self {
+        Self::both(0.0)
+    }
+
+    #[inline]
+    fn is_zero(&self) -> bool {
+        *self == Self::zero()
+    }
+}
+
+impl One for Pair {
+    #[inline]
+    fn one() -> Self {
+        Self::both(1.0)
     }
 }

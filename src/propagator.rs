@@ -12,8 +12,8 @@
 //! the last bit, and tiny steps lose nothing to `exp(A h)` being close to 1.
 
 use crate::decoupled::{Decoupled, Subsystem};
-use crate::number::{Number, TwoFloat};
-use crate::pair::PitchRoll;
+use crate::number::{Arithmetic, Number, TwoFloat};
+use crate::pair::{Pair, PitchRoll};
 use nalgebra::{Matrix3, Vector3};
 
 /// The step matrices of one subsystem for one step size.
@@ -26,26 +26,36 @@ pub struct Propagator<T = f64> {
 }
 
 impl<T: Number> Propagator<T> {
-    /// The propagator for step size `h` in s: a Taylor series over a fraction of the step in which it
-    /// converges quickly, then doubled until the step is full.
+    /// The propagator for step size `h` in s.
+    pub fn new(system: &Subsystem<T>, h: f64) -> Self {
+        let balance = Balance::new(&system.a);
+        balance.propagator(balance.equations(system).propagate(h, balance.doublings(h.log2())))
+    }
+}
+
+/// The equations of a subsystem; of two in pairs.
+#[derive(Clone, Copy)]
+struct Equations<T> {
+    a: Matrix3<T>,
+    b_angle: Vector3<T>,
+    b_rate: Vector3<T>,
+}
+
+impl<T: Arithmetic> Equations<T> {
+    /// Growth and ramp for step size `h` in s: a Taylor series over a fraction of the step in which it converges quickly,
+    /// then doubled until the step is full.
     ///
     /// Doubling follows from taking two steps: `growth(2h) = 2 growth + growth^2` and
     /// `ramp(2h) = 2 ramp + growth (ramp - [1, 1, 0] h)`.
-    pub fn new(system: &Subsystem<T>, h: f64) -> Self {
-        let scale = balance(&system.a);
-        let a = rescaled(&system.a, scale);
-        let to_scale = |z: Vector3<T>| Vector3::new(z.x, z.y, z.z / scale);
-        let doublings = doublings(&a, h);
+    fn propagate(&self, h: f64, doublings: i32) -> Propagator<T> {
         // In two factors, because one would underflow for the longest steps.
         let mut h = T::from(h * 0.5_f64.powi(doublings / 2) * 0.5_f64.powi(doublings - doublings / 2));
-        let ah = a * h;
+        let ah = self.a * h;
         let mut growth_term = ah;
         let mut growth = growth_term;
         // ramp = b_rate h + (A b_rate + b_angle) h^2/2 + A (A b_rate + b_angle) h^3/6 + ...
-        let b_rate = to_scale(system.b_rate);
-        let b_angle = to_scale(system.b_angle);
-        let mut ramp_term = (ah * b_rate + b_angle * h) * (h * T::from(0.5));
-        let mut ramp = b_rate * h + ramp_term;
+        let mut ramp_term = (ah * self.b_rate + self.b_angle * h) * (h * T::from(0.5));
+        let mut ramp = self.b_rate * h + ramp_term;
         for n in 2..=T::TAYLOR_ORDER {
             growth_term = (growth_term * ah).map(|entry| entry / f64::from(n));
             growth += growth_term;
@@ -60,28 +70,56 @@ impl<T: Number> Propagator<T> {
             growth = growth * two + growth * growth;
             h *= two;
         }
-        Self {
-            growth: rescaled(&growth, 1.0 / scale),
-            ramp: Vector3::new(ramp.x, ramp.y, ramp.z * scale.into()),
-        }
+        Propagator { growth, ramp }
     }
 }
 
-/// How often the step must be halved for the series to converge.
-fn doublings<T: Number>(balanced: &Matrix3<T>, h: f64) -> i32 {
-    // As logarithms: for a long step of a stiff system the product may be out of range.
-    let halvings = (balanced.map(T::rounded).abs().row_sum().max() / 0.25).log2() + h.log2();
-    halvings.ceil().clamp(0.0, 2100.0) as i32
+/// Of a subsystem: the unit of the velocity in which the series converges best, and how fast it does.
+///
+/// Angles and velocities differ in magnitude. With the velocity in this unit (a power of 2, so that nothing is rounded)
+/// the entries that couple them have the same magnitude: the norm is smaller, and the error of the doublings with it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Balance {
+    /// The unit of the velocity, rad/s.
+    scale: f64,
+    /// How often a step of 1 s must be halved for the series to converge. As logarithm: for a long step of a stiff
+    /// system the product may be out of range.
+    halvings: f64,
 }
 
-/// Angles and velocities differ in magnitude. With the velocity in these units (a power of 2, so that
-/// nothing is rounded) the entries that couple them have the same magnitude: the norm is smaller, and the
-/// error of the doublings with it.
-fn balance<T: Number>(a: &Matrix3<T>) -> f64 {
-    let a = a.map(T::rounded);
-    let into_velocity = a[(2, 0)].abs().max(a[(2, 1)].abs());
-    let from_velocity = a[(0, 2)].abs().max(a[(1, 2)].abs());
-    0.5_f64.powi((-0.5 * (into_velocity / from_velocity).log2()).round().clamp(-300.0, 300.0) as i32)
+impl Balance {
+    /// That of the state matrix `a`.
+    pub fn new<T: Number>(a: &Matrix3<T>) -> Self {
+        let rounded = a.map(T::rounded);
+        let into_velocity = rounded[(2, 0)].abs().max(rounded[(2, 1)].abs());
+        let from_velocity = rounded[(0, 2)].abs().max(rounded[(1, 2)].abs());
+        let power = (-0.5 * (into_velocity / from_velocity).log2()).round().clamp(-300.0, 300.0) as i32;
+        let scale = 0.5_f64.powi(power);
+        let norm = rescaled(a, scale).map(T::rounded).abs().row_sum().max();
+        Self { scale, halvings: (norm / 0.25).log2() }
+    }
+
+    /// How often a step must be halved whose size has this logarithm.
+    fn doublings(&self, log2_of_h: f64) -> i32 {
+        (self.halvings + log2_of_h).ceil().clamp(0.0, 2100.0) as i32
+    }
+
+    fn equations<T: Number>(&self, system: &Subsystem<T>) -> Equations<T> {
+        let to_scale = |z: Vector3<T>| Vector3::new(z.x, z.y, z.z / self.scale);
+        Equations {
+            a: rescaled(&system.a, self.scale),
+            b_angle: to_scale(system.b_angle),
+            b_rate: to_scale(system.b_rate),
+        }
+    }
+
+    /// A propagator of such equations with the velocity in rad/s.
+    fn propagator<T: Number>(&self, Propagator { growth, ramp }: Propagator<T>) -> Propagator<T> {
+        Propagator {
+            growth: rescaled(&growth, 1.0 / self.scale),
+            ramp: Vector3::new(ramp.x, ramp.y, ramp.z * self.scale.into()),
+        }
+    }
 }
 
 /// The matrix for a velocity in units of `scale`.
@@ -127,11 +165,11 @@ impl Rounded {
     /// motions of very different rates, and what is left after the fast one is a small difference. So is
     /// what is left of a velocity that damping has used up. Both need twice the digits.
     fn pitch_and_roll(system: &Decoupled, h: f64) -> [Self; 2] {
-        let subsystems = [system.pitch, system.roll];
-        let stiff = |s: &Subsystem| {
-            doublings(&rescaled(&s.a, balance(&s.a)), h) > 8 || -s.a[(2, 2)] * h > std::f64::consts::LN_2
-        };
-        if subsystems.iter().any(stiff) {
+        let Decoupled { pitch, roll, balances, .. } = system;
+        let log2_of_h = h.log2();
+        let doublings = balances.map(|balance| balance.doublings(log2_of_h));
+        let uses_up = |s: &Subsystem| -s.a[(2, 2)] * h > std::f64::consts::LN_2;
+        if doublings.into_iter().any(|doublings| doublings > 8) || uses_up(pitch) || uses_up(roll) {
             let exact = Subsystem::<TwoFloat>::pitch_and_roll(&system.parameters);
             let rounded = exact.map(|subsystem| Self::new(&Propagator::new(&subsystem, h)));
             // A TwoFloat that leaves the range of f64 on its way is no number.
@@ -139,7 +177,20 @@ impl Rounded {
                 return rounded;
             }
         }
-        subsystems.map(|subsystem| Self::new(&Propagator::new(&subsystem, h)))
+        let [pitch, roll] = [balances[0].equations(pitch), balances[1].equations(roll)];
+        let pairs = Equations {
+            a: pitch.a.zip_map(&roll.a, Pair::new),
+            b_angle: pitch.b_angle.zip_map(&roll.b_angle, Pair::new),
+            b_rate: pitch.b_rate.zip_map(&roll.b_rate, Pair::new),
+        };
+        // Both at once; most often they need as many doublings.
+        let of_pitch = pairs.propagate(h, doublings[0]);
+        let of_roll = if doublings[0] == doublings[1] { of_pitch } else { pairs.propagate(h, doublings[1]) };
+        let propagated = [(of_pitch, 0), (of_roll, 1)].map(|(Propagator { growth, ramp }, i)| Propagator {
+            growth: growth.map(|pair| pair[i]),
+            ramp: ramp.map(|pair| pair[i]),
+        });
+        [0, 1].map(|i| Self::new(&balances[i].propagator(propagated[i])))
     }
 
     fn is_finite(&self) -> bool {

@@ -118,7 +118,7 @@ impl Testbed {
         let [sum1, sum2] = ((q_i + q_ii) + v + (end.angle + end.rate)).array();
         let sum = sum1 + sum2;
         // `f64::is_finite` takes twice as many instructions.
-        if (sum - sum).is_nan() {
+        if (sum * 0.0).is_nan() {
             return false;
         }
         let ([theta3, theta4], [theta5, theta6], [omega5, omega6]) = (q_i.array(), q_ii.array(), v.array());

@@ -5,6 +5,8 @@ use nalgebra::SMatrix;
 use proptest::prelude::*;
 use prw_testbed::energies::{Angles, dissipation, kinetic_energy, potential_energy};
 use prw_testbed::motor::Motion;
+use prw_testbed::pair::PitchRoll;
+use prw_testbed::propagator::{Propagator, StepMatrices};
 use prw_testbed::state_space::state_space;
 use prw_testbed::{Parameters, Testbed};
 
@@ -94,6 +96,69 @@ proptest! {
         prop_assert!(twice.step(h - h * split));
         for (a, b) in once.state.iter().zip(twice.state) {
             prop_assert!((a - b).abs() < 1e-12 * (1.0 + a.abs()));
+        }
+    }
+
+    /// A step that is made at once is the same step, bit for bit, also with rates that are given or come from omega.
+    #[test]
+    fn steps_at_once_are_steps(
+        p in parameters(),
+        uses_omega in any::<bool>(),
+        steps in prop::collection::vec(
+            (prop::array::uniform2(-1.0..1.0f64), prop::array::uniform2(prop::option::weighted(0.2, -9.0..9.0f64)), 0..8),
+            4..30,
+        ),
+    ) {
+        let mut testbed = Testbed::new(p).unwrap();
+        testbed.motors.use_omega = uses_omega;
+        testbed.motors.use_omega_changed();
+        let mut other = testbed.clone();
+        let mut at_once = 0;
+        for (theta, rates, size) in steps {
+            for testbed in [&mut testbed, &mut other] {
+                for motor in 0..2 {
+                    testbed.motors.set_theta(motor, theta[motor]);
+                    testbed.motors.set_omega(motor, 0.5 - theta[motor]);
+                    if let Some(rate) = rates[motor] {
+                        testbed.motors.set_rate(motor, rate);
+                    }
+                }
+            }
+            let h = if size == 0 { 2e-3 } else { 1e-3 };
+            if size == 1 {
+                // A copy has no matrices yet.
+                testbed = testbed.clone();
+            }
+            if testbed.step_at_once(h) {
+                at_once += 1;
+            } else {
+                prop_assert!(testbed.step(h));
+            }
+            prop_assert!(other.step(h));
+            prop_assert_eq!(testbed.state.map(f64::to_bits), other.state.map(f64::to_bits));
+            prop_assert_eq!(testbed.motors, other.motors);
+        }
+        prop_assume!(at_once > 0);
+    }
+
+    /// Both subsystems side by side are each by itself.
+    #[test]
+    fn pairs_of_propagators_are_propagators(p in parameters(), exponent in -6.0..-3.0f64) {
+        let h = 10f64.powf(exponent);
+        let system = *Testbed::new(p).unwrap().system();
+        let matrices = StepMatrices::new(&system, h);
+        prop_assume!(matrices.left_velocity(PitchRoll::both(1.0)).is_none());
+        let [pitch, roll] = [system.pitch, system.roll].map(|subsystem| Propagator::new(&subsystem, h));
+        let zero = PitchRoll::both(0.0);
+        for column in 0..3 {
+            let mut unit = [zero; 3];
+            unit[column] = PitchRoll::both(2.0);
+            for (row, found) in matrices.increment(&unit, zero, zero).into_iter().enumerate() {
+                prop_assert_eq!(found.array(), [pitch.growth[(row, column)], roll.growth[(row, column)]]);
+            }
+        }
+        for (row, found) in matrices.increment(&[zero; 3], PitchRoll::both(2.0), zero).into_iter().enumerate() {
+            prop_assert_eq!(found.array(), [pitch.ramp[row], roll.ramp[row]]);
         }
     }
 }

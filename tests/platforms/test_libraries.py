@@ -12,7 +12,7 @@ from conftest import INCLUDED, library
 from targets import FOLDERS, TARGETS
 
 #: kB
-LARGEST = 600
+LARGEST = 450
 
 FMI2_FUNCTIONS = {f"fmi2{name}" for name in re.findall(r"F\((\w+)\)", (INCLUDED[0] / "fmu.h").read_text())}
 #: Those of the header of the standard, which FMPy brings.

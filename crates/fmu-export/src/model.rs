@@ -25,11 +25,12 @@ use std::path::PathBuf;
 /// | call of the importer | what the model sees |
 /// |---|---|
 /// | instantiate, reset | [`new`](Self::new) |
-/// | set inputs, states, start values of outputs | the value in its place, and the `then` of the table |
+/// | set inputs, states, start values of outputs | the value in its place, and the `then` of the table; [`calculate_start`](Self::calculate_start) after each, until the model has stepped |
 /// | set parameters | the same on a copy, then [`update`](Self::update) once; the copy takes the model's place if that succeeds |
 /// | enter initialization | [`initialize`](Self::initialize) on a copy likewise; refused while a start value that was refused has not been set to another |
 /// | read | [`calculate`](Self::calculate), if anything was set or stepped since the last time; then the `by` of the table |
-/// | step, event | [`CoSimulation::step`](crate::CoSimulation::step), [`ModelExchange::event`](crate::ModelExchange::event) |
+/// | step | [`CoSimulation::step_at_once`](crate::CoSimulation::step_at_once); [`step`](crate::CoSimulation::step) if that returns false |
+/// | event | [`ModelExchange::event`](crate::ModelExchange::event) |
 /// | enter Continuous-Time Mode | [`ModelExchange::continuous_time_entered`](crate::ModelExchange::continuous_time_entered) |
 /// | save, restore | `clone_from` |
 /// | de-serialize | on a copy, the values of the places and memory of the table; then [`restored`](Self::restored) and [`update`](Self::update) |
@@ -67,9 +68,9 @@ pub trait Model: Variables + Clone + Send + Sync {
         Ok(())
     }
 
-    /// Called after each value that is set, until the model has stepped or Continuous-Time Mode was entered: brings states
-    /// up to date whose start is [`calculated`](crate::Variable::calculated). (Not called where a place of the `memory` says
-    /// that they have started is the model's affair.)
+    /// Called after each value that is set, until the model has stepped or Continuous-Time Mode was entered: calculates the
+    /// states whose start is [`calculated`](crate::Variable::calculated). It is called as well if the importer has set
+    /// states, and until the next step after a state was read from bytes: the model remembers whether they still follow.
     #[inline]
     fn calculate_start(&mut self) {}
 

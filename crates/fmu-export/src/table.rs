@@ -353,8 +353,10 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// variables! { for Model, names Name, memory in PLACE, ...;  // both if you like, and there is any
 ///     /// Description that importers show
 ///     name = KIND(&TYPE).refinement() in PLACE;              // lives in a field of the model
+///     name = KIND(&TYPE) in PLACE then PLACE;                // and this bool becomes true when it is set
 ///     name = KIND(&TYPE) in PLACE then |model| { ... };      // and this is done after it was set
-///     name = KIND(&TYPE) by |model| ...;                     // is calculated
+///     name = KIND(&TYPE) by |model| ...;                     // is calculated when it is read
+///     name = KIND(&TYPE) from PLACE;                         // is read where Model::calculate has left it
 ///     name as "any text" = KIND(&TYPE) in PLACE by |model| ...;  // is set there, and read like this
 /// }
 /// ```
@@ -363,6 +365,9 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// `independent`; a refinement is one of its methods, where other variables are named by their names here. A place
 /// is a path of fields, such as `motors[0].theta`. Start values are those of the model that
 /// [`Model::new`](crate::Model::new) makes.
+///
+/// The fastest place of a Real is an `f64` in a path of fields and elements of arrays, without a block after `then`: it is
+/// read and set without a call. A path through a `Box`, a `Vec` or an `Index` takes a call.
 ///
 /// A value that is an array, in a place or calculated, makes the line an array: `[f64; 8]`, or `[[f64; 2]; 3]` as a matrix,
 /// row by row. FMI 3.0 has one variable for it, FMI 2.0 a scalar for each element, `T[1]` to `T[8]`; a start value, a range and

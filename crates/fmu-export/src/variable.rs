@@ -264,8 +264,8 @@ impl<M> Variable<M> {
     }
 
     /// The variable, a state, with a start that the model calculates: until the model steps, or the importer sets states
-    /// or enters Continuous-Time Mode, the model brings it up to date whenever something that it follows from is set
-    /// (`then` in the table). Importers that want to set it are told by [`depends_on`](Self::depends_on) what to set instead.
+    /// or enters Continuous-Time Mode, [`calculate_start`](crate::Model::calculate_start) brings it up to date whenever
+    /// something is set. Importers that want to set it are told by [`depends_on`](Self::depends_on) what to set instead.
     #[must_use]
     pub const fn calculated(mut self) -> Self {
         self.initial = Some(Initial::Calculated);

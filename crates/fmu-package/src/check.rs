@@ -417,6 +417,7 @@ fn check_changes<M: Exported>(changes: &Changes, starts: &mut Starts) -> Result<
         for (variable, start) in M::TABLE.iter().zip(&*starts) {
             if let Some(start) = start {
                 variable.set(&mut model, start);
+                model.calculate_start();
             }
         }
         model.update().map_err(|error| anyhow!("these start values make no model: {error}"))?;

@@ -60,7 +60,7 @@ pub(crate) unsafe fn call<M: Exported>(
     }
 }
 
-/// The short way of a call, if it can be gone: what it does is all that the call does, or false and nothing.
+/// Goes the short way of a call if the table of allowed calls has it. `None` if the long way must be gone.
 ///
 /// # Safety
 /// As above.
@@ -77,8 +77,8 @@ pub(crate) unsafe fn call_at_once<M: Exported>(
     if !unsafe { &*instance }.situation().is_in(rule.accepted()) {
         return None;
     }
-    // A pointer is handed on, because of what a reference refers to the compiler may read more than what is asked for. If a
-    // part of it was written right before, the processor waits.
+    // The way takes a pointer. Behind a reference the compiler may read more than one value at once, and the processor
+    // has to wait if one of them was written right before.
     //
     // SAFETY: as above.
     let walk = || way(instance).then(|| unsafe { &mut *instance }.listen());

@@ -1,7 +1,7 @@
 //! Reals of a model by their offsets: the pointer arithmetic of this crate.
 //!
-//! The functions that [`variables!`](crate::variables) writes find a place in the model as a reference and return how far it
-//! is from the begin. For paths of fields and elements of arrays these are constants, and the compiler makes a table of them.
+//! The functions that [`variables!`](crate::variables) implements take a reference to a place in the model and return its
+//! offset. For paths of fields and elements of arrays the offsets are constants, and the compiler puts them into a table.
 
 use crate::table::Variables;
 use crate::value::Place;

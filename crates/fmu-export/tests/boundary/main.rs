@@ -19,6 +19,7 @@ macro_rules! for_every_toy {
         $function::<crate::toys::Motor>($($argument),*);
         $function::<crate::toys::Lazy>($($argument),*);
         $function::<crate::toys::Balance>($($argument),*);
+        $function::<crate::toys::Meter>($($argument),*);
     }};
 }
 
@@ -32,6 +33,7 @@ mod fmi3;
 mod less;
 mod logging;
 mod oscillation;
+mod places;
 mod refusals;
 mod saved_states;
 mod settable;

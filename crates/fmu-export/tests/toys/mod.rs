@@ -10,6 +10,7 @@ pub mod faulty;
 pub mod fuse;
 pub mod grumbler;
 pub mod lazy;
+pub mod meter;
 #[path = "../../../cargo-fmu/models/motor/src/motor.rs"]
 pub mod motor;
 pub mod oscillator;
@@ -26,6 +27,7 @@ pub use faulty::Faulty;
 pub use fuse::Fuse;
 pub use grumbler::Grumbler;
 pub use lazy::Lazy;
+pub use meter::Meter;
 pub use motor::Motor;
 pub use oscillator::Oscillator;
 pub use palette::Palette;

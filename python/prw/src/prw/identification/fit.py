@@ -138,7 +138,7 @@ class Comparison:
         self._scaled = self.response.transfer[:bins] * share[:, None]
         self._noise = noise**2 * share
         stepped = experiment.channel_power * share**2 + self._noise
-        covariance = self._through(self._scaled)
+        covariance = (self._scaled * experiment.motor_power[:, None, :]) @ self._scaled.conj().swapaxes(-1, -2)
         covariance[:, np.arange(channels), np.arange(channels)] += stepped
         self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
         columns = [experiment.seen(self.response.transients)]
@@ -207,11 +207,15 @@ class Comparison:
         """Changes (2, bins, c, q) of the residual with changes of the outputs (q, f, c)."""
         return self.project(self._parts(-self._whiten @ self.experiment.seen(np.moveaxis(outputs, 0, -1))))
 
-    def _through(self, first: Complex, second: Complex | None = None) -> Complex:
-        """What encoders' errors do to the channels: first P second^H, (..., bins, c, c)."""
-        second = first if second is None else second
-        product: Complex = (first * self.experiment.motor_power[:, None, :]) @ second.conj().swapaxes(-1, -2)
-        return product
+    def echo(self, j: int, errors: Complex | Array) -> Complex:
+        """Mean products (bins,) of the residual and a course in channel j that has `errors` (..., 2) times the errors of
+        the two motors' paths."""
+        e = self.experiment
+        frequency = np.arange(e.bins) / (len(e.time) * e.step)
+        power = e.motor_power * np.column_stack([path.follows(frequency) ** 2 for path in e.paths or ()])
+        common = np.sum(self._whiten[:, :, [j]].conj() * (self._whiten @ self._scaled), axis=1)
+        products: Complex = 2 * e.shares[j] * np.sum(errors.conj() * common * power, axis=1)
+        return products
 
     def _parts(self, table: Complex) -> Array:
         """Real and imaginary parts (2, bins, ...), each of variance 1, of spectra (bins, ...) of variance 1."""
@@ -236,11 +240,22 @@ class Comparison:
     def noise_ratios(self) -> Array:
         """Sums (2, c) over frequencies, of which the ratio is 1 where each channel's noise explains its residuals, and
         above where there should be more of it: the score of the likelihood by its variance."""
-        inverse = self._whiten.conj().swapaxes(-1, -2) @ self._whiten
+        inverse = self._inverse()
         weighted = (inverse @ self._rest[:, :, None])[..., 0]
         expected = np.einsum("fcc->c", inverse).real
         sums: Array = self.experiment.shares * np.array([np.sum(np.abs(weighted) ** 2, axis=0), expected])
         return sums
+
+    def noise_error(self) -> Array:
+        """Standard errors (c,) of the variances of the channels' noise."""
+        each: Array = np.einsum("fcc->fc", self._inverse()).real
+        errors: Array = 1 / (self.experiment.shares * np.sqrt(np.sum(each**2, axis=0)))
+        return errors
+
+    def _inverse(self) -> Complex:
+        """Inverses (bins, c, c) of the covariances."""
+        inverse: Complex = self._whiten.conj().swapaxes(-1, -2) @ self._whiten
+        return inverse
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,135 @@
+//! Numbers in every kind of place, read and set alone and together: the short ways give what the long ones do.
+
+use crate::toys::{Meter, meter::Name};
+use fmu_export::Interface::{self, CoSimulation, ModelExchange};
+use fmu_export::Status;
+use fmu_test_kit::{Either, Importer, fmi3};
+
+const INPUTS: [Name; 6] = [Name::plain, Name::first, Name::second, Name::boxed, Name::listed, Name::moving];
+const TOTAL: u32 = Name::total as u32;
+const SUM: u32 = Name::sum as u32;
+const LEVEL: u32 = Name::level as u32;
+
+fn new<F: Either>(interface: Interface) -> F {
+    F::make::<Meter>(&fmu_test_kit::Arguments::of::<Meter>(interface)).expect("an instance")
+}
+
+/// Integers come from FMI 2.0 or 3.0.
+trait Integers: Either {
+    fn integer(&self, name: Name) -> i32;
+}
+
+impl Integers for Importer {
+    fn integer(&self, name: Name) -> i32 {
+        let mut value = 0;
+        self.ok(self.fmi2GetInteger(&(name as u32), 1, &mut value));
+        value
+    }
+}
+
+impl Integers for fmi3::Importer {
+    fn integer(&self, name: Name) -> i32 {
+        let mut value = 0;
+        self.ok(self.fmi3GetInt32(&fmu_export::fmi3::reference(name as u32), 1, &mut value, 1));
+        value
+    }
+}
+
+/// Sets and reads so many inputs at once, from each on, before the first step and after; all must be there then.
+fn set_and_read<F: Integers>(count: usize) {
+    let fmu: F = new(CoSimulation);
+    fmu.initialize(0.0);
+    let (mut now, mut time, mut number) = ([0.0; 6], 0.0, 0.0);
+    let mut seconds = 0;
+    for round in 0..12 {
+        let places: Vec<usize> = (round..round + count).map(|place| place % 6).collect();
+        let vr: Vec<u32> = places.iter().map(|place| INPUTS[*place] as u32).collect();
+        for place in &places {
+            number += 1.0;
+            now[*place] = number;
+        }
+        fmu.set(&vr, &places.iter().map(|place| now[*place]).collect::<Vec<_>>());
+        assert_eq!(fmu.read(&vr), places.iter().map(|place| now[*place]).collect::<Vec<_>>());
+        assert_eq!(fmu.get(INPUTS.map(|name| name as u32)), now);
+        assert_eq!(fmu.get([TOTAL, SUM]), [now.iter().sum(); 2]);
+        seconds += i32::from(places.contains(&2));
+        let marks = [1, 2, 3].iter().filter(|place| places.contains(place)).count() as i32;
+        assert_eq!(fmu.integer(Name::marks), 10 * seconds + marks, "{places:?}");
+        if round == 0 {
+            assert_eq!(fmu.get([LEVEL]), [now[0]], "it starts there");
+        }
+        // Of any size, of one that the model calculates after, and of one that it makes at once.
+        let size = [0.5, 2.0, 1.0][round % 3];
+        fmu.step(time, size);
+        time += size;
+        // The other number of the ring was never set, or two steps ago.
+        assert_eq!(fmu.get([TOTAL]), fmu.get([SUM]));
+        now[5] = fmu.get([Name::moving as u32])[0];
+        assert_eq!(fmu.integer(Name::marks), 10 * seconds);
+    }
+    assert_eq!(fmu.integer(Name::steps_at_once), 4);
+}
+
+#[test]
+fn alone_and_together() {
+    for count in 1..=6 {
+        set_and_read::<Importer>(count);
+        set_and_read::<fmi3::Importer>(count);
+    }
+}
+
+/// What cannot be set or read changes nothing, neither in the model nor in the importer's array, wherever it stands.
+fn refused<F: Either>() {
+    let fmu: F = new(CoSimulation);
+    fmu.initialize(0.0);
+    for round in 0..3 {
+        let before = fmu.bytes();
+        for wrong in [TOTAL, Name::marks as u32, 99, u32::MAX] {
+            for vr in [vec![wrong], vec![0, wrong], vec![wrong, 0], vec![0, 1, 2, wrong]] {
+                fmu.refused("set", |fmu| fmu.try_set(&vr, &vec![7.0; vr.len()]));
+                if wrong != TOTAL {
+                    let mut values = vec![-1.0; vr.len()];
+                    fmu.refused("get", |fmu| fmu.try_get(&vr, &mut values));
+                    assert_eq!(values, vec![-1.0; vr.len()]);
+                }
+            }
+        }
+        for value in [f64::NAN, f64::INFINITY] {
+            fmu.refused("no number", |fmu| fmu.try_set(&[0, 1], &[7.0, value]));
+        }
+        assert_eq!(fmu.bytes(), before);
+        fmu.step(f64::from(round), 1.0);
+    }
+    // The sum of them is out of range, each of them is not.
+    fmu.set(&[0, 1], &[f64::MAX, f64::MAX]);
+    assert_eq!(fmu.get([0, 1]), [f64::MAX; 2]);
+    fmu.refused_with(&["total", "out of the range"], |fmu| fmu.try_get(&[TOTAL, 0, 1, 2], &mut [0.0; 4]));
+    assert_eq!(fmu.try_step(3.0, 1.0), Status::Ok);
+}
+
+#[test]
+fn refused_as_before() {
+    refused::<Importer>();
+    refused::<fmi3::Importer>();
+}
+
+/// A state that starts where an input is follows it until the simulation begins, in whatever order things are set.
+#[test]
+fn starts_that_are_calculated() {
+    fn check<F: Either>() {
+        let fmu: F = new(ModelExchange);
+        fmu.set(&[0], &[2.0]);
+        fmu.initialize(0.0);
+        fmu.set(&[0, 1], &[3.0, 1.0]);
+        assert_eq!(fmu.get([LEVEL]), [3.0]);
+        let restored = fmu.bytes();
+        fmu.enter_continuous_time();
+        fmu.set(&[0], &[4.0]);
+        assert_eq!(fmu.get([LEVEL]), [3.0]);
+        fmu.restore(&restored);
+        fmu.set(&[0], &[5.0]);
+        assert_eq!(fmu.get([LEVEL]), [5.0]);
+    }
+    check::<Importer>();
+    check::<fmi3::Importer>();
+}
