@@ -1,6 +1,6 @@
 //! What the FMU of the testbed offers.
 
-use crate::fmu::TestbedFmu;
+use crate::fmu::{Moving, TestbedFmu};
 use crate::instant::Instant;
 use crate::motor::{Inputs, Motions};
 use crate::pair::Pair;
@@ -9,9 +9,11 @@ use crate::start::Start;
 use crate::testbed::{State, Testbed};
 use crate::variables::Name;
 use fmu_export::{
-    CoSimulation, DefaultExperiment, Error, Experiment, Info, InputDerivatives, Model, ModelExchange,
-    OutputDerivatives, Partials, Saved, Setup, StateVisitor, Step, Stepped, Variables, info, saved,
+    CoSimulation, DefaultExperiment, Error, Experiment, Info, InputDerivatives, Interface, Model,
+    ModelExchange, OutputDerivatives, Partials, Saved, Setup, StateVisitor, Step, Stepped, Variables, info,
+    saved,
 };
+use std::borrow::Cow;
 
 impl Saved for Pair {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
@@ -45,12 +47,18 @@ impl Model for TestbedFmu {
 
     fn new(setup: &Setup) -> Result<Self, Error> {
         let testbed = Testbed::new(Parameters::BUILT_IN)?;
-        let (interface, start) = (setup.interface, Start::default());
-        Ok(Self { testbed, interface, start, torques: [0.0; 2], angles: [0.0; 2], rates: [0.0; 2] })
+        let (interface, start, two) = (setup.interface, Start::default(), [0.0; 2]);
+        let jacobian = Default::default();
+        let mut fmu = Self { testbed, interface, start, torques: two, angles: two, rates: two, jacobian };
+        fmu.jacobian = fmu.jacobian();
+        Ok(fmu)
     }
 
+    #[inline(never)]
     fn update(&mut self) -> Result<(), Error> {
-        Ok(self.testbed.parameters_changed()?)
+        self.testbed.parameters_changed()?;
+        self.jacobian = self.jacobian();
+        Ok(())
     }
 
     fn restored(&mut self) -> Result<(), Error> {
@@ -124,7 +132,7 @@ impl InputDerivatives for TestbedFmu {
 
 impl OutputDerivatives for TestbedFmu {
     fn output_derivative(&self, of: Name, _: u32) -> f64 {
-        self.at(of, &self.now().rates(self.system()))
+        self.moving(&self.now().rates(self.system()))[of as usize]
     }
 }
 
@@ -133,94 +141,115 @@ impl OutputDerivatives for TestbedFmu {
 /// are A, B, C and D of eq. (11).
 impl Partials for TestbedFmu {
     fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
-        Some(match self.reaction(known) {
-            Some(reaction) => self.at(unknown, &reaction),
-            None => self.change(unknown, &self.unit_change(known)),
-        })
+        self.partials(Some((known, 0)), false)((unknown, 0))
+    }
+
+    #[inline]
+    fn partials(
+        &self,
+        known: Option<(Name, usize)>,
+        _initial: bool,
+    ) -> impl Fn((Name, usize)) -> Option<f64> {
+        let reactions = self.reactions(known.map(|(known, _)| known));
+        move |(unknown, _)| reactions.get(unknown as usize).copied()
     }
 }
 
 impl TestbedFmu {
-    /// The change of the instant when an input, a state, or a parameter that a state starts from is set to a value
-    /// that is larger by 1. `None` for the parameters of the equations.
-    fn reaction(&self, known: Name) -> Option<Instant> {
-        let (mut inputs, mut x) = ([Inputs::default(); 2], State::default());
-        let mut start = Start { state: State::default(), ..self.start };
-        *match known {
-            Name::theta1 => &mut inputs[0].theta,
-            Name::theta2 => &mut inputs[1].theta,
-            Name::omega1 => &mut inputs[0].omega,
-            Name::omega2 => &mut inputs[1].omega,
-            Name::theta3 => &mut x[0],
-            Name::theta4 => &mut x[1],
-            Name::theta5 => &mut x[2],
-            Name::theta6 => &mut x[3],
-            Name::omega5 => &mut x[4],
-            Name::omega6 => &mut x[5],
-            Name::theta3_start => &mut start.state[0],
-            Name::theta4_start => &mut start.state[1],
-            Name::theta5_start => &mut start.state[2],
-            Name::theta6_start => &mut start.state[3],
-            Name::omega5_start => &mut start.state[4],
-            Name::omega6_start => &mut start.state[5],
-            _ => return None,
-        } = 1.0;
-        let motors = self.testbed.motors.reaction(inputs);
-        if !start.is_over {
-            let followed = start.from(motors.theta());
-            x = std::array::from_fn(|i| x[i] + followed[i]);
-        }
-        Some(Instant { x, motors: self.motions(&motors) })
+    /// The changes when a known is set to a value that is larger by 1; nothing depends on the time.
+    #[inline(never)]
+    fn reactions(&self, known: Option<Name>) -> Cow<'_, Moving> {
+        let [_, _, _, _, of_states @ ..] = &self.jacobian;
+        let has_start = !self.start.is_over && !self.start.at_rest;
+        let start = |state: usize| if has_start { &of_states[state] } else { &[0.0; _] };
+        Cow::Borrowed(match known {
+            None => &[0.0; _],
+            Some(Name::theta3) => &of_states[0],
+            Some(Name::theta4) => &of_states[1],
+            Some(Name::theta5) => &of_states[2],
+            Some(Name::theta6) => &of_states[3],
+            Some(Name::omega5) => &of_states[4],
+            Some(Name::omega6) => &of_states[5],
+            Some(Name::theta3_start) => start(0),
+            Some(Name::theta4_start) => start(1),
+            Some(Name::theta5_start) => start(2),
+            Some(Name::theta6_start) => start(3),
+            Some(Name::omega5_start) => start(4),
+            Some(Name::omega6_start) => start(5),
+            Some(Name::theta1) => return self.reactions_to_angle(0),
+            Some(Name::theta2) => return self.reactions_to_angle(1),
+            Some(Name::omega1) => self.reactions_to_rate(0),
+            Some(Name::omega2) => self.reactions_to_rate(1),
+            Some(parameter) => return self.reactions_to_parameter(parameter),
+        })
     }
 
-    /// What a variable would be at an instant. All but parameters are linear in it.
-    fn at(&self, variable: Name, instant: &Instant) -> f64 {
-        let Instant { x, motors } = instant;
+    /// With the rate that is estimated from the angle, and with the states that follow the motor until the start is over.
+    #[inline(never)]
+    fn reactions_to_angle(&self, motor: usize) -> Cow<'_, Moving> {
+        let mut inputs = [Inputs::default(); 2];
+        inputs[motor].theta = 1.0;
+        let motors = self.motions(&self.testbed.motors.reaction(inputs));
+        let follows = !self.start.is_over && self.start.at_rest;
+        if motors.rate[motor] == 0.0 && !follows {
+            return Cow::Borrowed(&self.jacobian[motor]);
+        }
+        let x = if follows { self.start.from(motors.angle) } else { State::default() };
+        Cow::Owned(self.moving(&Instant { x, motors }))
+    }
+
+    fn reactions_to_rate(&self, motor: usize) -> &Moving {
+        let takes_omega =
+            self.interface == Interface::ModelExchange || self.testbed.motors.takes_omega(motor);
+        if takes_omega { &self.jacobian[2 + motor] } else { &[0.0; _] }
+    }
+
+    /// The partial derivatives of all that moves with respect to angles and rates of the motors and to the states.
+    fn jacobian(&self) -> [Moving; 10] {
+        std::array::from_fn(|column| {
+            let mut unit = Instant::default();
+            match column {
+                0 | 1 => unit.motors.angle[column] = 1.0,
+                2 | 3 => unit.motors.rate[column - 2] = 1.0,
+                _ => unit.x[column - 4] = 1.0,
+            }
+            self.moving(&unit)
+        })
+    }
+
+    /// The values of the variables at an instant, in which they are linear.
+    #[inline]
+    fn moving(&self, instant: &Instant) -> Moving {
         let system = self.system();
-        match variable {
-            Name::theta1 => motors.angle[0],
-            Name::theta2 => motors.angle[1],
-            Name::omega1 => motors.rate[0],
-            Name::omega2 => motors.rate[1],
-            Name::tau1 => instant.torques(system)[0],
-            Name::tau2 => instant.torques(system)[1],
-            Name::pitch => instant.pitch(system),
-            Name::roll => instant.roll(system),
-            Name::pitch_rate => instant.pitch_rate(system),
-            Name::roll_rate => instant.roll_rate(system),
-            Name::theta3 => x[0],
-            Name::theta4 => x[1],
-            Name::theta5 => x[2],
-            Name::theta6 => x[3],
-            Name::omega5 | Name::der_theta5 => x[4],
-            Name::omega6 | Name::der_theta6 => x[5],
-            Name::der_theta3 => instant.shaft_rates(system)[0],
-            Name::der_theta4 => instant.shaft_rates(system)[1],
-            Name::der_omega5 => instant.accelerations(system)[0],
-            Name::der_omega6 => instant.accelerations(system)[1],
-            _parameter => f64::NAN,
-        }
+        let Instant { x: [theta3, theta4, theta5, theta6, omega5, omega6], motors } = *instant;
+        let ([theta1, theta2], [omega1, omega2]) = (motors.angle.array(), motors.rate.array());
+        let [[tau1, tau2], [der_theta3, der_theta4], [der_omega5, der_omega6]] =
+            [instant.torques(system), instant.shaft_rates(system), instant.accelerations(system)]
+                .map(Pair::array);
+        let [pitch, roll] = [instant.pitch(system), instant.roll(system)];
+        let [pitch_rate, roll_rate] = [instant.pitch_rate(system), instant.roll_rate(system)];
+        [
+            theta1, theta2, omega1, omega2, tau1, tau2, pitch, roll, pitch_rate, roll_rate, theta3, theta4,
+            theta5, theta6, omega5, omega6, der_theta3, der_theta4, omega5, omega6, der_omega5, der_omega6,
+        ]
     }
 
-    /// By how much a variable changes with the parameters.
-    fn change(&self, variable: Name, parameters: &Parameters) -> f64 {
-        let (now, system) = (self.now(), self.system());
-        match variable {
-            Name::tau1 => now.change_of_torques(system, parameters)[0],
-            Name::tau2 => now.change_of_torques(system, parameters)[1],
-            Name::der_theta3 => now.change_of_shaft_rates(system, parameters)[0],
-            Name::der_theta4 => now.change_of_shaft_rates(system, parameters)[1],
-            Name::der_omega5 => now.change_of_accelerations(system, parameters)[0],
-            Name::der_omega6 => now.change_of_accelerations(system, parameters)[1],
-            _state_or_rate => 0.0,
-        }
-    }
-
-    /// The direction in which one parameter changes by 1: the table knows where it lives.
-    fn unit_change(&self, parameter: Name) -> Parameters {
+    /// The changes when a parameter of the equations is larger by 1: the table knows where it lives.
+    #[cold]
+    #[inline(never)]
+    fn reactions_to_parameter(&self, parameter: Name) -> Cow<'_, Moving> {
         let mut unit = self.clone();
         unit.testbed.parameters = Parameters::ZERO;
         Self::TABLE[parameter as usize].set(&mut unit, &1.0.into());
-        unit.testbed.parameters
+        let (now, system, change) = (self.now(), self.system(), &unit.testbed.parameters);
+        let mut reactions: Moving = [0.0; _];
+        for (first, [one, two]) in [
+            (Name::tau1, now.change_of_torques(system, change).array()),
+            (Name::der_theta3, now.change_of_shaft_rates(system, change).array()),
+            (Name::der_omega5, now.change_of_accelerations(system, change).array()),
+        ] {
+            reactions[first as usize..][..2].copy_from_slice(&[one, two]);
+        }
+        Cow::Owned(reactions)
     }
 }

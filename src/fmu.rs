@@ -18,7 +18,13 @@ pub struct TestbedFmu {
     pub(crate) torques: [f64; 2],
     pub(crate) angles: [f64; 2],
     pub(crate) rates: [f64; 2],
+    /// The partial derivatives of all that moves with respect to angles and rates of the motors and to the states; they
+    /// follow from the parameters.
+    pub(crate) jacobian: [Moving; 10],
 }
+
+/// A number for each variable before the parameters, in the order of the table.
+pub(crate) type Moving = [f64; 22];
 
 impl Clone for TestbedFmu {
     fn clone(&self) -> Self {
@@ -27,8 +33,10 @@ impl Clone for TestbedFmu {
 
     /// Passes on to the testbed, which copies little if the parameters are the same.
     fn clone_from(&mut self, source: &Self) {
-        let Self { testbed, interface, start, torques, angles, rates } = source;
-        self.testbed.clone_from(testbed);
+        let Self { testbed, interface, start, torques, angles, rates, jacobian } = source;
+        if self.testbed.copy_from(testbed) {
+            self.jacobian = *jacobian;
+        }
         (self.interface, self.start) = (*interface, *start);
         (self.torques, self.angles, self.rates) = (*torques, *angles, *rates);
     }

@@ -129,7 +129,12 @@ impl<T: Into<f64>> Entry<T> {
         let factor = match &per_degree {
             _ if self.unit == si => 1.0,
             Some(unit) if self.unit == *unit => DEG_PER_RAD,
-            Some(unit) => return Err(format!("the unit \"{}\" is unknown here; use \"{unit}\" or \"{si}\"", self.unit)),
+            Some(unit) => {
+                return Err(format!(
+                    "the unit \"{}\" is unknown here; use \"{unit}\" or \"{si}\"",
+                    self.unit
+                ));
+            }
             None => return Err(format!("the unit \"{}\" is unknown here; use \"{si}\"", self.unit)),
         };
         // Adding 0.0 turns -0.0 into 0.0.

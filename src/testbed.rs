@@ -27,18 +27,20 @@ impl Clone for Testbed {
     fn clone(&self) -> Self {
         Self { cache: StepCache::default(), ..*self }
     }
+}
 
-    /// With the same parameters the step matrices stay good.
-    fn clone_from(&mut self, source: &Self) {
-        if self.parameters != source.parameters {
+impl Testbed {
+    /// Copies all but the step matrices, which stay good with the same parameters. Returns whether these differ.
+    pub fn copy_from(&mut self, source: &Self) -> bool {
+        let differs = self.parameters != source.parameters;
+        if differs {
             self.cache.clear();
         }
         let Self { parameters, state, motors, system, cache: _ } = *source;
         (self.parameters, self.state, self.motors, self.system) = (parameters, state, motors, system);
+        differs
     }
-}
 
-impl Testbed {
     /// A testbed at rest at angle 0.
     ///
     /// # Errors
@@ -95,6 +97,7 @@ impl Testbed {
     }
 
     #[inline(always)]
+    #[expect(clippy::eq_op, reason = "the difference is NaN if the sum is not finite")]
     fn step_from(&mut self, motions: &Motions, jumps: Sides, h: f64) -> bool {
         let Self { state, motors, cache, .. } = self;
         let matrices = cache.current();

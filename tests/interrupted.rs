@@ -26,7 +26,8 @@ fn build_fmu(out: &Path) -> Command {
     let library = out.with_extension("dylib");
     let mut bytes = LIBRARY.map(u32::to_be_bytes).concat();
     bytes.extend(random_bytes(0, 2 * LIMIT as usize));
-    let (sources, start) = (fingerprint::sources(env!("CARGO_MANIFEST_DIR")), fingerprint::start(&Parameters::BUILT_IN));
+    let (sources, start) =
+        (fingerprint::sources(env!("CARGO_MANIFEST_DIR")), fingerprint::start(&Parameters::BUILT_IN));
     let variant = fmu_package::Variant { sources: sources.fingerprint().unwrap(), start, tunable: false };
     bytes.extend(variant.guid().as_bytes());
     fs::write(&library, bytes).unwrap();

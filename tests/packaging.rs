@@ -3,9 +3,9 @@
 use fmi_schema::fmi2::{DependenciesKind, Fmi2ModelDescription, Fmi2VariableDependency};
 use fmi_schema::traits::FmiModelDescription;
 use fmu_export::Variables;
-use prw_testbed::{TestbedFmu, fingerprint};
 use prw_testbed::parameters::Parameters;
 use prw_testbed::state_space::{StateSpace, state_space};
+use prw_testbed::{TestbedFmu, fingerprint};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;

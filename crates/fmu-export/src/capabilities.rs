@@ -189,6 +189,17 @@ pub trait Partials: Model {
             Some((known, _)) => self.partial(unknown.0, known),
         }
     }
+
+    /// All derivatives with respect to one known, as a function of the unknown. For models in which they have work in
+    /// common, which is then done once; without it, each is an [`element_partial`](Self::element_partial).
+    #[inline]
+    fn partials(
+        &self,
+        known: Option<(Self::Name, usize)>,
+        initial: bool,
+    ) -> impl Fn((Self::Name, usize)) -> Option<f64> {
+        move |unknown| self.element_partial(unknown, known, initial)
+    }
 }
 
 /// The model uses time derivatives of inputs in Co-Simulation (section 4.2.1).

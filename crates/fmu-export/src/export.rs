@@ -41,13 +41,12 @@ pub trait Exported: Model {
     #[doc(hidden)]
     fn exported_nominals(&self, _nominals: &mut [f64]) {}
     #[doc(hidden)]
-    fn exported_partial(
+    fn exported_partials(
         &self,
-        _unknown: (Self::Name, usize),
         _known: Option<(Self::Name, usize)>,
         _initial: bool,
-    ) -> Option<f64> {
-        None
+    ) -> impl Fn((Self::Name, usize)) -> Option<f64> {
+        |_| None
     }
     #[doc(hidden)]
     fn exported_input_derivative(&mut self, _of: (Self::Name, usize), _order: u32, _value: f64) {}
@@ -189,13 +188,13 @@ macro_rules! offer {
     (@capability Partials) => {
         const PARTIALS: bool = true;
 
-        fn exported_partial(
+        #[inline]
+        fn exported_partials(
             &self,
-            unknown: (<Self as $crate::Variables>::Name, usize),
             known: ::core::option::Option<(<Self as $crate::Variables>::Name, usize)>,
             initial: bool,
-        ) -> ::core::option::Option<f64> {
-            $crate::Partials::element_partial(self, unknown, known, initial)
+        ) -> impl ::core::ops::Fn((<Self as $crate::Variables>::Name, usize)) -> ::core::option::Option<f64> {
+            $crate::Partials::partials(self, known, initial)
         }
     };
     (@capability InputDerivatives) => {

@@ -4,8 +4,8 @@ use crate::cross::{ZIGBUILD, rustc_for};
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 use std::ffi::OsString;
-use std::io::{BufRead, BufReader};
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -16,7 +16,8 @@ use std::process::{Command, Stdio};
 pub(crate) fn check_that_program_is_current(command: &str) -> Result<()> {
     let program = std::env::current_exe().context("this program does not know its own path")?;
     let changed = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
-    let (Ok(list), Some(compiled)) = (fs::read_to_string(program.with_extension("d")), changed(&program)) else {
+    let (Ok(list), Some(compiled)) = (fs::read_to_string(program.with_extension("d")), changed(&program))
+    else {
         return Ok(());
     };
     // As in a makefile: `program: file file ...`, with blanks in names escaped.

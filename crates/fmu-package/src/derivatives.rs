@@ -53,7 +53,7 @@ fn check_pair<M: Exported>(points: &[(M, f64)], running: bool, unknown: u32, kno
     let mut wrong = Vec::new();
     for (model, now) in points {
         let by = (known != time).then(|| M::element(known));
-        let Some(said) = model.exported_partial(M::element(unknown), by, !running) else {
+        let Some(said) = model.exported_partials(by, !running)(M::element(unknown)) else {
             return Ok(());
         };
         let variable = M::TABLE.get(known as usize).filter(|_| known != time);

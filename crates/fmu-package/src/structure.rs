@@ -225,7 +225,7 @@ fn by_derivative<M: Exported>(
             && variable::<M>(unknown).base() == BaseType::Real
             && self::known::<M>(known).is_some_and(is_variable);
         let partial = |sample: &FactorSample<M>| {
-            sample.model.exported_partial(M::element(unknown), Some(M::element(known)), false)
+            sample.model.exported_partials(Some(M::element(known)), false)(M::element(unknown))
         };
         let samples = samples.iter().filter(|_| differentiable);
         let factors: Option<Vec<_>> = samples.map(|sample| Some((sample, partial(sample)?))).collect();

@@ -2,21 +2,22 @@
 
 use super::{array, output, same};
 use crate::export::Exported;
-use crate::instance::{Direction, Instance, Outcome, Reference, elements_of};
+use crate::instance::{Instance, Outcome, Reference, elements_of};
+use std::mem::MaybeUninit;
 
 /// Partial derivatives (section 2.1.9 of FMI 2.0, 2.2.11 of FMI 3.0): unknowns, knowns, seed and result, each with its
 /// length and called by `names`.
 ///
 /// # Safety
 /// Each is NULL or an array of its length; the result does not overlap the others.
-pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference>(
+#[inline]
+pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOINT: bool>(
     instance: &mut Instance<M>,
     names: [&str; 4],
     unknown: (*const u32, usize),
     known: (*const u32, usize),
     seed: (*const f64, usize),
     result: (*mut f64, usize),
-    direction: Direction,
 ) -> Outcome {
     let (seed_count, result_count) = (seed.1, result.1);
     // SAFETY: the caller's promise.
@@ -30,17 +31,17 @@ pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference>(
     };
     let counts =
         [("unknowns", instance.count_elements(unknown)?), ("knowns", instance.count_elements(known)?)];
-    let [wanted, seeded] = match direction {
-        Direction::Forward => counts,
-        Direction::Adjoint => [counts[1], counts[0]],
-    };
+    let [wanted, seeded] = if ADJOINT { [counts[1], counts[0]] } else { counts };
     same(seeded.0, seeded.1, seed_count)?;
     same(wanted.0, wanted.1, result_count)?;
+    result.fill(MaybeUninit::new(0.0));
+    // SAFETY: all have been written.
+    let sums = unsafe { &mut *(std::ptr::from_mut(result) as *mut [f64]) };
     if M::ARRAYS && R::ARRAYS {
         let [unknown, known] = [unknown, known].map(elements::<M, R>);
-        return instance.derivatives(&unknown, &known, seed, result, direction);
+        return instance.derivatives::<_, ADJOINT>(&unknown, &known, seed, sums);
     }
-    instance.derivatives(unknown, known, seed, result, direction)
+    instance.derivatives::<_, ADJOINT>(unknown, known, seed, sums)
 }
 
 fn elements<M: Exported, R: Reference>(vr: &[R]) -> Vec<u32> {

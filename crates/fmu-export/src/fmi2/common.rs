@@ -8,7 +8,7 @@ use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
 use crate::boundary::{partial_derivatives, place};
 use crate::export::Exported;
-use crate::instance::{Direction, Instance, Outcome};
+use crate::instance::{Instance, Outcome};
 use fmi_abi::BaseType::*;
 
 pub unsafe fn fmi2SetupExperiment<M: Exported>(
@@ -51,14 +51,13 @@ pub unsafe fn fmi2GetDirectionalDerivative<M: Exported>(
 ) -> Outcome {
     // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
     unsafe {
-        partial_derivatives::<M, fmi2ValueReference>(
+        partial_derivatives::<M, fmi2ValueReference, false>(
             instance,
             ["vUnknown_ref", "vKnown_ref", "dvKnown", "dvUnknown"],
             (unknown, unknown_count),
             (known, known_count),
             (seed, known_count),
             (result, unknown_count),
-            Direction::Forward,
         )
     }
 }

@@ -8,7 +8,7 @@ use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
 use crate::boundary::{array, of_elements, output, partial_derivatives, place};
 use crate::export::Exported;
-use crate::instance::{Direction, Instance, Outcome, refuse};
+use crate::instance::{Instance, Outcome, refuse};
 use crate::value::Value;
 use fmi_abi::BaseType::{self, *};
 
@@ -98,8 +98,9 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
     }
 }
 
+/// Each with whether it is the adjoint one.
 macro_rules! derivatives {
-    ($($function:ident: $direction:ident;)+) => {
+    ($($function:ident: $adjoint:literal;)+) => {
         $(
             pub unsafe fn $function<M: Exported>(
                 instance: &mut Instance<M>,
@@ -114,14 +115,13 @@ macro_rules! derivatives {
             ) -> Outcome {
                 // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
                 unsafe {
-                    partial_derivatives::<M, FromOne>(
+                    partial_derivatives::<M, FromOne, $adjoint>(
                         instance,
                         ["unknowns", "knowns", "seed", "sensitivity"],
                         (unknown, unknown_count),
                         (known, known_count),
                         (seed, seed_count),
                         (sensitivity, sensitivity_count),
-                        Direction::$direction,
                     )
                 }
             }
@@ -130,8 +130,8 @@ macro_rules! derivatives {
 }
 
 derivatives! {
-    fmi3GetDirectionalDerivative: Forward;
-    fmi3GetAdjointDerivative: Adjoint;
+    fmi3GetDirectionalDerivative: false;
+    fmi3GetAdjointDerivative: true;
 }
 
 pub unsafe fn fmi3EvaluateDiscreteStates<M: Exported>(_: &mut Instance<M>) -> Outcome {

@@ -1,6 +1,7 @@
 //! Derivatives with respect to variables (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0) and to time (section 4.2.1 of FMI
 //! 2.0, 4.1.2 of FMI 3.0).
 
+use super::values::is_finite;
 use super::{Instance, Outcome, Reference, finite, independent, refuse};
 use crate::causality::{Causality, Initial, Variability};
 use crate::export::Exported;
@@ -9,79 +10,157 @@ use fmi_abi::BaseType;
 use fmi_abi::{Mode, Standard};
 use std::mem::MaybeUninit;
 
-/// Which way partial derivatives are summed up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Direction {
-    /// What changes of the knowns make of the unknowns.
-    Forward,
-    /// The transposed: what the knowns contribute to changes of the unknowns.
-    Adjoint,
-}
-
 impl<M: Exported> Instance<M> {
-    /// The partial derivatives of unknowns with respect to knowns, times the seed: by rows for a directional
-    /// derivative, by columns for an adjoint one.
-    pub fn derivatives<R: Reference>(
+    /// Adds up the partial derivatives of unknowns with respect to knowns, times the seed, in `sums` of zeros: by rows
+    /// for a directional derivative, by columns for an adjoint one.
+    #[inline]
+    pub fn derivatives<R: Reference, const ADJOINT: bool>(
         &mut self,
         unknowns: &[R],
         knowns: &[R],
         seed: &[f64],
-        result: &mut [MaybeUninit<f64>],
-        direction: Direction,
+        sums: &mut [f64],
     ) -> Outcome {
         if !M::PARTIALS {
-            return refuse(match (self.standard(), direction) {
-                (Standard::Fmi2, _) => {
-                    "this FMU has no directional derivatives (providesDirectionalDerivative is false)"
-                }
-                (_, Direction::Forward) => {
-                    "this FMU has no directional derivatives (providesDirectionalDerivatives is false)"
-                }
-                (_, Direction::Adjoint) => {
-                    "this FMU has no adjoint derivatives (providesAdjointDerivatives is false)"
-                }
-            });
-        }
-        let initial = self.mode() == Mode::Initialization;
-        for vr in unknowns {
-            check_unknown(self.variable(vr.place(), BaseType::Real)?, initial)?;
-        }
-        for vr in knowns {
-            check_known(self.variable(vr.place(), BaseType::Real)?, initial)?;
-        }
-        let (seeded, wanted) = match direction {
-            Direction::Forward => (knowns, unknowns),
-            Direction::Adjoint => (unknowns, knowns),
-        };
-        for (vr, seed) in seeded.iter().zip(seed) {
-            if !seed.is_finite() {
-                let name = self.name(vr.place(), BaseType::Real)?;
-                return refuse(format!("the seed of {name} must be a finite number, it is {seed}"));
-            }
+            return self.refuse_derivatives(ADJOINT);
         }
         self.calculated();
-        let model = &self.state.model;
-        let (time, _) = independent::<M>();
-        for (wanted, result) in wanted.iter().zip(result) {
-            let mut sum = 0.0;
-            for (seeded, seed) in seeded.iter().zip(seed) {
-                let (unknown, known) = match direction {
-                    Direction::Forward => (wanted.place(), seeded.place()),
-                    Direction::Adjoint => (seeded.place(), wanted.place()),
+        let initial = self.mode() == Mode::Initialization;
+        // Finite only if all sums are, and these only if all seeds are.
+        let mut total = 0.0;
+        for (column, known) in knowns.iter().enumerate() {
+            self.check_known(*known, initial)?;
+            let is_time = known.place() == independent::<M>().0;
+            let by = (!is_time).then(|| M::element(known.place()));
+            let partial = self.state.model.exported_partials(by, initial);
+            let mut add = |unknown: R, seed: f64, sum: &mut f64| {
+                self.check_unknown(unknown, initial)?;
+                let Some(partial) = partial(M::element(unknown.place())) else {
+                    return self.refuse_partial(unknown, *known);
                 };
-                let by = (known != time).then(|| M::element(known));
-                let Some(partial) = model.exported_partial(M::element(unknown), by, initial) else {
-                    return refuse(format!(
-                        "the derivative of {} with respect to {} is not provided",
-                        self.name(unknown, BaseType::Real)?,
-                        self.name(known, BaseType::Real)?
-                    ));
-                };
-                sum += partial * seed;
+                *sum += partial * seed;
+                total += *sum;
+                Ok(())
+            };
+            if ADJOINT {
+                let mut pairs = unknowns.iter().zip(seed);
+                pairs.try_for_each(|(unknown, seed)| add(*unknown, *seed, &mut sums[column]))?;
+            } else {
+                let mut pairs = unknowns.iter().zip(&mut *sums);
+                pairs.try_for_each(|(unknown, sum)| add(*unknown, seed[column], sum))?;
             }
-            result.write(finite(self.variable(wanted.place(), BaseType::Real)?, sum)?);
+        }
+        if is_finite(total) && !unknowns.is_empty() && !knowns.is_empty() {
+            return Ok(());
+        }
+        unknowns.iter().try_for_each(|unknown| self.check_unknown(*unknown, initial))?;
+        let (seeded, wanted) = if ADJOINT { (unknowns, knowns) } else { (knowns, unknowns) };
+        self.refuse_numbers(seeded, seed, wanted, sums)
+    }
+
+    /// Names the first seed or sum that is no finite number, if there is one.
+    #[cold]
+    #[inline(never)]
+    fn refuse_numbers<R: Reference>(
+        &self,
+        seeded: &[R],
+        seed: &[f64],
+        wanted: &[R],
+        sums: &[f64],
+    ) -> Outcome {
+        if let Some((vr, seed)) = seeded.iter().zip(seed).find(|(_, seed)| !seed.is_finite()) {
+            let name = self.name(*vr, BaseType::Real)?;
+            return refuse(format!("the seed of {name} must be a finite number, it is {seed}"));
+        }
+        for (vr, sum) in wanted.iter().zip(sums) {
+            finite(self.variable(vr.place(), BaseType::Real)?, *sum)?;
         }
         Ok(())
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn refuse_derivatives(&self, adjoint: bool) -> Outcome {
+        let plural = if self.standard() == Standard::Fmi2 { "" } else { "s" };
+        let (kind, capability) =
+            if adjoint { ("adjoint", "Adjoint") } else { ("directional", "Directional") };
+        refuse(format!(
+            "this FMU has no {kind} derivatives (provides{capability}Derivative{plural} is false)"
+        ))
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn refuse_partial<R: Reference>(&self, unknown: R, known: R) -> Outcome {
+        refuse(format!(
+            "the derivative of {} with respect to {} is not provided",
+            self.name(unknown, BaseType::Real)?,
+            self.name(known, BaseType::Real)?
+        ))
+    }
+
+    /// What the instance calculates: outputs and derivatives of states, while initializing all InitialUnknowns (section
+    /// 2.1.9 of FMI 2.0).
+    #[inline]
+    fn check_unknown<R: Reference>(&self, unknown: R, initial: bool) -> Outcome {
+        let is_unknown = |of: &Variable<M>| {
+            of.base() == BaseType::Real
+                && (of.causality() == Causality::Output || of.differentiates().is_some())
+        };
+        if M::TABLE.get(unknown.place() as usize).is_some_and(is_unknown) {
+            return Ok(());
+        }
+        self.check_initial_unknown(unknown.place(), initial)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn check_initial_unknown(&self, place: u32, initial: bool) -> Outcome {
+        let variable = self.variable(place, BaseType::Real)?;
+        let calculated = matches!(variable.initial(), Some(Initial::Calculated | Initial::Approx));
+        let is_initial = variable.causality() == Causality::CalculatedParameter || variable.is_state();
+        if initial && calculated && is_initial {
+            return Ok(());
+        }
+        refuse(format!("{} is no unknown: neither output nor state derivative", variable.name()))
+    }
+
+    /// What the importer sets: inputs, states and parameters, while initializing all that is exact (section 2.2.8 of FMI
+    /// 2.0). Parameters may be set at any time, whether the description calls them tunable or not. FMI 2.0 has them among
+    /// the knowns in initialization mode alone; CasADi asks later.
+    #[inline]
+    fn check_known<R: Reference>(&self, known: R, initial: bool) -> Outcome {
+        let is_known = |of: &Variable<M>| {
+            let is_set = match of.causality() {
+                Causality::Input | Causality::Parameter | Causality::Independent => true,
+                _ if of.variability() == Variability::Constant => false,
+                _ if initial => of.initial() == Some(Initial::Exact),
+                _ => of.is_state(),
+            };
+            is_set && of.base() == BaseType::Real
+        };
+        match M::TABLE.get(known.place() as usize).is_some_and(is_known) {
+            true => Ok(()),
+            false => self.refuse_known(known.place()),
+        }
+    }
+
+    /// The time of FMI 3.0 may be no variable of the table.
+    #[cold]
+    #[inline(never)]
+    fn refuse_known(&self, place: u32) -> Outcome {
+        let variable = self.variable(place, BaseType::Real)?;
+        if variable.causality() == Causality::Independent {
+            return Ok(());
+        }
+        let why = if variable.variability() == Variability::Constant {
+            "no known: it is constant"
+        } else if variable.is_state() {
+            "no known in initialization mode, where it is calculated"
+        } else {
+            "no known: neither input, parameter nor state"
+        };
+        refuse(format!("{} is {why}", variable.name()))
     }
 
     pub fn set_input_derivatives(&mut self, vr: &[u32], orders: &[i32], values: &[f64]) -> Outcome {
@@ -141,39 +220,6 @@ impl<M: Exported> Instance<M> {
             });
         }
         Ok(())
-    }
-}
-
-/// What the instance calculates: outputs and derivatives of states, while initializing all InitialUnknowns (section
-/// 2.1.9 of FMI 2.0).
-fn check_unknown<M>(variable: &Variable<M>, initial: bool) -> Outcome {
-    let calculated = matches!(variable.initial(), Some(Initial::Calculated | Initial::Approx));
-    let is_initial = variable.causality() == Causality::CalculatedParameter || variable.is_state();
-    if variable.causality() == Causality::Output
-        || variable.differentiates().is_some()
-        || initial && calculated && is_initial
-    {
-        return Ok(());
-    }
-    refuse(format!("{} is no unknown: neither output nor state derivative", variable.name()))
-}
-
-/// What the importer sets: inputs, states and parameters, while initializing all that is exact (section 2.2.8 of FMI 2.0).
-/// Parameters may be set at any time, whether the description calls them tunable or not. FMI 2.0 has them among the knowns
-/// in initialization mode alone; CasADi asks later.
-fn check_known<M>(variable: &Variable<M>, initial: bool) -> Outcome {
-    let name = variable.name();
-    match variable.causality() {
-        Causality::Input | Causality::Parameter | Causality::Independent => Ok(()),
-        _ if variable.variability() == Variability::Constant => {
-            refuse(format!("{name} is no known: it is constant"))
-        }
-        _ if initial && variable.initial() == Some(Initial::Exact) => Ok(()),
-        _ if initial && variable.is_state() => {
-            refuse(format!("{name} is no known in initialization mode, where it is calculated"))
-        }
-        _ if variable.is_state() => Ok(()),
-        _ => refuse(format!("{name} is no known: neither input, parameter nor state")),
     }
 }
 

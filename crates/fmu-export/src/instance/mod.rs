@@ -14,7 +14,6 @@ mod trial;
 mod values;
 
 pub(crate) use co_simulation::no_status;
-pub(crate) use derivatives::Direction;
 pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
 pub use trial::{SavedTrial, Trial};
 
@@ -451,10 +450,20 @@ pub(crate) fn first_indicator<M: crate::Variables>() -> u32 {
     (M::TABLE.len() as u32).max(time + 1)
 }
 
+impl<M: crate::Variables> Implicit<M> {
+    const INDEPENDENT: (u32, &'static Variable<M>) = {
+        let mut place = 0;
+        while place < M::TABLE.len() && !matches!(M::TABLE[place].causality(), Causality::Independent) {
+            place += 1;
+        }
+        (place as u32, if place < M::TABLE.len() { &M::TABLE[place] } else { Self::TIME })
+    };
+}
+
 /// The independent variable as FMI 3.0 has it, with its place.
+#[inline]
 pub(crate) fn independent<M: crate::Variables>() -> (u32, &'static Variable<M>) {
-    let of_table = (0..).zip(M::TABLE).find(|(_, variable)| variable.causality() == Causality::Independent);
-    of_table.unwrap_or((M::TABLE.len() as u32, Implicit::TIME))
+    Implicit::INDEPENDENT
 }
 
 #[inline]
