@@ -111,6 +111,7 @@ impl Type {
     }
 
     /// A whole number of a kind, such as [`BaseType::UInt16`].
+    #[track_caller]
     pub const fn whole(name: &'static str, base: BaseType) -> Self {
         let Some((min, max)) = base.range() else { panic!("this kind of value is no whole number") };
         Self { name, attributes: Attributes::Integer { min, max }, base }
@@ -129,6 +130,7 @@ impl Type {
 
     /// With the quantity that it is of, for a Real, where that is not its name: `Velocity` for a type `Speed`.
     #[must_use]
+    #[track_caller]
     pub const fn quantity(mut self, name: &'static str) -> Self {
         let Attributes::Real { quantity, .. } = &mut self.attributes else { panic!("quantity is for Reals") };
         *quantity = name;
@@ -137,6 +139,7 @@ impl Type {
 
     /// With a smallest value, for a Real.
     #[must_use]
+    #[track_caller]
     pub const fn min(mut self, smallest: f64) -> Self {
         let Attributes::Real { min, .. } = &mut self.attributes else {
             panic!("min is for Reals; whole numbers have min_integer")
@@ -147,6 +150,7 @@ impl Type {
 
     /// With a largest value, for a Real.
     #[must_use]
+    #[track_caller]
     pub const fn max(mut self, largest: f64) -> Self {
         let Attributes::Real { max, .. } = &mut self.attributes else {
             panic!("max is for Reals; whole numbers have max_integer")
@@ -157,6 +161,7 @@ impl Type {
 
     /// With an order of magnitude, for a Real.
     #[must_use]
+    #[track_caller]
     pub const fn nominal(mut self, magnitude: f64) -> Self {
         let Attributes::Real { nominal, .. } = &mut self.attributes else { panic!("nominal is for Reals") };
         *nominal = Some(magnitude);
@@ -165,6 +170,7 @@ impl Type {
 
     /// With a smallest value, for a whole number.
     #[must_use]
+    #[track_caller]
     pub const fn min_integer(mut self, smallest: i128) -> Self {
         let base = self.base;
         let Attributes::Integer { min, .. } = &mut self.attributes else {
@@ -176,6 +182,7 @@ impl Type {
 
     /// With a largest value, for a whole number.
     #[must_use]
+    #[track_caller]
     pub const fn max_integer(mut self, largest: i128) -> Self {
         let base = self.base;
         let Attributes::Integer { max, .. } = &mut self.attributes else {
@@ -187,6 +194,7 @@ impl Type {
 
     /// With a largest number of bytes, at most a mebibyte.
     #[must_use]
+    #[track_caller]
     pub const fn max_size(mut self, largest: usize) -> Self {
         let Attributes::Binary { max_size, .. } = &mut self.attributes else {
             panic!("max_size is for Binary")
