@@ -97,7 +97,6 @@ impl Testbed {
     }
 
     #[inline(always)]
-    #[expect(clippy::eq_op, reason = "the difference is NaN if the sum is not finite")]
     fn step_from(&mut self, motions: &Motions, jumps: Sides, h: f64) -> bool {
         let Self { state, motors, cache, .. } = self;
         let matrices = cache.current();

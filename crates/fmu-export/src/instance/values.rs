@@ -314,7 +314,6 @@ impl<M: Exported> Instance<M> {
 
 /// Whether a sum is finite: only if all its terms are. One question costs less than one for each.
 #[inline(always)]
-#[expect(clippy::eq_op, reason = "the difference is NaN if the sum is not finite")]
 pub(super) fn is_finite(sum: f64) -> bool {
     // Takes half as many instructions as `f64::is_finite`.
     !(sum * 0.0).is_nan()
