@@ -37,7 +37,8 @@ def experiment(
 ) -> Truth:
     """A random rig in a random motion: NAMES up to `spread` off Table 1, 40 sines from 0.1 to 20 Hz a motor, 30 deg.
     Both motors in the same motion or in opposite ones, or each in its own; "fig4": the paper's, over and over; "slow":
-    slow smooth moves with small vibrations of 2 to 22 Hz on top."""
+    slow smooth moves with small vibrations of 2 to 22 Hz on top; "moves": from point to point with rests between, and
+    three small sines on top."""
     random = np.random.default_rng(seed)
     parameters = dict(table_1())
     for name in NAMES:
@@ -50,6 +51,8 @@ def experiment(
         size = np.concatenate([np.full(5, 0.2), random.uniform(0.0003, 0.003, 12)])
         waves = size * np.exp(1j * random.uniform(0, 2 * np.pi, (2, 17)))
         return respond(parameters, time, frequency, waves)
+    if pattern == "moves":
+        return respond(parameters, time, *_moves(random, duration), random.uniform(0.3, 0.6))
     frequency = np.sort(random.uniform(0.1, 20, 40))
     size = np.minimum(1, (2 / frequency) ** 1.5)
     phases = random.uniform(0, 2 * np.pi, (2, 40))
@@ -57,6 +60,27 @@ def experiment(
     first, second = waves
     waves = {"independent": (first, second), "equal": (first, first), "opposite": (first, -first)}[pattern]
     return respond(parameters, time, frequency, np.array(waves))
+
+
+def _moves(random: np.random.Generator, duration: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (m,) and waves (2, m) of point-to-point moves with the least jerk, and of three small sines a motor.
+
+    The moves are a Fourier series up to 15 Hz, with a period that is longer than the recording."""
+    period = duration + 4
+    when, lines = np.linspace(0, period, 4096, endpoint=False), int(15 * period)
+    waves = np.zeros((2, lines + 6), dtype=complex)
+    for i in (0, 1):
+        course, at, begin = np.zeros(4096), 0.0, random.uniform(0, 0.5)
+        while begin < duration + 2:
+            # The last move returns to the first angle: a jump would ring.
+            to, takes = random.uniform(-1, 1) if begin < duration else 0.0, random.uniform(0.3, 1.2)
+            x = np.clip((when - begin) / takes, 0, 1)
+            course += (to - at) * x**3 * (10 - 15 * x + 6 * x**2)
+            at, begin = to, begin + takes + random.uniform(0, 0.6) if begin < duration else np.inf
+        waves[i, :lines] = 2 * np.fft.rfft(course)[:lines] / 4096
+        waves[i, 0] /= 2
+        waves[i, lines + 3 * i :][:3] = random.uniform(0.005, 0.05, 3) * np.exp(1j * random.uniform(0, 2 * np.pi, 3))
+    return np.concatenate([np.arange(lines) / period, random.uniform(0.5, 15, 6)]), waves
 
 
 def respond(parameters, time: np.ndarray, frequency: np.ndarray, waves: np.ndarray, reach: float = 0.52) -> Truth:
@@ -164,9 +188,16 @@ def late(truth: Truth, seconds: float, channels: Sequence[str] = ("tau1", "tau2"
     return truth._replace(outputs={**truth.outputs, **{name: delayed[name] for name in channels}})
 
 
-def measure(truth: Truth, seed: int, channels: Sequence[str] = ALL, counts: int = COUNTS, log_rates: bool = False):
-    """What the sensors say, by column in SI: encoders on motors and shafts, each with its own zero; torques with 20
-    mN.m of noise, steps of 5 mN.m and an offset; an inertial sensor with 1 mrad of noise and an offset on pitch and
+def measure(
+    truth: Truth,
+    seed: int,
+    channels: Sequence[str] = ALL,
+    counts: int = COUNTS,
+    log_rates: bool = False,
+    noise: float = 0.02,
+):
+    """What the sensors say, by column in SI: encoders on motors and shafts, each with its own zero; torques with `noise`
+    N.m, steps of a quarter of that and an offset; an inertial sensor with 1 mrad of noise and an offset on pitch and
     roll."""
     random = np.random.default_rng(seed)
     quantum = 2 * np.pi / counts
@@ -182,8 +213,8 @@ def measure(truth: Truth, seed: int, channels: Sequence[str] = ALL, counts: int 
     for name in channels:
         y = truth.outputs[name]
         if name.startswith("tau"):
-            noisy = y + random.normal(0, 0.02, len(y)) + random.uniform(-0.2, 0.2)
-            found[name] = np.round(noisy / 0.005) * 0.005
+            noisy = y + random.normal(0, noise, len(y)) + random.uniform(-0.2, 0.2)
+            found[name] = np.round(noisy / (noise / 4)) * (noise / 4)
         elif name in SHAFT_SENSORS:
             found[name] = encoder(y, random.uniform(-0.1, 0.1))
         else:

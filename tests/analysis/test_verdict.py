@@ -15,8 +15,8 @@ def late(seconds):
     return lambda truth: rig.late(truth, seconds)
 
 
-def recording(truth, channels=rig.ALL, spoil=None, counts=rig.COUNTS) -> prw.Recording:
-    columns = rig.measure(truth, 5, channels, counts)
+def recording(truth, channels=rig.ALL, spoil=None, counts=rig.COUNTS, **sensors) -> prw.Recording:
+    columns = rig.measure(truth, 5, channels, counts, **sensors)
     if spoil:
         spoil(columns)
     theta = np.column_stack([columns["theta1"], columns["theta2"]])
@@ -97,7 +97,7 @@ def test_a_sensor_with_a_fault_is_named(experiment, fmu, spoil):
     assert said in found.diagnosis[0], found.diagnosis
 
 
-@pytest.mark.parametrize("pattern", ["independent", "equal", "slow", "fig4"])
+@pytest.mark.parametrize("pattern", ["independent", "equal", "slow", "fig4", "moves"])
 def test_a_rig_without_faults_fits(fmu, pattern):
     found = prw.identify(recording(rig.experiment(30, 6, pattern=pattern)), starts=1, fmu=fmu)
     assert found.fits and not found.misfits and not found.diagnosis
@@ -105,6 +105,13 @@ def test_a_rig_without_faults_fits(fmu, pattern):
     assert not any("roll" in note and "intervals allow for" not in note for note in found.notes), found.notes
     at_rest = {c.channel for c in found.channels if c.explained is None}
     assert at_rest == {"equal": {"roll"}, "fig4": {"pitch"}}.get(pattern, set())
+
+
+def test_coarse_encoders_on_the_motors_are_no_fault(fmu):
+    # A step of 0.8 mrad is 0.1 N.m of torque, behind which 3 mN.m of noise vanish.
+    truth = rig.experiment(151, 6, 250, "moves")
+    found = prw.identify(recording(truth, counts=8000, noise=0.003), starts=1, fmu=fmu)
+    assert found.fits, found.misfits
 
 
 @pytest.mark.parametrize(

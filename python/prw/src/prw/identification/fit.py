@@ -138,7 +138,7 @@ class Comparison:
         self._scaled = self.response.transfer[:bins] * share[:, None]
         self._noise = noise**2 * share
         stepped = experiment.channel_power * share**2 + self._noise
-        covariance = self._through(self._scaled)
+        covariance = (self._scaled * experiment.motor_power[:, None, :]) @ self._scaled.conj().swapaxes(-1, -2)
         covariance[:, np.arange(channels), np.arange(channels)] += stepped
         self._whiten = np.linalg.inv(np.linalg.cholesky(covariance))
         columns = [experiment.seen(self.response.transients)]
@@ -207,12 +207,6 @@ class Comparison:
         """Changes (2, bins, c, q) of the residual with changes of the outputs (q, f, c)."""
         return self.project(self._parts(-self._whiten @ self.experiment.seen(np.moveaxis(outputs, 0, -1))))
 
-    def _through(self, first: Complex, second: Complex | None = None) -> Complex:
-        """What encoders' errors do to the channels: first P second^H, (..., bins, c, c)."""
-        second = first if second is None else second
-        product: Complex = (first * self.experiment.motor_power[:, None, :]) @ second.conj().swapaxes(-1, -2)
-        return product
-
     def _parts(self, table: Complex) -> Array:
         """Real and imaginary parts (2, bins, ...), each of variance 1, of spectra (bins, ...) of variance 1."""
         found: Array = np.sqrt(2) * np.stack([table.real, table.imag])
@@ -234,12 +228,14 @@ class Comparison:
         return variance
 
     def noise_ratios(self) -> Array:
-        """Sums (2, c) over frequencies, of which the ratio is 1 where each channel's noise explains its residuals, and
-        above where there should be more of it: the score of the likelihood by its variance."""
+        """Sums (3, c) over frequencies, of which the first two have the ratio 1 where each channel's noise explains its
+        residuals, and above where there should be more of it: the score of the likelihood by its variance. The third is
+        the information about the noise's variance, 1 by the square of its standard error."""
         inverse = self._whiten.conj().swapaxes(-1, -2) @ self._whiten
         weighted = (inverse @ self._rest[:, :, None])[..., 0]
-        expected = np.einsum("fcc->c", inverse).real
-        sums: Array = self.experiment.shares * np.array([np.sum(np.abs(weighted) ** 2, axis=0), expected])
+        expected, share = np.einsum("fcc->c", inverse).real, self.experiment.shares
+        told = share * np.einsum("fcc,fcc->c", inverse, inverse).real
+        sums: Array = share * np.array([np.sum(np.abs(weighted) ** 2, axis=0), expected, told])
         return sums
 
 
@@ -400,14 +396,14 @@ class Fitter:
 
     def _judged_noise(self, point: Array) -> dict[str, float]:
         """Each channel's noise over all experiments, by its residuals at the present noise, where none is given."""
-        sums, freedom = dict.fromkeys(self.channels, np.zeros(2)), dict.fromkeys(self.channels, 0.0)
+        sums, freedom = dict.fromkeys(self.channels, np.zeros(3)), dict.fromkeys(self.channels, 0.0)
         for experiment, comparison in zip(self.experiments, self.compare(point)):
             taken = 1 + int(self.task.offsets) + 6 / len(experiment.channels)
             for name, ratio in zip(experiment.channels, comparison.noise_ratios().T):
                 sums[name] = sums[name] + ratio
                 freedom[name] += 2 * experiment.bins - taken
         each, judged = len(self.task.unknowns) / len(self.channels), {}
-        for name, (found, expected) in sums.items():
+        for name, (found, expected, _) in sums.items():
             left = max(freedom[name] - each, 1.0) / max(freedom[name], 1.0)
             noise = self.noise[name] * float(np.sqrt(found / (expected * left)))
             judged[name] = self.task.noise.get(name) or max(noise, FINEST * self._spread[name])

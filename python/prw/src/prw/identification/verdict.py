@@ -2,8 +2,8 @@
 
 The residuals of a fit that is right are noise. They are tested against the motion: by local regression on the motors'
 spectra and the channel's own, frequency by frequency (their coherence); along what single faults would leave (a delay,
-a lag or a gain of a channel, or of two in common; friction; backlash), as score tests (Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50); and
-their strength is compared with that of the noise at frequencies at which the motors do not move.
+a lag or a gain of a channel, or of two in common; friction; backlash), as score tests (Rao, Proc. Cambridge Phil. Soc.
+44 (1948) 50); and their strength is compared with that of the noise at frequencies at which the motors do not move.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ CLEAR_SIGN = 7.0
 EXCESS, LUCK = 1.3, 5.0
 #: Frequencies for each piece in which the residual may follow the motion in its own way, and pieces at most.
 PIECE, MOST_PIECES = 16, 6
+#: A course that moves is this many times stronger (power) than the errors that encoders make in it.
+CLEARLY_MOVING = 30.0
 #: Directions that the others explain to this share are none.
 NEW = 0.02
 #: A rate that is this share of its greatest has a sign.
@@ -111,14 +113,14 @@ def judge(solution: Solution) -> Verdict:
         def score(columns: Complex, i: int = i, comparison: Comparison = comparison) -> _Score:
             return _Score(solution, i, comparison.seen_along(columns), inverse)
 
-        spread = _strength(solution, i)
+        spread, luck = _strength(solution, i)
         for j, name in enumerate(experiment.channels):
             there = score(_following(experiment, comparison, j))
             chance = there.chance(2 * experiment.bins)
             texts = []
             if chance < CHANCE:
                 texts.append("what the FMU does not explain follows the motors")
-            if spread[j] > EXCESS * (1 + LUCK / np.sqrt(4 * experiment.bins)):
+            if spread[j] > EXCESS * (1 + LUCK * luck[j]):
                 texts.append(
                     f"the residual is {float(f'{spread[j]:.2g}'):g} times the noise at frequencies at which the motors rest"
                 )
@@ -166,13 +168,14 @@ class _Score:
     def chance(self, count: int) -> float:
         """Probability of so much along all directions in a fit that is right, with noise judged by `count` values."""
         values, vectors = np.linalg.eigh(self._information)
-        vectors = vectors[:, values > NEW]
-        if not vectors.shape[1]:
+        whiten = vectors[:, values > NEW] / np.sqrt(values[values > NEW])
+        k = whiten.shape[1]
+        if not k:
             return 1.0
-        score = vectors.T @ self._score
-        variance = vectors.T @ self._variance @ vectors
-        k = len(score)
-        ratio = float(score @ np.linalg.solve(variance, score))
+        # White residuals have the variance 1 in all directions. DRAWS of encoders' errors tell where there is more, but
+        # they are too few to tell where there is less.
+        variance, turn = np.linalg.eigh(whiten.T @ self._variance @ whiten)
+        ratio = float(np.sum((turn.T @ whiten.T @ self._score) ** 2 / np.maximum(variance, 1.0)))
         left = max(count - ratio, 0.02 * count) / max(count - k, 1)
         return float(fdtrc(k, max(count - k, 1), ratio / k / left))
 
@@ -193,17 +196,20 @@ class _Score:
 
 
 def _following(experiment: Experiment, comparison: Comparison, j: int) -> Complex:
-    """What follows the motors, and the channel itself, in channel j: columns (q, f, c), smooth over frequencies."""
-    bins = experiment.bins
+    """What follows the motors, and the channel itself, in channel j: columns (q, f, c), smooth over frequencies. They
+    are 0 where encoders' errors make up much of them: the residual contains the same errors."""
+    bins, response = experiment.bins, comparison.response
     pieces = int(np.clip(bins // PIECE, 1, MOST_PIECES))
     place = np.linspace(0, pieces - 1 + 1e-9, bins)
     hats = np.maximum(0, 1 - np.abs(place - np.arange(pieces)[:, None]))
-    own = comparison.response.outputs[:, j] + comparison.response.transients[:, j] @ comparison.initial
-    courses = [experiment.motors[:, 0], experiment.motors[:, 1], own]
+    own = response.outputs[:, j] + response.transients[:, j] @ comparison.initial
+    motors = [(experiment.motors[:, i], np.eye(2)[i]) for i in (0, 1)]
     columns = []
-    for course in courses:
+    for course, gains in [*motors, (own, response.transfer[:bins, j])]:
+        errors = np.sum(np.abs(gains) ** 2 * experiment.motor_power, axis=1)
+        clear = hats @ (np.abs(course[:bins]) ** 2 - CLEARLY_MOVING * errors) > 0
         there = np.zeros((pieces, experiment.needed_bins, len(experiment.channels)), dtype=complex)
-        there[:, :bins, j] = hats * course[:bins]
+        there[clear, :bins, j] = hats[clear] * course[:bins]
         columns += [there, 1j * there]
     return np.concatenate(columns)
 
@@ -248,13 +254,16 @@ def _sign(rate: Array) -> Array:
     return found
 
 
-def _strength(solution: Solution, i: int) -> Array:
-    """Noise of the channels (c,) in the band over that at frequencies at which the motors do not move."""
-    experiment, found = solution.fitter.experiments[i], []
+def _strength(solution: Solution, i: int) -> tuple[Array, Array]:
+    """Noise of the channels (c,) in the band over that at frequencies at which the motors do not move, and the standard
+    error of the former as a fraction: it is large where encoders' errors hide the noise."""
+    experiment, comparison, found = solution.fitter.experiments[i], solution.comparisons[i], []
     values = experiment.values
     assert values is not None
-    there, expected = solution.comparisons[i].noise_ratios()
-    seen = there / expected
+    there, expected, told = comparison.noise_ratios()
+    noise = np.array([solution.noise[name] for name in experiment.channels])
+    inside = noise**2 * there / expected + np.mean(experiment.channel_power, axis=0)
+    luck = 1 / (2 * inside * np.sqrt(told))
     for j, name in enumerate(experiment.channels):
         column = (values[:, j] - solution.modelled[i][:, j])[np.isfinite(values[:, j])]
         # Values that are missing are skipped: what is left above the band is noise in any order.
@@ -262,15 +271,14 @@ def _strength(solution: Solution, i: int) -> Array:
         share = experiment.band * 2 * (experiment.sampled[-1] - experiment.sampled[0]) / n
         first = max(int(2 * share * n / 2), n // 8)
         quantum = float(np.mean(experiment.channel_power[:, j]))
-        inside = solution.noise[name] ** 2 * seen[j] + quantum
         if first + 20 > n // 2:
             found.append(1.0)
             continue
         power = np.abs(np.fft.rfft(np.diff(column) * np.hanning(n - 1)))[first:] ** 2 / np.sum(np.hanning(n - 1) ** 2)
         turn = 2 - 2 * np.cos(2 * np.pi * np.arange(first, first + len(power)) / (n - 1))
         outside = float(np.mean(power / turn))
-        found.append(float(np.sqrt(inside / max(outside, quantum, 1e-300))))
-    return np.array(found)
+        found.append(float(np.sqrt(inside[j] / max(outside, quantum, 1e-300))))
+    return np.array(found), luck
 
 
 def _where(experiment: Experiment, comparison: Comparison, j: int) -> tuple[float, float]:
