@@ -1,22 +1,30 @@
 """Is `prw identify` unbiased, and are its intervals honest? Repetitions on simulated rigs; `make monte-carlo` runs it.
 
     python tests/analysis/monte_carlo.py target/fmu/prw_testbed.fmu [--repetitions 300] [--sensors all|torque]
-        [--motion independent|equal|opposite|fig4|slow] [--seed 0] [--faulty N] [--counts 10000] [--workers N] [--out out/monte_carlo.json]
+        [--motion independent|equal|opposite|fig4|slow|moves] [--seed 0]
+        [--faulty N] [--counts 10000] [--workers N] [--out out/monte_carlo.json]
 
 Every repetition has its own rig (parameters up to 30 % off Table 1, where the search starts), its own motion of 10 s
 at 1 kHz, its own noise, encoder positions and sensor offsets; see rig.py. Exit status 1 if an estimate is biased by
 more than a quarter of its standard error and twice what is chance, a 95 % interval holds the truth in less than 92 % of
 the repetitions, or the verdict is "fits" in less than 97 %; with --faulty, if it is "fits" although an interval misses by
 more than two of its widths, in more than 1 %.
+
+A campaign that was interrupted continues where it was: finished repetitions of the same commit are read from the file
+beside --out that ends in .jsonl.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import multiprocessing
+import os
+import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -37,7 +45,7 @@ from prw.motion import Motion  # noqa: E402
 from prw.recording import Recording  # noqa: E402
 
 SENSORS = {"all": rig.ALL, "torque": ("tau1", "tau2")}
-MOTIONS = ("independent", "equal", "opposite", "fig4", "slow")
+MOTIONS = ("independent", "equal", "opposite", "fig4", "slow", "moves")
 
 
 #: Faults in sizes from harmless to gross: what it is on a rig, or on what its sensors say, and the unit.
@@ -89,27 +97,57 @@ def repetition(fmu: str, seed: int, channels, counts: int, motion: str, fault: s
     true = np.log([truth.parameters[name] for name in rig.NAMES])
     low, high = np.log(sure.low), np.log(sure.high)
     missed = float((np.maximum(low - true, true - high) / (high - low)).max())
-    return solution.logarithms - true, sure.relative, (low < true) & (true < high), seconds, verdict.fits, missed
+    inside = (low < true) & (true < high)
+    return (solution.logarithms - true).tolist(), sure.relative.tolist(), inside.tolist(), seconds, verdict.fits, missed
 
 
-def campaign(pool: ProcessPoolExecutor, fmu: str, rigs: int, seed: int, figure: Path | None) -> tuple[dict, bool]:
+#: Files that results depend on.
+SOURCES = ("python/prw/src", "tests/analysis", "tests/oracle", "src", "modelDescription")
+
+
+def commit() -> str:
+    """Short hash of the commit, with "-dirty" if SOURCES differ from it."""
+
+    def git(*words: str) -> str:
+        command = ["git", "-C", str(Path(__file__).resolve().parents[2]), *words]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
+    return git("rev-parse", "--short", "HEAD") + "-dirty" * bool(git("status", "--porcelain", "--", *SOURCES))
+
+
+def results(pool: ProcessPoolExecutor, jobs: list[tuple], out: Path | None) -> Iterator[tuple]:
+    """Results of `repetition` with each of the arguments `jobs`, in their order."""
+    log = out.with_suffix(".jsonl") if out else Path(os.devnull)
+    log.parent.mkdir(parents=True, exist_ok=True)
+    version, done = commit(), {}
+    if log.is_file() and not version.endswith("dirty"):
+        done = dict(json.loads(line) for line in log.read_text().splitlines())
+    keys = [json.dumps([version, *job]) for job in jobs]
+    waiting = {key: pool.submit(repetition, *job) for key, job in zip(keys, jobs) if key not in done}
+    with log.open("a") as file:
+        for key in keys:
+            if key in waiting:
+                print(json.dumps([key, waiting[key].result()]), file=file, flush=True)
+            yield waiting[key].result() if key in waiting else done[key]
+
+
+def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[dict, bool]:
     """What the verdict is on rigs with faults, by fault and size; and whether it is never "fits" where an interval
     misses by more than two of its widths, but in 1 %."""
-    rows, good = {}, True
+    rows, rigs = {}, options.faulty
     print(
         f"{rigs} rigs for each fault and size, all sensors: share that does not fit (worst miss where it fits, in widths)"
     )
     cases = [(fault, size) for fault, (_, sizes) in FAULTS.items() for size in sizes]
     jobs = [
-        [
-            pool.submit(repetition, fmu, seed + i, rig.ALL, rig.COUNTS, MOTIONS[i % 2 * 4], fault, size)
-            for i in range(rigs)
-        ]
-        for fault, size in cases
+        (options.fmu, options.seed + i, rig.ALL, rig.COUNTS, MOTIONS[i % 2 * 4], *case)
+        for case in cases
+        for i in range(rigs)
     ]
+    everything = results(pool, jobs, options.out)
     grossly = missed = 0
-    for (fault, size), those in zip(cases, jobs):
-        found = [job.result() for job in those]
+    for fault, size in cases:
+        found = list(itertools.islice(everything, rigs))
         refused = float(np.mean([not each[4] for each in found]))
         grossly += sum(each[5] > 2 for each in found)
         missed += sum(each[5] > 2 and each[4] for each in found)
@@ -118,13 +156,14 @@ def campaign(pool: ProcessPoolExecutor, fmu: str, rigs: int, seed: int, figure: 
         print(f"  {FAULTS[fault][0]:<40}{size:>8g}{refused:>8.0%}{worst:>8.2g}", flush=True)
     good = missed <= 0.01 * grossly
     print(f"  {grossly} intervals missed by more than two widths, {missed} of them where the verdict is that it fits")
-    if figure:
-        draw(rows, figure)
-    return {"faults": rows, "missed_grossly": grossly, "unnoticed": missed}, good
+    if options.figure:
+        draw(rows, options.figure)
+    return {"commit": commit(), "rigs": rigs, "faults": rows, "missed_grossly": grossly, "unnoticed": missed}, good
 
 
 def draw(rows: dict, path: Path) -> None:
-    """Curves of detection over size."""
+    """Curves of detection over size; the same rows give the same bytes."""
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     drawn = Figure(figsize=(8, 4.6), layout="constrained")
@@ -141,7 +180,8 @@ def draw(rows: dict, path: Path) -> None:
             axes.invert_xaxis()
     drawn.supylabel("does not fit (% of rigs)")
     path.parent.mkdir(parents=True, exist_ok=True)
-    drawn.savefig(path, metadata={"Date": None})
+    with rc_context({"svg.hashsalt": "prw"}):
+        drawn.savefig(path, metadata={"Date": None})
 
 
 def main() -> int:
@@ -158,21 +198,15 @@ def main() -> int:
     parser.add_argument("--figure", type=Path, help="curves of detection over size, SVG")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    arguments = [
-        [options.fmu] * options.repetitions,
-        range(options.seed, options.seed + options.repetitions),
-        [SENSORS[options.sensors]] * options.repetitions,
-        [options.counts] * options.repetitions,
-        [options.motion] * options.repetitions,
-    ]
+    seeds = range(options.seed, options.seed + options.repetitions)
+    jobs = [(options.fmu, seed, SENSORS[options.sensors], options.counts, options.motion) for seed in seeds]
     with ProcessPoolExecutor(options.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         if options.faulty:
-            rows, good = campaign(pool, options.fmu, options.faulty, options.seed, options.figure)
+            rows, good = campaign(pool, options)
             if options.out:
-                options.out.parent.mkdir(parents=True, exist_ok=True)
                 options.out.write_text(json.dumps(rows, indent=2) + "\n")
             return 0 if good else 1
-        found = list(pool.map(repetition, *arguments))
+        found = list(results(pool, jobs, options.out))
     errors, sigmas, inside, seconds, fits = (np.array([entry[i] for entry in found]) for i in range(5))
     print(
         f"{options.repetitions} repetitions, {', '.join(SENSORS[options.sensors])}, {options.counts} counts a turn, "
@@ -191,11 +225,8 @@ def main() -> int:
         )
     print(f"  the verdict is that it fits in {fits.mean():.1%}")
     if options.out:
-        options.out.parent.mkdir(parents=True, exist_ok=True)
-        options.out.write_text(
-            json.dumps({"fits": float(fits.mean()), "repetitions": options.repetitions, "parameters": rows}, indent=2)
-            + "\n"
-        )
+        whole = {"commit": commit(), "fits": float(fits.mean()), "repetitions": options.repetitions, "parameters": rows}
+        options.out.write_text(json.dumps(whole, indent=2) + "\n")
     print("unbiased, intervals honest" if good else "BIASED, intervals too narrow, or false alarms")
     return 0 if good else 1
 

@@ -1,0 +1,33 @@
+"""The campaign of simulated rigs runs, continues after an interruption, and draws the same figure again."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import monte_carlo
+
+
+def test_one_rig_without_a_fault_and_one_with(fmu, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(monte_carlo, "FAULTS", {"gain": ("gain of tau1, % too much", (10.0,))})
+    monkeypatch.setattr(monte_carlo, "commit", lambda: "0123abc")
+
+    def run(*options):
+        monkeypatch.setattr(sys, "argv", ["monte_carlo.py", str(fmu), "--workers", "1", *map(str, options)])
+        monte_carlo.main()
+
+    run("--repetitions", 1, "--out", tmp_path / "clean.json")
+    clean = json.loads((tmp_path / "clean.json").read_text())
+    assert clean["fits"] == 1 and clean["commit"] == "0123abc" and "1 repetitions" in capsys.readouterr().out
+    assert all(abs(entry["bias"]) < 0.02 for entry in clean["parameters"].values())
+
+    figure, out = tmp_path / "detection.svg", tmp_path / "detection.json"
+    figures = []
+    for _ in range(2):
+        run("--faulty", 1, "--figure", figure, "--out", out)
+        figures.append(figure.read_bytes())
+        assert json.loads(out.read_text())["faults"]["gain"][0]["does_not_fit"] == 1
+        assert len(out.with_suffix(".jsonl").read_text().splitlines()) == 1, (
+            "the second run reads the first one's results"
+        )
+    assert figures[0] == figures[1]
