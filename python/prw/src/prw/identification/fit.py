@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -218,14 +219,18 @@ class Comparison:
     def score_variance(self, jacobian: Array) -> Array:
         """Variance (p, p) of the score J'r, with the encoders' errors as they were drawn: in a periodic motion they have
         its phase and repeat with it. jacobian: (2, bins, c, p)."""
-        e = self.experiment
-        drawn = e.channel_errors * e.shares - (self._scaled @ e.motor_errors[..., None])[..., 0]
-        white = self._parts(np.moveaxis((self._whiten @ drawn[..., None])[..., 0], 0, -1))
-        scores = np.einsum("rfcp,rfcd->dp", jacobian, white, optimize=True)
+        scores = np.einsum("rfcp,rfcd->dp", jacobian, self._drawn, optimize=True)
         seen = self._whiten * np.sqrt(self._noise)
         of_noise = np.einsum("fcj,rfcp->rfjp", seen.conj(), jacobian, optimize=True).reshape(-1, jacobian.shape[-1])
-        variance: Array = scores.T @ scores / len(drawn) + (of_noise.conj().T @ of_noise).real
+        variance: Array = scores.T @ scores / len(scores) + (of_noise.conj().T @ of_noise).real
         return variance
+
+    @cached_property
+    def _drawn(self) -> Array:
+        """What draws (d) of the encoders' errors make of the residual, (2, bins, c, d)."""
+        e = self.experiment
+        drawn = e.channel_errors * e.shares - (self._scaled @ e.motor_errors[..., None])[..., 0]
+        return self._parts(np.moveaxis((self._whiten @ drawn[..., None])[..., 0], 0, -1))
 
     def noise_ratios(self) -> Array:
         """Sums (3, c) over frequencies, of which the first two have the ratio 1 where each channel's noise explains its
