@@ -36,22 +36,6 @@ def test_quantised_angles(counts):
     np.testing.assert_allclose(np.abs(gain), 1, atol=0.01)
 
 
-@pytest.mark.parametrize("rate_noise", [None, 0.01])
-def test_the_share_of_the_samples_that_a_path_follows(rate_noise):
-    # A little more of one frequency in the samples, and how much of it the path has.
-    t, random = np.arange(4001) * 1e-3, np.random.default_rng(0)
-    angle, rate = wave(t)
-    angle = angle + random.normal(0, 1e-3, len(t))
-    rates = None if rate_noise is None else rate + random.normal(0, rate_noise, len(t))
-    path, middle = smooth(t, angle, rates), slice(1000, 3000)
-    for frequency in (5.0, 20.0, 30.0, 50.0):
-        w = 2 * np.pi * frequency
-        more, faster = 1e-7 * np.sin(w * t), 1e-7 * w * np.cos(w * t)
-        change = smooth(t, angle + more, None if rates is None else rates + faster).angle(t) - path.angle(t)
-        share = (change[middle] @ more[middle]) / (more[middle] @ more[middle])
-        assert path.follows(np.array([frequency]))[0] == pytest.approx(share, abs=0.03), frequency
-
-
 def test_exact_angles_are_followed():
     t = np.arange(4001) * 1e-3
     angle, rate = wave(t)

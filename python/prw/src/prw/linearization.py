@@ -171,7 +171,7 @@ class Linearizer:
             settable = [v.name for v in variables.values() if v.causality in ("parameter", "input")]
             raise UserError(f"{self.fmu}: no start value {name}; there are {', '.join([*settable, *self.states])}")
         kind = variables[name].type
-        if not isinstance(value, str if kind == "String" else (Real, np.bool_)):
+        if not isinstance(value, str if kind == "String" else (float, Real, np.bool_)):
             raise UserError(f"{name}: {value!r} is not a value of type {kind}")
         return value
 

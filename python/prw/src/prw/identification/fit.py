@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -207,16 +208,6 @@ class Comparison:
         """Changes (2, bins, c, q) of the residual with changes of the outputs (q, f, c)."""
         return self.project(self._parts(-self._whiten @ self.experiment.seen(np.moveaxis(outputs, 0, -1))))
 
-    def echo(self, j: int, errors: Complex | Array) -> Complex:
-        """Mean products (bins,) of the residual and a course in channel j that has `errors` (..., 2) times the errors of
-        the two motors' paths."""
-        e = self.experiment
-        frequency = np.arange(e.bins) / (len(e.time) * e.step)
-        power = e.motor_power * np.column_stack([path.follows(frequency) ** 2 for path in e.paths or ()])
-        common = np.sum(self._whiten[:, :, [j]].conj() * (self._whiten @ self._scaled), axis=1)
-        products: Complex = 2 * e.shares[j] * np.sum(errors.conj() * common * power, axis=1)
-        return products
-
     def _parts(self, table: Complex) -> Array:
         """Real and imaginary parts (2, bins, ...), each of variance 1, of spectra (bins, ...) of variance 1."""
         found: Array = np.sqrt(2) * np.stack([table.real, table.imag])
@@ -228,34 +219,29 @@ class Comparison:
     def score_variance(self, jacobian: Array) -> Array:
         """Variance (p, p) of the score J'r, with the encoders' errors as they were drawn: in a periodic motion they have
         its phase and repeat with it. jacobian: (2, bins, c, p)."""
-        e = self.experiment
-        drawn = e.channel_errors * e.shares - (self._scaled @ e.motor_errors[..., None])[..., 0]
-        white = self._parts(np.moveaxis((self._whiten @ drawn[..., None])[..., 0], 0, -1))
-        scores = np.einsum("rfcp,rfcd->dp", jacobian, white, optimize=True)
+        scores = np.einsum("rfcp,rfcd->dp", jacobian, self._drawn, optimize=True)
         seen = self._whiten * np.sqrt(self._noise)
         of_noise = np.einsum("fcj,rfcp->rfjp", seen.conj(), jacobian, optimize=True).reshape(-1, jacobian.shape[-1])
-        variance: Array = scores.T @ scores / len(drawn) + (of_noise.conj().T @ of_noise).real
+        variance: Array = scores.T @ scores / len(scores) + (of_noise.conj().T @ of_noise).real
         return variance
 
+    @cached_property
+    def _drawn(self) -> Array:
+        """What draws (d) of the encoders' errors make of the residual, (2, bins, c, d)."""
+        e = self.experiment
+        drawn = e.channel_errors * e.shares - (self._scaled @ e.motor_errors[..., None])[..., 0]
+        return self._parts(np.moveaxis((self._whiten @ drawn[..., None])[..., 0], 0, -1))
+
     def noise_ratios(self) -> Array:
-        """Sums (2, c) over frequencies, of which the ratio is 1 where each channel's noise explains its residuals, and
-        above where there should be more of it: the score of the likelihood by its variance."""
-        inverse = self._inverse()
+        """Sums (3, c) over frequencies, of which the first two have the ratio 1 where each channel's noise explains its
+        residuals, and above where there should be more of it: the score of the likelihood by its variance. The third is
+        the information about the noise's variance, 1 by the square of its standard error."""
+        inverse = self._whiten.conj().swapaxes(-1, -2) @ self._whiten
         weighted = (inverse @ self._rest[:, :, None])[..., 0]
-        expected = np.einsum("fcc->c", inverse).real
-        sums: Array = self.experiment.shares * np.array([np.sum(np.abs(weighted) ** 2, axis=0), expected])
+        expected, share = np.einsum("fcc->c", inverse).real, self.experiment.shares
+        told = share * np.einsum("fcc,fcc->c", inverse, inverse).real
+        sums: Array = share * np.array([np.sum(np.abs(weighted) ** 2, axis=0), expected, told])
         return sums
-
-    def noise_error(self) -> Array:
-        """Standard errors (c,) of the variances of the channels' noise."""
-        each: Array = np.einsum("fcc->fc", self._inverse()).real
-        errors: Array = 1 / (self.experiment.shares * np.sqrt(np.sum(each**2, axis=0)))
-        return errors
-
-    def _inverse(self) -> Complex:
-        """Inverses (bins, c, c) of the covariances."""
-        inverse: Complex = self._whiten.conj().swapaxes(-1, -2) @ self._whiten
-        return inverse
 
 
 @dataclass(frozen=True)
@@ -415,14 +401,14 @@ class Fitter:
 
     def _judged_noise(self, point: Array) -> dict[str, float]:
         """Each channel's noise over all experiments, by its residuals at the present noise, where none is given."""
-        sums, freedom = dict.fromkeys(self.channels, np.zeros(2)), dict.fromkeys(self.channels, 0.0)
+        sums, freedom = dict.fromkeys(self.channels, np.zeros(3)), dict.fromkeys(self.channels, 0.0)
         for experiment, comparison in zip(self.experiments, self.compare(point)):
             taken = 1 + int(self.task.offsets) + 6 / len(experiment.channels)
             for name, ratio in zip(experiment.channels, comparison.noise_ratios().T):
                 sums[name] = sums[name] + ratio
                 freedom[name] += 2 * experiment.bins - taken
         each, judged = len(self.task.unknowns) / len(self.channels), {}
-        for name, (found, expected) in sums.items():
+        for name, (found, expected, _) in sums.items():
             left = max(freedom[name] - each, 1.0) / max(freedom[name], 1.0)
             noise = self.noise[name] * float(np.sqrt(found / (expected * left)))
             judged[name] = self.task.noise.get(name) or max(noise, FINEST * self._spread[name])

@@ -49,21 +49,13 @@ QUANTUM_VALUES = 20000
 class Path(NamedTuple):
     """The course of one angle. angle: spline over time (rad, s); its derivative is the rate. noise: standard deviation
     of the samples, rad. quantum: of the samples, rad, 0 if none. rate_noise: of the logged rates, rad/s, or None.
-    quiet: (n,) rad, a course at the samples' times that does not follow their errors. stiffness: s^6, of the path."""
+    quiet: (n,) rad, a course at the samples' times that does not follow their errors."""
 
     angle: BSpline
     noise: float
     quantum: float
     rate_noise: float | None
     quiet: Array
-    stiffness: float
-
-    def follows(self, frequency: Array) -> Array:
-        """Share of the samples, of their errors, too, that the path follows at each frequency (f,) Hz."""
-        squared = (2 * np.pi * frequency) ** 2
-        rates = 0.0 if self.rate_noise is None else (self.noise / self.rate_noise) ** 2
-        share: Array = 1 / (1 + self.stiffness * squared**ORDER / (1 + rates * squared))
-        return share
 
     def errors(self, random: np.random.Generator) -> Array:
         """Errors (n,) in rad like those of the samples."""
@@ -80,9 +72,7 @@ def smooth(time: Array, theta: Array, omega: Array | None = None, quantum: float
     blocks = [(spline.rows(time, 0), theta)] + ([(spline.rows(time, 1), omega)] if omega is not None else [])
     found = _fit(spline, blocks, quantum**2 / 12)
     rate_noise = None if omega is None else found.noise / float(np.sqrt(found.weights[1]))
-    stiffness = found.penalty * spline.spacing ** (2 * ORDER) * (time[-1] - time[0]) / (spline.spacing * len(time))
-    course, quiet = spline.curve(found.coefficients), spline.curve(found.quiet)(time)
-    return Path(course, found.noise, quantum, rate_noise, quiet, stiffness)
+    return Path(spline.curve(found.coefficients), found.noise, quantum, rate_noise, spline.curve(found.quiet)(time))
 
 
 def quantum_of(values: Array) -> float:
@@ -152,13 +142,12 @@ class _Spline:
 
 class _Fit(NamedTuple):
     """Coefficients of the path and of a quieter one; noise of the first block, rad; weights of the blocks relative to
-    the first (ratios of their variances); penalty of the path."""
+    the first (ratios of their variances)."""
 
     coefficients: Array
     quiet: Array
     noise: float
     weights: list[float]
-    penalty: float
 
 
 def _fit(spline: _Spline, blocks: list[Block], least: float) -> _Fit:
@@ -211,7 +200,7 @@ def _fit(spline: _Spline, blocks: list[Block], least: float) -> _Fit:
         penalty, weights = most_probable(variance)
     quiet = solve(min(penalty * OVERSMOOTHING, 10.0 ** STIFFNESS[1]), weights)[0]
     penalty = max(penalty / UNDERSMOOTHING, 10.0 ** STIFFNESS[0])
-    return _Fit(solve(penalty, weights)[0], quiet, float(np.sqrt(variance)), weights, penalty)
+    return _Fit(solve(penalty, weights)[0], quiet, float(np.sqrt(variance)), weights)
 
 
 def _weights(x: Sequence[float]) -> list[float]:

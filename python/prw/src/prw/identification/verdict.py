@@ -1,10 +1,9 @@
 """Whether the model explains the data, and by what else they would be explained.
 
 The residuals of a fit that is right are noise. They are tested against the motion: by local regression on the motors'
-spectra and the channel's own, frequency by frequency (their coherence, without the encoders' errors, which are in
-both); along what single faults would leave (a delay, a lag or a gain of a channel, or of two in common; friction;
-backlash), as score tests (Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50); and their strength is compared with that of
-the noise at frequencies at which the motors do not move.
+spectra and the channel's own, frequency by frequency (their coherence); along what single faults would leave (a delay,
+a lag or a gain of a channel, or of two in common; friction; backlash), as score tests (Rao, Proc. Cambridge Phil. Soc.
+44 (1948) 50); and their strength is compared with that of the noise at frequencies at which the motors do not move.
 """
 
 from __future__ import annotations
@@ -32,6 +31,8 @@ CLEAR_SIGN = 7.0
 EXCESS, LUCK = 1.3, 5.0
 #: Frequencies for each piece in which the residual may follow the motion in its own way, and pieces at most.
 PIECE, MOST_PIECES = 16, 6
+#: A course that moves is this many times stronger (power) than the errors that encoders make in it.
+CLEARLY_MOVING = 30.0
 #: Directions that the others explain to this share are none.
 NEW = 0.02
 #: A rate that is this share of its greatest has a sign.
@@ -109,12 +110,12 @@ def judge(solution: Solution) -> Verdict:
     faults: list[Fault] = []
     for i, (experiment, comparison) in enumerate(zip(solution.fitter.experiments, solution.comparisons)):
 
-        def score(columns: Complex, echo: Array | float = 0.0, i: int = i, compared: Comparison = comparison) -> _Score:
-            return _Score(solution, i, compared.seen_along(columns), echo, inverse)
+        def score(columns: Complex, i: int = i, comparison: Comparison = comparison) -> _Score:
+            return _Score(solution, i, comparison.seen_along(columns), inverse)
 
         spread, luck = _strength(solution, i)
         for j, name in enumerate(experiment.channels):
-            there = score(*_following(experiment, comparison, j))
+            there = score(_following(experiment, comparison, j))
             chance = there.chance(2 * experiment.bins)
             texts = []
             if chance < CHANCE:
@@ -146,10 +147,9 @@ def judge(solution: Solution) -> Verdict:
 
 
 class _Score:
-    """The residuals' score along directions (2, bins, c, q) of one experiment. echo: (q,), the part of it that is there
-    because the directions err as the residuals do."""
+    """The residuals' score along directions (2, bins, c, q) of one experiment."""
 
-    def __init__(self, solution: Solution, i: int, table: Array, echo: Array | float, inverse: Array):
+    def __init__(self, solution: Solution, i: int, table: Array, inverse: Array):
         flat = table.reshape(-1, table.shape[-1])
         size = np.sqrt(np.sum(flat**2, axis=0))
         self._size = np.where(size > 0, size, 1.0)
@@ -158,7 +158,7 @@ class _Score:
         self._shift = inverse @ (jacobian.T @ flat)
         rest = (flat - jacobian @ self._shift).reshape(table.shape)
         self._rest, self._residual = rest, solution.comparisons[i].residual
-        self._score = flat.T @ solution.comparisons[i].residual.ravel() - echo / self._size
+        self._score = flat.T @ solution.comparisons[i].residual.ravel()
         self._variance = solution.comparisons[i].score_variance(rest)
         self._information = flat.T @ rest.reshape(flat.shape)
         for other, comparison in enumerate(solution.comparisons):
@@ -195,23 +195,23 @@ class _Score:
         return Fault(name, unit, -size / scale, error / scale, self._shift[:, 0] * size, gain)
 
 
-def _following(experiment: Experiment, comparison: Comparison, j: int) -> tuple[Complex, Array]:
-    """What follows the motors, and the channel itself, in channel j: columns (q, f, c), smooth over frequencies, and
-    their echo (q,)."""
+def _following(experiment: Experiment, comparison: Comparison, j: int) -> Complex:
+    """What follows the motors, and the channel itself, in channel j: columns (q, f, c), smooth over frequencies. They
+    are 0 where encoders' errors make up much of them: the residual contains the same errors."""
     bins, response = experiment.bins, comparison.response
     pieces = int(np.clip(bins // PIECE, 1, MOST_PIECES))
     place = np.linspace(0, pieces - 1 + 1e-9, bins)
     hats = np.maximum(0, 1 - np.abs(place - np.arange(pieces)[:, None]))
     own = response.outputs[:, j] + response.transients[:, j] @ comparison.initial
     motors = [(experiment.motors[:, i], np.eye(2)[i]) for i in (0, 1)]
-    columns, echoes = [], []
-    for course, errors in [*motors, (own, response.transfer[:bins, j])]:
+    columns = []
+    for course, gains in [*motors, (own, response.transfer[:bins, j])]:
+        errors = np.sum(np.abs(gains) ** 2 * experiment.motor_power, axis=1)
+        clear = hats @ (np.abs(course[:bins]) ** 2 - CLEARLY_MOVING * errors) > 0
         there = np.zeros((pieces, experiment.needed_bins, len(experiment.channels)), dtype=complex)
-        there[:, :bins, j] = hats * course[:bins]
+        there[clear, :bins, j] = hats[clear] * course[:bins]
         columns += [there, 1j * there]
-        echo = hats @ comparison.echo(j, errors)
-        echoes += [echo.real, echo.imag]
-    return np.concatenate(columns), np.concatenate(echoes)
+    return np.concatenate(columns)
 
 
 def _faults(solution: Solution, experiment: Experiment, comparison: Comparison) -> Iterator[tuple[str, str, Complex]]:
@@ -260,10 +260,10 @@ def _strength(solution: Solution, i: int) -> tuple[Array, Array]:
     experiment, comparison, found = solution.fitter.experiments[i], solution.comparisons[i], []
     values = experiment.values
     assert values is not None
-    there, expected = comparison.noise_ratios()
+    there, expected, told = comparison.noise_ratios()
     noise = np.array([solution.noise[name] for name in experiment.channels])
     inside = noise**2 * there / expected + np.mean(experiment.channel_power, axis=0)
-    luck = comparison.noise_error() / (2 * inside)
+    luck = 1 / (2 * inside * np.sqrt(told))
     for j, name in enumerate(experiment.channels):
         column = (values[:, j] - solution.modelled[i][:, j])[np.isfinite(values[:, j])]
         # Values that are missing are skipped: what is left above the band is noise in any order.
