@@ -275,17 +275,24 @@ const ZERO: PitchRoll = PitchRoll::both(0.0);
 pub struct StepCache {
     /// One of the others, at a place that needs no looking up.
     current: StepMatrices,
-    entries: [StepMatrices; Self::SIZE],
+    /// As many as there is room for, so that a step does not allocate.
+    entries: Vec<StepMatrices>,
     oldest: usize,
 }
 
 impl StepCache {
     const SIZE: usize = 8;
 
+    /// A cache with room for a few step sizes. That of [`default`](Self::default) has room for the current one only.
+    pub fn new() -> Self {
+        Self { entries: Vec::with_capacity(Self::SIZE), ..Self::default() }
+    }
+
     /// Forgets all of them.
     pub fn clear(&mut self) {
         self.current.h = 0.0;
-        self.entries.iter_mut().for_each(|entry| entry.h = 0.0);
+        self.entries.clear();
+        self.oldest = 0;
     }
 
     /// The matrices of the last step size.
@@ -310,14 +317,18 @@ impl StepCache {
             return;
         }
         self.current = StepMatrices::new(system, h);
-        self.entries[self.oldest] = self.current;
-        self.oldest = (self.oldest + 1) % Self::SIZE;
+        if self.entries.len() < self.entries.capacity() {
+            self.entries.push(self.current);
+        } else if let Some(oldest) = self.entries.get_mut(self.oldest) {
+            *oldest = self.current;
+            self.oldest = (self.oldest + 1) % self.entries.len();
+        }
     }
 }
 
 impl Default for StepCache {
     /// A cache without entries.
     fn default() -> Self {
-        Self { current: StepMatrices::UNUSED, entries: [StepMatrices::UNUSED; Self::SIZE], oldest: 0 }
+        Self { current: StepMatrices::UNUSED, entries: Vec::new(), oldest: 0 }
     }
 }

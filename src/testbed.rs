@@ -23,7 +23,7 @@ pub struct Testbed {
 }
 
 impl Clone for Testbed {
-    /// Without the step matrices, which are calculated again where they are needed.
+    /// Without the step matrices, and without room for several of them: most copies are saved states.
     fn clone(&self) -> Self {
         Self { cache: StepCache::default(), ..*self }
     }
@@ -51,7 +51,7 @@ impl Testbed {
             state: [0.0; 6],
             motors: Motors::default(),
             system: Decoupled::new(&parameters)?,
-            cache: StepCache::default(),
+            cache: StepCache::new(),
         })
     }
 
