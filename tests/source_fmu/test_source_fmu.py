@@ -243,9 +243,10 @@ def test_fmpy_compiles_and_runs_it(tmp_path: Path) -> None:
 
 
 def cargo_test(library: Path, *arguments: str, **environment: str) -> str:
-    """Tests in Rust, on compiled sources."""
+    """Tests in Rust, on compiled sources; the model in them has the same guid."""
     command = ["cargo", "test", "--locked", "--release", *arguments]
-    environment = {**os.environ, "FMU_LIBRARY": str(library), **environment}
+    guid = fmpy.read_model_description(str(SOURCE_FMU)).guid
+    environment = {**os.environ, "FMU_LIBRARY": str(library), "FMU_GUID": guid, **environment}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
