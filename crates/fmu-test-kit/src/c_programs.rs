@@ -102,7 +102,7 @@ pub fn command(program: &Path) -> Command {
 /// # Panics
 /// When it grows by more.
 pub fn reload(program: &Path, names: &[&str]) {
-    const ROUNDS: i64 = 1000;
+    const ROUNDS: i64 = 3000;
     let mut command = command(program);
     command.arg(ROUNDS.to_string()).args(names.iter().map(|name| library(name)));
     let printed = output(&mut command, "the compiled program does not run");
