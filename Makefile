@@ -17,8 +17,8 @@ DIST_VENV := .venv-dist
 WITH_WASM2C := WASM2C='$(CURDIR)/$(VENV)/bin/wasm2c'
 PY   := $(VENV)/bin/python
 # What is imported is compiled then; all of it takes longer than to install it.
-PIP_INSTALL := env -u MAKEFLAGS $(PY) -m pip install --progress-bar off --no-compile
-# The large environments take uv a tenth of the time.
+PIP_INSTALL := $(PY) -m pip install --progress-bar off --no-compile
+# uv installs the large environments in a tenth of the time that pip takes.
 UV_INSTALL := $(VENV)/bin/uv pip install --quiet --python $(PY)
 # A process for each core; `.venv/bin/python -m pytest -x FILE` runs a part.
 PYTEST := $(PY) -m pytest -q -p no:cacheprovider -n auto --dist worksteal
@@ -29,8 +29,7 @@ SOURCE_FMU := target/fmu/source/prw_testbed.fmu
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-# Without MAKEFLAGS: make closes its job server to cargo, and cargo warns that it cannot be reached.
-CARGO ?= env -u MAKEFLAGS cargo
+CARGO ?= cargo
 # CI and users build what Cargo.lock says
 LOCKED ?= --locked
 
@@ -41,7 +40,7 @@ HAS_WEBASSEMBLY = ls "$$(env -u MAKEFLAGS -u MFLAGS rustc --print target-libdir 
 ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
 
 BUILD_FMU = $(CARGO) run $(LOCKED) --release --bin build_fmu --
-# The page in the FMU that is there runs it.
+# Succeeds if the existing FMU contains the page that runs it.
 HAS_PAGE = $(PYTHON) -c 'import sys, zipfile; sys.exit(b".catch(withoutIt)" not in zipfile.ZipFile("$(FMU)").read("documentation/index.html"))' 2>/dev/null
 
 stop = { echo '$(1)' >&2; exit 1; }
@@ -84,7 +83,7 @@ help:
 	@echo 'make clean                   remove .venv, .venv-dist, target, out and dist'
 
 # The network is waited for while the compiler works. What fails then runs again alone, for its message to come last.
-# An FMU that is up to date stays as it is: it may have the page that runs it, which `make fmu` adds.
+# The page that runs the FMU takes longest to build. If the existing FMU contains the page, the new one does too.
 demo: need-rust need-python
 	@$(MAKE) --no-print-directory $(if $(findstring jobserver,$(MAKEFLAGS)),,-j2) $(VENV)/demo.stamp demo-fmu || \
 	  $(MAKE) --no-print-directory $(VENV)/demo.stamp demo-fmu
@@ -97,11 +96,11 @@ fmu: need-rust
 	@$(ADD_WEBASSEMBLY) || echo 'note: the page in the FMU goes in without *Try it*, which needs: rustup target add $(WEBASSEMBLY)'
 	@$(BUILD_FMU) $$($(HAS_WEBASSEMBLY) && echo --live-page)
 
-# A minute after a small change.
+# Takes about a minute after a small change.
 check: $(VENV)/test.stamp need-rust
 	@$(PY) tools/changed.py
 
-# Hours: everything that exists.
+# Takes hours.
 check-release: $(VENV)/importers.stamp need-rust
 	@$(PY) tools/release_check.py $(ARGS)
 
@@ -298,7 +297,7 @@ $(DIST_VENV)/test.stamp: $(DIST_VENV)/dist.stamp requirements/test-platforms.txt
 	@touch $@
 
 need-rust:
-	@command -v $(lastword $(CARGO)) >/dev/null || \
+	@command -v $(CARGO) >/dev/null || \
 	  $(call stop,Rust is missing; install it with rustup (https://rustup.rs))
 	@command -v cc >/dev/null || \
 	  $(call stop,the C compiler that Rust links with is missing; on Debian: apt install gcc libc6-dev)

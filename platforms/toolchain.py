@@ -37,7 +37,7 @@ def say(text: str) -> None:
 
 @dataclass(frozen=True)
 class Toolchain:
-    """Rust for a target: what it is called, and what cargo needs to be told."""
+    """The Rust compiler for a target: its version, and the environment and flags of cargo."""
 
     description: str
     environment: dict[str, str] = field(default_factory=dict)

@@ -74,7 +74,7 @@ impl<T: Arithmetic> Equations<T> {
     }
 }
 
-/// Of a subsystem: the unit of the velocity in which the series converges best, and how fast it does.
+/// The unit of the velocity in which the series of a subsystem converges best, and the rate of convergence.
 ///
 /// Angles and velocities differ in magnitude. With the velocity in this unit (a power of 2, so that nothing is rounded)
 /// the entries that couple them have the same magnitude: the norm is smaller, and the error of the doublings with it.

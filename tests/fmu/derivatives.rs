@@ -19,8 +19,8 @@ use std::sync::LazyLock;
 static STRUCTURE: LazyLock<ModelStructure> =
     LazyLock::new(|| ModelStructure::of::<TestbedFmu>(false).unwrap());
 
-/// Central differences of the values that getters return, and what rounding may do to them. All but the parameters of
-/// the equations act linearly.
+/// Central differences of the values that getters return, each with a bound of its rounding error. The values are linear
+/// in every known except the parameters of the equations.
 fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f64)> {
     let [value] = fmu.get([known]);
     let is_linear = [&INPUTS[..], &STATES, &STARTS].concat().contains(&known);

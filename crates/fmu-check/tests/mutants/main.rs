@@ -106,8 +106,8 @@ fn description(fmi: u32) -> String {
     text
 }
 
-/// The library of the wagon. Tests share it: the variable `WAGON_FAULT` chooses the fault when it is loaded, but for those
-/// that the linker sees.
+/// The compiled library of the wagon, which the tests share. The environment variable `WAGON_FAULT` chooses the fault when
+/// the library is loaded. Each fault in linking has a separate library.
 fn library(fmi: u32, of_linker: &str) -> PathBuf {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mutants/wagon.c");
     let text = std::fs::read(&source).expect("the source");

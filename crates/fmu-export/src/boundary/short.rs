@@ -32,7 +32,7 @@ unsafe fn get<M: Exported, R: Reference>(
     count: usize,
 ) -> bool {
     let (references, places): (_, *mut MaybeUninit<f64>) = (R::cast(vr), values.cast());
-    // SAFETY: not NULL, aligned, and so many by contract; `MaybeUninit` asks for no initialized values.
+    // SAFETY: both arrays are not NULL, aligned, and by contract `count` long; `MaybeUninit` needs no initialized values.
     unsafe {
         match count {
             _ if !are_arrays(vr, values, count) => false,
@@ -52,7 +52,7 @@ unsafe fn set<M: Exported, R: Reference>(
     count: usize,
 ) -> bool {
     let references = R::cast(vr);
-    // SAFETY: not NULL, aligned, and so many by contract.
+    // SAFETY: both arrays are not NULL, aligned, and by contract `count` long.
     unsafe {
         match count {
             _ if !are_arrays(vr, values, count) => false,

@@ -130,7 +130,7 @@ impl<M: Exported> Instance<M> {
         vr: &[R; N],
         values: &[f64; N],
     ) -> bool {
-        // Copied one by one, because the compiler cannot know that they are not part of the model.
+        // Copies the arrays: the compiler cannot assume that they do not overlap the model.
         let lines: [usize; N] = std::array::from_fn(|number| vr[number].place() as usize);
         let values: [f64; N] = std::array::from_fn(|number| values[number]);
         let is_taken = |line: &usize| {
