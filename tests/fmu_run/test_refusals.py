@@ -140,7 +140,7 @@ FMPY = Path(fmpy.__file__).parent
 FOREIGN = {
     "Windows on x86_64": lambda _: (FMPY / "logging/win64/logging.dll").read_bytes(),
     "Windows on x86": lambda _: (FMPY / "logging/win32/logging.dll").read_bytes(),
-    "macOS on x86_64 and aarch64": lambda _: (FMPY / "cswrapper/cswrapper.dylib").read_bytes(),
+    "macOS on x86_64 and aarch64": lambda _: (FMPY / "logging/darwin64/logging.dylib").read_bytes(),
     "Linux on loongarch64": lambda library: library[:18] + bytes([2, 1]) + library[20:],
     "Linux on riscv64": lambda library: library[:18] + bytes([243, 0]) + library[20:],
 }
