@@ -210,6 +210,7 @@ def test_with_the_keyboard_alone(visit: Any) -> None:
     page.get_by_label("Motion", exact=True).focus()
     page.keyboard.press("ArrowDown")
     expect(page.get_by_label("Motion", exact=True)).to_have_value("move")
+    page.wait_for_function("parseFloat(document.querySelector('.live-clock').textContent) > 0")
     button(page, "Pause").focus()
     page.keyboard.press("Space")
     expect(button(page, "Play")).to_be_focused()
