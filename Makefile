@@ -46,7 +46,7 @@ HAS_PAGE = $(PYTHON) -c 'import sys, zipfile; sys.exit(b".catch(withoutIt)" not 
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-fmu check check-release test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo demo-fmu check check-release test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -60,6 +60,7 @@ help:
 	@echo 'make check                   check what has changed since the last commit, in a minute'
 	@echo 'make check-release           run everything below and above, and write a table -> out/release-check.md'
 	@echo 'make test-python             check the Python, with ruff and mypy'
+	@echo 'make test-faults             put faults into the sources and count those that the tests find'
 	@echo 'make test-newest-fmpy        the tests with FMPy again, with its newest version'
 	@echo 'make test-page               the page in the FMU, in Chromium, Firefox and WebKit, which it installs'
 	@echo 'make bench                   time the FMU against bare C             -> out/bench.md'
@@ -191,6 +192,10 @@ importer-fmus: closed-loop-fmus
 # What its tests saw goes into docs/compatibility.md by `python -m tools compatibility`.
 test-importers: $(VENV)/importers.stamp importer-fmus
 	$(PYTEST) tests/importers
+
+# Takes about a minute for each three faults.
+test-faults: need-rust headers
+	@$(PY) tools/seeded_faults.py $(ARGS)
 
 # The tools for other platforms have a separate environment. Programs that are no Python packages are installed
 # where that is possible, else named.

@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 #: What is checked, the target of the Makefile and its variables.
 PARTS = {
     "tests": ("test",),
+    "seeded faults": ("test-faults",),
     "newest FMPy": ("test-newest-fmpy",),
     "page in browsers": ("test-page",),
     "C sources": ("test-source-fmu",),

@@ -20,6 +20,24 @@ from tools import compatibility, figures
 from tools.documentation.pages import CONTROLLER, TESTBED
 from tools.figures import film, gallery, visit
 
+#: One fault that the tests of fmi-abi find, and a change that they cannot find.
+FAULTS = """
+directory = "crates/fmi-abi/src"
+tests = ["--package fmi-abi --lib"]
+
+[[fault]]
+name = "Pending is a status"
+file = "status.rs"
+old = "            4 => Self::Fatal,"
+new = "            4 | 5 => Self::Fatal,"
+
+[[fault]]
+name = "a comment is shorter"
+file = "status.rs"
+old = "    /// All well."
+new = "    /// Well."
+"""
+
 
 def run(*command: object, **environment: str) -> str:
     """Runs a program, which must succeed, in the project's directory. Returns its standard output."""
@@ -47,6 +65,16 @@ def test_the_benchmarks(fmu: Path) -> None:
     if shutil.which("valgrind"):
         ((_, counts),) = rows(run("benches/profile", fmu, sys.executable, BENCH_QUICK="1")).items()
         assert sum(counts[1:]) < counts[0] < 10_000
+
+
+def test_seeded_faults_are_found_or_escape(tmp_path: Path) -> None:
+    assert "34 faults fit the sources" in run(sys.executable, "tools/seeded_faults.py", "--check")
+    faults = tmp_path / "faults.toml"
+    faults.write_text(FAULTS, encoding="utf-8")
+    command = [sys.executable, "tools/seeded_faults.py", str(faults)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 1 and done.stderr == ""
+    assert done.stdout == "found    Pending is a status\nescaped  a comment is shorter\n1 of 2 faults found\n"
 
 
 def test_the_reference_experiments_are_written(tmp_path: Path) -> None:

@@ -34,3 +34,15 @@ impl Status {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Status;
+
+    #[test]
+    fn other_numbers_and_pending_are_errors() {
+        let known = [Status::Ok, Status::Warning, Status::Discard, Status::Error, Status::Fatal];
+        assert_eq!([0, 1, 2, 3, 4].map(Status::from_c), known);
+        assert_eq!([-1, 5, 6].map(Status::from_c), [Status::Error; 3]);
+    }
+}

@@ -1,0 +1,143 @@
+"""Puts faults into the sources, one at a time, and runs the tests with each: a fault that no test finds has escaped.
+
+    python tools/seeded_faults.py [--only TEXT] [--check] [LIST.toml ...]
+
+The lists are in tests/faults. The faults go into a copy of the sources in target/faults. Run all lists before and after
+tests are deleted or merged. The faults of fmu-check's tests are in crates/fmu-check/tests/mutants and run with `make test`.
+Exit status 1 if a fault escaped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LISTS = ROOT / "tests/faults"
+COPY = ROOT / "target/faults/sources"
+#: Seconds that compiling and one set of tests may take. A fault may make a test hang.
+LONGEST = 600
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A replacement in a file, and the arguments of `cargo test` that should fail with it."""
+
+    name: str
+    file: Path
+    old: str
+    new: str
+    prelude: str
+    tests: tuple[str, ...]
+
+    def put_into(self, text: str) -> str:
+        """The text of the file with the fault."""
+        if text.count(self.old) != 1:
+            raise ValueError(f"{self.file}: the text to replace occurs {text.count(self.old)} times: {self.name}")
+        faulty = text.replace(self.old, self.new)
+        if not self.prelude:
+            return faulty
+        # Imports stand behind the comment on the module.
+        head, separator, rest = faulty.partition("\n\n")
+        return head + separator + self.prelude + rest
+
+
+def read(path: Path) -> list[Fault]:
+    """The faults of a list."""
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    directory = Path(content["directory"])
+    return [
+        Fault(
+            fault["name"],
+            directory / fault["file"],
+            fault["old"],
+            fault["new"],
+            fault.get("prelude", ""),
+            tuple(fault.get("tests", content["tests"])),
+        )
+        for fault in content["fault"]
+    ]
+
+
+def copy_sources() -> None:
+    """Copies the files that git tracks to COPY. Files that have not changed keep their times, for cargo."""
+    command = ["git", "ls-files", "-z"]
+    names = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
+    for name in filter(None, names):
+        source, target = ROOT / name, COPY / name
+        if source.is_file() and not (target.is_file() and target.read_bytes() == source.read_bytes()):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, target)
+
+
+def fails(arguments: str) -> bool:
+    """Whether `cargo test` with these arguments fails in the copy."""
+    # The headers of the C programs are in the environment of this interpreter.
+    headers = next(Path(sys.prefix).glob("lib/python3*/site-packages/fmpy/c-code"), None)
+    environment = {"FMI2_HEADERS": str(headers)} if headers else {}
+    command = ["cargo", "test", "--locked", "--quiet", *arguments.split()]
+    try:
+        done = subprocess.run(
+            command,
+            cwd=COPY,
+            env={**os.environ, **environment, "CARGO_TARGET_DIR": str(COPY.parent / "target")},
+            timeout=LONGEST,
+            check=False,
+            capture_output=True,
+            text=True,
+        )
+    except subprocess.TimeoutExpired:
+        return True
+    if "could not compile" in done.stderr:
+        raise RuntimeError(f"the faulty sources do not compile:\n{done.stderr}")
+    return done.returncode != 0
+
+
+def escapes(fault: Fault) -> bool:
+    """Whether all tests pass with the fault."""
+    path = COPY / fault.file
+    text = path.read_text(encoding="utf-8")
+    path.write_text(fault.put_into(text), encoding="utf-8")
+    try:
+        return not any(fails(arguments) for arguments in fault.tests)
+    finally:
+        path.write_text(text, encoding="utf-8")
+
+
+def main() -> int:
+    """Run the lists, or check that their faults fit the sources."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("lists", nargs="*", type=Path, metavar="LIST.toml", default=sorted(LISTS.glob("*.toml")))
+    parser.add_argument("--only", default="", metavar="TEXT", help="the faults whose names contain the text")
+    parser.add_argument("--check", action="store_true", help="only check that each fault fits the sources")
+    options = parser.parse_args()
+    faults = [fault for path in options.lists for fault in read(path) if options.only in fault.name]
+    if not faults:
+        parser.error(f"no fault is called {options.only!r}")
+    for fault in faults:
+        fault.put_into((ROOT / fault.file).read_text(encoding="utf-8"))
+    if options.check:
+        print(f"{len(faults)} faults fit the sources")
+        return 0
+    copy_sources()
+    for arguments in dict.fromkeys(arguments for fault in faults for arguments in fault.tests):
+        if fails(arguments):
+            print(f"cargo test {arguments} fails without a fault", file=sys.stderr)
+            return 1
+    escaped = []
+    for fault in faults:
+        if escapes(fault):
+            escaped.append(fault.name)
+        print(f"{'escaped' if fault.name in escaped else 'found  '}  {fault.name}", flush=True)
+    print(f"{len(faults) - len(escaped)} of {len(faults)} faults found")
+    return 1 if escaped else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
