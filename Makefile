@@ -225,12 +225,12 @@ monte-carlo: $(VENV)/study.stamp fmu
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --repetitions $(RIGS) --out out/monte_carlo.json $(ARGS)
 	$(PY) tests/analysis/monte_carlo.py $(FMU) --faulty $(FAULTY) --figure $(FIGURE) --out out/detection.json $(ARGS)
 
-# libFuzzer keeps what is new in target/fuzz/corpus; crates/fmu-export/fuzz/corpus has the committed beginnings.
+# libFuzzer starts from the inputs in corpus.zip and adds new ones to target/fuzz/corpus.
 fuzz: need-rust need-nightly
 	@$(CARGO) fuzz --version >/dev/null 2>&1 || \
 	  $(call stop,cargo-fuzz is missing; install it with: cargo install --locked cargo-fuzz)
-	@mkdir -p target/fuzz/corpus
-	$(CARGO) +nightly fuzz run --fuzz-dir crates/fmu-export/fuzz --target-dir target/fuzz calls target/fuzz/corpus crates/fmu-export/fuzz/corpus/calls \
+	@$(PYTHON) -m zipfile -e crates/fmu-export/fuzz/corpus.zip target/fuzz/corpus
+	$(CARGO) +nightly fuzz run --fuzz-dir crates/fmu-export/fuzz --target-dir target/fuzz calls target/fuzz/corpus \
 	  -- -max_len=4096 -max_total_time=$(FUZZ_SECONDS) -print_final_stats=1
 
 sanitize: need-rust need-nightly $(VENV)/test.stamp source-fmu fmu

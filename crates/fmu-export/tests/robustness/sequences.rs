@@ -3,6 +3,7 @@
 use crate::toys::*;
 use fmu_test_kit::careless::{RunBytes, Tally, run, run_seeds};
 use fmu_test_kit::{FUNCTIONS, Importer, fmi3};
+use std::io::{Cursor, Read as _};
 
 /// All toys but the faulty one.
 const TOYS: [(&str, RunBytes); 10] = [
@@ -67,16 +68,18 @@ fn no_sequence_of_calls_of_fmi3_breaks_a_promise() {
     check_counts(&tally, &["fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange"]);
 }
 
-/// What libFuzzer found worth keeping, for every toy in both standards.
+/// The inputs that libFuzzer found worth keeping, for every test model in both FMI versions.
 #[test]
 fn the_corpus_breaks_no_promise() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/fuzz/corpus/calls");
+    let archive = include_bytes!("../../fuzz/corpus.zip");
+    let mut archive = zip::ZipArchive::new(Cursor::new(archive)).expect("a zip archive");
     let mut tally = Tally::new();
-    for entry in std::fs::read_dir(folder).expect("the corpus is committed") {
-        let path = entry.expect("a readable folder").path();
-        let bytes = std::fs::read(&path).expect("a readable file");
+    for index in 0..archive.len() {
+        let mut file = archive.by_index(index).expect("a file of the archive");
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).expect("an intact file");
         for (toy, session) in TOYS.iter().chain(&TOYS_OF_FMI3) {
-            println!("{toy}, {}", path.display());
+            println!("{toy}, {:?}", file.name());
             session(&bytes, &mut tally);
         }
     }
