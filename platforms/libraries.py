@@ -93,9 +93,9 @@ def remap(toolchain: tools.Toolchain) -> list[tuple[Path, str]]:
     """Folders whose names would get into the library through messages of a panic."""
     cargo = Path(os.environ.get("CARGO_HOME") or Path.home() / ".cargo")
     crates = sorted((cargo / "registry" / "src").glob("*/"))
-    std = toolchain.sysroot / "lib/rustlib/src/rust"
+    std = (toolchain.sysroot / "lib/rustlib/src/rust", f"/rustc/{toolchain.commit}")
     # The last that fits counts.
-    return [(ROOT, MODEL), (target_folder(), "target"), (std, "rust"), *((path, "crates") for path in crates)]
+    return [(ROOT, MODEL), (target_folder(), "target"), std, *((path, "crates") for path in crates)]
 
 
 def target_folder() -> Path:

@@ -48,6 +48,11 @@ class Toolchain:
         """Where its libraries and their sources are."""
         return Path(_output("rustc", "--print", "sysroot"))
 
+    @property
+    def commit(self) -> str:
+        """The commit of the compiler, which std's own paths contain where its sources are not installed."""
+        return re.search(r"^commit-hash: (\w+)$", _output("rustc", "-vV"), re.MULTILINE)[1]
+
 
 @cache
 def toolchain(target: Target) -> Toolchain:

