@@ -46,8 +46,9 @@ def run(name: str, arguments: tuple[str, ...], logs: Path) -> tuple[str, float]:
     begin, before = time.monotonic(), changed()
     log = logs / f"{arguments[0]}.log"
     print(f"== {name}: make {' '.join(arguments)} > {log.relative_to(ROOT)}", flush=True)
-    # The targets of the parts start their own make.
-    environment = {key: value for key, value in os.environ.items() if key not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
+    # The targets of the parts start their own make. ARGS names the parts.
+    inherited = ("ARGS", "MAKEFLAGS", "MAKELEVEL", "MAKEOVERRIDES", "MFLAGS")
+    environment = {key: value for key, value in os.environ.items() if key not in inherited}
     with log.open("w", encoding="utf-8") as file:
         command = ["make", "--no-print-directory", *arguments]
         done = subprocess.run(command, cwd=ROOT, env=environment, stdout=file, stderr=subprocess.STDOUT, check=False)
