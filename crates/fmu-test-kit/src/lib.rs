@@ -5,6 +5,9 @@
 //! [`serialized`] has the bytes of saved states, [`c_programs`] what tests with C programs need. [`careless`] is an importer
 //! that makes any calls in any order, [`realtime`] checks that code may run in a control loop; [`checks`] holds for every FMU.
 
+// Under Miri, the logger is variadic as in C.
+#![cfg_attr(miri, feature(c_variadic))]
+
 pub mod c_programs;
 pub mod careless;
 pub mod checks;
