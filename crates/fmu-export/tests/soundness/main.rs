@@ -1,6 +1,8 @@
 //! What importers do that a Rust library must survive: calling back out of the log callback, and handing over memory that
 //! nobody has written yet. Valgrind sees more of it than the assertions; `make sanitize` lets it look.
 #![allow(missing_docs)]
+// Under Miri, the callback is variadic as in C.
+#![cfg_attr(miri, feature(c_variadic))]
 
 #[path = "../toys/mod.rs"]
 mod toys;
