@@ -112,7 +112,7 @@ def test_no_equation_is_left_untyped(which, formulas):
 
 def test_typeset():
     block = typeset(r"\[ \begin{bmatrix} a & b \end{bmatrix} < 1 \tag{8} \]")
-    assert block.startswith('<div class="equation"><math display="block">') and block.endswith("(8)</span></div>")
+    assert block.startswith('<div class="equation" tabindex="0"><math display="block">') and block.endswith("(8)</span></div>")
     assert '<mtable class="matrix">' in block and "<mo>&lt;</mo>" in block
 
 
@@ -128,7 +128,7 @@ def test_a_table_that_is_missing_or_has_gaps_is_named(tmp_path):
 
 
 def program(page: str, name: str) -> str:
-    (text,) = re.findall(rf'<pre data-run="{name}"><code>(.*?)</code></pre>', page, flags=re.S)
+    (text,) = re.findall(rf'<pre data-run="{name}" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
     return html.unescape(text)
 
 
