@@ -8,10 +8,10 @@
 /**
  * What a model has beside sliders and courses. `word` is for its motions. Besides outputs, variables that are `recorded` are in the table, and columns that are
  * `written` by motions. `follow` leads inputs to where the sliders are; `move` of a view moves a slider.
- * `buttons` start motions; the parameters that are `near` stand with the sliders.
+ * `buttons` start motions; the parameters that are `near`, each with a short description, stand with the sliders.
  * @typedef {{
  *   word: string, start: Record<string, number>, sliders: {name: string, label: string, reach: number}[], recorded: string[], written: string[], motions: Motion[],
- *   lead: string, buttons: {label: string, motion: string}[], near: string[], panels: Panel[], isMinor(name: string): boolean,
+ *   lead: string, buttons: {label: string, motion: string}[], near: Record<string, string>, panels: Panel[], isMinor(name: string): boolean,
  *   follow(inputs: Record<string, number>, targets: Map<string, number>, size: number): void,
  *   view(move: (name: string, by: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, HTMLInputElement | HTMLSelectElement>},
  * }} AddOn
@@ -89,7 +89,7 @@ class Session {
       if (refusal instanceof Ended) {
         [this.error, this.ended] = [refusal.message, this.table.end];
       } else {
-        this.error = `The FMU refuses this: ${refusal instanceof Error ? refusal.message : refusal}`;
+        this.error = `The FMU rejects this: ${refusal instanceof Error ? refusal.message : refusal}`;
       }
       this.instance = this.connected();
       this.isBegun = false;
@@ -181,7 +181,7 @@ function plain(description) {
   return {
     lead: "This page runs the FMU: move its inputs, or change its parameters.",
     buttons: [],
-    near: [],
+    near: {},
     word: "Inputs",
     start: {},
     sliders: real.map((one) => ({ name: one.name, label: one.name, reach: reach(one) })),
@@ -481,9 +481,9 @@ async function live(packed, resources) {
     parameters.mark.forEach((mark) => mark(""));
     recalculate();
   };
-  const near = settable.filter((one) => addOn.near.includes(one.name)).map((one) => parameters.row(one, one.name, null));
+  const near = Object.entries(addOn.near).map(([name, about]) => parameters.row(find(name), name, null, about));
   const rows = (/** @type {boolean} */ isMinor) =>
-    settable.filter((one) => addOn.isMinor(one.name) === isMinor && !addOn.near.includes(one.name)).map((one) => parameters.row(one, one.name, null));
+    settable.filter((one) => addOn.isMinor(one.name) === isMinor && !(one.name in addOn.near)).map((one) => parameters.row(one, one.name, null));
   const minor = rows(true);
 
   const button = (/** @type {string} */ text, /** @type {() => void} */ action) => {

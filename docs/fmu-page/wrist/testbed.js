@@ -107,7 +107,7 @@ addOns.prw_testbed = (_, others) => {
   return {
     lead: "Two motors move a robotic wrist: drag a motor, or press a button.",
     buttons: [{ label: "Pitch", motion: "pitch" }, { label: "Roll", motion: "roll" }, { label: "Shake it", motion: "chirp" }],
-    near: ["k1", "k2", "c1", "c2"],
+    near: { k1: "stiffness, motor side", k2: "stiffness, wrist side", c1: "damping, motor side", c2: "damping, wrist side" },
     word: "Motion",
     start: { use_omega: 1 },
     sliders: [
