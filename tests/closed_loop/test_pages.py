@@ -22,7 +22,9 @@ from tools.figures import ICON, ICON_SVG
 def test_the_programs(closed_loop, tmp_path, master, package):
     pytest.importorskip(package)
     page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
-    (program,) = re.findall(rf'<pre data-run="closed_loop_in_{master}"><code>(.*?)</code></pre>', page, flags=re.S)
+    (program,) = re.findall(
+        rf'<pre data-run="closed_loop_in_{master}" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S
+    )
     shutil.copy(closed_loop.ssp, tmp_path)
     shutil.copytree(closed_loop.osp, tmp_path / closed_loop.osp.name)
     run = subprocess.run(
@@ -36,7 +38,7 @@ def test_the_programs(closed_loop, tmp_path, master, package):
 def test_the_script_for_omsimulator(closed_loop):
     """Where it is not installed, a stand-in writes down what the script asks of it: what the SSP says."""
     page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
-    (script,) = re.findall(r'<pre data-wires="oms"><code>(.*?)</code></pre>', page, flags=re.S)
+    (script,) = re.findall(r'<pre data-wires="oms" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
     library = Mock(CRef=lambda system, *names: ".".join(names))
     with patch.dict(sys.modules, {"OMSimulator": library}):
         exec(html.unescape(script), {})

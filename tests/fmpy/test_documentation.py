@@ -59,11 +59,11 @@ def test_the_pages_are_up_to_date(which):
     assert text_of(which) == render(ROOT, which), f"{which.path} is out of date; write it anew with `make docs`"
 
 
-def test_the_page_travels_in_the_fmu(fmu, page):
+def test_the_fmu_contains_page_and_icons(fmu, page):
     with zipfile.ZipFile(fmu) as archive:
-        # What runs the FMU is put in before its end: test_page.py.
-        beginning = page[: page.index("</body>")]
-        assert archive.read("documentation/index.html").decode().startswith(beginning)
+        # build_fmu adds the scripts that run the FMU: test_page.py.
+        main = page[page.index("<main>") + len("<main>") : page.index("</body>")]
+        assert main in archive.read("documentation/index.html").decode()
         for icon in (ICON, ICON_SVG):
             assert archive.read(icon.as_posix()) == (ROOT / TESTBED.content / icon).read_bytes()
     assert fmu.stat().st_size < 2e6
@@ -112,7 +112,9 @@ def test_no_equation_is_left_untyped(which, formulas):
 
 def test_typeset():
     block = typeset(r"\[ \begin{bmatrix} a & b \end{bmatrix} < 1 \tag{8} \]")
-    assert block.startswith('<div class="equation"><math display="block">') and block.endswith("(8)</span></div>")
+    assert block.startswith('<div class="equation" tabindex="0"><math display="block">') and block.endswith(
+        "(8)</span></div>"
+    )
     assert '<mtable class="matrix">' in block and "<mo>&lt;</mo>" in block
 
 
@@ -128,7 +130,7 @@ def test_a_table_that_is_missing_or_has_gaps_is_named(tmp_path):
 
 
 def program(page: str, name: str) -> str:
-    (text,) = re.findall(rf'<pre data-run="{name}"><code>(.*?)</code></pre>', page, flags=re.S)
+    (text,) = re.findall(rf'<pre data-run="{name}" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
     return html.unescape(text)
 
 

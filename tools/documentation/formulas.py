@@ -22,7 +22,7 @@ def typeset(text: str) -> str:
         tag = re.search(r"\\tag\{(.*?)\}", match[1])
         formula = _tidy(convert(re.sub(r"\\tag\{.*?\}", "", match[1]).strip(), display="block"))
         number = f'<span class="number">({tag[1]})</span>' if tag else ""
-        return f'<div class="equation">{formula}{number}</div>'
+        return f'<div class="equation" tabindex="0">{formula}{number}</div>'
 
     return re.sub(r"\\\((.+?)\\\)", inline, re.sub(r"\\\[(.+?)\\\]", block, text, flags=re.S), flags=re.S)
 

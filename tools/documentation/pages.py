@@ -120,7 +120,7 @@ def _picture(path: Path, meaning: str) -> str:
 
 def _program(name: str, text: str) -> str:
     """A program, which the tests run as it stands here."""
-    return f'<pre data-run="{name}"><code>{html.escape(text.strip(), quote=False)}</code></pre>'
+    return f'<pre data-run="{name}" tabindex="0"><code>{html.escape(text.strip(), quote=False)}</code></pre>'
 
 
 def _roots(roots: Iterable[Sequence[float]]) -> str:

@@ -87,7 +87,7 @@ def _table(title: str, heads: Sequence[str], rows: Iterable[str], numbers: Seque
     body = "\n".join(rows)
     of_kind = f' class="{kind}"' if kind else ""
     parts = f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody>"
-    return f'{heading}<div class="scroll"><table{of_kind}>\n{parts}\n</table></div>'
+    return f'{heading}<div class="scroll" tabindex="0"><table{of_kind}>\n{parts}\n</table></div>'
 
 
 def _pretty(unit: str) -> str:

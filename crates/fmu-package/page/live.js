@@ -8,9 +8,10 @@
 /**
  * What a model has beside sliders and courses. `word` is for its motions. Besides outputs, variables that are `recorded` are in the table, and columns that are
  * `written` by motions. `follow` leads inputs to where the sliders are; `move` of a view moves a slider.
+ * `buttons` start motions; the parameters that are `near`, each with a short description, stand with the sliders.
  * @typedef {{
  *   word: string, start: Record<string, number>, sliders: {name: string, label: string, reach: number}[], recorded: string[], written: string[], motions: Motion[],
- *   panels: Panel[], isMinor(name: string): boolean,
+ *   lead: string, buttons: {label: string, motion: string}[], near: Record<string, string>, panels: Panel[], isMinor(name: string): boolean,
  *   follow(inputs: Record<string, number>, targets: Map<string, number>, size: number): void,
  *   view(move: (name: string, by: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, HTMLInputElement | HTMLSelectElement>},
  * }} AddOn
@@ -88,7 +89,7 @@ class Session {
       if (refusal instanceof Ended) {
         [this.error, this.ended] = [refusal.message, this.table.end];
       } else {
-        this.error = `The FMU refuses this: ${refusal instanceof Error ? refusal.message : refusal}`;
+        this.error = `The FMU rejects this: ${refusal instanceof Error ? refusal.message : refusal}`;
       }
       this.instance = this.connected();
       this.isBegun = false;
@@ -131,11 +132,19 @@ class Session {
     table.count = row + 1;
   }
 
-  /** All rows, in the units of the FMU, every digit. */
+  /** The value that a parameter has in this run. @param {Variable} one */
+  parameter(one) {
+    return this.start.get(one) ?? (one.type === "String" ? one.start || "" : startOf(one));
+  }
+
+  /** All rows, in the units of the FMU, every digit; above them the FMU and its parameters, as comments. */
   csv() {
+    const { identifier, version, guid, variables } = this.description;
+    const parameters = variables.filter((one) => one.causality === "parameter").map((one) => `${one.name} = ${JSON.stringify(this.parameter(one))}`);
+    const about = [`# ${identifier} ${version}, guid ${guid}`, `# ${parameters.join(", ")}`];
     const names = ["time", ...this.inputs.map((one) => one.name), ...this.outputs.map((one) => one.name), ...this.written.filter((name) => !Number.isNaN(this.table.column(name)[0]))];
     const columns = names.map((name) => this.table.column(name));
-    const lines = [names.map((name) => (/[",\s]/.test(name) ? `"${name.replaceAll('"', '""')}"` : name)).join(",")];
+    const lines = [...about, names.map((name) => (/[",\s]/.test(name) ? `"${name.replaceAll('"', '""')}"` : name)).join(",")];
     for (let row = 0; row < this.table.count; row++) {
       lines.push(columns.map((column) => String(column[row])).join(","));
     }
@@ -170,6 +179,9 @@ function plain(description) {
   }
   const free = { id: "run", title: "At their start values", length, inputs: () => {} };
   return {
+    lead: "This page runs the FMU: move its inputs, or change its parameters.",
+    buttons: [],
+    near: {},
     word: "Inputs",
     start: {},
     sliders: real.map((one) => ({ name: one.name, label: one.name, reach: reach(one) })),
@@ -183,13 +195,52 @@ function plain(description) {
   };
 }
 
+/** Why a variable cannot have a value; "" if it can. @param {Variable} one @param {number | string} value */
+function complaint(one, value) {
+  if (one.type === "String") {
+    return "";
+  }
+  if (value === "" || !Number.isFinite(Number(value))) {
+    return "must be a number";
+  }
+  const isWhole = Number.isInteger(value) && Math.abs(Number(value)) < 2 ** 31;
+  return one.type === "Real" || isWhole ? "" : "must be an integer below 2\u00b3\u00b9";
+}
+
 /** The rows of sliders and numbers for variables, in the units in which they are shown. */
 class Fields {
-  /** @param {(one: Variable, value: number | string) => void} changed */
+  /** @param {(one: Variable, value: number | string) => void} changed called with values that are possible for the type */
   constructor(changed) {
     this.changed = changed;
     /** @type {Map<string, (value: number | string) => void>} */
     this.show = new Map();
+    /** Marks the fields of variables as invalid, or as valid with "". @type {Map<string, (message: string) => void>} */
+    this.mark = new Map();
+  }
+
+  /** Passes a value on, or marks its field. @param {Variable} one @param {number | string} value */
+  change(one, value) {
+    const why = complaint(one, value);
+    this.mark.get(one.name)?.(why && `${one.name} ${why}`);
+    if (!why) {
+      this.changed(one, value);
+    }
+  }
+
+  /** The place of a message below a field. @param {Variable} one @param {HTMLElement} field @returns {HTMLElement} */
+  message(one, field) {
+    const id = `${field.id}-message`;
+    const message = element("span", { id, class: "live-message", role: "alert" });
+    this.mark.set(one.name, (text) => {
+      message.textContent = text;
+      field.toggleAttribute("aria-invalid", text !== "");
+      field.toggleAttribute("aria-describedby", text !== "");
+      if (text) {
+        field.setAttribute("aria-invalid", "true");
+        field.setAttribute("aria-describedby", id);
+      }
+    });
+    return message;
   }
 
   /** A row. @param {Variable} one @param {string} label @param {[number, number] | null} ends of the slider, if not by what the variable says @param {string} [about] */
@@ -201,18 +252,18 @@ class Fields {
     }
     if (one.type === "Enumeration") {
       const list = element("select", { id }, ...one.items.map((item) => element("option", { value: String(item.value) }, item.name)));
-      list.addEventListener("change", () => this.changed(one, Number(list.value)));
+      list.addEventListener("change", () => this.change(one, Number(list.value)));
       this.show.set(one.name, (value) => (list.value = String(value)));
-      return element("div", { class: "live-row" }, name, list);
+      return element("div", { class: "live-row" }, name, list, this.message(one, list));
     }
     const kind = one.type === "Boolean" ? "checkbox" : one.type === "String" ? "text" : "number";
     const field = element("input", { id, type: kind });
-    field.addEventListener("change", () => this.changed(one, kind === "checkbox" ? Number(field.checked) : kind === "text" ? field.value : Number(field.value)));
+    field.addEventListener("change", () => this.change(one, kind === "checkbox" ? Number(field.checked) : kind === "text" ? field.value : Number(field.value)));
     this.show.set(one.name, (value) => {
       field.checked = Number(value) !== 0;
       field.value = String(value);
     });
-    return element("div", { class: "live-row" }, name, field);
+    return element("div", { class: "live-row" }, name, field, this.message(one, field));
   }
 
   /** @param {Variable} one @param {string} id @param {HTMLElement} name @param {[number, number] | null} ends */
@@ -229,14 +280,19 @@ class Fields {
     const digits = Math.max(0, 4 - Math.floor(Math.log10(end - begin)));
     const forth = (/** @type {number} */ value) => (isLog ? Math.log(Math.max(value, 1e-300) / begin) / Math.log(end / begin) : (value - begin) / (end - begin));
     const back = (/** @type {number} */ share) => (isLog ? begin * (end / begin) ** share : begin + share * (end - begin));
-    const slider = element("input", { type: "range", min: "0", max: "1", step: isWhole ? String(1 / (end - begin)) : "0.001", "aria-label": one.name });
+    const slider = element("input", { type: "range", min: "0", max: "1", step: isWhole ? String(1 / (end - begin)) : "0.001", "aria-labelledby": `${id}-label` });
+    name.firstElementChild?.setAttribute("id", `${id}-label`);
     const field = element("input", { id, type: "number", step: isWhole ? "1" : "any" });
     const show = (/** @type {number} */ value) => {
+      const text = String(ends ? Number(value.toFixed(digits)) : Number(value.toPrecision(6)));
       slider.value = String(forth(value));
-      field.value = String(ends ? Number(value.toFixed(digits)) : Number(value.toPrecision(6)));
-      slider.setAttribute("aria-valuetext", `${field.value} ${one.unit}`);
+      slider.setAttribute("aria-valuetext", `${text} ${one.unit}`);
+      // Someone may be typing there.
+      if (document.activeElement !== field) {
+        field.value = text;
+      }
     };
-    const change = (/** @type {number} */ value) => this.changed(one, Math.abs(value - start) <= 1e-12 * Math.abs(start) ? startOf(one) : (value - offset) / factor);
+    const change = (/** @type {number} */ value) => this.change(one, Math.abs(value - start) <= 1e-12 * Math.abs(start) ? startOf(one) : (value - offset) / factor);
     slider.addEventListener("input", () => {
       const value = Number(slider.value) === Number(forth(start).toFixed(3)) ? start : back(Number(slider.value));
       const round = isWhole ? Math.round(value) : Number(value.toPrecision(3));
@@ -247,12 +303,16 @@ class Fields {
     let last = start;
     field.addEventListener("change", () => {
       last = field.value === "" ? last : Number(field.value);
+      field.value = String(last);
       show(last);
       change(last);
     });
+    field.addEventListener("focus", () => field.select());
+    field.addEventListener("blur", () => show(last));
     this.show.set(one.name, (value) => show((last = Number(value) * factor + offset)));
     const hint = Number.isFinite(most) ? `${least} to ${most}` : least > 0 && least < 1e-200 ? "> 0" : Number.isFinite(least) ? `\u2265 ${least}` : "";
-    return element("div", { class: "live-row" }, name, slider, field, element("span", { class: "live-unit" }, one.unit, hint ? element("small", {}, ` ${hint}`) : ""));
+    const unit = element("span", { class: "live-unit" }, one.unit, hint ? element("small", {}, ` ${hint}`) : "");
+    return element("div", { class: "live-row" }, name, slider, field, unit, this.message(one, field));
   }
 }
 
@@ -296,10 +356,23 @@ async function live(packed, resources) {
   const recorded = () => Math.max(session.table.end, session.timeOf(session.known - 1));
   const isWide = () => session.motion || !(description.step < 0.1);
 
+  /** The last change, to be undone if the FMU rejects it: its fields, and by hand the rows and targets before it. @type {{fields: Fields, one: Variable, rows: number, targets: Map<string, number>} | null} */
+  let latest = null;
+  /** The run before the parameters changed, and when they did, ms. @type {Table | null} */
+  let earlier = null;
+  let changedAt = -Infinity;
+  let isTouched = false;
+
   const sliders = new Fields((one, value) => byHand(one.name, Number(value)));
   /** From here on by hand. @param {string} name @param {number} value */
   const byHand = (name, value) => {
-    const row = session.table.row(player.now);
+    const isRejected = session.error !== "" && session.ended === Infinity;
+    if (isRejected && latest && !session.motion) {
+      session.targets = latest.targets;
+      session.restart(latest.rows);
+      player.now = Math.min(player.now, session.timeOf(latest.rows - 1));
+    }
+    const row = isRejected && session.table.count === 0 ? session.known - 1 : session.table.row(player.now);
     if (session.motion) {
       session.targets = new Map(addOn.sliders.map((slider) => [slider.name, session.table.at(slider.name, player.now)]));
     }
@@ -308,10 +381,13 @@ async function live(packed, resources) {
     }
     session.motion = null;
     choice.value = BY_HAND;
+    earlier = null;
+    latest = { fields: sliders, one: find(name), rows: row + 1, targets: new Map(session.targets) };
     session.targets.set(name, value);
     player.setPlaying(true);
   };
   const view = addOn.view((name, by) => {
+    isTouched = true;
     const from = session.motion ? session.table.at(name, player.now) : (session.targets.get(name) ?? 0);
     const slider = addOn.sliders.find((one) => one.name === name);
     const value = Math.max(-(slider?.reach ?? 1), Math.min(slider?.reach ?? 1, from + by));
@@ -323,6 +399,8 @@ async function live(packed, resources) {
     plots: (seek) => new Plots(addOn.panels, seek),
     view,
     begin,
+    isLooping: () => !isTouched && session.motion === addOn.motions[0],
+    earlier: () => earlier,
     table: session.table,
     span: (now) => (isWide() ? [begin, end()] : [Math.max(begin, now - WINDOW), Math.max(begin + WINDOW, now)]),
     recorded: () => (session.motion ? end() : recorded()),
@@ -339,11 +417,22 @@ async function live(packed, resources) {
   });
 
   let said = "";
-  /** @param {string} error */
+  /** Shows why a run has ended. One that the FMU has rejected stands still and is grey until something else is tried. @param {string} error */
   const say = (error) => {
-    if (error !== said) {
-      said = status.textContent = error;
-      status.classList.toggle("live-error", error !== "" && session.ended === Infinity);
+    const isRejected = error !== "" && session.ended === Infinity;
+    if (isRejected) {
+      player.setPlaying(false);
+    }
+    if (error === said) {
+      return;
+    }
+    said = status.textContent = error;
+    status.classList.toggle("live-error", isRejected);
+    player.element.classList.toggle("live-rejected", isRejected);
+    if (isRejected) {
+      latest?.fields.mark.get(latest.one.name)?.(`The FMU rejects this value of ${latest.one.name}.`);
+    } else {
+      [sliders, parameters].forEach((fields) => fields.mark.forEach((mark) => mark("")));
     }
   };
 
@@ -356,6 +445,7 @@ async function live(packed, resources) {
       addOn.sliders.forEach((slider) => sliders.show.get(slider.name)?.(startOf(find(slider.name))));
     }
     choice.value = motion ? id : BY_HAND;
+    earlier = null;
     session.known = 0;
     session.restart(0);
     player.setPlaying(false);
@@ -364,18 +454,36 @@ async function live(packed, resources) {
   };
   choice.addEventListener("change", () => choose(choice.value));
 
-  const parameters = new Fields((one, value) => {
-    session.start.set(one, value);
+  /** Calculates the run again with other parameters, and keeps the one before for comparison. */
+  const recalculate = () => {
+    const now = performance.now();
+    if (now - changedAt > 1000 && session.motion && !session.error && session.table.end >= end() - 0.5 * description.step) {
+      earlier = session.table.copy();
+    }
+    changedAt = now;
+    const isRejected = session.error !== "" && session.ended === Infinity;
     session.restart(session.motion ? 0 : Infinity);
-    player.ask();
-  });
-  const reset = () => {
-    session.start = new Map(Object.entries(addOn.start).map(([name, value]) => [find(name), value]));
-    settable.forEach((one) => parameters.show.get(one.name)?.(session.start.get(one) ?? (one.type === "String" ? one.start || "" : startOf(one))));
-    session.restart(session.motion ? 0 : Infinity);
+    view.set?.((name) => Number(session.parameter(find(name))));
+    if (isRejected && session.motion) {
+      player.setPlaying(!matchMedia("(prefers-reduced-motion: reduce)").matches);
+    }
     player.ask();
   };
-  const rows = (/** @type {boolean} */ isMinor) => settable.filter((one) => addOn.isMinor(one.name) === isMinor).map((one) => parameters.row(one, one.name, null));
+  const parameters = new Fields((one, value) => {
+    latest = { fields: parameters, one, rows: 0, targets: session.targets };
+    session.start.set(one, value);
+    recalculate();
+  });
+  /** @param {Record<string, number>} start the start values that are not the FMU's */
+  const reset = (start) => {
+    session.start = new Map(Object.entries(start).map(([name, value]) => [find(name), value]));
+    settable.forEach((one) => parameters.show.get(one.name)?.(session.parameter(one)));
+    parameters.mark.forEach((mark) => mark(""));
+    recalculate();
+  };
+  const near = Object.entries(addOn.near).map(([name, about]) => parameters.row(find(name), name, null, about));
+  const rows = (/** @type {boolean} */ isMinor) =>
+    settable.filter((one) => addOn.isMinor(one.name) === isMinor && !(one.name in addOn.near)).map((one) => parameters.row(one, one.name, null));
   const minor = rows(true);
 
   const button = (/** @type {string} */ text, /** @type {() => void} */ action) => {
@@ -400,6 +508,11 @@ async function live(packed, resources) {
         settings.set(one.name, String(value));
       }
     }
+    for (const name of Object.keys(addOn.start)) {
+      if (!session.start.has(find(name))) {
+        settings.set(name, String(startOf(find(name))));
+      }
+    }
     if (!session.motion) {
       session.targets.forEach((value, name) => settings.set(name, String(value)));
     }
@@ -407,19 +520,28 @@ async function live(packed, resources) {
     location.hash = `try&${settings}`;
     status.classList.remove("live-error");
     status.textContent = "The address of this page now carries these settings.";
+    if (location.protocol === "file:") {
+      status.textContent += " It leads here on this computer only: to share it, put this file on a web server.";
+    }
     navigator.clipboard?.writeText(location.href).then(() => (status.textContent += " It is copied."), () => {});
   };
   /** What a link has set. */
   const settle = () => {
     const settings = new URLSearchParams(location.hash.replace(/^#try&?/, ""));
-    reset();
+    reset(addOn.start);
     const wanted = settings.get("motion") || choice.value;
     choose(motions.has(wanted) || wanted === BY_HAND ? wanted : addOn.motions[0].id);
     for (const [name, value] of settings) {
       const one = description.byName.get(name);
       if (one?.causality === "parameter") {
-        session.start.set(one, one.type === "String" ? value : Number(value));
-        parameters.show.get(name)?.(one.type === "String" ? value : Number(value));
+        const given = one.type === "String" ? value : Number(value);
+        const why = complaint(one, given);
+        parameters.mark.get(name)?.(why && `The link asks for ${name} = ${value}; it ${why}`);
+        if (!why) {
+          latest = { fields: parameters, one, rows: 0, targets: session.targets };
+          session.start.set(one, given);
+          parameters.show.get(name)?.(given);
+        }
       } else if (one?.causality === "input" && wanted === BY_HAND) {
         session.targets.set(name, Number(value));
         sliders.show.get(name)?.(Number(value));
@@ -430,6 +552,8 @@ async function live(packed, resources) {
         control.dispatchEvent(new Event("change"));
       }
     }
+    view.set?.((name) => Number(session.parameter(find(name))));
+    isTouched ||= settings.size > 0;
     const speed = Number(settings.get("speed"));
     if (speed > 0) {
       player.setSpeed(speed);
@@ -448,10 +572,15 @@ async function live(packed, resources) {
     { class: "live-controls" },
     ...(choice.length > 1 ? [element("div", { class: "live-row" }, element("label", { for: "live-motion" }, element("b", {}, addOn.word)), choice)] : []),
     ...inputs,
+    ...near,
     element("div", { class: "live-buttons" }, ...(view.controls || []), button("Start again", () => choose(choice.value)), button("Save as CSV", save), button("Link to this", share)),
     status,
   );
+  if (addOn.buttons.length) {
+    player.bar.before(element("div", { class: "live-buttons" }, ...addOn.buttons.map(({ label, motion }) => button(label, () => choose(motion)))));
+  }
   player.side.append(controls);
+  player.plots.element.append(element("p", { class: "live-legend" }, "Pale: the part of the run that is still to come. Grey: the run before the parameters changed."));
   const about = element(
     "p",
     {},
@@ -465,11 +594,18 @@ async function live(packed, resources) {
     element("summary", {}, "Parameters"),
     element("div", { class: "live-rows" }, ...rows(false)),
     ...(minor.length ? [element("details", {}, element("summary", {}, "Start values"), element("div", { class: "live-rows" }, ...minor))] : []),
-    button("Parameters as built in", reset),
+    button("Parameters as built in", () => reset({})),
   );
   fields.open = matchMedia("(min-width: 60rem)").matches;
-  const section = element("section", { class: "live", "aria-labelledby": "try" }, element("h2", { id: "try" }, "Try it"), about, player.element, ...(settable.length ? [fields] : []));
+  const section = element("section", { class: "live", "aria-labelledby": "try" }, element("h2", { id: "try" }, "Try it"), element("p", {}, addOn.lead), player.element, ...(settable.length ? [fields] : []), about);
+  for (const kind of ["pointerdown", "keydown"]) {
+    section.addEventListener(kind, () => (isTouched = true), { capture: true });
+  }
   (document.querySelector("main") || document.body).prepend(section);
+  const contents = document.querySelector("header nav");
+  if (contents) {
+    section.append(contents);
+  }
   document.querySelector("nav ul")?.prepend(element("li", {}, element("a", { href: "#try" }, "Try it")));
   const long = description.stopTime - begin;
   if (addOns[description.identifier] === undefined && !(long < 60 && long > 1)) {

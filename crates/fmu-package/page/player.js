@@ -2,7 +2,7 @@
 
 /**
  * A picture of an instant, beside the courses.
- * @typedef {{element: HTMLElement, draw(table: Table, time: number): void}} View
+ * @typedef {{element: HTMLElement, draw(table: Table, time: number): void, set?(parameters: (name: string) => number): void, touch?(): void}} View
  */
 
 /** How fast, as in the list. */
@@ -12,8 +12,8 @@ class Player {
   /**
    * `span` is what the courses show, `advance` calculates until a time and tells how far that went. Beyond `recorded` a
    * run that goes on is calculated, until `limit`.
-   * @param {{plots: (seek: (time: number) => void) => Plots, view: View | null, begin: number, isLooping?: boolean, table: Table,
-   *   span(now: number): [number, number], recorded(): number, limit(): number, advance?(now: number): number}} options
+   * @param {{plots: (seek: (time: number) => void) => Plots, view: View | null, begin: number, isLooping?(): boolean, table: Table,
+   *   span(now: number): [number, number], recorded(): number, limit(): number, advance?(now: number): number, earlier?(): Table | null}} options
    */
   constructor(options) {
     this.options = options;
@@ -21,6 +21,8 @@ class Player {
     this.speed = 1;
     this.isPlaying = false;
     this.last = 0;
+    /** Seconds that passed and that were played since the last look at the pace. */
+    this.paced = { passed: 0, played: 0 };
     this.isAsked = false;
     this.isSeen = true;
     this.plots = options.plots((time) => this.seek(time));
@@ -35,7 +37,8 @@ class Player {
     this.pace.append(...[...SPEEDS].map(([value, text]) => element("option", { value }, text)));
     this.pace.value = "1";
     this.pace.addEventListener("change", () => this.setSpeed(Number(this.pace.value)));
-    this.bar = element("div", { class: "live-bar" }, this.play, this.place, this.clock, this.pace);
+    this.late = element("span", { class: "live-late", hidden: "" });
+    this.bar = element("div", { class: "live-bar" }, this.play, this.place, this.clock, this.pace, this.late);
     this.side = element("div", { class: "live-side" }, ...(options.view ? [options.view.element] : []), this.bar);
     this.element = element("div", { class: "live-player" }, this.side, this.plots.element);
     new ResizeObserver(() => this.ask()).observe(this.element);
@@ -63,6 +66,8 @@ class Player {
       this.now = this.options.begin;
     }
     this.isPlaying = isPlaying;
+    this.paced = { passed: 0, played: 0 };
+    this.late.hidden = true;
     this.play.textContent = isPlaying ? "Pause" : "Play";
     this.last = 0;
     this.ask();
@@ -90,7 +95,8 @@ class Player {
       this.last = 0;
       return;
     }
-    const passed = this.last ? Math.min(stamp - this.last, 100) / 1000 : 0;
+    const waited = this.last ? (stamp - this.last) / 1000 : 0;
+    const passed = Math.min(waited, 0.1);
     this.last = stamp;
     const { begin, table, view } = this.options;
     const [limit, before] = [this.options.limit(), this.now];
@@ -103,8 +109,9 @@ class Player {
     if (isBehind && this.isPlaying && this.speed !== Infinity) {
       this.now = Math.max(before, reached);
     }
+    this.checkPace(waited, this.now - before);
     if (table.count && !(isBehind && reached < before - 1e-9)) {
-      this.plots.draw(table, this.now, ...this.options.span(this.now));
+      this.plots.draw(table, this.now, ...this.options.span(this.now), this.options.earlier?.() ?? null);
       view?.draw(table, this.now);
     }
     this.place.value = String(Math.round((1000 * (this.now - begin)) / (this.options.recorded() - begin || 1)));
@@ -112,7 +119,7 @@ class Player {
     this.clock.textContent = text;
     this.place.setAttribute("aria-valuetext", text);
     if (this.isPlaying && this.now >= limit - 1e-9 && !isBehind) {
-      if (this.options.isLooping) {
+      if (this.options.isLooping?.()) {
         this.now = begin;
       } else {
         this.setPlaying(false);
@@ -120,6 +127,21 @@ class Player {
     }
     if (this.isPlaying || isBehind) {
       this.ask();
+    }
+  }
+
+  /** Shows the pace where the browser cannot keep the chosen one. @param {number} passed s @param {number} played s */
+  checkPace(passed, played) {
+    if (!this.isPlaying || this.speed === Infinity || played < 0) {
+      return;
+    }
+    this.paced.passed += passed;
+    this.paced.played += played;
+    if (this.paced.passed >= 1) {
+      const pace = this.paced.played / this.paced.passed;
+      this.late.hidden = pace > 0.9 * this.speed;
+      this.late.textContent = `slower here: ${Number(pace.toPrecision(2))} \u00d7 real time`;
+      this.paced = { passed: 0, played: 0 };
     }
   }
 }

@@ -36,6 +36,14 @@ class Table {
     }
   }
 
+  /** A copy of the rows. */
+  copy() {
+    const made = new Table([]);
+    made.count = this.count;
+    this.columns.forEach((column, name) => made.columns.set(name, column.slice(0, this.count)));
+    return made;
+  }
+
   /** The last time, s. */
   get end() {
     return this.count ? this.column("time")[this.count - 1] : 0;
@@ -143,13 +151,18 @@ class Plots {
     this.panels = panels.map((panel) => this.panel(panel, seek));
     this.element = element("div", { class: "live-plots" }, ...this.panels.map((panel) => panel.figure));
     this.span = { begin: 0, end: 1 };
+    /** Room for the numbers on the left of all panels, px. */
+    this.left = LEFT;
   }
 
   /** @param {Panel} panel @param {(time: number) => void} seek */
   panel(panel, seek) {
-    const keys = panel.curves.map((curve) => {
+    const keys = panel.curves.map((curve, place) => {
       const value = element("span", { class: "live-number" });
-      return { value, key: element("span", { class: "live-key", style: `--colour: var(--${curve.colour})` }, curve.label, " ", value) };
+      const key = element("span", { class: "live-key" }, curve.label, " ", value);
+      key.style.setProperty("--colour", `var(--${curve.colour})`);
+      key.classList.toggle("live-dashed", place % 2 === 1);
+      return { value, key };
     });
     const unit = panel.unit ? ` (${panel.unit})` : "";
     const caption = element("figcaption", {}, element("b", {}, panel.title + unit), " ", ...keys.map(({ key }) => key));
@@ -170,36 +183,52 @@ class Plots {
   /** @param {number} x @param {number} width */
   timeAt(x, width) {
     const { begin, end } = this.span;
-    return begin + (end - begin) * Math.min(1, Math.max(0, (x - LEFT) / (width - LEFT - RIGHT)));
+    return begin + (end - begin) * Math.min(1, Math.max(0, (x - this.left) / (width - this.left - RIGHT)));
   }
 
-  /** The courses from `begin` to `end`, those after `now` pale. @param {Table} table @param {number} now @param {number} begin @param {number} end */
-  draw(table, now, begin, end) {
+  /**
+   * Draws the trajectories from `begin` to `end`, those after `now` pale, and those of an earlier run in grey.
+   * @param {Table} table @param {number} now @param {number} begin @param {number} end @param {Table | null} [earlier]
+   */
+  draw(table, now, begin, end, earlier = null) {
     this.span = { begin, end };
-    const colour = (/** @type {string} */ name) => colourAt(this.element, name);
+    const axes = this.panels.map(({ panel, canvas }) => {
+      const { pen } = sharp(canvas);
+      pen.font = FONT;
+      const ranges = [table, ...(earlier ? [earlier] : [])].map((run) => range(panel, run, ...rowsOf(run, begin, end)));
+      const [low, high] = [Math.min(...ranges.map(([one]) => one)), Math.max(...ranges.map(([, one]) => one))];
+      const marks = ticks(low, high, 5);
+      return { low, high, marks, width: Math.max(...marks.map(({ text }) => pen.measureText(text).width)) };
+    });
+    // In steps, lest the axes move with each digit.
+    this.left = Math.max(LEFT, 8 * Math.ceil((12 + Math.max(...axes.map(({ width }) => width))) / 8));
     for (const [place, shownPanel] of this.panels.entries()) {
-      this.drawPanel(shownPanel, table, now, colour, place === this.panels.length - 1);
+      this.drawPanel(shownPanel, axes[place], table, now, place === this.panels.length - 1, earlier);
     }
   }
 
-  /** @param {ReturnType<Plots["panel"]>} what @param {Table} table @param {number} now @param {(name: string) => string} colour @param {boolean} isLast */
-  drawPanel({ panel, canvas, keys }, table, now, colour, isLast) {
+  /**
+   * @param {ReturnType<Plots["panel"]>} what @param {{low: number, high: number, marks: {place: number, text: string}[]}} axis
+   * @param {Table} table @param {number} now @param {boolean} isLast @param {Table | null} earlier
+   */
+  drawPanel({ panel, canvas, keys }, { low, high, marks }, table, now, isLast, earlier) {
+    const colour = (/** @type {string} */ name) => colourAt(this.element, name);
     const { pen, width, height } = sharp(canvas);
+    const { left } = this;
     const { begin, end } = this.span;
-    const [first, last] = [table.row(begin), Math.min(table.row(end) + 1, table.count - 1)];
-    const [low, high] = range(panel, table, first, last);
+    const [first, last] = rowsOf(table, begin, end);
     const bottom = height - (isLast ? 34 : 20);
-    const x = (/** @type {number} */ time) => LEFT + ((time - begin) / (end - begin)) * (width - LEFT - RIGHT);
+    const x = (/** @type {number} */ time) => left + ((time - begin) / (end - begin)) * (width - left - RIGHT);
     const y = (/** @type {number} */ value) => bottom - ((value - low) / (high - low)) * (bottom - 6);
-    pen.font = "12px system-ui, sans-serif";
+    pen.font = FONT;
     pen.lineWidth = 1;
     pen.strokeStyle = colour("grid");
     pen.fillStyle = colour("soft");
     pen.textAlign = "right";
     pen.textBaseline = "middle";
-    for (const tick of ticks(low, high, 5)) {
-      line(pen, [LEFT, y(tick.place)], [width - RIGHT, y(tick.place)]);
-      pen.fillText(tick.text, LEFT - 6, y(tick.place));
+    for (const tick of marks) {
+      line(pen, [left, y(tick.place)], [width - RIGHT, y(tick.place)]);
+      pen.fillText(tick.text, left - 6, y(tick.place));
     }
     pen.textAlign = "center";
     pen.textBaseline = "top";
@@ -208,9 +237,17 @@ class Plots {
       pen.fillText(tick.text, x(tick.place), bottom + 5);
     }
     if (isLast) {
-      pen.fillText("time (s)", (LEFT + width - RIGHT) / 2, bottom + 20);
+      pen.fillText("time (s)", (left + width - RIGHT) / 2, bottom + 20);
     }
     pen.lineJoin = "round";
+    for (const curve of earlier ? panel.curves : []) {
+      const run = /** @type {Table} */ (earlier);
+      const column = run.column(curve.name);
+      pen.strokeStyle = colour("soft");
+      pen.globalAlpha = 0.6;
+      course(pen, run.column("time"), x, (row) => y(curve.factor * column[row] + (curve.offset || 0)), ...rowsOf(run, begin, end));
+      pen.globalAlpha = 1;
+    }
     for (const [place, curve] of panel.curves.entries()) {
       const column = table.column(curve.name);
       const value = (/** @type {number} */ row) => y(curve.factor * column[row] + (curve.offset || 0));
@@ -226,7 +263,7 @@ class Plots {
       pen.lineWidth = 1;
       if (table.count) {
         const here = curve.factor * table.at(curve.name, now) + (curve.offset || 0);
-      keys[place].key.hidden = Number.isNaN(here);
+        keys[place].key.hidden = Number.isNaN(here);
         pen.fillStyle = colour(curve.colour);
         pen.beginPath();
         pen.arc(x(Math.min(now, table.end)), y(here), 3.5, 0, 2 * Math.PI);
@@ -240,8 +277,13 @@ class Plots {
   }
 }
 
-/** Room beside a panel's axes, px. */
-const [LEFT, RIGHT] = [46, 16];
+/** The least room beside a panel's axes, px, and the font of their numbers. */
+const [LEFT, RIGHT, FONT] = [46, 16, "12px system-ui, sans-serif"];
+
+/** The first and the last row that is drawn. @param {Table} table @param {number} begin @param {number} end @returns {[number, number]} */
+function rowsOf(table, begin, end) {
+  return [table.row(begin), Math.min(table.row(end) + 1, table.count - 1)];
+}
 
 /** Least and largest value of these rows, and a little more. @param {Panel} panel @param {Table} table @param {number} first @param {number} last */
 function range(panel, table, first, last) {

@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
 use quick_xml::escape::escape;
+use sha2::{Digest as _, Sha256};
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
@@ -16,6 +17,9 @@ const PAGE: &str = "documentation/index.html";
 
 /// The page where a model has none.
 const PLAIN: &str = include_str!("../page/page.html");
+/// Stands where the scripts put the section that runs the FMU.
+const WITHOUT_SCRIPTS: &str =
+    "<noscript><p class=\"note\">With scripts, this page runs the FMU here. All else on it is complete.</p></noscript>";
 const STYLE: &str = include_str!("../page/live.css");
 const SCRIPTS: [&str; 4] = [
     include_str!("../page/plot.js"),
@@ -66,10 +70,54 @@ fn live(page: &str, runnables: &[Runnable], resources: &[&str], scripts: &[&str]
         let description = base64(&deflated(description.as_bytes())?);
         writeln!(text, "{{ description: \"{description}\", module: \"{}\" }},", base64(&deflated(module)?))?;
     }
-    writeln!(text, "], {}).catch(withoutIt);\n}})();\n</script>", serde_json::to_string(resources)?)?;
-    // At the end, when there is what it is put into.
-    let end = page.rfind("</body>").unwrap_or(page.len());
-    Ok(format!("{}{text}{}", &page[..end], &page[end..]))
+    // In JSON, `<` occurs in strings only: a name must not end the script.
+    let resources = serde_json::to_string(resources)?.replace('<', "\\u003c");
+    writeln!(text, "], {resources}).catch(withoutIt);\n}})();\n</script>")?;
+    let begin = page.find("<main>").map_or(page.len(), |place| place + "<main>".len());
+    let (head, rest) = page.split_at(begin);
+    // At the end, when the elements exist that the scripts change.
+    let end = rest.rfind("</body>").unwrap_or(rest.len());
+    let page = format!("{head}{WITHOUT_SCRIPTS}{}{text}{}", &rest[..end], &rest[end..]);
+    Ok(with_policy(&page))
+}
+
+/// The page with a Content-Security-Policy: the scripts and the style sheets of the page run, by their hashes, and nothing is
+/// loaded but images from beside the page.
+fn with_policy(page: &str) -> String {
+    let hashes = |tag: &str| {
+        let contents = elements(page, tag).into_iter();
+        // Browsers read line ends so.
+        let hash = |content: &str| base64(&Sha256::digest(content.replace("\r\n", "\n")));
+        contents.map(|content| format!(" 'sha256-{}'", hash(content))).collect::<String>()
+    };
+    let policy = format!(
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src 'self' file: data:; \
+         script-src 'wasm-unsafe-eval'{}; style-src-elem{}; style-src-attr 'unsafe-inline'\">\n",
+        hashes("script"),
+        hashes("style"),
+    );
+    let place = ["<meta charset=\"utf-8\">\n", "<head>\n", "<head>"].iter();
+    let place = place.filter_map(|tag| Some(page.find(tag)? + tag.len())).next().unwrap_or(0);
+    format!("{}{policy}{}", &page[..place], &page[place..])
+}
+
+/// The contents of all elements of this name.
+fn elements<'a>(page: &'a str, tag: &str) -> Vec<&'a str> {
+    let (begin, end) = (format!("<{tag}"), format!("</{tag}>"));
+    let mut found = Vec::new();
+    let mut rest = page;
+    while let Some(place) = rest.find(&begin) {
+        let after = &rest[place + begin.len()..];
+        let is_tag = after.starts_with(|c: char| c == '>' || c.is_ascii_whitespace());
+        let content = after.find('>').map(|open| &after[open + 1..]).filter(|_| is_tag);
+        let Some((content, length)) = content.and_then(|text| Some((text, text.find(&end)?))) else {
+            rest = after;
+            continue;
+        };
+        found.push(&content[..length]);
+        rest = &content[length + end.len()..];
+    }
+    found
 }
 
 /// Compressed, as browsers call `deflate-raw`.
@@ -125,11 +173,31 @@ mod tests {
             &["const ownScript = 1;\n"],
         )
         .unwrap();
-        assert!(page.starts_with("<body><p>text</p><style>") && page.ends_with("</script>\n</body></html>"));
+        assert!(page.contains("<body><p>text</p><style>") && page.ends_with("</script>\n</body></html>"));
         let places = ["async function live(", "const ownScript", "live([\n{ description: \""];
         assert!(places.map(|part| page.find(part).unwrap()).is_sorted());
         assert_eq!(page.matches("\n{ description: \"").count(), 2);
         assert!(page.contains("\n], [\"a.csv\"]).catch("));
+    }
+
+    #[test]
+    fn names_of_files_end_no_script() {
+        let page = live("<body></body>", &[], &["</script><img src=x onerror=alert(8)>"], &[]).unwrap();
+        assert_eq!(page.matches("</script").count(), 1);
+        assert!(page.contains("[\"\\u003c/script>\\u003cimg src=x onerror=alert(8)>\"]"));
+    }
+
+    /// Each block by the hash of its bytes (Content Security Policy Level 3, section 2.3.1).
+    #[test]
+    fn the_policy_has_a_hash_for_each_block() {
+        let page = "<head>\n<style>a</style></head><svg><style type=\"text/css\">b</style></svg><styled>c</styled>";
+        let page = with_policy(&format!("{page}<script></script>"));
+        assert_eq!(page.matches("'sha256-").count(), 3);
+        assert!(page.starts_with("<head>\n<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none';"));
+        // printf a | openssl dgst -sha256 -binary | base64
+        assert!(page.contains("style-src-elem 'sha256-ypeBEsobvcr6wjGzmiPcTaeG7/gUfE5yuYB3ha/uSLs=' "));
+        // The same of nothing.
+        assert!(page.contains("script-src 'wasm-unsafe-eval' 'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=';"));
     }
 
     #[test]

@@ -23,7 +23,7 @@ function animation(run) {
     },
   };
   const player = new Player({
-    plots: (seek) => new Plots(WRIST_PANELS, seek), view, begin, isLooping: true, table,
+    plots: (seek) => new Plots(WRIST_PANELS, seek), view, begin, isLooping: () => true, table,
     span: () => [begin, end], recorded: () => end, limit: () => end,
   });
   const isPlaying = player.isPlaying;

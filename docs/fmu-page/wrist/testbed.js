@@ -57,6 +57,8 @@ function move(time, isShaped) {
 /** @type {Motion[]} */
 const MOTIONS = [
   led("tour", "Both ways: equal motors pitch the wrist, opposite ones roll it", 5.2, (time) => (time < 2.5 ? both(swing(time)) : both(swing(time - 2.6), -1))),
+  led("pitch", "Pitch: both motors alike", 2.6, (time) => both(swing(time))),
+  led("roll", "Roll: one motor against the other", 2.6, (time) => both(swing(time), -1)),
   led("fig4", "The paper\u2019s Fig. 4: opposite rates, sin(10\u03c0t) rad/s", 2, (time) => both(sine(time), -1)),
   led("fig4-equal", "The same with equal rates", 2, (time) => both(sine(time))),
   led("step", "A step: motor 1 turns by 20\u00b0 in 20 ms, motor 2 stands", 1, (time) => {
@@ -103,6 +105,9 @@ addOns.prw_testbed = (_, others) => {
   /** @type {HTMLSelectElement} */
   const twist = element("select", { "aria-label": "Enlargement of the couplings\u2019 twist" }, element("option", { value: "0" }, "twist: automatic"), ...["1", "5", "20", "50", "100"].map((value) => element("option", { value }, `twist \u00d7 ${value}`)));
   return {
+    lead: "Two motors move a robotic wrist: drag a motor, or press a button.",
+    buttons: [{ label: "Pitch", motion: "pitch" }, { label: "Roll", motion: "roll" }, { label: "Shake it", motion: "chirp" }],
+    near: { k1: "stiffness, motor side", k2: "stiffness, wrist side", c1: "damping, motor side", c2: "damping, wrist side" },
     word: "Motion",
     start: { use_omega: 1 },
     sliders: [
@@ -133,7 +138,7 @@ addOns.prw_testbed = (_, others) => {
     view: (turn) => {
       const wrist = new Wrist(WRIST, turn);
       twist.addEventListener("change", () => wrist.enlarge(Number(twist.value)));
-      return { element: wrist.element, draw: (table, time) => wrist.draw(table, time), controls: [twist], settings: new Map([["twist", twist]]) };
+      return { element: wrist.element, draw: (table, time) => wrist.draw(table, time), set: (parameter) => wrist.count(parameter("M"), parameter("N")), controls: [twist], settings: new Map([["twist", twist]]) };
     },
   };
 };

@@ -5,6 +5,8 @@
  * @typedef {{corners: number[], colour: number[], isClosed: boolean}} Face
  * @typedef {{points: number[], faces: Face[], turn: string}} Solid
  * @typedef {{turns?: string | null, lathe?: number[][], box?: number[][], colours: string[], lobes?: number}} Shape
+ * A body on the graphics card: corners and normals of its triangles, the number of corners, and what turns it.
+ * @typedef {{buffer: WebGLBuffer, count: number, turn: string}} Mesh
  */
 
 /** @typedef {{
@@ -33,10 +35,11 @@ const WRIST_PANELS = [
   { title: "Torques", unit: "N m", curves: [{ name: "tau1", label: "\u03c4\u2081", colour: "curve-1", factor: 1 }, { name: "tau2", label: "\u03c4\u2082", colour: "curve-2", factor: 1 }] },
 ];
 
-/** The bodies of the wrist. @param {Parts} parts @returns {Solid[]} */
-function bodies(parts) {
+/** The bodies of the wrist, with a number of cam lobes. @param {Parts} parts @param {number} waves @returns {Solid[]} */
+function bodies(parts, waves) {
   const rgb = (/** @type {string} */ name) => [1, 3, 5].map((place) => parseInt(parts.colours[name].slice(place, place + 2), 16));
-  const round = parts.round;
+  // Enough corners for each lobe.
+  const round = parts.round * Math.max(1, Math.ceil((6 * waves) / parts.round));
 
   /** Turned about X from points (x, radius), in stripes of the colours. @param {Shape} shape @param {string} own @returns {Solid} */
   const lathe = ({ lathe: profile = [], colours, lobes = 0, turns }, own) => {
@@ -50,7 +53,7 @@ function bodies(parts) {
     }
     const made = points.flatMap(([x, radius]) =>
       Array.from({ length: round }, (_, k) => {
-        const [angle, wave] = [(2 * Math.PI * k) / round, 1 + lobes * Math.cos((8 * Math.PI * k) / round)];
+        const [angle, wave] = [(2 * Math.PI * k) / round, 1 + lobes * Math.cos((2 * Math.PI * waves * k) / round)];
         return [x, radius * wave * Math.cos(angle), radius * wave * Math.sin(angle)];
       }).flat(),
     );
@@ -216,7 +219,11 @@ class Wrist {
   /** @param {Parts} parts @param {((motor: string, by: number) => void) | null} move turns a motor, rad */
   constructor(parts, move) {
     this.parts = parts;
-    this.bodies = bodies(parts);
+    /** @type {Solid[]} */
+    this.bodies = [];
+    /** Whether the hint that a motor can be dragged is shown. */
+    this.isHinting = move !== null;
+    this.shaded = Shaded.make();
     this.azimuth = parts.azimuth + 90;
     this.elevation = parts.elevation;
     this.twist = 0;
@@ -228,18 +235,28 @@ class Wrist {
     });
     this.listen(move);
     this.settled = { key: "", factor: 1 };
+    this.count(LOBES, parts.rollers.count);
+  }
+
+  /** Draws this many cam lobes and rollers on each side, within what can be told apart. @param {number} lobes @param {number} rollers */
+  count(lobes, rollers) {
+    const most = (/** @type {number} */ number) => Math.min(Math.max(Math.round(number) || 1, 1), 24);
+    this.bodies = bodies({ ...this.parts, rollers: { ...this.parts.rollers, count: most(rollers) } }, most(lobes));
+    this.shaded?.load(this.bodies);
+    this.turn(0, 0);
   }
 
   /** @param {((motor: string, by: number) => void) | null} move */
   listen(move) {
     const canvas = this.element;
-    let held = "";
+    /** @type {typeof SHAFTS[number] | undefined} */
+    let held;
     let last = [0, 0];
     /** @param {number} x @param {number} y */
-    const motorAt = (x, y) => (move && SHAFTS.find(({ side }) => {
+    const motorAt = (x, y) => (move ? SHAFTS.find(({ side }) => {
       const [centre, edge] = [this.project([side * 4.1, 0, 0]), this.project([side * 4.1, 0.8, 0])];
       return Math.hypot(x - centre[0], y - centre[1]) < Math.max(24, Math.hypot(edge[0] - centre[0], edge[1] - centre[1]));
-    })?.motor) || "";
+    }) : undefined);
     canvas.addEventListener("pointerdown", (event) => {
       held = motorAt(event.offsetX, event.offsetY);
       last = [event.clientX, event.clientY];
@@ -262,7 +279,9 @@ class Wrist {
       const [right, down] = [event.clientX - last[0], event.clientY - last[1]];
       last = [event.clientX, event.clientY];
       if (held) {
-        move?.(held, 0.01 * (down + right));
+        const box = canvas.getBoundingClientRect();
+        this.isHinting = false;
+        move?.(held.motor, this.angleOf(held.side, [event.clientX - box.left, event.clientY - box.top], [right, down]));
       } else {
         this.turn(-0.4 * right, 0.4 * down);
       }
@@ -274,6 +293,26 @@ class Wrist {
         this.turn(steps[0], steps[1]);
       }
     });
+  }
+
+  /**
+   * The angle by which a motor turns when its surface follows the hand, rad.
+   * @param {number} side @param {number[]} place of the hand, px @param {number[]} way of the hand, px
+   */
+  angleOf(side, place, way) {
+    const { rotation, scale } = this.camera();
+    const [nearX, nearY, nearZ] = rotation.slice(6);
+    const across = Math.hypot(nearY, nearZ);
+    const centre = this.project([side * 4.1, 0, 0]);
+    if (across < 0.5) {
+      // Seen along its axis, the motor turns about its centre.
+      const [x, y] = [place[0] - centre[0], place[1] - centre[1]];
+      return (-Math.sign(nearX) * (x * way[1] - y * way[0])) / Math.max(x * x + y * y, 100);
+    }
+    // The way that the point next to the viewer takes on the screen.
+    const [y, z] = [-nearZ / across, nearY / across];
+    const [right, down] = [rotation[1] * y + rotation[2] * z, -(rotation[4] * y + rotation[5] * z)];
+    return (right * way[0] + down * way[1]) / (0.66 * scale * (right * right + down * down));
   }
 
   /** @param {number} azimuth deg @param {number} elevation deg */
@@ -319,13 +358,42 @@ class Wrist {
   /** @param {Table} table @param {number} time */
   draw(table, time) {
     this.last = [table, time];
-    const { pen, width } = sharp(this.element);
+    const { pen, width, height } = sharp(this.element);
     const { rotation, scale, centre } = this.camera();
     const angle = (/** @type {string} */ name) => table.at(name, time);
     const turns = rotations(angle);
+    const twist = this.factor(table);
+    const couplings = this.couplings(angle, twist);
+    const image = this.shaded?.draw({ width, height, rotation, scale, centre, turns, lamp: this.parts.lamp }, couplings);
+    if (image) {
+      pen.drawImage(image, 0, 0, width, height);
+    } else {
+      this.paint(pen, { rotation, scale, centre }, turns, couplings);
+    }
+    this.label(pen, width, height, twist);
+  }
+
+  /** The strands of all couplings. @param {(name: string) => number} angle @param {number} twist @returns {Solid[]} */
+  couplings(angle, twist) {
+    return SHAFTS.flatMap((shaft) =>
+      this.parts.couplings.map(({ from, to, x }) => {
+        const [outer, inner] = [angle(shaft[/** @type {"motor"} */ (from)]), angle(shaft[/** @type {"motor"} */ (to)])];
+        const points = strands(this.parts, x.map((place) => shaft.side * place), outer, inner, twist);
+        const colour = [1, 3, 5].map((place) => parseInt(this.parts.colours[shaft.colour].slice(place, place + 2), 16));
+        const faces = Array.from({ length: points.length / 12 }, (_, k) => ({ corners: [0, 1, 2, 3].map((corner) => 4 * k + corner), colour, isClosed: false }));
+        return { points, faces, turn: "" };
+      }),
+    );
+  }
+
+  /**
+   * Paints the faces from the farthest to the nearest, for browsers without WebGL.
+   * @param {CanvasRenderingContext2D} pen @param {{rotation: number[], scale: number, centre: number[]}} camera
+   * @param {Record<string, number[]>} turns @param {Solid[]} couplings
+   */
+  paint(pen, { rotation, scale, centre }, turns, couplings) {
     /** @type {{near: number, points: number[], corners: number[], colour: number[], light: number, isReversed: boolean}[]} */
     const seen = [];
-    const twist = this.factor(table);
     const lamp = this.parts.lamp;
     /** @param {Solid} body */
     const add = (body) => {
@@ -360,16 +428,7 @@ class Wrist {
         seen.push({ near: near / corners.length, points: placed, corners, colour, light, isReversed: area > 0 });
       }
     };
-    this.bodies.forEach(add);
-    for (const shaft of SHAFTS) {
-      for (const { from, to, x } of this.parts.couplings) {
-        const [outer, inner] = [angle(shaft[/** @type {"motor"} */ (from)]), angle(shaft[/** @type {"motor"} */ (to)])];
-        const points = strands(this.parts, x.map((place) => shaft.side * place), outer, inner, twist);
-        const colour = [1, 3, 5].map((place) => parseInt(this.parts.colours[shaft.colour].slice(place, place + 2), 16));
-        const faces = Array.from({ length: points.length / 12 }, (_, k) => ({ corners: [0, 1, 2, 3].map((corner) => 4 * k + corner), colour, isClosed: false }));
-        add({ points, faces, turn: "" });
-      }
-    }
+    [...this.bodies, ...couplings].forEach(add);
     seen.sort((one, other) => one.near - other.near);
     let shade = "";
     pen.beginPath();
@@ -401,11 +460,10 @@ class Wrist {
       pen.closePath();
     }
     pen.fill();
-    this.label(pen, width, twist);
   }
 
-  /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} twist */
-  label(pen, width, twist) {
+  /** @param {CanvasRenderingContext2D} pen @param {number} width @param {number} height @param {number} twist */
+  label(pen, width, height, twist) {
     pen.font = "13px system-ui, sans-serif";
     pen.textBaseline = "alphabetic";
     pen.lineWidth = 3;
@@ -422,9 +480,144 @@ class Wrist {
     words("motor 2", this.project([4.1, 0.95, 0]), "curve-2", "center");
     words("ring: pitch", [width - 8, 20], "curve-3", "right");
     words("gripper: roll", [width - 8, 38], "curve-4", "right");
-    words(`couplings\u2019 twist \u00d7 ${twist}`, [8, 20], "soft", "left");
+    words(`couplings\u2019 twist drawn \u00d7 ${twist}`, [8, 20], "soft", "left");
+    if (this.isHinting) {
+      pen.font = "600 15px system-ui, sans-serif";
+      words("Drag a motor", [width / 2, height - 12], "ink", "center");
+    }
   }
 }
 
-/** From the viewer to the centre. */
-const DISTANCE = 20;
+/** Draws bodies with a depth buffer, on a canvas of its own. */
+class Shaded {
+  /** `null` where the browser has no WebGL, or only a slow one. @returns {Shaded | null} */
+  static make() {
+    const gl = element("canvas").getContext("webgl", { antialias: true, preserveDrawingBuffer: true, failIfMajorPerformanceCaveat: true });
+    return gl && new Shaded(gl);
+  }
+
+  /** @param {WebGLRenderingContext} gl */
+  constructor(gl) {
+    this.gl = gl;
+    /** @type {Mesh[]} */
+    this.meshes = [];
+    const program = /** @type {WebGLProgram} */ (gl.createProgram());
+    for (const [type, source] of /** @type {[number, string][]} */ ([[gl.VERTEX_SHADER, CORNERS], [gl.FRAGMENT_SHADER, PIXELS]])) {
+      const shader = /** @type {WebGLShader} */ (gl.createShader(type));
+      gl.shaderSource(shader, source);
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+    }
+    gl.linkProgram(program);
+    gl.useProgram(program);
+    gl.enable(gl.DEPTH_TEST);
+    this.uniform = (/** @type {string} */ name) => gl.getUniformLocation(program, name);
+    this.attributes = ["place", "normal", "colour"].map((name) => gl.getAttribLocation(program, name));
+    this.attributes.forEach((attribute) => gl.enableVertexAttribArray(attribute));
+    this.strands = /** @type {WebGLBuffer} */ (gl.createBuffer());
+  }
+
+  /** Keeps these bodies on the graphics card. @param {Solid[]} bodies */
+  load(bodies) {
+    const { gl } = this;
+    this.meshes.forEach(({ buffer }) => gl.deleteBuffer(buffer));
+    this.meshes = bodies.map((body) => {
+      const [buffer, corners] = [/** @type {WebGLBuffer} */ (gl.createBuffer()), triangles(body)];
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.bufferData(gl.ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+      return { buffer, count: corners.length / 9, turn: body.turn };
+    });
+  }
+
+  /**
+   * The canvas with the bodies and the couplings; `null` if the graphics card was lost.
+   * @param {{width: number, height: number, rotation: number[], scale: number, centre: number[], turns: Record<string, number[]>, lamp: number[]}} view
+   * @param {Solid[]} couplings
+   */
+  draw({ width, height, rotation, scale, centre, turns, lamp }, couplings) {
+    const { gl } = this;
+    const canvas = /** @type {HTMLCanvasElement} */ (gl.canvas);
+    const ratio = window.devicePixelRatio || 1;
+    const [fineWidth, fineHeight] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (gl.isContextLost() || !fineWidth || !fineHeight) {
+      return null;
+    }
+    if (canvas.width !== fineWidth || canvas.height !== fineHeight) {
+      [canvas.width, canvas.height] = [fineWidth, fineHeight];
+    }
+    gl.viewport(0, 0, fineWidth, fineHeight);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.uniformMatrix3fv(this.uniform("camera"), false, columns(rotation));
+    gl.uniform2f(this.uniform("scale"), (2 * scale) / width, (2 * scale) / height);
+    gl.uniform2f(this.uniform("centre"), (2 * centre[0]) / width - 1, 1 - (2 * centre[1]) / height);
+    gl.uniform3f(this.uniform("lamp"), lamp[0], lamp[1], lamp[2]);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.strands);
+    const corners = Float32Array.from(couplings.flatMap((body) => [...triangles(body)]));
+    gl.bufferData(gl.ARRAY_BUFFER, corners, gl.DYNAMIC_DRAW);
+    for (const { buffer, count, turn } of [...this.meshes, { buffer: this.strands, count: corners.length / 9, turn: "" }]) {
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      this.attributes.forEach((attribute, place) => gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 36, 12 * place));
+      gl.uniformMatrix3fv(this.uniform("turn"), false, columns(turns[turn]));
+      gl.drawArrays(gl.TRIANGLES, 0, count);
+    }
+    return canvas;
+  }
+}
+
+/** A matrix (3, 3) by columns, as WebGL has them. @param {number[]} m */
+function columns(m) {
+  return [m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]];
+}
+
+/** Place, normal and colour of each corner of a body's triangles. @param {Solid} body */
+function triangles({ points, faces }) {
+  const all = [];
+  for (const { corners, colour } of faces) {
+    let [x, y, z] = [0, 0, 0];
+    for (let k = 0, before = corners[corners.length - 1]; k < corners.length; before = corners[k++]) {
+      const [a, b] = [3 * before, 3 * corners[k]];
+      // Newell's normal.
+      x += (points[a + 1] - points[b + 1]) * (points[a + 2] + points[b + 2]);
+      y += (points[a + 2] - points[b + 2]) * (points[a] + points[b]);
+      z += (points[a] - points[b]) * (points[a + 1] + points[b + 1]);
+    }
+    const length = Math.hypot(x, y, z) || 1;
+    const own = [x / length, y / length, z / length, ...colour.map((part) => part / 255)];
+    // From both ends to the middle: a face of a ring is an arc there and an arc back.
+    for (let [first, last] = [0, corners.length - 1]; last - first > 1; first++, last--) {
+      const [a, b, c, d] = [corners[first], corners[first + 1], corners[last - 1], corners[last]];
+      for (const corner of last - first > 2 ? [a, b, d, b, c, d] : [a, b, d]) {
+        all.push(points[3 * corner], points[3 * corner + 1], points[3 * corner + 2], ...own);
+      }
+    }
+  }
+  return Float32Array.from(all);
+}
+
+/** From the viewer to the centre; and the lobes that the cams have before the FMU says otherwise. */
+const [DISTANCE, LOBES] = [20, 4];
+
+/** The shaders: a perspective as in `Wrist.project`, and faces that are lit from both sides. */
+const CORNERS = `
+attribute vec3 place, normal, colour;
+uniform mat3 camera, turn;
+uniform vec2 scale, centre;
+varying vec3 own, face;
+void main() {
+  vec3 seen = camera * (turn * place);
+  float far = ${DISTANCE}.0 - seen.z;
+  gl_Position = vec4(centre * far + scale * ${DISTANCE}.0 * seen.xy, (far - ${DISTANCE}.0) / 10.0 * far, far);
+  own = colour;
+  face = turn * normal;
+}`;
+const PIXELS = `
+precision mediump float;
+uniform mat3 camera;
+uniform vec3 lamp;
+varying vec3 own, face;
+void main() {
+  vec3 normal = normalize(face);
+  float light = dot(normal, lamp) * (gl_FrontFacing ? 1.0 : -1.0);
+  gl_FragColor = vec4(own * (0.62 + 0.38 * max(0.0, light)), 1.0);
+}`;
