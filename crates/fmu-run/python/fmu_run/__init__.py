@@ -17,7 +17,9 @@ Values are in the FMU's units, which `Fmu.variables` tells. FMI 2.0 and 3.0.
 
 from __future__ import annotations
 
+import operator
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -115,16 +117,14 @@ class _Model:
 
         A run that the FMU refuses or ends does not stop the others, see `Runs.errors` and `Runs.check`. If it is refused
         without a reason, it is made once more with logging on, after all others, for the FMU's words alone. Raises ValueError for what
-        does not fit the FMU or itself, FmuError if the FMU is closed. Ctrl-C stops after the runs under way.
+        does not fit the FMU or itself, FmuError if the FMU is closed. Ctrl-C stops all runs after the step that each is in.
         """
         times = _array("time", time)
         if times.ndim != 1:
             raise ValueError(f"time must have one dimension, it has {times.ndim}")
         names = [outputs] if isinstance(outputs, str) else list(outputs)
         wanted = [measures] if isinstance(measures, str) else list(measures)
-        kept = 1 if every is None and not wanted else every
-        if kept is not None and kept < 1:
-            raise ValueError(f"every must be at least 1, it is {kept}")
+        kept = 1 if every is None and not wanted else _count("every", every)
         courses, measured, errors, notes, starts = self._loaded.run(
             times,
             [(name, _course(name, values, len(times))) for name, values in (inputs or {}).items()],
@@ -133,7 +133,7 @@ class _Model:
             names,
             kept,
             wanted,
-            threads,
+            _count("threads", threads),
             read_before_set,
             progress,
         )
@@ -170,10 +170,13 @@ class _Model:
         ------
         ValueError
             For what does not fit the FMU or itself.
+        MemoryError
+            For more instances than there is memory for.
         FmuError
             If the FMU has no such interface, or refuses all of them.
         """
-        return Instances(self._loaded, count, interface, dict(start or {}), start_time, stop_time, threads)
+        asked, threads = _count("count", count) or 1, _count("threads", threads)
+        return Instances(self._loaded, asked, interface, dict(start or {}), start_time, stop_time, threads)
 
 
 class Fmu(_Model):
@@ -244,6 +247,18 @@ class System(_Model):
     def __repr__(self) -> str:
         connections = sum(map(len, self.stages))
         return f"<System {self.name}, {connections} connections, {len(self.variables)} variables>"
+
+
+def _count(name: str, value: int | None) -> int | None:
+    if value is None:
+        return None
+    try:
+        count = operator.index(value)
+    except TypeError:
+        raise ValueError(f"{name} must be an integer, it is {value!r}") from None
+    if count < 1:
+        raise ValueError(f"{name} must be at least 1, it is {count}")
+    return min(count, sys.maxsize)
 
 
 def _array(name: str, values: ArrayLike) -> _Array:
