@@ -107,7 +107,7 @@ class Runs(Mapping[str, _Array]):
             count = "all" if len(self._errors) == self.count else f"{len(self._errors)} of {self.count}"
             lines.append(f"{count} runs failed, see Runs.errors; run {number}: {why}")
         if key not in self._checked:
-            bad = np.isnan(values).reshape(self.count, -1).any(axis=1)
+            bad: NDArray[np.bool_] = np.asarray(np.isnan(values).reshape(self.count, -1).any(axis=1))
             bad[list(self._errors)] = False
             if bad.any():
                 lines.append(f"{key} is not a number in {bad.sum()} finished runs, run {bad.argmax()} among them")

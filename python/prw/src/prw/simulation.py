@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from prw.arguments import Table, names_of
-from prw.channels import QUANTITIES, si_unit
+from prw.channels import MEASURED, QUANTITIES, si_unit
 from prw.errors import UserError
 from prw.extras import need
 from prw.motion import Array, Motion, fig4
@@ -51,6 +51,11 @@ class Run(Mapping[str, Array]):
 
     def __len__(self) -> int:
         return len(self._outputs)
+
+    def recording(self) -> Recording:
+        """The run as if its outputs had been measured."""
+        measured = {name: self[name] for name in MEASURED if name in self}
+        return Recording(Path(self.motion.name), self.motion, measured, {name: "" for name in self})
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write time (s), the motors' angles (rad) and, where given, rates (rad/s), and the outputs (SI) to `path`, a

@@ -36,8 +36,6 @@ UNSEEN = 1e-9
 #: Rounds of fitting and judging the noise, and the change at which they end; and of the latter alone.
 ROUNDS, SETTLED = 12, 0.003
 NOISE_ROUNDS = 30
-#: A channel cannot be more exact than this fraction of its range: doubles and CSV digits end somewhere.
-FINEST = 1e-9
 #: A search starts at least this far inside its bounds.
 INSIDE = 1e-6
 #: When a search ends.
@@ -285,16 +283,19 @@ class Fitter:
         self.model, self.experiments, self.task = model, experiments, task
         self.channels = tuple(dict.fromkeys(name for e in experiments for name in e.channels))
         columns = {name: self._columns(name) for name in self.channels}
-        self._spread = {n: max([1e-12, *(float(np.nanstd(v)) for v, _ in c)]) for n, c in columns.items()}
-        self._stepped = {n: max([0.0, *(float(e.mean()) for _, e in c)]) for n, c in columns.items()}
-        self.noise = dict(noise) or {n: task.noise.get(n) or 0.05 * self._spread[n] for n in self.channels}
+        spread = {n: max([1e-12, *(float(np.nanstd(v)) for v, *_ in c)]) for n, c in columns.items()}
+        self._finest = {n: max([0.0, *(finest for *_, finest in c)]) for n, c in columns.items()}
+        self._stepped = {n: max([0.0, *(float(e.mean()) for _, e, _ in c)]) for n, c in columns.items()}
+        self.noise = dict(noise) or {n: task.noise.get(n) or 0.05 * spread[n] for n in self.channels}
         self.evaluations = 0
         self._responses: tuple[bytes, list[Response]] = b"", []
         self._comparisons: tuple[tuple[object, ...], list[Comparison]] = (), []
 
     def _model(self, logarithms: Array, experiment: Experiment) -> Discrete:
         """The FMU's linear model over the experiment's steps."""
-        one = discrete(self._matrices(logarithms[None]), experiment.step, experiment.channels)
+        one = discrete(
+            self._matrices(logarithms[None]), experiment.step, experiment.channels, experiment.jumps is not None
+        )
         return Discrete(*(block[0] for block in one))
 
     def _response(self, logarithms: Array, experiment: Experiment, bins: int) -> Response:
@@ -338,9 +339,8 @@ class Fitter:
         self.evaluations += 2 * len(steps)
         tables, noise = [], np.zeros((len(logarithms), len(logarithms)))
         for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
-            table, of_noise = comparison.slopes(
-                discrete(around, experiment.step, experiment.channels).slopes(DIFFERENCE)
-            )
+            steps_of = discrete(around, experiment.step, experiment.channels, experiment.jumps is not None)
+            table, of_noise = comparison.slopes(steps_of.slopes(DIFFERENCE))
             tables.append(table)
             noise += of_noise
         return tables, noise
@@ -411,7 +411,7 @@ class Fitter:
         for name, (found, expected, _) in sums.items():
             left = max(freedom[name] - each, 1.0) / max(freedom[name], 1.0)
             noise = self.noise[name] * float(np.sqrt(found / (expected * left)))
-            judged[name] = self.task.noise.get(name) or max(noise, FINEST * self._spread[name])
+            judged[name] = self.task.noise.get(name) or max(noise, self._finest[name])
         return judged
 
     def _alike(self, noise: Mapping[str, float], other: Mapping[str, float]) -> bool:
@@ -435,10 +435,10 @@ class Fitter:
         late = {d.channel for d in self.task.distortions if d.kind != "gain"}
         return [i for i, name in enumerate(experiment.channels) if name in late]
 
-    def _columns(self, name: str) -> list[tuple[Array, Array]]:
-        """Values (s,) and errors' power (bins,) of the channel in every experiment that has it."""
+    def _columns(self, name: str) -> list[tuple[Array, Array, float]]:
+        """Values (s,), errors' power (bins,) and least noise of the channel in every experiment that has it."""
         with_it = [(e, e.channels.index(name)) for e in self.experiments if name in e.channels and e.values is not None]
-        return [(e.values[:, i], e.channel_power[:, i]) for e, i in with_it if e.values is not None]
+        return [(e.values[:, i], e.channel_power[:, i], float(e.finest[i])) for e, i in with_it if e.values is not None]
 
 
 def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int = 6, seed: int = 0) -> Solution:

@@ -277,7 +277,7 @@ def _strength(solution: Solution, i: int) -> tuple[Array, Array]:
         power = np.abs(np.fft.rfft(np.diff(column) * np.hanning(n - 1)))[first:] ** 2 / np.sum(np.hanning(n - 1) ** 2)
         turn = 2 - 2 * np.cos(2 * np.pi * np.arange(first, first + len(power)) / (n - 1))
         outside = float(np.mean(power / turn))
-        found.append(float(np.sqrt(inside[j] / max(outside, quantum, 1e-300))))
+        found.append(float(np.sqrt(inside[j] / max(outside, quantum, experiment.finest[j] ** 2))))
     return np.array(found), luck
 
 
