@@ -50,7 +50,7 @@ def fmu(testbed):
         ({"threads": -2}, "threads must be at least 1, it is -2"),
         ({"threads": 1.5}, "threads must be an integer, it is 1.5"),
         ({"start": {"roll": 1.0}}, "roll is read-only: it is calculated by the FMU and has no start value"),
-        ({"outputs": ["nope"]}, "PitchRollWristTestbed has no variable \"nope\"\n"),
+        ({"outputs": ["nope"]}, 'PitchRollWristTestbed has no variable "nope"\n'),
         ({"time": [0.0]}, "time has 1 values"),
         ({"time": [[0.0, 1.0]]}, "time must have one dimension"),
         ({"time": [0.0, 0.1, np.nan]}, "time[2] is NaN; times must be finite"),

@@ -192,8 +192,8 @@ def test_errors_are_those_of_python_too(monkeypatch: pytest.MonkeyPatch) -> None
         prw.sweep()
 
 
-def test_the_fmu_inside_comes_first(tmp_path: Path) -> None:
-    """Of a package that is installed, whatever stands in the working directory; a clone has its own."""
+def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """PRW_FMU first, then the one in an installed package, then that of the clone; the working directory does not matter."""
     own, here = tmp_path / "site" / "prw", tmp_path / "work" / "target" / "fmu"
     shutil.copytree(Path(prw.__path__[0]), own, ignore=shutil.ignore_patterns("__pycache__"))
     here.mkdir(parents=True)
@@ -203,11 +203,27 @@ def test_the_fmu_inside_comes_first(tmp_path: Path) -> None:
     )
     line = [sys.executable, "-c", program]
     alone = subprocess.run(line, cwd=tmp_path / "work", capture_output=True, text=True)
-    assert "prw_testbed.fmu: no such FMU\n" in alone.stderr
+    assert (
+        "there is no FMU: none is named by fmu= (--fmu in the shell), PRW_FMU is not set, there is no" in alone.stderr
+    )
+    assert (
+        f"{own / 'fmu' / 'prw_testbed.fmu'}, and no" in alone.stderr and "`make fmu` builds in a clone" in alone.stderr
+    )
+    (own / "clone.txt").write_text(str(ROOT))
+    from_clone = program + "; prw.animate(prw.simulate(), 'wrist.html')"
+    assert python(from_clone, tmp_path / "work") == f"{prw.default_fmu()}\n", (
+        "a package that was installed from a clone"
+    )
+    assert (tmp_path / "work" / "wrist.html").stat().st_size > 50_000
     (own / "fmu").mkdir()
     shutil.copy(prw.default_fmu(), own / "fmu")
     assert python(program, tmp_path / "work") == f"{own / 'fmu' / 'prw_testbed.fmu'}\n"
     assert prw.default_fmu() == ROOT / "target" / "fmu" / "prw_testbed.fmu"
+    monkeypatch.setenv("PRW_FMU", str(here / "prw_testbed.fmu"))
+    assert python(program, tmp_path / "work") == f"{here / 'prw_testbed.fmu'}\n"
+    monkeypatch.setenv("PRW_FMU", "absent.fmu")
+    with pytest.raises(prw.UserError, match=r"absent.fmu: no such FMU, which the environment variable PRW_FMU names"):
+        prw.simulate()
 
 
 def test_wrong_motions() -> None:

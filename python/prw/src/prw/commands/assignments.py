@@ -129,12 +129,13 @@ def add_parameter_options(parser: argparse.ArgumentParser, unit: str) -> None:
     )
 
 
-def parameters_of(arguments: argparse.Namespace, fmu: Path) -> dict[str, Any]:
+def parameters_of(arguments: argparse.Namespace, fmu: Path | None) -> dict[str, Any]:
     """What these options say."""
     found: dict[str, Any] = {}
     if arguments.parameters is not None:
-        with loaded(existing_fmu(fmu)) as inside:
-            found = values_of(arguments.parameters, fmu, inside)
+        path = existing_fmu(fmu)
+        with loaded(path) as inside:
+            found = values_of(arguments.parameters, path, inside)
     for name, text in pairs(arguments.set, "--set").items():
         try:
             found[name] = text == "true" if text in ("true", "false") else float(text)
