@@ -86,7 +86,7 @@ def test_what_two_channels_have_in_common_is_seen_where_parameters_make_up_for_e
     truth = rig.late(rig.experiment(400004, 6, pattern="slow"), 7e-4)
     found = prw.identify(recording(truth, ("tau1", "tau2", "pitch", "roll")), starts=1, fmu=fmu)
     assert {misfit.channel for misfit in found.verdict.misfits} == {"tau1", "tau2"}, found.misfits
-    assert "--delay tau1,tau2" in found.diagnosis[0], found.diagnosis
+    assert "(delay tau1,tau2 estimates it along)" in found.diagnosis[0], found.diagnosis
 
 
 @pytest.mark.parametrize("spoil", SPOILT_SENSORS, ids=lambda spoil: spoil.__name__)
@@ -142,7 +142,7 @@ def test_the_command_tells_and_writes_no_parameters(prw, tmp_path, experiment):
     out = tmp_path / "out" / "identified"
     result = prw("identify", "run.csv", "--starts", 1)
     assert result.returncode == 3 and result.stderr.count("\n") == 1, result.stderr
-    assert "tau1, tau2" in result.stderr and "--delay" in result.stderr and "--write-anyway" in result.stderr
+    assert "tau1, tau2" in result.stderr and "(delay tau1,tau2 " in result.stderr and "--write-anyway" in result.stderr
     assert result.stdout.index("DOES NOT EXPLAIN") < result.stdout.index("k1 ")
     assert not (out / "identified.json").exists()
     page = (out / "report.html").read_text(encoding="utf-8")

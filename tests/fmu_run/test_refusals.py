@@ -190,6 +190,7 @@ def test_an_fmu_that_is_closed(testbed):
     fmu.close()
     with pytest.raises(fmu_run.FmuError, match="the FMU is closed"):
         fmu.run(TIME, outputs=["roll"])
+    assert repr(fmu).endswith("variables, closed>")
 
 
 def test_units_of_declared_types(unruly, unruly3):
@@ -220,6 +221,13 @@ def test_start_values_with_units(fmu):
     )
     for name in outputs:
         np.testing.assert_allclose(other[name], own[name], rtol=1e-12)
+    turned = fmu.run(time, inputs={"theta1": (np.linspace(0, 30, 11), "deg"), "theta2": (3.0, "deg")}, outputs=["roll"])
+    radians = fmu.run(
+        time, inputs={"theta1": np.linspace(0, 30, 11) * np.pi / 180, "theta2": 3.0 * np.pi / 180}, outputs=["roll"]
+    )
+    np.testing.assert_allclose(turned["roll"], radians["roll"], rtol=1e-12, atol=1e-15)
+    with pytest.raises(ValueError, match='theta1 can be given in rad or deg, not in "grad"'):
+        fmu.run(time, inputs={"theta1": (0.0, "grad")}, outputs=["roll"])
     held = fmu.instances(2, start={"theta3_start": (30.0, "deg"), "start_at_rest": "false"})
     np.testing.assert_allclose(held.get("theta3"), np.pi / 6, rtol=1e-15)
     for start, words in [

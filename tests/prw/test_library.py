@@ -286,7 +286,10 @@ def test_wrong_sweeps(testbed: Path) -> None:
         ({}, "nothing varies; give values by parameter"),
         ({"grid": {"k9": [1.0]}}, "k9 is not known; there are J2"),
         ({"grid": {"k1": []}}, "k1: .* are not the values of a parameter"),
-        ({"grid": {"k1": [1.0]}, "random": {"k1": 0.1}}, "k1 is in the grid and random; choose one"),
+        (
+            {"grid": {"k1": [1.0]}, "random": {"k1": 0.1}},
+            "k1 is in more than one of grid, random and parameters; choose one",
+        ),
         ({"grid": {"k1": None}}, "k1: None are not the values of a parameter"),
         ({"random": {"k1": -0.1}}, "random: k1 -0.1 is not a positive number"),
         ({"random": {"k1": None}}, "random: k1 None is not a positive number"),

@@ -40,6 +40,8 @@ _Array = NDArray[np.float64]
 #: A start value: one for all runs or instances, or one for each. Texts are for texts, and name the items of enumerations; a
 #: number or array with a unit is in that unit, which the FMU must have among its display units.
 Start = ArrayLike | str | Sequence[str] | tuple[ArrayLike, str]
+#: What an input does: values, or values with a unit as for `Start`.
+Course = ArrayLike | tuple[ArrayLike, str]
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ class _Model:
         time: ArrayLike,
         *,
         outputs: Sequence[str],
-        inputs: Mapping[str, ArrayLike] | None = None,
+        inputs: Mapping[str, Course] | None = None,
         input_derivatives: Mapping[str, ArrayLike] | None = None,
         start: Mapping[str, Start] | None = None,
         every: int | None = None,
@@ -102,8 +104,8 @@ class _Model:
         time: (times,), the communication points, s. At each the inputs are set, the outputs read, and the step to the next
         is taken.
         outputs: the variables to read, any that are numbers.
-        inputs: by name; (times,) for all runs, (runs, times) for each its own, or a number that stays. Inputs that are not
-        named keep their start values.
+        inputs: by name; (times,) for all runs, (runs, times) for each its own, or a number that stays; with a unit or without,
+        {"theta1": (angles, "deg")}. Inputs that are not named keep their start values.
         input_derivatives: d/dt of inputs, in the same shapes, for FMUs of FMI 2.0 that can interpolate inputs.
         start: start values of parameters, states and so on by name: one for all runs or (runs,) for each its own; numbers,
         texts, items of enumerations, or numbers with a unit, {"k1": (1.9, "N.m/deg")}.
@@ -127,7 +129,7 @@ class _Model:
         kept = 1 if every is None and not wanted else _count("every", every)
         courses, measured, errors, notes, starts = self._loaded.run(
             times,
-            [(name, _course(name, values, len(times))) for name, values in (inputs or {}).items()],
+            [(name, self._course(name, values, len(times))) for name, values in (inputs or {}).items()],
             [(name, _course(name, values, len(times))) for name, values in (input_derivatives or {}).items()],
             dict(start or {}),
             names,
@@ -139,6 +141,19 @@ class _Model:
         )
         kept_times = times[:: kept or len(times)][: courses.shape[2]]
         return Runs(kept_times, names, courses, wanted, measured, dict(errors), dict(notes), starts)
+
+    def converted(self, name: str, values: ArrayLike, unit: str) -> float | _Array:
+        """Values in another unit, which the FMU must have among its display units, in the unit of the variable. Raises ValueError
+        for a variable or a unit that it does not have."""
+        factor, offset = self._loaded.display_unit(name, unit)
+        found = (_array(name, values) - offset) / factor
+        return float(found) if found.ndim == 0 else found
+
+    def _course(self, name: str, values: Course, times: int) -> float | _Array:
+        """Values in the variable's unit."""
+        if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str):
+            return _course(name, self.converted(name, values[0], values[1]), times)
+        return _course(name, values, times)
 
     def instances(
         self,
@@ -194,7 +209,8 @@ class Fmu(_Model):
         self.fmi_version, self.model_name, self.token, self._once = self._loaded.about()
 
     def __repr__(self) -> str:
-        return f"<Fmu {self.model_name}, FMI {self.fmi_version}, {len(self.variables)} variables>"
+        closed = ", closed" if self._loaded.is_closed() else ""
+        return f"<Fmu {self.model_name}, FMI {self.fmi_version}, {len(self.variables)} variables{closed}>"
 
 
 class System(_Model):
@@ -272,8 +288,8 @@ def _array(name: str, values: ArrayLike) -> _Array:
     return np.ascontiguousarray(array, dtype=np.float64).reshape(array.shape)
 
 
-def _course(name: str, values: ArrayLike, times: int) -> float | _Array:
-    array = _array(name, values)
+def _course(name: str, values: Course, times: int) -> float | _Array:
+    array = _array(name, values)  # type: ignore[arg-type]
     if array.ndim == 0:
         return float(array)
     if array.ndim > 2 or array.shape[-1] != times:

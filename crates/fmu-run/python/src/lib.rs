@@ -124,6 +124,15 @@ impl Loaded {
         py.detach(|| drop(model));
     }
 
+    fn is_closed(&self) -> bool {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).is_none()
+    }
+
+    /// Factor and offset: value in the other unit = factor * value + offset.
+    fn display_unit(&self, name: &str, unit: &str) -> PyResult<(f64, f64)> {
+        self.model()?.display_unit(name, unit).map_err(python)
+    }
+
     /// Of an FMU: edition of the standard, name of the model, token, whether there may be one instance only.
     fn about(&self) -> PyResult<(String, String, String, bool)> {
         let Model::Fmu(fmu) = self.model()? else {

@@ -55,7 +55,7 @@ class Run(Mapping[str, Array]):
     def recording(self) -> Recording:
         """The run as if its outputs had been measured."""
         measured = {name: self[name] for name in MEASURED if name in self}
-        return Recording(Path(self.motion.name), self.motion, measured, {name: "" for name in self})
+        return Recording(Path(self.motion.name), self.motion, measured, dict.fromkeys(self, ""))
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write time (s), the motors' angles (rad) and, where given, rates (rad/s), and the outputs (SI) to `path`, a
@@ -116,7 +116,8 @@ def simulate(
         What the motors do, or a recording of it (a CSV file, a DataFrame or a dict of arrays as `prw.read` takes it;
         only its motors matter here), or a run, to be made again. Default: the paper's experiment of Fig. 4.
     parameters
-        Values in SI by name, or the JSON file with them that `prw.identify` writes; others keep the FMU's start values.
+        Values by name, in SI or with a unit as (1.9, "N.m/deg"), or the JSON file with them that `prw.identify` writes; others
+        keep the FMU's start values.
     fmu
         The testbed FMU, of FMI 2.0 or 3.0 (default: the one inside this package, see `default_fmu`).
     outputs
@@ -135,7 +136,7 @@ def simulate(
     course = motion_of(motion)
     names = names_of("outputs", outputs)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
-        given = values_of(parameters, testbed.fmu, testbed.loaded)
+        given = values_of(parameters, testbed.loaded)
         values = testbed.with_starts(given)
         for name in names:
             if name not in testbed.loaded.variables:

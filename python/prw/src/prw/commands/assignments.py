@@ -76,7 +76,7 @@ def reading_options(arguments: argparse.Namespace) -> dict[str, Any]:
     return {
         "units": pairs([arguments.units], "--units"),
         "degrees": arguments.degrees,
-        "names": {header: name for name, header in pairs(arguments.names, "--names").items()},
+        "names": pairs(arguments.names, "--names"),
         "skip": arguments.skip_lines,
         "encoding": arguments.encoding,
     }
@@ -133,9 +133,8 @@ def parameters_of(arguments: argparse.Namespace, fmu: Path | None) -> dict[str, 
     """What these options say."""
     found: dict[str, Any] = {}
     if arguments.parameters is not None:
-        path = existing_fmu(fmu)
-        with loaded(path) as inside:
-            found = values_of(arguments.parameters, path, inside)
+        with loaded(existing_fmu(fmu)) as inside:
+            found = values_of(arguments.parameters, inside)
     for name, text in pairs(arguments.set, "--set").items():
         try:
             found[name] = text == "true" if text in ("true", "false") else float(text)

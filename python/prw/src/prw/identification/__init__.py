@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from prw.identification.fit import Task
     from prw.identification.model import Parameters
     from prw.identification.results import Identification
+    from prw.parameters import Given
     from prw.recording import Recording
     from prw.simulation import Run
 
@@ -41,7 +42,7 @@ def identify(
     *,
     estimate: str | Iterable[str] = DEFAULT_ESTIMATE,
     priors: Mapping[str, float | tuple[float, float]] = {},
-    parameters: Mapping[str, float] = {},
+    parameters: Given = None,
     bounds: Mapping[str, tuple[float, float]] = {},
     noise: Mapping[str, float] = {},
     units: Mapping[str, str] = {},
@@ -72,7 +73,7 @@ def identify(
         What is known beforehand of a parameter, by name: the standard deviation as a fraction of its start value
         (0.1 is 10 %, 1 the most), or (value, fraction). It is then estimated along.
     parameters
-        Other start values, or values of what is not estimated.
+        Other start values, or values of what is not estimated, as for `prw.simulate`.
     bounds
         (least, greatest) by parameter.
     noise
@@ -111,6 +112,7 @@ def identify(
     from prw.identification.results import Identification
     from prw.identification.statistics import certainty
     from prw.identification.verdict import judge
+    from prw.parameters import values_of
     from prw.recording import Recording, read
     from prw.simulation import Run
 
@@ -125,7 +127,8 @@ def identify(
     with Model(fmu) as model, threadpool_limits(1):
         distortions = tuple(Distortion(k, n) for k, names in zip(KINDS, (delay, lag, gain)) for n in names)
         task = replace(
-            task_of(model.known, estimate, priors, parameters, bounds, noise, offsets), distortions=distortions
+            task_of(model.known, estimate, priors, values_of(parameters, model.loaded), bounds, noise, offsets),
+            distortions=distortions,
         )
         measured = [
             each.recording()

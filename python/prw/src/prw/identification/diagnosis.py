@@ -147,7 +147,7 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[tuple[float, str]]
         good = judge(found).fits
         then = "with that, the data fit" if good else "that explains a part of it"
         said_of = "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
-        yield gain, f"{said_of}: {then} (--{kind} {options} estimates it along)"
+        yield gain, f"{said_of}: {then} ({kind} {options} estimates it along)"
 
 
 def _size(distortion: Distortion, value: float, error: float) -> str:
