@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -224,6 +225,28 @@ def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setenv("PRW_FMU", "absent.fmu")
     with pytest.raises(prw.UserError, match=r"absent.fmu: no such FMU, which the environment variable PRW_FMU names"):
         prw.simulate()
+
+
+@pytest.mark.parametrize("rates", [False, True])
+def test_coarse_sampling_is_told(testbed: Path, rates: bool) -> None:
+    """A sine of 3 Hz; the truth is that of 20 kHz."""
+
+    def motion(rate: int, with_rates: bool) -> prw.Motion:
+        time = np.arange(rate + 1) / rate
+        angle, omega = 0.3 * (1 - np.cos(6 * np.pi * time)), 1.8 * np.pi * np.sin(6 * np.pi * time)
+        return prw.Motion(time, np.outer(angle, [1, -1]), np.outer(omega, [1, -1]) if with_rates else None)
+
+    truth = prw.simulate(motion(20_000, True), fmu=testbed)["tau1"]
+    for rate in (100, 200):
+        with pytest.warns(UserWarning, match=rf"tau1 may be off by .* sampled with {rate} Hz: with some .* Hz") as told:
+            run = prw.simulate(motion(rate, rates), fmu=testbed)
+        assert ("give the motors' rates" in str(told[0].message)) != rates and run.notes[-1] in repr(run)
+        error = np.abs(run["tau1"] - truth[:: 20_000 // rate]).max() / np.abs(truth).max()
+        assert 0.9 * error < run.sampling_errors["tau1"] < 1.4 * error
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fine = prw.simulate(motion(1000, rates), fmu=testbed)
+    assert fine.sampling_errors["tau1"] < 0.003 and fine.doubt == ""
 
 
 def test_wrong_motions() -> None:
