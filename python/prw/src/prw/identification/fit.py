@@ -127,10 +127,17 @@ class Comparison:
     and of variance 1, offsets and initial state taken out. offsets: (c,) SI. initial: (6,), x[0] - x[n]."""
 
     def __init__(
-        self, experiment: Experiment, response: Response, noise: Array, offsets: bool, edges: Sequence[int] = ()
+        self,
+        experiment: Experiment,
+        response: Response,
+        noise: Array,
+        offsets: bool,
+        edges: Sequence[int] = (),
+        faults: Sequence[Complex] = (),
     ):
         """noise: (c,) standard deviations, SI. offsets: whether the channels have any. edges: channels that are delayed
-        or lag, of which the first samples come from before the recording."""
+        or lag, of which the first samples come from before the recording. faults: what else may be in the channels by an unknown
+        share, (needed_bins, c) each."""
         self.experiment, self.response = experiment, response
         bins, channels = experiment.bins, len(experiment.channels)
         share = experiment.shares
@@ -151,6 +158,8 @@ class Comparison:
             for k, i in enumerate(edges):
                 early[:, i, 3 * k : 3 * k + 3] = s[:, None] ** np.arange(3)
             columns.insert(1 if offsets else 0, experiment.seen(early))
+        if faults:
+            columns.insert(1 if offsets else 0, experiment.seen(np.stack(faults, axis=2)))
         nuisance = np.concatenate(columns, axis=2)
         difference = np.zeros((bins, channels), dtype=complex)
         if experiment.values is not None:
@@ -278,9 +287,16 @@ class Solution:
 class Fitter:
     """The experiments and the FMU, ready to be compared at any parameters and noise."""
 
-    def __init__(self, model: Model, experiments: Sequence[Experiment], task: Task, noise: Mapping[str, float] = {}):
-        """noise: of all channels, by name, SI; default: a twentieth of their motion."""
-        self.model, self.experiments, self.task = model, experiments, task
+    def __init__(
+        self,
+        model: Model,
+        experiments: Sequence[Experiment],
+        task: Task,
+        noise: Mapping[str, float] = {},
+        faults: Sequence[Sequence[Complex]] = (),
+    ):
+        """noise: of all channels, by name, SI; default: a twentieth of their motion. faults: of each experiment, see Comparison."""
+        self.model, self.experiments, self.task, self.faults = model, experiments, task, faults
         self.channels = tuple(dict.fromkeys(name for e in experiments for name in e.channels))
         columns = {name: self._columns(name) for name in self.channels}
         spread = {n: max([1e-12, *(float(np.nanstd(v)) for v, *_ in c)]) for n, c in columns.items()}
@@ -325,8 +341,9 @@ class Fitter:
                         np.array([self.noise[n] for n in e.channels]),
                         self.task.offsets,
                         self._edges(e),
+                        self.faults[i] if self.faults else (),
                     )
-                    for e, response in zip(self.experiments, self._responses[1])
+                    for i, (e, response) in enumerate(zip(self.experiments, self._responses[1]))
                 ],
             )
         return self._comparisons[1]
@@ -387,10 +404,10 @@ class Fitter:
         found.x = at(found.x)
         return found
 
-    def settle(self, point: Array) -> Array:
-        """Fit and judge the noise by turns, until the noise settles."""
-        for _ in range(ROUNDS):
-            point, before = self.search(point).x, self.noise
+    def settle(self, point: Array, rounds: int = ROUNDS, tolerances: Mapping[str, float] = FINE) -> Array:
+        """Fit and judge the noise by turns, until the noise settles or so many times."""
+        for _ in range(rounds):
+            point, before = self.search(point, tolerances).x, self.noise
             for _ in range(NOISE_ROUNDS):
                 last, self.noise = self.noise, self._judged_noise(point)
                 if self._alike(self.noise, last):
@@ -486,15 +503,24 @@ def _solution(fitter: Fitter, point: Array, misfit: float, rivals: list[tuple[Ar
     )
 
 
-def settled(solution: Solution, distortions: tuple[Distortion, ...]) -> Solution:
-    """The fit once more, with further distortions as unknowns, from where it is and from where it began."""
+def settled(
+    solution: Solution,
+    distortions: tuple[Distortion, ...],
+    faults: Sequence[Sequence[Complex]] = (),
+    rounds: int = ROUNDS,
+) -> Solution:
+    """The fit once more, with further distortions as unknowns or faults of each experiment, from where it is and, if it runs away,
+    from where it began. rounds: of fitting and judging the noise; few are enough to compare."""
     task = replace(solution.task, distortions=(*solution.task.distortions, *distortions))
     places = [np.append(solution.logarithms, np.zeros(len(distortions))), task.first()]
     found = []
     for place in places:
-        fitter = Fitter(solution.fitter.model, solution.fitter.experiments, task, solution.noise)
-        point = fitter.settle(fitter.search(place, COARSE).x)
-        found.append(_solution(fitter, point, 2 * fitter.search(point).cost, [], 1))
+        fitter = Fitter(
+            solution.fitter.model, solution.fitter.experiments, task, solution.noise, faults or solution.fitter.faults
+        )
+        point = fitter.settle(fitter.search(place, COARSE).x, rounds, FINE if rounds == ROUNDS else COARSE)
+        misfit = float(np.sum(fitter.residuals(point) ** 2))
+        found.append(_solution(fitter, point, misfit, [], 1))
         if np.abs(point[: len(task.names)] - task.first()[: len(task.names)]).max() < 1:
             break
     return min(found, key=lambda each: each.unlikeliness)
