@@ -46,6 +46,7 @@ def wrists(count: int, unlike: int) -> VectorEnv:
         reward=lambda before, rate, after: -np.where(envs.steps * STEP > MOVE, (after[:, 1] - GOAL) ** 2, 0),
         step=STEP,
         length=1000,
+        failed_reward=-1e6,
         start={"use_omega": True},
         drawn={name: partial(draw, value, unlike) for name, value in VARIED.items()},
     )

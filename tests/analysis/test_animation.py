@@ -37,7 +37,8 @@ def swing(**changed: np.ndarray | None) -> Run:
 def corners(at: dict[str, float], colour: str) -> np.ndarray:
     """Where the corners of all faces of a colour are, (k, 3)."""
     everything = dict.fromkeys((f"theta{k}" for k in range(1, 7)), 0.0) | {"pitch": 0.0, "roll": 0.0} | at
-    return np.vstack([face.corners for face in Wrist(1.0).faces(everything) if face.colour == to_rgb(colour)])
+    found, colours = Wrist(1.0).faces(everything)
+    return np.reshape(found[(colours == to_rgb(colour)).all(axis=1)], (-1, 3))
 
 
 def pictures_of(path: Path) -> list[np.ndarray]:

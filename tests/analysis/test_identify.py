@@ -135,7 +135,7 @@ def test_equal_motors_say_nothing_of_the_roll_inertia(prw, tmp_path):
         r"an experiment with (opposite motors|one motor alone|motors that move independently|a spectrum made for it)",
         result.stderr,
     )
-    assert "prw excite --measure tau1,tau2" in result.stderr
+    assert "`excite` proposes it for tau1,tau2 as" in result.stderr
     assert not (out / "identified.json").exists() and (out / "report.html").exists()
     assert "do not determine all" in (out / "report.html").read_text(encoding="utf-8")
 

@@ -118,7 +118,7 @@ def test_headers_of_other_tools(tmp_path):
     rows = "".join(f"{k / 100};{k};{2 * k};{k % 7}\n" for k in range(30))
     path = tmp_path / "run.csv"
     path.write_text("type;float\ncapture;2026\n\nX;Motor 1;Motor 2;T [mNm]\n" + rows, encoding="utf-16")
-    names = {"X": "time", "Motor 1": "theta1", "Motor 2": "theta2", "T": "tau1"}
+    names = {"time": "X", "theta1": "Motor 1", "theta2": "Motor 2", "tau1": "T"}
     counted = {"theta1": "rev/10000", "theta2": "rev/10000"}
     measured = read(path, counted, names=names, skip=2)
     np.testing.assert_allclose(measured.theta[29], np.array([29, 58]) * 2 * np.pi / 10000)
@@ -126,8 +126,8 @@ def test_headers_of_other_tools(tmp_path):
     path.write_text(path.read_text(encoding="utf-16"), encoding="latin-1")
     assert read(path, counted, names=names, skip=2, encoding="latin-1").time[-1] == pytest.approx(0.29)
     with pytest.raises(UserError, match="row 4: no column 'Motor 3'; the header has X, Motor 1"):
-        read(path, names={"Motor 3": "theta1"}, skip=2)
+        read(path, names={"theta1": "Motor 3"}, skip=2)
     with pytest.raises(UserError, match="names: tau3 is not known"):
-        read(path, names={"X": "tau3"})
+        read(path, names={"tau3": "X"})
     with pytest.raises(UserError, match="encoding: 'utf-7000' is not known"):
         read(path, encoding="utf-7000")

@@ -103,5 +103,5 @@ def test_an_encoder_s_errors_in_every_period_are_no_motion(counts):
     angle = (1 - np.cos(10 * np.pi * t)) / (10 * np.pi)
     theta = np.round(np.outer(angle, [1, -1]) / quantum + [0.3, 0.1]) * quantum
     assert quantum_of(theta[:, 0]) == pytest.approx(quantum)
-    found = prepare(Recording(Path("run.csv"), Motion(t, theta), {"tau1": np.zeros(len(t))}, {}))
+    found = prepare(Recording(Path("run.csv"), Motion(t, theta), {"tau1": angle}, {}))
     assert 5 < found.band < 8

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+import prw
 from prw.motion import fig4
 from prw.testbed import OUTPUTS, Testbed
 
@@ -96,3 +97,32 @@ def test_wrong_options(prw, tmp_path, arguments, message):
     result = prw("sweep", *arguments)
     assert result.returncode == 1 and message in result.stderr and result.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_sweep_in_which_all_runs_fail(fmu):
+    with pytest.warns(RuntimeWarning, match=r"all 2 runs failed; run 0: .*k1 must not be below"):
+        prw.sweep({"k1": [-1.0, -2.0]}, fmu=fmu)
+
+
+def test_spreads_fixed_values_and_units(fmu):
+    spreads = {"k1": ("uniform", 100.0, 120.0), "k2": ("normal", 50.0, 2.0), "c1": ("lognormal", 0.5, 0.1)}
+    fixed = {"c3": 0.3, "c2": (0.007, "N.m.s/deg")}
+    table = prw.sweep(random=spreads, parameters=fixed, runs=200, fmu=fmu).to_pandas()
+    assert (table["status"] == "done").all() and "c3" not in table
+    assert table["k1"].between(100, 120).all() and 4 < table["k1"].std() < 7
+    assert abs(table["k2"].mean() - 50) < 0.6 and 1.6 < table["k2"].std() < 2.4
+    assert abs(np.log(table["c1"] / 0.5).std() - 0.1) < 0.02
+    run = prw.simulate(parameters={**table.loc[7, ["k1", "k2", "c1"]].to_dict(), **fixed}, fmu=fmu)
+    assert np.abs(run["tau1"]).max() == table.loc[7, "tau1_peak"]
+    assert run.parameters["c2"] == pytest.approx(0.007 * 180 / np.pi)
+    grid = prw.sweep({"k1": ([1.5, 1.9], "N.m/deg")}, fmu=fmu)["k1"].to_numpy()
+    np.testing.assert_allclose(grid, np.array([1.5, 1.9]) * 180 / np.pi)
+    for arguments, words in [
+        ({"random": {"k1": ("even", 1.0, 2.0)}}, r'random: k1 \(.even., 1.0, 2.0\): write \("uniform", low, high\)'),
+        ({"random": {"k1": ("uniform", 2.0, 1.0)}}, "uniform"),
+        ({"grid": {"k1": 1.0}, "parameters": {"k1": 2.0}}, "k1 is in more than one of grid, random and parameters"),
+        ({"grid": {"k1": 1.0}, "parameters": {"k9": 2.0}}, "parameters: k9 is not known"),
+        ({"grid": {"k1": ([1.0], "N")}}, "k1 can be given in N.m/rad or N.m/deg"),
+    ]:
+        with pytest.raises(prw.UserError, match=words):
+            prw.sweep(fmu=fmu, **arguments)

@@ -90,7 +90,10 @@ def test_other_parameters(prw, tmp_path, model):
     assert len({found[name] for name in ("file", "both", "none")}) == 3
     for entry, complaint in [
         ({"k9": 1.0}, "--parameters: k9 is not known; there are J2"),
-        ({"k1": {"value": 1.0, "unit": "N.m/rev"}}, "mine.json: k1 is in N.m/rev; it must be in N.m/rad, N.m/deg"),
+        (
+            {"k1": {"value": 1.0, "unit": "N.m/rev"}},
+            'mine.json: k1 can be given in N.m/rad or N.m/deg, not in "N.m/rev"',
+        ),
         ({"k1": {"unit": "N.m/rad"}}, "mine.json: k1 is None, not a number"),
         ([1.0], "--parameters: mine.json is no JSON file with values by name"),
     ]:

@@ -32,6 +32,7 @@ def task(testbed) -> Task:
         reward=effort,
         step=STEP,
         length=20,
+        failed_reward=-100.0,
         drawn={"k1": (100.0, 140.0), "J3": lambda rng, n: 0.0127 * rng.lognormal(0.0, 0.1, n)},
     )
 
@@ -185,6 +186,7 @@ def test_an_fmu_that_ends_or_tells_no_numbers_ends_the_episode(unruly, mood, slo
         reward=lambda before, action, after: after[:, 0],
         step=0.1,
         length=100,
+        failed_reward=0.0,
         start={"mood": mood},
     )
     with Env(task) as env:
@@ -237,6 +239,7 @@ def test_actions_that_make_inputs(task) -> None:
         ({"observations": ()}, "observations: name at least one"),
         ({"actions": {"theta1": (1, -1)}}, "theta1 needs"),
         ({"length": 0}, "length must be at least 1"),
+        ({"failed_reward": np.nan}, "failed_reward must be a finite number"),
         ({"step": 0.0}, "step above 0"),
         ({"inputs": MOTORS}, "inputs and to_inputs, or neither"),
         ({"start": {"k9": 1.0}}, "k9"),

@@ -141,6 +141,12 @@ def test_one_drops_out_and_the_others_go_on(testbed) -> None:
         assert wrists.errors == {} and np.array_equal(wrists.get("tau1"), np.zeros(3))
         with pytest.raises(fmu_run.FmuError, match="theta1 must be a finite number"):
             alone.set("theta1", np.nan)
+        gone = r"^the instance has dropped out before; reset\(\) or restore\(\) brings .*theta1 must be a finite number"
+        for call in (lambda: alone.step(1e-3), lambda: alone.get("roll"), alone.save):
+            with pytest.raises(fmu_run.FmuError, match=gone):
+                call()
+        alone.reset()
+        assert alone.errors == {} and alone.get("roll")[0] == 0.0
         with pytest.raises(fmu_run.FmuError, match="k1 must not be below"):
             fmu.instances(2, start={"k1": -1.0})
 
@@ -219,9 +225,22 @@ def test_what_does_not_fit_is_named(testbed) -> None:
             (lambda: wrists.get(MOTORS, out=np.zeros((2, 3)).T), "contiguous"),
             (lambda: wrists.get("theta1", out=np.zeros(3, dtype=np.float32)), "float64"),
             (lambda: wrists.step(), "either the size of the step or the time"),
-            (lambda: wrists.step(1e-3, mask=[True]), "1 truth values for 3 instances"),
+            (lambda: wrists.step(1e-3, mask=[True]), "1 Booleans for 3 instances"),
             (lambda: wrists.restore(fmu.instances(3).save()), "states are of other instances"),
-            (lambda: fmu.instances(0), "one instance at least"),
+            (lambda: fmu.instances(0), "count must be at least 1, it is 0"),
+            (lambda: fmu.instances(-3), "count must be at least 1, it is -3"),
+            (lambda: fmu.instances(2, threads=-1), "threads must be at least 1, it is -1"),
+            (lambda: wrists.step(-1e-3), "the size of a step is -0.001 s; it must be above 0 and finite"),
+            (lambda: wrists.step(0.0), "above 0"),
+            (lambda: wrists.step(np.nan), "above 0 and finite"),
+            (lambda: wrists.advance(MOTORS, 0.0, -1e-3, MOTORS), "above 0"),
+            (lambda: wrists.step(to=0.0), "to is 0 s; it must be after .*, and instance 0 is at 0 s"),
+            (lambda: wrists.set("roll", 0.1), "roll is read-only: it is an output"),
+            (lambda: wrists.set(("theta1", "omega5"), 0.1), "omega5 is read-only: it is a local variable"),
+            (
+                lambda: wrists.directional_derivative("roll", "tau1", 1.0),
+                "tau1 cannot be a known; expected an input, a parameter or a continuous state",
+            ),
             (lambda: fmu.instances(2, start={"k1": [1.0, 2.0, 3.0]}), "k1 has 3 start values for 2 instances"),
             (lambda: fmu.instances(interface="both"), "co-simulation"),
             (lambda: wrists.deserialize([b""]), "1 states for 3 instances"),
@@ -230,6 +249,7 @@ def test_what_does_not_fit_is_named(testbed) -> None:
             (lambda: wrists.get_derivatives(), "for Co-Simulation; this is for Model Exchange"),
             (lambda: wrists.set_time(0.0), "for Co-Simulation; this is for Model Exchange"),
             (lambda: fmu.instances(interface="model-exchange").step(1e-3), "only Co-Simulation steps"),
+            (lambda: fmu.instances(interface="model-exchange").set_time(np.inf), "time is inf; it must be finite"),
         ]:
             with pytest.raises(ValueError, match=words):
                 call()
@@ -237,6 +257,30 @@ def test_what_does_not_fit_is_named(testbed) -> None:
         with pytest.raises(ValueError, match="shares memory"):
             wrists.advance(MOTORS, shared, 1e-3, MOTORS, out=shared)
         assert wrists.errors == {}
+
+
+def test_what_an_fmu_does_not_offer_costs_no_instance(unruly) -> None:
+    with fmu_run.Fmu(unruly) as fmu:
+        one = fmu.instances()
+        for call, words in [
+            (one.save, "Unruly cannot save its state"),
+            (lambda: one.deserialize([b"12345678"]), "Unruly cannot deserialize a state"),
+            (lambda: one.directional_derivative("y", "slope", 1.0), "Unruly has no directional derivatives"),
+            (lambda: one.set_input_derivatives("slope", 1.0), "Unruly takes no input derivatives"),
+        ]:
+            with pytest.raises(ValueError, match=words):
+                call()
+        one.step(0.1)
+        assert one.errors == {}
+
+
+def test_more_instances_than_memory(testbed) -> None:
+    with fmu_run.Fmu(testbed) as fmu:
+        for count in (200_000_000, 10**30):
+            with pytest.raises(MemoryError, match="instances need more memory than there is"):
+                fmu.instances(count)
+        with pytest.raises(MemoryError, match="trajectories need more memory"):
+            fmu.run(np.arange(1e6), start={"k1": np.full(10**7, 90.0)}, outputs=["roll"] * 10**6)
 
 
 def test_several_threads_of_python_share_them(testbed) -> None:

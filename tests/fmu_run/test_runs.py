@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+import warnings
 
 import fmpy
 import fmu_run
@@ -174,6 +175,40 @@ def test_frames_and_datasets(testbed, monkeypatch):
         monkeypatch.setitem(sys.modules, package, None)
         with pytest.raises(ImportError, match=f"{package} is missing; install it with: pip install {package}"):
             call()
+
+
+def test_names_that_were_not_asked_for(testbed):
+    with fmu_run.Fmu(testbed) as fmu:
+        runs = fmu.run([0.0, 1e-3], outputs=["roll", "tau1"], every=1, measures=["peak"])
+    for key, words in [
+        ("nix", "no output 'nix' was asked for; there are roll, tau1"),
+        (("roll", "rms"), "no measure 'rms' was asked for; there are peak"),
+    ]:
+        with pytest.raises(KeyError, match=words):
+            runs[key]
+
+
+def test_results_that_are_not_a_number_are_announced(testbed, unruly):
+    time = np.arange(11) / 10
+    with fmu_run.Fmu(testbed) as fmu:
+        ask = {"inputs": {"theta1": np.zeros(11)}, "outputs": ["roll"], "measures": ["peak"], "every": 1}
+        some = fmu.run(time, start={"k1": [100.0, -1.0, 100.0]}, **ask)
+        every = fmu.run(time, start={"k1": -1.0}, **ask)
+        looked = fmu.run(time, start={"k1": -1.0}, **ask)
+    assert looked.errors
+    with fmu_run.Fmu(unruly) as fmu:
+        endless = fmu.run(time, inputs={"slope": np.where(time < 0.35, 1.0, np.nan)}, outputs=["y"])
+    with pytest.warns(RuntimeWarning, match=r"^1 of 3 runs failed, see Runs.errors; run 1: .*k1 must not be below"):
+        some["roll"]
+    with pytest.warns(RuntimeWarning, match=r"^all runs failed"):
+        every.to_pandas()
+    with pytest.warns(RuntimeWarning, match=r"^y is not a number in 1 finished runs, run 0 among them"):
+        endless["y"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for runs in (some, every, looked):
+            runs["roll"], runs["roll", "peak"]
+        endless["y"]
 
 
 def test_many_short_runs_leave_nothing_behind(testbed, tmp_path, monkeypatch):

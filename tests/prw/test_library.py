@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -192,8 +193,8 @@ def test_errors_are_those_of_python_too(monkeypatch: pytest.MonkeyPatch) -> None
         prw.sweep()
 
 
-def test_the_fmu_inside_comes_first(tmp_path: Path) -> None:
-    """Of a package that is installed, whatever stands in the working directory; a clone has its own."""
+def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """PRW_FMU first, then the one in an installed package, then that of the clone; the working directory does not matter."""
     own, here = tmp_path / "site" / "prw", tmp_path / "work" / "target" / "fmu"
     shutil.copytree(Path(prw.__path__[0]), own, ignore=shutil.ignore_patterns("__pycache__"))
     here.mkdir(parents=True)
@@ -203,11 +204,49 @@ def test_the_fmu_inside_comes_first(tmp_path: Path) -> None:
     )
     line = [sys.executable, "-c", program]
     alone = subprocess.run(line, cwd=tmp_path / "work", capture_output=True, text=True)
-    assert "prw_testbed.fmu: no such FMU\n" in alone.stderr
+    assert (
+        "there is no FMU: none is named by fmu= (--fmu in the shell), PRW_FMU is not set, there is no" in alone.stderr
+    )
+    assert (
+        f"{own / 'fmu' / 'prw_testbed.fmu'}, and no" in alone.stderr and "`make fmu` builds in a clone" in alone.stderr
+    )
+    (own / "clone.txt").write_text(str(ROOT))
+    from_clone = program + "; prw.animate(prw.simulate(), 'wrist.html')"
+    assert python(from_clone, tmp_path / "work") == f"{prw.default_fmu()}\n", (
+        "a package that was installed from a clone"
+    )
+    assert (tmp_path / "work" / "wrist.html").stat().st_size > 50_000
     (own / "fmu").mkdir()
     shutil.copy(prw.default_fmu(), own / "fmu")
     assert python(program, tmp_path / "work") == f"{own / 'fmu' / 'prw_testbed.fmu'}\n"
     assert prw.default_fmu() == ROOT / "target" / "fmu" / "prw_testbed.fmu"
+    monkeypatch.setenv("PRW_FMU", str(here / "prw_testbed.fmu"))
+    assert python(program, tmp_path / "work") == f"{here / 'prw_testbed.fmu'}\n"
+    monkeypatch.setenv("PRW_FMU", "absent.fmu")
+    with pytest.raises(prw.UserError, match=r"absent.fmu: no such FMU, which the environment variable PRW_FMU names"):
+        prw.simulate()
+
+
+@pytest.mark.parametrize("rates", [False, True])
+def test_coarse_sampling_is_told(testbed: Path, rates: bool) -> None:
+    """A sine of 3 Hz; the truth is that of 20 kHz."""
+
+    def motion(rate: int, with_rates: bool) -> prw.Motion:
+        time = np.arange(rate + 1) / rate
+        angle, omega = 0.3 * (1 - np.cos(6 * np.pi * time)), 1.8 * np.pi * np.sin(6 * np.pi * time)
+        return prw.Motion(time, np.outer(angle, [1, -1]), np.outer(omega, [1, -1]) if with_rates else None)
+
+    truth = prw.simulate(motion(20_000, True), fmu=testbed)["tau1"]
+    for rate in (100, 200):
+        with pytest.warns(UserWarning, match=rf"tau1 may be off by .* sampled with {rate} Hz: with some .* Hz") as told:
+            run = prw.simulate(motion(rate, rates), fmu=testbed)
+        assert ("give the motors' rates" in str(told[0].message)) != rates and run.notes[-1] in repr(run)
+        error = np.abs(run["tau1"] - truth[:: 20_000 // rate]).max() / np.abs(truth).max()
+        assert 0.9 * error < run.sampling_errors["tau1"] < 1.4 * error
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fine = prw.simulate(motion(1000, rates), fmu=testbed)
+    assert fine.sampling_errors["tau1"] < 0.003 and fine.doubt == ""
 
 
 def test_wrong_motions() -> None:
@@ -270,7 +309,10 @@ def test_wrong_sweeps(testbed: Path) -> None:
         ({}, "nothing varies; give values by parameter"),
         ({"grid": {"k9": [1.0]}}, "k9 is not known; there are J2"),
         ({"grid": {"k1": []}}, "k1: .* are not the values of a parameter"),
-        ({"grid": {"k1": [1.0]}, "random": {"k1": 0.1}}, "k1 is in the grid and random; choose one"),
+        (
+            {"grid": {"k1": [1.0]}, "random": {"k1": 0.1}},
+            "k1 is in more than one of grid, random and parameters; choose one",
+        ),
         ({"grid": {"k1": None}}, "k1: None are not the values of a parameter"),
         ({"random": {"k1": -0.1}}, "random: k1 -0.1 is not a positive number"),
         ({"random": {"k1": None}}, "random: k1 None is not a positive number"),

@@ -29,6 +29,10 @@ pub struct Variable {
     pub max: Option<f64>,
     /// The name of its declared type, if it has one.
     pub declared_type: Option<String>,
+    /// The unit that its values are displayed in, or that of its declared type, if there is one.
+    pub display_unit: Option<String>,
+    /// The name of the continuous state whose derivative with respect to time it is, if it is one.
+    pub derivative_of: Option<String>,
     /// Of an output: the value references of what it depends on without a step; `None` if nothing is said, for then it may be
     /// all inputs (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
     pub depends_on: Option<Vec<u32>>,
@@ -47,6 +51,12 @@ pub struct Offer {
     pub needs_execution_tool: bool,
     /// It takes input derivatives (FMI 2.0, `canInterpolateInputs`).
     pub input_derivatives: bool,
+    /// It calculates directional derivatives (`providesDirectionalDerivative`, in FMI 3.0 with an s at the end).
+    pub directional_derivatives: bool,
+    /// Its state can be saved and restored (`canGetAndSetFMUstate`, in FMI 3.0 with a capital S).
+    pub saves_states: bool,
+    /// Saved states can be serialized (`canSerializeFMUstate`).
+    pub serializes_states: bool,
 }
 
 /// The model description of an FMU, as far as running or wiring it needs it.
@@ -106,6 +116,7 @@ impl Description {
             Standard::Fmi3 => ("instantiationToken", variables_of_fmi3(root)?),
         };
         depend(root, standard, &mut variables, &arrays);
+        differentiate(root, standard, &mut variables, &arrays);
         Ok(Self {
             standard,
             model_name: needed(root, "modelName")?,
@@ -137,6 +148,12 @@ impl Description {
         self.places.get(name).map(|place| &self.variables[*place])
     }
 
+    /// Whether directional derivatives with respect to this variable may exist: it is an input, a parameter or a continuous state.
+    pub(crate) fn is_known(&self, name: &str) -> bool {
+        self.variable(name).is_some_and(Variable::is_settable)
+            || self.variables.iter().any(|of| of.derivative_of.as_deref() == Some(name))
+    }
+
     /// The names and numbers of the items of a variable's enumeration, if it is of one.
     pub fn items(&self, of: &Variable) -> Option<&[(String, String)]> {
         self.enumerations.get(of.declared_type.as_ref()?).map(Vec::as_slice)
@@ -164,6 +181,11 @@ impl Description {
 }
 
 impl Variable {
+    /// Whether a caller may set it after the initialization, as far as its causality tells.
+    pub(crate) fn is_settable(&self) -> bool {
+        matches!(self.causality.as_str(), "input" | "parameter" | "structuralParameter")
+    }
+
     /// What its values are, in a sentence.
     pub(crate) fn what(&self) -> &'static str {
         match self.kind() {
@@ -201,6 +223,10 @@ fn offer(standard: Standard, node: Node) -> Result<Offer, String> {
         once_per_process: is_true("canBeInstantiatedOnlyOncePerProcess"),
         needs_execution_tool: is_true("needsExecutionTool"),
         input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
+        directional_derivatives: is_true("providesDirectionalDerivative")
+            || is_true("providesDirectionalDerivatives"),
+        saves_states: is_true("canGetAndSetFMUstate") || is_true("canGetAndSetFMUState"),
+        serializes_states: is_true("canSerializeFMUstate") || is_true("canSerializeFMUState"),
     })
 }
 
@@ -298,6 +324,32 @@ fn depend(root: Node, standard: Standard, variables: &mut [Variable], arrays: &A
                 outputs.for_each(|output| output.depends_on.clone_from(&known));
             }
         }
+    }
+}
+
+/// The states of derivatives: by places in FMI 2.0, counted from 1, by value references in FMI 3.0.
+fn differentiate(root: Node, standard: Standard, variables: &mut [Variable], arrays: &Arrays) {
+    let names: HashMap<u32, String> = match standard {
+        Standard::Fmi2 => (1..).zip(variables.iter().map(|of| of.name.clone())).collect(),
+        Standard::Fmi3 => variables.iter().map(|of| (of.reference, of.name.clone())).collect(),
+    };
+    let of_type = |node: Node| node.children().find_map(|child| number(child, "derivative"));
+    let mut found = HashMap::new();
+    for (place, node) in elements(root, "ModelVariables").enumerate() {
+        match (standard, number(node, "valueReference")) {
+            (Standard::Fmi2, Some(_)) => {
+                found.extend(of_type(node).map(|state| (variables[place].name.clone(), names.get(&state))));
+            }
+            (Standard::Fmi3, Some(own)) => {
+                let Some(state) = number(node, "derivative") else { continue };
+                let pairs = arrays.elements(own).zip(arrays.elements(state));
+                found.extend(pairs.filter_map(|(own, state)| Some((names.get(&own)?.clone(), names.get(&state)))));
+            }
+            _ => {}
+        }
+    }
+    for variable in variables {
+        variable.derivative_of = found.get(&variable.name).copied().flatten().cloned();
     }
 }
 
@@ -416,6 +468,8 @@ fn variable(node: Node, of_type: Node, base: BaseType, types: &Types) -> Result<
         min: limit("min"),
         max: limit("max"),
         declared_type: declared_type.map(str::to_owned),
+        display_unit: of_both("displayUnit").map(str::to_owned),
+        derivative_of: None,
         depends_on: None,
         description: text("description").unwrap_or_default(),
     })

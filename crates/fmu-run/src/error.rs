@@ -9,15 +9,17 @@ pub enum Error {
     Fmu(String),
     /// What is asked for does not fit the FMU, or itself.
     Request(String),
+    /// The results or the instances need more memory than there is.
+    Memory(String),
     /// The caller has [cancelled](crate::Watch::cancel).
     Cancelled,
 }
 
 impl Error {
-    /// What is asked for fits into no memory.
+    /// The results of a batch fit into no memory.
     pub fn too_much() -> Self {
-        Self::Request(
-            "the courses need more memory than there is; take measures, keep fewer times (every), or split the runs"
+        Self::Memory(
+            "the trajectories need more memory than there is; take measures, keep fewer times (every), or split the runs"
                 .to_owned(),
         )
     }
@@ -30,7 +32,7 @@ pub(crate) fn request<T>(message: String) -> Result<T, Error> {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Fmu(message) | Self::Request(message) => f.write_str(message),
+            Self::Fmu(message) | Self::Request(message) | Self::Memory(message) => f.write_str(message),
             Self::Cancelled => f.write_str("cancelled"),
         }
     }

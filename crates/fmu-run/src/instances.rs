@@ -2,7 +2,7 @@
 
 use crate::description::Description;
 use crate::error::{Error, request};
-use crate::instance::{Continuous, Event, Saved};
+use crate::instance::{Continuous, Event, Instance, Saved};
 use crate::refusal::Refusal;
 use crate::running::Running;
 use crate::selection::{Place, Selection};
@@ -83,7 +83,7 @@ struct Own {
 ///
 /// ```compile_fail,E0382
 /// fn restore_what_is_freed(instances: &mut fmu_run::Instances) {
-///     let states = instances.save();
+///     let states = instances.save().unwrap();
 ///     instances.forget(states);
 ///     instances.restore(&states, None);
 /// }
@@ -104,7 +104,7 @@ impl System {
     pub fn instances(&self, setup: &Setup) -> Result<Instances, Error> {
         self.check_interface(setup.interface)?;
         if setup.count == 0 {
-            return request("there must be one instance at least".to_owned());
+            return request("count must be at least 1".to_owned());
         }
         if setup.count > 1 && self.once_per_process(setup.interface) {
             return request(format!(
@@ -113,14 +113,14 @@ impl System {
             ));
         }
         let start = StartValues::of(self, &[])?;
-        let one = || One { instance: None, error: None, own: Own::default() };
+        let all = empty(setup.count, self.parts().len())?;
         let threads = self.threads(setup.interface, setup.threads)?.min(setup.count);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads - 1);
         let pool = (threads > 1).then(|| pool.build()).transpose();
         let mut instances = Instances {
             system: self.clone(),
             interface: setup.interface,
-            all: std::iter::repeat_with(one).take(setup.count).collect(),
+            all,
             begin: Begin { start, time: setup.start_time, stop_time: setup.stop_time },
             pool: pool.map_err(|error| Error::Fmu(format!("no threads can be made: {error}")))?,
         };
@@ -215,7 +215,8 @@ impl Instances {
     /// Sets variables, from a row for each instance or from one row for all.
     ///
     /// # Errors
-    /// [`Error::Request`] when a whole number or a Boolean cannot have its value, or an output feeds one of them.
+    /// [`Error::Request`] when a variable is read-only, an integer or a Boolean cannot have its value, or an output feeds one of
+    /// them.
     ///
     /// # Panics
     /// When there are other than so many values.
@@ -235,28 +236,45 @@ impl Instances {
     }
 
     /// Steps of Co-Simulation of this size, s.
-    pub fn step(&mut self, size: f64, mask: Mask) {
+    ///
+    /// # Errors
+    /// [`Error::Request`] when the size is not above 0 and finite.
+    pub fn step(&mut self, size: f64, mask: Mask) -> Result<(), Error> {
+        check_size(size)?;
         self.alive(mask, |_, own, instance| {
             instance.step(own.time, size)?;
             own.time += size;
             Ok(())
         });
+        Ok(())
     }
 
     /// Steps of Co-Simulation to this time, s.
-    pub fn step_to(&mut self, time: f64, mask: Mask) {
+    ///
+    /// # Errors
+    /// [`Error::Request`] when the time is not finite, or not after the time of an instance.
+    pub fn step_to(&mut self, time: f64, mask: Mask) -> Result<(), Error> {
+        let steps = |place: usize, one: &One| one.error.is_none() && mask.is_none_or(|mask| mask[place]);
+        let mut ahead = self.all.iter().enumerate().filter(|(place, one)| steps(*place, one));
+        if let Some((place, one)) = ahead.find(|(_, one)| !(time.is_finite() && time > one.own.time)) {
+            return request(format!(
+                "to is {time} s; it must be after the time of each instance, and instance {place} is at {} s",
+                one.own.time
+            ));
+        }
         self.alive(mask, |_, own, instance| {
             instance.step(own.time, time - own.time)?;
             own.time = time;
             Ok(())
         });
+        Ok(())
     }
 
     /// Sets variables, steps and reads others: [`set`](Self::set), [`step`](Self::step) and [`get`](Self::get) in one go of the
     /// threads.
     ///
     /// # Errors
-    /// As [`set`](Self::set).
+    /// As [`set`](Self::set) and [`step`](Self::step).
     ///
     /// # Panics
     /// As they do.
@@ -267,6 +285,7 @@ impl Instances {
         (get, read): (&Selection, &mut [f64]),
     ) -> Result<(), Error> {
         set.check(values)?;
+        check_size(size)?;
         let rows = rows(set.len(), values.len(), self.len());
         self.fill_by_place(get.len(), read, |place, own, instance, row| {
             instance.set(set, rows.of(values, place))?;
@@ -278,7 +297,12 @@ impl Instances {
     }
 
     /// Saves the state of each.
-    pub fn save(&mut self) -> States {
+    ///
+    /// # Errors
+    /// [`Error::Request`] when the FMU does not offer it.
+    pub fn save(&mut self) -> Result<States, Error> {
+        let why = "cannot save its state (canGetAndSetFMUstate is not true)";
+        self.system.check_offer(self.interface, |offer| offer.saves_states, why)?;
         let mut states = vec![None; self.len()];
         let places = std::sync::Mutex::new(&mut states);
         self.alive(None, |place, own, instance| {
@@ -286,7 +310,7 @@ impl Instances {
             places.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[place] = Some(saved);
             Ok(())
         });
-        States(states)
+        Ok(States(states))
     }
 
     /// Back to states that they have saved.
@@ -314,17 +338,24 @@ impl Instances {
         }
     }
 
-    /// A saved state as bytes, which another process can read; `None` if that instance had none, or its FMU refuses.
-    pub fn serialize(&mut self, states: &States, place: usize) -> Option<Vec<u8>> {
-        let (saved, time) = (*states.0.get(place)?)?;
-        let one = self.all.get_mut(place)?;
-        match one.instance.as_mut()?.serialize(saved) {
-            Ok(bytes) => Some([&time.to_le_bytes()[..], &bytes].concat()),
-            Err(refusal) => {
-                one.error = Some(refusal.to_string());
-                None
+    /// Saved states as bytes, which another process can read; `None` if an instance had none, or its FMU refuses.
+    ///
+    /// # Errors
+    /// [`Error::Request`] when the FMU does not offer it.
+    pub fn serialize(&mut self, states: &States) -> Result<Vec<Option<Vec<u8>>>, Error> {
+        let why = "cannot serialize its state (canSerializeFMUstate is not true)";
+        self.system.check_offer(self.interface, |offer| offer.serializes_states, why)?;
+        let bytes = self.all.iter_mut().zip(&states.0).map(|(one, saved)| {
+            let ((saved, time), instance) = (saved.as_ref()?, one.instance.as_mut()?);
+            match instance.serialize(*saved) {
+                Ok(bytes) => Some([&time.to_le_bytes()[..], &bytes].concat()),
+                Err(refusal) => {
+                    one.error = Some(refusal.to_string());
+                    None
+                }
             }
-        }
+        });
+        Ok(bytes.collect())
     }
 
     /// States that were [serialized](Self::serialize), one for each instance, or none.
@@ -335,6 +366,8 @@ impl Instances {
         if bytes.len() != self.len() {
             return request(format!("there are {} states for {} instances", bytes.len(), self.len()));
         }
+        let why = "cannot deserialize a state (canSerializeFMUstate is not true)";
+        self.system.check_offer(self.interface, |offer| offer.serializes_states, why)?;
         let mut states = Vec::new();
         for (place, (one, bytes)) in self.all.iter_mut().zip(bytes).enumerate() {
             let Some(bytes) = bytes else {
@@ -355,7 +388,7 @@ impl Instances {
     /// The derivatives of unknowns in the direction of a seed: a row of the knowns for each instance, or one for all.
     ///
     /// # Errors
-    /// [`Error::Request`] unless all variables are Real.
+    /// [`Error::Request`] unless all variables are Real, and each known is an input, a parameter or a continuous state.
     ///
     /// # Panics
     /// As [`set`](Self::set) and [`get`](Self::get).
@@ -366,6 +399,11 @@ impl Instances {
         values: &mut [f64],
     ) -> Result<(), Error> {
         let (unknown, known) = (self.real(unknowns)?, self.real(knowns)?);
+        let why = "has no directional derivatives (providesDirectionalDerivative is not true)";
+        self.system.check_offer(self.interface, |offer| offer.directional_derivatives, why)?;
+        if let Some(name) = self.description().and_then(|of| knowns.names().iter().find(|name| !of.is_known(name))) {
+            return request(format!("{name} cannot be a known; expected an input, a parameter or a continuous state"));
+        }
         let rows = rows(knowns.len(), seed.len(), self.len());
         self.fill_by_place(unknowns.len(), values, |place, _, instance, row| {
             instance.sole().directional_derivative(unknown, known, rows.of(seed, place), row)
@@ -376,7 +414,7 @@ impl Instances {
     /// In Co-Simulation: time derivatives of inputs, of order 1, which only FMI 2.0 has.
     ///
     /// # Errors
-    /// [`Error::Request`] unless all variables are Real.
+    /// [`Error::Request`] unless all variables are Real inputs of an FMU that takes input derivatives.
     ///
     /// # Panics
     /// As [`set`](Self::set).
@@ -387,6 +425,7 @@ impl Instances {
         mask: Mask,
     ) -> Result<(), Error> {
         let (references, orders) = (self.real(inputs)?, vec![1; inputs.len()]);
+        inputs.names().iter().try_for_each(|name| self.system.takes_input_derivative(name).map(drop))?;
         let rows = rows(inputs.len(), values.len(), self.len());
         self.alive(mask, |place, _, instance| {
             instance.sole().set_input_derivatives(references, &orders, rows.of(values, place))
@@ -411,14 +450,21 @@ impl Instances {
 
     /// In Model Exchange: the time, s, one for each or for all.
     ///
+    /// # Errors
+    /// [`Error::Request`] when a time is not finite.
+    ///
     /// # Panics
     /// When there are other than so many values.
-    pub fn set_time(&mut self, times: &[f64], mask: Mask) {
+    pub fn set_time(&mut self, times: &[f64], mask: Mask) -> Result<(), Error> {
+        if let Some(time) = times.iter().find(|time| !time.is_finite()) {
+            return request(format!("time is {time}; it must be finite"));
+        }
         let rows = rows(1, times.len(), self.len());
         self.alive(mask, |place, own, instance| {
             own.time = rows.of(times, place)[0];
             instance.sole().set_time(own.time)
         });
+        Ok(())
     }
 
     /// In Model Exchange: the continuous states, a row for each or for all.
@@ -558,6 +604,28 @@ impl One {
         }
         true
     }
+}
+
+/// Room for so many instances of a system with so many components, if there is memory for them and for what they point to.
+fn empty(count: usize, parts: usize) -> Result<Vec<One>, Error> {
+    /// At least what a component of an instance takes besides: the allocations of its FMU and of its log.
+    const COMPONENT: usize = 256;
+    let too_many = || Error::Memory(format!("{count} instances need more memory than there is"));
+    let mut all = Vec::new();
+    all.try_reserve_exact(count).map_err(|_| too_many())?;
+    let each = size_of::<Running>() + parts * (size_of::<Instance>() + COMPONENT);
+    let needed = count.checked_mul(each).ok_or_else(too_many)?;
+    // Freed at once; what it shows is that the system would give so much.
+    Vec::<u8>::new().try_reserve_exact(needed).map_err(|_| too_many())?;
+    all.resize_with(count, || One { instance: None, error: None, own: Own::default() });
+    Ok(all)
+}
+
+fn check_size(size: f64) -> Result<(), Error> {
+    if size.is_finite() && size > 0.0 {
+        return Ok(());
+    }
+    request(format!("the size of a step is {size} s; it must be above 0 and finite"))
 }
 
 /// From the start values to the first step.

@@ -14,8 +14,8 @@ pub struct Selection {
     groups: Vec<Group>,
     /// All are Real variables of one component, so that a row goes over as it is.
     is_direct: bool,
-    /// One that is fed by an output, and which.
-    fed: Option<(String, String)>,
+    /// Why a caller cannot set them, if one is read-only or fed by an output.
+    read_only: Option<String>,
 }
 
 /// Those of one component.
@@ -62,8 +62,8 @@ impl Selection {
     pub(crate) fn push(&mut self, name: &str, found: &[Found]) {
         let row = self.names.len();
         self.names.push(name.to_owned());
-        let fed = found.iter().find_map(|found| Some((name.to_owned(), found.fed_by?.to_owned())));
-        self.fed = self.fed.take().or(fed);
+        let read_only = found.iter().find_map(|found| found.check_settable(name).err());
+        self.read_only = self.read_only.take().or(read_only.map(|error| error.to_string()));
         for Place { part, base, reference } in found.iter().copied().map(Place::of) {
             let place = self.groups.iter().position(|group| group.part == part);
             let place = place.unwrap_or_else(|| {
@@ -93,12 +93,12 @@ impl Selection {
     /// Fails unless a caller may set them to the values of these rows.
     #[inline]
     pub(crate) fn check(&self, values: &[f64]) -> Result<(), Error> {
-        if self.is_direct && self.fed.is_none() { Ok(()) } else { self.check_each(values) }
+        if self.is_direct && self.read_only.is_none() { Ok(()) } else { self.check_each(values) }
     }
 
     fn check_each(&self, values: &[f64]) -> Result<(), Error> {
-        if let Some((input, output)) = &self.fed {
-            return request(format!("{input} is fed by {output}, it cannot be set"));
+        if let Some(why) = &self.read_only {
+            return request(why.clone());
         }
         for (base, _, place) in self.groups.iter().flat_map(|group| &group.others) {
             for row in values.chunks_exact(self.len()) {

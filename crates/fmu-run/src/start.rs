@@ -94,7 +94,7 @@ impl<'a> StartValues<'a> {
 
     fn found(system: &System, name: &str, start: Start<'a>) -> Result<Self, Error> {
         let mut all = Self::default();
-        for found in system.find_own(name)? {
+        for found in system.find_startable(name)? {
             let place = Place::of(found);
             let texts: Vec<&str> = match start {
                 Start::Same(number) => {

@@ -17,7 +17,9 @@ Values are in the FMU's units, which `Fmu.variables` tells. FMI 2.0 and 3.0.
 
 from __future__ import annotations
 
+import operator
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -38,6 +40,8 @@ _Array = NDArray[np.float64]
 #: A start value: one for all runs or instances, or one for each. Texts are for texts, and name the items of enumerations; a
 #: number or array with a unit is in that unit, which the FMU must have among its display units.
 Start = ArrayLike | str | Sequence[str] | tuple[ArrayLike, str]
+#: What an input does: values, or values with a unit as for `Start`.
+Course = ArrayLike | tuple[ArrayLike, str]
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,7 @@ class _Model:
         time: ArrayLike,
         *,
         outputs: Sequence[str],
-        inputs: Mapping[str, ArrayLike] | None = None,
+        inputs: Mapping[str, Course] | None = None,
         input_derivatives: Mapping[str, ArrayLike] | None = None,
         start: Mapping[str, Start] | None = None,
         every: int | None = None,
@@ -100,8 +104,8 @@ class _Model:
         time: (times,), the communication points, s. At each the inputs are set, the outputs read, and the step to the next
         is taken.
         outputs: the variables to read, any that are numbers.
-        inputs: by name; (times,) for all runs, (runs, times) for each its own, or a number that stays. Inputs that are not
-        named keep their start values.
+        inputs: by name; (times,) for all runs, (runs, times) for each its own, or a number that stays; with a unit or without,
+        {"theta1": (angles, "deg")}. Inputs that are not named keep their start values.
         input_derivatives: d/dt of inputs, in the same shapes, for FMUs of FMI 2.0 that can interpolate inputs.
         start: start values of parameters, states and so on by name: one for all runs or (runs,) for each its own; numbers,
         texts, items of enumerations, or numbers with a unit, {"k1": (1.9, "N.m/deg")}.
@@ -115,30 +119,41 @@ class _Model:
 
         A run that the FMU refuses or ends does not stop the others, see `Runs.errors` and `Runs.check`. If it is refused
         without a reason, it is made once more with logging on, after all others, for the FMU's words alone. Raises ValueError for what
-        does not fit the FMU or itself, FmuError if the FMU is closed. Ctrl-C stops after the runs under way.
+        does not fit the FMU or itself, FmuError if the FMU is closed. Ctrl-C stops all runs after the step that each is in.
         """
         times = _array("time", time)
         if times.ndim != 1:
             raise ValueError(f"time must have one dimension, it has {times.ndim}")
         names = [outputs] if isinstance(outputs, str) else list(outputs)
         wanted = [measures] if isinstance(measures, str) else list(measures)
-        kept = 1 if every is None and not wanted else every
-        if kept is not None and kept < 1:
-            raise ValueError(f"every must be at least 1, it is {kept}")
+        kept = 1 if every is None and not wanted else _count("every", every)
         courses, measured, errors, notes, starts = self._loaded.run(
             times,
-            [(name, _course(name, values, len(times))) for name, values in (inputs or {}).items()],
+            [(name, self._course(name, values, len(times))) for name, values in (inputs or {}).items()],
             [(name, _course(name, values, len(times))) for name, values in (input_derivatives or {}).items()],
             dict(start or {}),
             names,
             kept,
             wanted,
-            threads,
+            _count("threads", threads),
             read_before_set,
             progress,
         )
         kept_times = times[:: kept or len(times)][: courses.shape[2]]
         return Runs(kept_times, names, courses, wanted, measured, dict(errors), dict(notes), starts)
+
+    def converted(self, name: str, values: ArrayLike, unit: str) -> float | _Array:
+        """Values in another unit, which the FMU must have among its display units, in the unit of the variable. Raises ValueError
+        for a variable or a unit that it does not have."""
+        factor, offset = self._loaded.display_unit(name, unit)
+        found = (_array(name, values) - offset) / factor
+        return float(found) if found.ndim == 0 else found
+
+    def _course(self, name: str, values: Course, times: int) -> float | _Array:
+        """Values in the variable's unit."""
+        if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str):
+            return _course(name, self.converted(name, values[0], values[1]), times)
+        return _course(name, values, times)
 
     def instances(
         self,
@@ -170,10 +185,13 @@ class _Model:
         ------
         ValueError
             For what does not fit the FMU or itself.
+        MemoryError
+            For more instances than there is memory for.
         FmuError
             If the FMU has no such interface, or refuses all of them.
         """
-        return Instances(self._loaded, count, interface, dict(start or {}), start_time, stop_time, threads)
+        asked, threads = _count("count", count) or 1, _count("threads", threads)
+        return Instances(self._loaded, asked, interface, dict(start or {}), start_time, stop_time, threads)
 
 
 class Fmu(_Model):
@@ -191,7 +209,8 @@ class Fmu(_Model):
         self.fmi_version, self.model_name, self.token, self._once = self._loaded.about()
 
     def __repr__(self) -> str:
-        return f"<Fmu {self.model_name}, FMI {self.fmi_version}, {len(self.variables)} variables>"
+        closed = ", closed" if self._loaded.is_closed() else ""
+        return f"<Fmu {self.model_name}, FMI {self.fmi_version}, {len(self.variables)} variables{closed}>"
 
 
 class System(_Model):
@@ -246,6 +265,18 @@ class System(_Model):
         return f"<System {self.name}, {connections} connections, {len(self.variables)} variables>"
 
 
+def _count(name: str, value: int | None) -> int | None:
+    if value is None:
+        return None
+    try:
+        count = operator.index(value)
+    except TypeError:
+        raise ValueError(f"{name} must be an integer, it is {value!r}") from None
+    if count < 1:
+        raise ValueError(f"{name} must be at least 1, it is {count}")
+    return min(count, sys.maxsize)
+
+
 def _array(name: str, values: ArrayLike) -> _Array:
     try:
         array = np.asarray(values)
@@ -257,8 +288,8 @@ def _array(name: str, values: ArrayLike) -> _Array:
     return np.ascontiguousarray(array, dtype=np.float64).reshape(array.shape)
 
 
-def _course(name: str, values: ArrayLike, times: int) -> float | _Array:
-    array = _array(name, values)
+def _course(name: str, values: Course, times: int) -> float | _Array:
+    array = _array(name, values)  # type: ignore[arg-type]
     if array.ndim == 0:
         return float(array)
     if array.ndim > 2 or array.shape[-1] != times:

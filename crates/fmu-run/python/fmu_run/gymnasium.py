@@ -1,7 +1,7 @@
 """Gymnasium's environments of any FMU: one (`Env`), or thousands side by side (`VectorEnv`), both of one `Task`.
 
-    task = Task("model.fmu", actions={"u": (-1, 1)}, observations=("y",), step=0.01, length=500,
-                reward=lambda before, action, after: -abs(after[:, 0]))
+    task = Task(fmu="model.fmu", actions={"u": (-1, 1)}, observations=("y",), step=0.01, length=500,
+                reward=lambda before, action, after: -abs(after[:, 0]), failed_reward=-500.0)
     envs = VectorEnv(task, 1024)
 
 Needs the package gymnasium: pip install gymnasium.
@@ -61,7 +61,8 @@ class Task:
     drawn
         Start values that are drawn anew for each episode: (low, high), or (generator, count) -> (count,).
     failed_reward
-        For a step that the FMU refuses.
+        The reward for a step that the FMU refuses, which also ends the episode: worse than that of all steps that are left, or
+        breaking the FMU pays.
     threads
         See `Fmu.instances`.
     """
@@ -72,6 +73,7 @@ class Task:
     reward: Callable[[_Array, _Array, _Array], ArrayLike]
     step: float
     length: int
+    failed_reward: float
     terminated: Callable[[_Array, _Array, _Array], ArrayLike] | None = None
     inputs: Sequence[str] | None = None
     to_inputs: Callable[[_Array, _Array], ArrayLike] | None = None
@@ -79,7 +81,6 @@ class Task:
     drawn: Mapping[str, tuple[float, float] | Callable[[np.random.Generator, int], ArrayLike]] = field(
         default_factory=dict
     )
-    failed_reward: float = 0.0
     threads: int | None = 1
 
 
@@ -113,6 +114,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
     def __init__(self, task: Task, num_envs: int = 1, *, autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP):
         if task.length < 1 or not task.step > 0:
             raise ValueError(f"length must be at least 1 and step above 0, they are {task.length} and {task.step}")
+        if not np.isfinite(task.failed_reward):
+            raise ValueError(f"failed_reward must be a finite number, it is {task.failed_reward}")
         if (task.inputs is None) != (task.to_inputs is None):
             raise ValueError("give inputs and to_inputs, or neither")
         self.task, self.num_envs = task, num_envs

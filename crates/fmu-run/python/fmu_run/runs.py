@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -24,13 +25,13 @@ class Runs(Mapping[str, _Array]):
     runs["roll"]: (runs, times), what was kept. runs["roll", "peak"]: (runs,). Where a run has not reached a time there is
     not a number. Nor are there measures of a run that the FMU refused; those of one that it ended are of the times until
     then. As a mapping it has the courses by output, none where only measures were asked for; it is true all the same.
+
+    Results that are not a number are announced by a RuntimeWarning when they are first used, those of failed runs only if
+    neither `errors` nor `ok` was read before.
     """
 
     #: (times,), s: the times that were kept.
     time: _Array
-    #: The runs that the FMU refused or ended before the last time, by their numbers, how far they got and why, in the
-    #: words of the FMU ("at 0.5 s: ...", "ended by the FMU at t = 0.5 s: ...").
-    errors: dict[int, str]
     #: What is to be said of finished runs: that the FMU ended at the last time by itself, or refused to be terminated.
     notes: dict[int, str]
     #: (runs,): the start values that were given, by name; those that are texts as they are.
@@ -47,7 +48,8 @@ class Runs(Mapping[str, _Array]):
         notes: dict[int, str],
         start: Mapping[str, float | str | _Array],
     ):
-        self.time, self.errors, self.notes = time, errors, notes
+        self.time, self._errors, self.notes = time, errors, notes
+        self._told, self._checked = not errors, set[str | tuple[str, str]]()
         runs = courses.shape[0]
         self.start = {
             name: value if isinstance(value, str) else np.broadcast_to(value, runs) for name, value in start.items()
@@ -60,6 +62,13 @@ class Runs(Mapping[str, _Array]):
     def count(self) -> int:
         """The number of runs."""
         return int(self._courses.shape[0])
+
+    @property
+    def errors(self) -> dict[int, str]:
+        """The runs that the FMU refused or ended before the last time, by their numbers, how far they got and why, in the words
+        of the FMU ("at 0.5 s: ...", "ended by the FMU at t = 0.5 s: ...")."""
+        self._told = True
+        return self._errors
 
     @property
     def ok(self) -> NDArray[np.bool_]:
@@ -77,12 +86,35 @@ class Runs(Mapping[str, _Array]):
         return self
 
     def __getitem__(self, key: str | tuple[str, str]) -> _Array:
-        if isinstance(key, str):
-            if not self._courses.shape[2]:
-                raise KeyError(f"{key}: no courses were kept; ask for them with every=1, or for [output, measure]")
-            return self._courses[:, self._outputs[key], :]
-        output, measure = key
-        return self._measured[:, self._outputs[output], self._measures[measure]]
+        output, *measure = [key] if isinstance(key, str) else key
+        if output not in self._outputs:
+            raise KeyError(f"no output {output!r} was asked for; there are {', '.join(self._outputs)}")
+        if not measure and not self._courses.shape[2]:
+            raise KeyError(f"{key}: no courses were kept; ask for them with every=1, or for [output, measure]")
+        if measure and measure[0] not in self._measures:
+            known = ", ".join(self._measures) or "none"
+            raise KeyError(f"no measure {measure[0]!r} was asked for; there are {known}")
+        of_output = (self._measured if measure else self._courses)[:, self._outputs[output]]
+        found: _Array = of_output[:, self._measures[measure[0]]] if measure else of_output
+        self._announce(key, found)
+        return found
+
+    def _announce(self, key: str | tuple[str, str], values: _Array) -> None:
+        """Warn about failed runs, unless the caller knows of them, and about other results that are not a number."""
+        lines = []
+        if not self._told:
+            number, why = next(iter(self._errors.items()))
+            count = "all" if len(self._errors) == self.count else f"{len(self._errors)} of {self.count}"
+            lines.append(f"{count} runs failed, see Runs.errors; run {number}: {why}")
+        if key not in self._checked:
+            bad: NDArray[np.bool_] = np.asarray(np.isnan(values).reshape(self.count, -1).any(axis=1))
+            bad[list(self._errors)] = False
+            if bad.any():
+                lines.append(f"{key} is not a number in {bad.sum()} finished runs, run {bad.argmax()} among them")
+        self._told = True
+        self._checked.add(key)
+        for line in lines:
+            warnings.warn(line, RuntimeWarning, stacklevel=3)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._outputs if self._courses.shape[2] else ())
@@ -131,7 +163,7 @@ class Runs(Mapping[str, _Array]):
 
     def __repr__(self) -> str:
         measures = f", measures {', '.join(self._measures)}" if self._measures else ""
-        failed = f", {len(self.errors)} failed" if self.errors else ""
+        failed = f", {len(self._errors)} failed" if self._errors else ""
         return f"<Runs: {self.count} of {', '.join(self._outputs)}, {len(self.time)} times{measures}{failed}>"
 
 

@@ -17,7 +17,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// Arrays are written in place if they are given as `out`.
 ///
 /// An instance that the FMU refuses something drops out: `errors` says why, what is read of it is not a number, the others go
-/// on; `reset` and `restore` bring it back. Where the last one drops out, FmuError is raised.
+/// on; `reset` and `restore` bring it back. The call in which the last one drops out raises FmuError with the reason, as do all
+/// calls after it until one is brought back.
 #[pyclass(frozen, module = "fmu_run")]
 pub struct Instances {
     system: System,
@@ -183,8 +184,8 @@ impl Instances {
         self.only(Interface::CoSimulation)?;
         let mask = self.mask(mask)?;
         match (size, to) {
-            (Some(size), None) => self.with(py, |all| all.step(size, mask.as_deref())),
-            (None, Some(to)) => self.with(py, |all| all.step_to(to, mask.as_deref())),
+            (Some(size), None) => self.attempt(py, |all| all.step(size, mask.as_deref())),
+            (None, Some(to)) => self.attempt(py, |all| all.step_to(to, mask.as_deref())),
             _ => Err(PyValueError::new_err("give either the size of the step or the time to step to")),
         }
     }
@@ -222,7 +223,7 @@ impl Instances {
     #[pyo3(signature = (mask=None, *, start=None))]
     fn reset(&self, py: Python, mask: Given, start: Option<Bound<'_, PyDict>>) -> PyResult<()> {
         let (mask, start) = (self.mask(mask)?, Start::of(&self.system, start.as_ref())?);
-        self.attempt(py, |all| {
+        self.revive(py, |all| {
             all.start_from(&start.values())?;
             all.reset(mask.as_deref());
             Ok(())
@@ -232,7 +233,10 @@ impl Instances {
     /// Save the state of each, with its time.
     fn save(&self, py: Python) -> PyResult<States> {
         let mut states = None;
-        self.with(py, |all| states = Some(all.save()))?;
+        self.attempt(py, |all| {
+            states = Some(all.save()?);
+            Ok(())
+        })?;
         Ok(States { held: Arc::clone(&self.held), states: states.map(Arc::new) })
     }
 
@@ -240,14 +244,20 @@ impl Instances {
     #[pyo3(signature = (states, mask=None))]
     fn restore(&self, py: Python, states: &States, mask: Given) -> PyResult<()> {
         let (mask, states) = (self.mask(mask)?, self.own(states)?);
-        self.with(py, |all| all.restore(&states, mask.as_deref()))
+        self.revive(py, |all| {
+            all.restore(&states, mask.as_deref());
+            Ok(())
+        })
     }
 
     /// Saved states as bytes, for another process: one for each instance, None for those that had dropped out.
     fn serialize<'py>(&self, py: Python<'py>, states: &States) -> PyResult<Vec<Option<Bound<'py, PyBytes>>>> {
         let states = self.own(states)?;
         let mut found = Vec::new();
-        self.with(py, |all| found.extend((0..self.count).map(|place| all.serialize(&states, place))))?;
+        self.attempt(py, |all| {
+            found = all.serialize(&states)?;
+            Ok(())
+        })?;
         Ok(found.into_iter().map(|bytes| bytes.map(|bytes| PyBytes::new(py, &bytes))).collect())
     }
 
@@ -297,6 +307,7 @@ impl Instances {
         values: &Bound<'_, PyAny>,
         mask: Given,
     ) -> PyResult<()> {
+        self.only(Interface::CoSimulation)?;
         self.put(py, variables, values, mask, fmu_run::Instances::set_input_derivatives)
     }
 
@@ -308,6 +319,7 @@ impl Instances {
         variables: &Bound<'py, PyAny>,
         out: Given<'py>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        self.only(Interface::CoSimulation)?;
         let named = self.named(variables)?;
         self.read(py, named.columns(), out, |all, values| {
             all.get_output_derivatives(&named.selection, values)
@@ -319,7 +331,7 @@ impl Instances {
     fn set_time(&self, py: Python, time: &Bound<'_, PyAny>, mask: Given) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
         let (mask, time) = (self.mask(mask)?, self.fitting(None, Numbers::of(time)?)?);
-        self.with(py, |all| all.set_time(time.values(), mask.as_deref()))
+        self.attempt(py, |all| all.set_time(time.values(), mask.as_deref()))
     }
 
     /// Model Exchange: the continuous states, (states,) for all or (n, states).
@@ -328,7 +340,10 @@ impl Instances {
         self.only(Interface::ModelExchange)?;
         let columns = Some(lock(&self.held).continuous(Continuous::States));
         let (mask, states) = (self.mask(mask)?, self.fitting(columns, Numbers::of(states)?)?);
-        self.with(py, |all| all.set_continuous_states(states.values(), mask.as_deref()))
+        self.attempt(py, |all| {
+            all.set_continuous_states(states.values(), mask.as_deref());
+            Ok(())
+        })
     }
 
     /// Model Exchange: the continuous states, (n, states).
@@ -428,7 +443,7 @@ impl Instances {
         if mask.len() == self.count {
             return Ok(Some(mask));
         }
-        let why = format!("the mask has {} truth values for {} instances", mask.len(), self.count);
+        let why = format!("the mask has {} Booleans for {} instances", mask.len(), self.count);
         Err(PyValueError::new_err(why))
     }
 
@@ -480,16 +495,22 @@ impl Instances {
         })
     }
 
-    /// A call without the GIL; raises if no instance is left.
-    fn with(&self, py: Python, body: impl FnOnce(&mut fmu_run::Instances) + Send) -> PyResult<()> {
-        self.attempt(py, |all| {
-            body(all);
-            Ok(())
-        })
+    /// A call without the GIL; raises if no instance is left, before it or after it.
+    fn attempt(
+        &self,
+        py: Python,
+        body: impl FnOnce(&mut fmu_run::Instances) -> Result<(), Error> + Send,
+    ) -> PyResult<()> {
+        if let Some(why) = lock(&self.held).none_left() {
+            let all = if self.count == 1 { "the instance has" } else { "all instances have" };
+            let why = format!("{all} dropped out before; reset() or restore() brings them back (instance 0: {why})");
+            return Err(FmuError::new_err(why));
+        }
+        self.revive(py, body)
     }
 
-    /// The same, of what may not fit the FMU.
-    fn attempt(
+    /// A call that may bring instances back.
+    fn revive(
         &self,
         py: Python,
         body: impl FnOnce(&mut fmu_run::Instances) -> Result<(), Error> + Send,

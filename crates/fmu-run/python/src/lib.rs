@@ -8,7 +8,7 @@ mod start;
 use buffers::{Numbers, Room};
 use fmu_run::{Batch, Course, Error, Fmu, Order, Planned, System, Watch, Wiring};
 use pyo3::create_exception;
-use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use start::Start;
@@ -67,6 +67,7 @@ fn python(error: Error) -> PyErr {
     match error {
         Error::Fmu(message) => FmuError::new_err(message),
         Error::Request(message) => PyValueError::new_err(message),
+        Error::Memory(message) => PyMemoryError::new_err(message),
         Error::Cancelled => PyRuntimeError::new_err("cancelled"),
     }
 }
@@ -123,6 +124,15 @@ impl Loaded {
         py.detach(|| drop(model));
     }
 
+    fn is_closed(&self) -> bool {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).is_none()
+    }
+
+    /// Factor and offset: value in the other unit = factor * value + offset.
+    fn display_unit(&self, name: &str, unit: &str) -> PyResult<(f64, f64)> {
+        self.model()?.display_unit(name, unit).map_err(python)
+    }
+
     /// Of an FMU: edition of the standard, name of the model, token, whether there may be one instance only.
     fn about(&self) -> PyResult<(String, String, String, bool)> {
         let Model::Fmu(fmu) = self.model()? else {
@@ -157,7 +167,7 @@ impl Loaded {
         Ok(self.model()?.variables().map(describe).collect())
     }
 
-    /// Sees to Ctrl-C, which ends the runs after those that are under way, and calls progress(done, runs).
+    /// Sees to Ctrl-C, which ends all runs after their steps, and calls progress(done, runs).
     #[allow(clippy::too_many_arguments, reason = "named where it is called")]
     fn run<'py>(
         &self,

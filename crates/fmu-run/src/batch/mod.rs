@@ -102,8 +102,8 @@ impl System {
     /// Carries out the runs.
     ///
     /// # Errors
-    /// [`Error::Request`] when what is asked for does not fit the FMU or itself, [`Error::Fmu`] when there are no threads,
-    /// [`Error::Cancelled`]. A run that the FMU refuses, or makes no instance for, is no error here, see
+    /// [`Error::Request`] when what is asked for does not fit the FMU or itself, [`Error::Memory`], [`Error::Fmu`] when there are
+    /// no threads, [`Error::Cancelled`]. A run that the FMU refuses, or makes no instance for, is no error here, see
     /// [`Runs::errors`].
     pub fn run(&self, batch: &Batch, watch: &Watch) -> Result<Runs, Error> {
         let planned = self.plan(batch)?;

@@ -4,7 +4,7 @@ use super::{Batch, Course, Measure};
 use crate::error::{Error, request};
 use crate::selection::{Selection, fits};
 use crate::start::StartValues;
-use crate::system::System;
+use crate::system::{System, article};
 use fmi_abi::{BaseType, Interface};
 
 /// A batch after all checks.
@@ -99,8 +99,7 @@ impl<'a> Plan<'a> {
             let variables = system.find_numbers(name)?;
             variables.iter().try_for_each(|found| found.check_own(name))?;
             let of = variables[0].of;
-            let settable = matches!(of.causality.as_str(), "input" | "parameter");
-            if !settable || of.variability.as_deref() == Some("fixed") {
+            if !of.is_settable() || of.variability.as_deref() == Some("fixed") {
                 return request(format!(
                     "{name} is no input but {} {}; give it a start value",
                     article(of.variability.as_deref().unwrap_or(&of.causality)),
@@ -111,22 +110,11 @@ impl<'a> Plan<'a> {
             self.inputs.values.push(self.course(name, of.base, *course)?);
             self.inputs.variables.push(name, &variables);
         }
-        let offer = system.sole().and_then(|fmu| fmu.description.co_simulation.as_ref());
-        if !batch.input_derivatives.is_empty() && offer.is_none_or(|offer| !offer.input_derivatives) {
-            return request(format!(
-                "{} takes no input derivatives (canInterpolateInputs of FMI 2.0)",
-                system.name()
-            ));
-        }
         let mut seen = Vec::new();
         for (name, course) in &batch.input_derivatives {
-            let variables = system.find_numbers(name)?;
-            let of = variables[0].of;
-            if of.base != BaseType::Real || of.causality != "input" {
-                return request(format!("{name} is no Real input; only these have input derivatives"));
-            }
+            let variables = system.takes_input_derivative(name)?;
             once(&mut seen, name, "input derivatives")?;
-            self.derivatives.values.push(self.course(name, of.base, *course)?);
+            self.derivatives.values.push(self.course(name, BaseType::Real, *course)?);
             self.derivatives.variables.push(name, &variables);
         }
         Ok(())
@@ -205,9 +193,4 @@ fn once<'a>(seen: &mut Vec<&'a str>, name: &'a str, where_: &str) -> Result<(), 
     }
     seen.push(name);
     Ok(())
-}
-
-fn article(word: &str) -> String {
-    let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
-    format!("{} {word}", if vowel { "an" } else { "a" })
 }

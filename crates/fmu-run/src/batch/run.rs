@@ -30,7 +30,7 @@ impl Watch {
         self.done.load(Ordering::Relaxed)
     }
 
-    /// No run begins any more.
+    /// No run begins any more, and those under way end after their step.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
@@ -68,13 +68,17 @@ pub(super) fn run(
     let next = || rows.lock().unwrap_or_else(PoisonError::into_inner).next();
     // One instance a thread, whoever takes the next run.
     let found = pool.broadcast(|_| {
-        let mut worker = Worker::new(system, plan, None);
+        let mut worker = Worker::new(system, plan, watch, None);
         let (mut failures, mut notes) = (Vec::new(), Vec::new());
         while !watch.is_cancelled()
             && let Some(row) = next()
         {
             let Row { run, courses, measures } = row;
-            match worker.run(run, plan.time, courses, measures) {
+            let result = worker.run(run, plan.time, courses, measures);
+            if watch.is_cancelled() {
+                break;
+            }
+            match result {
                 Ok(None) => {}
                 Ok(Some(note)) => notes.push((run, note)),
                 Err(failure) => failures.push((run, failure)),
@@ -105,7 +109,7 @@ fn ask(system: &System, plan: &Plan, watch: &Watch, until: time::Instant, failur
     let silent = Mutex::new(failures.iter_mut().filter(|(_, failure)| failure.is_silent));
     let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
     rayon::broadcast(|_| {
-        let mut worker = Worker::new(system, plan, Some(until));
+        let mut worker = Worker::new(system, plan, watch, Some(until));
         let mut courses = vec![0.0; plan.outputs.len() * plan.kept()];
         let mut measures = vec![0.0; plan.outputs.len() * plan.measures.len()];
         while !watch.is_cancelled()
@@ -146,6 +150,7 @@ struct Failure {
 struct Worker<'a> {
     system: &'a System,
     plan: &'a Plan<'a>,
+    watch: &'a Watch,
     /// Logging is on, until then at most.
     logging: Option<time::Instant>,
     instance: Option<Running>,
@@ -191,8 +196,13 @@ impl<'a> Room<'a> {
 }
 
 impl<'a> Worker<'a> {
-    fn new(system: &'a System, plan: &'a Plan<'a>, logging: Option<time::Instant>) -> Self {
-        Self { system, plan, logging, instance: None, room: Room::of(plan) }
+    fn new(
+        system: &'a System,
+        plan: &'a Plan<'a>,
+        watch: &'a Watch,
+        logging: Option<time::Instant>,
+    ) -> Self {
+        Self { system, plan, watch, logging, instance: None, room: Room::of(plan) }
     }
 
     /// A run over these times. There may be something to note of one that reaches the last of them.
@@ -213,7 +223,8 @@ impl<'a> Worker<'a> {
             }
         };
         self.room.begin(plan, run);
-        let stopped = follow(plan, times, &mut instance, &mut self.room, run, courses, self.logging).err();
+        let until = Until { watch: self.watch, logging: self.logging };
+        let stopped = follow(plan, times, &mut instance, &mut self.room, run, courses, &until).err();
         let filled = plan.every.map_or(0, |every| self.room.rows.div_ceil(every));
         for course in courses.chunks_mut(plan.kept().max(1)) {
             course[filled..].fill(f64::NAN);
@@ -252,7 +263,13 @@ impl<'a> Worker<'a> {
 /// The number of the time, after the initialization, and what was refused.
 type Stopped = (Option<usize>, Refusal);
 
-/// From the start values to the last of these times, or until logging has taken too long.
+/// What ends a run before its last time.
+struct Until<'a> {
+    watch: &'a Watch,
+    logging: Option<time::Instant>,
+}
+
+/// From the start values to the last of these times, or until the caller cancels or logging has taken too long.
 fn follow(
     plan: &Plan,
     times: &[f64],
@@ -260,7 +277,7 @@ fn follow(
     room: &mut Room,
     run: usize,
     courses: &mut [f64],
-    logging: Option<time::Instant>,
+    until: &Until,
 ) -> Result<(), Stopped> {
     start(plan, instance, room, run).map_err(|refusal| (None, refusal))?;
     instance.forget_log();
@@ -270,10 +287,13 @@ fn follow(
     let mut ended: Option<Refusal> = None;
     for (k, &time) in times.iter().enumerate() {
         let at = |refusal| (Some(k), refusal);
-        if let Some(until) = logging {
-            // What it says of earlier steps is no reason.
+        if until.watch.is_cancelled() {
+            return Ok(());
+        }
+        if let Some(logged) = until.logging {
+            // Messages about earlier steps are no reason.
             instance.forget_log();
-            if time::Instant::now() > until {
+            if time::Instant::now() > logged {
                 return Ok(());
             }
         }

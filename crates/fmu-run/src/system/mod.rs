@@ -3,7 +3,7 @@
 mod order;
 mod ssp;
 
-use crate::description::{Description, Variable};
+use crate::description::{Description, Offer, Variable};
 use crate::error::{Error, request};
 use crate::fmu::{Fmu, Loaded};
 use crate::selection::Selection;
@@ -220,11 +220,40 @@ impl System {
         Ok(found)
     }
 
-    /// Variables that a caller may set: inputs that are fed by outputs are not his.
-    pub(crate) fn find_own(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
+    /// Variables that take a start value: inputs that are fed by outputs do not.
+    pub(crate) fn find_startable(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         let found = self.find(name)?;
-        found.iter().try_for_each(|found| found.check_own(name))?;
+        found.iter().try_for_each(|found| found.check_start(name))?;
         Ok(found)
+    }
+
+    /// Fails unless it is a Real input of a single FMU that takes derivatives of inputs.
+    pub(crate) fn takes_input_derivative(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
+        let offer = self.sole().and_then(|fmu| fmu.description.co_simulation.as_ref());
+        if offer.is_none_or(|offer| !offer.input_derivatives) {
+            return request(format!(
+                "{} takes no input derivatives (canInterpolateInputs of FMI 2.0)",
+                self.name()
+            ));
+        }
+        let variables = self.find_numbers(name)?;
+        let of = variables[0].of;
+        if of.base != BaseType::Real || of.causality != "input" {
+            return request(format!("{name} is no Real input; only these have input derivatives"));
+        }
+        Ok(variables)
+    }
+
+    /// Fails unless all components offer something by this interface.
+    pub(crate) fn check_offer(
+        &self,
+        interface: Interface,
+        offers: fn(&Offer) -> bool,
+        what: &str,
+    ) -> Result<(), Error> {
+        let descriptions = self.parts().iter().map(|part| &part.fmu.description);
+        let mut lacking = descriptions.filter(|of| !of.offer(interface).is_some_and(offers));
+        lacking.next().map_or(Ok(()), |of| request(format!("{} {what}", of.model_name)))
     }
 }
 
@@ -242,6 +271,30 @@ impl Found<'_> {
             Some(output) => request(format!("{name} is fed by {output}, it cannot be set")),
             None => Ok(()),
         }
+    }
+
+    /// Fails if it cannot be set after the initialization.
+    pub fn check_settable(self, name: &str) -> Result<(), Error> {
+        self.check_own(name)?;
+        if self.of.is_settable() {
+            return Ok(());
+        }
+        let kind = match self.of.causality.as_str() {
+            "output" => "an output".to_owned(),
+            other => format!("{} variable", article(other)),
+        };
+        request(format!("{name} is read-only: it is {kind}"))
+    }
+
+    /// Fails if it takes no start value (section 2.2.7 of FMI 2.0, 2.4.7.5 of FMI 3.0: what has one, or is set from outside).
+    pub fn check_start(self, name: &str) -> Result<(), Error> {
+        self.check_own(name)?;
+        let constant = self.of.variability.as_deref() == Some("constant");
+        if !constant && (self.of.is_settable() || self.of.start.is_some()) {
+            return Ok(());
+        }
+        let kind = if constant { "a constant" } else { "calculated by the FMU and has no start value" };
+        request(format!("{name} is read-only: it is {kind}"))
     }
 
     fn display_unit(self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
@@ -356,20 +409,27 @@ impl Whole {
     }
 }
 
-/// The name that is most like another. The derivative of a variable is seldom meant.
+/// The name that is most like another, if one is. The derivative of a variable is seldom meant.
 fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
+    /// Names less similar than this have little in common.
+    const SIMILAR: f64 = 0.8;
     let wanted = name.to_lowercase();
-    let distance = |known: &String| {
+    let similarity = |known: &String| {
         let known = known.to_lowercase();
-        // Abbreviations, too: "height" for "h".
-        let short = wanted.starts_with(&known) || known.starts_with(&wanted);
+        // The beginning of a name, too, but not its first letter only.
+        let short = known.len().min(wanted.len()) > 1
+            && (wanted.starts_with(&known) || known.starts_with(&wanted));
         let derived = known.starts_with("der(") && !wanted.starts_with("der(");
-        f64::from(u8::from(derived))
-            - 0.1 * f64::from(u8::from(short))
-            - strsim::jaro_winkler(&known, &wanted)
+        0.1 * f64::from(u8::from(short)) - f64::from(u8::from(derived))
+            + strsim::jaro_winkler(&known, &wanted)
     };
-    let names = names.map(|known| (distance(&known), known));
-    names.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
+    let names = names.map(|known| (similarity(&known), known)).filter(|(similarity, _)| *similarity > SIMILAR);
+    names.reduce(|best, other| if other.0 > best.0 { other } else { best }).map(|(_, name)| name)
+}
+
+pub(crate) fn article(word: &str) -> String {
+    let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
+    format!("{} {word}", if vowel { "an" } else { "a" })
 }
 
 fn joined(component: &str, name: &str) -> String {

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from prw.simulation import Run
 
 #: Pictures a second, by the file's suffix; "" is for a notebook.
-RATES = {".gif": 10, ".html": 10, ".mp4": 25, "": 10}
+RATES = {".gif": 10, ".html": 10, ".mp4": 15, "": 10}
 #: What a run is slowed down to or hurried up to, s, when the speed is not given.
 SHORTEST, LONGEST = 6.0, 40.0
 #: More pictures than this take long to draw and to open.

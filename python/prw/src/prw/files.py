@@ -10,15 +10,21 @@ from pathlib import Path
 
 from prw.errors import UserError
 
-#: The scripts of the pages, in the wheel, and where a clone has them.
-_INSIDE = Path(__file__).parent / "page"
-_CLONE = Path(os.path.normpath(_INSIDE / "../../../../.."))
+#: The package, and the clone that it belongs to: the one around it, or the one that it was installed from.
+PACKAGE = Path(__file__).parent
+_INSTALLED_FROM = PACKAGE / "clone.txt"
+CLONE = (
+    Path(_INSTALLED_FROM.read_text(encoding="utf-8"))
+    if _INSTALLED_FROM.is_file()
+    else Path(os.path.normpath(PACKAGE / "../../../.."))
+)
+#: Where a clone has the files of the pages.
 PAGE_FOLDERS = ("crates/fmu-package/page", "docs/fmu-page/wrist")
 
 
 def page_file(name: str) -> Path:
     """A script, style sheet or table of the pages that show the wrist."""
-    places = [_INSIDE / name, *(_CLONE / folder / name for folder in PAGE_FOLDERS)]
+    places = [PACKAGE / "page" / name, *(CLONE / folder / name for folder in PAGE_FOLDERS)]
     return next((path for path in places if path.is_file()), places[0])
 
 

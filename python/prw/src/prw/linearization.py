@@ -40,8 +40,8 @@ def linearize(
     Parameters
     ----------
     parameters
-        Start values of parameters, states and inputs by name, in the FMU's units, or the JSON file with them that
-        `prw.identify` writes; others keep their own. The
+        Start values of parameters, states and inputs by name, in the FMU's units or with a unit as (1.9, "N.m/deg"), or the
+        JSON file with them that `prw.identify` writes; others keep their own. The
         testbed is linear, so of these only parameters matter there. `use_omega` is set to true and `start_at_rest` to
         false where they are not given: A, B, C and D are then those of eq. (11), with the motors' angles and rates as
         independent inputs. With `use_omega` false, Co-Simulation estimates the rates from the angles and ignores
@@ -116,7 +116,7 @@ class Linearizer:
         units, or a file with them); others keep the FMU's own. Raises UserError for a name or a value that the FMU does not take."""
         if self._closed:
             raise UserError(f"{self.fmu}: is closed")
-        given = values_of(parameters, self.fmu, self.loaded)
+        given = values_of(parameters, self.loaded)
         start = {name: value for name, value in INDEPENDENT.items() if self._has_flag(name)}
         start |= {name: self._start(name, value) for name, value in given.items()}
         table = np.zeros((len(self._knowns), len(self._unknowns)))

@@ -11,20 +11,19 @@ from typing import Any
 import fmu_run
 
 from prw.arguments import is_path
-from prw.description import Unit, read_description
 from prw.errors import UserError
 
-#: Values by name, or the path of a JSON file with them.
+#: Values by name, in SI or as (value, unit), or the path of a JSON file with them.
 Given = Mapping[str, Any] | str | os.PathLike[str] | None
 
 
-def values_of(given: Given, fmu: Path, loaded: fmu_run.Fmu) -> dict[str, Any]:
-    """Values by name in the units of the FMU, which is in the file `fmu` and loaded. Raises UserError for a file that
-    cannot be read, or has none of its units."""
+def values_of(given: Given, loaded: fmu_run.Fmu) -> dict[str, Any]:
+    """Values by name in the units of the FMU. Raises UserError for a file that cannot be read, or a unit that the FMU does not
+    have."""
     if given is None:
         return {}
     if isinstance(given, Mapping):
-        return dict(given)
+        return {name: in_own_unit(name, value, loaded) for name, value in given.items()}
     if not is_path(given):
         raise UserError(f"parameters: {given!r} are neither values by name nor a JSON file with them")
     path = Path(given)
@@ -36,21 +35,27 @@ def values_of(given: Given, fmu: Path, loaded: fmu_run.Fmu) -> dict[str, Any]:
         raise UserError(f"parameters: {path} cannot be read ({error.strerror or error})") from None
     except (ValueError, AttributeError):
         raise UserError(f"parameters: {path} is no JSON file with values by name; an FMU is named by `fmu`") from None
-    units = read_description(fmu).units
-    return {name: _value(path, name, entry, loaded.variables.get(name), units) for name, entry in entries.items()}
+    return {name: _value(path, name, entry, loaded) for name, entry in entries.items()}
 
 
-def _value(
-    path: Path, name: str, entry: Any, variable: fmu_run.Variable | None, units: Mapping[str, Unit]
-) -> float | int | bool:
+def in_own_unit(name: str, value: Any, loaded: fmu_run.Fmu) -> Any:
+    """(value, unit) in the unit of the FMU's variable; a value without a unit as it is. Raises UserError."""
+    if not (isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], str)) or name not in loaded.variables:
+        return value
+    try:
+        return loaded.converted(name, *value)
+    except ValueError as error:
+        raise UserError(f"parameters: {error}") from None
+
+
+def _value(path: Path, name: str, entry: Any, loaded: fmu_run.Fmu) -> float | int | bool:
     """A number in the FMU's unit, of one in this unit or of an entry that names another."""
     value, unit = (entry.get("value"), str(entry.get("unit", ""))) if isinstance(entry, dict) else (entry, "")
     if not isinstance(value, (int, float)):
         raise UserError(f"parameters: {path}: {name} is {value!r}, not a number")
-    own = (variable.unit if variable else None) or "1"
-    if variable is None or unit in ("", own):
+    if unit in ("", "1") or name not in loaded.variables:
         return value
-    known = units[own].displayed if own in units else {}
-    if unit not in known:
-        raise UserError(f"parameters: {path}: {name} is in {unit}; it must be in {', '.join([own, *known])}")
-    return value * known[unit]
+    try:
+        return loaded.converted(name, value, unit)  # type: ignore[return-value]
+    except ValueError as error:
+        raise UserError(f"parameters: {path}: {error}") from None

@@ -84,6 +84,11 @@ class Moving(NamedTuple):
     shown: Text
 
 
+class _Animation(FuncAnimation):
+    def __del__(self) -> None:
+        """Not every animation is shown: one that is written to a file is done. matplotlib would warn."""
+
+
 def drawn(
     run: Run, speed: float, count: int, rate: int, target: Path | None, captions: Sequence[tuple[float, str]]
 ) -> FuncAnimation:
@@ -98,7 +103,7 @@ def drawn(
         picture.draw(float(instants[number]))
         return []
 
-    animation = FuncAnimation(picture.figure, draw, frames=len(instants), interval=1000 / rate, init_func=list)
+    animation = _Animation(picture.figure, draw, frames=len(instants), interval=1000 / rate, init_func=list)
     if target is not None:
         with matplotlib.rc_context(STYLE), replacing(target) as temporary:
             pictures = (picture.at(float(instant)) for instant in instants)
@@ -177,8 +182,9 @@ class _Picture:
         if abs(speed - 1) > 1e-3:
             note = f"{speed:.2g} × real time, {note}"
         self.note = self.figure.text(0.98, 0.955, note, fontsize=8, color="0.35", ha="right", va="center")
-        for x, y, words, colour in LABELS:
-            self.figure.text(x, y, words, color=colour, ha="center", va="center")
+        self.labels = [
+            self.figure.text(x, y, words, color=colour, ha="center", va="center") for x, y, words, colour in LABELS
+        ]
 
     def _panel(self, number: int, panel: Panel) -> list[Moving]:
         """Axes with the whole courses, pale, and what is to be moved on them."""
@@ -206,9 +212,9 @@ class _Picture:
         if self.bodies is not None:
             self.bodies.remove()
         # matplotlib's axes have the depth second and the height third: Y, the roll axis, is up.
-        faces = self.wrist.faces(at)
-        corners = [face.corners[:, [0, 2, 1]] * (1, -1, 1) for face in faces]
-        colours = _lit(corners, [face.colour for face in faces])
+        corners, colours = self.wrist.faces(at)
+        corners = corners[:, :, [0, 2, 1]] * (1, -1, 1)
+        colours = _lit(corners, colours)
         self.bodies = Poly3DCollection(corners, facecolors=colours, edgecolors=colours, linewidths=0.8)
         self.scene.add_collection3d(self.bodies, autolim=False)
         passed = [text for begin, text in self.captions if begin <= instant + 1e-9]
@@ -227,7 +233,7 @@ class _Picture:
         """The picture at the instant (s), with its transparency."""
         self.draw(instant)
         canvas: Any = self.figure.canvas
-        moved = [self.bodies, *(artist for one in self.moving for artist in one[2:]), *self.figure.texts]
+        moved = [self.bodies, *(artist for one in self.moving for artist in one[2:]), self.caption]
         if self._ground is None:
             # What never moves, axes and whole courses, takes longest: it is drawn once.
             for artist in moved:
@@ -252,9 +258,9 @@ def _colours() -> Iterator[ArrayLike]:
     yield from ((grey, grey, grey) for grey in (0.0, 0.35, 0.63, 0.9, 1.0))
 
 
-def _lit(faces: Sequence[Array], colours: Sequence[tuple[float, float, float]]) -> Array:
-    """The colours (n, 3) of the faces, corners (k, 3) each, in the light: of the sides which the viewer sees."""
-    first, second, third = np.moveaxis(np.array([corners[:3] for corners in faces]), 1, 0)
+def _lit(corners: Array, colours: Array) -> Array:
+    """The colours (n, 3) of faces (n, k, 3) in the light: of the sides which the viewer sees."""
+    first, second, third = np.moveaxis(corners[:, :3], 1, 0)
     normal = np.cross(second - first, third - second)
     normal *= (np.sign(normal @ VIEWER) / np.maximum(np.linalg.norm(normal, axis=1), 1e-12))[:, None]
     return _bright(colours, np.rint(LEVELS * np.maximum(normal @ LAMP, 0.0))[:, None])

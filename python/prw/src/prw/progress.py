@@ -1,4 +1,4 @@
-"""Progress of long work, on stderr, for those who run a command."""
+"""Progress of long work, on stderr, for those who run a command or work interactively."""
 
 from __future__ import annotations
 
@@ -14,9 +14,14 @@ _wanted = False
 
 
 def show() -> None:
-    """From now on, progress is shown in this process. Commands call this; a library is quiet."""
+    """From now on, progress is shown in this process. Commands call this."""
     global _wanted
     _wanted = True
+
+
+def _is_wanted() -> bool:
+    """Whether somebody waits: a command, a Python prompt or a notebook runs. Programs that import the library get no output."""
+    return _wanted or hasattr(sys, "ps1") or "ipykernel" in sys.modules
 
 
 class Progress:
@@ -38,7 +43,7 @@ class Progress:
     def __call__(self, done: int) -> None:
         """Report that `done` units are done; cheap enough for every thousand rows."""
         now = time.monotonic()
-        if not _wanted or now < self._next:
+        if now < self._next or not _is_wanted():
             return
         self._next = now + (TERMINAL_PERIOD if self._terminal else LOG_PERIOD)
         self._shown = True

@@ -113,7 +113,7 @@ def read(
     degrees
         Columns without a unit are in degrees and degrees per second.
     names
-        What columns are, where they are called otherwise: {"Motor 1": "theta1"}.
+        What columns are called in the file, where that differs: {"theta1": "Motor 1"}.
     skip
         Lines above the header, as dSPACE writes them.
     encoding
@@ -152,10 +152,11 @@ def _read(
     if not is_path(source) and not is_table(source):
         raise UserError(f"{source!r} is no recording: neither a file nor a DataFrame or a dict of arrays")
     path = Path(source) if isinstance(source, (str, os.PathLike)) else IN_MEMORY
-    for what, known in (("units", units or {}), ("names", names.values())):
+    for what, known in (("units", units or {}), ("names", names)):
         for name in known:
             if name not in QUANTITIES:
                 raise UserError(f"{what}: {name} is not known; there are {', '.join(QUANTITIES)}")
+    called = {header: name for name, header in names.items()}
     if skip < 0:
         raise UserError(f"skip {skip}: it must be 0 or more lines")
 
@@ -163,10 +164,10 @@ def _read(
 
     def choose(header: Sequence[str], line: int) -> Sequence[tuple[str, int]]:
         nonlocal found
-        for name in names:
+        for name in called:
             if not any(text.startswith(name) for text in header):
                 raise UserError(f"{path}, row {line}: no column {name!r}; the header has {shown(header)}")
-        found = columns(path, [_renamed(text, names) for text in header], line, measured, units, degrees)
+        found = columns(path, [_renamed(text, called) for text in header], line, measured, units, degrees)
         return found.taken
 
     values = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import os
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,13 +12,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from prw.arguments import Table, names_of
-from prw.channels import QUANTITIES, si_unit
+from prw.channels import MEASURED, QUANTITIES, si_unit
 from prw.errors import UserError
 from prw.extras import need
 from prw.motion import Array, Motion, fig4
 from prw.parameters import Given, values_of
 from prw.recording import Recording, read_motion
 from prw.testbed import OUTPUTS, Testbed
+
+#: A sampling error (fraction of the peak) that is worth a warning; the fewest times that it is estimated from; a peak that is
+#: rounding.
+DOUBTFUL, FEWEST, ROUNDING = 0.01, 8, 1e-12
 
 if TYPE_CHECKING:
     import pandas
@@ -30,11 +35,38 @@ class Run(Mapping[str, Array]):
     """What the testbed did. run["roll"]: (n,), in SI, at the times `time`; so for each of its outputs.
 
     time: (n,) s. motion: what the motors did. parameters: the value of every parameter of the FMU in this run, in SI.
+    sampling_errors: by output the greatest error because the motors are only known at these times, as a fraction of the output's
+    peak; estimated from a run with every other time.
     """
 
-    def __init__(self, motion: Motion, outputs: Mapping[str, Array], parameters: Mapping[str, Value]):
+    def __init__(
+        self,
+        motion: Motion,
+        outputs: Mapping[str, Array],
+        parameters: Mapping[str, Value],
+        sampling_errors: Mapping[str, float] = {},
+    ):
         self.motion, self.parameters = motion, dict(parameters)
-        self._outputs = dict(outputs)
+        self._outputs, self.sampling_errors = dict(outputs), dict(sampling_errors)
+
+    @property
+    def notes(self) -> list[str]:
+        """Lines that the user should read."""
+        return [*self.motion.notes, *([self.doubt] if self.doubt else [])]
+
+    @property
+    def doubt(self) -> str:
+        """A line on the sampling error, if it is large."""
+        worst = max(self.sampling_errors, key=self.sampling_errors.__getitem__, default="")
+        if not worst or (error := self.sampling_errors[worst]) < DOUBTFUL:
+            return ""
+        times = float(np.sqrt(error / DOUBTFUL))
+        rate = (len(self.time) - 1) / float(self.time[-1] - self.time[0])
+        rates = "; give the motors' rates omega1 and omega2, too" if self.motion.omega is None else ""
+        return (
+            f"{worst} may be off by {error:.1%} of its peak, because the motors are sampled with {rate:.3g} Hz: with some "
+            f"{float(f'{times * rate:.2g}'):g} Hz it would be {DOUBTFUL:.0%}{rates}"
+        )
 
     @property
     def time(self) -> Array:
@@ -51,6 +83,11 @@ class Run(Mapping[str, Array]):
 
     def __len__(self) -> int:
         return len(self._outputs)
+
+    def recording(self) -> Recording:
+        """The run as if its outputs had been measured."""
+        measured = {name: self[name] for name in MEASURED if name in self}
+        return Recording(Path(self.motion.name), self.motion, measured, dict.fromkeys(self, ""))
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write time (s), the motors' angles (rad) and, where given, rates (rad/s), and the outputs (SI) to `path`, a
@@ -83,7 +120,8 @@ class Run(Mapping[str, Array]):
         return draw_response(title, self.motion, self, angles)
 
     def __repr__(self) -> str:
-        return f"<Run of {self.motion.name}: {', '.join(self)} at {len(self.time)} times>"
+        notes = "".join(f"\n  note: {note}" for note in self.notes)
+        return f"<Run of {self.motion.name}: {', '.join(self)} at {len(self.time)} times>{notes}"
 
     def _repr_html_(self) -> str:
         rows = [
@@ -93,7 +131,8 @@ class Run(Mapping[str, Array]):
         ]
         heads = "<tr><th>output</th><th>unit</th><th>largest magnitude</th><th>at the end</th></tr>"
         span = f"{len(self.time)} times, {self.time[0]:g} to {self.time[-1]:g} s"
-        return f"<p>{html.escape(self.motion.name)}: {span}</p><table>{heads}{''.join(rows)}</table>"
+        notes = "".join(f"<p>{html.escape(note)}</p>" for note in self.notes)
+        return f"<p>{html.escape(self.motion.name)}: {span}</p><table>{heads}{''.join(rows)}</table>{notes}"
 
 
 def simulate(
@@ -111,7 +150,8 @@ def simulate(
         What the motors do, or a recording of it (a CSV file, a DataFrame or a dict of arrays as `prw.read` takes it;
         only its motors matter here), or a run, to be made again. Default: the paper's experiment of Fig. 4.
     parameters
-        Values in SI by name, or the JSON file with them that `prw.identify` writes; others keep the FMU's start values.
+        Values by name, in SI or with a unit as (1.9, "N.m/deg"), or the JSON file with them that `prw.identify` writes; others
+        keep the FMU's start values.
     fmu
         The testbed FMU, of FMI 2.0 or 3.0 (default: the one inside this package, see `default_fmu`).
     outputs
@@ -126,17 +166,46 @@ def simulate(
     ------
     UserError
         The FMU is missing or refuses a value, a name is unknown or a file unreadable.
+
+    Warns
+    -----
+    UserWarning
+        The motors are sampled so coarsely that an output may be off by more than 1 % of its peak.
     """
+    run = simulated(motion, parameters, fmu=fmu, outputs=outputs)
+    if run.doubt:
+        warnings.warn(run.doubt, UserWarning, stacklevel=2)
+    return run
+
+
+def simulated(
+    motion: Motion | Recording | Run | str | os.PathLike[str] | Table | None = None,
+    parameters: Given = None,
+    *,
+    fmu: str | os.PathLike[str] | None = None,
+    outputs: Sequence[str] = OUTPUTS,
+) -> Run:
+    """As `simulate`, without its warning."""
     course = motion_of(motion)
     names = names_of("outputs", outputs)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
-        given = values_of(parameters, testbed.fmu, testbed.loaded)
+        given = values_of(parameters, testbed.loaded)
         values = testbed.with_starts(given)
         for name in names:
             if name not in testbed.loaded.variables:
                 raise UserError(f"outputs: {name} is not known; there are {', '.join(testbed.loaded.variables)}")
         found = testbed.respond(course, names, given)
-    return Run(course, found, values)
+        coarse = Motion(course.time[::2], course.theta[::2], None if course.omega is None else course.omega[::2])
+        other = testbed.respond(coarse, names, given) if len(coarse.time) >= FEWEST else {}
+    errors = {name: _sampling_error(found[name], other[name]) for name in other}
+    return Run(course, found, values, errors)
+
+
+def _sampling_error(fine: Array, coarse: Array) -> float:
+    """The error of a course (n,), as a fraction of its peak, of which the other one is calculated with every other time: the
+    FMU is of second order, so that the other one has four times the error."""
+    peak = float(np.abs(fine).max())
+    return float(np.abs(coarse - fine[::2]).max()) / 3 / peak if peak > ROUNDING else 0.0
 
 
 def motion_of(source: Motion | Recording | Run | str | os.PathLike[str] | Table | None) -> Motion:

@@ -13,6 +13,7 @@ import numpy as np
 
 from prw.columns import ANGLES, RATES
 from prw.errors import UserError
+from prw.files import CLONE, PACKAGE
 from prw.motion import Array, Motion
 
 OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
@@ -22,26 +23,35 @@ ANGLE_OF = dict(zip(RATES, ANGLES))
 Value = float | int | bool
 #: What a continuous variable is called in FMI 2.0 and in 3.0.
 REAL = ("Real", "Float64")
-_PACKAGE = Path(__file__).parent
-#: The FMU in the wheel, and where `make fmu` leaves it in a clone, to which a package belongs that has none inside.
-INSIDE = _PACKAGE / "fmu" / "prw_testbed.fmu"
-_CLONE = Path(os.path.normpath(_PACKAGE / "../../../.."))
-BUILT = _CLONE / "target" / "fmu" / "prw_testbed.fmu"
+#: The environment variable that names an FMU, the FMU in the wheel, and that which `make fmu` leaves in the clone.
+VARIABLE = "PRW_FMU"
+INSIDE = PACKAGE / "fmu" / "prw_testbed.fmu"
+BUILT = CLONE / "target" / "fmu" / "prw_testbed.fmu"
 
 
 def default_fmu() -> Path:
-    """The testbed FMU that is used if none is named: the one inside the installed package, or, in a clone, the one
-    that `make fmu` builds. For all that runs FMUs: `fmu_run.Fmu(prw.default_fmu())`.
+    """The testbed FMU that is used if none is named: the one that the environment variable PRW_FMU names, else the one inside
+    the installed package, else the one that `make fmu` builds in the clone that the package comes from. For all that runs FMUs:
+    `fmu_run.Fmu(prw.default_fmu())`. Raises UserError where there is none.
     """
-    return INSIDE if INSIDE.is_file() else BUILT
+    if named := os.environ.get(VARIABLE):
+        if not Path(named).is_file():
+            raise UserError(f"{named}: no such FMU, which the environment variable {VARIABLE} names")
+        return Path(named)
+    for path in (INSIDE, BUILT):
+        if path.is_file():
+            return path
+    raise UserError(
+        f"there is no FMU: none is named by fmu= (--fmu in the shell), {VARIABLE} is not set, there is no {INSIDE}, and no {BUILT}, "
+        "which `make fmu` builds in a clone"
+    )
 
 
 def existing_fmu(fmu: str | os.PathLike[str] | None) -> Path:
     """The FMU file `fmu`, or the default one. Raises UserError where there is none."""
     path = default_fmu() if fmu is None else Path(fmu)
     if not path.is_file():
-        hint = "; `make fmu` builds it" if path == BUILT and (_CLONE / "Makefile").is_file() else ""
-        raise UserError(f"{path}: no such FMU{hint}")
+        raise UserError(f"{path}: no such FMU")
     return path
 
 

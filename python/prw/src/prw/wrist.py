@@ -22,6 +22,8 @@ Array = np.ndarray
 PARTS: dict[str, Any] = json.loads(page_file("wrist.json").read_text(encoding="utf-8"))
 COLOURS: dict[str, str] = PARTS["colours"]
 STEEL, DARK, PALE = COLOURS["steel"], COLOURS["dark"], COLOURS["pale"]
+#: Corners that a face has at most: the end of a roller.
+CORNERS = 6
 #: Sides of what is round.
 ROUND: int = PARTS["round"]
 
@@ -38,6 +40,10 @@ class Part(NamedTuple):
 
     faces: Sequence[Face]
     turn: Callable[[Mapping[str, float]], Array]
+
+    def corners(self) -> Array:
+        """Of all faces, (n, CORNERS, 3): where a face has fewer, the last one repeated."""
+        return np.array([face.corners[np.minimum(range(CORNERS), len(face.corners) - 1)] for face in self.faces])
 
 
 def about_x(angle: float) -> Array:
@@ -57,12 +63,13 @@ class Wrist:
 
     def __init__(self, twist: float):
         self.twist = twist
-        self.parts = [*_side(1, -1, BLUE), *_side(2, 1, VERMILION), *_ring(), *_output()]
+        parts = [*_side(1, -1, BLUE), *_side(2, 1, VERMILION), *_ring(), *_output()]
+        self._parts = [(part.turn, part.corners()) for part in parts]
+        self._colours = [face.colour for part in parts for face in part.faces]
 
-    def faces(self, at: Mapping[str, float]) -> list[Face]:
-        """Everything at the angles `at`: theta1 ... theta6, pitch and roll in rad."""
-        turned = [(part.turn(at).T, part.faces) for part in self.parts]
-        faces = [Face(face.corners @ turn, face.colour) for turn, bodies in turned for face in bodies]
+    def faces(self, at: Mapping[str, float]) -> tuple[Array, Array]:
+        """Everything at the angles `at`, theta1 ... theta6, pitch and roll in rad: corners (n, CORNERS, 3), colours (n, 3)."""
+        faces: list[Face] = []
         for side, angles, colour in (
             (-1, ("theta1", "theta3", "theta5"), BLUE),
             (1, ("theta2", "theta4", "theta6"), VERMILION),
@@ -71,7 +78,9 @@ class Wrist:
             for coupling in PARTS["couplings"]:
                 x0, x1 = (side * x for x in coupling["x"])
                 faces += self._coupling(x0, x1, angle[coupling["from"]], angle[coupling["to"]], colour)
-        return faces
+        corners = [corners @ turn(at).T for turn, corners in self._parts]
+        colours = np.array([*self._colours, *(face.colour for face in faces)])
+        return np.concatenate([*corners, Part(faces, _still).corners()]), colours
 
     def _coupling(self, x0: float, x1: float, outer: float, inner: float, colour: str) -> list[Face]:
         """Strands from disc to disc: straight at rest, a twisted bundle under torque."""

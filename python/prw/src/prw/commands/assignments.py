@@ -76,7 +76,7 @@ def reading_options(arguments: argparse.Namespace) -> dict[str, Any]:
     return {
         "units": pairs([arguments.units], "--units"),
         "degrees": arguments.degrees,
-        "names": {header: name for name, header in pairs(arguments.names, "--names").items()},
+        "names": pairs(arguments.names, "--names"),
         "skip": arguments.skip_lines,
         "encoding": arguments.encoding,
     }
@@ -129,12 +129,12 @@ def add_parameter_options(parser: argparse.ArgumentParser, unit: str) -> None:
     )
 
 
-def parameters_of(arguments: argparse.Namespace, fmu: Path) -> dict[str, Any]:
+def parameters_of(arguments: argparse.Namespace, fmu: Path | None) -> dict[str, Any]:
     """What these options say."""
     found: dict[str, Any] = {}
     if arguments.parameters is not None:
         with loaded(existing_fmu(fmu)) as inside:
-            found = values_of(arguments.parameters, fmu, inside)
+            found = values_of(arguments.parameters, inside)
     for name, text in pairs(arguments.set, "--set").items():
         try:
             found[name] = text == "true" if text in ("true", "false") else float(text)

@@ -140,7 +140,7 @@ def run(arguments: argparse.Namespace) -> None:
     )
     found.report(report)
     found.to_json(numbers_)
-    print(found.summary())
+    print(found.summary(shown=True))
     # The parameters only if they are those of the testbed, and never beside another fit's report.
     wrong = not found.fits and not arguments.write_anyway
     if wrong or found.undetermined:

@@ -22,7 +22,7 @@ from prw.errors import MissingPackage, UserError
 from prw.files import replacing
 from prw.motion import fig4
 from prw.recording import read_motion
-from prw.simulation import Run, simulate
+from prw.simulation import Run, simulated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> None:
     with said_of_options(parameters="parameters"):
         given = parameters_of(arguments, arguments.fmu)
     with said_of_options(parameters="set" if arguments.set else "parameters"):
-        response = simulate(motion, given, fmu=arguments.fmu)
+        response = simulated(motion, given, fmu=arguments.fmu)
     response.to_csv(table)
     written, missing = [table], ""
     try:
@@ -132,7 +132,7 @@ def _summary(
         lines.append("            opposite motors turn the wrist about its roll axis only, as the paper says")
     else:
         lines.append(f"at the end  pitch {_degrees(response['pitch'][-1])}, roll {_degrees(response['roll'][-1])}")
-    lines += [f"note        {note}" for note in motion.notes]
+    lines += [f"note        {note}" for note in response.notes]
     lines.append(f"wrote       {', '.join(map(str, written))}")
     if missing:
         lines.append(f"no figure   {missing}")

@@ -90,8 +90,8 @@ def run(arguments: argparse.Namespace) -> None:
         raise UserError("nothing varies; add --grid NAME=LOW:HIGH:N or --random NAME=PERCENT% (see --help)")
     with Testbed(arguments.fmu) as testbed:
         with said_of_options(grid="grid", random="random"):
-            values = layout(grid, random, arguments.runs, arguments.seed, testbed.starts)
-        study = Study(arguments.fmu.read_bytes(), motion, tuple(values), np.column_stack(list(values.values())))
+            values = layout(grid, random, arguments.runs, arguments.seed, testbed)
+        study = Study.of(testbed, motion, values, None)
         with said_of_options(scheduler="scheduler", out="out"):
             swept = carry_out(study, testbed, arguments.out, threads, arguments.scheduler)
     print("\n".join(_summary(arguments, swept, threads)))

@@ -18,13 +18,16 @@ from prw.errors import UserError
 from prw.extras import need
 
 if TYPE_CHECKING:
+    from prw.identification.experiment import Rates
     from prw.identification.fit import Task
     from prw.identification.model import Parameters
     from prw.identification.results import Identification
+    from prw.parameters import Given
     from prw.recording import Recording
+    from prw.simulation import Run
 
     #: What an experiment is read from.
-    Source: TypeAlias = str | os.PathLike[str] | Recording | Table
+    Source: TypeAlias = str | os.PathLike[str] | Recording | Run | Table
 
 #: What is estimated if nothing is said.
 DEFAULT_ESTIMATE = ("k1", "k2", "c1", "c2", "c3")
@@ -39,7 +42,7 @@ def identify(
     *,
     estimate: str | Iterable[str] = DEFAULT_ESTIMATE,
     priors: Mapping[str, float | tuple[float, float]] = {},
-    parameters: Mapping[str, float] = {},
+    parameters: Given = None,
     bounds: Mapping[str, tuple[float, float]] = {},
     noise: Mapping[str, float] = {},
     units: Mapping[str, str] = {},
@@ -63,14 +66,14 @@ def identify(
     Parameters
     ----------
     files
-        CSV tables, DataFrames or dicts of arrays as `prw.read` reads them, or what it returned.
+        CSV tables, DataFrames or dicts of arrays as `prw.read` reads them, what it returned, or what `prw.simulate` returned.
     estimate
         Names of the parameters, or one.
     priors
         What is known beforehand of a parameter, by name: the standard deviation as a fraction of its start value
         (0.1 is 10 %, 1 the most), or (value, fraction). It is then estimated along.
     parameters
-        Other start values, or values of what is not estimated.
+        Other start values, or values of what is not estimated, as for `prw.simulate`.
     bounds
         (least, greatest) by parameter.
     noise
@@ -103,13 +106,15 @@ def identify(
     # They take a while to load.
     from threadpoolctl import threadpool_limits
 
-    from prw.identification.experiment import prepare
+    from prw.identification.experiment import may_be_simulated, prepare
     from prw.identification.fit import Distortion, fit
     from prw.identification.model import Model
     from prw.identification.results import Identification
     from prw.identification.statistics import certainty
     from prw.identification.verdict import judge
+    from prw.parameters import values_of
     from prw.recording import Recording, read
+    from prw.simulation import Run
 
     starts = counted("starts", starts)
     header: Any = {"names": names, "skip": skip, "encoding": encoding}
@@ -122,15 +127,35 @@ def identify(
     with Model(fmu) as model, threadpool_limits(1):
         distortions = tuple(Distortion(k, n) for k, names in zip(KINDS, (delay, lag, gain)) for n in names)
         task = replace(
-            task_of(model.known, estimate, priors, parameters, bounds, noise, offsets), distortions=distortions
+            task_of(model.known, estimate, priors, values_of(parameters, model.loaded), bounds, noise, offsets),
+            distortions=distortions,
         )
-        measured = [each if isinstance(each, Recording) else read(each, units, degrees, **header) for each in several]
+        measured = [
+            each.recording()
+            if isinstance(each, Run)
+            else each
+            if isinstance(each, Recording)
+            else read(each, units, degrees, **header)
+            for each in several
+        ]
         channels = dict.fromkeys(name for m in measured for name in m.measured)
         for what, named in (("noise", noise), ("delay", delay), ("lag", lag), ("gain", gain)):
             _check(what, named, channels)
-        experiments = [prepare(each, quantum) for each in measured]
+        rates: list[Rates] = [
+            "motors" if not isinstance(each, Run) else "angles" if each.motion.omega is None else "inputs"
+            for each in several
+        ]
+        experiments = [prepare(each, quantum, how) for each, how in zip(measured, rates)]
         solution = fit(model, experiments, task, starts, seed)
         verdict = judge(solution)
+        exact = [may_be_simulated(experiment) for experiment in experiments]
+        ways: tuple[Rates, ...] = ("inputs", "angles") if any(exact) else ()
+        for way in ways:
+            if not verdict.fits:
+                again = [prepare(m, quantum, way) if x else e for m, x, e in zip(measured, exact, experiments)]
+                other = fit(model, again, task, starts, seed)
+                if (better := judge(other)).fits:
+                    experiments, solution, verdict = again, other, better
         sure = certainty(solution, verdict.widening)
         hints: list[str] = []
         diagnosis: list[str] = []

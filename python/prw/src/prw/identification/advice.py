@@ -55,7 +55,7 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
             said = SAID.get(pattern, "a spectrum made for it")
             sentences.append(
                 f"an experiment with {said} (worst standard error then {error:.1%}; "
-                f"`prw excite --measure {','.join(channels)}` writes its motion as {name}.csv)"
+                f"`excite` proposes it for {','.join(channels)} as {name})"
             )
     trials = []
     for name, pair in SENSORS.items():

@@ -3,8 +3,10 @@ channels may be late, lag, or have another gain."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,8 +14,9 @@ from prw.channels import QUANTITIES
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Distortion, Fitter, Solution, settled
 from prw.identification.statistics import covariance_of, information_of
-from prw.identification.verdict import CLEAR, PAIRS, Verdict, groups, judge, named
+from prw.identification.verdict import CLEAR, PAIRS, Verdict, groups, judge, named, single_faults
 from prw.motion import Array
+from prw.progress import Progress
 
 #: Gains that a slip with units makes, give or take TOLERANCE (a factor); what a channel is then.
 SLIPS = {57.3: "in degrees, not radians", 1 / 57.3: "in radians, not degrees", 1000.0: "in thousandths of its unit"}
@@ -22,10 +25,10 @@ TOLERANCE = 1.7
 ALIKE, UNLIKE = 0.9, 0.7
 #: Values at an end of a channel's range that come one after another so often are no chance, s; so long at rest: stuck.
 FLAT, FLATS, STUCK = 4, 3, 0.25
-#: So many of the sets of channels that promise most are fitted.
-TRIED = 5
-#: A fault that explains this share of what the best explains is named as well.
-SHARE = 0.6
+#: So many of the sets of channels that promise most are fitted, with so many rounds of judging the noise.
+TRIED, ROUNDS = 2, 2
+#: A fault that explains this share of what the best explains is named as well; and one that explains this share in addition.
+SHARE, SECOND = 0.6, 0.05
 
 
 def diagnose(solution: Solution, verdict: Verdict) -> list[str]:
@@ -33,15 +36,48 @@ def diagnose(solution: Solution, verdict: Verdict) -> list[str]:
     found = [text for i, e in enumerate(solution.fitter.experiments) for text in _looks(solution, i, e)]
     if found:
         return list(dict.fromkeys(found))
-    trials = [(gain, text) for gain, text in _refits(solution, verdict)]
-    for fault in verdict.faults:
-        if fault.clear > CLEAR and fault.signs:
-            size = f"{fault.size:.2g} +- {fault.error:.1g} {fault.unit}"
-            trials.append(
-                (fault.gain, f"{fault.name} of {size} would explain it: the residual follows the sign of a rate")
-            )
-    trials.sort(key=lambda trial: -trial[0])
-    return [text for gain, text in trials[:2] if gain > SHARE * trials[0][0]]
+    causes = _causes(solution, verdict)
+    said = [cause.text for cause in causes[:2] if cause.gain > SHARE * causes[0].gain]
+    if causes and not causes[0].explains:
+        # What is left when the first is known.
+        after = causes[0].after()
+        left = judge(after)
+        others = [] if left.fits else _causes(after, left)
+        others = [c for c in others if c.name != causes[0].name and c.gain > SECOND * causes[0].gain]
+        said = [causes[0].text, *(f"besides, {other.text}" for other in others[:1])] if others else said
+    return said
+
+
+class _Cause(NamedTuple):
+    """gain: rise of twice the log likelihood. name: of the fault. text: what it is. explains: whether nothing is left then. after:
+    the fit with it."""
+
+    gain: float
+    name: str
+    text: str
+    explains: bool
+    after: Callable[[], Solution]
+
+
+def _causes(solution: Solution, verdict: Verdict) -> list[_Cause]:
+    """What may be wrong, what explains most first."""
+    causes = list(_refits(solution, verdict))
+    signs = [fault for fault in verdict.faults if fault.clear > CLEAR and fault.signs]
+    for fault in sorted(signs, key=lambda fault: -fault.gain)[:1]:
+        size = f"{fault.size:.2g} +- {fault.error:.1g} {fault.unit}"
+        text = f"{fault.name} of {size} would explain it: the residual follows the sign of a rate"
+        causes.append(_Cause(fault.gain, fault.name, text, False, partial(_with_fault, solution, fault.name)))
+    return sorted(causes, key=lambda cause: -cause.gain)
+
+
+def _with_fault(solution: Solution, name: str) -> Solution:
+    """The fit with this fault, of unknown size, in all experiments; once more with the rates that it then has."""
+    found = solution
+    for _ in range(2):
+        pairs = zip(found.fitter.experiments, found.comparisons)
+        faults = [[column for n, _, column in single_faults(found, *pair) if n == name] for pair in pairs]
+        found = settled(found, (), faults, ROUNDS)
+    return found
 
 
 def _looks(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
@@ -105,8 +141,8 @@ def _flat(name: str, time: Array, column: Array) -> Iterator[str]:
         yield f"{name} is stuck from {time[first[longest]]:.4g} to {time[last[longest]]:.4g} s, at {column[first[longest]]:.4g} (SI)"
 
 
-def _refits(solution: Solution, verdict: Verdict) -> Iterator[tuple[float, str]]:
-    """Rise of twice the log likelihood, and what it would mean, with distortions of single channels, pairs and all."""
+def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
+    """Distortions of single channels, pairs and all."""
     channels = solution.fitter.channels
     clear = {fault.name: fault for fault in verdict.faults}
     trials = []
@@ -125,11 +161,13 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[tuple[float, str]]
     tried = [t for kind in ("delay", "lag", "gain") for t in [t for t in trials if t[1] == kind][:TRIED]]
     best = -np.inf
     results = []
-    for _, kind, group, new in tried:
-        found = settled(solution, new)
-        gain = solution.unlikeliness - found.unlikeliness - 12 * len(group)
-        results.append((gain, kind, group, found))
-        best = max(best, gain)
+    with Progress("looking for what is wrong", len(tried)) as progress:
+        for done, (_, kind, group, new) in enumerate(tried):
+            progress(done)
+            found = settled(solution, new, rounds=ROUNDS)
+            gain = solution.unlikeliness - found.unlikeliness - 12 * len(group)
+            results.append((gain, kind, group, found))
+            best = max(best, gain)
     results.sort(key=lambda result: -result[0])
     said: set[str] = set()
     for gain, kind, group, found in results:
@@ -147,7 +185,10 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[tuple[float, str]]
         good = judge(found).fits
         then = "with that, the data fit" if good else "that explains a part of it"
         said_of = "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
-        yield gain, f"{said_of}: {then} (--{kind} {options} estimates it along)"
+        text = f"{said_of}: {then} ({kind} {options} estimates it along)"
+        yield _Cause(
+            gain, kind, text, good, partial(settled, solution, found.task.distortions[-len(group) :], rounds=ROUNDS)
+        )
 
 
 def _size(distortion: Distortion, value: float, error: float) -> str:

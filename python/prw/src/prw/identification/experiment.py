@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
@@ -27,6 +28,17 @@ CLEARLY_MOVING, MARGIN = 10.0, 1.15
 NEIGHBOURS = 9
 #: Less power than this share of the strongest is none.
 ROUNDING = 1e-10
+#: No line of a spectrum is known to less than this fraction: doubles, CSV digits and the linear model end somewhere. And no value
+#: in SI to less than this.
+FINEST, LEAST = 1e-7, 1e-15
+#: A channel whose values differ by no more than this fraction of its usual noise does not move.
+STILL = 1e-6
+#: How the motors move between the rows of a recording: smoothly, as motors do; or as in a simulation of the FMU in Co-Simulation
+#: with a step from row to row, with the motors' rates as inputs, or with rates that the FMU estimates from the angles.
+Rates = Literal["motors", "inputs", "angles"]
+#: Motors may be those of a simulation if their samples have no more noise than this fraction of their motion, and no coarser steps
+#: than that; samples with next to no noise are taken as they are.
+EXACT, DIGITS, ROUNDED = 1e-3, 1e-4, 1e-6
 #: Draws of encoders' errors, and how many frequencies further a line of theirs still counts.
 DRAWS, FURTHEST = 64, 100
 #: Times are even if none is off by more than this fraction of a step.
@@ -42,7 +54,9 @@ class Experiment:
     only planned. between: (s, n), interpolation from `time` to `sampled`, or None where both are the same. samplers: the
     same for each channel, with empty rows where it has no value, or None where nothing is missing either. bins: number
     of frequencies that are compared, from 0. motor_errors: (d, bins, 2) rad, spectra of d draws of the errors of the
-    motors' samples. channel_errors: (d, bins, c), of what encoders' steps add to the channels. paths: of the two motors, or None where they are known exactly. notes: lines for the user."""
+    motors' samples. channel_errors: (d, bins, c), of what encoders' steps add to the channels. paths: of the two motors, or None where they are known exactly. notes: lines for the user.
+    jumps: (n, 2) rad where the FMU simulated the recording, else None: how far each angle is from where its rate led; the FMU adds
+    them to the states at the start of the next step."""
 
     name: str
     time: Array
@@ -58,6 +72,7 @@ class Experiment:
     channel_errors: Complex
     paths: tuple[Path, Path] | None = None
     notes: tuple[str, ...] = ()
+    jumps: Array | None = None
 
     @property
     def step(self) -> float:
@@ -81,8 +96,18 @@ class Experiment:
 
     @cached_property
     def motors(self) -> Complex:
-        """Spectra of the motors' angles and rates (all_bins, 4)."""
-        return spectra(np.hstack([self.theta, self.omega]))
+        """Spectra of the motors' angles and rates (all_bins, 4), and of `jumps` (all_bins, 6) where there are any."""
+        return spectra(np.hstack([self.theta, self.omega, *([] if self.jumps is None else [self.jumps])]))
+
+    @cached_property
+    def finest(self) -> Array:
+        """The least noise (c,) that the channels can have, SI: numbers and the path between samples are this exact. No line of a
+        spectrum is known better."""
+        turn = 2 * np.pi * np.arange(1, self.bins) / len(self.time)
+        # Twelve times the error of the cubic between two samples; more where rows are uneven.
+        between = turn**4 * (0.0 if self.jumps is not None else 1 / 60 if self.between is None else 1 / 10)
+        found: Array = np.max((FINEST + between)[:, None] * np.abs(self.measured[1:]), axis=0, initial=LEAST)
+        return found
 
     @cached_property
     def measured(self) -> Complex:
@@ -132,13 +157,13 @@ def spectra(courses: Array) -> Complex:
     return np.fft.rfft(courses, axis=0, norm="ortho")
 
 
-def prepare(recording: Recording, quantum: float = 0.0) -> Experiment:
+def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motors") -> Experiment:
     """Find the motors' paths in `recording`, and how far their samples and the other encoders err.
 
-    quantum: of the motor angles in rad, where it is known to be coarser than it looks. Raises UserError where nothing
-    was measured, or too little of something."""
-    sampled, omega, channels = recording.time, recording.omega, tuple(recording.measured)
-    values, notes = _measured(recording)
+    quantum: of the motor angles in rad, where it is known to be coarser than it looks. rates_of: see `Rates`.
+    Raises UserError where nothing was measured, or too little of something."""
+    sampled, omega = recording.time, recording.omega
+    channels, values, notes = _measured(recording)
     paths = [smooth(sampled, recording.theta[:, i], None if omega is None else omega[:, i], quantum) for i in (0, 1)]
     spacing = (sampled[-1] - sampled[0]) / (len(sampled) - 1)
     even = np.abs(sampled - (sampled[0] + spacing * np.arange(len(sampled)))).max() < EVEN * spacing
@@ -149,7 +174,17 @@ def prepare(recording: Recording, quantum: float = 0.0) -> Experiment:
         time = sampled[0] + spacing * np.arange(max(int((sampled[-1] - sampled[0]) / spacing + 1e-9) + 1, 5))
     inside = np.clip(time, sampled[0], sampled[-1])
     theta = np.column_stack([path.angle(inside) for path in paths])
+    rates = np.column_stack([path.angle.derivative()(inside) for path in paths])
     errors = [_drawn(path, inside, sampled) for path in paths]
+    jumps = None
+    if rates_of != "motors" and even:
+        if all(path.noise <= ROUNDED * max(np.ptp(path.quiet), LEAST) for path in paths):
+            theta, rates = recording.theta, rates if omega is None else omega
+            errors = [np.zeros((1, len(time)))] * 2
+        if rates_of == "angles":
+            rates = _estimated(theta, spacing)
+        notes += ("it is taken for a simulation of the FMU, with a step from row to row",)
+        jumps = np.vstack([np.zeros((1, 2)), theta[1:] - theta[:-1] - spacing * rates[:-1]])
     bins = max(_clear(t, e, path.rate_noise, spacing) for t, e, path in zip(theta.T, errors, paths))
     bins = min(max(bins, FEWEST), len(time) // 2 + 1)
     channel_errors = np.zeros((DRAWS, bins, len(channels)), dtype=np.complex128)
@@ -163,7 +198,7 @@ def prepare(recording: Recording, quantum: float = 0.0) -> Experiment:
         recording.name,
         time,
         theta,
-        np.column_stack([path.angle.derivative()(inside) for path in paths]),
+        rates,
         channels,
         sampled,
         values,
@@ -174,11 +209,32 @@ def prepare(recording: Recording, quantum: float = 0.0) -> Experiment:
         channel_errors,
         (paths[0], paths[1]),
         notes,
+        jumps,
     )
 
 
-def _measured(recording: Recording) -> tuple[Array, tuple[str, ...]]:
-    """What was measured (s, c), and what should be said of it."""
+def may_be_simulated(experiment: Experiment) -> bool:
+    """Whether the motors' samples are as exact as those of a simulation."""
+    paths = experiment.paths or ()
+    exact = [
+        path.noise <= EXACT * reach and path.quantum <= DIGITS * reach
+        for path in paths
+        for reach in [max(float(np.ptp(path.quiet)), LEAST)]
+    ]
+    return all(exact) and experiment.between is None and experiment.jumps is None
+
+
+def _estimated(theta: Array, step: float) -> Array:
+    """The rates (n, 2) that the FMU estimates from the angles (n, 2): a backward difference of second order, of first order in the
+    second row, 0 in the first."""
+    rates = np.zeros_like(theta)
+    rates[1:2] = (theta[1:2] - theta[:1]) / step
+    rates[2:] = (1.5 * theta[2:] - 2 * theta[1:-1] + 0.5 * theta[:-2]) / step
+    return rates
+
+
+def _measured(recording: Recording) -> tuple[tuple[str, ...], Array, tuple[str, ...]]:
+    """The channels that change, their values (s, c), and notes for the user."""
     if not recording.measured:
         raise UserError(
             f"{recording.source}: nothing measured; at least one column of {', '.join(MEASURED)} is needed, "
@@ -186,15 +242,20 @@ def _measured(recording: Recording) -> tuple[Array, tuple[str, ...]]:
         )
     # Rates are found by smoothing here, so the advice that a simulation gives on them is no news.
     notes = [note for note in recording.notes if "at rest" not in note and not note.startswith("no omega")]
+    moving = {}
     for name, column in recording.measured.items():
         count = int(np.isfinite(column).sum())
         if count < FEWEST_VALUES:
             raise UserError(
                 f"{recording.source}, column {name}: {count} values; at least {FEWEST_VALUES} are needed to fit anything"
             )
-        if np.nanmax(column) == np.nanmin(column):
-            notes.append(f"{name} never changes; is its sensor connected?")
-    return np.column_stack(list(recording.measured.values())), tuple(notes)
+        if np.nanmax(column) - np.nanmin(column) > STILL * MEASURED[name].noise:
+            moving[name] = column
+        else:
+            notes.append(f"{name} never changes and is left out; if it should, is its sensor connected?")
+    if not moving:
+        raise UserError(f"{recording.source}: nothing that was measured changes; is the testbed at rest?")
+    return tuple(moving), np.column_stack(list(moving.values())), tuple(notes)
 
 
 def planned(motion: Motion, channels: Sequence[str]) -> Experiment:

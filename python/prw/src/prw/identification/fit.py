@@ -36,8 +36,6 @@ UNSEEN = 1e-9
 #: Rounds of fitting and judging the noise, and the change at which they end; and of the latter alone.
 ROUNDS, SETTLED = 12, 0.003
 NOISE_ROUNDS = 30
-#: A channel cannot be more exact than this fraction of its range: doubles and CSV digits end somewhere.
-FINEST = 1e-9
 #: A search starts at least this far inside its bounds.
 INSIDE = 1e-6
 #: When a search ends.
@@ -129,10 +127,17 @@ class Comparison:
     and of variance 1, offsets and initial state taken out. offsets: (c,) SI. initial: (6,), x[0] - x[n]."""
 
     def __init__(
-        self, experiment: Experiment, response: Response, noise: Array, offsets: bool, edges: Sequence[int] = ()
+        self,
+        experiment: Experiment,
+        response: Response,
+        noise: Array,
+        offsets: bool,
+        edges: Sequence[int] = (),
+        faults: Sequence[Complex] = (),
     ):
         """noise: (c,) standard deviations, SI. offsets: whether the channels have any. edges: channels that are delayed
-        or lag, of which the first samples come from before the recording."""
+        or lag, of which the first samples come from before the recording. faults: what else may be in the channels by an unknown
+        share, (needed_bins, c) each."""
         self.experiment, self.response = experiment, response
         bins, channels = experiment.bins, len(experiment.channels)
         share = experiment.shares
@@ -153,6 +158,8 @@ class Comparison:
             for k, i in enumerate(edges):
                 early[:, i, 3 * k : 3 * k + 3] = s[:, None] ** np.arange(3)
             columns.insert(1 if offsets else 0, experiment.seen(early))
+        if faults:
+            columns.insert(1 if offsets else 0, experiment.seen(np.stack(faults, axis=2)))
         nuisance = np.concatenate(columns, axis=2)
         difference = np.zeros((bins, channels), dtype=complex)
         if experiment.values is not None:
@@ -280,21 +287,31 @@ class Solution:
 class Fitter:
     """The experiments and the FMU, ready to be compared at any parameters and noise."""
 
-    def __init__(self, model: Model, experiments: Sequence[Experiment], task: Task, noise: Mapping[str, float] = {}):
-        """noise: of all channels, by name, SI; default: a twentieth of their motion."""
-        self.model, self.experiments, self.task = model, experiments, task
+    def __init__(
+        self,
+        model: Model,
+        experiments: Sequence[Experiment],
+        task: Task,
+        noise: Mapping[str, float] = {},
+        faults: Sequence[Sequence[Complex]] = (),
+    ):
+        """noise: of all channels, by name, SI; default: a twentieth of their motion. faults: of each experiment, see Comparison."""
+        self.model, self.experiments, self.task, self.faults = model, experiments, task, faults
         self.channels = tuple(dict.fromkeys(name for e in experiments for name in e.channels))
         columns = {name: self._columns(name) for name in self.channels}
-        self._spread = {n: max([1e-12, *(float(np.nanstd(v)) for v, _ in c)]) for n, c in columns.items()}
-        self._stepped = {n: max([0.0, *(float(e.mean()) for _, e in c)]) for n, c in columns.items()}
-        self.noise = dict(noise) or {n: task.noise.get(n) or 0.05 * self._spread[n] for n in self.channels}
+        spread = {n: max([1e-12, *(float(np.nanstd(v)) for v, *_ in c)]) for n, c in columns.items()}
+        self._finest = {n: max([0.0, *(finest for *_, finest in c)]) for n, c in columns.items()}
+        self._stepped = {n: max([0.0, *(float(e.mean()) for _, e, _ in c)]) for n, c in columns.items()}
+        self.noise = dict(noise) or {n: task.noise.get(n) or 0.05 * spread[n] for n in self.channels}
         self.evaluations = 0
         self._responses: tuple[bytes, list[Response]] = b"", []
         self._comparisons: tuple[tuple[object, ...], list[Comparison]] = (), []
 
     def _model(self, logarithms: Array, experiment: Experiment) -> Discrete:
         """The FMU's linear model over the experiment's steps."""
-        one = discrete(self._matrices(logarithms[None]), experiment.step, experiment.channels)
+        one = discrete(
+            self._matrices(logarithms[None]), experiment.step, experiment.channels, experiment.jumps is not None
+        )
         return Discrete(*(block[0] for block in one))
 
     def _response(self, logarithms: Array, experiment: Experiment, bins: int) -> Response:
@@ -324,8 +341,9 @@ class Fitter:
                         np.array([self.noise[n] for n in e.channels]),
                         self.task.offsets,
                         self._edges(e),
+                        self.faults[i] if self.faults else (),
                     )
-                    for e, response in zip(self.experiments, self._responses[1])
+                    for i, (e, response) in enumerate(zip(self.experiments, self._responses[1]))
                 ],
             )
         return self._comparisons[1]
@@ -338,9 +356,8 @@ class Fitter:
         self.evaluations += 2 * len(steps)
         tables, noise = [], np.zeros((len(logarithms), len(logarithms)))
         for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
-            table, of_noise = comparison.slopes(
-                discrete(around, experiment.step, experiment.channels).slopes(DIFFERENCE)
-            )
+            steps_of = discrete(around, experiment.step, experiment.channels, experiment.jumps is not None)
+            table, of_noise = comparison.slopes(steps_of.slopes(DIFFERENCE))
             tables.append(table)
             noise += of_noise
         return tables, noise
@@ -387,10 +404,10 @@ class Fitter:
         found.x = at(found.x)
         return found
 
-    def settle(self, point: Array) -> Array:
-        """Fit and judge the noise by turns, until the noise settles."""
-        for _ in range(ROUNDS):
-            point, before = self.search(point).x, self.noise
+    def settle(self, point: Array, rounds: int = ROUNDS, tolerances: Mapping[str, float] = FINE) -> Array:
+        """Fit and judge the noise by turns, until the noise settles or so many times."""
+        for _ in range(rounds):
+            point, before = self.search(point, tolerances).x, self.noise
             for _ in range(NOISE_ROUNDS):
                 last, self.noise = self.noise, self._judged_noise(point)
                 if self._alike(self.noise, last):
@@ -411,7 +428,7 @@ class Fitter:
         for name, (found, expected, _) in sums.items():
             left = max(freedom[name] - each, 1.0) / max(freedom[name], 1.0)
             noise = self.noise[name] * float(np.sqrt(found / (expected * left)))
-            judged[name] = self.task.noise.get(name) or max(noise, FINEST * self._spread[name])
+            judged[name] = self.task.noise.get(name) or max(noise, self._finest[name])
         return judged
 
     def _alike(self, noise: Mapping[str, float], other: Mapping[str, float]) -> bool:
@@ -435,10 +452,10 @@ class Fitter:
         late = {d.channel for d in self.task.distortions if d.kind != "gain"}
         return [i for i, name in enumerate(experiment.channels) if name in late]
 
-    def _columns(self, name: str) -> list[tuple[Array, Array]]:
-        """Values (s,) and errors' power (bins,) of the channel in every experiment that has it."""
+    def _columns(self, name: str) -> list[tuple[Array, Array, float]]:
+        """Values (s,), errors' power (bins,) and least noise of the channel in every experiment that has it."""
         with_it = [(e, e.channels.index(name)) for e in self.experiments if name in e.channels and e.values is not None]
-        return [(e.values[:, i], e.channel_power[:, i]) for e, i in with_it if e.values is not None]
+        return [(e.values[:, i], e.channel_power[:, i], float(e.finest[i])) for e, i in with_it if e.values is not None]
 
 
 def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int = 6, seed: int = 0) -> Solution:
@@ -486,15 +503,24 @@ def _solution(fitter: Fitter, point: Array, misfit: float, rivals: list[tuple[Ar
     )
 
 
-def settled(solution: Solution, distortions: tuple[Distortion, ...]) -> Solution:
-    """The fit once more, with further distortions as unknowns, from where it is and from where it began."""
+def settled(
+    solution: Solution,
+    distortions: tuple[Distortion, ...],
+    faults: Sequence[Sequence[Complex]] = (),
+    rounds: int = ROUNDS,
+) -> Solution:
+    """The fit once more, with further distortions as unknowns or faults of each experiment, from where it is and, if it runs away,
+    from where it began. rounds: of fitting and judging the noise; few are enough to compare."""
     task = replace(solution.task, distortions=(*solution.task.distortions, *distortions))
     places = [np.append(solution.logarithms, np.zeros(len(distortions))), task.first()]
     found = []
     for place in places:
-        fitter = Fitter(solution.fitter.model, solution.fitter.experiments, task, solution.noise)
-        point = fitter.settle(fitter.search(place, COARSE).x)
-        found.append(_solution(fitter, point, 2 * fitter.search(point).cost, [], 1))
+        fitter = Fitter(
+            solution.fitter.model, solution.fitter.experiments, task, solution.noise, faults or solution.fitter.faults
+        )
+        point = fitter.settle(fitter.search(place, COARSE).x, rounds, FINE if rounds == ROUNDS else COARSE)
+        misfit = float(np.sum(fitter.residuals(point) ** 2))
+        found.append(_solution(fitter, point, misfit, [], 1))
         if np.abs(point[: len(task.names)] - task.first()[: len(task.names)]).max() < 1:
             break
     return min(found, key=lambda each: each.unlikeliness)

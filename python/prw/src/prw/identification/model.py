@@ -111,7 +111,7 @@ class Model:
     def __init__(self, fmu: str | os.PathLike[str] | None = None):
         """Unpack, load and instantiate the FMU file `fmu` (default: see prw.testbed.default_fmu)."""
         self._linearizer = Linearizer(fmu, outputs=OUTPUTS)
-        self.fmu = self._linearizer.fmu
+        self.fmu, self.loaded = self._linearizer.fmu, self._linearizer.loaded
         self.known = Parameters(self._linearizer.loaded, read_description(self.fmu))
 
     def __enter__(self) -> Model:

@@ -79,7 +79,7 @@ def quantum_of(values: Array) -> float:
     """The step that all `values` (n,) are multiples of, give or take a constant, or 0 if there is none."""
     levels = np.unique(values[:QUANTUM_VALUES])
     if len(levels) < 3:
-        return 0.0
+        return float(np.ptp(levels))
     gaps = np.diff(levels)
     # Digits cut off in the file make two values of one level; what is left of the gaps is one quantum or several.
     gaps = gaps[gaps > np.median(gaps) / MOST_STEPS]

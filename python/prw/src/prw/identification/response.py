@@ -5,6 +5,9 @@ solved exactly by one matrix exponential. Summed over a recording of n samples, 
 becomes z X = Ad X + (G0 + z G1) U + z d with z = exp(2 pi i f h) and d = x[0] - x[n]: an experiment that starts
 and ends anywhere differs from a periodic one by six numbers (Pintelon and Schoukens, System Identification: A Frequency
 Domain Approach, 2nd ed., Sec. 6.3.2).
+
+A recording that the FMU simulated in Co-Simulation is compared with what the FMU does: over a step each angle follows its rate, and
+at the start of a step the states jump by what the angle is off from there.
 """
 
 from __future__ import annotations
@@ -27,7 +30,7 @@ Distorted = tuple[int, Callable[[Complex], tuple[Complex, Complex]]]
 
 class Discrete(NamedTuple):
     """x[k+1] = A x[k] + before u[k] + after u[k+1], y[k] = C x[k] + D u[k]: A (..., 6, 6), before and after
-    (..., 6, 4), C (..., c, 6), D (..., c, 4)."""
+    (..., 6, m), C (..., c, 6), D (..., c, m), with m = 4, or 6 with jumps."""
 
     A: Array
     before: Array
@@ -41,8 +44,8 @@ class Discrete(NamedTuple):
         return Discrete(*((block[:half] - block[half:]) / (2 * step) for block in self))
 
 
-def discrete(models: Matrices, step: float, channels: tuple[str, ...]) -> Discrete:
-    """`models`, one or m of them, over steps of `step` s, with the rows of `channels`."""
+def discrete(models: Matrices, step: float, channels: tuple[str, ...], simulated: bool = False) -> Discrete:
+    """`models`, one or m of them, over steps of `step` s, with the rows of `channels`. simulated: in steps of the FMU."""
     rows = [OUTPUTS.index(name) for name in channels]
     angle, rate = models.B[..., :2], models.B[..., 2:]
     # The state, and the motors' angles with three derivatives, in units of the step.
@@ -51,9 +54,14 @@ def discrete(models: Matrices, step: float, channels: tuple[str, ...]) -> Discre
     whole[..., 6:12, 8:14] = np.eye(6)
     solved = expm(whole)[..., :6, :]
     e0, e1, e2, e3 = (solved[..., 6 + 2 * i : 8 + 2 * i] for i in range(4))
+    C, D = models.C[..., rows, :], models.D[..., rows, :]
+    if simulated:
+        before = np.concatenate([e0, step * e1, solved[..., :6] @ rate], axis=-1)
+        direct = np.concatenate([D, np.zeros((*D.shape[:-1], 2))], axis=-1)
+        return Discrete(solved[..., :6], before, np.zeros_like(before), C, direct)
     before = np.concatenate([e0 - 6 * e2 + 12 * e3, step * (e1 - 4 * e2 + 6 * e3)], axis=-1)
     after = np.concatenate([6 * e2 - 12 * e3, step * (6 * e3 - 2 * e2)], axis=-1)
-    return Discrete(solved[..., :6], before, after, models.C[..., rows, :], models.D[..., rows, :])
+    return Discrete(solved[..., :6], before, after, C, D)
 
 
 class Response:
@@ -67,9 +75,12 @@ class Response:
         turn = 2j * np.pi * np.arange(bins) / len(experiment.time)
         self._z, self._s = np.exp(turn)[:, None, None], (turn / experiment.step).astype(np.complex128)
         # The motors as they moved, and each of them alone: an error of an angle comes with one of its rate.
-        self._motors = np.zeros((bins, 4, 3), dtype=complex)
-        self._motors[..., 0] = experiment.motors[:bins]
+        motors = experiment.motors[:bins]
+        self._motors = np.zeros((*motors.shape, 3), dtype=complex)
+        self._motors[..., 0] = motors
         self._motors[:, [0, 1], [1, 2]], self._motors[:, [2, 3], [1, 2]] = 1, self._s[:, None]
+        if experiment.jumps is not None:
+            self._motors[:, [4, 5], [1, 2]] = 1 - (1 + self._s[:, None] * experiment.step) / self._z[..., 0]
         self._resolvent = np.linalg.inv(self._z * np.eye(6) - model.A)
         self._states = self._resolvent @ ((model.before + self._z * model.after) @ self._motors)
         answers: Complex = model.C @ self._states + model.D @ self._motors

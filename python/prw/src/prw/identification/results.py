@@ -163,7 +163,7 @@ class Identification:
                 lines.append(f"{name} ended at its bound; give wider bounds, or doubt the data")
         for point, _ in solution.rivals:
             values = ", ".join(
-                f"{name} {value / self.known.real[name].factor:.4g} {self.known.real[name].shown}"
+                f"{name} {value:.4g} {self.known.real[name].unit}"
                 for name, value in zip(solution.task.names, np.exp(point))
             )
             swapped = " (the couplings exchanged)" if self._exchanged(point) else ""
@@ -192,8 +192,8 @@ class Identification:
             lines.append("the noise is not white (quantised angles do that); the standard errors take it into account")
         return list(dict.fromkeys(lines))
 
-    def summary(self) -> str:
-        """What was found, in a few lines of text."""
+    def summary(self, *, shown: bool = False) -> str:
+        """What was found, in a few lines of text, in SI; with `shown` parameters in the units that the FMU shows."""
         channels = ", ".join(dict.fromkeys(name for e in self.experiments for name in e.channels))
         seconds = sum(e.sampled[-1] - e.sampled[0] for e in self.experiments)
         lines = [f"identified  from {', '.join(self.files)}: {seconds:.4g} s with {channels}"]
@@ -204,10 +204,11 @@ class Identification:
             lines += [f"  {misfit}" for misfit in self.misfits]
             lines += [f"perhaps     {text}" for text in self.diagnosis or ["nothing that is known by its looks"]]
         for name, found in self.parameters.items():
-            value, low, high = (v / found.factor for v in (found.value, *found.interval))
+            factor, unit = (found.factor, found.shown) if shown else (1.0, found.unit)
+            value, low, high = (v / factor for v in (found.value, *found.interval))
             sureness = f"+- {found.relative:.2%}   95 % interval {low:.5g} to {high:.5g}"
             sureness = "not determined" if found.hopeless else sureness
-            lines.append(f"  {name:<9} {value:.5g} {found.shown}  {sureness}{', prior' if found.prior else ''}")
+            lines.append(f"  {name:<9} {value:.5g} {unit}  {sureness}{', prior' if found.prior else ''}")
         for name, (value, error) in self.distortions.items():
             factor, unit = (1.0, "") if name.startswith("gain") else (1e3, " ms")
             lines.append(f"  {name}: {value * factor:.4g} +- {error * factor:.2g}{unit}")
@@ -244,11 +245,9 @@ class Identification:
     def _repr_html_(self) -> str:
         rows = []
         for name, found in self.parameters.items():
-            value, error, low, high = (
-                f"{v / found.factor:.5g}" for v in (found.value, found.standard_error, *found.interval)
-            )
-            cells = [name, value, f"± {error}", f"{low} to {high}", found.shown]
-            cells = [name, "not determined", "", "", found.shown] if found.hopeless else cells
+            value, error, low, high = (f"{v:.5g}" for v in (found.value, found.standard_error, *found.interval))
+            cells = [name, value, f"± {error}", f"{low} to {high}", found.unit]
+            cells = [name, "not determined", "", "", found.unit] if found.hopeless else cells
             rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
         head = "".join(f"<th>{h}</th>" for h in ("parameter", "estimate", "standard error", "95 % interval", "unit"))
         notes = "".join(

@@ -126,7 +126,7 @@ def judge(solution: Solution) -> Verdict:
                 )
             if texts:
                 misfits.append(Misfit(experiment.name, name, *_where(experiment, comparison, j), "; ".join(texts)))
-        for name, unit, column in _faults(solution, experiment, comparison):
+        for name, unit, column in single_faults(solution, experiment, comparison):
             fault = score(column[None]).fault(name, unit)
             # Neither friction nor backlash is ever negative.
             if fault is not None and (fault.size > 0 or not fault.signs):
@@ -214,7 +214,9 @@ def _following(experiment: Experiment, comparison: Comparison, j: int) -> Comple
     return np.concatenate(columns)
 
 
-def _faults(solution: Solution, experiment: Experiment, comparison: Comparison) -> Iterator[tuple[str, str, Complex]]:
+def single_faults(
+    solution: Solution, experiment: Experiment, comparison: Comparison
+) -> Iterator[tuple[str, str, Complex]]:
     """Name, unit and what it adds to the channels (f, c) per unit, of single faults."""
     response, count = comparison.response, experiment.needed_bins
     there = response.outputs + response.transients @ comparison.initial
@@ -277,7 +279,7 @@ def _strength(solution: Solution, i: int) -> tuple[Array, Array]:
         power = np.abs(np.fft.rfft(np.diff(column) * np.hanning(n - 1)))[first:] ** 2 / np.sum(np.hanning(n - 1) ** 2)
         turn = 2 - 2 * np.cos(2 * np.pi * np.arange(first, first + len(power)) / (n - 1))
         outside = float(np.mean(power / turn))
-        found.append(float(np.sqrt(inside[j] / max(outside, quantum, 1e-300))))
+        found.append(float(np.sqrt(inside[j] / max(outside, quantum, experiment.finest[j] ** 2))))
     return np.array(found), luck
 
 

@@ -6,7 +6,9 @@ import itertools
 import math
 import os
 import time
+import warnings
 from collections.abc import Iterable, Mapping
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +19,7 @@ from prw.arguments import Table, counted, spread_of
 from prw.errors import UserError
 from prw.extras import need
 from prw.motion import Array, Motion
+from prw.parameters import Given, in_own_unit, values_of
 from prw.progress import Progress
 from prw.recording import Recording
 from prw.simulation import Run, motion_of
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
 #: A chunk is kept when it is done, and is the unit of what an interruption loses: so many in a study, of so many runs.
 CHUNKS, LONGEST_CHUNK = 16, 256
 MOST_RUNS = 10_000_000
+#: How a parameter varies, see `sweep`.
+Spread = float | tuple[float, float] | tuple[str, float, float]
 
 
 class Swept(NamedTuple):
@@ -41,8 +46,9 @@ class Swept(NamedTuple):
 
 def sweep(
     grid: Mapping[str, ArrayLike] | None = None,
-    random: Mapping[str, float | tuple[float, float]] | None = None,
+    random: Mapping[str, Spread] | None = None,
     *,
+    parameters: Given = None,
     runs: int = 1000,
     seed: int = 0,
     motion: Motion | Recording | Run | str | os.PathLike[str] | Table | None = None,
@@ -56,10 +62,13 @@ def sweep(
     Parameters
     ----------
     grid
-        Values by parameter, in SI; all combinations are run.
+        Values by parameter, in SI or with a unit as ([1.5, 1.9], "N.m/deg"); all combinations are run.
     random
-        By parameter the relative standard deviation (0.1 is 10 %) about the start value, or (value, relative) about
-        another one; `runs` log-normal draws for each combination of the grid, from the seed `seed`.
+        By parameter ("uniform", low, high), ("normal", mean, standard deviation) or ("lognormal", median, relative standard
+        deviation), in SI; for the last also the relative standard deviation alone (0.1 is 10 %), about the start value, or
+        (median, relative). `runs` draws for each combination of the grid, from the seed `seed`.
+    parameters
+        Values that are the same in all runs, as for `prw.simulate`.
     motion
         As for `prw.simulate`; so is `fmu`.
     threads
@@ -81,15 +90,23 @@ def sweep(
     ------
     UserError
         An argument makes no sense, a file cannot be read or written, or the cluster does not answer.
+
+    Warns
+    -----
+    RuntimeWarning
+        All runs failed.
     """
     need("pyarrow")
     if scheduler:
         need("distributed")
     path = existing_fmu(fmu)
     with Testbed(path) as testbed:
-        values = layout(grid or {}, random or {}, runs, seed, testbed.starts)
-        study = Study(path.read_bytes(), motion_of(motion), tuple(values), np.column_stack(list(values.values())))
-        return carry_out(study, testbed, None if out is None else Path(out), threads, scheduler).table
+        values = layout(grid or {}, random or {}, runs, seed, testbed, parameters)
+        study = Study.of(testbed, motion_of(motion), values, parameters)
+        table = carry_out(study, testbed, None if out is None else Path(out), threads, scheduler).table
+    if "done" not in table["status"].to_pylist():
+        warnings.warn(f"all {table.num_rows} runs failed; run 0: {table['message'][0]}", RuntimeWarning, stacklevel=2)
+    return table
 
 
 def carry_out(study: Study, testbed: Testbed, out: Path | None, threads: int | None, scheduler: str | None) -> Swept:
@@ -118,23 +135,27 @@ def carry_out(study: Study, testbed: Testbed, out: Path | None, threads: int | N
 
 def layout(
     grid: Mapping[str, ArrayLike],
-    random: Mapping[str, float | tuple[float, float]],
+    random: Mapping[str, Spread],
     runs: int,
     seed: int,
-    starts: Mapping[str, float],
+    testbed: Testbed,
+    parameters: Given = None,
 ) -> dict[str, Array]:
-    """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws.
-    starts: the FMU's start values. Raises UserError for what does not fit."""
+    """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws, about
+    `parameters` or the FMU's start values. Raises UserError for what does not fit."""
+    fixed = values_of(parameters, testbed.loaded)
+    testbed.with_starts(fixed)
+    starts = {**testbed.starts, **fixed}
     for name in (*grid, *random):
-        if name not in starts:
+        if name not in testbed.starts:
             argument = "grid" if name in grid else "random"
-            raise UserError(f"{argument}: {name} is not known; there are {', '.join(starts)}")
-        if name in grid and name in random:
-            raise UserError(f"{name} is in the grid and random; choose one")
+            raise UserError(f"{argument}: {name} is not known; there are {', '.join(testbed.starts)}")
+        if (name in grid) + (name in random) + (name in fixed and name in grid) > 1:
+            raise UserError(f"{name} is in more than one of grid, random and parameters; choose one")
     if not grid and not random:
         raise UserError("nothing varies; give values by parameter (grid), or relative standard deviations (random)")
     draws = counted("runs", runs) if random else 1
-    axes = {name: _column(name, values) for name, values in grid.items()}
+    axes = {name: _column(name, in_own_unit(name, values, testbed.loaded)) for name, values in grid.items()}
     total = math.prod(map(len, axes.values())) * draws
     if total > MOST_RUNS:
         raise UserError(f"{total} runs are more than {MOST_RUNS}; take fewer steps or runs")
@@ -144,9 +165,25 @@ def layout(
     table = dict(zip(axes, np.repeat(combinations, draws, axis=0).T))
     generator = np.random.default_rng(seed)
     for name, spread in random.items():
-        value, relative = spread_of(f"random: {name}", spread, starts[name])
-        table[name] = value * np.exp(relative * generator.standard_normal(total))
+        table[name] = drawn(f"random: {name}", spread, starts[name], generator, total)
     return table
+
+
+def drawn(what: str, spread: Spread, start: float, generator: np.random.Generator, count: int) -> Array:
+    """So many values (count,) of a spread, see `sweep`. Raises UserError for what is none."""
+    kind, *numbers = spread if isinstance(spread, tuple) and isinstance(spread[0], str) else ("lognormal", spread)
+    if kind == "lognormal":
+        median, relative = spread_of(what, tuple(numbers) if len(numbers) > 1 else numbers[0], start)
+        return median * np.exp(relative * generator.standard_normal(count))
+    finite = len(numbers) == 2 and all(isinstance(n, Real) and math.isfinite(float(n)) for n in numbers)
+    one, other = map(float, numbers) if finite else (math.nan, math.nan)  # type: ignore[arg-type]
+    if kind == "uniform" and one < other:
+        return generator.uniform(one, other, count)
+    if kind == "normal" and other > 0:
+        return generator.normal(one, other, count)
+    raise UserError(
+        f'{what} {spread!r}: write ("uniform", low, high), ("normal", mean, deviation) or ("lognormal", median, relative)'
+    )
 
 
 def _column(name: str, values: Any) -> Array:

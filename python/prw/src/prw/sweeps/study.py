@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +11,7 @@ import fmu_run
 import numpy as np
 
 from prw.motion import Array, Motion
+from prw.parameters import Given, values_of
 from prw.testbed import OUTPUTS, Testbed, driven_by, stopped
 
 #: What is kept of each output's course.
@@ -23,13 +24,20 @@ Rows = list[dict[str, Any]]
 @dataclass(frozen=True)
 class Study:
     """fmu: the FMU file's content. motion: what the motors do. names: parameters that vary; table: their values in SI,
-    (runs, len(names)). key: a hash of all this."""
+    (runs, len(names)). fixed: values of others. key: a hash of all this."""
 
     fmu: bytes
     motion: Motion
     names: tuple[str, ...]
     table: Array
+    fixed: Mapping[str, Any] = field(default_factory=dict)
     key: str = field(init=False)
+
+    @classmethod
+    def of(cls, testbed: Testbed, motion: Motion, values: Mapping[str, Array], parameters: Given) -> Study:
+        """The study of this FMU with the `values` (runs,) by parameter."""
+        fixed = {name: value for name, value in values_of(parameters, testbed.loaded).items() if name not in values}
+        return cls(testbed.fmu.read_bytes(), motion, tuple(values), np.column_stack(list(values.values())), fixed)
 
     def __post_init__(self) -> None:
         digest = hashlib.sha256(self.fmu)
@@ -38,6 +46,8 @@ class Study:
             if array is not None:
                 digest.update(np.ascontiguousarray(array).tobytes() + b"|")
         digest.update(",".join((*self.names, *MEASURES, *OUTPUTS)).encode())
+        if self.fixed:
+            digest.update(repr(sorted(self.fixed.items())).encode())
         object.__setattr__(self, "key", digest.hexdigest()[:16])
 
     def columns(self) -> list[str]:
@@ -54,13 +64,14 @@ def run_chunk(study: Study, testbed: Testbed, chunk: Chunk, threads: int) -> Row
         outputs=OUTPUTS,
         measures=MEASURES,
         threads=threads,
-        **driven_by(study.motion, dict(zip(study.names, table.T))),
+        **driven_by(study.motion, {**study.fixed, **dict(zip(study.names, table.T))}),
     )
+    errors = runs.errors
     columns = [runs[name, measure].tolist() for name in OUTPUTS for measure in MEASURES]
     rows = []
     for number, values, measured in zip(range(first, last), table.tolist(), zip(*columns)):
-        if number - first in runs.errors:
-            rows.append(failed(study, number, stopped(runs.errors[number - first])))
+        if number - first in errors:
+            rows.append(failed(study, number, stopped(errors[number - first])))
         else:
             done = {"run": number, "status": "done", "message": ""}
             rows.append({**done, **dict(zip(study.columns(), (*values, *measured)))})

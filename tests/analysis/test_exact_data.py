@@ -1,0 +1,91 @@
+"""Data with little noise or none: a simulation's own results, a rig without sensors' errors, channels that do not change."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import rig
+
+import prw
+
+K1 = 135.0
+
+
+@pytest.fixture(scope="module")
+def run(fmu) -> prw.Run:
+    return prw.simulate(parameters={"k1": K1}, fmu=fmu)
+
+
+def columns(run: prw.Run) -> dict[str, np.ndarray]:
+    return dict(run.to_pandas().reset_index())
+
+
+def check(found: prw.Identification, truth: float, worst: float) -> None:
+    """The estimate of k1 is within its own interval, which is narrow."""
+    assert found.fits, (found.misfits, found.diagnosis)
+    estimate = found.parameters["k1"]
+    assert estimate.interval[0] < truth < estimate.interval[1]
+    assert estimate.relative < worst
+
+
+def test_a_run_is_taken_as_it_is(run, fmu):
+    found = prw.identify(run, fmu=fmu)
+    check(found, K1, 1e-6)
+    assert all(abs(found.values[name] / run.parameters[name] - 1) < 1e-6 for name in rig.NAMES)
+    left_out = [note for note in found.notes if "never changes and is left out" in note]
+    assert [note.split()[1] for note in left_out] == ["pitch", "pitch_rate"], "opposite motors"
+
+
+def test_a_run_without_rates(run, fmu):
+    angles = prw.Motion(run.time, run.motion.theta)
+    check(prw.identify(prw.simulate(angles, {"k1": K1}, fmu=fmu), starts=1, fmu=fmu), K1, 1e-6)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2, 1e-1])
+def test_any_relative_noise(run, fmu, noise):
+    random, table = np.random.default_rng(1), columns(run)
+    for name in run:
+        table[name] = table[name] + random.normal(0, 1, len(run.time)) * noise * np.std(table[name])
+    check(prw.identify(table, starts=1, fmu=fmu), K1, max(1e-6, 0.15 * noise))
+
+
+def test_columns_with_six_decimals(run, fmu):
+    table = {name: column if name == "time" else np.round(column, 6) for name, column in columns(run).items()}
+    check(prw.identify(table, starts=1, fmu=fmu), K1, 1e-5)
+
+
+def test_an_encoder_that_sees_two_steps(run, fmu):
+    """theta3 and theta4 have two values, which tell next to nothing and spoil nothing."""
+    random, table = np.random.default_rng(1), columns(run)
+    for name, noise in (("tau1", 0.02), ("tau2", 0.02), ("roll", 1e-3)):
+        table[name] = table[name] + random.normal(0, noise, len(run.time))
+    seen = {name: 0.06 * np.round(table[name] / 0.06) for name in ("theta3", "theta4")}
+    assert {len(np.unique(angle)) for angle in seen.values()} == {2}
+    table |= seen
+    found = prw.identify(table, estimate="k1", starts=1, fmu=fmu)
+    without = prw.identify(
+        {name: column for name, column in table.items() if name not in seen}, estimate="k1", starts=1, fmu=fmu
+    )
+    check(found, K1, 1.05 * without.parameters["k1"].relative)
+
+
+@pytest.mark.parametrize("rate, pattern", [(1000, "independent"), (250, "moves"), (500, "fig4"), (250, "opposite")])
+def test_a_rig_with_exact_sensors(fmu, rate, pattern):
+    """Its motors move smoothly between the samples."""
+    truth = rig.experiment(23, 6, rate, pattern)
+    table = {"time": truth.time, "theta1": truth.theta[:, 0], "theta2": truth.theta[:, 1], **truth.outputs}
+    check(prw.identify(table, starts=1, fmu=fmu), truth.parameters["k1"], 2e-4)
+
+
+def test_a_fault_shows_in_exact_data(fmu):
+    truth = rig.late(rig.experiment(23, 6), 1e-4)
+    table = {"time": truth.time, "theta1": truth.theta[:, 0], "theta2": truth.theta[:, 1], **truth.outputs}
+    found = prw.identify(table, starts=1, fmu=fmu)
+    assert not found.fits and "ms late" in found.diagnosis[0]
+    assert found.diagnosis[0].startswith("tau1, tau2 comes 0.1 +-")
+
+
+def test_nothing_changes(run, fmu):
+    table = {**columns(run), **{name: np.zeros(len(run.time)) for name in run}}
+    with pytest.raises(prw.UserError, match="nothing that was measured changes"):
+        prw.identify(table, fmu=fmu)
