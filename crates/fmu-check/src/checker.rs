@@ -8,6 +8,7 @@ use crate::script::{End, Numbered, Run, Script, Setting, Step, Written};
 use crate::shrink::shrink;
 use crate::writer::{Course, Point, Value, Writer, status_name};
 use fmi_abi::{Interface, Standard};
+use std::collections::HashMap;
 use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -270,6 +271,13 @@ impl Checker {
                 return Ok(());
             }
         }
+        if let End::Flood(_) = run.end {
+            let section = self.section("2.1", "2.2.1");
+            let promise = "Processes that an FMU starts end with the instance that they were started for.";
+            let claim = Claim::new("resources.processes", Grade::Violation, section, promise);
+            self.add(claim.finding(seen, script.clone(), ends));
+            return Ok(());
+        }
         let what = match run.end {
             End::Hang(_) => "hang",
             End::Exit(_) => "exit",
@@ -282,7 +290,7 @@ impl Checker {
             Claim::new(&name, claim.ends.unwrap_or(Grade::Fragile), claim.section, promise)
         } else {
             // What only a fresh process shows has its own name; other crashes are the same in many checks.
-            let own = claim.name.contains("fresh-process");
+            let own = ["fresh-process", "unload", "exit"].iter().any(|name| claim.name.ends_with(name));
             let name = format!("{}.{what}", if own { &claim.name } else { claim.topic() });
             let section = self.section("2.1.3", "2.2.4");
             let promise = "A call that the standard allows there returns with a status.";
@@ -309,6 +317,22 @@ impl Checker {
         }
         let mut all = Vec::new();
         walk(script, &mut all);
+        if let Some(pairs) = lives(&all).filter(|_| !run.left.is_empty()) {
+            let section = self.section("2.1", "2.2.1");
+            let promise = "Processes that an FMU starts end with the instance that they were started for.";
+            let claim = Claim::new("resources.processes", Grade::Violation, section, promise);
+            let judge: Judge = Arc::new(move |run| {
+                let (count, first) = (run.left.len(), run.left.first()?);
+                let freed = |(make, free): &(u32, u32)| run.of(*make).is_none() || run.of(*free).is_some();
+                let processes = if count == 1 { "process is" } else { "processes are" };
+                pairs.iter().all(freed).then(|| {
+                    format!("{count} {processes} left after all instances were freed, the first is {first:?}")
+                })
+            });
+            if let Some(seen) = judge(run) {
+                self.add(claim.finding(seen, script.clone(), judge));
+            }
+        }
         for numbered in all {
             let id = numbered.id;
             let Some(outcome) = run.of(id) else { continue };
@@ -435,6 +459,22 @@ impl Checker {
         finding.steps.1 = short.len();
         finding.script = short;
     }
+}
+
+/// The instantiations of a script, each with the call that frees the instance; none if an instance is not freed.
+fn lives(all: &[&Numbered]) -> Option<Vec<(u32, u32)>> {
+    let mut alive = HashMap::new();
+    let mut pairs = Vec::new();
+    for numbered in all {
+        match &numbered.step {
+            Step::Make(place, _) if alive.insert(*place, numbered.id).is_some() => return None,
+            Step::Free(place) => {
+                pairs.extend(alive.remove(place).map(|make| (make, numbered.id)));
+            }
+            _ => {}
+        }
+    }
+    alive.is_empty().then_some(pairs)
 }
 
 /// What a check claims.

@@ -93,6 +93,7 @@ pub fn ending(run: &Run, script: &Script) -> Option<String> {
         End::Hang(seconds) => format!("{name} does not return within {seconds:.1} s"),
         End::Exit(code) => format!("{name} ends the whole process with exit status {code}"),
         End::Unloadable(why) => format!("the library cannot be loaded: {why}"),
+        End::Flood(count) => format!("{name} leads to {count} processes at once, after which all were ended"),
     })
 }
 
@@ -109,5 +110,7 @@ pub fn step_name(step: &Step) -> String {
         Step::Parallel(scripts) => format!("a call on one of {} threads", scripts.len()),
         Step::Measure => "a measurement".to_owned(),
         Step::FreshProcess => "a fresh process".to_owned(),
+        Step::Unload => "unloading the library".to_owned(),
+        Step::Quit => "the exit of the process".to_owned(),
     }
 }

@@ -51,6 +51,9 @@ pub struct Options {
     /// Megabytes of memory that the FMU may use.
     #[arg(long, default_value_t = 8192)]
     pub memory: u64,
+    /// Megabytes that the FMU may have when it is unpacked.
+    #[arg(long, default_value_t = 1000)]
+    pub unpacked: u64,
     /// Chooses the order of calls that chance chooses.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -93,6 +96,7 @@ pub enum FailOn {
 /// The program must call [`work_if_asked`] before anything else: it is started anew for every sequence of calls.
 pub fn command(fmu: &Path, options: &Options) -> ExitCode {
     let progress = !options.json && std::io::stderr().is_terminal();
+    worker::listen_for_interrupts();
     match check(fmu, options, progress).and_then(|report| {
         let text = match options.json {
             true => format!("{}\n", report.json()?),
@@ -121,7 +125,7 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
         }
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::from(2)
+            ExitCode::from(if worker::interrupted() { 130 } else { 2 })
         }
     }
 }
@@ -132,8 +136,11 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
 /// When it is no FMU of FMI 2.0 or 3.0, or has no library for this machine.
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
-    let unpacked = checks::package::unpack(path)?;
-    let folder = unpacked.folder.path();
+    let scratch = tempfile::Builder::new().prefix("fmu-check-").tempdir()?;
+    // The workers end, and write nothing any more, before the directory is removed.
+    let workers = run::Workers::new(scratch.path().to_owned())?;
+    let folder = &scratch.path().join("fmu");
+    let of_zip = checks::package::unpack(path, folder, options.unpacked << 20)?;
     let text = std::fs::read(folder.join("modelDescription.xml")).with_context(|| {
         format!("{}: there is no modelDescription.xml in it; it is no FMU", path.display())
     })?;
@@ -143,7 +150,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     let wanted = |topic: &str| options.only.is_empty() || options.only.iter().any(|only| only == topic);
     let mut of_files = Vec::new();
     if wanted("package") {
-        of_files.extend(unpacked.found);
+        of_files.extend(of_zip);
         of_files.extend(checks::package::look(folder, &description));
     }
     if wanted("description") {
@@ -154,7 +161,6 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     }
     let setting = setting(path, options, folder, &description)?;
     let deadline = begin + Duration::from_secs_f64(options.time.max(1.0));
-    let workers = run::Workers::new()?;
     let mut checker = Checker::new(description, setting, workers, options.seed, options.limit, deadline);
     of_files.into_iter().for_each(|finding| checker.add(finding));
     for (place, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
@@ -193,6 +199,9 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     findings.retain(|finding| options.only.is_empty() || wanted(finding.topic()) || always(finding));
     findings.sort_by(|one, other| other.grade.cmp(&one.grade).then_with(|| one.name.cmp(&other.name)));
     shorten(&checker, &mut findings, options, progress);
+    if worker::interrupted() {
+        return Err(run::Interrupted.into());
+    }
     let mut report = Report::new(path, &checker, findings);
     report.seconds = begin.elapsed().as_secs_f64();
     Ok(report)
@@ -275,8 +284,8 @@ fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + S
                 while let Some((topic, check)) = checks.get(next.fetch_add(1, Ordering::Relaxed)) {
                     match check(checker) {
                         Ok(()) => {}
-                        Err(error) if error.is::<TimeOver>() => {
-                            checker.unreached(format!("{topic}: the time was over"))
+                        Err(error) if error.is::<TimeOver>() || error.is::<run::OutOfMemory>() => {
+                            checker.unreached(format!("{topic}: {error}"))
                         }
                         Err(error) => {
                             *failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(error);

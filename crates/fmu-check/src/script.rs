@@ -160,6 +160,10 @@ pub enum Step {
     Measure,
     /// Goes on in a new process, to which only serialized bytes are passed on.
     FreshProcess,
+    /// Unloads the library.
+    Unload,
+    /// Ends the process as programs do: with the destructors of its libraries. Nothing follows.
+    Quit,
 }
 
 /// A step with a number of its own, which it keeps when others are left out.
@@ -296,6 +300,8 @@ pub enum End {
     Exit(i32),
     /// The library cannot be loaded; what the loader says.
     Unloadable(String),
+    /// It had so many processes that they were ended.
+    Flood(usize),
 }
 
 /// What came of a script.
@@ -309,6 +315,8 @@ pub struct Run {
     pub at: Option<u32>,
     /// What was written to the standard output and the standard error.
     pub said: String,
+    /// Names of the processes that were left at its end.
+    pub left: Vec<String>,
 }
 
 impl Run {

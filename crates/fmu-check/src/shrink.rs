@@ -47,7 +47,7 @@ fn content(step: &Step) -> Option<String> {
             (!reads).then(|| format!("{function} {args:?}"))
         }
         Step::Repeat(..) | Step::Parallel(_) | Step::Measure | Step::Version(_) => None,
-        Step::Make(..) | Step::Free(_) | Step::FreshProcess => None,
+        Step::Make(..) | Step::Free(_) | Step::FreshProcess | Step::Unload | Step::Quit => None,
     }
 }
 

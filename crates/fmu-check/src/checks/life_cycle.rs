@@ -203,8 +203,33 @@ pub fn orders(checker: &Checker) -> anyhow::Result<()> {
             play(checker, writer)?;
         }
         token(checker, course)?;
+        unload(checker, course)?;
     }
     super::hostile::free_null(checker)
+}
+
+/// After all instances were freed, the library can be unloaded and loaded again, and the process can exit.
+fn unload(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    for (name, step) in [("life_cycle.unload", Step::Unload), ("life_cycle.exit", Step::Quit)] {
+        let mut writer = checker.writer();
+        for _ in 0..2 {
+            writer.begin(0, course);
+            for point in course.points.iter().take(2) {
+                writer.point(0, course, point);
+            }
+            writer.call(0, "Terminate", vec![]);
+            writer.free(0);
+            writer.add(step.clone());
+            if step == Step::Quit {
+                break;
+            }
+        }
+        let section = checker.section("2.1.5", "2.3.1");
+        let promise = "A library whose instances were freed can be unloaded, and its destructors return.";
+        let nothing: Judge = Arc::new(|_| None);
+        checker.judge(&Claim::new(name, Grade::Violation, section, promise), writer.script, nothing)?;
+    }
+    Ok(())
 }
 
 /// The library of another description is not this one's.

@@ -2,64 +2,93 @@
 
 use crate::description::{Description, Offer};
 use crate::finding::{Finding, Grade};
+use anyhow::Context as _;
 use fmi_abi::Standard;
 use object::Object as _;
 use std::collections::BTreeSet;
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-/// An FMU, unpacked.
-pub struct Unpacked {
-    /// Where.
-    pub folder: tempfile::TempDir,
-    /// What is wrong with the ZIP.
-    pub found: Vec<Finding>,
-}
-
-/// Unpacks an FMU.
+/// Unpacks an FMU of at most so many bytes. The findings in its ZIP file.
 ///
 /// # Errors
-/// When it cannot be.
-pub fn unpack(path: &Path) -> anyhow::Result<Unpacked> {
-    let file = File::open(path)
-        .map_err(|error| anyhow::anyhow!("{}: cannot be opened ({error})", path.display()))?;
+/// When it cannot be unpacked.
+pub fn unpack(path: &Path, folder: &Path, most: u64) -> anyhow::Result<Vec<Finding>> {
+    let at = path.display();
+    let file = File::open(path).map_err(|error| anyhow::anyhow!("{at}: cannot be opened ({error})"))?;
     let mut archive = zip::ZipArchive::new(file)
-        .map_err(|error| anyhow::anyhow!("{}: is no FMU, which is a ZIP file ({error})", path.display()))?;
-    let folder = tempfile::Builder::new().prefix("fmu-check-").tempdir()?;
+        .map_err(|error| anyhow::anyhow!("{at}: is no FMU, which is a ZIP file ({error})"))?;
     let mut found = Vec::new();
+    let mut names = BTreeSet::new();
+    let mut left = most;
+    for place in 0..archive.len() {
+        let name = entry(&mut archive, place, &mut names, &mut found)?;
+        if crate::worker::interrupted() {
+            return Err(crate::run::Interrupted.into());
+        }
+        let Some(inside) = name else { continue };
+        let mut entry =
+            archive.by_index(place).map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
+        let target = folder.join(inside);
+        if entry.is_dir() {
+            std::fs::create_dir_all(target)?;
+            continue;
+        }
+        std::fs::create_dir_all(target.parent().unwrap_or(folder))?;
+        // What the entry says of its size need not be true.
+        let written = std::io::copy(&mut (&mut entry).take(left + 1), &mut File::create(&target)?)
+            .map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
+        left = left.checked_sub(written).with_context(|| {
+            let most = most >> 20;
+            format!(
+                "{at}: it has more than {most} MB when it is unpacked; if that is right, give --unpacked MB"
+            )
+        })?;
+        #[cfg(unix)]
+        if let Some(mode) = entry.unix_mode().filter(|mode| mode & 0o100 != 0) {
+            use std::os::unix::fs::PermissionsExt as _;
+            std::fs::set_permissions(&target, std::fs::Permissions::from_mode(mode & 0o777 | 0o600))?;
+        }
+    }
+    Ok(found)
+}
+
+/// Looks at an entry of a ZIP file. The path within the FMU's directory, if it has one.
+fn entry(
+    archive: &mut zip::ZipArchive<File>,
+    place: usize,
+    names: &mut BTreeSet<String>,
+    found: &mut Vec<Finding>,
+) -> anyhow::Result<Option<PathBuf>> {
     let mut tell = |name: &str, grade, promise: &str, seen: String| {
         found.push(Finding::of_files(name, grade, "2.3 of FMI 2.0, 2.5.1 of FMI 3.0", promise, seen));
     };
-    let mut names = BTreeSet::new();
-    for place in 0..archive.len() {
-        let entry = archive.by_index_raw(place)?;
-        let name = entry.name()?.into_owned();
-        if entry.enclosed_name().is_none() || name.contains('\\') {
-            tell(
-                "package.paths",
-                Grade::Violation,
-                "Entries lie within the ZIP's folder, with / between folders.",
-                name.clone(),
-            );
-        }
-        if !matches!(entry.compression(), zip::CompressionMethod::Stored | zip::CompressionMethod::Deflated) {
-            let seen = format!("{name} is compressed by {}", entry.compression());
-            tell("package.compression", Grade::Violation, "Entries are stored or deflated.", seen);
-        }
-        if !names.insert(name.to_lowercase()) {
-            tell(
-                "package.names",
-                Grade::Fragile,
-                "No two entries have names that some systems take for one.",
-                name,
-            );
-        }
+    let entry = archive.by_index_raw(place)?;
+    let name = entry.name()?.into_owned();
+    let inside = entry.enclosed_name();
+    if inside.is_none() || name.contains('\\') {
+        tell(
+            "package.paths",
+            Grade::Violation,
+            "Entries lie within the ZIP's folder, with / between folders.",
+            name.clone(),
+        );
     }
-    archive
-        .extract(folder.path())
-        .map_err(|error| anyhow::anyhow!("{}: cannot be unpacked ({error})", path.display()))?;
-    Ok(Unpacked { folder, found })
+    if !matches!(entry.compression(), zip::CompressionMethod::Stored | zip::CompressionMethod::Deflated) {
+        let seen = format!("{name} is compressed by {}", entry.compression());
+        tell("package.compression", Grade::Violation, "Entries are stored or deflated.", seen);
+    }
+    if !names.insert(name.to_lowercase()) {
+        tell(
+            "package.names",
+            Grade::Fragile,
+            "No two entries have names that some systems take for one.",
+            name,
+        );
+    }
+    Ok(inside)
 }
 
 /// The folders of `binaries/` for this machine.

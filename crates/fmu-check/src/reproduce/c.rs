@@ -150,6 +150,12 @@ impl Writer {
                 text.push_str(&joins);
             }
             Step::FreshProcess => {}
+            Step::Unload => {
+                let _ = writeln!(text, "{indent}dlclose(library);\n{indent}library = NULL;");
+            }
+            Step::Quit => {
+                let _ = writeln!(text, "{indent}exit(0);");
+            }
             Step::Call { of, function, args } => self.call(*of, function, args, text, indent, description),
         }
     }

@@ -119,6 +119,12 @@ fn step(
             let _ = writeln!(text, "{indent}for thread in threads:\n{indent}    thread.join()");
         }
         Step::FreshProcess => {}
+        Step::Unload => {
+            let _ = writeln!(text, "{indent}libc.dlclose(c_void_p(library._handle))");
+        }
+        Step::Quit => {
+            let _ = writeln!(text, "{indent}sys.stdout.flush()\n{indent}libc.exit(0)");
+        }
         Step::Call { of, function, args } => {
             let Some(signature) = signature(function) else { return };
             if let Some(names) = comment(args, description) {

@@ -1,18 +1,24 @@
 //! The process that loads the library and plays a script. It may be lost at any step: what came of each is written down
 //! before the next.
 
+mod contain;
 mod measure;
 mod memory;
 #[cfg(target_os = "linux")]
 mod server;
 
 use crate::script::{Arg, Kind, Make, Message, NOBODY, Numbered, Outcome, Script, Setting, Step, Written};
+#[cfg(not(target_os = "linux"))]
+pub use contain::end_group;
+#[cfg(target_os = "linux")]
+pub use contain::readable;
+pub use contain::{interrupted, listen_for_interrupts};
 use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmi_abi::calls;
 use fmi_abi::fmi2::types::{fmi2CallbackFunctions, fmi2CallbackLogger};
 use fmi_abi::fmi3::types::fmi3LogMessageCallback;
 pub use memory::FILL;
-use memory::Guarded;
+use memory::{Guarded, INSIDE};
 use serde::{Deserialize, Serialize};
 #[cfg(target_os = "linux")]
 pub use server::Answer;
@@ -21,12 +27,15 @@ use std::ffi::{CStr, CString};
 use std::fs::File;
 use std::io::Write as _;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// The variable that names the job of a worker.
 pub const VARIABLE: &str = "FMU_CHECK_JOB";
+
+/// The variable that names the temporary directory of a check.
+pub const SCRATCH: &str = "FMU_CHECK_SCRATCH";
 
 /// The exit status of a worker that has a fault of its own.
 pub const OWN_FAULT: i32 = 97;
@@ -94,6 +103,7 @@ fn end(result: Result<(), String>) -> ! {
 /// Plays a call sequence, and writes a line to the file for the outcome of each step.
 fn work(job: Job, file: File) {
     limit(job.setting.memory);
+    PROCESS.store(std::process::id(), Ordering::Relaxed);
     if job.setting.soft {
         memory::AFTER.store(4096, std::sync::atomic::Ordering::Relaxed);
     }
@@ -120,6 +130,7 @@ fn limit(memory: u64) {
             unsafe { libc::setrlimit(what, &limit) };
         };
         set(libc::RLIMIT_CORE, 0);
+        set(libc::RLIMIT_FSIZE, 1 << 30);
         #[cfg(target_os = "linux")]
         {
             set(libc::RLIMIT_AS, memory as _);
@@ -136,6 +147,9 @@ fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// What was said, with the environment it came with.
 static SAID: Mutex<Vec<(usize, Message)>> = Mutex::new(Vec::new());
+
+/// The process that plays the call sequence.
+static PROCESS: AtomicU32 = AtomicU32::new(0);
 
 /// An instance: its handle and the environment it was given.
 struct Instance {
@@ -226,6 +240,14 @@ enum Kept {
 
 impl Player {
     fn write(&self, of: &impl Serialize) {
+        #[cfg(unix)]
+        if std::process::id() != PROCESS.load(Ordering::Relaxed) {
+            // The FMU has duplicated this process: the duplicate waits to be found and ended.
+            loop {
+                // SAFETY: waits.
+                unsafe { libc::pause() };
+            }
+        }
         let mut line = serde_json::to_vec(of).unwrap_or_default();
         line.push(b'\n');
         // An importer whose disk is full has other worries.
@@ -287,11 +309,13 @@ impl Player {
                 let Some(instance) = nobody.or_else(|| locked(&self.instances).remove(place)) else { return };
                 let name = self.named("FreeInstance");
                 if let Some(address) = self.find(instance.co_simulation, &name) {
+                    INSIDE.enter();
                     // SAFETY: the functions of both standards for this have this type.
                     unsafe {
                         let function: unsafe extern "C" fn(*mut c_void) = std::mem::transmute(address);
                         function(instance.handle as *mut c_void);
                     }
+                    INSIDE.leave();
                     outcome.status = Some(0);
                 } else {
                     outcome.missing = true;
@@ -300,16 +324,34 @@ impl Player {
             }
             Step::Version(name) => match self.find(self.setting.libraries[0].is_some(), name) {
                 Some(address) => {
+                    INSIDE.enter();
                     // SAFETY: these functions have no arguments and return a text.
                     outcome.text = unsafe {
                         let function: unsafe extern "C" fn() -> *const c_char = std::mem::transmute(address);
                         text_at(function())
                     };
+                    INSIDE.leave();
                 }
                 None => outcome.missing = true,
             },
             Step::Call { of, function, args } => self.call(*of, function, args, outcome),
             Step::Measure => outcome.measured = Some(measure::now()),
+            Step::Unload => {
+                let mut loaded: Vec<_> =
+                    locked(&self.libraries).iter_mut().filter_map(Option::take).collect();
+                loaded.dedup_by_key(|library| std::ptr::from_ref(*library));
+                INSIDE.enter();
+                for library in loaded {
+                    // SAFETY: made by Box::leak, and nothing else refers to it.
+                    drop(unsafe { Box::from_raw(std::ptr::from_ref(library).cast_mut()) });
+                }
+                INSIDE.leave();
+            }
+            Step::Quit => {
+                self.write(&Last { bytes: HashMap::new() });
+                INSIDE.enter();
+                std::process::exit(PLAYED)
+            }
             Step::Repeat(..) | Step::Parallel(_) | Step::FreshProcess => {}
         }
     }
@@ -326,8 +368,11 @@ impl Player {
             if place == 1 && self.setting.libraries[0].as_ref() == Some(path) && libraries[0].is_some() {
                 libraries[1] = libraries[0];
             } else {
+                INSIDE.enter();
                 // SAFETY: this is what the process is for.
-                match unsafe { libloading::Library::new(path) } {
+                let loaded = unsafe { libloading::Library::new(path) };
+                INSIDE.leave();
+                match loaded {
                     Ok(library) => libraries[place] = Some(Box::leak(Box::new(library))),
                     Err(error) => {
                         let why = std::error::Error::source(&error)
@@ -368,6 +413,7 @@ impl Player {
             return;
         };
         let logging = make.logging;
+        INSIDE.enter();
         // SAFETY: the functions are those of the names; each has the type that the standard gives it.
         let handle = unsafe {
             match (self.setting.fmi3, make.co_simulation) {
@@ -446,6 +492,7 @@ impl Player {
                 }
             }
         };
+        INSIDE.leave();
         for text in [name, token, resources].iter().flatten() {
             outcome.damage.extend(text.damage(true));
         }
@@ -480,8 +527,10 @@ impl Player {
         };
         let mut kept = Vec::new();
         let words: Vec<u64> = args.iter().map(|arg| self.word(arg, &mut kept)).collect();
+        INSIDE.enter();
         // SAFETY: this is what the process is for.
         let status = unsafe { calls::call(address, function, handle as *mut c_void, &words) };
+        INSIDE.leave();
         outcome.status = Some(status);
         let succeeded = status == 0 || status == 1;
         for kept in &kept {

@@ -289,6 +289,8 @@ mutants! {
     2 step_adds "results" "results.cut";
     3 lossy_when_late "states" "states.restore-values";
     2 name_gone "life_cycle" "arrays.read-beyond";
+    2 unload_crashes "life_cycle" "life_cycle.unload.crash";
+    3 exit_hangs "life_cycle" "life_cycle.unload.hang";
 }
 
 #[test]
@@ -326,6 +328,106 @@ fn descriptions() {
     }
 }
 
+/// Faults that attack the processes around the FMU, with the name of the finding.
+const ATTACKS: [(u32, &str, &str); 8] = [
+    (2, "forks", "resources.processes"),
+    (3, "daemon_left", "resources.processes"),
+    (2, "forks_without_end", "resources.processes"),
+    (3, "duplicates_itself", "resources.processes"),
+    (2, "kills_group", "life_cycle.crash"),
+    (3, "kills_parent", "life_cycle.crash"),
+    (2, "kills_all", "life_cycle.crash"),
+    (3, "stops_parent", "life_cycle.crash"),
+];
+
+/// The processes whose environment has this mark.
+#[cfg(target_os = "linux")]
+fn marked(mark: &str) -> usize {
+    let processes = std::fs::read_dir("/proc").expect("the processes").flatten();
+    let environments = processes.filter_map(|entry| std::fs::read(entry.path().join("environ")).ok());
+    environments.filter(|environment| String::from_utf8_lossy(environment).contains(mark)).count()
+}
+
+/// A check with its temporary files in a directory and its processes marked.
+#[cfg(target_os = "linux")]
+fn contained(folder: &Path, fmi: u32, fault: &str) -> Command {
+    let path = fmu(folder, fmi, &library(fmi, ""), |text| text);
+    let scratch = folder.join("scratch");
+    std::fs::create_dir_all(&scratch).expect("a folder");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
+    command.arg(path).args(["--json", "--no-shrink", "--repeat", "0.3"]);
+    command.env("WAGON_FAULT", fault).env("TMPDIR", scratch).env("WAGON_MARK", folder);
+    command
+}
+
+/// A FMU that starts processes, or that sends signals to others, is found out. Nothing of it is left, and whoever called
+/// the check lives.
+#[cfg(target_os = "linux")]
+#[test]
+fn attacks_are_contained() {
+    for (fmi, fault, name) in ATTACKS {
+        let folder = TempDir::new().expect("a folder");
+        let mut command = contained(folder.path(), fmi, fault);
+        let output = command.args(["--only", "resources", "--limit", "2"]).output().expect("runs");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(text.contains(&format!("\"name\": \"{name}\"")), "{fault}: {text} {output:?}");
+        assert_eq!(output.status.code(), Some(1), "{fault}");
+        assert_eq!(marked(&folder.path().to_string_lossy()), 0, "{fault}");
+        assert_eq!(std::fs::read_dir(folder.path().join("scratch")).expect("a folder").count(), 0, "{fault}");
+    }
+}
+
+/// Whatever signal ends the check, no process and no file of it is left.
+#[cfg(target_os = "linux")]
+#[test]
+fn interrupts_leave_nothing() {
+    for signal in ["INT", "TERM", "KILL"] {
+        let folder = TempDir::new().expect("a folder");
+        let scratch = folder.path().join("scratch");
+        let mut command = contained(folder.path(), 2, "make_hangs");
+        let mut child =
+            command.args(["--limit", "60"]).stdout(std::process::Stdio::null()).spawn().expect("runs");
+        let mark = folder.path().to_string_lossy().into_owned();
+        // The process itself, one that forks, and the one that hangs.
+        wait_until(|| marked(&mark) >= 3);
+        let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
+        assert!(sent.expect("kill").success());
+        let status = child.wait().expect("it ends");
+        if signal != "KILL" {
+            assert_eq!(status.code(), Some(130), "{signal}");
+            assert_eq!(marked(&mark), 0, "{signal}");
+            assert_eq!(std::fs::read_dir(&scratch).expect("a folder").count(), 0, "{signal}");
+        }
+        wait_until(|| marked(&mark) == 0 && std::fs::read_dir(&scratch).is_ok_and(|of| of.count() == 0));
+    }
+}
+
+/// Waits 20 seconds at most.
+#[cfg(target_os = "linux")]
+fn wait_until(holds: impl Fn() -> bool) {
+    let begin = std::time::Instant::now();
+    while !holds() {
+        assert!(begin.elapsed().as_secs() < 20, "it takes too long");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+}
+
+/// An FMU that is larger than it may be is not unpacked.
+#[test]
+fn unpacking_has_a_limit() {
+    let folder = TempDir::new().expect("a folder");
+    let path = fmu(folder.path(), 2, &library(2, ""), |text| text + &" ".repeat(3 << 20));
+    let run = |megabytes: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
+        command.arg(&path).args(["--only", "description", "--unpacked", megabytes]).output().expect("runs")
+    };
+    let output = run("2");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(text.contains("it has more than 2 MB when it is unpacked"), "{text}");
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(run("4").status.code(), Some(0));
+}
+
 /// The source has no fault that is not tested, and the documentation counts them.
 #[test]
 fn no_fault_is_forgotten() {
@@ -336,13 +438,15 @@ fn no_fault_is_forgotten() {
     let faults = source.split(" X(").skip(1).filter_map(|rest| rest.split_once(')')).map(|(name, _)| name);
     let mut faults: Vec<&str> = faults.collect();
     let mut tested = FAULTS.to_vec();
+    tested.extend(ATTACKS.iter().map(|(_, name, _)| *name));
+    tested.push("make_hangs");
     faults.sort_unstable();
     tested.sort_unstable();
     assert_eq!(faults, tested);
     let page = read("../../docs/checking.md").split_whitespace().collect::<Vec<_>>().join(" ");
     let count = format!(
         "{} faults that are put into its library one at a time, {} more into its description",
-        FAULTS.len() + ["SYMBOL_MISSING", "WITHOUT_NOMINALS"].len(),
+        tested.len() + ["SYMBOL_MISSING", "WITHOUT_NOMINALS"].len(),
         DESCRIPTIONS.len()
     );
     assert!(page.contains(&count), "{count}");

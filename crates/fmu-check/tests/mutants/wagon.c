@@ -5,6 +5,7 @@
 #include <locale.h>
 #include <math.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -32,7 +33,8 @@
     X(directional_imprecise) X(directional_added) X(event_moves_silently) X(event_loses_input) X(early_time_wrong)     \
     X(early_unsaid) X(name_in_result) X(reference_once) X(start_time_ignored) X(last_step_refused)                     \
     X(step_overshoots) X(step_adds) X(lossy_when_late) X(step_prints) X(start_in_mode_ignored) X(event_again_now)      \
-    X(name_gone)                                                                                                      
+    X(name_gone) X(forks) X(daemon_left) X(forks_without_end) X(duplicates_itself) X(kills_group) X(kills_parent)       \
+    X(kills_all) X(stops_parent) X(unload_crashes) X(exit_hangs) X(make_hangs)                                                                                                      
 #define NUMBER(name) M_##name,
 #define NAME(name) #name,
 enum { M_none, FAULTS(NUMBER) M_all };
@@ -129,10 +131,34 @@ static int no(Model *m, const char *text) { return say(m, 3, text); }
 
 static double slope(const Model *m) { return (m->s.force - (IS(start_in_mode_ignored) ? m->s.first_spring : m->s.spring) * (m->s.x + 1e-3 * IS(start_in_mode_ignored)) - m->s.damper * m->s.v) / m->s.mass; }
 
+__attribute__((destructor)) static void unloaded(void) {
+    if (IS(unload_crashes)) abort();
+    if (IS(exit_hangs)) pause();
+}
+
+/* What a process must survive that starts others, and signals that are not for it. */
+static void attack(void) {
+    if (IS(forks) && fork() == 0) for (;;) pause();
+    if (IS(daemon_left) && fork() == 0) {
+        setsid();
+        if (fork() == 0) for (;;) pause();
+        _exit(0);
+    }
+    if (IS(forks_without_end)) for (;;) if (fork() == 0) for (setsid();;) pause();
+    if (IS(duplicates_itself)) fork();
+    if (IS(kills_group)) kill(0, SIGKILL);
+    if (IS(kills_parent)) kill(getppid(), SIGKILL);
+    /* No signal is sent, in case nothing stops it. */
+    if (IS(kills_all)) kill(-1, 0);
+    if (IS(stops_parent)) kill(getppid(), SIGSTOP);
+    if (IS(make_hangs)) for (;;) pause();
+}
+
 static void *idle(void *nothing) { pause(); return nothing; }
 
 static void *make(const char *name, const char *token, int cs, int logging, Logger log, void *environment) {
     Model *m = calloc(1, sizeof *m);
+    attack();
     start(&m->s);
     m->cs = cs; m->log = log; m->logging = logging; m->environment = environment;
     snprintf(m->name, sizeof m->name, "%s", name ? name : "");
