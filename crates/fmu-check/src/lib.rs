@@ -6,26 +6,32 @@
 //! (`run`, `worker`) and judges what came of them. What is found is shortened (`shrink`) as long as it keeps to the
 //! standard (`legal`), and written as programs (`reproduce`). `unsafe` is in `worker` alone: the process that may be lost.
 
+mod always;
 mod checker;
 mod checks;
+mod course;
 mod description;
 mod finding;
 mod legal;
 mod report;
 mod reproduce;
+mod rules;
 mod run;
 mod script;
 mod shrink;
+mod values;
 #[allow(unsafe_code, reason = "the library under attack is loaded and called here")]
 mod worker;
 mod writer;
 
+pub use checker::Unchecked;
 pub use finding::{Finding, Grade};
 pub use report::Report;
 pub use worker::work_if_asked;
 
 use anyhow::Context as _;
-use checker::{Checker, TimeOver, find_course};
+use checker::{Checker, TimeOver};
+use course::{NoCourse, find_course};
 use description::Description;
 use fmi_abi::Interface;
 use std::io::{IsTerminal as _, Write as _};
@@ -42,6 +48,10 @@ pub struct Options {
     /// states, derivatives, dependencies, results, reset, refusals, logs, resources, hostile.
     #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(checks::TOPICS))]
     pub only: Vec<String>,
+    /// Succeeds without these topics and interfaces (co-simulation, model-exchange, scheduled-execution), with commas between.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(
+        checks::TOPICS.iter().chain(&INTERFACES)))]
+    pub allow_unchecked: Vec<String>,
     /// Seconds for all of it.
     #[arg(long, default_value_t = 120.0)]
     pub time: f64,
@@ -90,8 +100,11 @@ pub enum FailOn {
     Never,
 }
 
+/// The interfaces that an FMU may offer.
+const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled-execution"];
+
 /// Checks an FMU, tells what is found and writes the reports. The exit status: 0 for nothing that is to fail, 1 for
-/// findings of a grade that is to fail, 2 if it could not be checked.
+/// findings of a grade that is to fail, 2 if it, one of its interfaces or a topic could not be checked.
 ///
 /// The program must call [`work_if_asked`] before anything else: it is started anew for every sequence of calls.
 pub fn command(fmu: &Path, options: &Options) -> ExitCode {
@@ -121,7 +134,8 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
                 FailOn::Note => worst >= Some(Grade::Note),
                 FailOn::Never => false,
             };
-            ExitCode::from(u8::from(fails))
+            let unchecked = report.unreached.iter().any(|unchecked| !unchecked.allowed);
+            ExitCode::from(if fails { 1 } else { 2 * u8::from(unchecked) })
         }
         Err(error) => {
             eprintln!("error: {error:#}");
@@ -154,31 +168,26 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
         of_files.extend(checks::package::look(folder, &description));
     }
     if wanted("description") {
-        for (name, section, seen) in &description.wrong {
-            let promise = "The model description keeps to the standard.";
-            of_files.push(Finding::of_files(name, Grade::Violation, section, promise, seen.clone()));
-        }
+        of_files.extend(description.wrong.iter().cloned());
     }
-    let setting = setting(path, options, folder, &description)?;
+    let (setting, without) = setting(options, folder, &description);
     let deadline = begin + Duration::from_secs_f64(options.time.max(1.0));
     let mut checker = Checker::new(description, setting, workers, options.seed, options.limit, deadline);
-    of_files.into_iter().for_each(|finding| checker.add(finding));
+    of_files.into_iter().for_each(|(name, seen)| checker.add(checker.claim(name).of_files(seen)));
+    without.into_iter().for_each(|(name, why)| checker.unchecked(name, why));
     for (place, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
         if checker.setting.libraries[place].is_none() {
             continue;
         }
-        let mut course = find_course(&checker, interface)?;
-        if let Err((_, script)) = &course {
-            no_course(&checker, script.clone())?;
-            // One that reads or writes beyond arrays may have more to show where there is room for it.
-            if ["arrays.read-beyond", "arrays.written-beyond"].iter().any(|name| checker.has(name)) {
-                checker.setting.soft = true;
-                course = find_course(&checker, interface)?;
-            }
-        }
-        match course {
+        match reach(&mut checker, interface) {
             Ok(course) => checker.courses.push(course),
-            Err((why, _)) => checker.unreached(format!("{interface}: no simulation of it succeeds ({why})")),
+            Err(error) if error.is::<NoCourse>() => {
+                checker.unchecked(INTERFACES[place], format!("no simulation succeeds: {error}"));
+            }
+            Err(error) if error.is::<TimeOver>() || error.is::<run::OutOfMemory>() => {
+                checker.unchecked(INTERFACES[place], error.to_string());
+            }
+            Err(error) => return Err(error),
         }
     }
     attack(&checker, progress, &wanted)?;
@@ -204,41 +213,57 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     }
     let mut report = Report::new(path, &checker, findings);
     report.seconds = begin.elapsed().as_secs_f64();
+    for unchecked in &mut report.unreached {
+        unchecked.allowed = options.allow_unchecked.contains(&unchecked.name);
+    }
+    let unwanted = checks::TOPICS.iter().filter(|topic| !wanted(topic));
+    report.unreached.extend(unwanted.map(|topic| Unchecked {
+        name: (*topic).to_owned(),
+        why: "not asked for (--only)".to_owned(),
+        allowed: true,
+    }));
     Ok(report)
 }
 
-/// Where the libraries are.
+/// A simulation that succeeds. That there is none is a finding, too.
+fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::Course> {
+    let course = find_course(checker, interface);
+    let Some(NoCourse(_, script)) = course.as_ref().err().and_then(|error| error.downcast_ref()) else {
+        return course;
+    };
+    no_course(checker, script.clone())?;
+    // One that reads or writes beyond arrays may have more to show where there is room for it.
+    if ["arrays.read-beyond", "arrays.written-beyond"].iter().any(|name| checker.has(name)) {
+        checker.setting.soft = true;
+        return find_course(checker, interface);
+    }
+    course
+}
+
+/// The libraries, and the interfaces that cannot be checked with the reason of each.
 fn setting(
-    fmu: &Path,
     options: &Options,
     folder: &Path,
     description: &Description,
-) -> anyhow::Result<script::Setting> {
-    let path = fmu.display();
+) -> (script::Setting, Vec<(&'static str, String)>) {
     let mut libraries = [None, None];
-    let offers = [&description.co_simulation, &description.model_exchange];
-    if offers.iter().all(|offer| offer.is_none()) {
-        anyhow::bail!(
-            "{path}: it has neither Co-Simulation nor Model Exchange, which are what can be checked"
-        );
+    let mut without = Vec::new();
+    if description.scheduled_execution {
+        without.push((INTERFACES[2], "fmu-check has no checks for Scheduled Execution".to_owned()));
     }
-    for (place, offer) in offers.into_iter().enumerate() {
+    for (place, offer) in [&description.co_simulation, &description.model_exchange].into_iter().enumerate() {
         let Some(offer) = offer else { continue };
         if offer.can(&["needsExecutionTool"]) && !options.execution_tool {
-            anyhow::bail!(
-                "{path}: it starts another program (needsExecutionTool); to check it all the same, give --execution-tool"
-            );
+            let why = "it starts another program (needsExecutionTool); to check it, give --execution-tool";
+            without.push((INTERFACES[place], why.to_owned()));
+            continue;
         }
-        libraries[place] = checks::package::library(folder, description.standard, offer);
+        match checks::package::library(folder, description.standard, offer) {
+            Ok(library) => libraries[place] = Some(library),
+            Err(why) => without.push((INTERFACES[place], why)),
+        }
     }
-    if libraries.iter().all(Option::is_none) {
-        let binaries = std::fs::read_dir(folder.join("binaries")).into_iter().flatten().flatten();
-        let others: Vec<String> =
-            binaries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-        let others = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
-        anyhow::bail!("{path}: it has no library for this machine; it has: {others}");
-    }
-    Ok(script::Setting {
+    let setting = script::Setting {
         fmi3: description.standard == fmi_abi::Standard::Fmi3,
         libraries,
         resources: folder.join("resources"),
@@ -246,17 +271,12 @@ fn setting(
         soft: false,
         now: false,
         repetitions: options.repeat,
-    })
+    };
+    (setting, without)
 }
 
 /// A simulation as the standard has it fails: that is the finding.
 fn no_course(checker: &Checker, script: script::Script) -> anyhow::Result<()> {
-    let claim = checker::Claim::new(
-        "life_cycle.course",
-        Grade::Violation,
-        checker.section("4.2.4 and 3.2.3", "2.3"),
-        "A simulation with the numbers of the description succeeds.",
-    );
     let copy = script.clone();
     let judge: finding::Judge = std::sync::Arc::new(move |run| {
         let ids: Vec<u32> = copy.iter().map(|numbered| numbered.id).collect();
@@ -266,10 +286,10 @@ fn no_course(checker: &Checker, script: script::Script) -> anyhow::Result<()> {
             .map(|numbered| numbered.id)
             .collect();
         let rest: Vec<u32> = ids.into_iter().filter(|id| !makes.contains(id)).collect();
-        let of_makes = makes.iter().find_map(|id| checker::refused_one(&copy, run, *id));
-        of_makes.or_else(|| checker::refused(&copy, run, &rest))
+        let of_makes = makes.iter().find_map(|id| finding::refused_one(&copy, run, *id));
+        of_makes.or_else(|| finding::refused(&copy, run, &rest))
     });
-    checker.judge(&claim, script, judge)?;
+    checker.judge("life_cycle.course", script, judge)?;
     Ok(())
 }
 
@@ -285,7 +305,7 @@ fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + S
                     match check(checker) {
                         Ok(()) => {}
                         Err(error) if error.is::<TimeOver>() || error.is::<run::OutOfMemory>() => {
-                            checker.unreached(format!("{topic}: {error}"))
+                            checker.unchecked(topic, error.to_string())
                         }
                         Err(error) => {
                             *failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(error);

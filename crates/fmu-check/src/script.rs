@@ -239,8 +239,13 @@ impl Written {
     /// The first place at which two differ.
     pub fn differ(&self, other: &Self) -> Option<usize> {
         match (self, other) {
-            (Self::Numbers(_, one), Self::Numbers(_, two)) => {
-                one.iter().zip(two).position(|(one, two)| one != two)
+            (Self::Numbers(kind, one), Self::Numbers(_, two)) => {
+                // Zeros of both signs are equal, and so are all NaNs.
+                let equal =
+                    |one: f64, two: f64| kind.is_float() && (one == two || one.is_nan() && two.is_nan());
+                one.iter()
+                    .zip(two)
+                    .position(|(one, two)| one != two && !equal(kind.number(*one), kind.number(*two)))
             }
             (Self::Texts(one), Self::Texts(two)) => one.iter().zip(two).position(|(one, two)| one != two),
             _ => Some(0),

@@ -3,9 +3,10 @@
 use crate::description::Description;
 use crate::legal::first_illegal;
 use crate::script::{Numbered, Script, Step};
+use std::collections::HashMap;
 
 /// Calls that belong together: they are left out together or not at all.
-fn units(script: &Script) -> Vec<Vec<u32>> {
+fn units(script: &[Numbered]) -> Vec<Vec<u32>> {
     let name = |numbered: &Numbered| match &numbered.step {
         Step::Call { function, .. } => function.get(4..).unwrap_or_default().to_owned(),
         _ => String::new(),
@@ -51,11 +52,36 @@ fn content(step: &Step) -> Option<String> {
     }
 }
 
+/// The calls of a script and of its threads.
+fn flat(script: &[Numbered]) -> Vec<&Numbered> {
+    script.iter().fold(Vec::new(), |mut all, numbered| {
+        all.push(numbered);
+        if let Step::Parallel(scripts) = &numbered.step {
+            all.extend(scripts.iter().flat_map(|script| flat(script)));
+        }
+        all
+    })
+}
+
+/// A script without some calls, also of its threads.
+fn without(script: &[Numbered], ids: &[u32]) -> Script {
+    let kept = script.iter().filter(|numbered| !ids.contains(&numbered.id)).cloned();
+    kept.map(|mut numbered| {
+        if let Step::Parallel(scripts) = &mut numbered.step {
+            scripts.iter_mut().for_each(|script| *script = without(script, ids));
+        }
+        numbered
+    })
+    .collect()
+}
+
 /// The same units of compared simulations are left out together: one that lacks a call differs for that alone.
 fn together(script: &Script, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
-    let of = |id: &u32| {
-        script.iter().find(|numbered| numbered.id == *id).and_then(|numbered| content(&numbered.step))
-    };
+    let contents: HashMap<u32, String> = flat(script)
+        .into_iter()
+        .filter_map(|numbered| Some((numbered.id, content(&numbered.step)?)))
+        .collect();
+    let of = |id: &u32| contents.get(id).cloned();
     let mut groups: Vec<(Vec<String>, Vec<u32>)> = Vec::new();
     for unit in units {
         let key: Vec<String> = unit.iter().filter_map(of).collect();
@@ -78,9 +104,14 @@ pub fn shrink(
 ) -> Script {
     let legal = first_illegal(description, script).is_none();
     let mut best = script.clone();
-    let mut units = if compared { together(script, units(script)) } else { units(script) };
+    let threads = script.iter().flat_map(|numbered| match &numbered.step {
+        Step::Parallel(scripts) => scripts.iter().flat_map(|script| units(script)).collect(),
+        _ => Vec::new(),
+    });
+    let all: Vec<Vec<u32>> = units(script).into_iter().chain(threads).collect();
+    let mut units = if compared { together(script, all) } else { all };
     let stays = |id: &u32| {
-        script.iter().any(|numbered| match &numbered.step {
+        flat(script).into_iter().any(|numbered| match &numbered.step {
             Step::Call { function, .. } => {
                 numbered.id == *id && pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name))
             }
@@ -95,11 +126,9 @@ pub fn shrink(
         let mut shorter = false;
         while end > 0 {
             let begin = end.saturating_sub(size);
-            let without: Vec<u32> = units[begin..end].concat();
-            let tried: Script =
-                best.iter().filter(|numbered| !without.contains(&numbered.id)).cloned().collect();
+            let tried = without(&best, &units[begin..end].concat());
             let keeps = !legal || first_illegal(description, &tried).is_none();
-            if keeps && tried.len() < best.len() && shows(&tried) {
+            if keeps && flat(&tried).len() < flat(&best).len() && shows(&tried) {
                 best = tried;
                 units.drain(begin..end);
                 shorter = true;

@@ -1,9 +1,10 @@
 //! What depends on something is declared to.
 
-use crate::checker::{Checker, Claim, near};
-use crate::finding::{Grade, Judge};
+use crate::checker::Checker;
+use crate::finding::Judge;
 use crate::script::Written;
-use crate::writer::{Read, Value, value_of};
+use crate::values::{Value, near};
+use crate::writer::{Read, value_of};
 use fmi_abi::Interface;
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -55,8 +56,6 @@ fn judge(
 /// Inputs and, in Model Exchange, states, moved one at a time.
 pub fn missing(checker: &Checker) -> anyhow::Result<()> {
     let description = &checker.description;
-    let section = checker.section("2.2.8", "2.4.8");
-    let promise = "An output or derivative that depends on an input or a state lists it in ModelStructure.";
     for course in &checker.courses {
         let listed = match course.interface {
             Interface::CoSimulation => description.outputs.clone(),
@@ -120,8 +119,11 @@ pub fn missing(checker: &Checker) -> anyhow::Result<()> {
             let after = writer.read_these(0, &unknowns);
             set(&mut writer, &value);
             let back = writer.read_these(0, &unknowns);
-            let claim = Claim::new("dependencies.missing", Grade::Violation, section, promise);
-            checker.judge(&claim, writer.script, judge(checker, known, unknowns, before, after, back))?;
+            checker.judge(
+                "dependencies.missing",
+                writer.script,
+                judge(checker, known, unknowns, before, after, back),
+            )?;
         }
     }
     Ok(())
@@ -161,13 +163,11 @@ pub fn initial(checker: &Checker) -> anyhow::Result<()> {
             let after = writer.read_these(0, &unknowns);
             writer.set(0, &[(known, Value::Numbers(value))]);
             let back = writer.read_these(0, &unknowns);
-            let claim = Claim::new(
+            checker.judge(
                 "dependencies.initial",
-                Grade::Violation,
-                checker.section("2.2.8", "2.4.8"),
-                "An initial unknown that depends on an input or an exact start value lists it in ModelStructure.",
-            );
-            checker.judge(&claim, writer.script, judge(checker, known, unknowns, before, after, back))?;
+                writer.script,
+                judge(checker, known, unknowns, before, after, back),
+            )?;
         }
     }
     Ok(())

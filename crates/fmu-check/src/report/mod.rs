@@ -2,7 +2,7 @@
 
 mod page;
 
-use crate::checker::Checker;
+use crate::checker::{Checker, Unchecked};
 use crate::finding::{Finding, Grade};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -24,8 +24,8 @@ pub struct Report {
     pub seconds: f64,
     /// Chose what was chosen at random.
     pub seed: u64,
-    /// What could not be checked, and why.
-    pub unreached: Vec<String>,
+    /// The interfaces and topics that were not checked, with the reason of each.
+    pub unreached: Vec<Unchecked>,
     /// The worst first.
     pub findings: Vec<Finding>,
 }
@@ -40,7 +40,7 @@ impl Report {
             scripts: checker.played(),
             seconds: 0.0,
             seed: checker.seed,
-            unreached: checker.take_unreached(),
+            unreached: checker.take_unchecked(),
             findings,
         }
     }
@@ -50,12 +50,21 @@ impl Report {
         self.findings.iter().filter(|finding| finding.grade == grade).count()
     }
 
+    /// The interfaces that were checked.
+    fn offers(&self) -> String {
+        if self.interfaces.is_empty() { "no interface".to_owned() } else { self.interfaces.join(" and ") }
+    }
+
     /// In a sentence.
     fn summary(&self) -> String {
         let many =
             |count: usize, one: &str, more: &str| format!("{count} {}", if count == 1 { one } else { more });
+        let unchecked = match self.unreached.iter().filter(|unchecked| !unchecked.allowed).count() {
+            0 => String::new(),
+            count => format!(", {count} not checked"),
+        };
         format!(
-            "{}, {} fragile, {}",
+            "{}, {} fragile, {}{unchecked}",
             many(self.count(Grade::Violation), "violation", "violations"),
             self.count(Grade::Fragile),
             many(self.count(Grade::Note), "note", "notes")
@@ -65,14 +74,7 @@ impl Report {
     /// For a terminal.
     pub fn terminal(&self, colours: bool) -> String {
         let mut text = String::new();
-        let _ = writeln!(
-            text,
-            "{} ({}, {}): {}",
-            self.fmu,
-            self.standard,
-            self.interfaces.join(" and "),
-            self.summary()
-        );
+        let _ = writeln!(text, "{} ({}, {}): {}", self.fmu, self.standard, self.offers(), self.summary());
         for finding in &self.findings {
             let (on, off) = match (colours, finding.grade) {
                 (false, _) => ("", ""),
@@ -95,13 +97,14 @@ impl Report {
                 (0, 0) => String::new(),
                 (_, steps) => format!("; {steps} calls show it"),
             };
-            let _ = writeln!(text, "{:36} section {}{calls}{more}", "", finding.section);
+            let section = if finding.section.is_empty() { "not in the standard" } else { &finding.section };
+            let _ = writeln!(text, "{:36} {section}{calls}{more}", "");
         }
-        for what in &self.unreached {
-            let _ = writeln!(text, "not checked: {what}");
+        for Unchecked { name, why, allowed } in &self.unreached {
+            let allowed = if *allowed { " (allowed)" } else { "" };
+            let _ = writeln!(text, "not checked{allowed}: {name}: {why}");
         }
-        let _ =
-            writeln!(text, "{} sequences of calls, {:.1} s, seed {}", self.scripts, self.seconds, self.seed);
+        let _ = writeln!(text, "{} call sequences, {:.1} s, seed {}", self.scripts, self.seconds, self.seed);
         text
     }
 
@@ -122,15 +125,24 @@ impl Report {
         };
         let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
         let failures = self.count(Grade::Violation) + self.count(Grade::Fragile);
+        let skipped = self.unreached.iter().filter(|unchecked| unchecked.allowed).count();
         let _ = writeln!(
             text,
-            "<testsuite name=\"{}\" tests=\"{}\" failures=\"{failures}\" time=\"{:.3}\">",
+            "<testsuite name=\"{}\" tests=\"{}\" failures=\"{failures}\" errors=\"{}\" skipped=\"{skipped}\" time=\"{:.3}\">",
             escape(&format!("fmu-check {}", self.model)),
-            self.findings.len().max(1),
+            self.findings.len().max(1) + self.unreached.len(),
+            self.unreached.len() - skipped,
             self.seconds
         );
         if self.findings.is_empty() {
             let _ = writeln!(text, "  <testcase classname=\"fmu-check\" name=\"no findings\"/>");
+        }
+        for Unchecked { name, why, allowed } in &self.unreached {
+            let (kind, why) = (if *allowed { "skipped" } else { "error" }, escape(why));
+            let _ = writeln!(
+                text,
+                "  <testcase classname=\"fmu-check\" name=\"{name}\"><{kind} message=\"not checked: {why}\"/></testcase>"
+            );
         }
         for finding in &self.findings {
             let _ = writeln!(
@@ -140,7 +152,7 @@ impl Report {
                 finding.name
             );
             let body = escape(&format!(
-                "{}\nSection {}: {}\n{}",
+                "{}\n{}: {}\n{}",
                 finding.seen,
                 finding.section,
                 finding.promise,

@@ -17,16 +17,15 @@ pub fn programs(finding: &mut Finding, setting: &Setting, description: &Descript
 fn head(finding: &Finding, description: &Description) -> Vec<String> {
     let mut lines = vec![
         format!(
-            "{}: {} ({}, section {} of {})",
+            "{}: {} ({}, {})",
             description.model_name,
             finding.name,
             finding.grade.name(),
-            finding.section,
-            description.standard
+            if finding.section.is_empty() { "not in the standard" } else { &finding.section }
         ),
         String::new(),
-        format!("Promised: {}", finding.promise),
-        format!("Seen: {}", finding.seen),
+        format!("Rule: {}", finding.promise),
+        format!("Observed: {}", finding.seen),
         String::new(),
     ];
     lines.iter_mut().for_each(|line| {

@@ -193,28 +193,113 @@ unsafe fn remember(environment: *mut c_void, status: c_int, category: *const c_c
     }
 }
 
-/// The logger of FMI 2.0 with the first of its `...` as an argument.
-type PlainLogger =
-    unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, *const c_char);
+/// The logger of FMI 2.0 with its `...` as arguments: integers and pointers, then floating-point numbers, which have
+/// separate registers.
+type PlainLogger = unsafe extern "C" fn(
+    *mut c_void,
+    *const c_char,
+    c_int,
+    *const c_char,
+    *const c_char,
+    usize,
+    usize,
+    usize,
+    usize,
+    f64,
+    f64,
+    f64,
+    f64,
+);
 
-/// Without its `...`, which stable Rust cannot define: named arguments travel the same way, but for Apple's ARM. The format
-/// `%s`, which takes any text as it is, stands for its argument.
+/// Without its `...`, which stable Rust cannot define: on Linux and on Macs with Intel processors, named arguments are
+/// passed the same way.
+#[allow(clippy::too_many_arguments, reason = "the values of the message")]
 unsafe extern "C" fn log_of_fmi2(
     environment: *mut c_void,
     instance_name: *const c_char,
     status: c_int,
     category: *const c_char,
     text: *const c_char,
-    first: *const c_char,
+    first: usize,
+    second: usize,
+    third: usize,
+    fourth: usize,
+    one: f64,
+    two: f64,
+    three: f64,
+    four: f64,
 ) {
-    let all_named_alike = !cfg!(all(target_vendor = "apple", target_arch = "aarch64"));
-    // SAFETY: section 2.1.5 of FMI 2.0: the texts end with zeros. The name is read as importers that show it do.
+    // SAFETY: section 2.1.5 of FMI 2.0: the strings end with NUL. The name is read as by importers that show it.
     unsafe {
         std::hint::black_box(text_at(instance_name));
-        let plain = text_at(text).as_deref() == Some(b"%s") && all_named_alike;
-        let text = if plain { first } else { text };
+        let format = text_at(text);
+        if cfg!(all(unix, not(all(target_vendor = "apple", target_arch = "aarch64"))))
+            && let Some(format) = format.filter(|format| format.contains(&b'%'))
+        {
+            let text = expanded(&format, &[first, second, third, fourth], &[one, two, three, four]);
+            let text = CString::new(text).unwrap_or_default();
+            return remember(environment, status, category, text.as_ptr());
+        }
         remember(environment, status, category, text);
     }
+}
+
+/// The message of a format of printf with its values. A conversion without a value, or that writes, stays as it is.
+///
+/// # Safety
+/// The values of `%s` are strings that end with NUL.
+#[cfg_attr(not(unix), allow(unused_variables, reason = "values are elsewhere"))]
+unsafe fn expanded(format: &[u8], mut words: &[usize], mut numbers: &[f64]) -> Vec<u8> {
+    let mut text = Vec::new();
+    let mut rest = format;
+    while let Some(at) = rest.iter().position(|byte| *byte == b'%') {
+        text.extend_from_slice(&rest[..at]);
+        rest = &rest[at..];
+        let Some(end) = rest
+            .iter()
+            .skip(1)
+            .position(|byte| byte.is_ascii_alphabetic() && !b"hlLqjzt".contains(byte) || *byte == b'%')
+        else {
+            break;
+        };
+        let (conversion, after) = rest.split_at(end + 2);
+        if let (b"%s", [word, others @ ..]) = (conversion, words) {
+            // SAFETY: the caller's promise.
+            let string = unsafe { text_at(*word as *const c_char) };
+            text.extend(string.unwrap_or_else(|| b"(null)".to_vec()));
+            (words, rest) = (others, after);
+            continue;
+        }
+        let mut room = [0_u8; 400];
+        let written = match (conversion[conversion.len() - 1], words, numbers) {
+            (b'%', ..) => {
+                room[0] = b'%';
+                1
+            }
+            _ if conversion.contains(&b'*') => break,
+            #[cfg(unix)]
+            (kind, [word, others @ ..], _) if b"diouxXcsp".contains(&kind) => {
+                words = others;
+                let format = CString::new(conversion).unwrap_or_default();
+                // SAFETY: one value of the size that the conversion has.
+                unsafe { libc::snprintf(room.as_mut_ptr().cast(), room.len(), format.as_ptr(), *word) }
+            }
+            #[cfg(unix)]
+            (kind, _, [number, others @ ..])
+                if b"eEfFgGaA".contains(&kind) && !conversion.contains(&b'L') =>
+            {
+                numbers = others;
+                let format = CString::new(conversion).unwrap_or_default();
+                // SAFETY: one number.
+                unsafe { libc::snprintf(room.as_mut_ptr().cast(), room.len(), format.as_ptr(), *number) }
+            }
+            _ => break,
+        };
+        text.extend_from_slice(&room[..usize::try_from(written).unwrap_or(0).min(room.len() - 1)]);
+        rest = after;
+    }
+    text.extend_from_slice(rest);
+    text
 }
 
 unsafe extern "C" fn log_of_fmi3(
@@ -719,4 +804,24 @@ fn location(setting: &Setting) -> CString {
 pub unsafe fn text_at(pointer: *const c_char) -> Option<Vec<u8>> {
     // SAFETY: the caller's promise.
     (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) }.to_bytes().to_vec())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::expanded;
+
+    #[test]
+    fn messages_of_fmi2_have_their_values() {
+        let (token, path) = (c"{8c4e}", c"model.fmu");
+        let words = [token.as_ptr() as usize, 7, path.as_ptr() as usize, 0];
+        // SAFETY: the values of %s are strings.
+        let text = |format: &str| unsafe {
+            String::from_utf8(expanded(format.as_bytes(), &words, &[0.5, 1e-9, 0.0, 0.0])).unwrap_or_default()
+        };
+        assert_eq!(text("Wrong GUID %s, line %d of %s"), "Wrong GUID {8c4e}, line 7 of model.fmu");
+        assert_eq!(text("t = %g, %5.1e: 100 %%"), "t = 0.5, 1.0e-09: 100 %");
+        // A conversion that writes, one that is none and one too many stay.
+        assert_eq!(text("%n %"), "%n %");
+        assert_eq!(text("%g%g%g%g%g"), "0.51e-0900%g");
+    }
 }

@@ -203,7 +203,7 @@ macro_rules! mutants {
 
 mutants! {
     2 half_set "refusals" "refusals.changed";
-    3 discard_changes "refusals" "refusals.changed";
+    3 discard_changes "refusals" "refusals.discarded";
     2 step_refused_halfway "refusals" "refusals.changed";
     2 getter_changes "results" "results.reading";
     3 reading_once "results" "results.reading";
@@ -215,7 +215,7 @@ mutants! {
     3 save_changes "states" "states.changed-by-saving";
     2 handle_not_reused "states" "states.several";
     3 freed_handle_stays "states" "states.free";
-    3 adjoint_off "derivatives" "derivatives.adjoint";
+    3 adjoint_off "derivatives" "derivatives.adjoint-digits";
     2 directional_sign "derivatives" "derivatives.directional";
     3 directional_not_linear "derivatives" "derivatives.linear";
     2 derivative_changes "derivatives" "derivatives.changed";
@@ -410,6 +410,56 @@ fn wait_until(holds: impl Fn() -> bool) {
         assert!(begin.elapsed().as_secs() < 20, "it takes too long");
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
+}
+
+/// What is not checked is in every report and fails, unless it is allowed by name.
+#[test]
+fn nothing_passes_unchecked() {
+    let both = "co-simulation,model-exchange";
+    let tool = |text: String| text.replace("<CoSimulation", "<CoSimulation needsExecutionTool=\"true\"");
+    let elsewhere = |text: String| {
+        text.replace("<ModelExchange modelIdentifier=\"wagon", "<ModelExchange modelIdentifier=\"cart")
+    };
+    let scheduled = |text: String| text.replace("<CoSimulation", "<ScheduledExecution/><CoSimulation");
+    let neither = |text: String| text.replace("modelIdentifier=\"wagon", "modelIdentifier=\"cart");
+    type Change = Box<dyn Fn(String) -> String>;
+    let cases: [(u32, Change, &str, &str); 4] = [
+        (2, Box::new(tool), "co-simulation", "needsExecutionTool"),
+        (2, Box::new(elsewhere), "model-exchange", "there is no cart"),
+        (3, Box::new(scheduled), "scheduled-execution", "Scheduled Execution"),
+        (3, Box::new(neither), both, "there is no cart"),
+    ];
+    for (fmi, change, names, why) in cases {
+        let folder = TempDir::new().expect("a folder");
+        let path = fmu(folder.path(), fmi, &library(fmi, ""), change);
+        let out = folder.path().join("out");
+        let run = |options: &[&str]| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
+            command.arg(&path).args(["--only", "functions", "--out"]).arg(&out).args(options);
+            command.output().expect("runs")
+        };
+        let output = run(&[]);
+        assert_eq!(output.status.code(), Some(2), "{names}: {output:?}");
+        for name in names.split(',') {
+            let said = String::from_utf8_lossy(&output.stdout).into_owned();
+            let all = [said, "report.json".into(), "junit.xml".into(), "report.html".into()];
+            for (place, text) in all.into_iter().enumerate() {
+                let text =
+                    if place == 0 { text } else { std::fs::read_to_string(out.join(text)).expect("it") };
+                assert!(text.contains(name) && text.contains(why), "{name}: {text}");
+            }
+        }
+        assert_eq!(run(&["--allow-unchecked", names]).status.code(), Some(0), "{names}");
+    }
+    // A hang is a violation; after it nothing of the interface is checked.
+    let folder = TempDir::new().expect("a folder");
+    let path = fmu(folder.path(), 2, &library(2, ""), |text| text);
+    let (found, report) = found(&path, "make_hangs", &["--only", "states", "--no-shrink", "--limit", "0.3"]);
+    assert!(found.iter().any(|(name, _)| name == "life_cycle.hang"), "{found:?}");
+    assert_eq!(report["findings"][0]["grade"], "violation");
+    let unchecked = report["unreached"].as_array().expect("a list").iter();
+    let names: Vec<_> = unchecked.filter(|of| of["allowed"] == false).map(|of| of["name"].clone()).collect();
+    assert_eq!(names, ["co-simulation", "model-exchange"]);
 }
 
 /// An FMU that is larger than it may be is not unpacked.
