@@ -54,6 +54,8 @@ pub struct Checker {
     pub limit: f64,
     /// When all must be over.
     pub deadline: Instant,
+    /// Whether fewer values and orders are tried.
+    pub quick: bool,
     found: Mutex<Vec<Finding>>,
     unchecked: Mutex<Vec<Unchecked>>,
     /// Kept by call sequences while they are played; a suspected hang is played again alone.
@@ -109,6 +111,7 @@ impl Checker {
             seed,
             limit,
             deadline,
+            quick: false,
             found: Mutex::default(),
             unchecked: Mutex::default(),
             alone: RwLock::default(),
@@ -120,6 +123,11 @@ impl Checker {
     /// A writer of scripts.
     pub fn writer(&self) -> Writer<'_> {
         Writer::new(&self.description)
+    }
+
+    /// As many values or orders as are tried at most: of so many, some in a quick check.
+    pub fn most(&self, many: usize) -> usize {
+        if self.quick { many.div_ceil(8) } else { many }
     }
 
     /// Whether the standard is 3.0.
@@ -333,10 +341,28 @@ impl Checker {
         event(run, id, self.fmi3())
     }
 
+    /// The setting in which a finding shows: crashes at the ends of arrays, without room after them.
+    fn hard(&self, finding: &Finding) -> Setting {
+        let ends = ["read-beyond", "written-beyond", "crash"].iter().any(|end| finding.name.ends_with(end));
+        Setting { soft: self.setting.soft && !ends, ..self.setting.clone() }
+    }
+
+    /// The programs of a finding.
+    pub fn reproduce(&self, finding: &mut Finding) -> anyhow::Result<()> {
+        let late = Instant::now() > self.deadline && self.quick;
+        if finding.judge.is_some() && !late {
+            let limit = self.limit + 3.0 * self.setting.repetitions;
+            let run = self.workers.play(&self.hard(finding), &finding.script, limit)?;
+            crate::reproduce::programs(finding, &run, &self.setting, &self.description);
+        }
+        Ok(())
+    }
+
     /// A shorter script for each finding, as long as there is time.
     pub fn shorten(&self, finding: &mut Finding) {
         finding.steps = (finding.script.len(), finding.script.len());
         let Some(judge) = finding.judge.clone() else { return };
+        let setting = self.hard(finding);
         let hangs = finding.name.ends_with("hang");
         let limit = if hangs { self.limit.min(1.5) } else { self.limit };
         let mut left = match finding.topic() {
@@ -375,7 +401,7 @@ impl Checker {
         // A shorter script may show other numbers, but not another observation.
         let (same, mut seen) = (outline(&finding.seen), finding.seen.clone());
         let mut shows = |tried: &Script| {
-            let run = self.workers.play(&self.setting, tried, limit).ok();
+            let run = self.workers.play(&setting, tried, limit).ok();
             let now = run.and_then(|run| judge(&run)).filter(|now| outline(now) == same);
             now.is_some_and(|now| {
                 seen = now;

@@ -56,6 +56,10 @@ pub struct Finding {
     /// What is still wrong when it shows.
     #[serde(skip)]
     pub judge: Option<Judge>,
+    /// Whether it fails the check.
+    pub fails: bool,
+    /// The reason for which it is accepted, if the baseline has one.
+    pub accepted: Option<String>,
     /// The steps of the script, and what they were before it was shortened.
     pub steps: (usize, usize),
 }
@@ -74,6 +78,8 @@ impl Finding {
             c: String::new(),
             python: String::new(),
             judge: None,
+            fails: false,
+            accepted: None,
             steps: (0, 0),
         }
     }

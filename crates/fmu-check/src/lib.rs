@@ -7,6 +7,7 @@
 //! standard (`legal`), and written as programs (`reproduce`). `unsafe` is in `worker` alone: the process that may be lost.
 
 mod always;
+mod baseline;
 mod checker;
 mod checks;
 mod course;
@@ -67,7 +68,17 @@ pub struct Options {
     /// Chooses the order of calls that chance chooses.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Writes report.html, report.json, junit.xml and a program in C and one in Python for each finding to this folder.
+    /// Checks a part in 30 seconds at most: neither hostile calls nor resources, and fewer values and orders of calls.
+    #[arg(long, conflicts_with = "time")]
+    pub quick: bool,
+    /// Accepts the findings in this file, which has a line for each: NAME: REASON.
+    #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
+    /// Prints a rule, its severity and its section of the standard, or all rules as a page.
+    #[arg(long, value_name = "RULE")]
+    pub explain: Option<String>,
+    /// Writes report.html, report.json, junit.xml, report.sarif and a program in C and one in Python for each finding to this
+    /// folder.
     #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
     /// Writes the report as JSON to the standard output.
@@ -100,6 +111,12 @@ pub enum FailOn {
     Never,
 }
 
+/// Seconds of a quick check; what is under way then may take a little longer.
+const QUICK: f64 = 24.0;
+
+/// Topics that a quick check leaves out.
+const LONG: [&str; 2] = ["hostile", "resources"];
+
 /// The interfaces that an FMU may offer.
 const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled-execution"];
 
@@ -108,6 +125,19 @@ const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled-exe
 ///
 /// The program must call [`work_if_asked`] before anything else: it is started anew for every sequence of calls.
 pub fn command(fmu: &Path, options: &Options) -> ExitCode {
+    if let Some(rule) = &options.explain {
+        return match rules::explain(rule) {
+            Some(text) => {
+                // A closed pipe is not an error.
+                let _ = std::io::stdout().write_all(text.as_bytes());
+                ExitCode::SUCCESS
+            }
+            None => {
+                eprintln!("error: no rule is called {rule}; --explain all prints all");
+                ExitCode::from(2)
+            }
+        };
+    }
     let progress = !options.json && std::io::stderr().is_terminal();
     worker::listen_for_interrupts();
     match check(fmu, options, progress).and_then(|report| {
@@ -126,17 +156,7 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
         }
         Ok(report)
     }) {
-        Ok(report) => {
-            let worst = report.findings.iter().map(|finding| finding.grade).max();
-            let fails = match options.fail_on {
-                FailOn::Violation => worst >= Some(Grade::Violation),
-                FailOn::Fragile => worst >= Some(Grade::Fragile),
-                FailOn::Note => worst >= Some(Grade::Note),
-                FailOn::Never => false,
-            };
-            let unchecked = report.unreached.iter().any(|unchecked| !unchecked.allowed);
-            ExitCode::from(if fails { 1 } else { 2 * u8::from(unchecked) })
-        }
+        Ok(report) => ExitCode::from(report.status),
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::from(if worker::interrupted() { 130 } else { 2 })
@@ -150,6 +170,7 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
 /// When it is no FMU of FMI 2.0 or 3.0, or has no library for this machine.
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
+    let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
     let scratch = tempfile::Builder::new().prefix("fmu-check-").tempdir()?;
     // The workers end, and write nothing any more, before the directory is removed.
     let workers = run::Workers::new(scratch.path().to_owned())?;
@@ -158,21 +179,33 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     let text = std::fs::read(folder.join("modelDescription.xml")).with_context(|| {
         format!("{}: there is no modelDescription.xml in it; it is no FMU", path.display())
     })?;
-    let text = String::from_utf8_lossy(&text);
+    let encoding = encoding(&text);
+    // Other encodings are read for the checks that follow.
+    let text = match std::str::from_utf8(&text) {
+        Ok(text) => text.to_owned(),
+        Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
+    };
     let description = Description::parse(text.trim_start_matches('\u{feff}'))
         .map_err(|why| anyhow::anyhow!("{}: {why}", path.display()))?;
-    let wanted = |topic: &str| options.only.is_empty() || options.only.iter().any(|only| only == topic);
+    let wanted = |topic: &str| match options.only.is_empty() {
+        true => !options.quick || !LONG.contains(&topic),
+        false => options.only.iter().any(|only| only == topic),
+    };
     let mut of_files = Vec::new();
     if wanted("package") {
         of_files.extend(of_zip);
         of_files.extend(checks::package::look(folder, &description));
     }
     if wanted("description") {
+        of_files.extend(encoding);
         of_files.extend(description.wrong.iter().cloned());
     }
     let (setting, without) = setting(options, folder, &description);
-    let deadline = begin + Duration::from_secs_f64(options.time.max(1.0));
-    let mut checker = Checker::new(description, setting, workers, options.seed, options.limit, deadline);
+    let time = if options.quick { QUICK } else { options.time.max(1.0) };
+    let deadline = begin + Duration::from_secs_f64(time);
+    let limit = if options.quick { options.limit.min(QUICK / 10.0) } else { options.limit };
+    let mut checker = Checker::new(description, setting, workers, options.seed, limit, deadline);
+    checker.quick = options.quick;
     of_files.into_iter().for_each(|(name, seen)| checker.add(checker.claim(name).of_files(seen)));
     without.into_iter().for_each(|(name, why)| checker.unchecked(name, why));
     for (place, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
@@ -213,16 +246,33 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     }
     let mut report = Report::new(path, &checker, findings);
     report.seconds = begin.elapsed().as_secs_f64();
-    for unchecked in &mut report.unreached {
-        unchecked.allowed = options.allow_unchecked.contains(&unchecked.name);
-    }
+    let why = if options.only.is_empty() { "left out (--quick)" } else { "not asked for (--only)" };
     let unwanted = checks::TOPICS.iter().filter(|topic| !wanted(topic));
     report.unreached.extend(unwanted.map(|topic| Unchecked {
         name: (*topic).to_owned(),
-        why: "not asked for (--only)".to_owned(),
+        why: why.to_owned(),
         allowed: true,
     }));
+    report.judge(options, &baseline);
     Ok(report)
+}
+
+/// What is wrong with the encoding of a model description, by its first line and its bytes.
+fn encoding(text: &[u8]) -> Option<rules::Observation> {
+    let declaration = text.split(|byte| *byte == b'>').next().unwrap_or_default();
+    let declaration = String::from_utf8_lossy(declaration);
+    let declared =
+        declaration.split_once("encoding=").and_then(|(_, rest)| rest.get(1..)?.split(['"', '\'']).next());
+    let why = match declared {
+        Some(name) if !name.eq_ignore_ascii_case("utf-8") => {
+            format!("the encoding of modelDescription.xml is {name}")
+        }
+        _ if std::str::from_utf8(text).is_err() => {
+            "modelDescription.xml has bytes that are not UTF-8".to_owned()
+        }
+        _ => return None,
+    };
+    Some(("description.encoding", why))
 }
 
 /// A simulation that succeeds. That there is none is a finding, too.
@@ -350,9 +400,8 @@ fn shorten(checker: &Checker, findings: &mut [Finding], options: &Options, progr
                         eprint!("\rthe shortest calls for {count} findings: {:40}", finding.name);
                         let _ = std::io::stderr().flush();
                     }
-                    if finding.judge.is_some() {
-                        reproduce::programs(&mut finding, &checker.setting, &checker.description);
-                    }
+                    // Without a run there is no program; the finding stays.
+                    let _ = checker.reproduce(&mut finding);
                 }
             });
         }

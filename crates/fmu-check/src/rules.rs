@@ -39,6 +39,33 @@ impl Rule {
     }
 }
 
+/// Sentences of the standard: a rule, the FMI version, the section, the text.
+#[rustfmt::skip]
+const QUOTES: &[(&str, u8, &str, &str)] = &[
+    ("description.encoding", 2, "2.2", "The first line of an XML file, such as modelDescription.xml, must contain the encoding scheme of the XML file. It is required that the encoding scheme is always UTF-8."),
+    ("description.start", 2, "2.2.7", "If initial = \"exact\" or \"approx\", or causality = \"input\", a start value must be provided."),
+    ("description.structure", 2, "2.2.8", "Ordered list of all outputs, in other words, a list of ScalarVariable indices where every corresponding ScalarVariable must have causality = \"output\" (and every variable with causality=\"output\" must be listed here)."),
+    ("life_cycle.course", 3, "2.3.1", "For FMUs that have clocks, eventModeUsed = fmi3True is required."),
+    ("life_cycle.free-null", 2, "2.1.5", "If a null pointer is provided for c, the function call is ignored (does not have an effect)."),
+    ("life_cycle.states-changed", 2, "3.2.2", "If valuesOfContinuousStatesChanged = fmi2True, then at least one element of the continuous state vector has changed its value due to the function call."),
+    ("life_cycle.stop-time", 3, "2.3.2", "If the environment tries to compute past stopTime, the FMU has to return fmi3Status = fmi3Error."),
+    ("logs.category", 3, "2.3.1", "The allowed values for category are defined in the modelDescription.xml file via the element <LogCategories>. If the FMU does not define any log categories, category must be NULL."),
+    ("logs.off", 3, "2.3.1", "logMessage must only be called for log categories that were enabled by calls to fmi3SetDebugLogging or via loggingOn = fmi3True in fmi3Instantiate."),
+    ("logs.silent", 3, "2.3.1", "If a function does not return fmi3OK, it must provide the reason by calling logMessage at least once with this status."),
+    ("refusals.discarded", 3, "2.2.4", "The call was not successful and the FMU is in the same state as before the call."),
+    ("reset.incomplete", 2, "2.1.6", "The FMU goes into the same state as if fmi2Instantiate would have been called."),
+    ("reset.values", 2, "2.1.6", "All variables have their default values."),
+    ("resources.settings", 3, "2.2.1", "FMI functions must not change global settings which affect other processes/threads."),
+    ("results.early-return", 3, "2.3.1", "If earlyReturnAllowed = fmi3True the importer can handle early return. Only in this case, fmi3DoStep may return with earlyReturn = fmi3True."),
+    ("results.threads", 2, "2.1", "FMI functions of one instance do not need to be thread-safe."),
+    ("start_values.start", 2, "2.2.7", "If fmiSetXXX is not called on a variable with causality = \"input\", then the FMU must use the start value as value of this input."),
+    ("states.changed-by-saving", 2, "2.1.8", "fmi2GetFMUstate makes a copy of the internal FMU state and returns a pointer to this copy (FMUstate)."),
+    ("states.free", 2, "2.1.8", "If a null pointer is provided, the call is ignored. The function returns a null pointer in argument FMUstate."),
+    ("states.restore-values", 2, "2.1.8", "fmi2SetFMUstate copies the content of the previously copied FMUstate back and uses it as actual new FMU state."),
+    ("states.several", 2, "2.1.8", "If *FMUstate != NULL, then *FMUstate points to a previously returned FMUstate that has not been modified since."),
+    ("states.twice", 2, "2.1.8", "The FMUstate copy still exists."),
+];
+
 const fn rule(
     name: &'static str,
     grades: [Grade; 2],
@@ -57,6 +84,35 @@ pub fn find(name: &str) -> Option<&'static Rule> {
         same(base).or_else(|| end.filter(|_| crate::checks::TOPICS.contains(&base)))
     };
     same(name).or_else(|| of_end(name.rsplit_once('.')?))
+}
+
+/// A rule as text, or all of them as a page; `None` if there is no such rule.
+pub fn explain(name: &str) -> Option<String> {
+    if name != "all" {
+        return find(name).map(|rule| page(rule, name));
+    }
+    let begin = "# Rules of fmu-check\n\nThe rules for the end of a process (`*`) hold in every topic: `states.crash` is a crash \
+        in a call that tests saved states. `fmu-check --explain all` prints this page.\n";
+    Some(RULES.iter().fold(begin.to_owned(), |text, rule| text + "\n" + &page(rule, rule.name)))
+}
+
+fn page(rule: &Rule, name: &str) -> String {
+    let (standards, mut lines) = ([Standard::Fmi2, Standard::Fmi3], Vec::new());
+    for standard in standards {
+        let grade = rule.grade(standard).name();
+        match rule.section(standard) {
+            section if section.is_empty() => {
+                lines.push(format!("* {standard}: {grade}, not in the standard"))
+            }
+            section => lines.push(format!("* {grade} in {section}")),
+        }
+    }
+    let quote = QUOTES.iter().find(|(of, ..)| *of == rule.name);
+    let quote = quote.map_or(String::new(), |(_, standard, section, text)| {
+        let edition = EDITIONS[usize::from(*standard == 3)];
+        format!("\n> {text}\n>\n> {edition} section {section}\n")
+    });
+    format!("## {name}\n\n{}\n\n{}\n{quote}", rule.promise, lines.join("\n"))
 }
 
 const SAVING: [&str; 2] = ["2.1.8", "2.2.7.4"];
@@ -91,8 +147,10 @@ pub static RULES: &[Rule] = &[
     rule("derivatives.directional", [V; 2], DERIVATIVES, "Partial derivatives are those of the model, as differences of its values show them."),
     rule("derivatives.linear", [V; 2], DERIVATIVES, "Directional derivatives are linear in the seed."),
     rule("derivatives.nominals", [V; 2], ["3.2.2", "3.2.1"], "Nominal values of states are greater than zero."),
+    rule("derivatives.order", [V; 2], DERIVATIVES, "Partial derivatives are those of the variables in the order of the call."),
     rule("derivatives.precision", [N; 2], DERIVATIVES, "Partial derivatives are as exact as differences of the model's values can show; less exact ones may be differences themselves."),
     rule("derivatives.vectors", [V; 2], ["3.2.2", "3.2.1"], "The vectors of states and derivatives have the values of their variables, in the order of ModelStructure."),
+    rule("description.encoding", [V; 2], ["2.2", "2.4"], "modelDescription.xml is encoded in UTF-8."),
     rule("description.experiment", [V; 2], ["2.2.5", "2.4.6"], "The default experiment ends after its start."),
     rule("description.identifier", [V; 2], ["2.1.1", "2.2.2"], "modelIdentifier is a name in C."),
     rule("description.interfaces", [V; 2], ["2.2.1", "2.4.1"], "The FMU offers at least one interface type."),
@@ -123,6 +181,7 @@ pub static RULES: &[Rule] = &[
     rule("life_cycle.next-event-time", [F; 2], EVENTS, "The next time event is in the future: importers integrate up to it."),
     rule("life_cycle.refused", [V; 2], MACHINES, "A call that the state machine allows, with valid arguments, succeeds."),
     rule("life_cycle.states-changed", [V; 2], EVENTS, "An event that changes continuous states reports valuesOfContinuousStatesChanged; otherwise importers do not read them."),
+    rule("life_cycle.stop-time", [V; 2], ["2.1.6", "2.3.2"], "A step beyond the stop time returns Error."),
     rule("life_cycle.token", [N; 2], CREATION, "Instantiation fails for a guid or instantiationToken that is not that of the model description."),
     rule("life_cycle.unload", [V; 2], CREATION, "A library whose instances were freed can be unloaded and loaded again."),
     rule("logs.category", [N, V], CREATION, "The category of a message is one of LogCategories, or NULL if there are none. FMI 2.0 requires that from edition 2.0.3 on, and the model description does not contain the edition."),
@@ -228,7 +287,7 @@ pub fn claim(standard: Standard, name: &str) -> Claim {
 
 #[cfg(test)]
 mod tests {
-    use super::{RULES, find};
+    use super::{QUOTES, RULES, explain, find};
 
     #[test]
     fn every_rule_is_written_once_in_order_with_a_topic() {
@@ -247,6 +306,19 @@ mod tests {
         assert_eq!(of_script, Some("states.fresh-process"));
         assert_eq!(find("states.restore").map(|rule| rule.name), Some("states.restore"));
         assert!(find("nothing.crash").is_none() && find("states.nothing").is_none());
+    }
+
+    /// The page in the documentation is the one that `--explain all` prints.
+    #[test]
+    fn the_page_has_all_rules() {
+        let written = include_str!("../RULES.md");
+        assert_eq!(
+            explain("all").as_deref(),
+            Some(written),
+            "fmu-check --explain all > crates/fmu-check/RULES.md"
+        );
+        assert!(QUOTES.iter().all(|(name, ..)| RULES.iter().any(|rule| rule.name == *name)));
+        assert!(explain("states.nothing").is_none());
     }
 
     /// The sources name no rule that is not in the table.

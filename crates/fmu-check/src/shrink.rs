@@ -93,7 +93,7 @@ fn together(script: &Script, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
     groups.into_iter().map(|(_, ids)| ids).collect()
 }
 
-/// Leaves out what is not needed for `shows` to hold, as long as the rest keeps to the standard. Calls of `pinned`
+/// Leaves out the calls that are not needed for `shows` to hold, as long as the rest keeps to the standard. Calls of `pinned`
 /// functions stay; what is the same in simulations that are compared goes together.
 pub fn shrink(
     description: &Description,
@@ -140,4 +140,93 @@ pub fn shrink(
         }
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{flat, shrink};
+    use crate::description::Description;
+    use crate::legal::first_illegal;
+    use crate::script::{Numbered, Script, Step};
+    use crate::values::Value;
+    use crate::writer::{Course, Point, Writer};
+    use fmi_abi::Interface;
+
+    fn description() -> Description {
+        let text = "<fmiModelDescription fmiVersion='2.0' guid='g' modelName='m'><CoSimulation modelIdentifier='m'/>\
+            <ModelVariables><ScalarVariable name='u' valueReference='1' causality='input'><Real start='0'/>\
+            </ScalarVariable></ModelVariables></fmiModelDescription>";
+        Description::parse(text).expect("a model description")
+    }
+
+    fn course() -> Course {
+        let point = |number: usize| {
+            let inputs = vec![(0, Value::Numbers(vec![number as f64]))];
+            Point { time: number as f64, size: 1.0, inputs, ..Point::default() }
+        };
+        let points = (0..6).map(point).collect();
+        Course { interface: Interface::CoSimulation, updates: 0, points, end: 6.0 }
+    }
+
+    fn played(writer: &mut Writer, of: usize, course: &Course) {
+        writer.begin(of, course);
+        for point in &course.points {
+            writer.point(of, course, point);
+            writer.ask(of, course.interface);
+        }
+        writer.free(of);
+    }
+
+    fn names(script: &[Numbered]) -> Vec<String> {
+        flat(script).into_iter().map(|numbered| crate::finding::step_name(&numbered.step)).collect()
+    }
+
+    fn count(script: &Script, name: &str) -> usize {
+        names(script).iter().filter(|of| *of == name).count()
+    }
+
+    #[test]
+    fn what_is_left_is_needed_and_legal() {
+        let (description, course) = (description(), course());
+        let mut writer = Writer::new(&description);
+        played(&mut writer, 0, &course);
+        let short = shrink(&description, &writer.script, &[], false, |tried| count(tried, "fmi2DoStep") >= 2);
+        let calls = ["the instantiation", "fmi2SetupExperiment", "fmi2EnterInitializationMode"];
+        let rest = ["fmi2ExitInitializationMode", "fmi2DoStep", "fmi2DoStep"];
+        assert_eq!(names(&short), [calls, rest].concat());
+        assert_eq!(first_illegal(&description, &short), None);
+    }
+
+    #[test]
+    fn nothing_is_left_out_that_is_pinned() {
+        let (description, course) = (description(), course());
+        let mut writer = Writer::new(&description);
+        played(&mut writer, 0, &course);
+        let short = shrink(&description, &writer.script, &["SetReal"], false, |_| true);
+        assert_eq!((count(&short, "fmi2SetReal"), count(&short, "fmi2DoStep")), (6, 0));
+    }
+
+    /// A simulation that is compared with others on threads loses no call that these keep.
+    #[test]
+    fn compared_simulations_stay_alike() {
+        let (description, course) = (description(), course());
+        let mut writer = Writer::new(&description);
+        played(&mut writer, 0, &course);
+        let mut thread = Writer { next: writer.next, ..Writer::new(&description) };
+        played(&mut thread, 1, &course);
+        writer.next = thread.next;
+        writer.add(Step::Parallel(vec![thread.script]));
+        let parallel =
+            |script: &Script| matches!(script.last(), Some(Numbered { step: Step::Parallel(_), .. }));
+        let shows = |tried: &Script| parallel(tried) && count(tried, "fmi2DoStep") >= 4;
+        let short = shrink(&description, &writer.script, &[], true, shows);
+        let Some(Step::Parallel(threads)) = short.last().map(|numbered| &numbered.step) else {
+            panic!("{short:?}")
+        };
+        let alone = short[..short.len() - 1].to_vec();
+        for name in ["fmi2DoStep", "fmi2SetReal"] {
+            assert_eq!(count(&alone, name), count(&threads[0], name), "{name}");
+        }
+        assert_eq!(count(&alone, "fmi2DoStep"), 2);
+    }
 }

@@ -79,6 +79,9 @@ pub fn is_read(read: &Written, value: &Value) -> bool {
 pub fn input_values(description: &Description, phase: usize, discrete: bool) -> Vec<(usize, Value)> {
     let mut values = Vec::new();
     for (place, variable) in description.variables.iter().enumerate() {
+        if values.len() == 1000 {
+            break;
+        }
         let (Some(size), true) = (variable.size, variable.causality == "input" && !variable.clocked) else {
             continue;
         };

@@ -405,14 +405,39 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// The variables that can be read at any time: no clocks, none whose size is not known.
+/// Variables that most checks read at most.
+pub const READ: usize = 1000;
+
+/// The variables that can be read at any time: no clocks, none whose size is not known. Of more than a thousand, inputs,
+/// outputs and derivatives come first, and others are taken at equal distances.
 pub fn readable(description: &Description) -> Vec<usize> {
-    (0..description.variables.len())
-        .filter(|place| {
-            let variable = &description.variables[*place];
-            variable.base.is_some() && variable.size.is_some()
-        })
-        .collect()
+    sample(description, READ)
+}
+
+/// So many of the variables that can be read at any time.
+pub fn sample(description: &Description, most: usize) -> Vec<usize> {
+    let known = |place: &usize| {
+        let variable = &description.variables[*place];
+        variable.base.is_some() && variable.size.is_some()
+    };
+    let all: Vec<usize> = (0..description.variables.len()).filter(known).collect();
+    if all.len() <= most {
+        return all;
+    }
+    let first = |place: &usize| {
+        let variable = &description.variables[*place];
+        ["input", "output", "independent"].contains(&variable.causality.as_str())
+            || variable.derivative_of.is_some()
+    };
+    let (first, others): (Vec<usize>, Vec<usize>) = all.into_iter().partition(first);
+    let evenly = |from: Vec<usize>, most: usize| -> Vec<usize> {
+        let step = from.len().div_ceil(most.max(1)).max(1);
+        from.into_iter().step_by(step).collect()
+    };
+    let mut found = evenly(first, most / 2);
+    found.extend(evenly(others, most - found.len()));
+    found.sort_unstable();
+    found
 }
 
 /// The first difference between what was read here and there: the variable and both values.

@@ -75,7 +75,7 @@ pub fn missing(checker: &Checker) -> anyhow::Result<()> {
                 && !variable.clocked
         });
         let knowns: Vec<usize> =
-            inputs.chain(if scalar { states.clone() } else { Vec::new() }).take(60).collect();
+            inputs.chain(if scalar { states.clone() } else { Vec::new() }).take(checker.most(60)).collect();
         let to = course.points.len() / 2;
         let mut writer = checker.writer();
         writer.begin(0, course);
@@ -144,7 +144,7 @@ pub fn initial(checker: &Checker) -> anyhow::Result<()> {
                     && !variable.starts().is_empty()
                     && !variable.clocked
             })
-            .take(60)
+            .take(checker.most(60))
             .collect();
         for known in knowns {
             let unknowns = undeclared(checker, &description.initial_unknowns, known);

@@ -9,22 +9,18 @@ use crate::writer::{Course, Read, Writer, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
 
-/// Scalar unknowns and knowns that are continuous, and what each unknown may depend on.
-pub fn pairs(description: &Description, interface: Interface) -> Vec<(usize, usize)> {
+/// A scalar unknown and a known that are continuous, of which the unknown may depend on the known.
+pub fn pair(description: &Description, interface: Interface) -> Option<(usize, usize)> {
     let unknowns = unknowns(description, interface);
     let knowns = knowns(description, interface);
-    let listed = description.outputs.iter().chain(&description.derivatives);
-    let mut pairs = Vec::new();
-    for unknown in listed.filter(|unknown| unknowns.contains(&unknown.variable)) {
-        for known in &knowns {
-            let depends =
-                unknown.dependencies.as_ref().is_none_or(|list| list.iter().any(|(place, _)| place == known));
-            if depends && !pairs.contains(&(unknown.variable, *known)) {
-                pairs.push((unknown.variable, *known));
-            }
-        }
-    }
-    pairs
+    let mut listed = description.outputs.iter().chain(&description.derivatives);
+    listed.find_map(|unknown| {
+        let depends = |known: &&usize| {
+            unknown.dependencies.as_ref().is_none_or(|list| list.iter().any(|(place, _)| place == *known))
+        };
+        let known = knowns.iter().find(depends).filter(|_| unknowns.contains(&unknown.variable))?;
+        Some((unknown.variable, *known))
+    })
 }
 
 fn continuous(description: &Description, place: usize) -> bool {
@@ -42,6 +38,7 @@ fn unknowns(description: &Description, interface: Interface) -> Vec<usize> {
     let listed = description.outputs.iter().chain(derivatives).map(|unknown| unknown.variable);
     let mut found: Vec<usize> = listed.filter(|place| continuous(description, *place)).collect();
     found.dedup();
+    found.truncate(200);
     found
 }
 
@@ -106,7 +103,7 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
         let description = &checker.description;
         let unknowns = unknowns(description, interface);
         let mut knowns = knowns(description, interface);
-        knowns.truncate(40);
+        knowns.truncate(checker.most(40));
         if unknowns.is_empty() || knowns.is_empty() {
             continue;
         }
@@ -235,9 +232,38 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
                 }
             }
         }
+        if has_directional {
+            order(checker, course, &of_unknowns, &of_knowns)?;
+        }
         let by_column = has_directional;
         differences(checker, course, &unknowns, &knowns, by_column)?;
     }
+    Ok(())
+}
+
+/// The same derivatives in another order of unknowns and knowns.
+fn order(checker: &Checker, course: &Course, unknowns: &[u32], knowns: &[u32]) -> anyhow::Result<()> {
+    let reversed = |list: &[u32]| list.iter().rev().copied().collect::<Vec<_>>();
+    let seed: Vec<f64> = (1..=knowns.len()).map(|number| number as f64).collect();
+    let back: Vec<f64> = seed.iter().rev().copied().collect();
+    let mut writer = checker.writer();
+    amid(&mut writer, course);
+    let name = "GetDirectionalDerivative";
+    let one = derivative(&mut writer, name, unknowns, knowns, &seed, unknowns.len());
+    let other = derivative(&mut writer, name, &reversed(unknowns), &reversed(knowns), &back, unknowns.len());
+    let judge: Judge = Arc::new(move |run| {
+        let numbers = |id: u32| run.written(id).filter(|_| run.status(id) == Some(0)).map(|of| of.numbers());
+        let (one, other) = (numbers(one)?, numbers(other)?);
+        let scale = one.iter().fold(0.0_f64, |most, number| most.max(number.abs()));
+        let off = |(one, other): (&f64, &f64)| (one - other).abs() > 1e-6 * scale;
+        let at = one.iter().zip(other.iter().rev()).position(off)?;
+        let (is, reversed) = (one[at], other[other.len() - 1 - at]);
+        Some(format!(
+            "derivative {} is {is:?}, and {reversed:?} when variables are named in reverse order",
+            at + 1
+        ))
+    });
+    checker.judge("derivatives.order", writer.script, judge)?;
     Ok(())
 }
 

@@ -118,8 +118,7 @@ fn capabilities(checker: &Checker, interface: Interface) -> anyhow::Result<()> {
         ids.push(writer.drop_state(0, 0));
         asked.push(("canGetAndSetFMUstate and canSerializeFMUstate", ids, writer));
     }
-    let pairs = super::derivatives::pairs(&checker.description, interface);
-    if let Some((unknown, known)) = pairs.first() {
+    if let Some((unknown, known)) = super::derivatives::pair(&checker.description, interface) {
         let reference = |place: usize| {
             Arg::In(Kind::U32, vec![u64::from(checker.description.variables[place].reference)])
         };
@@ -134,12 +133,12 @@ fn capabilities(checker: &Checker, interface: Interface) -> anyhow::Result<()> {
             let mut writer = checker.writer();
             writer.begin(0, course);
             let (seeds, results) = if function.contains("Adjoint") {
-                (sizes(*unknown), sizes(*known))
+                (sizes(unknown), sizes(known))
             } else {
-                (sizes(*known), sizes(*unknown))
+                (sizes(known), sizes(unknown))
             };
             let seed = Arg::In(Kind::F64, vec![1_f64.to_bits(); seeds]);
-            let mut args = vec![reference(*unknown), Arg::Whole(1), reference(*known), Arg::Whole(1), seed];
+            let mut args = vec![reference(unknown), Arg::Whole(1), reference(known), Arg::Whole(1), seed];
             if checker.fmi3() {
                 args.push(Arg::Whole(seeds as i64));
             }

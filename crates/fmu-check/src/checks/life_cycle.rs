@@ -88,8 +88,15 @@ pub fn orders(checker: &Checker) -> anyhow::Result<()> {
         });
         if checker.several(interface) {
             order(&|writer| {
+                // More than a pool may have.
+                for of in 4..20 {
+                    writer.make(of, interface);
+                }
                 for of in 0..4 {
                     writer.begin(of, course);
+                }
+                for of in 4..20 {
+                    writer.free(of);
                 }
                 writer.free(0);
                 points(writer, 1, 2);
@@ -199,8 +206,32 @@ pub fn orders(checker: &Checker) -> anyhow::Result<()> {
         }
         token(checker, course)?;
         unload(checker, course)?;
+        beyond(checker, course)?;
     }
     super::hostile::free_null(checker)
+}
+
+/// A step that goes beyond the stop time fails.
+fn beyond(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let Some(last) = course.points.last().filter(|_| course.interface == Interface::CoSimulation) else {
+        return Ok(());
+    };
+    let mut writer = checker.writer();
+    writer.make(0, course.interface);
+    writer.enter_with(0, None, checker.description.start_time, Some(course.end));
+    let mut ids = writer.leave(0, course);
+    for point in &course.points {
+        ids.extend(writer.point(0, course, point));
+    }
+    writer.forbidden = true;
+    let id = writer.step(0, course.end, last.size);
+    let end = course.end;
+    let judge: Judge = Arc::new(move |run| {
+        let good = |id: &u32| run.status(*id).is_some_and(|status| status <= 1);
+        (ids.iter().all(good) && good(&id)).then(|| format!("a step from the stop time {end:?} on succeeds"))
+    });
+    checker.judge("life_cycle.stop-time", writer.script, judge)?;
+    Ok(())
 }
 
 /// After all instances were freed, the library can be unloaded and loaded again, and the process can exit.
@@ -247,7 +278,7 @@ pub fn random(checker: &Checker) -> anyhow::Result<()> {
         (state >> 33) as usize % below
     };
     for course in &checker.courses {
-        for _ in 0..20 {
+        for _ in 0..checker.most(20) {
             let mut writer = checker.writer();
             // Nothing, initializing, in the course at a point, terminated.
             let (mut mode, mut at) = (0, 0);

@@ -244,10 +244,42 @@ fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String
     };
     let foreign: Vec<&String> =
         libraries.iter().filter(|library| !of_system(library) && !folder.join(library).exists()).collect();
+    let unlinked = unlinked(&bytes).unwrap_or_default();
+    if libraries.iter().all(|library| of_system(library)) && !unlinked.is_empty() {
+        let list = unlinked.join(", ");
+        let seen =
+            format!("binaries/{platform}/{name} needs {list}, which none of the libraries that it names has");
+        tell("package.symbols", seen);
+    }
     if !foreign.is_empty() {
         let list: Vec<&str> = foreign.iter().map(|name| name.as_str()).collect();
         tell("package.needs", format!("binaries/{platform}/{name} needs {}", list.join(", ")));
     }
+}
+
+/// Functions that a library for Linux needs from no library in particular: those without a version, where others have one.
+/// The program that loads the library may happen to have them.
+fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
+    use object::read::elf::{FileHeader as _, Sym as _};
+    let header = object::elf::FileHeader64::<object::Endianness>::parse(bytes)?;
+    let endian = header.endian()?;
+    let sections = header.sections(endian, bytes)?;
+    let symbols = sections.symbols(endian, bytes, object::elf::SHT_DYNSYM)?;
+    let Some(versions) = sections.versions(endian, bytes)? else { return Ok(Vec::new()) };
+    let (mut found, mut versioned) = (Vec::new(), false);
+    for (index, symbol) in symbols.enumerate() {
+        if !symbol.is_undefined(endian) || symbol.st_bind() != object::elf::STB_GLOBAL {
+            continue;
+        }
+        // 0 and 1 are no versions.
+        if versions.version_index(endian, index).index() > object::elf::VER_NDX_GLOBAL {
+            versioned = true;
+        } else {
+            found.push(String::from_utf8_lossy(symbol.name(endian, symbols.strings())?).into_owned());
+        }
+    }
+    found.retain(|name| versioned && !name.is_empty());
+    Ok(found)
 }
 
 /// The newest version of glibc that it needs.

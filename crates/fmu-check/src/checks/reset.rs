@@ -60,7 +60,7 @@ fn changed(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<
     }
     // What a model may refuse apart, and not for long.
     after_values(checker, course, &values, true)?;
-    for other in others.chunks(1).take(40) {
+    for other in others.chunks(1).take(checker.most(40)) {
         after_values(checker, course, other, false)?;
     }
     Ok(())

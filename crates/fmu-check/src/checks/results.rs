@@ -148,7 +148,42 @@ pub fn reading(checker: &Checker) -> anyhow::Result<()> {
             Arc::new(move |run| twice(run).or_else(|| alone(run)).or_else(|| changed(run)));
         checker.judge("results.reading", writer.script, all_three)?;
         repeated(checker, course, &all)?;
+        first(checker, course)?;
     }
+    Ok(())
+}
+
+/// Each output read first after a step, in a separate instance.
+fn first(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let variables = &checker.description.variables;
+    let outputs =
+        readable(&checker.description).into_iter().filter(|place| variables[*place].causality == "output");
+    let mut writer = checker.writer();
+    let start = |writer: &mut Writer| {
+        writer.begin(0, course);
+        for point in course.points.iter().take(3) {
+            writer.point(0, course, point);
+        }
+    };
+    start(&mut writer);
+    let together = writer.read(0);
+    writer.free(0);
+    let mut alone = Vec::new();
+    for output in outputs.take(checker.most(16)) {
+        start(&mut writer);
+        alone.push((output, writer.read_these(0, &[output])));
+        writer.free(0);
+    }
+    let description = checker.description.clone();
+    let judge: Judge = Arc::new(move |run| {
+        alone.iter().find_map(|(output, reads)| {
+            let (one, other) = (value_of(run, reads, *output)?, value_of(run, &together, *output)?);
+            let at = one.differ(&other)?;
+            let name = &description.variables[*output].name;
+            Some(format!("{name} is {} read first and {} read after others", one.show(at), other.show(at)))
+        })
+    });
+    checker.judge("results.reading", writer.script, judge)?;
     Ok(())
 }
 

@@ -6,7 +6,7 @@ use crate::finding::Judge;
 use crate::script::Written;
 use crate::values::{Value, is_read, other_values};
 use crate::worker::FILL;
-use crate::writer::{Course, Writer, readable, value_of};
+use crate::writer::{Course, Writer, readable, sample, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
 
@@ -17,11 +17,12 @@ pub fn starts(checker: &Checker) -> anyhow::Result<()> {
         let mut writer = checker.writer();
         writer.make(0, course.interface);
         writer.enter(0);
-        let reads = writer.read(0);
+        let reads = writer.read_these(0, &sample(description, 10_000));
         let all = reads.clone();
         let variables = description.variables.clone();
         let judge: Judge = Arc::new(move |run| {
-            for (place, variable) in variables.iter().enumerate() {
+            for (place, _) in all.iter().flat_map(|read| read.of.iter().copied()) {
+                let variable = &variables[place];
                 let fixed = variable.initial == "exact" || variable.causality == "input";
                 let (true, Some(base)) =
                     (fixed && !variable.start.is_empty() && !variable.clocked, variable.base)
@@ -128,7 +129,8 @@ fn values(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<(
         let (variables, reads) = (variables.clone(), reads.clone());
         let judge: Judge = Arc::new(move |run| {
             for reads in &reads {
-                for (place, variable) in variables.iter().enumerate() {
+                for (place, _) in reads.iter().flat_map(|read| read.of.iter().copied()) {
+                    let variable = &variables[place];
                     if variable.clocked {
                         continue;
                     }
@@ -206,7 +208,7 @@ pub fn set(checker: &Checker) -> anyhow::Result<()> {
         let alone = places
             .iter()
             .filter(|place| !description.variables[**place].is_float())
-            .take(40)
+            .take(checker.most(40))
             .flat_map(|place| {
                 // Longer than buffers are.
                 let long =
@@ -229,7 +231,7 @@ pub fn set(checker: &Checker) -> anyhow::Result<()> {
             }
         }
         // At a communication point, where event modes are not needed for it.
-        for place in places {
+        for place in places.into_iter().take(checker.most(400)) {
             let variable = &description.variables[place];
             let late = match course.interface {
                 Interface::CoSimulation => variable.causality == "input" || variable.variability == "tunable",

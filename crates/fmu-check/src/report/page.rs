@@ -53,6 +53,9 @@ pub fn page(report: &Report) -> String {
                 if finding.section.is_empty() { "Not in the standard" } else { &finding.section },
                 escape(&finding.promise)
             );
+            if let Some(reason) = &finding.accepted {
+                let _ = writeln!(text, "<p>Accepted: {}</p>", escape(reason));
+            }
             if !finding.more.is_empty() {
                 let _ = writeln!(text, "<details><summary>{} more</summary><ul>", finding.more.len());
                 for more in &finding.more {

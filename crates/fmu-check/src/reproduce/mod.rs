@@ -1,16 +1,19 @@
 //! Scripts as programs in C and in Python, which show a finding without this tool.
 
 mod c;
+mod evidence;
 mod python;
 
 use crate::description::Description;
 use crate::finding::Finding;
-use crate::script::{Numbered, Script, Setting, Step};
+use crate::script::{Numbered, Run, Script, Setting, Step};
 
-/// Writes both programs of a finding.
-pub fn programs(finding: &mut Finding, setting: &Setting, description: &Description) {
-    finding.c = c::program(finding, setting, description);
-    finding.python = python::program(finding, setting, description);
+/// Writes both programs of a finding. They show what the last run of its script did.
+pub fn programs(finding: &mut Finding, run: &Run, setting: &Setting, description: &Description) {
+    let evidence = evidence::evidence(finding, run);
+    let script = evidence::as_repeated(&finding.script, run);
+    finding.c = c::program(finding, &script, &evidence, setting, description);
+    finding.python = python::program(finding, &script, &evidence, setting, description).unwrap_or_default();
 }
 
 /// What a program says of itself, in lines.

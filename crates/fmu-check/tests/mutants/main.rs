@@ -180,13 +180,40 @@ fn caught(
     let folder = TempDir::new().expect("a folder");
     let path = fmu(folder.path(), fmi, &library(fmi, of_linker), change);
     // Enough for 50 cycles on a busy machine; fewer are not judged.
+    let out = folder.path().join("out");
     let options = ["--only", topic, "--no-shrink", "--limit", "2", "--repeat", "0.3"];
-    let (found, report) = found(&path, fault, &options);
+    let (found, report) = found(&path, fault, &[&options[..], &["--out", &out.to_string_lossy()]].concat());
     assert!(
         found.iter().any(|(other, _)| other == name),
         "{fault}{of_linker} is not found as {name}: {found:?} {}",
         report["unreached"]
     );
+    if fault != "none" {
+        let unpacked = folder.path().join("unpacked");
+        let file = std::fs::File::open(&path).expect("it");
+        zip::ZipArchive::new(file).expect("a ZIP").extract(&unpacked).expect("a folder");
+        reproduced(&out, name, &unpacked, fault);
+    }
+}
+
+/// Both programs of a finding show it in the FMU with the fault, and not in the one without.
+fn reproduced(out: &Path, name: &str, unpacked: &Path, fault: &str) {
+    let program = out.join("repro");
+    let source = out.join(format!("{name}.c"));
+    let compiled =
+        Command::new("cc").args(["-w", "-o"]).arg(&program).arg(source).args(["-ldl", "-lpthread"]).status();
+    assert!(compiled.expect("a C compiler").success(), "{name}.c");
+    let mut python = Command::new("python3");
+    python.arg(out.join(format!("{name}.py")));
+    for (language, mut command) in [("C", Command::new(&program)), ("Python", python)] {
+        command.arg(unpacked);
+        for (fault, expected) in [(fault, 1), ("none", 0)] {
+            let output = command.env("WAGON_FAULT", fault).output().expect("runs");
+            let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+            let text: String = text.chars().rev().take(2000).collect::<Vec<_>>().into_iter().rev().collect();
+            assert_eq!(output.status.code(), Some(expected), "{name} in {language} with {fault}: {text}");
+        }
+    }
 }
 
 macro_rules! mutants {
@@ -289,6 +316,10 @@ mutants! {
     2 step_adds "results" "results.cut";
     3 lossy_when_late "states" "states.restore-values";
     2 name_gone "life_cycle" "arrays.read-beyond";
+    3 stop_ignored "life_cycle" "life_cycle.stop-time";
+    2 order_ignored "derivatives" "derivatives.order";
+    3 pool_of_eight "life_cycle" "life_cycle.refused";
+    2 output_stale "results" "results.reading";
     2 unload_crashes "life_cycle" "life_cycle.unload.crash";
     3 exit_hangs "life_cycle" "life_cycle.unload.hang";
 }
@@ -306,7 +337,8 @@ fn symbol_missing() {
 }
 
 /// Faults of the description: edition, topic, name of the finding, what is replaced by what.
-const DESCRIPTIONS: [(u32, &str, &str, &str, &str); 9] = [
+const DESCRIPTIONS: [(u32, &str, &str, &str, &str); 10] = [
+    (2, "description", "encoding", "encoding=\"UTF-8\"", "encoding=\"ISO-8859-1\""),
     (2, "dependencies", "missing", "index=\"9\" dependencies=\"4 5\"", "index=\"9\" dependencies=\"5\""),
     (3, "dependencies", "missing", "dependencies=\"4 5 6\"", "dependencies=\"4 6\""),
     (3, "dependencies", "initial", "\"9\" dependencies=\"4\"", "\"9\" dependencies=\"\""),
@@ -462,6 +494,47 @@ fn nothing_passes_unchecked() {
     assert_eq!(names, ["co-simulation", "model-exchange"]);
 }
 
+/// A finding that a baseline accepts does not fail, in any report; one of another observation does.
+#[test]
+fn a_baseline_accepts_with_a_reason() {
+    let folder = TempDir::new().expect("a folder");
+    let path = fmu(folder.path(), 2, &library(2, ""), |text| text);
+    let (baseline, out) = (folder.path().join("baseline.txt"), folder.path().join("out"));
+    for (line, status) in [("start_values.start: known", 0), ("start_values.start \"mass\": known", 1)] {
+        std::fs::write(&baseline, line).expect("a file");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
+        command.arg(&path).args(["--only", "start_values", "--no-shrink", "--baseline"]).arg(&baseline);
+        let output = command.arg("--out").arg(&out).env("WAGON_FAULT", "start_value").output().expect("runs");
+        assert_eq!(output.status.code(), Some(status), "{line}: {output:?}");
+        let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
+        assert_eq!(read("junit.xml").contains("<failure"), status == 1, "{line}");
+        let sarif: serde_json::Value = serde_json::from_str(&read("report.sarif")).expect("JSON");
+        let result = &sarif["runs"][0]["results"][0];
+        assert_eq!(
+            (result["ruleId"].as_str(), result["level"].as_str()),
+            (Some("start_values.start"), Some("error"))
+        );
+        assert_eq!(result["suppressions"].is_array(), status == 0, "{line}");
+        let report: serde_json::Value = serde_json::from_str(&read("report.json")).expect("JSON");
+        assert_eq!((&report["schema"], &report["status"]), (&1.into(), &status.into()));
+        assert_eq!(String::from_utf8_lossy(&output.stdout).contains("1 accepted"), status == 0);
+    }
+}
+
+/// A quick check ends in time, names the topics that it leaves out, and passes.
+#[test]
+fn a_quick_check_is_quick() {
+    let folder = TempDir::new().expect("a folder");
+    let path = fmu(folder.path(), 2, &library(2, ""), |text| text);
+    let begin = std::time::Instant::now();
+    let (_, report) = found(&path, "none", &["--quick"]);
+    assert!(begin.elapsed().as_secs() < 30);
+    let unchecked = report["unreached"].as_array().expect("a list").iter();
+    let names: Vec<_> = unchecked.map(|of| (of["name"].clone(), of["allowed"].clone())).collect();
+    assert_eq!(names, [("resources".into(), true.into()), ("hostile".into(), true.into())]);
+    assert_eq!(report["status"], 0);
+}
+
 /// An FMU that is larger than it may be is not unpacked.
 #[test]
 fn unpacking_has_a_limit() {
@@ -545,35 +618,8 @@ fn programs_show_it() {
             assert!(std::fs::read_to_string(out.join(file)).expect(file).contains(name), "{file}");
         }
         let unpacked = folder.path().join("unpacked");
-        zip::ZipArchive::new(std::fs::File::open(&path).expect("it"))
-            .expect("a ZIP")
-            .extract(&unpacked)
-            .expect("a folder");
-        let program = folder.path().join("repro");
-        let status = Command::new("cc")
-            .arg("-o")
-            .arg(&program)
-            .arg(out.join(format!("{name}.c")))
-            .args(["-ldl", "-lpthread"])
-            .status();
-        assert!(status.expect("a C compiler").success(), "{name}.c");
-        let of_c = Command::new(&program).arg(&unpacked).env("WAGON_FAULT", mutant).output().expect("runs");
-        let of_python = Command::new("python3")
-            .arg(out.join(format!("{name}.py")))
-            .arg(&unpacked)
-            .env("WAGON_FAULT", mutant)
-            .output()
-            .expect("runs");
-        for (language, output) in [("C", of_c), ("Python", of_python)] {
-            let text = String::from_utf8_lossy(&output.stdout).into_owned()
-                + &String::from_utf8_lossy(&output.stderr);
-            let crashes = name != "states.restore-values";
-            assert_eq!(text.contains("ended by signal"), crashes, "{mutant} in {language}: {text}");
-            if !crashes {
-                // What was read before and after differs.
-                let read: Vec<&str> = text.lines().filter(|line| line.starts_with("fmi2GetReal")).collect();
-                assert!(read.len() >= 2 && read[0] != read[read.len() - 1], "{mutant} in {language}: {text}");
-            }
-        }
+        let file = std::fs::File::open(&path).expect("it");
+        zip::ZipArchive::new(file).expect("a ZIP").extract(&unpacked).expect("a folder");
+        reproduced(&out, name, &unpacked, mutant);
     }
 }
