@@ -1,6 +1,7 @@
 //! The model description, read for what it promises. `fmu-run` reads what it needs to run an FMU; here it is all that can
 //! be held against the library, arrays and clocks too, and what is wrong is told instead of refused.
 
+use crate::rules::Observation;
 use crate::script::Kind;
 use fmi_abi::{BaseType, Interface, Standard};
 use roxmltree::{Document, Node};
@@ -92,6 +93,8 @@ pub struct Description {
     pub co_simulation: Option<Offer>,
     /// What it offers.
     pub model_exchange: Option<Offer>,
+    /// Whether it offers Scheduled Execution.
+    pub scheduled_execution: bool,
     /// In the order of the text.
     pub variables: Vec<Variable>,
     /// Of the model structure.
@@ -111,7 +114,7 @@ pub struct Description {
     /// The size of its steps, if it is said.
     pub step_size: Option<f64>,
     /// What is wrong in it: the name of a finding, the section, a sentence.
-    pub wrong: Vec<(&'static str, &'static str, String)>,
+    pub wrong: Vec<Observation>,
 }
 
 impl Description {
@@ -150,6 +153,7 @@ impl Description {
             token: root.attribute(token).unwrap_or_default().to_owned(),
             co_simulation: offer("CoSimulation"),
             model_exchange: offer("ModelExchange"),
+            scheduled_execution: child(root, "ScheduledExecution").is_some(),
             variables,
             outputs: Vec::new(),
             derivatives: Vec::new(),
@@ -234,26 +238,17 @@ impl Description {
                 }
             };
         }
-        let section = self.section("2.2.8", "2.4.8");
-        self.wrong.extend(lost.into_iter().map(|why| ("description.structure", section, why)));
-    }
-
-    /// The section of the standard at hand.
-    pub fn section(&self, of_fmi2: &'static str, of_fmi3: &'static str) -> &'static str {
-        if self.standard == Standard::Fmi2 { of_fmi2 } else { of_fmi3 }
+        self.wrong.extend(lost.into_iter().map(|why| ("description.structure", why)));
     }
 
     /// What the text itself has wrong.
     fn judge(&mut self, root: Node) {
         let mut wrong = Vec::new();
-        let structure = self.section("2.2.8", "2.4.8");
-        let attributes = self.section("2.2.7", "2.4.7.4");
         if self.token.is_empty() {
-            wrong.push((
-                "description.token",
-                self.section("2.2.1", "2.4.1"),
-                "guid or instantiationToken is missing or empty".to_owned(),
-            ));
+            wrong.push(("description.token", "guid or instantiationToken is missing or empty".to_owned()));
+        }
+        if self.co_simulation.is_none() && self.model_exchange.is_none() && !self.scheduled_execution {
+            wrong.push(("description.interfaces", "it offers no interface type".to_owned()));
         }
         for offer in [&self.co_simulation, &self.model_exchange].into_iter().flatten() {
             let mut letters = offer.identifier.chars();
@@ -262,7 +257,6 @@ impl Description {
             if !good {
                 wrong.push((
                     "description.identifier",
-                    self.section("2.1.1", "2.2.2"),
                     format!("modelIdentifier {:?} is no name in C", offer.identifier),
                 ));
             }
@@ -277,24 +271,22 @@ impl Description {
         for (place, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;
             if !names.insert(name) {
-                wrong.push(("description.names", attributes, format!("two variables are called {name:?}")));
+                wrong.push(("description.names", format!("two variables are called {name:?}")));
             }
             if self.standard == Standard::Fmi3 && !references.insert(variable.reference) {
                 let why =
                     format!("value reference {} of {name} is that of another variable", variable.reference);
-                wrong.push(("description.references", "2.4.7.4", why));
+                wrong.push(("description.references", why));
             }
             if variable.causality == "output" && !outputs.contains(&place) && !variable.clocked {
                 wrong.push((
                     "description.structure",
-                    structure,
                     format!("output {name} is not among the outputs of ModelStructure"),
                 ));
             }
             if variable.causality != "output" && outputs.contains(&place) {
                 wrong.push((
                     "description.structure",
-                    structure,
                     format!("{name} is no output, and is among those of ModelStructure"),
                 ));
             }
@@ -303,7 +295,6 @@ impl Description {
             {
                 wrong.push((
                     "description.units",
-                    self.section("2.2.2", "2.4.3"),
                     format!("{name} is in {unit:?}, which is no unit of UnitDefinitions"),
                 ));
             }
@@ -312,7 +303,6 @@ impl Description {
             {
                 wrong.push((
                     "description.types",
-                    self.section("2.2.3", "2.4.4"),
                     format!("{name} is of type {of:?}, which is none of TypeDefinitions"),
                 ));
             }
@@ -325,25 +315,16 @@ impl Description {
             {
                 wrong.push((
                     "description.start",
-                    attributes,
                     format!("{name} ({}) has no start value", variable.causality),
                 ));
             }
             if variable.initial == "calculated" && !variable.start.is_empty() && variable.base.is_some() {
-                wrong.push((
-                    "description.start",
-                    attributes,
-                    format!("{name} is calculated and has a start value"),
-                ));
+                wrong.push(("description.start", format!("{name} is calculated and has a start value")));
             }
             if let (Some(min), Some(max)) = (variable.min, variable.max)
                 && min > max
             {
-                wrong.push((
-                    "description.range",
-                    attributes,
-                    format!("{name} has a min of {min} and a max of {max}"),
-                ));
+                wrong.push(("description.range", format!("{name} has a min of {min} and a max of {max}")));
             }
             for number in variable.starts() {
                 if variable.min.is_some_and(|min| number < min)
@@ -351,7 +332,6 @@ impl Description {
                 {
                     wrong.push((
                         "description.range",
-                        attributes,
                         format!("the start value of {name}, {number}, is outside its min and max"),
                     ));
                 }
@@ -365,7 +345,6 @@ impl Description {
             {
                 wrong.push((
                     "description.start",
-                    attributes,
                     format!("the start value of {name}, {:?}, is no number", variable.start.join(" ")),
                 ));
             }
@@ -376,7 +355,6 @@ impl Description {
                 let name = &self.variables[unknown.variable].name;
                 wrong.push((
                     "description.structure",
-                    structure,
                     format!("{name} is among the derivatives, and is not declared to be one"),
                 ));
             }
@@ -384,13 +362,16 @@ impl Description {
         // A derivative that is not listed may be one that is no state's (section 2.2.8 of FMI 2.0).
         let _ = listed;
         if self.stop_time.is_some_and(|stop| stop <= self.start_time) {
-            wrong.push((
-                "description.experiment",
-                self.section("2.2.5", "2.4.6"),
-                "the default experiment stops before it starts".to_owned(),
-            ));
+            wrong
+                .push(("description.experiment", "the default experiment stops before it starts".to_owned()));
         }
         self.wrong.extend(wrong);
+    }
+
+    /// Whether Co-Simulation needs Event Mode: FMUs with clocks do (section 2.3.1 of FMI 3.0, `eventModeUsed`).
+    pub fn event_mode(&self) -> bool {
+        let has_clocks = self.variables.iter().any(|variable| variable.base.is_none() || variable.clocked);
+        has_clocks && self.co_simulation.as_ref().is_some_and(|offer| offer.can(&["hasEventMode"]))
     }
 
     /// The variables that a place of the same type and reference stands for.
@@ -520,14 +501,9 @@ fn default_initial(causality: &str, variability: &str) -> &'static str {
     }
 }
 
-fn variables(
-    root: Node,
-    standard: Standard,
-    wrong: &mut Vec<(&'static str, &'static str, String)>,
-) -> Vec<Variable> {
+fn variables(root: Node, standard: Standard, wrong: &mut Vec<Observation>) -> Vec<Variable> {
     let types: HashMap<&str, Node> =
         elements(root, "TypeDefinitions").filter_map(|node| Some((node.attribute("name")?, node))).collect();
-    let section = if standard == Standard::Fmi2 { "2.2.7" } else { "2.4.7" };
     let nodes: Vec<Node> = elements(root, "ModelVariables").collect();
     let by_reference: BTreeMap<u32, usize> = nodes
         .iter()
@@ -541,7 +517,7 @@ fn variables(
         let name = node.attribute("name").unwrap_or_default().to_owned();
         let Some(reference) = node.attribute("valueReference").and_then(|text| text.trim().parse().ok())
         else {
-            wrong.push(("description.references", section, format!("{name} has no value reference")));
+            wrong.push(("description.references", format!("{name} has no value reference")));
             continue;
         };
         let of_type = match standard {
@@ -551,7 +527,7 @@ fn variables(
             Standard::Fmi3 => Some(*node),
         };
         let Some(of_type) = of_type else {
-            wrong.push(("description.types", section, format!("{name} has no type")));
+            wrong.push(("description.types", format!("{name} has no type")));
             continue;
         };
         let base = base_of(standard, of_type.tag_name().name());

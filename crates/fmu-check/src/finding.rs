@@ -1,6 +1,7 @@
 //! What is found: graded, with the section of the standard and the shortest script that shows it.
 
-use crate::script::{End, Run, Script, Step};
+use crate::script::{End, Run, Script, Step, Written};
+
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -37,7 +38,7 @@ pub struct Finding {
     pub name: String,
     /// How bad it is.
     pub grade: Grade,
-    /// The section of the standard that says so.
+    /// The edition and section of the standard; empty if the rule is not part of it.
     pub section: String,
     /// What is promised.
     pub promise: String,
@@ -55,17 +56,21 @@ pub struct Finding {
     /// What is still wrong when it shows.
     #[serde(skip)]
     pub judge: Option<Judge>,
+    /// Whether it fails the check.
+    pub fails: bool,
+    /// The reason for which it is accepted, if the baseline has one.
+    pub accepted: Option<String>,
     /// The steps of the script, and what they were before it was shortened.
     pub steps: (usize, usize),
 }
 
 impl Finding {
-    /// One that the files alone show.
-    pub fn of_files(name: &str, grade: Grade, section: &str, promise: &str, seen: String) -> Self {
+    /// A finding without a call sequence.
+    pub fn new(name: &str, grade: Grade, section: String, promise: &str, seen: String) -> Self {
         Self {
             name: name.to_owned(),
             grade,
-            section: section.to_owned(),
+            section,
             promise: promise.to_owned(),
             seen,
             more: Vec::new(),
@@ -73,6 +78,8 @@ impl Finding {
             c: String::new(),
             python: String::new(),
             judge: None,
+            fails: false,
+            accepted: None,
             steps: (0, 0),
         }
     }
@@ -93,6 +100,7 @@ pub fn ending(run: &Run, script: &Script) -> Option<String> {
         End::Hang(seconds) => format!("{name} does not return within {seconds:.1} s"),
         End::Exit(code) => format!("{name} ends the whole process with exit status {code}"),
         End::Unloadable(why) => format!("the library cannot be loaded: {why}"),
+        End::Flood(count) => format!("{name} leads to {count} processes at once, after which all were ended"),
     })
 }
 
@@ -109,5 +117,79 @@ pub fn step_name(step: &Step) -> String {
         Step::Parallel(scripts) => format!("a call on one of {} threads", scripts.len()),
         Step::Measure => "a measurement".to_owned(),
         Step::FreshProcess => "a fresh process".to_owned(),
+        Step::Unload => "unloading the library".to_owned(),
+        Step::Quit => "the exit of the process".to_owned(),
+    }
+}
+
+/// What an event did.
+#[derive(Clone, Copy, Debug)]
+pub struct Event {
+    /// Another update is needed.
+    pub again: bool,
+    /// The model wants to end.
+    pub terminate: bool,
+    /// Continuous states have changed.
+    pub states_changed: bool,
+    /// The next time event.
+    pub next: Option<f64>,
+}
+
+/// The result of a successful update of the discrete states.
+pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
+    let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
+    let (flags, time) = if fmi3 {
+        let number = |place: usize| outcome.written.get(place)?.numbers().first().copied();
+        ([0, 1, 3, 4].map(|place| number(place) == Some(1.0)), number(5)?)
+    } else {
+        // fmi2EventInfo has five flags, two to a word, and the time.
+        let Written::Numbers(_, words) = outcome.written.first()? else { return None };
+        let [first, changed, defined, time] = words[..] else { return None };
+        let flags = [first as u32 != 0, first >> 32 != 0, changed >> 32 != 0, defined as u32 != 0];
+        (flags, f64::from_bits(time))
+    };
+    let [again, terminate, states_changed, defined] = flags;
+    Some(Event { again, terminate, states_changed, next: defined.then_some(time) })
+}
+
+/// A sentence on a call that answered otherwise than OK.
+pub fn refused(script: &Script, run: &Run, ids: &[u32]) -> Option<String> {
+    let id = ids
+        .iter()
+        .find(|id| run.of(**id).is_some_and(|of| of.missing || of.status.is_some_and(|status| status > 1)))?;
+    refused_one(script, run, *id)
+}
+
+/// A sentence on this call, if it did not answer OK.
+pub fn refused_one(script: &Script, run: &Run, id: u32) -> Option<String> {
+    let outcome = run.of(id)?;
+    let name = script
+        .iter()
+        .find(|numbered| numbered.id == id)
+        .map(|numbered| (step_name(&numbered.step), &numbered.step));
+    let (name, step) = name?;
+    if outcome.missing {
+        return Some(format!("{name} is not in the library"));
+    }
+    let status = outcome.status?;
+    let failed = if matches!(step, Step::Make(..)) { status == 0 } else { status > 1 };
+    let why = outcome.log.iter().rev().find_map(|message| message.text.as_ref());
+    let why = why.map_or(String::new(), |text| format!(": {:?}", String::from_utf8_lossy(text)));
+    failed.then(|| {
+        let result = if matches!(step, Step::Make(..)) { "NULL".to_owned() } else { status_name(status) };
+        format!("{name} returns {result}{why}")
+    })
+}
+
+/// The name of a status.
+pub fn status_name(status: i32) -> String {
+    match status {
+        0 => "OK".to_owned(),
+        1 => "Warning".to_owned(),
+        2 => "Discard".to_owned(),
+        3 => "Error".to_owned(),
+        4 => "Fatal".to_owned(),
+        5 => "Pending".to_owned(),
+        other => other.to_string(),
     }
 }

@@ -175,6 +175,7 @@ fn walk(description: &Description, script: &[Numbered], course: &mut Course) -> 
                 slots.clear();
                 true
             }
+            Step::Unload | Step::Quit => instances.is_empty(),
             Step::Version(_) | Step::Measure => true,
         };
         if !good {

@@ -6,26 +6,33 @@
 //! (`run`, `worker`) and judges what came of them. What is found is shortened (`shrink`) as long as it keeps to the
 //! standard (`legal`), and written as programs (`reproduce`). `unsafe` is in `worker` alone: the process that may be lost.
 
+mod always;
+mod baseline;
 mod checker;
 mod checks;
+mod course;
 mod description;
 mod finding;
 mod legal;
 mod report;
 mod reproduce;
+mod rules;
 mod run;
 mod script;
 mod shrink;
+mod values;
 #[allow(unsafe_code, reason = "the library under attack is loaded and called here")]
 mod worker;
 mod writer;
 
+pub use checker::Unchecked;
 pub use finding::{Finding, Grade};
 pub use report::Report;
 pub use worker::work_if_asked;
 
 use anyhow::Context as _;
-use checker::{Checker, TimeOver, find_course};
+use checker::{Checker, TimeOver};
+use course::{NoCourse, find_course};
 use description::Description;
 use fmi_abi::Interface;
 use std::io::{IsTerminal as _, Write as _};
@@ -42,6 +49,10 @@ pub struct Options {
     /// states, derivatives, dependencies, results, reset, refusals, logs, resources, hostile.
     #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(checks::TOPICS))]
     pub only: Vec<String>,
+    /// Succeeds without these topics and interfaces (co-simulation, model-exchange, scheduled-execution), with commas between.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(
+        checks::TOPICS.iter().chain(&INTERFACES)))]
+    pub allow_unchecked: Vec<String>,
     /// Seconds for all of it.
     #[arg(long, default_value_t = 120.0)]
     pub time: f64,
@@ -51,10 +62,23 @@ pub struct Options {
     /// Megabytes of memory that the FMU may use.
     #[arg(long, default_value_t = 8192)]
     pub memory: u64,
+    /// Megabytes that the FMU may have when it is unpacked.
+    #[arg(long, default_value_t = 1000)]
+    pub unpacked: u64,
     /// Chooses the order of calls that chance chooses.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Writes report.html, report.json, junit.xml and a program in C and one in Python for each finding to this folder.
+    /// Checks a part in 30 seconds at most: neither hostile calls nor resources, and fewer values and orders of calls.
+    #[arg(long, conflicts_with = "time")]
+    pub quick: bool,
+    /// Accepts the findings in this file, which has a line for each: NAME: REASON.
+    #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
+    /// Prints a rule, its severity and its section of the standard, or all rules as a page.
+    #[arg(long, value_name = "RULE")]
+    pub explain: Option<String>,
+    /// Writes report.html, report.json, junit.xml, report.sarif and a program in C and one in Python for each finding to this
+    /// folder.
     #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
     /// Writes the report as JSON to the standard output.
@@ -87,12 +111,35 @@ pub enum FailOn {
     Never,
 }
 
+/// Seconds of a quick check; what is under way then may take a little longer.
+const QUICK: f64 = 24.0;
+
+/// Topics that a quick check leaves out.
+const LONG: [&str; 2] = ["hostile", "resources"];
+
+/// The interfaces that an FMU may offer.
+const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled-execution"];
+
 /// Checks an FMU, tells what is found and writes the reports. The exit status: 0 for nothing that is to fail, 1 for
-/// findings of a grade that is to fail, 2 if it could not be checked.
+/// findings of a grade that is to fail, 2 if it, one of its interfaces or a topic could not be checked.
 ///
 /// The program must call [`work_if_asked`] before anything else: it is started anew for every sequence of calls.
 pub fn command(fmu: &Path, options: &Options) -> ExitCode {
+    if let Some(rule) = &options.explain {
+        return match rules::explain(rule) {
+            Some(text) => {
+                // A closed pipe is not an error.
+                let _ = std::io::stdout().write_all(text.as_bytes());
+                ExitCode::SUCCESS
+            }
+            None => {
+                eprintln!("error: no rule is called {rule}; --explain all prints all");
+                ExitCode::from(2)
+            }
+        };
+    }
     let progress = !options.json && std::io::stderr().is_terminal();
+    worker::listen_for_interrupts();
     match check(fmu, options, progress).and_then(|report| {
         let text = match options.json {
             true => format!("{}\n", report.json()?),
@@ -109,19 +156,10 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
         }
         Ok(report)
     }) {
-        Ok(report) => {
-            let worst = report.findings.iter().map(|finding| finding.grade).max();
-            let fails = match options.fail_on {
-                FailOn::Violation => worst >= Some(Grade::Violation),
-                FailOn::Fragile => worst >= Some(Grade::Fragile),
-                FailOn::Note => worst >= Some(Grade::Note),
-                FailOn::Never => false,
-            };
-            ExitCode::from(u8::from(fails))
-        }
+        Ok(report) => ExitCode::from(report.status),
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::from(2)
+            ExitCode::from(if worker::interrupted() { 130 } else { 2 })
         }
     }
 }
@@ -132,47 +170,57 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
 /// When it is no FMU of FMI 2.0 or 3.0, or has no library for this machine.
 pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<Report> {
     let begin = Instant::now();
-    let unpacked = checks::package::unpack(path)?;
-    let folder = unpacked.folder.path();
+    let baseline = options.baseline.as_deref().map(baseline::Baseline::read).transpose()?.unwrap_or_default();
+    let scratch = tempfile::Builder::new().prefix("fmu-check-").tempdir()?;
+    // The workers end, and write nothing any more, before the directory is removed.
+    let workers = run::Workers::new(scratch.path().to_owned())?;
+    let folder = &scratch.path().join("fmu");
+    let of_zip = checks::package::unpack(path, folder, options.unpacked << 20)?;
     let text = std::fs::read(folder.join("modelDescription.xml")).with_context(|| {
         format!("{}: there is no modelDescription.xml in it; it is no FMU", path.display())
     })?;
-    let text = String::from_utf8_lossy(&text);
+    let encoding = encoding(&text);
+    // Other encodings are read for the checks that follow.
+    let text = match std::str::from_utf8(&text) {
+        Ok(text) => text.to_owned(),
+        Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
+    };
     let description = Description::parse(text.trim_start_matches('\u{feff}'))
         .map_err(|why| anyhow::anyhow!("{}: {why}", path.display()))?;
-    let wanted = |topic: &str| options.only.is_empty() || options.only.iter().any(|only| only == topic);
+    let wanted = |topic: &str| match options.only.is_empty() {
+        true => !options.quick || !LONG.contains(&topic),
+        false => options.only.iter().any(|only| only == topic),
+    };
     let mut of_files = Vec::new();
     if wanted("package") {
-        of_files.extend(unpacked.found);
+        of_files.extend(of_zip);
         of_files.extend(checks::package::look(folder, &description));
     }
     if wanted("description") {
-        for (name, section, seen) in &description.wrong {
-            let promise = "The model description keeps to the standard.";
-            of_files.push(Finding::of_files(name, Grade::Violation, section, promise, seen.clone()));
-        }
+        of_files.extend(encoding);
+        of_files.extend(description.wrong.iter().cloned());
     }
-    let setting = setting(path, options, folder, &description)?;
-    let deadline = begin + Duration::from_secs_f64(options.time.max(1.0));
-    let workers = run::Workers::new()?;
-    let mut checker = Checker::new(description, setting, workers, options.seed, options.limit, deadline);
-    of_files.into_iter().for_each(|finding| checker.add(finding));
+    let (setting, without) = setting(options, folder, &description);
+    let time = if options.quick { QUICK } else { options.time.max(1.0) };
+    let deadline = begin + Duration::from_secs_f64(time);
+    let limit = if options.quick { options.limit.min(QUICK / 10.0) } else { options.limit };
+    let mut checker = Checker::new(description, setting, workers, options.seed, limit, deadline);
+    checker.quick = options.quick;
+    of_files.into_iter().for_each(|(name, seen)| checker.add(checker.claim(name).of_files(seen)));
+    without.into_iter().for_each(|(name, why)| checker.unchecked(name, why));
     for (place, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
         if checker.setting.libraries[place].is_none() {
             continue;
         }
-        let mut course = find_course(&checker, interface)?;
-        if let Err((_, script)) = &course {
-            no_course(&checker, script.clone())?;
-            // One that reads or writes beyond arrays may have more to show where there is room for it.
-            if ["arrays.read-beyond", "arrays.written-beyond"].iter().any(|name| checker.has(name)) {
-                checker.setting.soft = true;
-                course = find_course(&checker, interface)?;
-            }
-        }
-        match course {
+        match reach(&mut checker, interface) {
             Ok(course) => checker.courses.push(course),
-            Err((why, _)) => checker.unreached(format!("{interface}: no simulation of it succeeds ({why})")),
+            Err(error) if error.is::<NoCourse>() => {
+                checker.unchecked(INTERFACES[place], format!("no simulation succeeds: {error}"));
+            }
+            Err(error) if error.is::<TimeOver>() || error.is::<run::OutOfMemory>() => {
+                checker.unchecked(INTERFACES[place], error.to_string());
+            }
+            Err(error) => return Err(error),
         }
     }
     attack(&checker, progress, &wanted)?;
@@ -193,43 +241,79 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     findings.retain(|finding| options.only.is_empty() || wanted(finding.topic()) || always(finding));
     findings.sort_by(|one, other| other.grade.cmp(&one.grade).then_with(|| one.name.cmp(&other.name)));
     shorten(&checker, &mut findings, options, progress);
+    if worker::interrupted() {
+        return Err(run::Interrupted.into());
+    }
     let mut report = Report::new(path, &checker, findings);
     report.seconds = begin.elapsed().as_secs_f64();
+    let why = if options.only.is_empty() { "left out (--quick)" } else { "not asked for (--only)" };
+    let unwanted = checks::TOPICS.iter().filter(|topic| !wanted(topic));
+    report.unreached.extend(unwanted.map(|topic| Unchecked {
+        name: (*topic).to_owned(),
+        why: why.to_owned(),
+        allowed: true,
+    }));
+    report.judge(options, &baseline);
     Ok(report)
 }
 
-/// Where the libraries are.
+/// What is wrong with the encoding of a model description, by its first line and its bytes.
+fn encoding(text: &[u8]) -> Option<rules::Observation> {
+    let declaration = text.split(|byte| *byte == b'>').next().unwrap_or_default();
+    let declaration = String::from_utf8_lossy(declaration);
+    let declared =
+        declaration.split_once("encoding=").and_then(|(_, rest)| rest.get(1..)?.split(['"', '\'']).next());
+    let why = match declared {
+        Some(name) if !name.eq_ignore_ascii_case("utf-8") => {
+            format!("the encoding of modelDescription.xml is {name}")
+        }
+        _ if std::str::from_utf8(text).is_err() => {
+            "modelDescription.xml has bytes that are not UTF-8".to_owned()
+        }
+        _ => return None,
+    };
+    Some(("description.encoding", why))
+}
+
+/// A simulation that succeeds. That there is none is a finding, too.
+fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::Course> {
+    let course = find_course(checker, interface);
+    let Some(NoCourse(_, script)) = course.as_ref().err().and_then(|error| error.downcast_ref()) else {
+        return course;
+    };
+    no_course(checker, script.clone())?;
+    // One that reads or writes beyond arrays may have more to show where there is room for it.
+    if ["arrays.read-beyond", "arrays.written-beyond"].iter().any(|name| checker.has(name)) {
+        checker.setting.soft = true;
+        return find_course(checker, interface);
+    }
+    course
+}
+
+/// The libraries, and the interfaces that cannot be checked with the reason of each.
 fn setting(
-    fmu: &Path,
     options: &Options,
     folder: &Path,
     description: &Description,
-) -> anyhow::Result<script::Setting> {
-    let path = fmu.display();
+) -> (script::Setting, Vec<(&'static str, String)>) {
     let mut libraries = [None, None];
-    let offers = [&description.co_simulation, &description.model_exchange];
-    if offers.iter().all(|offer| offer.is_none()) {
-        anyhow::bail!(
-            "{path}: it has neither Co-Simulation nor Model Exchange, which are what can be checked"
-        );
+    let mut without = Vec::new();
+    if description.scheduled_execution {
+        without.push((INTERFACES[2], "fmu-check has no checks for Scheduled Execution".to_owned()));
     }
-    for (place, offer) in offers.into_iter().enumerate() {
+    for (place, offer) in [&description.co_simulation, &description.model_exchange].into_iter().enumerate() {
         let Some(offer) = offer else { continue };
         if offer.can(&["needsExecutionTool"]) && !options.execution_tool {
-            anyhow::bail!(
-                "{path}: it starts another program (needsExecutionTool); to check it all the same, give --execution-tool"
-            );
+            let why = "it starts another program (needsExecutionTool); to check it, give --execution-tool";
+            without.push((INTERFACES[place], why.to_owned()));
+            continue;
         }
-        libraries[place] = checks::package::library(folder, description.standard, offer);
+        match checks::package::library(folder, description.standard, offer) {
+            Ok(library) => libraries[place] = Some(library),
+            Err(why) => without.push((INTERFACES[place], why)),
+        }
     }
-    if libraries.iter().all(Option::is_none) {
-        let binaries = std::fs::read_dir(folder.join("binaries")).into_iter().flatten().flatten();
-        let others: Vec<String> =
-            binaries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
-        let others = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
-        anyhow::bail!("{path}: it has no library for this machine; it has: {others}");
-    }
-    Ok(script::Setting {
+    let setting = script::Setting {
         fmi3: description.standard == fmi_abi::Standard::Fmi3,
         libraries,
         resources: folder.join("resources"),
@@ -237,17 +321,12 @@ fn setting(
         soft: false,
         now: false,
         repetitions: options.repeat,
-    })
+    };
+    (setting, without)
 }
 
 /// A simulation as the standard has it fails: that is the finding.
 fn no_course(checker: &Checker, script: script::Script) -> anyhow::Result<()> {
-    let claim = checker::Claim::new(
-        "life_cycle.course",
-        Grade::Violation,
-        checker.section("4.2.4 and 3.2.3", "2.3"),
-        "A simulation with the numbers of the description succeeds.",
-    );
     let copy = script.clone();
     let judge: finding::Judge = std::sync::Arc::new(move |run| {
         let ids: Vec<u32> = copy.iter().map(|numbered| numbered.id).collect();
@@ -257,10 +336,10 @@ fn no_course(checker: &Checker, script: script::Script) -> anyhow::Result<()> {
             .map(|numbered| numbered.id)
             .collect();
         let rest: Vec<u32> = ids.into_iter().filter(|id| !makes.contains(id)).collect();
-        let of_makes = makes.iter().find_map(|id| checker::refused_one(&copy, run, *id));
-        of_makes.or_else(|| checker::refused(&copy, run, &rest))
+        let of_makes = makes.iter().find_map(|id| finding::refused_one(&copy, run, *id));
+        of_makes.or_else(|| finding::refused(&copy, run, &rest))
     });
-    checker.judge(&claim, script, judge)?;
+    checker.judge("life_cycle.course", script, judge)?;
     Ok(())
 }
 
@@ -275,8 +354,8 @@ fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + S
                 while let Some((topic, check)) = checks.get(next.fetch_add(1, Ordering::Relaxed)) {
                     match check(checker) {
                         Ok(()) => {}
-                        Err(error) if error.is::<TimeOver>() => {
-                            checker.unreached(format!("{topic}: the time was over"))
+                        Err(error) if error.is::<TimeOver>() || error.is::<run::OutOfMemory>() => {
+                            checker.unchecked(topic, error.to_string())
                         }
                         Err(error) => {
                             *failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(error);
@@ -321,9 +400,8 @@ fn shorten(checker: &Checker, findings: &mut [Finding], options: &Options, progr
                         eprint!("\rthe shortest calls for {count} findings: {:40}", finding.name);
                         let _ = std::io::stderr().flush();
                     }
-                    if finding.judge.is_some() {
-                        reproduce::programs(&mut finding, &checker.setting, &checker.description);
-                    }
+                    // Without a run there is no program; the finding stays.
+                    let _ = checker.reproduce(&mut finding);
                 }
             });
         }

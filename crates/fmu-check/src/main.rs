@@ -7,7 +7,8 @@ use std::process::ExitCode;
 #[command(name = "fmu-check", version, about, long_about = None)]
 struct Arguments {
     /// The FMU
-    fmu: std::path::PathBuf,
+    #[arg(required_unless_present = "explain")]
+    fmu: Option<std::path::PathBuf>,
     #[command(flatten)]
     options: fmu_check::Options,
 }
@@ -15,5 +16,5 @@ struct Arguments {
 fn main() -> ExitCode {
     fmu_check::work_if_asked();
     let Arguments { fmu, options } = Arguments::parse();
-    fmu_check::command(&fmu, &options)
+    fmu_check::command(&fmu.unwrap_or_default(), &options)
 }

@@ -3,16 +3,16 @@
 use crate::script::{End, Numbered, Outcome, Run, Script, Setting, Step};
 #[cfg(target_os = "linux")]
 use crate::worker::Answer;
-use crate::worker::{Job, Last, OWN_FAULT, PLAYED, Unloadable, VARIABLE};
+use crate::worker::{Job, Last, OWN_FAULT, PLAYED, SCRATCH, Unloadable, VARIABLE, interrupted};
 use anyhow::{Context as _, bail};
 use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
-use tempfile::TempDir;
 
 /// Processes that play call sequences.
 pub struct Workers {
-    /// For the files of processes.
-    scratch: TempDir,
+    /// The temporary directory of the check, for the files of processes.
+    scratch: PathBuf,
     #[cfg(target_os = "linux")]
     idle: std::sync::Mutex<HashMap<Situation, Vec<Server>>>,
 }
@@ -22,18 +22,50 @@ pub struct Workers {
 type Situation = (usize, bool);
 
 /// The results of a process.
+#[derive(Default)]
 struct Left {
     /// Its exit status; `None` if it did not end in time.
     ended: Option<ExitStatus>,
     said: Vec<u8>,
     outcomes: Vec<u8>,
+    /// Names of the processes that it has left.
+    left: Vec<String>,
+    /// The number of its processes, if that is why it was ended.
+    flood: Option<usize>,
+    /// It ended outside the functions of the FMU.
+    outside: bool,
 }
 
+/// This tool needs more memory than the FMU may use.
+#[derive(Debug)]
+pub struct OutOfMemory;
+
+impl std::fmt::Display for OutOfMemory {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("fmu-check itself needs more than the memory of --memory")
+    }
+}
+
+impl std::error::Error for OutOfMemory {}
+
+/// The user has interrupted the check.
+#[derive(Debug)]
+pub struct Interrupted;
+
+impl std::fmt::Display for Interrupted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("interrupted")
+    }
+}
+
+impl std::error::Error for Interrupted {}
+
 /// The command that starts this program as a worker.
-fn worker(job: &std::path::Path, (phase, now): Situation) -> anyhow::Result<Command> {
+fn worker(job: &Path, scratch: &Path, (phase, now): Situation) -> anyhow::Result<Command> {
     let mut command = Command::new(std::env::current_exe()?);
     command
         .env(VARIABLE, job)
+        .env(SCRATCH, scratch)
         // Memory that was not written differs between the processes of a call sequence.
         .env("MALLOC_PERTURB_", (1 + phase * 90).to_string())
         // Freed blocks that each thread keeps would count as in use (mallinfo2 of glibc).
@@ -44,11 +76,17 @@ fn worker(job: &std::path::Path, (phase, now): Situation) -> anyhow::Result<Comm
 
 impl Workers {
     /// Processes that are started when they are needed.
-    pub fn new() -> std::io::Result<Self> {
+    ///
+    /// # Errors
+    /// When the first of them cannot be started. It removes the temporary directory if this process is killed.
+    pub fn new(scratch: PathBuf) -> anyhow::Result<Self> {
         Ok(Self {
-            scratch: tempfile::Builder::new().prefix("fmu-check-").tempdir()?,
             #[cfg(target_os = "linux")]
-            idle: std::sync::Mutex::default(),
+            idle: std::sync::Mutex::new(HashMap::from([(
+                (0, false),
+                vec![Server::new((0, false), &scratch)?],
+            )])),
+            scratch,
         })
     }
 
@@ -83,7 +121,8 @@ impl Workers {
                 Ok(left)
             }
             // The library has ended the process that forks.
-            Err(_) => Ok(Left { ended: Some(server.0.wait()?), said: Vec::new(), outcomes: Vec::new() }),
+            Err(_) if interrupted() => Err(Interrupted.into()),
+            Err(_) => Ok(Left { ended: Some(server.0.wait()?), ..Left::default() }),
         }
     }
 
@@ -91,32 +130,34 @@ impl Workers {
     #[cfg(not(target_os = "linux"))]
     fn process(&self, job: &Job, situation: Situation, limit: f64) -> anyhow::Result<Left> {
         use std::process::Stdio;
-        let folder = tempfile::Builder::new().prefix("run-").tempdir_in(self.scratch.path())?;
+        let folder = tempfile::Builder::new().prefix("run-").tempdir_in(&self.scratch)?;
         let at = |name: &str| folder.path().join(name);
         std::fs::write(at("job"), serde_json::to_vec(job)?)?;
         std::fs::create_dir(at("here"))?;
         let said = std::fs::File::create(at("said"))?;
-        let mut child = worker(&at("job"), situation)?
-            .current_dir(at("here"))
-            .stdin(Stdio::null())
-            .stdout(said.try_clone()?)
-            .stderr(said)
-            .spawn()
-            .context("a process for the FMU cannot be started")?;
+        let mut command = worker(&at("job"), &self.scratch, situation)?;
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        command.current_dir(at("here")).stdin(Stdio::null()).stdout(said.try_clone()?).stderr(said);
+        let mut child = command.spawn().context("a process for the FMU cannot be started")?;
         let begin = std::time::Instant::now();
         let ended = loop {
             if let Some(status) = child.try_wait()? {
                 break Some(status);
             }
-            if begin.elapsed().as_secs_f64() > limit {
+            if interrupted() || begin.elapsed().as_secs_f64() > limit {
                 child.kill()?;
                 child.wait()?;
                 break None;
             }
             std::thread::sleep(std::time::Duration::from_micros(500));
         };
+        crate::worker::end_group(child.id());
+        if interrupted() {
+            return Err(Interrupted.into());
+        }
         let [said, outcomes] = ["said", "outcomes"].map(|name| std::fs::read(at(name)).unwrap_or_default());
-        Ok(Left { ended, said, outcomes })
+        Ok(Left { ended, said, outcomes, ..Left::default() })
     }
 }
 
@@ -126,10 +167,10 @@ struct Server(std::process::Child);
 
 #[cfg(target_os = "linux")]
 impl Server {
-    fn new(situation: Situation, scratch: &TempDir) -> anyhow::Result<Self> {
+    fn new(situation: Situation, scratch: &Path) -> anyhow::Result<Self> {
         use std::process::Stdio;
         let here = tempfile::tempdir_in(scratch)?.keep();
-        let mut command = worker(std::path::Path::new(""), situation)?;
+        let mut command = worker(Path::new(""), scratch, situation)?;
         command.current_dir(here).stdin(Stdio::piped()).stdout(Stdio::piped());
         Ok(Self(command.spawn().context("a process for the FMU cannot be started")?))
     }
@@ -139,14 +180,20 @@ impl Server {
         use std::os::unix::process::ExitStatusExt as _;
         let (input, output) = self.0.stdin.as_mut().zip(self.0.stdout.as_mut()).context("no pipes")?;
         input.write_all(job.as_bytes())?;
+        while !crate::worker::readable(output)? {
+            if interrupted() {
+                return Err(Interrupted.into());
+            }
+        }
         let mut output = std::io::BufReader::new(output);
         let mut line = String::new();
         output.read_line(&mut line)?;
-        let Answer { ended, lengths } = serde_json::from_str(&line)?;
+        let Answer { ended, lengths, left, flood, inside } = serde_json::from_str(&line)?;
         let [mut said, mut outcomes] = lengths.map(|length| vec![0; length]);
         output.read_exact(&mut said)?;
         output.read_exact(&mut outcomes)?;
-        Ok(Left { ended: ended.map(ExitStatus::from_raw), said, outcomes })
+        let ended = ended.map(ExitStatus::from_raw);
+        Ok(Left { ended, said, outcomes, left, flood, outside: !inside })
     }
 }
 
@@ -161,11 +208,12 @@ impl Drop for Server {
 /// Reads the outcomes of a process, and returns the bytes that it has serialized.
 fn read(
     script: &[Numbered],
-    Left { ended, said, outcomes }: Left,
+    Left { ended, said, outcomes, left, flood, outside }: Left,
     limit: f64,
     run: &mut Run,
 ) -> anyhow::Result<HashMap<usize, Vec<u8>>> {
     run.said.push_str(&String::from_utf8_lossy(&said));
+    run.left.extend(left);
     let mut last = None;
     for line in outcomes.split(|byte| *byte == b'\n').filter(|line| !line.is_empty()) {
         if let Ok(outcome) = serde_json::from_slice::<Outcome>(line) {
@@ -182,8 +230,15 @@ fn read(
     {
         return Ok(bytes);
     }
+    // Abort messages of the Rust and C libraries, after a failure that is not in the FMU.
+    if outside
+        && ["memory allocation of", "no memory for an array"].iter().any(|text| run.said.contains(text))
+    {
+        return Err(OutOfMemory.into());
+    }
     run.at = script.iter().map(|numbered| numbered.id).find(|id| !run.outcomes.contains_key(id));
     run.end = match ended {
+        _ if flood.is_some() => End::Flood(flood.unwrap_or_default()),
         None => End::Hang(limit),
         Some(status) => match status.code() {
             Some(OWN_FAULT) => bail!("a process for the FMU failed: {}", run.said.trim()),
@@ -208,7 +263,9 @@ fn crash(status: ExitStatus, said: &str) -> String {
             Some(libc::SIGABRT) => "SIGABRT: it ended itself".to_owned(),
             Some(libc::SIGFPE) => "SIGFPE: a division by zero".to_owned(),
             Some(libc::SIGILL) => "SIGILL: no instruction".to_owned(),
-            Some(libc::SIGKILL) => "SIGKILL: killed, perhaps for want of memory".to_owned(),
+            Some(libc::SIGKILL) => "SIGKILL: killed by itself, or for want of memory".to_owned(),
+            Some(libc::SIGSYS) => "SIGSYS: it sent a signal to processes that are not its own".to_owned(),
+            Some(libc::SIGXFSZ) => "SIGXFSZ: it wrote more than 1 GiB to a file".to_owned(),
             Some(other) => format!("signal {other}"),
             None => status.to_string(),
         }

@@ -160,6 +160,10 @@ pub enum Step {
     Measure,
     /// Goes on in a new process, to which only serialized bytes are passed on.
     FreshProcess,
+    /// Unloads the library.
+    Unload,
+    /// Ends the process as programs do: with the destructors of its libraries. Nothing follows.
+    Quit,
 }
 
 /// A step with a number of its own, which it keeps when others are left out.
@@ -235,8 +239,13 @@ impl Written {
     /// The first place at which two differ.
     pub fn differ(&self, other: &Self) -> Option<usize> {
         match (self, other) {
-            (Self::Numbers(_, one), Self::Numbers(_, two)) => {
-                one.iter().zip(two).position(|(one, two)| one != two)
+            (Self::Numbers(kind, one), Self::Numbers(_, two)) => {
+                // Zeros of both signs are equal, and so are all NaNs.
+                let equal =
+                    |one: f64, two: f64| kind.is_float() && (one == two || one.is_nan() && two.is_nan());
+                one.iter()
+                    .zip(two)
+                    .position(|(one, two)| one != two && !equal(kind.number(*one), kind.number(*two)))
             }
             (Self::Texts(one), Self::Texts(two)) => one.iter().zip(two).position(|(one, two)| one != two),
             _ => Some(0),
@@ -296,6 +305,8 @@ pub enum End {
     Exit(i32),
     /// The library cannot be loaded; what the loader says.
     Unloadable(String),
+    /// It had so many processes that they were ended.
+    Flood(usize),
 }
 
 /// What came of a script.
@@ -309,6 +320,8 @@ pub struct Run {
     pub at: Option<u32>,
     /// What was written to the standard output and the standard error.
     pub said: String,
+    /// Names of the processes that were left at its end.
+    pub left: Vec<String>,
 }
 
 impl Run {

@@ -3,9 +3,10 @@
 use crate::description::Description;
 use crate::legal::first_illegal;
 use crate::script::{Numbered, Script, Step};
+use std::collections::HashMap;
 
 /// Calls that belong together: they are left out together or not at all.
-fn units(script: &Script) -> Vec<Vec<u32>> {
+fn units(script: &[Numbered]) -> Vec<Vec<u32>> {
     let name = |numbered: &Numbered| match &numbered.step {
         Step::Call { function, .. } => function.get(4..).unwrap_or_default().to_owned(),
         _ => String::new(),
@@ -47,15 +48,40 @@ fn content(step: &Step) -> Option<String> {
             (!reads).then(|| format!("{function} {args:?}"))
         }
         Step::Repeat(..) | Step::Parallel(_) | Step::Measure | Step::Version(_) => None,
-        Step::Make(..) | Step::Free(_) | Step::FreshProcess => None,
+        Step::Make(..) | Step::Free(_) | Step::FreshProcess | Step::Unload | Step::Quit => None,
     }
+}
+
+/// The calls of a script and of its threads.
+fn flat(script: &[Numbered]) -> Vec<&Numbered> {
+    script.iter().fold(Vec::new(), |mut all, numbered| {
+        all.push(numbered);
+        if let Step::Parallel(scripts) = &numbered.step {
+            all.extend(scripts.iter().flat_map(|script| flat(script)));
+        }
+        all
+    })
+}
+
+/// A script without some calls, also of its threads.
+fn without(script: &[Numbered], ids: &[u32]) -> Script {
+    let kept = script.iter().filter(|numbered| !ids.contains(&numbered.id)).cloned();
+    kept.map(|mut numbered| {
+        if let Step::Parallel(scripts) = &mut numbered.step {
+            scripts.iter_mut().for_each(|script| *script = without(script, ids));
+        }
+        numbered
+    })
+    .collect()
 }
 
 /// The same units of compared simulations are left out together: one that lacks a call differs for that alone.
 fn together(script: &Script, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
-    let of = |id: &u32| {
-        script.iter().find(|numbered| numbered.id == *id).and_then(|numbered| content(&numbered.step))
-    };
+    let contents: HashMap<u32, String> = flat(script)
+        .into_iter()
+        .filter_map(|numbered| Some((numbered.id, content(&numbered.step)?)))
+        .collect();
+    let of = |id: &u32| contents.get(id).cloned();
     let mut groups: Vec<(Vec<String>, Vec<u32>)> = Vec::new();
     for unit in units {
         let key: Vec<String> = unit.iter().filter_map(of).collect();
@@ -67,7 +93,7 @@ fn together(script: &Script, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
     groups.into_iter().map(|(_, ids)| ids).collect()
 }
 
-/// Leaves out what is not needed for `shows` to hold, as long as the rest keeps to the standard. Calls of `pinned`
+/// Leaves out the calls that are not needed for `shows` to hold, as long as the rest keeps to the standard. Calls of `pinned`
 /// functions stay; what is the same in simulations that are compared goes together.
 pub fn shrink(
     description: &Description,
@@ -78,9 +104,14 @@ pub fn shrink(
 ) -> Script {
     let legal = first_illegal(description, script).is_none();
     let mut best = script.clone();
-    let mut units = if compared { together(script, units(script)) } else { units(script) };
+    let threads = script.iter().flat_map(|numbered| match &numbered.step {
+        Step::Parallel(scripts) => scripts.iter().flat_map(|script| units(script)).collect(),
+        _ => Vec::new(),
+    });
+    let all: Vec<Vec<u32>> = units(script).into_iter().chain(threads).collect();
+    let mut units = if compared { together(script, all) } else { all };
     let stays = |id: &u32| {
-        script.iter().any(|numbered| match &numbered.step {
+        flat(script).into_iter().any(|numbered| match &numbered.step {
             Step::Call { function, .. } => {
                 numbered.id == *id && pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name))
             }
@@ -95,11 +126,9 @@ pub fn shrink(
         let mut shorter = false;
         while end > 0 {
             let begin = end.saturating_sub(size);
-            let without: Vec<u32> = units[begin..end].concat();
-            let tried: Script =
-                best.iter().filter(|numbered| !without.contains(&numbered.id)).cloned().collect();
+            let tried = without(&best, &units[begin..end].concat());
             let keeps = !legal || first_illegal(description, &tried).is_none();
-            if keeps && tried.len() < best.len() && shows(&tried) {
+            if keeps && flat(&tried).len() < flat(&best).len() && shows(&tried) {
                 best = tried;
                 units.drain(begin..end);
                 shorter = true;
@@ -111,4 +140,93 @@ pub fn shrink(
         }
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{flat, shrink};
+    use crate::description::Description;
+    use crate::legal::first_illegal;
+    use crate::script::{Numbered, Script, Step};
+    use crate::values::Value;
+    use crate::writer::{Course, Point, Writer};
+    use fmi_abi::Interface;
+
+    fn description() -> Description {
+        let text = "<fmiModelDescription fmiVersion='2.0' guid='g' modelName='m'><CoSimulation modelIdentifier='m'/>\
+            <ModelVariables><ScalarVariable name='u' valueReference='1' causality='input'><Real start='0'/>\
+            </ScalarVariable></ModelVariables></fmiModelDescription>";
+        Description::parse(text).expect("a model description")
+    }
+
+    fn course() -> Course {
+        let point = |number: usize| {
+            let inputs = vec![(0, Value::Numbers(vec![number as f64]))];
+            Point { time: number as f64, size: 1.0, inputs, ..Point::default() }
+        };
+        let points = (0..6).map(point).collect();
+        Course { interface: Interface::CoSimulation, updates: 0, points, end: 6.0 }
+    }
+
+    fn played(writer: &mut Writer, of: usize, course: &Course) {
+        writer.begin(of, course);
+        for point in &course.points {
+            writer.point(of, course, point);
+            writer.ask(of, course.interface);
+        }
+        writer.free(of);
+    }
+
+    fn names(script: &[Numbered]) -> Vec<String> {
+        flat(script).into_iter().map(|numbered| crate::finding::step_name(&numbered.step)).collect()
+    }
+
+    fn count(script: &Script, name: &str) -> usize {
+        names(script).iter().filter(|of| *of == name).count()
+    }
+
+    #[test]
+    fn what_is_left_is_needed_and_legal() {
+        let (description, course) = (description(), course());
+        let mut writer = Writer::new(&description);
+        played(&mut writer, 0, &course);
+        let short = shrink(&description, &writer.script, &[], false, |tried| count(tried, "fmi2DoStep") >= 2);
+        let calls = ["the instantiation", "fmi2SetupExperiment", "fmi2EnterInitializationMode"];
+        let rest = ["fmi2ExitInitializationMode", "fmi2DoStep", "fmi2DoStep"];
+        assert_eq!(names(&short), [calls, rest].concat());
+        assert_eq!(first_illegal(&description, &short), None);
+    }
+
+    #[test]
+    fn nothing_is_left_out_that_is_pinned() {
+        let (description, course) = (description(), course());
+        let mut writer = Writer::new(&description);
+        played(&mut writer, 0, &course);
+        let short = shrink(&description, &writer.script, &["SetReal"], false, |_| true);
+        assert_eq!((count(&short, "fmi2SetReal"), count(&short, "fmi2DoStep")), (6, 0));
+    }
+
+    /// A simulation that is compared with others on threads loses no call that these keep.
+    #[test]
+    fn compared_simulations_stay_alike() {
+        let (description, course) = (description(), course());
+        let mut writer = Writer::new(&description);
+        played(&mut writer, 0, &course);
+        let mut thread = Writer { next: writer.next, ..Writer::new(&description) };
+        played(&mut thread, 1, &course);
+        writer.next = thread.next;
+        writer.add(Step::Parallel(vec![thread.script]));
+        let parallel =
+            |script: &Script| matches!(script.last(), Some(Numbered { step: Step::Parallel(_), .. }));
+        let shows = |tried: &Script| parallel(tried) && count(tried, "fmi2DoStep") >= 4;
+        let short = shrink(&description, &writer.script, &[], true, shows);
+        let Some(Step::Parallel(threads)) = short.last().map(|numbered| &numbered.step) else {
+            panic!("{short:?}")
+        };
+        let alone = short[..short.len() - 1].to_vec();
+        for name in ["fmi2DoStep", "fmi2SetReal"] {
+            assert_eq!(count(&alone, name), count(&threads[0], name), "{name}");
+        }
+        assert_eq!(count(&alone, "fmi2DoStep"), 2);
+    }
 }

@@ -1,32 +1,10 @@
 //! Writes scripts: the calls of an importer that does what the standard says, with the numbers of this FMU.
 
-use crate::checker::near;
 use crate::description::{Description, kind_of, type_name};
+use crate::finding::status_name;
 use crate::script::{Arg, Kind, Make, Numbered, Run, Script, Step, Written, steps_itself};
+use crate::values::Value;
 use fmi_abi::{BaseType, Interface, Standard};
-
-/// A value for a variable.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Value {
-    /// Numbers, one for each element.
-    Numbers(Vec<f64>),
-    /// Texts or bytes.
-    Texts(Vec<Vec<u8>>),
-}
-
-impl Value {
-    /// The first of it, for people.
-    pub fn show(&self) -> String {
-        match self {
-            Self::Numbers(numbers) => {
-                numbers.first().map_or("nothing".to_owned(), |number| format!("{number:?}"))
-            }
-            Self::Texts(texts) => texts
-                .first()
-                .map_or("nothing".to_owned(), |text| format!("{:?}", String::from_utf8_lossy(text))),
-        }
-    }
-}
 
 /// What a call read: the step's number and whose values it wrote, by places, with how many each has.
 #[derive(Clone, Debug)]
@@ -51,7 +29,7 @@ pub struct Point {
     pub inputs: Vec<(usize, Value)>,
     /// Model Exchange: what the states are set to.
     pub states: Vec<f64>,
-    /// Model Exchange: so many updates of the discrete states in an event here; 0 for no event.
+    /// So many updates of the discrete states in an event here; 0 for no event.
     pub updates: usize,
 }
 
@@ -121,7 +99,7 @@ impl<'a> Writer<'a> {
             name: Some("instance".to_owned()),
             token: Some(self.description.token.clone()),
             logging: true,
-            event_mode: false,
+            event_mode: steps_itself(interface) && self.description.event_mode(),
             early_return: false,
             resources: true,
         }
@@ -193,6 +171,9 @@ impl<'a> Writer<'a> {
         if course.interface == Interface::ModelExchange {
             ids.extend(self.update(of, course.updates));
             ids.push(self.call(of, "EnterContinuousTimeMode", vec![]));
+        } else if self.description.event_mode() {
+            ids.extend(self.update(of, course.updates));
+            ids.push(self.call(of, "EnterStepMode", vec![]));
         }
         ids
     }
@@ -312,6 +293,11 @@ impl<'a> Writer<'a> {
             Interface::CoSimulation => {
                 ids.extend(self.set(of, &point.inputs));
                 ids.push(self.step(of, point.time, point.size));
+                if point.updates > 0 {
+                    ids.push(self.call(of, "EnterEventMode", vec![]));
+                    ids.extend(self.update(of, point.updates));
+                    ids.push(self.call(of, "EnterStepMode", vec![]));
+                }
             }
             Interface::ModelExchange => {
                 ids.push(self.call(of, "SetTime", vec![Arg::real(point.time)]));
@@ -419,62 +405,39 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Other values than at the start that a variable may well take: a text beyond ASCII, bytes with zeros among them, the next
-/// number, the other truth value.
-pub fn other_values(description: &Description, place: usize) -> Option<Value> {
-    let variable = &description.variables[place];
-    let starts = variable.starts();
-    Some(match variable.base? {
-        BaseType::Real | BaseType::Float32 => {
-            let kind = kind_of(description.standard, variable.base?);
-            let near = |start: &f64| kind.number(kind.bits(near(variable, *start, 1.0 / 64.0)));
-            Value::Numbers(starts.iter().map(near).collect())
-        }
-        BaseType::String => Value::Texts(vec!["Gödel, Escher, Bach".into(); variable.start.len()]),
-        BaseType::Binary => {
-            let bytes = (0..300).map(|byte| (byte % 256) as u8).collect();
-            Value::Texts(vec![bytes; variable.start.len()])
-        }
-        BaseType::Boolean => Value::Numbers(starts.iter().map(|start| 1.0 - start).collect()),
-        BaseType::Enumeration if variable.max.is_none() => return None,
-        _ => {
-            let other = |start: &f64| match variable.max.is_some_and(|max| start + 1.0 > max) {
-                true => start - 1.0,
-                false => start + 1.0,
-            };
-            let others: Vec<f64> = starts.iter().map(other).collect();
-            let inside = |number: &f64| variable.min.is_none_or(|min| *number >= min);
-            if !others.iter().all(inside) {
-                return None;
-            }
-            Value::Numbers(others)
-        }
-    })
-}
+/// Variables that most checks read at most.
+pub const READ: usize = 1000;
 
-/// What is read is what was set.
-pub fn is_read(read: &Written, value: &Value) -> bool {
-    match (read, value) {
-        (Written::Numbers(kind, bits), Value::Numbers(numbers)) => {
-            bits.iter().zip(numbers).all(|(bits, number)| {
-                *bits == kind.bits(*number) || *kind == Kind::F64 && kind.number(*bits) == *number
-            })
-        }
-        (Written::Texts(texts), Value::Texts(set)) => {
-            texts.iter().zip(set).all(|(text, set)| text.as_ref() == Some(set))
-        }
-        _ => true,
-    }
-}
-
-/// The variables that can be read at any time: no clocks, none whose size is not known.
+/// The variables that can be read at any time: no clocks, none whose size is not known. Of more than a thousand, inputs,
+/// outputs and derivatives come first, and others are taken at equal distances.
 pub fn readable(description: &Description) -> Vec<usize> {
-    (0..description.variables.len())
-        .filter(|place| {
-            let variable = &description.variables[*place];
-            variable.base.is_some() && variable.size.is_some()
-        })
-        .collect()
+    sample(description, READ)
+}
+
+/// So many of the variables that can be read at any time.
+pub fn sample(description: &Description, most: usize) -> Vec<usize> {
+    let known = |place: &usize| {
+        let variable = &description.variables[*place];
+        variable.base.is_some() && variable.size.is_some()
+    };
+    let all: Vec<usize> = (0..description.variables.len()).filter(known).collect();
+    if all.len() <= most {
+        return all;
+    }
+    let first = |place: &usize| {
+        let variable = &description.variables[*place];
+        ["input", "output", "independent"].contains(&variable.causality.as_str())
+            || variable.derivative_of.is_some()
+    };
+    let (first, others): (Vec<usize>, Vec<usize>) = all.into_iter().partition(first);
+    let evenly = |from: Vec<usize>, most: usize| -> Vec<usize> {
+        let step = from.len().div_ceil(most.max(1)).max(1);
+        from.into_iter().step_by(step).collect()
+    };
+    let mut found = evenly(first, most / 2);
+    found.extend(evenly(others, most - found.len()));
+    found.sort_unstable();
+    found
 }
 
 /// The first difference between what was read here and there: the variable and both values.
@@ -485,7 +448,7 @@ pub fn difference(
     other: &[Read],
 ) -> Option<(String, String, String)> {
     for (one, other) in one.iter().zip(other) {
-        let (of_one, of_other) = (run.of(one.id)?, run.of(other.id)?);
+        let (Some(of_one), Some(of_other)) = (run.of(one.id), run.of(other.id)) else { continue };
         if of_one.status != of_other.status {
             let show =
                 |status: Option<i32>| format!("status {}", status.map_or("none".to_owned(), status_name));
@@ -533,17 +496,4 @@ pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Written> {
         }
     }
     None
-}
-
-/// The name of a status.
-pub fn status_name(status: i32) -> String {
-    match status {
-        0 => "OK".to_owned(),
-        1 => "Warning".to_owned(),
-        2 => "Discard".to_owned(),
-        3 => "Error".to_owned(),
-        4 => "Fatal".to_owned(),
-        5 => "Pending".to_owned(),
-        other => other.to_string(),
-    }
 }

@@ -1,9 +1,10 @@
 //! What depends on something is declared to.
 
-use crate::checker::{Checker, Claim, near};
-use crate::finding::{Grade, Judge};
+use crate::checker::Checker;
+use crate::finding::Judge;
 use crate::script::Written;
-use crate::writer::{Read, Value, value_of};
+use crate::values::{Value, near};
+use crate::writer::{Read, value_of};
 use fmi_abi::Interface;
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -55,8 +56,6 @@ fn judge(
 /// Inputs and, in Model Exchange, states, moved one at a time.
 pub fn missing(checker: &Checker) -> anyhow::Result<()> {
     let description = &checker.description;
-    let section = checker.section("2.2.8", "2.4.8");
-    let promise = "An output or derivative that depends on an input or a state lists it in ModelStructure.";
     for course in &checker.courses {
         let listed = match course.interface {
             Interface::CoSimulation => description.outputs.clone(),
@@ -76,7 +75,7 @@ pub fn missing(checker: &Checker) -> anyhow::Result<()> {
                 && !variable.clocked
         });
         let knowns: Vec<usize> =
-            inputs.chain(if scalar { states.clone() } else { Vec::new() }).take(60).collect();
+            inputs.chain(if scalar { states.clone() } else { Vec::new() }).take(checker.most(60)).collect();
         let to = course.points.len() / 2;
         let mut writer = checker.writer();
         writer.begin(0, course);
@@ -120,8 +119,11 @@ pub fn missing(checker: &Checker) -> anyhow::Result<()> {
             let after = writer.read_these(0, &unknowns);
             set(&mut writer, &value);
             let back = writer.read_these(0, &unknowns);
-            let claim = Claim::new("dependencies.missing", Grade::Violation, section, promise);
-            checker.judge(&claim, writer.script, judge(checker, known, unknowns, before, after, back))?;
+            checker.judge(
+                "dependencies.missing",
+                writer.script,
+                judge(checker, known, unknowns, before, after, back),
+            )?;
         }
     }
     Ok(())
@@ -142,7 +144,7 @@ pub fn initial(checker: &Checker) -> anyhow::Result<()> {
                     && !variable.starts().is_empty()
                     && !variable.clocked
             })
-            .take(60)
+            .take(checker.most(60))
             .collect();
         for known in knowns {
             let unknowns = undeclared(checker, &description.initial_unknowns, known);
@@ -161,13 +163,11 @@ pub fn initial(checker: &Checker) -> anyhow::Result<()> {
             let after = writer.read_these(0, &unknowns);
             writer.set(0, &[(known, Value::Numbers(value))]);
             let back = writer.read_these(0, &unknowns);
-            let claim = Claim::new(
+            checker.judge(
                 "dependencies.initial",
-                Grade::Violation,
-                checker.section("2.2.8", "2.4.8"),
-                "An initial unknown that depends on an input or an exact start value lists it in ModelStructure.",
-            );
-            checker.judge(&claim, writer.script, judge(checker, known, unknowns, before, after, back))?;
+                writer.script,
+                judge(checker, known, unknowns, before, after, back),
+            )?;
         }
     }
     Ok(())

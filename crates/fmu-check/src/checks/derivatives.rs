@@ -1,29 +1,26 @@
 //! Partial derivatives against differences, adjoint against directional ones, vectors against variables.
 
-use crate::checker::{Checker, Claim};
+use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::{Grade, Judge};
+use crate::finding::Judge;
 use crate::script::{Arg, Kind, Run};
-use crate::writer::{Course, Read, Value, Writer, value_of};
+use crate::values::Value;
+use crate::writer::{Course, Read, Writer, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
 
-/// Scalar unknowns and knowns that are continuous, and what each unknown may depend on.
-pub fn pairs(description: &Description, interface: Interface) -> Vec<(usize, usize)> {
+/// A scalar unknown and a known that are continuous, of which the unknown may depend on the known.
+pub fn pair(description: &Description, interface: Interface) -> Option<(usize, usize)> {
     let unknowns = unknowns(description, interface);
     let knowns = knowns(description, interface);
-    let listed = description.outputs.iter().chain(&description.derivatives);
-    let mut pairs = Vec::new();
-    for unknown in listed.filter(|unknown| unknowns.contains(&unknown.variable)) {
-        for known in &knowns {
-            let depends =
-                unknown.dependencies.as_ref().is_none_or(|list| list.iter().any(|(place, _)| place == known));
-            if depends && !pairs.contains(&(unknown.variable, *known)) {
-                pairs.push((unknown.variable, *known));
-            }
-        }
-    }
-    pairs
+    let mut listed = description.outputs.iter().chain(&description.derivatives);
+    listed.find_map(|unknown| {
+        let depends = |known: &&usize| {
+            unknown.dependencies.as_ref().is_none_or(|list| list.iter().any(|(place, _)| place == *known))
+        };
+        let known = knowns.iter().find(depends).filter(|_| unknowns.contains(&unknown.variable))?;
+        Some((unknown.variable, *known))
+    })
 }
 
 fn continuous(description: &Description, place: usize) -> bool {
@@ -41,6 +38,7 @@ fn unknowns(description: &Description, interface: Interface) -> Vec<usize> {
     let listed = description.outputs.iter().chain(derivatives).map(|unknown| unknown.variable);
     let mut found: Vec<usize> = listed.filter(|place| continuous(description, *place)).collect();
     found.dedup();
+    found.truncate(200);
     found
 }
 
@@ -94,7 +92,6 @@ fn amid(writer: &mut Writer, course: &Course) -> Vec<f64> {
 
 /// Each column against differences, the transposed against the adjoint, a sum of seeds against the sum.
 pub fn directional(checker: &Checker) -> anyhow::Result<()> {
-    let section = checker.section("2.1.9", "2.2.12");
     for course in &checker.courses {
         let interface = course.interface;
         let has_directional =
@@ -106,7 +103,7 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
         let description = &checker.description;
         let unknowns = unknowns(description, interface);
         let mut knowns = knowns(description, interface);
-        knowns.truncate(40);
+        knowns.truncate(checker.most(40));
         if unknowns.is_empty() || knowns.is_empty() {
             continue;
         }
@@ -170,18 +167,12 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
         let script = writer.script.clone();
 
         // Asking changes nothing.
-        let changed = Claim::new(
-            "derivatives.changed",
-            Grade::Violation,
-            section,
-            "Asking for derivatives changes no value.",
-        );
         let model = description.clone();
         let judge: Judge = Arc::new(move |run| {
             let (name, before, after) = crate::writer::difference(&model, run, &first, &last)?;
             Some(format!("{name} was {before}, after derivatives were asked for it is {after}"))
         });
-        let run = checker.judge(&changed, script.clone(), judge)?;
+        let run = checker.judge("derivatives.changed", script.clone(), judge)?;
         if run.end != crate::script::End::Done {
             continue;
         }
@@ -208,18 +199,10 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
                     })
                 })
             });
-            if let Some(seen) = judge(&run) {
-                let claim = Claim::new(
-                    "derivatives.linear",
-                    Grade::Violation,
-                    section,
-                    "Directional derivatives are linear in the seed.",
-                );
-                checker.add(claim.finding(seen, script.clone(), judge));
-            }
+            checker.keep("derivatives.linear", &run, &script, judge);
         }
         if has_directional && has_adjoint {
-            for (grade, tolerance) in [(Grade::Violation, 1e-6), (Grade::Note, 1e-11)] {
+            for (name, tolerance) in [("derivatives.adjoint", 1e-6), ("derivatives.adjoint-digits", 1e-11)] {
                 let (columns, rows, names, knows) =
                     (columns.clone(), rows.clone(), names.clone(), knows.clone());
                 let judge: Judge = Arc::new(move |run| {
@@ -244,21 +227,43 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
                     }
                     None
                 });
-                if let Some(seen) = judge(&run) {
-                    let claim = Claim::new(
-                        "derivatives.adjoint",
-                        grade,
-                        section,
-                        "Adjoint derivatives are those of the transposed matrix.",
-                    );
-                    checker.add(claim.finding(seen, script.clone(), judge));
+                if checker.keep(name, &run, &script, judge) {
                     break;
                 }
             }
         }
+        if has_directional {
+            order(checker, course, &of_unknowns, &of_knowns)?;
+        }
         let by_column = has_directional;
         differences(checker, course, &unknowns, &knowns, by_column)?;
     }
+    Ok(())
+}
+
+/// The same derivatives in another order of unknowns and knowns.
+fn order(checker: &Checker, course: &Course, unknowns: &[u32], knowns: &[u32]) -> anyhow::Result<()> {
+    let reversed = |list: &[u32]| list.iter().rev().copied().collect::<Vec<_>>();
+    let seed: Vec<f64> = (1..=knowns.len()).map(|number| number as f64).collect();
+    let back: Vec<f64> = seed.iter().rev().copied().collect();
+    let mut writer = checker.writer();
+    amid(&mut writer, course);
+    let name = "GetDirectionalDerivative";
+    let one = derivative(&mut writer, name, unknowns, knowns, &seed, unknowns.len());
+    let other = derivative(&mut writer, name, &reversed(unknowns), &reversed(knowns), &back, unknowns.len());
+    let judge: Judge = Arc::new(move |run| {
+        let numbers = |id: u32| run.written(id).filter(|_| run.status(id) == Some(0)).map(|of| of.numbers());
+        let (one, other) = (numbers(one)?, numbers(other)?);
+        let scale = one.iter().fold(0.0_f64, |most, number| most.max(number.abs()));
+        let off = |(one, other): (&f64, &f64)| (one - other).abs() > 1e-6 * scale;
+        let at = one.iter().zip(other.iter().rev()).position(off)?;
+        let (is, reversed) = (one[at], other[other.len() - 1 - at]);
+        Some(format!(
+            "derivative {} is {is:?}, and {reversed:?} when variables are named in reverse order",
+            at + 1
+        ))
+    });
+    checker.judge("derivatives.order", writer.script, judge)?;
     Ok(())
 }
 
@@ -410,22 +415,16 @@ fn differences(
             }
             None
         });
-        let section = checker.section("2.1.9", "2.2.12");
-        let claim = Claim::new(
-            "derivatives.directional",
-            Grade::Violation,
-            section,
-            "Partial derivatives are those of the model: what differences of its own values show.",
-        );
         let precise = Arc::clone(&compare);
         let script = writer.script.clone();
-        let run = checker.judge(&claim, script.clone(), Arc::new(move |run| compare(run, 1e-4)))?;
+        let run = checker.judge(
+            "derivatives.directional",
+            script.clone(),
+            Arc::new(move |run| compare(run, 1e-4)),
+        )?;
         let judge: Judge = Arc::new(move |run| precise(run, 2e-7));
-        if let Some(seen) = judge(&run).filter(|_| !checker.has("derivatives.directional")) {
-            let promise = "Partial derivatives are exact to the digits that differences of the model's values show. A note: \
-                they may be differences themselves.";
-            let claim = Claim::new("derivatives.precision", Grade::Note, section, promise);
-            checker.add(claim.finding(seen, script, judge));
+        if !checker.has("derivatives.directional") {
+            checker.keep("derivatives.precision", &run, &script, judge);
         }
     }
     Ok(())
@@ -487,28 +486,13 @@ pub fn vectors(checker: &Checker) -> anyhow::Result<()> {
         }
         None
     });
-    let section = checker.section("3.2.2", "3.2.1");
-    let claim = Claim::new(
-        "derivatives.vectors",
-        Grade::Violation,
-        section,
-        "The vectors of states and derivatives are the values of their variables, in the order of the model structure.",
-    );
-    let run = checker.judge(&claim, writer.script.clone(), judge)?;
+    let run = checker.judge("derivatives.vectors", writer.script.clone(), judge)?;
     let judge: Judge = Arc::new(move |run| {
         let numbers =
             run.written(nominals?).filter(|_| run.status(nominals.unwrap_or(0)) == Some(0))?.numbers();
         let bad = numbers.iter().find(|number| !(**number > 0.0 && number.is_finite()))?;
         Some(format!("a nominal value is {bad:?}"))
     });
-    if let Some(seen) = judge(&run) {
-        let claim = Claim::new(
-            "derivatives.nominals",
-            Grade::Violation,
-            section,
-            "Nominal values of states are greater than zero.",
-        );
-        checker.add(claim.finding(seen, writer.script, judge));
-    }
+    checker.keep("derivatives.nominals", &run, &writer.script, judge);
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! What must be there: functions, versions, an instance for the right token, and what the capabilities promise.
 
-use crate::checker::{Checker, Claim, refused_one};
-use crate::finding::{Finding, Grade, Judge};
+use crate::checker::Checker;
+use crate::finding::Judge;
+use crate::finding::refused_one;
 use crate::script::{Arg, End, Kind, Setting, Step};
 use fmi_abi::calls::{fmi2, fmi3, signatures};
 use fmi_abi::{Interface, Standard};
@@ -16,15 +17,8 @@ fn symbols(checker: &Checker) -> anyhow::Result<()> {
         checker.workers.play(&setting, &writer.script, checker.limit)
     });
     if let (End::Done, End::Unloadable(why)) = (late?.end, now?.end) {
-        let claim = Claim::new(
-            "package.symbols",
-            Grade::Fragile,
-            checker.section("2.3", "2.5.1"),
-            "All functions that the library needs are in it or in the system: importers that look them up at once cannot load \
-             it, and others crash later.",
-        );
         let nothing: Judge = Arc::new(|_| None);
-        checker.add(claim.finding(why, writer.script, nothing));
+        checker.add(checker.claim("package.symbols").finding(why, writer.script, nothing));
     }
     Ok(())
 }
@@ -33,9 +27,6 @@ fn symbols(checker: &Checker) -> anyhow::Result<()> {
 pub fn present(checker: &Checker) -> anyhow::Result<()> {
     let standard = checker.description.standard;
     let places = [(Interface::CoSimulation, 0), (Interface::ModelExchange, 1)];
-    let section = checker.section("2.3", "2.2.2");
-    let promise = "All functions of the interface types that are offered are in the library, also those of capabilities it \
-        lacks.";
     let mut missing: Vec<String> = Vec::new();
     for (interface, place) in places {
         let Some(path) = &checker.setting.libraries[place] else { continue };
@@ -71,7 +62,7 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
     }
     if !missing.is_empty() {
         let seen = format!("the library lacks {}", missing.join(", "));
-        checker.add(Finding::of_files("functions.missing", Grade::Violation, section, promise, seen));
+        checker.add(checker.claim("functions.missing").of_files(seen));
     }
     symbols(checker)?;
     version(checker)?;
@@ -87,13 +78,6 @@ fn version(checker: &Checker) -> anyhow::Result<()> {
     let version = writer.add(Step::Version(name.to_owned()));
     let platform = (!checker.fmi3()).then(|| writer.add(Step::Version("fmi2GetTypesPlatform".to_owned())));
     let declared = checker.description.version.clone();
-    let claim = Claim::new(
-        "functions.version",
-        Grade::Violation,
-        checker.section("2.1.4", "2.2.5"),
-        "The version that the library answers is that of the model description; the types are those of the platform \
-         \"default\".",
-    );
     let judge: Judge = Arc::new(move |run| {
         let text = |id: u32| {
             run.of(id)
@@ -105,13 +89,15 @@ fn version(checker: &Checker) -> anyhow::Result<()> {
                 *answer == declared || declared.starts_with("3.") && answer.starts_with("3.")
             });
             if !good {
-                return Some(format!("{name} answers {answer:?}, the description says {declared:?}"));
+                let answer = answer.unwrap_or_else(|| "NULL".to_owned());
+                return Some(format!("{name} returns {answer}, and fmiVersion is {declared}"));
             }
         }
         let answer = text(platform?)?;
-        (answer.as_deref() != Some("default")).then(|| format!("fmi2GetTypesPlatform answers {answer:?}"))
+        let answer = answer.unwrap_or_else(|| "NULL".to_owned());
+        (answer != "default").then(|| format!("fmi2GetTypesPlatform returns {answer}"))
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("functions.version", writer.script, judge)?;
     Ok(())
 }
 
@@ -120,14 +106,6 @@ fn capabilities(checker: &Checker, interface: Interface) -> anyhow::Result<()> {
     let Some(course) = checker.courses.iter().find(|course| course.interface == interface) else {
         return Ok(());
     };
-    let section =
-        checker.section(if interface == Interface::CoSimulation { "4.3.1" } else { "3.3.1" }, "2.4.2");
-    let claim = Claim::new(
-        "functions.capability",
-        Grade::Violation,
-        section,
-        "What a capability flag declares, the library does.",
-    );
     let mut asked: Vec<(&str, Vec<u32>, crate::writer::Writer)> = Vec::new();
     if checker.saves(interface) {
         let mut writer = checker.writer();
@@ -140,8 +118,7 @@ fn capabilities(checker: &Checker, interface: Interface) -> anyhow::Result<()> {
         ids.push(writer.drop_state(0, 0));
         asked.push(("canGetAndSetFMUstate and canSerializeFMUstate", ids, writer));
     }
-    let pairs = super::derivatives::pairs(&checker.description, interface);
-    if let Some((unknown, known)) = pairs.first() {
+    if let Some((unknown, known)) = super::derivatives::pair(&checker.description, interface) {
         let reference = |place: usize| {
             Arg::In(Kind::U32, vec![u64::from(checker.description.variables[place].reference)])
         };
@@ -156,12 +133,12 @@ fn capabilities(checker: &Checker, interface: Interface) -> anyhow::Result<()> {
             let mut writer = checker.writer();
             writer.begin(0, course);
             let (seeds, results) = if function.contains("Adjoint") {
-                (sizes(*unknown), sizes(*known))
+                (sizes(unknown), sizes(known))
             } else {
-                (sizes(*known), sizes(*unknown))
+                (sizes(known), sizes(unknown))
             };
             let seed = Arg::In(Kind::F64, vec![1_f64.to_bits(); seeds]);
-            let mut args = vec![reference(*unknown), Arg::Whole(1), reference(*known), Arg::Whole(1), seed];
+            let mut args = vec![reference(unknown), Arg::Whole(1), reference(known), Arg::Whole(1), seed];
             if checker.fmi3() {
                 args.push(Arg::Whole(seeds as i64));
             }
@@ -183,7 +160,7 @@ fn capabilities(checker: &Checker, interface: Interface) -> anyhow::Result<()> {
             let why = ids.iter().find_map(|id| refused_one(&script, run, *id))?;
             Some(format!("declared by {flag}, but {why}"))
         });
-        checker.judge(&claim, writer.script, judge)?;
+        checker.judge("functions.capability", writer.script, judge)?;
     }
     Ok(())
 }

@@ -1,11 +1,12 @@
 //! What no importer ought to do, and some do: a crash or a hang is fragile, where the standard does not forbid it.
 
 use super::refusals::unknown_reference;
-use crate::checker::{Checker, Claim};
+use crate::checker::Checker;
 use crate::description::{kind_of, type_name};
-use crate::finding::{Grade, Judge};
+use crate::finding::Judge;
 use crate::script::{Arg, End, Kind, NOBODY, Script, Step};
-use crate::writer::{Course, Value, Writer, readable};
+use crate::values::Value;
+use crate::writer::{Course, Writer, readable};
 use fmi_abi::calls::signatures;
 use fmi_abi::{Interface, Mode};
 use std::sync::Arc;
@@ -16,11 +17,11 @@ const CRASHES: usize = 40;
 const HANGS: usize = 2;
 
 /// Plays scripts until `CRASHES` of them have crashed or `HANGS` have hung.
-fn all(checker: &Checker, claim: &Claim, scripts: impl IntoIterator<Item = Script>) -> anyhow::Result<()> {
+fn all(checker: &Checker, name: &str, scripts: impl IntoIterator<Item = Script>) -> anyhow::Result<()> {
     let nothing: Judge = Arc::new(|_| None);
     let (mut crashes, mut hangs) = (0, 0);
     for script in scripts {
-        match checker.judge(claim, script, Arc::clone(&nothing))?.end {
+        match checker.judge(name, script, Arc::clone(&nothing))?.end {
             End::Hang(_) => hangs += 1,
             End::Done => {}
             _ => crashes += 1,
@@ -32,28 +33,13 @@ fn all(checker: &Checker, claim: &Claim, scripts: impl IntoIterator<Item = Scrip
     Ok(())
 }
 
-fn claim(checker: &Checker, name: &str) -> Claim {
-    let promise = "Whatever it is given, the FMU answers with a status and leaves the process alive.";
-    Claim::new(name, Grade::Fragile, checker.section("2.1.3", "2.2.1"), promise)
-}
-
 /// NULL for the instance that is to be freed, which is allowed.
 pub fn free_null(checker: &Checker) -> anyhow::Result<()> {
-    let section = checker.section("2.1.5", "2.3.1");
     let mut writer = checker.writer();
     writer.forbidden = true;
     writer.add(Step::Free(NOBODY));
-    let of_free = Claim {
-        ends: Some(Grade::Violation),
-        ..Claim::new(
-            "life_cycle.free-null",
-            Grade::Violation,
-            section,
-            "Freeing an instance that is NULL is ignored.",
-        )
-    };
     let nothing: Judge = Arc::new(|_| None);
-    checker.judge(&of_free, writer.script, nothing)?;
+    checker.judge("life_cycle.free-null", writer.script, nothing)?;
     Ok(())
 }
 
@@ -139,8 +125,8 @@ pub fn calls(checker: &Checker) -> anyhow::Result<()> {
                 nulls.push(writer.script);
             }
         }
-        all(checker, &claim(checker, "hostile.null-instance"), of_null)?;
-        all(checker, &claim(checker, "hostile.null"), nulls)?;
+        all(checker, "hostile.null-instance", of_null)?;
+        all(checker, "hostile.null", nulls)?;
         references(checker, course)?;
     }
     Ok(())
@@ -211,7 +197,7 @@ fn references(checker: &Checker, course: &Course) -> anyhow::Result<()> {
             }
         }
     }
-    all(checker, &claim(checker, "hostile.references"), wrong)?;
+    all(checker, "hostile.references", wrong)?;
     let mut sizes = Vec::new();
     for place in readable(description) {
         let variable = &description.variables[place];
@@ -254,7 +240,7 @@ fn references(checker: &Checker, course: &Course) -> anyhow::Result<()> {
             }
         }
     }
-    all(checker, &claim(checker, "hostile.sizes"), sizes)
+    all(checker, "hostile.sizes", sizes)
 }
 
 /// Numbers that are none, too great or too small, and texts that are none, for parameters and inputs.
@@ -355,7 +341,7 @@ pub fn values(checker: &Checker) -> anyhow::Result<()> {
             }
         }
         scripts.truncate(120);
-        all(checker, &claim(checker, "hostile.values"), scripts)?;
+        all(checker, "hostile.values", scripts)?;
     }
     Ok(())
 }
@@ -396,7 +382,7 @@ pub fn times(checker: &Checker) -> anyhow::Result<()> {
             writer.free(0);
             scripts.push(writer.script);
         }
-        all(checker, &claim(checker, "hostile.times"), scripts)?;
+        all(checker, "hostile.times", scripts)?;
     }
     Ok(())
 }
@@ -447,7 +433,7 @@ pub fn bytes(checker: &Checker) -> anyhow::Result<()> {
                 writer.script
             })
             .collect();
-        all(checker, &claim(checker, "hostile.bytes"), scripts)?;
+        all(checker, "hostile.bytes", scripts)?;
     }
     Ok(())
 }

@@ -1,7 +1,8 @@
 //! The life of an instance in every order that the standard allows.
 
-use crate::checker::{Checker, Claim, event, refused, refused_one};
-use crate::finding::{Grade, Judge};
+use crate::checker::Checker;
+use crate::finding::Judge;
+use crate::finding::{event, refused, refused_one};
 use crate::script::{Arg, Step};
 use crate::writer::{Course, Point, Writer};
 use fmi_abi::Interface;
@@ -9,12 +10,6 @@ use std::sync::Arc;
 
 fn play(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
     let script = writer.script;
-    let claim = Claim::new(
-        "life_cycle.refused",
-        Grade::Violation,
-        checker.section("4.2.4 and 3.2.3", "2.3"),
-        "A call that the state machine allows, with arguments that are right, succeeds.",
-    );
     let copy = script.clone();
     let judge: Judge = Arc::new(move |run| {
         let ids: Vec<u32> = copy
@@ -30,7 +25,7 @@ fn play(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
             .next()
             .or_else(|| ids.iter().find(error).and_then(|id| refused(&copy, run, &[*id])))
     });
-    checker.judge(&claim, script, judge)?;
+    checker.judge("life_cycle.refused", script, judge)?;
     Ok(())
 }
 
@@ -93,8 +88,15 @@ pub fn orders(checker: &Checker) -> anyhow::Result<()> {
         });
         if checker.several(interface) {
             order(&|writer| {
+                // More than a pool may have.
+                for of in 4..20 {
+                    writer.make(of, interface);
+                }
                 for of in 0..4 {
                     writer.begin(of, course);
+                }
+                for of in 4..20 {
+                    writer.free(of);
                 }
                 writer.free(0);
                 points(writer, 1, 2);
@@ -203,8 +205,55 @@ pub fn orders(checker: &Checker) -> anyhow::Result<()> {
             play(checker, writer)?;
         }
         token(checker, course)?;
+        unload(checker, course)?;
+        beyond(checker, course)?;
     }
     super::hostile::free_null(checker)
+}
+
+/// A step that goes beyond the stop time fails.
+fn beyond(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let Some(last) = course.points.last().filter(|_| course.interface == Interface::CoSimulation) else {
+        return Ok(());
+    };
+    let mut writer = checker.writer();
+    writer.make(0, course.interface);
+    writer.enter_with(0, None, checker.description.start_time, Some(course.end));
+    let mut ids = writer.leave(0, course);
+    for point in &course.points {
+        ids.extend(writer.point(0, course, point));
+    }
+    writer.forbidden = true;
+    let id = writer.step(0, course.end, last.size);
+    let end = course.end;
+    let judge: Judge = Arc::new(move |run| {
+        let good = |id: &u32| run.status(*id).is_some_and(|status| status <= 1);
+        (ids.iter().all(good) && good(&id)).then(|| format!("a step from the stop time {end:?} on succeeds"))
+    });
+    checker.judge("life_cycle.stop-time", writer.script, judge)?;
+    Ok(())
+}
+
+/// After all instances were freed, the library can be unloaded and loaded again, and the process can exit.
+fn unload(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    for (name, step) in [("life_cycle.unload", Step::Unload), ("life_cycle.exit", Step::Quit)] {
+        let mut writer = checker.writer();
+        for _ in 0..2 {
+            writer.begin(0, course);
+            for point in course.points.iter().take(2) {
+                writer.point(0, course, point);
+            }
+            writer.call(0, "Terminate", vec![]);
+            writer.free(0);
+            writer.add(step.clone());
+            if step == Step::Quit {
+                break;
+            }
+        }
+        let nothing: Judge = Arc::new(|_| None);
+        checker.judge(name, writer.script, nothing)?;
+    }
+    Ok(())
 }
 
 /// The library of another description is not this one's.
@@ -214,17 +263,10 @@ fn token(checker: &Checker, course: &Course) -> anyhow::Result<()> {
     how.token = Some("no token of this FMU".to_owned());
     writer.forbidden = true;
     let id = writer.add(Step::Make(0, how));
-    let claim = Claim::new(
-        "life_cycle.token",
-        Grade::Note,
-        checker.section("2.1.5", "2.3.1"),
-        "An instance is made for the guid or instantiationToken of the description only, so that a library and a description \
-         that do not belong together are found out.",
-    );
     let judge: Judge = Arc::new(move |run| {
         (run.status(id) == Some(1)).then(|| "an instance is made for another one".to_owned())
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("life_cycle.token", writer.script, judge)?;
     Ok(())
 }
 
@@ -236,7 +278,7 @@ pub fn random(checker: &Checker) -> anyhow::Result<()> {
         (state >> 33) as usize % below
     };
     for course in &checker.courses {
-        for _ in 0..20 {
+        for _ in 0..checker.most(20) {
             let mut writer = checker.writer();
             // Nothing, initializing, in the course at a point, terminated.
             let (mut mode, mut at) = (0, 0);
@@ -296,8 +338,7 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
     else {
         return Ok(());
     };
-    let section = checker.section("3.2.2", "2.3.5");
-    changed_states(checker, course, section)?;
+    changed_states(checker, course)?;
     let mut writer = checker.writer();
     let mut asked: Vec<(u32, f64)> = Vec::new();
     let of_updates = |writer: &Writer, ids: &[u32], time: f64| -> Vec<(u32, f64)> {
@@ -320,12 +361,6 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
         asked.extend(of_updates(&writer, &ids, point.time));
     }
     let fmi3 = checker.fmi3();
-    let claim = Claim::new(
-        "life_cycle.next-event-time",
-        Grade::Fragile,
-        section,
-        "The next time event lies ahead of the time: importers integrate up to it.",
-    );
     let judge: Judge = Arc::new(move |run| {
         asked.iter().find_map(|(id, time)| {
             let event = event(run, *id, fmi3)?;
@@ -333,13 +368,7 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
             past.then(|| format!("at {time:?} the next event is at {:?}", event.next.unwrap_or_default()))
         })
     });
-    checker.judge(&claim, writer.script, judge)?;
-    let claim = Claim::new(
-        "life_cycle.late-event",
-        Grade::Note,
-        section,
-        "After events were passed by, the next one lies ahead.",
-    );
+    checker.judge("life_cycle.next-event-time", writer.script, judge)?;
     // One who comes late, too, is told of an event that lies ahead.
     let late = course.end.abs() * 10.0 + 10.0;
     let mut writer = checker.writer();
@@ -359,29 +388,23 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
             )
         })
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("life_cycle.late-event", writer.script, judge)?;
     // An event that needs more and more updates never ends.
     let mut writer = checker.writer();
     writer.make(0, course.interface);
     writer.enter(0);
     writer.call(0, "ExitInitializationMode", vec![]);
     let ids = writer.update(0, 100);
-    let claim = Claim::new(
-        "life_cycle.event-iteration",
-        Grade::Fragile,
-        section,
-        "The iteration of an event comes to an end.",
-    );
     let judge: Judge = Arc::new(move |run| {
         let all = ids.iter().all(|id| event(run, *id, fmi3).is_some_and(|event| event.again));
         all.then(|| "after 100 updates of the discrete states another one is needed".to_owned())
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("life_cycle.event-iteration", writer.script, judge)?;
     Ok(())
 }
 
 /// An event that changes states says so: else importers go on with those that they have.
-fn changed_states(checker: &Checker, course: &Course, section: &'static str) -> anyhow::Result<()> {
+fn changed_states(checker: &Checker, course: &Course) -> anyhow::Result<()> {
     let count = checker.description.states_count().unwrap_or(0);
     if count == 0 {
         return Ok(());
@@ -399,12 +422,6 @@ fn changed_states(checker: &Checker, course: &Course, section: &'static str) -> 
         let after = writer.vector(0, "GetContinuousStates", count);
         asked.push((point.time, before, updates, after));
     }
-    let claim = Claim::new(
-        "life_cycle.states-changed",
-        Grade::Violation,
-        section,
-        "An event that changes continuous states says valuesOfContinuousStatesChanged: else importers do not read them.",
-    );
     let fmi3 = checker.fmi3();
     let judge: Judge = Arc::new(move |run| {
         asked.iter().find_map(|(time, before, updates, after)| {
@@ -417,6 +434,6 @@ fn changed_states(checker: &Checker, course: &Course, section: &'static str) -> 
             Some(format!("at {time:?} state {} was {was}, after the event it is {is}", place + 1))
         })
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("life_cycle.states-changed", writer.script, judge)?;
     Ok(())
 }

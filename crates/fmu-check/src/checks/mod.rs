@@ -69,3 +69,22 @@ pub const TOPICS: [&str; 14] = [
     "resources",
     "hostile",
 ];
+
+/// The sources of the checks, whose rules are to be in the table.
+#[cfg(test)]
+pub const SOURCES: &[&str] = &[
+    include_str!("dependencies.rs"),
+    include_str!("derivatives.rs"),
+    include_str!("early_returns.rs"),
+    include_str!("functions.rs"),
+    include_str!("hostile.rs"),
+    include_str!("life_cycle.rs"),
+    include_str!("logs.rs"),
+    include_str!("package.rs"),
+    include_str!("refusals.rs"),
+    include_str!("reset.rs"),
+    include_str!("resources.rs"),
+    include_str!("results.rs"),
+    include_str!("start_values.rs"),
+    include_str!("states.rs"),
+];

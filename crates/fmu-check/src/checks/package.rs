@@ -1,65 +1,82 @@
 //! The ZIP, its folders, the names of the libraries, and what these need.
 
 use crate::description::{Description, Offer};
-use crate::finding::{Finding, Grade};
+use crate::rules::Observation;
+use anyhow::Context as _;
 use fmi_abi::Standard;
 use object::Object as _;
 use std::collections::BTreeSet;
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-/// An FMU, unpacked.
-pub struct Unpacked {
-    /// Where.
-    pub folder: tempfile::TempDir,
-    /// What is wrong with the ZIP.
-    pub found: Vec<Finding>,
-}
-
-/// Unpacks an FMU.
+/// Unpacks an FMU of at most so many bytes. The findings in its ZIP file.
 ///
 /// # Errors
-/// When it cannot be.
-pub fn unpack(path: &Path) -> anyhow::Result<Unpacked> {
-    let file = File::open(path)
-        .map_err(|error| anyhow::anyhow!("{}: cannot be opened ({error})", path.display()))?;
+/// When it cannot be unpacked.
+pub fn unpack(path: &Path, folder: &Path, most: u64) -> anyhow::Result<Vec<Observation>> {
+    let at = path.display();
+    let file = File::open(path).map_err(|error| anyhow::anyhow!("{at}: cannot be opened ({error})"))?;
     let mut archive = zip::ZipArchive::new(file)
-        .map_err(|error| anyhow::anyhow!("{}: is no FMU, which is a ZIP file ({error})", path.display()))?;
-    let folder = tempfile::Builder::new().prefix("fmu-check-").tempdir()?;
+        .map_err(|error| anyhow::anyhow!("{at}: is no FMU, which is a ZIP file ({error})"))?;
     let mut found = Vec::new();
-    let mut tell = |name: &str, grade, promise: &str, seen: String| {
-        found.push(Finding::of_files(name, grade, "2.3 of FMI 2.0, 2.5.1 of FMI 3.0", promise, seen));
-    };
     let mut names = BTreeSet::new();
+    let mut left = most;
     for place in 0..archive.len() {
-        let entry = archive.by_index_raw(place)?;
-        let name = entry.name()?.into_owned();
-        if entry.enclosed_name().is_none() || name.contains('\\') {
-            tell(
-                "package.paths",
-                Grade::Violation,
-                "Entries lie within the ZIP's folder, with / between folders.",
-                name.clone(),
-            );
+        let name = entry(&mut archive, place, &mut names, &mut found)?;
+        if crate::worker::interrupted() {
+            return Err(crate::run::Interrupted.into());
         }
-        if !matches!(entry.compression(), zip::CompressionMethod::Stored | zip::CompressionMethod::Deflated) {
-            let seen = format!("{name} is compressed by {}", entry.compression());
-            tell("package.compression", Grade::Violation, "Entries are stored or deflated.", seen);
+        let Some(inside) = name else { continue };
+        let mut entry =
+            archive.by_index(place).map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
+        let target = folder.join(inside);
+        if entry.is_dir() {
+            std::fs::create_dir_all(target)?;
+            continue;
         }
-        if !names.insert(name.to_lowercase()) {
-            tell(
-                "package.names",
-                Grade::Fragile,
-                "No two entries have names that some systems take for one.",
-                name,
-            );
+        std::fs::create_dir_all(target.parent().unwrap_or(folder))?;
+        // What the entry says of its size need not be true.
+        let written = std::io::copy(&mut (&mut entry).take(left + 1), &mut File::create(&target)?)
+            .map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
+        left = left.checked_sub(written).with_context(|| {
+            let most = most >> 20;
+            format!(
+                "{at}: it has more than {most} MB when it is unpacked; if that is right, give --unpacked MB"
+            )
+        })?;
+        #[cfg(unix)]
+        if let Some(mode) = entry.unix_mode().filter(|mode| mode & 0o100 != 0) {
+            use std::os::unix::fs::PermissionsExt as _;
+            std::fs::set_permissions(&target, std::fs::Permissions::from_mode(mode & 0o777 | 0o600))?;
         }
     }
-    archive
-        .extract(folder.path())
-        .map_err(|error| anyhow::anyhow!("{}: cannot be unpacked ({error})", path.display()))?;
-    Ok(Unpacked { folder, found })
+    Ok(found)
+}
+
+/// Looks at an entry of a ZIP file. The path within the FMU's directory, if it has one.
+fn entry(
+    archive: &mut zip::ZipArchive<File>,
+    place: usize,
+    names: &mut BTreeSet<String>,
+    found: &mut Vec<Observation>,
+) -> anyhow::Result<Option<PathBuf>> {
+    let mut tell = |name: &'static str, seen: String| found.push((name, seen));
+    let entry = archive.by_index_raw(place)?;
+    let name = entry.name()?.into_owned();
+    let inside = entry.enclosed_name();
+    if inside.is_none() || name.contains('\\') {
+        tell("package.paths", name.clone());
+    }
+    if !matches!(entry.compression(), zip::CompressionMethod::Stored | zip::CompressionMethod::Deflated) {
+        let seen = format!("{name} is compressed by {}", entry.compression());
+        tell("package.compression", seen);
+    }
+    if !names.insert(name.to_lowercase()) {
+        tell("package.names", name);
+    }
+    Ok(inside)
 }
 
 /// The folders of `binaries/` for this machine.
@@ -75,12 +92,41 @@ fn folders(standard: Standard) -> Vec<String> {
 }
 
 /// The library for this machine.
-pub fn library(folder: &Path, standard: Standard, offer: &Offer) -> Option<PathBuf> {
+///
+/// # Errors
+/// The reason for which there is none.
+pub fn library(folder: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
     let name = format!("{}{DLL_SUFFIX}", offer.identifier);
-    folders(standard)
-        .iter()
-        .map(|of| folder.join("binaries").join(of).join(&name))
-        .find(|path| path.is_file())
+    let wanted = folders(standard);
+    let library =
+        wanted.iter().map(|of| folder.join("binaries").join(of).join(&name)).find(|path| path.is_file());
+    let Some(library) = library else {
+        let binaries = std::fs::read_dir(folder.join("binaries")).into_iter().flatten().flatten();
+        let mut others: Vec<String> =
+            binaries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        others.sort_unstable();
+        let others = if others.is_empty() { "nothing".to_owned() } else { others.join(", ") };
+        let wanted = wanted.join(" nor in binaries/");
+        return Err(format!("there is no {name} in binaries/{wanted}; binaries has {others}"));
+    };
+    let bytes = std::fs::read(&library).map_err(|error| error.to_string())?;
+    match object::File::parse(bytes.as_slice()).ok().and_then(|file| machine(&file)) {
+        Some(other) if other != ARCH && OS != "macos" => {
+            Err(format!("the library for this machine, {ARCH}, is for {other}"))
+        }
+        _ => Ok(library),
+    }
+}
+
+/// The processor that a library is for.
+fn machine(file: &object::File) -> Option<&'static str> {
+    Some(match file.architecture() {
+        object::Architecture::X86_64 => "x86_64",
+        object::Architecture::I386 => "x86",
+        object::Architecture::Aarch64 => "aarch64",
+        object::Architecture::Arm => "aarch32",
+        _ => return None,
+    })
 }
 
 /// Names that a library exports.
@@ -96,12 +142,9 @@ pub fn exported(library: &Path) -> Option<Vec<String>> {
 }
 
 /// What the folders and libraries have to say.
-pub fn look(folder: &Path, description: &Description) -> Vec<Finding> {
+pub fn look(folder: &Path, description: &Description) -> Vec<Observation> {
     let mut found = Vec::new();
-    let section = description.section("2.3", "2.5.1");
-    let mut tell = |name: &str, grade, promise: &str, seen: String| {
-        found.push(Finding::of_files(name, grade, section, promise, seen));
-    };
+    let mut tell = |name: &'static str, seen: String| found.push((name, seen));
     let known: &[&str] = match description.standard {
         Standard::Fmi2 => &["win32", "win64", "linux32", "linux64", "darwin32", "darwin64"],
         Standard::Fmi3 => &[],
@@ -111,12 +154,7 @@ pub fn look(folder: &Path, description: &Description) -> Vec<Finding> {
         let name = platform.file_name().to_string_lossy().into_owned();
         let tuple = name.split_once('-');
         if description.standard == Standard::Fmi3 && tuple.is_none() {
-            tell(
-                "package.platforms",
-                Grade::Violation,
-                "The folders of binaries are called <arch>-<sys>.",
-                format!("binaries/{name}"),
-            );
+            tell("package.platforms", format!("binaries/{name}"));
         }
         let (is_windows, is_mac) =
             (name.contains("win") && !name.contains("darwin"), name.contains("darwin"));
@@ -135,34 +173,23 @@ pub fn look(folder: &Path, description: &Description) -> Vec<Finding> {
                 && (description.standard == Standard::Fmi2) == known.contains(&name.as_str())
             {
                 let seen = format!("binaries/{name} has no {}{end}", offer.identifier);
-                tell(
-                    "package.library",
-                    Grade::Violation,
-                    "The library is called <modelIdentifier> with the ending of the platform.",
-                    seen,
-                );
+                tell("package.library", seen);
             }
         }
         for file in std::fs::read_dir(platform.path()).into_iter().flatten().flatten() {
             needs(&file.path(), &name, &mut tell);
         }
     }
-    found.dedup_by(|one, other| one.name == other.name && one.seen == other.seen);
+    found.dedup();
     found
 }
 
 /// What a library needs of the system.
-fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&str, Grade, &str, String)) {
+fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String)) {
     let Ok(bytes) = std::fs::read(path) else { return };
     let Ok(file) = object::File::parse(bytes.as_slice()) else { return };
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let machine = match file.architecture() {
-        object::Architecture::X86_64 => "x86_64",
-        object::Architecture::I386 => "x86",
-        object::Architecture::Aarch64 => "aarch64",
-        object::Architecture::Arm => "aarch32",
-        _ => return,
-    };
+    let Some(machine) = machine(&file) else { return };
     let wanted = match platform {
         "linux64" | "win64" | "darwin64" => &["x86_64", "aarch64"][..],
         "linux32" | "win32" => &["x86", "aarch32"],
@@ -170,12 +197,7 @@ fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&str, Grade, &str, S
     };
     let universal = platform.contains("darwin");
     if !universal && !wanted.contains(&machine) && platform.contains(['-', '6', '3']) {
-        tell(
-            "package.machine",
-            Grade::Violation,
-            "A library is for the machine that its folder is named after.",
-            format!("binaries/{platform}/{name} is for {machine}"),
-        );
+        tell("package.machine", format!("binaries/{platform}/{name} is for {machine}"));
     }
     if matches!(file, object::File::Elf64(_) | object::File::Elf32(_)) {
         glibc(&bytes, platform, &name, tell);
@@ -222,19 +244,46 @@ fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&str, Grade, &str, S
     };
     let foreign: Vec<&String> =
         libraries.iter().filter(|library| !of_system(library) && !folder.join(library).exists()).collect();
+    let unlinked = unlinked(&bytes).unwrap_or_default();
+    if libraries.iter().all(|library| of_system(library)) && !unlinked.is_empty() {
+        let list = unlinked.join(", ");
+        let seen =
+            format!("binaries/{platform}/{name} needs {list}, which none of the libraries that it names has");
+        tell("package.symbols", seen);
+    }
     if !foreign.is_empty() {
         let list: Vec<&str> = foreign.iter().map(|name| name.as_str()).collect();
-        tell(
-            "package.needs",
-            Grade::Note,
-            "What a library needs is in the FMU or on every machine of its platform.",
-            format!("binaries/{platform}/{name} needs {}", list.join(", ")),
-        );
+        tell("package.needs", format!("binaries/{platform}/{name} needs {}", list.join(", ")));
     }
 }
 
+/// Functions that a library for Linux needs from no library in particular: those without a version, where others have one.
+/// The program that loads the library may happen to have them.
+fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
+    use object::read::elf::{FileHeader as _, Sym as _};
+    let header = object::elf::FileHeader64::<object::Endianness>::parse(bytes)?;
+    let endian = header.endian()?;
+    let sections = header.sections(endian, bytes)?;
+    let symbols = sections.symbols(endian, bytes, object::elf::SHT_DYNSYM)?;
+    let Some(versions) = sections.versions(endian, bytes)? else { return Ok(Vec::new()) };
+    let (mut found, mut versioned) = (Vec::new(), false);
+    for (index, symbol) in symbols.enumerate() {
+        if !symbol.is_undefined(endian) || symbol.st_bind() != object::elf::STB_GLOBAL {
+            continue;
+        }
+        // 0 and 1 are no versions.
+        if versions.version_index(endian, index).index() > object::elf::VER_NDX_GLOBAL {
+            versioned = true;
+        } else {
+            found.push(String::from_utf8_lossy(symbol.name(endian, symbols.strings())?).into_owned());
+        }
+    }
+    found.retain(|name| versioned && !name.is_empty());
+    Ok(found)
+}
+
 /// The newest version of glibc that it needs.
-fn glibc(bytes: &[u8], platform: &str, name: &str, tell: &mut impl FnMut(&str, Grade, &str, String)) {
+fn glibc(bytes: &[u8], platform: &str, name: &str, tell: &mut impl FnMut(&'static str, String)) {
     let marker = b"GLIBC_2.";
     let mut newest = (0, 0);
     for place in
@@ -248,11 +297,6 @@ fn glibc(bytes: &[u8], platform: &str, name: &str, tell: &mut impl FnMut(&str, G
         newest = newest.max((2, minor));
     }
     if newest >= (2, 29) {
-        tell(
-            "package.glibc",
-            Grade::Note,
-            "A library for Linux runs on systems that are some years old.",
-            format!("binaries/{platform}/{name} needs glibc {}.{}", newest.0, newest.1),
-        );
+        tell("package.glibc", format!("binaries/{platform}/{name} needs glibc {}.{}", newest.0, newest.1));
     }
 }

@@ -1,13 +1,13 @@
 //! Reset equals new.
 
-use crate::checker::{Checker, Claim, refused};
-use crate::finding::{Grade, Judge};
+use crate::checker::Checker;
+use crate::finding::Judge;
+use crate::finding::refused;
 use crate::writer::difference;
 use std::sync::Arc;
 
 /// After a course and a reset, what is read and what the course gives are those of a new instance.
 pub fn reset(checker: &Checker) -> anyhow::Result<()> {
-    let section = checker.section("2.1.6", "2.3.1");
     for course in &checker.courses {
         // A reset instance in one process, a new one in another.
         for terminated in [true, false] {
@@ -30,12 +30,6 @@ pub fn reset(checker: &Checker) -> anyhow::Result<()> {
             let reset = writer.call(0, "Reset", vec![]);
             let enter = writer.enter(0);
             let second = ask(&mut writer, 0);
-            let claim = Claim::new(
-                "reset.incomplete",
-                Grade::Violation,
-                section,
-                "After a reset the instance is as if it were new: all variables have their default values.",
-            );
             let (description, script) = (checker.description.clone(), writer.script.clone());
             let judge: Judge = Arc::new(move |run| {
                 if let Some(why) = refused(&script, run, &[reset, enter]) {
@@ -44,7 +38,7 @@ pub fn reset(checker: &Checker) -> anyhow::Result<()> {
                 let (name, before, after) = difference(&description, run, &first, &second)?;
                 Some(format!("{name} of the new instance was {before}, after the reset it is {after}"))
             });
-            checker.judge(&claim, writer.script, judge)?;
+            checker.judge("reset.incomplete", writer.script, judge)?;
         }
         changed(checker, course)?;
     }
@@ -61,12 +55,12 @@ fn changed(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<
             || variable.causality == "input";
         if settable && !variable.clocked && !variable.start.is_empty() {
             let list = if variable.is_float() { &mut values } else { &mut others };
-            list.extend(crate::writer::other_values(description, place).map(|value| (place, value)));
+            list.extend(crate::values::other_values(description, place).map(|value| (place, value)));
         }
     }
     // What a model may refuse apart, and not for long.
     after_values(checker, course, &values, true)?;
-    for other in others.chunks(1).take(40) {
+    for other in others.chunks(1).take(checker.most(40)) {
         after_values(checker, course, other, false)?;
     }
     Ok(())
@@ -75,7 +69,7 @@ fn changed(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<
 fn after_values(
     checker: &Checker,
     course: &crate::writer::Course,
-    values: &[(usize, crate::writer::Value)],
+    values: &[(usize, crate::values::Value)],
     initialized: bool,
 ) -> anyhow::Result<()> {
     let description = &checker.description;
@@ -92,12 +86,6 @@ fn after_values(
     writer.call(0, "Reset", vec![]);
     writer.enter(0);
     let second = writer.read(0);
-    let claim = Claim::new(
-        "reset.values",
-        Grade::Violation,
-        checker.section("2.1.6", "2.3.1"),
-        "After a reset all variables have their default values, whatever was set before.",
-    );
     let description = description.clone();
     let judge: Judge = Arc::new(move |run| {
         let (name, before, after) = difference(&description, run, &first, &second)?;
@@ -105,6 +93,6 @@ fn after_values(
             "{name} of the new instance was {before}, after values were set and a reset it is {after}"
         ))
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("reset.values", writer.script, judge)?;
     Ok(())
 }

@@ -1,9 +1,10 @@
 //! What is left after many simulations, and what belongs to the whole process.
 
-use crate::checker::{Checker, Claim};
-use crate::finding::{Grade, Judge};
+use crate::checker::Checker;
+use crate::finding::Judge;
 use crate::script::{End, Numbered, Step};
-use crate::writer::{Course, Value, Writer};
+use crate::values::Value;
+use crate::writer::{Course, Writer};
 use fmi_abi::BaseType;
 use std::sync::Arc;
 
@@ -107,7 +108,6 @@ fn measured(
     let times = writer.add(repeat(10_000));
     let last = writer.add(Step::Measure);
     let last_of_cycle: Vec<u32> = steps.iter().map(|numbered| numbered.id).collect();
-    let section = checker.section("2.1.5", "2.3.1");
     let done = move |run: &crate::script::Run| {
         let (one, two) = (run.of(warm)?.measured.as_ref()?.times, run.of(times)?.measured.as_ref()?.times);
         (one >= 50 && two >= 50).then_some(two)
@@ -122,52 +122,38 @@ fn measured(
             format!("{grown} bytes are left after {times} {what}: {} for each", grown / times as u64)
         })
     });
-    let claim = Claim::new(
-        "resources.memory",
-        Grade::Violation,
-        section,
-        "What was allocated for an instance or a state is freed with it.",
-    );
     let script = writer.script.clone();
     let limit = checker.setting.repetitions * 3.0 + checker.limit;
     let run = checker.play_for(&script, limit)?;
     if run.end != crate::script::End::Done {
         let nothing: Judge = Arc::new(|_| None);
-        checker.judge(&Claim::new("resources.cycles", Grade::Violation, section, ""), script, nothing)?;
+        checker.judge("resources.cycles", script, nothing)?;
         return Ok(());
     }
-    checker.always(&script, &run);
-    let tell = |claim: Claim, judge: Judge| {
-        if let Some(seen) = judge(&run) {
-            checker.add(claim.finding(seen, script.clone(), judge));
-        }
-    };
-    tell(claim, memory);
+    checker.keep_always(&script, &run);
+    checker.keep("resources.memory", &run, &script, memory);
     let threads: Judge = Arc::new(move |run| {
         let times = done(run)?;
         let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
         (two.threads > one.threads + 2)
             .then(|| format!("{} threads are left after {times} {what}", two.threads - one.threads))
     });
-    let promise = "Threads end with the instance that they were started for.";
-    tell(Claim::new("resources.threads", Grade::Violation, section, promise), threads);
+    checker.keep("resources.threads", &run, &script, threads);
     let files: Judge = Arc::new(move |run| {
         let times = done(run)?;
         let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
         (two.files > one.files + 2)
             .then(|| format!("{} files are left open after {times} {what}", two.files - one.files))
     });
-    let promise = "Files are closed with the instance that they were opened for.";
-    tell(Claim::new("resources.files", Grade::Violation, section, promise), files);
+    checker.keep("resources.files", &run, &script, files);
     let inner = steps.clone();
     let again: Judge = Arc::new(move |run| {
         let times = run.of(times)?.measured.as_ref()?.times;
-        let why = crate::checker::refused(&inner, run, &last_of_cycle[1..])
-            .or_else(|| crate::checker::refused_one(&inner, run, last_of_cycle[0]))?;
+        let why = crate::finding::refused(&inner, run, &last_of_cycle[1..])
+            .or_else(|| crate::finding::refused_one(&inner, run, last_of_cycle[0]))?;
         (times > 1).then(|| format!("after {} {what}: {why}", times - 1))
     });
-    let promise = "What works once works again, however often.";
-    tell(Claim::new("resources.cycles", Grade::Violation, section, promise), again);
+    checker.keep("resources.cycles", &run, &script, again);
     Ok(())
 }
 
@@ -183,26 +169,16 @@ fn settings(checker: &Checker, course: &Course) -> anyhow::Result<()> {
     }
     writer.ask(0, course.interface);
     let last = writer.add(Step::Measure);
-    let claim = Claim::new(
-        "resources.settings",
-        Grade::Violation,
-        checker.section("2.1", "2.2.1"),
-        "Functions do not change global settings: floating-point control, locale, working directory, signals.",
-    );
     let judge: Judge = Arc::new(move |run| {
         let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
         let (was, is) = one.settings.iter().zip(&two.settings).find(|(was, is)| was != is)?;
         Some(format!("{was} has become {is}"))
     });
-    let run = checker.judge(&claim, writer.script.clone(), judge)?;
+    let run = checker.judge("resources.settings", writer.script.clone(), judge)?;
     let judge: Judge = Arc::new(move |run| {
         let line = run.said.lines().find(|line| !line.trim().is_empty())?;
         (run.end == End::Done).then(|| format!("{:?}", line.chars().take(80).collect::<String>()))
     });
-    if let Some(seen) = judge(&run) {
-        let promise = "What is to be said goes to the logger: the standard output is the importer's.";
-        let claim = Claim::new("logs.printed", Grade::Note, checker.section("2.1.5", "2.3.1"), promise);
-        checker.add(claim.finding(seen, writer.script, judge));
-    }
+    checker.keep("logs.printed", &run, &writer.script, judge);
     Ok(())
 }

@@ -1,9 +1,10 @@
 //! Results depend on the calls alone: not on the process, on other instances, on threads, on what was read.
 
-use crate::checker::{Checker, Claim, steps};
-use crate::finding::{Grade, Judge};
+use crate::checker::Checker;
+use crate::course::steps;
+use crate::finding::{Judge, status_name};
 use crate::script::{Arg, Kind, Numbered, Step};
-use crate::writer::{Course, Point, Read, Writer, difference, readable, status_name, value_of};
+use crate::writer::{Course, Point, Read, Writer, difference, readable, value_of};
 use fmi_abi::Interface;
 use std::sync::Arc;
 
@@ -33,14 +34,7 @@ pub fn repeat(checker: &Checker) -> anyhow::Result<()> {
         let one = whole(&mut writer, 0, course);
         writer.add(Step::FreshProcess);
         let other = whole(&mut writer, 0, course);
-        let claim = Claim::new(
-            "results.process",
-            Grade::Fragile,
-            checker.section("2.1", "2.2.1"),
-            "The same calls give the same results in another process. What differs comes from memory that was not \
-             written, addresses, the clock or chance.",
-        );
-        checker.judge(&claim, writer.script, judge(checker, one, other, "in another process"))?;
+        checker.judge("results.process", writer.script, judge(checker, one, other, "in another process"))?;
     }
     Ok(())
 }
@@ -62,14 +56,8 @@ pub fn name(checker: &Checker) -> anyhow::Result<()> {
             };
             reads.into_iter().filter(|read| !texts(read)).collect()
         };
-        let claim = Claim::new(
-            "results.name",
-            Grade::Fragile,
-            checker.section("2.1.5", "2.3.1"),
-            "The name of an instance serves to tell it from others: numbers do not depend on it.",
-        );
         let judge = judge(checker, no_texts(one), no_texts(other), "of an instance of another name");
-        checker.judge(&claim, writer.script, judge)?;
+        checker.judge("results.name", writer.script, judge)?;
     }
     Ok(())
 }
@@ -77,8 +65,6 @@ pub fn name(checker: &Checker) -> anyhow::Result<()> {
 /// A second instance before, meanwhile, and in turns.
 pub fn instances(checker: &Checker) -> anyhow::Result<()> {
     for course in checker.courses.iter().filter(|course| checker.several(course.interface)) {
-        let section = checker.section("2.1.5", "2.3.1");
-        let promise = "An FMU can be instantiated several times; an instance is not affected by others.";
         let mut writer = checker.writer();
         let alone = whole(&mut writer, 0, course);
         writer.free(0);
@@ -105,11 +91,10 @@ pub fn instances(checker: &Checker) -> anyhow::Result<()> {
                 other.extend(writer.ask(2, course.interface));
             }
         }
-        let claim = Claim::new("results.instances", Grade::Violation, section, promise);
         let first = judge(checker, alone.clone(), one, "beside another instance");
         let second = judge(checker, alone, other, "of a second instance beside the first");
         let both: Judge = Arc::new(move |run| first(run).or_else(|| second(run)));
-        checker.judge(&claim, writer.script, both)?;
+        checker.judge("results.instances", writer.script, both)?;
     }
     Ok(())
 }
@@ -138,12 +123,6 @@ pub fn reading(checker: &Checker) -> anyhow::Result<()> {
         let again = writer.ask(1, course.interface);
         let singly: Vec<Read> =
             all.iter().take(400).flat_map(|place| writer.read_these(1, &[*place])).collect();
-        let claim = Claim::new(
-            "results.reading",
-            Grade::Violation,
-            checker.section("2.1.7", "2.2.7.2"),
-            "Reading values changes nothing: not the values, and not what follows.",
-        );
         let description = checker.description.clone();
         let changed = judge(checker, silent, read.clone(), "after more was read meanwhile");
         let twice = judge(checker, read.clone(), again, "read a second time");
@@ -167,9 +146,44 @@ pub fn reading(checker: &Checker) -> anyhow::Result<()> {
         });
         let all_three: Judge =
             Arc::new(move |run| twice(run).or_else(|| alone(run)).or_else(|| changed(run)));
-        checker.judge(&claim, writer.script, all_three)?;
+        checker.judge("results.reading", writer.script, all_three)?;
         repeated(checker, course, &all)?;
+        first(checker, course)?;
     }
+    Ok(())
+}
+
+/// Each output read first after a step, in a separate instance.
+fn first(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+    let variables = &checker.description.variables;
+    let outputs =
+        readable(&checker.description).into_iter().filter(|place| variables[*place].causality == "output");
+    let mut writer = checker.writer();
+    let start = |writer: &mut Writer| {
+        writer.begin(0, course);
+        for point in course.points.iter().take(3) {
+            writer.point(0, course, point);
+        }
+    };
+    start(&mut writer);
+    let together = writer.read(0);
+    writer.free(0);
+    let mut alone = Vec::new();
+    for output in outputs.take(checker.most(16)) {
+        start(&mut writer);
+        alone.push((output, writer.read_these(0, &[output])));
+        writer.free(0);
+    }
+    let description = checker.description.clone();
+    let judge: Judge = Arc::new(move |run| {
+        alone.iter().find_map(|(output, reads)| {
+            let (one, other) = (value_of(run, reads, *output)?, value_of(run, &together, *output)?);
+            let at = one.differ(&other)?;
+            let name = &description.variables[*output].name;
+            Some(format!("{name} is {} read first and {} read after others", one.show(at), other.show(at)))
+        })
+    });
+    checker.judge("results.reading", writer.script, judge)?;
     Ok(())
 }
 
@@ -186,16 +200,10 @@ fn repeated(checker: &Checker, course: &Course, all: &[usize]) -> anyhow::Result
         nothing.push(Arg::Whole(0));
     }
     let none = writer.call(0, &format!("Get{float}"), nothing);
-    let claim = Claim::new(
-        "results.repeated",
-        Grade::Fragile,
-        checker.section("2.1.7", "2.2.7.2"),
-        "A variable that is asked for twice in a call is told twice; a call that asks for none succeeds.",
-    );
     let description = checker.description.clone();
     let judge: Judge = Arc::new(move |run| {
         if let Some(status) = run.status(none).filter(|status| *status > 1) {
-            return Some(format!("a call that asks for no variable answers {}", status_name(status)));
+            return Some(format!("a call that queries no variable returns {}", status_name(status)));
         }
         singly.iter().zip(&doubly).find_map(|(single, double)| {
             if [single, double].iter().any(|read| run.status(read.id).is_none_or(|status| status > 1)) {
@@ -216,7 +224,7 @@ fn repeated(checker: &Checker, course: &Course, all: &[usize]) -> anyhow::Result
             })
         })
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("results.repeated", writer.script, judge)?;
     Ok(())
 }
 
@@ -240,18 +248,12 @@ pub fn threads(checker: &Checker) -> anyhow::Result<()> {
             scripts.push(thread.script);
         }
         writer.add(Step::Parallel(scripts));
-        let claim = Claim::new(
-            "results.threads",
-            Grade::Violation,
-            checker.section("2.1", "2.2.1"),
-            "Different instances can be called from different threads at the same time.",
-        );
         let judges: Vec<Judge> = reads
             .into_iter()
             .map(|reads| judge(checker, alone.clone(), reads, "on a thread beside others"))
             .collect();
         let any: Judge = Arc::new(move |run| judges.iter().find_map(|judge| judge(run)));
-        checker.judge(&claim, writer.script, any)?;
+        checker.judge("results.threads", writer.script, any)?;
     }
     Ok(())
 }
@@ -264,6 +266,7 @@ pub fn cut(checker: &Checker) -> anyhow::Result<()> {
     };
     if !checker.can(Interface::CoSimulation, &["canHandleVariableCommunicationStepSize"])
         || course.points.len() < 4
+        || checker.description.event_mode()
     {
         return Ok(());
     }
@@ -291,13 +294,6 @@ pub fn cut(checker: &Checker) -> anyhow::Result<()> {
         writer.free(of);
     }
     let description = checker.description.clone();
-    let claim = Claim::new(
-        "results.cut",
-        Grade::Note,
-        checker.section("4.2.2", "4.2.1"),
-        "Where inputs do not change, the state at a time hardly depends on how many steps led there \
-         (canHandleVariableCommunicationStepSize). A note: a solver of fixed steps has such errors.",
-    );
     let judge: Judge = Arc::new(move |run| {
         for (place, variable) in description.variables.iter().enumerate() {
             let values: Vec<Vec<f64>> = ends
@@ -333,7 +329,7 @@ pub fn cut(checker: &Checker) -> anyhow::Result<()> {
         }
         None
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("results.cut", writer.script, judge)?;
     Ok(())
 }
 
@@ -377,12 +373,6 @@ pub fn time(checker: &Checker) -> anyhow::Result<()> {
             let id = ids.last().copied().filter(|_| stepped && checker.fmi3());
             asked.push((writer.read_these(0, &[place]), time, id));
         }
-        let claim = Claim::new(
-            "results.time",
-            Grade::Violation,
-            checker.section("2.2.7", "2.4.7.4"),
-            "The independent variable is the time: after a step, its end.",
-        );
         let judge: Judge = Arc::new(move |run| {
             asked.iter().find_map(|(reads, time, step)| {
                 let value = *value_of(run, reads, place)?.numbers().first()?;
@@ -393,7 +383,7 @@ pub fn time(checker: &Checker) -> anyhow::Result<()> {
                 off.then(|| format!("the independent variable is {value:?} at {time:?}"))
             })
         });
-        checker.judge(&claim, writer.script, judge)?;
+        checker.judge("results.time", writer.script, judge)?;
     }
     last_successful(checker)
 }
@@ -409,12 +399,6 @@ fn last_successful(checker: &Checker) -> anyhow::Result<()> {
         let ids = writer.point(0, course, point);
         asked.extend(ids.last().map(|id| (*id, point.time + point.size)));
     }
-    let claim = Claim::new(
-        "results.last-successful-time",
-        Grade::Note,
-        "4.2.1",
-        "A step ends where it was to end, unless the solver cannot (fixedInternalStepSize says so).",
-    );
     let judge: Judge = Arc::new(move |run| {
         asked.iter().find_map(|(id, time)| {
             let outcome = run.of(*id).filter(|of| of.status == Some(0))?;
@@ -423,6 +407,6 @@ fn last_successful(checker: &Checker) -> anyhow::Result<()> {
             off.then(|| format!("lastSuccessfulTime is {reached:?}, the step ends at {time:?}"))
         })
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("results.last-successful-time", writer.script, judge)?;
     Ok(())
 }

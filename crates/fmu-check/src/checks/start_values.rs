@@ -1,11 +1,12 @@
 //! Start values are what the description says; what is set is what is read; values are of their types and within their
 //! ranges.
 
-use crate::checker::{Checker, Claim};
-use crate::finding::{Grade, Judge};
+use crate::checker::Checker;
+use crate::finding::Judge;
 use crate::script::Written;
+use crate::values::{Value, is_read, other_values};
 use crate::worker::FILL;
-use crate::writer::{Course, Value, Writer, is_read, other_values, readable, value_of};
+use crate::writer::{Course, Writer, readable, sample, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
 
@@ -16,17 +17,12 @@ pub fn starts(checker: &Checker) -> anyhow::Result<()> {
         let mut writer = checker.writer();
         writer.make(0, course.interface);
         writer.enter(0);
-        let reads = writer.read(0);
+        let reads = writer.read_these(0, &sample(description, 10_000));
         let all = reads.clone();
-        let claim = Claim::new(
-            "start_values.start",
-            Grade::Violation,
-            checker.section("2.2.7", "2.4.7.4"),
-            "Variables with initial = exact and inputs have their start values when the initialization begins.",
-        );
         let variables = description.variables.clone();
         let judge: Judge = Arc::new(move |run| {
-            for (place, variable) in variables.iter().enumerate() {
+            for (place, _) in all.iter().flat_map(|read| read.of.iter().copied()) {
+                let variable = &variables[place];
                 let fixed = variable.initial == "exact" || variable.causality == "input";
                 let (true, Some(base)) =
                     (fixed && !variable.start.is_empty() && !variable.clocked, variable.base)
@@ -62,7 +58,7 @@ pub fn starts(checker: &Checker) -> anyhow::Result<()> {
             }
             None
         });
-        checker.judge(&claim, writer.script.clone(), judge)?;
+        checker.judge("start_values.start", writer.script.clone(), judge)?;
         values(checker, course)?;
         constants(checker, course)?;
     }
@@ -79,88 +75,75 @@ fn values(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<(
         writer.point(0, course, point);
         reads.push(writer.read(0));
     }
-    let section = checker.section("2.2.7", "2.4.7");
     let variables = description.variables.clone();
     let standard = description.standard;
     type Test = Arc<dyn Fn(&crate::description::Variable, &Written) -> Option<String> + Send + Sync>;
-    let tests: Vec<(&str, Grade, &str, Test)> = vec![
+    let tests: [(&str, Test); 5] = [
         (
             "start_values.unwritten",
-            Grade::Violation,
-            "A function that answers OK has written all values that it was asked for.",
             Arc::new(|_, value| {
                 let Written::Numbers(kind, bits) = value else { return None };
                 let untouched = u64::from_ne_bytes([FILL; 8]) >> (64 - 8 * kind.size());
-                (kind.size() >= 4 && bits.contains(&untouched)).then(|| "nothing was written".to_owned())
+                (kind.size() >= 4 && bits.contains(&untouched)).then(|| "has not been written".to_owned())
             }),
         ),
         (
             "start_values.boolean",
-            Grade::Violation,
-            "A Boolean is true or false: 1 or 0.",
             Arc::new(|variable, value| {
                 let wrong = variable.base == Some(BaseType::Boolean)
                     && value.numbers().iter().any(|number| ![0.0, 1.0].contains(number));
-                wrong.then(|| value.show(0))
+                wrong.then(|| format!("is {}", value.show(0)))
             }),
         ),
         (
             "start_values.range",
-            Grade::Violation,
-            "Whole numbers and enumerations that are outputs or local stay within their min and max.",
             Arc::new(|variable, value| {
                 let whole = variable.base.is_some_and(|base| !base.is_float())
                     && ["local", "output"].contains(&variable.causality.as_str());
                 let (min, max) =
                     (variable.min.unwrap_or(f64::NEG_INFINITY), variable.max.unwrap_or(f64::INFINITY));
                 let wrong = whole && value.numbers().iter().any(|number| *number < min || *number > max);
-                wrong.then(|| format!("{}, but lies between {min} and {max}", value.show(0)))
+                wrong.then(|| format!("is {}, outside of {min} to {max}", value.show(0)))
             }),
         ),
         (
             "start_values.text",
-            Grade::Violation,
-            "A text is not NULL.",
             Arc::new(|variable, value| {
                 let wrong = variable.base == Some(BaseType::String)
                     && matches!(value, Written::Texts(texts) if texts.contains(&None));
-                wrong.then(|| "NULL".to_owned())
+                wrong.then(|| "is NULL".to_owned())
             }),
         ),
         (
             "results.not-finite",
-            Grade::Note,
-            "Inputs near their start values give results that are numbers.",
             Arc::new(|variable, value| {
                 let wrong = variable.is_float() && value.numbers().iter().any(|number| !number.is_finite());
-                wrong.then(|| value.show(0))
+                wrong.then(|| format!("is {}", value.show(0)))
             }),
         ),
     ];
     let _ = standard;
     let run = checker.play(&writer.script)?;
-    checker.always(&writer.script, &run);
-    for (name, grade, promise, test) in tests {
+    checker.keep_always(&writer.script, &run);
+    for (name, test) in tests {
         let (variables, reads) = (variables.clone(), reads.clone());
         let judge: Judge = Arc::new(move |run| {
             for reads in &reads {
-                for (place, variable) in variables.iter().enumerate() {
+                for (place, _) in reads.iter().flat_map(|read| read.of.iter().copied()) {
+                    let variable = &variables[place];
                     if variable.clocked {
                         continue;
                     }
                     if let Some(value) = value_of(run, reads, place)
                         && let Some(why) = test(variable, &value)
                     {
-                        return Some(format!("{} is {why}", variable.name));
+                        return Some(format!("{} {why}", variable.name));
                     }
                 }
             }
             None
         });
-        if let Some(seen) = judge(&run) {
-            let claim = Claim::new(name, grade, section, promise);
-            checker.add(claim.finding(seen, writer.script.clone(), judge));
-        }
+        checker.keep(name, &run, &writer.script, judge);
     }
     Ok(())
 }
@@ -190,18 +173,12 @@ fn constants(checker: &Checker, course: &crate::writer::Course) -> anyhow::Resul
         writer.point(0, course, point);
     }
     let last = writer.read_these(0, &fixed);
-    let claim = Claim::new(
-        "start_values.fixed",
-        Grade::Violation,
-        checker.section("2.2.7", "2.4.7.4"),
-        "Constants and parameters that nobody sets do not change after the initialization.",
-    );
     let description = description.clone();
     let judge: Judge = Arc::new(move |run| {
         let (name, before, after) = crate::writer::difference(&description, run, &first, &last)?;
         Some(format!("{name} was {before} and has become {after}"))
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("start_values.fixed", writer.script, judge)?;
     Ok(())
 }
 
@@ -231,7 +208,7 @@ pub fn set(checker: &Checker) -> anyhow::Result<()> {
         let alone = places
             .iter()
             .filter(|place| !description.variables[**place].is_float())
-            .take(40)
+            .take(checker.most(40))
             .flat_map(|place| {
                 // Longer than buffers are.
                 let long =
@@ -254,7 +231,7 @@ pub fn set(checker: &Checker) -> anyhow::Result<()> {
             }
         }
         // At a communication point, where event modes are not needed for it.
-        for place in places {
+        for place in places.into_iter().take(checker.most(400)) {
             let variable = &description.variables[place];
             let late = match course.interface {
                 Interface::CoSimulation => variable.causality == "input" || variable.variability == "tunable",
@@ -301,12 +278,6 @@ fn when(checker: &Checker, course: &Course, values: &[(usize, Value)]) -> anyhow
         reads.extend(writer.ask(of, course.interface));
         writer.free(of);
     }
-    let claim = Claim::new(
-        "start_values.when",
-        Grade::Violation,
-        checker.section("2.1.7", "2.2.7.2"),
-        "Start values that are set in Initialization Mode lead to what they lead to when they are set before it.",
-    );
     let [before, within] = reads;
     let description = checker.description.clone();
     let judge: Judge = Arc::new(move |run| {
@@ -318,7 +289,7 @@ fn when(checker: &Checker, course: &Course, values: &[(usize, Value)]) -> anyhow
             "{name} is {one} with values set before Initialization Mode, {other} with those set in it"
         ))
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("start_values.when", writer.script, judge)?;
     Ok(())
 }
 
@@ -330,12 +301,6 @@ fn what_was_set(
 ) -> anyhow::Result<()> {
     let places: Vec<usize> = values.iter().map(|(place, _)| *place).collect();
     let reads = writer.read_these(0, &places);
-    let claim = Claim::new(
-        "start_values.set",
-        Grade::Violation,
-        checker.section("2.1.7", "2.2.7.2"),
-        "What is set is what is read.",
-    );
     let description = checker.description.clone();
     let judge: Judge = Arc::new(move |run| {
         if sets.iter().any(|id| run.status(*id).is_none_or(|status| status > 1)) {
@@ -347,7 +312,7 @@ fn what_was_set(
             Some(format!("{name} was set to {} and reads {}", value.show(), read.show(0)))
         })
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("start_values.set", writer.script, judge)?;
     Ok(())
 }
 
@@ -361,12 +326,6 @@ fn inputs(checker: &Checker, course: &Course) -> anyhow::Result<()> {
         let places: Vec<usize> = point.inputs.iter().map(|(place, _)| *place).collect();
         asked.push((ids, writer.read_these(0, &places), point.inputs.clone()));
     }
-    let claim = Claim::new(
-        "start_values.inputs",
-        Grade::Violation,
-        checker.section("2.1.7", "2.2.7.2"),
-        "An input keeps the value that it was set to until it is set anew.",
-    );
     let description = checker.description.clone();
     let judge: Judge = Arc::new(move |run| {
         asked.iter().find_map(|(ids, reads, inputs)| {
@@ -380,6 +339,6 @@ fn inputs(checker: &Checker, course: &Course) -> anyhow::Result<()> {
             })
         })
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("start_values.inputs", writer.script, judge)?;
     Ok(())
 }

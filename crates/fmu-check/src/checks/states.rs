@@ -1,8 +1,9 @@
 //! Saved states: what follows a restored one is what followed the first time, in the same instance, after a reset, from
 //! bytes, and in a fresh process.
 
-use crate::checker::{Checker, Claim, refused};
-use crate::finding::{Grade, Judge};
+use crate::checker::Checker;
+use crate::finding::Judge;
+use crate::finding::refused;
 use crate::script::{Step, Written};
 use crate::writer::{Course, Read, Writer, difference};
 use std::sync::Arc;
@@ -44,7 +45,6 @@ fn same(checker: &Checker, what: &'static str, one: Vec<Read>, other: Vec<Read>)
 
 /// Saved, gone on, restored, gone on: the same; twice; and saving changes nothing.
 pub fn restore(checker: &Checker) -> anyhow::Result<()> {
-    let section = checker.section("2.1.8", "2.2.7.4");
     for course in checker.courses.iter().filter(|course| checker.saves(course.interface)) {
         for place in places(course) {
             let mut writer = checker.writer();
@@ -59,33 +59,18 @@ pub fn restore(checker: &Checker) -> anyhow::Result<()> {
             writer.restore(0, 0);
             let (_, third) = rest(&mut writer, 0, course, place);
             let script = writer.script;
-            let claim = |name: &str, promise: &str| Claim::new(name, Grade::Violation, section, promise);
-            let changed = claim("states.changed-by-saving", "Saving a state copies it and changes nothing.");
             let run = checker.judge(
-                &changed,
+                "states.changed-by-saving",
                 script.clone(),
                 same(checker, "after the state was saved", before.clone(), after),
             )?;
             let judges = [
-                (
-                    claim("states.restore-values", "A restored state has the values that it was saved with."),
-                    same(checker, "after the state was restored", before, at_once),
-                ),
-                (
-                    claim(
-                        "states.restore",
-                        "The simulation that goes on from a restored state is the one that went on from it before.",
-                    ),
-                    same(checker, "from the restored state", first.clone(), second),
-                ),
-                (
-                    claim("states.twice", "A state can be restored again: restoring it does not change it."),
-                    same(checker, "from the state restored a second time", first, third),
-                ),
+                ("states.restore-values", same(checker, "after the state was restored", before, at_once)),
+                ("states.restore", same(checker, "from the restored state", first.clone(), second)),
+                ("states.twice", same(checker, "from the state restored a second time", first, third)),
             ];
-            for (claim, judge) in judges {
-                if let Some(seen) = judge(&run) {
-                    checker.add(claim.finding(seen, script.clone(), judge));
+            for (name, judge) in judges {
+                if checker.keep(name, &run, &script, judge) {
                     break;
                 }
             }
@@ -118,12 +103,6 @@ fn modes(checker: &Checker, course: &Course) -> anyhow::Result<()> {
     let (more, third) = rest(&mut writer, 0, course, 0);
     ids.extend(more);
     ids.extend([back, again]);
-    let claim = Claim::new(
-        "states.modes",
-        Grade::Violation,
-        checker.section("2.1.8", "2.2.7.4"),
-        "A state that was saved before or in Initialization Mode can be restored later, and is in that mode.",
-    );
     let (script, one) = (
         writer.script.clone(),
         same(checker, "from the state of Initialization Mode", first.clone(), second),
@@ -131,7 +110,7 @@ fn modes(checker: &Checker, course: &Course) -> anyhow::Result<()> {
     let two = same(checker, "from the state of the new instance", first, third);
     let judge: Judge =
         Arc::new(move |run| refused(&script, run, &ids).or_else(|| one(run)).or_else(|| two(run)));
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("states.modes", writer.script, judge)?;
     Ok(())
 }
 
@@ -158,36 +137,23 @@ fn reused(checker: &Checker, course: &Course) -> anyhow::Result<()> {
     let from_first = writer.ask(0, course.interface);
     writer.drop_state(0, 0);
     writer.drop_state(0, 1);
-    let claim = Claim::new(
-        "states.several",
-        Grade::Violation,
-        checker.section("2.1.8", "2.2.7.4"),
-        "There may be several states of an instance, and a handle may be used for a later one.",
-    );
     let judges = [
         same(checker, "from the state in a used handle", values.clone(), again),
         same(checker, "from the state in a used handle", first, second),
         same(checker, "from the other state", values, from_first),
     ];
     let judge: Judge = Arc::new(move |run| judges.iter().find_map(|judge| judge(run)));
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("states.several", writer.script, judge)?;
     Ok(())
 }
 
 /// NULL is ignored, and a freed state leaves NULL.
 fn free_null(checker: &Checker, course: &Course) -> anyhow::Result<()> {
-    let section = checker.section("2.1.8", "2.2.7.4");
     let mut writer = checker.writer();
     writer.begin(0, course);
     writer.save(0, 0);
     let freed = writer.drop_state(0, 0);
     let nothing = writer.drop_state(0, 1);
-    let claim = Claim::new(
-        "states.free",
-        Grade::Violation,
-        section,
-        "Freeing a state leaves NULL in its handle; freeing NULL is ignored.",
-    );
     let judge: Judge = Arc::new(move |run| {
         if run.status(nothing).is_some_and(|status| status > 1) {
             return Some("freeing a state that is NULL is refused".to_owned());
@@ -195,13 +161,12 @@ fn free_null(checker: &Checker, course: &Course) -> anyhow::Result<()> {
         let left = run.status(freed) == Some(0) && run.written(freed)?.numbers() != [0.0];
         left.then(|| "the handle of a freed state is not NULL".to_owned())
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("states.free", writer.script, judge)?;
     Ok(())
 }
 
 /// From bytes: in the same instance, in a new one, in a fresh process.
 pub fn serialized(checker: &Checker) -> anyhow::Result<()> {
-    let section = checker.section("2.1.8", "2.2.7.4");
     for course in checker.courses.iter().filter(|course| checker.serializes(course.interface)) {
         for place in places(course) {
             for fresh in [false, true] {
@@ -229,11 +194,6 @@ pub fn serialized(checker: &Checker) -> anyhow::Result<()> {
                 let (_, second) = rest(&mut writer, 1, course, place);
                 let script = writer.script.clone();
                 let name = if fresh { "states.fresh-process" } else { "states.serialized" };
-                let promise = if fresh {
-                    "Serialized bytes, read in a fresh process, are the state: its values and what follows."
-                } else {
-                    "Serialized bytes, read by another instance, are the state: its values and what follows."
-                };
                 let one = same(checker, "from the bytes", before, at_once);
                 let two = same(checker, "from the bytes", first, second);
                 let judge: Judge = Arc::new(move |run| {
@@ -244,7 +204,7 @@ pub fn serialized(checker: &Checker) -> anyhow::Result<()> {
                     }
                     refused(&script, run, &[read, set]).or_else(|| one(run)).or_else(|| two(run))
                 });
-                checker.judge(&Claim::new(name, Grade::Violation, section, promise), writer.script, judge)?;
+                checker.judge(name, writer.script, judge)?;
             }
         }
         again(checker, course)?;
@@ -260,12 +220,6 @@ fn again(checker: &Checker, course: &Course) -> anyhow::Result<()> {
     let [_, first] = writer.serialize(0, 0);
     writer.deserialize(0, 0, 1);
     let [_, second] = writer.serialize(0, 1);
-    let claim = Claim::new(
-        "states.bytes",
-        Grade::Note,
-        checker.section("2.1.8", "2.2.7.4"),
-        "A state read from bytes gives the same bytes again; others show that something is lost, or memory that nobody wrote.",
-    );
     let judge: Judge = Arc::new(move |run| {
         let (one, two) = (run.written(first)?, run.written(second)?);
         match (one, two) {
@@ -275,6 +229,6 @@ fn again(checker: &Checker, course: &Course) -> anyhow::Result<()> {
             _ => one.differ(two).map(|place| format!("byte {place} of {} differs", one.numbers().len())),
         }
     });
-    checker.judge(&claim, writer.script, judge)?;
+    checker.judge("states.bytes", writer.script, judge)?;
     Ok(())
 }

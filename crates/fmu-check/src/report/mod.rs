@@ -1,15 +1,24 @@
 //! The report: for a terminal, as a page, as JSON, as JUnit.
 
 mod page;
+mod sarif;
 
-use crate::checker::Checker;
+use crate::baseline::Baseline;
+use crate::checker::{Checker, Unchecked};
 use crate::finding::{Finding, Grade};
+use crate::{FailOn, Options};
 use std::fmt::Write as _;
 use std::path::Path;
 
 /// What was found in an FMU.
 #[derive(Clone, serde::Serialize)]
 pub struct Report {
+    /// The version of the report's structure: 1. It changes when a field changes or goes.
+    pub schema: u32,
+    /// The version of this tool.
+    pub version: &'static str,
+    /// The exit status: 0, 1 for findings that fail, 2 for an interface or a topic that was not checked.
+    pub status: u8,
     /// The file.
     pub fmu: String,
     /// The name of the model.
@@ -24,8 +33,12 @@ pub struct Report {
     pub seconds: f64,
     /// Chose what was chosen at random.
     pub seed: u64,
-    /// What could not be checked, and why.
-    pub unreached: Vec<String>,
+    /// How many variables there are, and how many of them most checks read.
+    pub variables: [usize; 2],
+    /// The interfaces and topics that were not checked, with the reason of each.
+    pub unreached: Vec<Unchecked>,
+    /// Names in the baseline for which nothing was found.
+    pub unused: Vec<String>,
     /// The worst first.
     pub findings: Vec<Finding>,
 }
@@ -33,6 +46,10 @@ pub struct Report {
 impl Report {
     pub(crate) fn new(path: &Path, checker: &Checker, findings: Vec<Finding>) -> Self {
         Self {
+            schema: 1,
+            version: env!("CARGO_PKG_VERSION"),
+            status: 0,
+            unused: Vec::new(),
             fmu: path.display().to_string(),
             model: checker.description.model_name.clone(),
             standard: checker.description.standard.to_string(),
@@ -40,22 +57,64 @@ impl Report {
             scripts: checker.played(),
             seconds: 0.0,
             seed: checker.seed,
-            unreached: checker.take_unreached(),
+            variables: [
+                checker.description.variables.len(),
+                crate::writer::readable(&checker.description).len(),
+            ],
+            unreached: checker.take_unchecked(),
             findings,
         }
     }
 
+    /// Decides which findings fail and what is allowed, for all outputs.
+    pub(crate) fn judge(&mut self, options: &Options, baseline: &Baseline) {
+        let from = match options.fail_on {
+            FailOn::Violation => Some(Grade::Violation),
+            FailOn::Fragile => Some(Grade::Fragile),
+            FailOn::Note => Some(Grade::Note),
+            FailOn::Never => None,
+        };
+        self.unused = baseline.unused(&self.findings, &self.unreached);
+        for finding in &mut self.findings {
+            finding.accepted = baseline.of_finding(finding);
+            finding.fails = finding.accepted.is_none() && from.is_some_and(|from| finding.grade >= from);
+        }
+        for unchecked in self.unreached.iter_mut().filter(|unchecked| !unchecked.allowed) {
+            let reason = baseline.of_unchecked(&unchecked.name);
+            if let Some(reason) = reason {
+                unchecked.why = format!("{} (accepted: {reason})", unchecked.why);
+            }
+            unchecked.allowed = reason.is_some() || options.allow_unchecked.contains(&unchecked.name);
+        }
+        let fails = self.findings.iter().any(|finding| finding.fails);
+        let unchecked = self.unreached.iter().any(|unchecked| !unchecked.allowed);
+        self.status = if fails { 1 } else { 2 * u8::from(unchecked) };
+    }
+
     /// How many findings there are of a grade.
     pub fn count(&self, grade: Grade) -> usize {
-        self.findings.iter().filter(|finding| finding.grade == grade).count()
+        self.findings.iter().filter(|finding| finding.grade == grade && finding.accepted.is_none()).count()
+    }
+
+    /// The interfaces that were checked.
+    fn offers(&self) -> String {
+        if self.interfaces.is_empty() { "no interface".to_owned() } else { self.interfaces.join(" and ") }
     }
 
     /// In a sentence.
     fn summary(&self) -> String {
         let many =
             |count: usize, one: &str, more: &str| format!("{count} {}", if count == 1 { one } else { more });
+        let unchecked = match self.unreached.iter().filter(|unchecked| !unchecked.allowed).count() {
+            0 => String::new(),
+            count => format!(", {count} not checked"),
+        };
+        let accepted = match self.findings.iter().filter(|finding| finding.accepted.is_some()).count() {
+            0 => String::new(),
+            count => format!(", {count} accepted"),
+        };
         format!(
-            "{}, {} fragile, {}",
+            "{}, {} fragile, {}{accepted}{unchecked}",
             many(self.count(Grade::Violation), "violation", "violations"),
             self.count(Grade::Fragile),
             many(self.count(Grade::Note), "note", "notes")
@@ -65,14 +124,7 @@ impl Report {
     /// For a terminal.
     pub fn terminal(&self, colours: bool) -> String {
         let mut text = String::new();
-        let _ = writeln!(
-            text,
-            "{} ({}, {}): {}",
-            self.fmu,
-            self.standard,
-            self.interfaces.join(" and "),
-            self.summary()
-        );
+        let _ = writeln!(text, "{} ({}, {}): {}", self.fmu, self.standard, self.offers(), self.summary());
         for finding in &self.findings {
             let (on, off) = match (colours, finding.grade) {
                 (false, _) => ("", ""),
@@ -95,13 +147,16 @@ impl Report {
                 (0, 0) => String::new(),
                 (_, steps) => format!("; {steps} calls show it"),
             };
-            let _ = writeln!(text, "{:36} section {}{calls}{more}", "", finding.section);
+            let section = if finding.section.is_empty() { "not in the standard" } else { &finding.section };
+            let accepted =
+                finding.accepted.as_ref().map_or(String::new(), |reason| format!("; accepted: {reason}"));
+            let _ = writeln!(text, "{:36} {section}{calls}{more}{accepted}", "");
         }
-        for what in &self.unreached {
-            let _ = writeln!(text, "not checked: {what}");
+        for Unchecked { name, why, allowed } in &self.unreached {
+            let allowed = if *allowed { " (allowed)" } else { "" };
+            let _ = writeln!(text, "not checked{allowed}: {name}: {why}");
         }
-        let _ =
-            writeln!(text, "{} sequences of calls, {:.1} s, seed {}", self.scripts, self.seconds, self.seed);
+        let _ = writeln!(text, "{} call sequences, {:.1} s, seed {}", self.scripts, self.seconds, self.seed);
         text
     }
 
@@ -113,7 +168,7 @@ impl Report {
         serde_json::to_string_pretty(self)
     }
 
-    /// As JUnit: a test for each finding, notes passed with what they say.
+    /// As JUnit: a test for each finding, which fails if the finding fails the check.
     pub fn junit(&self) -> String {
         let escape = |text: &str| {
             let printable =
@@ -121,16 +176,25 @@ impl Report {
             printable.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
         };
         let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
-        let failures = self.count(Grade::Violation) + self.count(Grade::Fragile);
+        let failures = self.findings.iter().filter(|finding| finding.fails).count();
+        let skipped = self.unreached.iter().filter(|unchecked| unchecked.allowed).count();
         let _ = writeln!(
             text,
-            "<testsuite name=\"{}\" tests=\"{}\" failures=\"{failures}\" time=\"{:.3}\">",
+            "<testsuite name=\"{}\" tests=\"{}\" failures=\"{failures}\" errors=\"{}\" skipped=\"{skipped}\" time=\"{:.3}\">",
             escape(&format!("fmu-check {}", self.model)),
-            self.findings.len().max(1),
+            self.findings.len().max(1) + self.unreached.len(),
+            self.unreached.len() - skipped,
             self.seconds
         );
         if self.findings.is_empty() {
             let _ = writeln!(text, "  <testcase classname=\"fmu-check\" name=\"no findings\"/>");
+        }
+        for Unchecked { name, why, allowed } in &self.unreached {
+            let (kind, why) = (if *allowed { "skipped" } else { "error" }, escape(why));
+            let _ = writeln!(
+                text,
+                "  <testcase classname=\"fmu-check\" name=\"{name}\"><{kind} message=\"not checked: {why}\"/></testcase>"
+            );
         }
         for finding in &self.findings {
             let _ = writeln!(
@@ -140,15 +204,19 @@ impl Report {
                 finding.name
             );
             let body = escape(&format!(
-                "{}\nSection {}: {}\n{}",
+                "{}\n{}: {}\n{}",
                 finding.seen,
                 finding.section,
                 finding.promise,
                 finding.more.join("\n")
             ));
             let (grade, seen) = (finding.grade.name(), escape(&finding.seen));
-            if finding.grade == Grade::Note {
-                let _ = writeln!(text, "    <system-out>{body}</system-out>");
+            if !finding.fails {
+                let reason = finding
+                    .accepted
+                    .as_ref()
+                    .map_or(String::new(), |reason| escape(&format!("\nAccepted: {reason}")));
+                let _ = writeln!(text, "    <system-out>{grade}: {body}{reason}</system-out>");
             } else {
                 let _ = writeln!(text, "    <failure type=\"{grade}\" message=\"{seen}\">{body}</failure>");
             }
@@ -166,6 +234,7 @@ impl Report {
         std::fs::create_dir_all(folder)?;
         std::fs::write(folder.join("report.json"), self.json()?)?;
         std::fs::write(folder.join("junit.xml"), self.junit())?;
+        std::fs::write(folder.join("report.sarif"), serde_json::to_vec_pretty(&sarif::sarif(self))?)?;
         std::fs::write(folder.join("report.html"), page::page(self))?;
         for finding in self.findings.iter().filter(|finding| !finding.c.is_empty()) {
             std::fs::write(folder.join(format!("{}.c", finding.name)), &finding.c)?;

@@ -25,12 +25,12 @@ pub fn page(report: &Report) -> String {
         escape(&report.model),
         escape(&report.fmu),
         report.standard,
-        report.interfaces.join(" and "),
+        report.offers(),
         report.summary()
     );
     let _ = writeln!(
         text,
-        "<p>{} sequences of calls were played in processes of their own, in {:.1} s, with seed {}.</p>",
+        "<p>{} call sequences were played in separate processes, in {:.1} s, with seed {}.</p>",
         report.scripts, report.seconds, report.seed
     );
     for (grade, what) in [
@@ -47,13 +47,15 @@ pub fn page(report: &Report) -> String {
             let name = grade.name();
             let _ = write!(
                 text,
-                "<section class=\"{name}\"><span class=\"grade\">{name}</span><h2>{}</h2>\n<p>{}</p>\n<p>Section {} of {}: {}</p>\n",
+                "<section class=\"{name}\"><span class=\"grade\">{name}</span><h2>{}</h2>\n<p>{}</p>\n<p>{}: {}</p>\n",
                 finding.name,
                 escape(&finding.seen),
-                finding.section,
-                report.standard,
+                if finding.section.is_empty() { "Not in the standard" } else { &finding.section },
                 escape(&finding.promise)
             );
+            if let Some(reason) = &finding.accepted {
+                let _ = writeln!(text, "<p>Accepted: {}</p>", escape(reason));
+            }
             if !finding.more.is_empty() {
                 let _ = writeln!(text, "<details><summary>{} more</summary><ul>", finding.more.len());
                 for more in &finding.more {
@@ -79,8 +81,8 @@ pub fn page(report: &Report) -> String {
     }
     if !report.unreached.is_empty() {
         text.push_str("<p>Not checked:</p><ul>\n");
-        for what in &report.unreached {
-            let _ = writeln!(text, "<li>{}</li>", escape(what));
+        for unchecked in &report.unreached {
+            let _ = writeln!(text, "<li>{}: {}</li>", unchecked.name, escape(&unchecked.why));
         }
         text.push_str("</ul>\n");
     }

@@ -1,21 +1,31 @@
 //! A script as a program in C.
 
+use super::evidence::{Evidence, Measure, Proof};
 use super::{Names, head, library, phases};
 use crate::description::Description;
 use crate::finding::Finding;
-use crate::script::{Arg, Kind, NOBODY, Numbered, Setting, Step};
+use crate::script::{Arg, Kind, Make, NOBODY, Numbered, Script, Setting, Step};
 use fmi_abi::calls::signature;
 use std::fmt::Write as _;
 
 /// The program.
-pub fn program(finding: &Finding, setting: &Setting, description: &Description) -> String {
+pub fn program(
+    finding: &Finding,
+    script: &Script,
+    evidence: &Evidence,
+    setting: &Setting,
+    description: &Description,
+) -> String {
     let mut text = String::from("/*\n");
     for line in head(finding, description) {
         let _ = writeln!(text, " * {line}");
     }
-    text.push_str(" * cc repro.c -o repro -ldl -lpthread && ./repro FOLDER_OF_THE_UNPACKED_FMU\n */\n");
+    text.push_str(
+        " * cc repro.c -o repro -ldl -lpthread && ./repro FOLDER_OF_THE_UNPACKED_FMU\n *\n \
+         * Exit status: 1 if the finding shows, 0 if it does not, 3 if that cannot be told.\n */\n",
+    );
     text.push_str(include_str!("prelude.c"));
-    let names = Names::of(&finding.script);
+    let names = Names::of(script);
     for place in names.instances.iter().filter(|place| **place != NOBODY) {
         let _ = writeln!(text, "static void *c{place};");
     }
@@ -28,107 +38,129 @@ pub fn program(finding: &Finding, setting: &Setting, description: &Description) 
     text.push_str(
         "static char resources[5000];\nstatic __attribute__((unused)) Callbacks callbacks = {say2, calloc, free, NULL, NULL};\n\n",
     );
-    let mut writer = Writer { fmi3: setting.fmi3, next: 0, threads: String::new() };
+    let mut writer = Writer { fmi3: setting.fmi3, evidence, description, next: 0, threads: String::new() };
     let mut bodies = String::new();
-    let parts = phases(&finding.script);
+    let parts = phases(script);
     for (number, part) in parts.iter().enumerate() {
         let mut body = String::new();
-        writer.steps(part, &mut body, "    ", description);
+        writer.steps(part, &mut body, "    ");
         let _ = write!(bodies, "static void phase{number}(void) {{\n{body}}}\n\n");
     }
     text.push_str(&writer.threads);
     text.push_str(&bodies);
     let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
     let _ = writeln!(text, "static void (*const phases[])(void) = {{{}}};", list.join(", "));
-    let _ = writeln!(text, "static const char library_name[] = \"{}\";", library(setting, &finding.script));
+    let _ = writeln!(text, "static const char library_name[] = \"{}\";", library(setting, script));
     let format = if setting.fmi3 { "%s/resources/" } else { "file://%s/resources" };
     let _ = writeln!(text, "static const char resources_format[] = \"{format}\";");
     // Serialized bytes are passed on to the next process in files.
     let each =
         |write: &dyn Fn(usize) -> String| names.bytes.iter().map(|slot| write(*slot)).collect::<String>();
     let load = each(&|slot| {
-        format!("    b{slot} = guarded(NULL, 1 << 24);\n    n{slot} = passed_on(folder, {slot}, b{slot});\n")
+        format!("    b{slot} = guarded(NULL, 1 << 24);\n    n{slot} = passed_on({slot}, b{slot});\n")
     });
-    let save = each(&|slot| format!("    pass_on(folder, {slot}, b{slot}, *n{slot});\n"));
-    let _ = write!(text, "\nstatic void load(const char *folder) {{\n    (void)folder;\n{load}}}\n\n");
-    let _ = write!(text, "static void save(const char *folder) {{\n    (void)folder;\n{save}}}\n\n");
+    let save = each(&|slot| format!("    pass_on({slot}, b{slot}, *n{slot});\n"));
+    let _ = write!(text, "\nstatic void load(void) {{\n{load}}}\n\n");
+    let _ = write!(text, "static void save(void) {{\n{save}}}\n\n");
+    text.push_str(&shows(evidence));
     text.push_str(include_str!("main.c"));
     text
 }
 
-struct Writer {
+/// The function that tells whether the results of the calls are those of the finding.
+fn shows(evidence: &Evidence) -> String {
+    let (kind, expression) = match evidence {
+        Evidence::None => ("NONE", "false".to_owned()),
+        Evidence::End => ("END", "false".to_owned()),
+        Evidence::Left => ("LEFT", "false".to_owned()),
+        Evidence::Printed => ("RESULTS", "*result(\"printed\", 0) != 0".to_owned()),
+        Evidence::Damage => ("RESULTS", "damaged()".to_owned()),
+        Evidence::Differ(proofs) => {
+            let of = |place: usize| proofs.get(place).map_or(0, |proof| proof.id);
+            ("RESULTS", format!("strcmp(result(\"r\", {}), result(\"r\", {})) != 0", of(0), of(1)))
+        }
+        Evidence::AnyDiffer(pairs) => {
+            let list: Vec<String> = pairs.iter().map(|[one, other]| format!("{{{one}, {other}}}")).collect();
+            let list = list.join(", ");
+            ("RESULTS", format!("any_differ((const int[][2]){{{list}}}, {})", pairs.len()))
+        }
+        Evidence::Same(proofs) => {
+            let same = |Proof { id, observed, .. }: &Proof| {
+                format!("strcmp(result(\"r\", {id}), {}) == 0", literal(observed.as_bytes()))
+            };
+            ("RESULTS", proofs.iter().map(same).collect::<Vec<_>>().join("\n        && "))
+        }
+        Evidence::Grown(Measure::Settings, first, last, _) => {
+            let settings = |id: &u32| format!("strchr(result(\"r\", {id}), ';')");
+            ("RESULTS", format!("strcmp({}, {}) != 0", settings(first), settings(last)))
+        }
+        Evidence::Grown(measure, first, last, most) => {
+            let place = *measure as usize;
+            ("RESULTS", format!("measured({last}, {place}) - measured({first}, {place}) > {most}"))
+        }
+    };
+    format!("#define EVIDENCE {kind}\n\nstatic bool shows(void) {{\n    return {expression};\n}}\n\n")
+}
+
+struct Writer<'a> {
     fmi3: bool,
+    evidence: &'a Evidence,
+    description: &'a Description,
     next: usize,
     threads: String,
 }
 
-impl Writer {
-    fn steps(&mut self, script: &[Numbered], text: &mut String, indent: &str, description: &Description) {
-        for numbered in script {
-            self.step(&numbered.step, text, indent, description);
+impl Writer<'_> {
+    fn steps(&mut self, script: &[Numbered], text: &mut String, indent: &str) {
+        for Numbered { id, step, .. } in script {
+            let matters = match self.evidence {
+                Evidence::Differ(proofs) | Evidence::Same(proofs) => {
+                    proofs.iter().find(|proof| proof.id == *id).map(|proof| proof.matters)
+                }
+                Evidence::AnyDiffer(pairs) => {
+                    pairs.iter().any(|pair| pair.contains(id)).then_some([true, true, false])
+                }
+                _ => None,
+            };
+            match step {
+                Step::Make(place, make) => self.make(*id, *place, make, matters, text, indent),
+                Step::Call { of, function, args } => {
+                    self.call(*id, *of, function, args, matters, text, indent)
+                }
+                Step::Version(name) => {
+                    let _ = writeln!(
+                        text,
+                        "{indent}{{\n{indent}    const char *version = ((const char *(*)(void))function(\"{name}\"))();\n\
+                         {indent}    print(\"{name}: %s\\n\", version);\n\
+                         {indent}    FILE *file = results(\"r\", {id}, \"w\"); put_texts(file, &version, 1); fclose(file);\n{indent}}}"
+                    );
+                }
+                other => self.around(*id, other, text, indent),
+            }
         }
     }
 
-    fn step(&mut self, step: &Step, text: &mut String, indent: &str, description: &Description) {
-        match step {
-            Step::Make(place, make) => {
-                let of = |text: &Option<String>| {
-                    text.as_ref().map_or("NULL".to_owned(), |text| literal(text.as_bytes()))
-                };
-                let (name, token) = (of(&make.name), of(&make.token));
-                let resources = if make.resources { "resources" } else { "NULL" };
-                let logging = u8::from(make.logging);
-                let made = match (self.fmi3, make.co_simulation) {
-                    (false, co_simulation) => format!(
-                        "((void *(*)(const char *, int, const char *, const char *, const Callbacks *, int, int))function(\"fmi2Instantiate\"))\
-                         ({name}, {}, {token}, {resources}, &callbacks, 0, {logging})",
-                        u8::from(co_simulation)
-                    ),
-                    (true, false) => format!(
-                        "((void *(*)(const char *, const char *, const char *, bool, bool, void *, void *))function(\"fmi3InstantiateModelExchange\"))\
-                         ({name}, {token}, {resources}, false, {logging}, NULL, (void *)say3)"
-                    ),
-                    (true, true) => format!(
-                        "((void *(*)(const char *, const char *, const char *, bool, bool, bool, bool, const uint32_t *, size_t, void *, void *, void *))\
-                         function(\"fmi3InstantiateCoSimulation\"))({name}, {token}, {resources}, false, {logging}, {}, {}, NULL, 0, NULL, (void *)say3, NULL)",
-                        u8::from(make.event_mode),
-                        u8::from(make.early_return)
-                    ),
-                };
-                let _ = writeln!(
-                    text,
-                    "{indent}c{place} = {made};\n{indent}printf(\"instance {place}: %s\\n\", c{place} ? \"made\" : \"NULL\");"
-                );
-            }
+    /// A step that is no call of the FMU.
+    fn around(&mut self, id: u32, step: &Step, text: &mut String, indent: &str) {
+        let _ = match step {
             Step::Free(place) => {
                 let name = if self.fmi3 { "fmi3FreeInstance" } else { "fmi2FreeInstance" };
                 let instance = if *place == NOBODY { "NULL".to_owned() } else { format!("c{place}") };
-                let _ = writeln!(text, "{indent}((void (*)(void *))function(\"{name}\"))({instance});");
+                writeln!(text, "{indent}((void (*)(void *))function(\"{name}\"))({instance});")
             }
-            Step::Version(name) => {
-                let _ = writeln!(
-                    text,
-                    "{indent}printf(\"{name}: %s\\n\", ((const char *(*)(void))function(\"{name}\"))());"
-                );
-            }
-            Step::Measure => {
-                let _ = writeln!(text, "{indent}measure();");
-            }
+            Step::Measure => writeln!(text, "{indent}measure({id});"),
+            Step::Unload => writeln!(text, "{indent}dlclose(library);\n{indent}open_library();"),
+            Step::Quit => writeln!(text, "{indent}exit(0);"),
             Step::Repeat(times, steps) => {
                 let mut body = String::new();
-                self.steps(steps, &mut body, &format!("{indent}    "), description);
-                // Only what is measured is told.
-                let quiet: String = body
-                    .lines()
-                    .filter(|line| !line.trim_start().starts_with("printf("))
-                    .map(|line| format!("{line}\n"))
-                    .collect();
+                self.steps(steps, &mut body, &format!("{indent}    "));
                 let counter = self.next;
                 self.next += 1;
-                let _ = write!(
+                writeln!(
                     text,
-                    "{indent}for (long i{counter} = 0; i{counter} < {times}; i{counter}++) {{\n{quiet}{indent}}}\n"
-                );
+                    "{indent}quiet = true;\n{indent}for (long i{counter} = 0; i{counter} < {times}; i{counter}++) {{\n{body}{indent}}}\n\
+                     {indent}quiet = false;"
+                )
             }
             Step::Parallel(scripts) => {
                 let mut joins = String::new();
@@ -136,7 +168,7 @@ impl Writer {
                     let number = self.next;
                     self.next += 1;
                     let mut body = String::new();
-                    self.steps(script, &mut body, "    ", description);
+                    self.steps(script, &mut body, "    ");
                     let _ = write!(
                         self.threads,
                         "static void *thread{number}(void *nothing) {{\n{body}    return nothing;\n}}\n\n"
@@ -148,103 +180,214 @@ impl Writer {
                     let _ = writeln!(joins, "{indent}pthread_join(t{number}, NULL);");
                 }
                 text.push_str(&joins);
+                Ok(())
             }
-            Step::FreshProcess => {}
-            Step::Call { of, function, args } => self.call(*of, function, args, text, indent, description),
+            _ => Ok(()),
+        };
+    }
+
+    fn make(
+        &self,
+        id: u32,
+        place: usize,
+        make: &Make,
+        matters: Option<[bool; 3]>,
+        text: &mut String,
+        indent: &str,
+    ) {
+        let of = |text: &Option<String>| {
+            text.as_ref().map_or("NULL".to_owned(), |text| {
+                format!("guarded({}, {})", literal(text.as_bytes()), text.len() + 1)
+            })
+        };
+        let (name, token) = (of(&make.name), of(&make.token));
+        let resources = if make.resources { "guarded(resources, strlen(resources) + 1)" } else { "NULL" };
+        let logging = u8::from(make.logging);
+        let made = match (self.fmi3, make.co_simulation) {
+            (false, co_simulation) => format!(
+                "((void *(*)(const char *, int, const char *, const char *, const Callbacks *, int, int))function(\"fmi2Instantiate\"))\
+                 ({name}, {}, {token}, {resources}, &callbacks, 0, {logging})",
+                u8::from(co_simulation)
+            ),
+            (true, false) => format!(
+                "((void *(*)(const char *, const char *, const char *, bool, bool, void *, void *))function(\"fmi3InstantiateModelExchange\"))\
+                 ({name}, {token}, {resources}, false, {logging}, NULL, (void *)say3)"
+            ),
+            (true, true) => format!(
+                "((void *(*)(const char *, const char *, const char *, bool, bool, bool, bool, const uint32_t *, size_t, void *, void *, void *))\
+                 function(\"fmi3InstantiateCoSimulation\"))({name}, {token}, {resources}, false, {logging}, {}, {}, NULL, 0, NULL, (void *)say3, NULL)",
+                u8::from(make.event_mode),
+                u8::from(make.early_return)
+            ),
+        };
+        let _ = writeln!(
+            text,
+            "{indent}{{ size_t before = arrays; *said = 0; c{place} = {made}; release(before); }}\n{indent}print(\"instance {place}: %s\\n\", c{place} ? \"made\" : \"NULL\");"
+        );
+        if let Some([_, _, log]) = matters {
+            let log = if log { "said" } else { "\"\"" };
+            let _ = writeln!(
+                text,
+                "{indent}{{ FILE *file = results(\"r\", {id}, \"w\"); fprintf(file, \"%d;%s\", c{place} != NULL, {log}); fclose(file); }}"
+            );
         }
     }
 
+    #[allow(clippy::too_many_arguments, reason = "the parts of a step")]
     fn call(
         &mut self,
+        id: u32,
         of: Option<usize>,
         name: &str,
         args: &[Arg],
+        matters: Option<[bool; 3]>,
         text: &mut String,
         indent: &str,
-        description: &Description,
     ) {
         let Some(signature) = signature(name) else { return };
-        let (mut types, mut passed, mut before, mut after) =
-            (Vec::new(), Vec::new(), String::new(), String::new());
+        let inner = format!("{indent}    ");
+        let mut parts = Parts::default();
         for (arg, argument) in args.iter().zip(signature.arguments) {
-            types.push(type_of(argument.of));
-            let number = self.next;
-            let mut array = |kind: Kind, bits: &[u64]| {
-                let list = bits.iter().map(|bits| number_of(kind, *bits)).collect::<Vec<_>>().join(", ");
-                let c = c_name(kind);
-                let list = if bits.is_empty() { "0".to_owned() } else { list };
-                let _ = writeln!(
-                    before,
-                    "{indent}    {c} v{number}[] = {{{list}}}; void *a{number} = guarded(v{number}, {} * sizeof({c}));",
-                    bits.len()
-                );
-                format!("a{number}")
-            };
-            passed.push(match arg {
-                Arg::Real(bits) => number_of(Kind::F64, *bits),
-                Arg::Whole(number) => number.to_string(),
-                Arg::Null => "NULL".to_owned(),
-                Arg::Misaligned => "(char *)guarded(NULL, 64) + 1".to_owned(),
-                Arg::In(kind, bits) => array(*kind, bits),
-                Arg::Texts(texts) => {
-                    let list = texts.iter().map(|text| text.as_ref().map_or("NULL".to_owned(), |text| format!("guarded({}, {})", literal(text), text.len() + 1)));
-                    let list = list.collect::<Vec<_>>().join(", ");
-                    let _ = writeln!(before, "{indent}    void *v{number}[] = {{{list}}}; void *a{number} = guarded(v{number}, sizeof v{number});");
-                    format!("a{number}")
-                }
-                Arg::Blobs(blobs) => {
-                    let list = blobs.iter().map(|blob| format!("guarded({}, {})", literal(blob), blob.len())).collect::<Vec<_>>().join(", ");
-                    let _ = writeln!(before, "{indent}    void *v{number}[] = {{{list}}}; void *a{number} = guarded(v{number}, sizeof v{number});");
-                    format!("a{number}")
-                }
-                Arg::Out(kind, count) => {
-                    let c = c_name(*kind);
-                    let _ = writeln!(before, "{indent}    void *a{number} = guarded(NULL, {count} * sizeof({c}));");
-                    let letter = match kind {
-                        kind if kind.is_float() => 'f',
-                        Kind::Pointer => 's',
-                        Kind::I8 | Kind::I16 | Kind::I32 | Kind::I64 => 'i',
-                        _ => 'u',
-                    };
-                    let guard = if *kind == Kind::Pointer { "if (status < 2) " } else { "" };
-                    if name == "fmi2NewDiscreteStates" {
-                        // Of fmi2EventInfo the five flags, then the time.
-                        let _ = writeln!(after, "{indent}    printf(\" ->\"); show(a{number}, 5, 'i', 4); show((char *)a{number} + 24, 1, 'f', 8);");
-                    } else if name != "fmi3GetBinary" {
-                        let _ = writeln!(after, "{indent}    printf(\" ->\"); {guard}show(a{number}, {count}, '{letter}', sizeof({c}));");
-                    }
-                    format!("a{number}")
-                }
-                Arg::State(slot) => format!("s{slot}"),
-                Arg::StateOut(slot) => format!("&s{slot}"),
-                Arg::Saved(slot) => format!("guarded(b{slot}, *n{slot})"),
-                Arg::SavedSize(slot) => format!("*n{slot}"),
-                Arg::SizeOut(slot) => {
-                    let _ = writeln!(after, "{indent}    printf(\" -> %zu bytes\", *n{slot});");
-                    format!("n{slot}")
-                }
-                Arg::SavedOut(slot) => {
-                    let _ = writeln!(before, "{indent}    void *a{number} = guarded(NULL, *n{slot});");
-                    let _ = writeln!(after, "{indent}    memcpy(b{slot}, a{number}, *n{slot});");
-                    format!("a{number}")
-                }
-            });
+            parts.types.push(type_of(argument.of));
+            parts.add(arg, name, self.next);
             self.next += 1;
         }
         let instance = of.map_or("NULL".to_owned(), |place| format!("c{place}"));
-        let types: String = types.iter().map(|of| format!(", {of}")).collect();
-        let passed: String = passed.iter().map(|arg| format!(", {arg}")).collect();
-        let comment = comment(args, description).map_or(String::new(), |names| format!(" /* {names} */"));
+        let list = |parts: &[String]| parts.iter().map(|part| format!(", {part}")).collect::<String>();
+        let types: Vec<String> = parts.types.iter().map(|of| (*of).to_owned()).collect();
+        let comment =
+            comment(args, self.description).map_or(String::new(), |names| format!(" /* {names} */"));
+        let lines = |parts: &[String]| {
+            parts.iter().fold(String::new(), |mut lines, part| {
+                let _ = writeln!(lines, "{inner}{part}");
+                lines
+            })
+        };
+        let mut after = lines(&parts.after);
+        if let Some([_, written, log]) = matters {
+            let _ = writeln!(after, "{inner}FILE *file = results(\"r\", {id}, \"w\");");
+            let _ = writeln!(after, "{inner}fprintf(file, \"%d;\", status);");
+            after.push_str(&lines(if written { &parts.proofs } else { &[] }));
+            let _ = writeln!(
+                after,
+                "{inner}fprintf(file, \"%s\", {}); fclose(file);",
+                if log { "said" } else { "\"\"" }
+            );
+        }
+        if *self.evidence == Evidence::Damage {
+            after.push_str(&lines(&parts.checks));
+        }
+        let guard = of.map_or(String::new(), |place| format!("if (c{place}) "));
         let _ = write!(
             text,
-            "{indent}{{{comment}\n{before}{indent}    int status = ((int (*)(void *{types}))function(\"{name}\"))({instance}{passed});\n\
-             {indent}    printf(\"{name}: %d\", status);\n{after}{indent}    printf(\"\\n\");\n{indent}}}\n"
+            "{indent}{guard}{{{comment}\n{inner}size_t before = arrays;\n{}{inner}*said = 0;\n\
+             {inner}int status = ((int (*)(void *{}))function(\"{name}\"))({instance}{});\n\
+             {inner}print(\"{name}: %d\", status);\n{after}{inner}print(\"\\n\"); release(before);\n{indent}}}\n",
+            lines(&parts.before),
+            list(&types),
+            list(&parts.passed)
         );
     }
 }
 
+/// The lines of a call.
+#[derive(Default)]
+struct Parts {
+    types: Vec<&'static str>,
+    passed: Vec<String>,
+    before: Vec<String>,
+    after: Vec<String>,
+    /// Lines that keep the results.
+    proofs: Vec<String>,
+    /// Lines that look for damage.
+    checks: Vec<String>,
+}
+
+impl Parts {
+    fn add(&mut self, arg: &Arg, name: &str, number: usize) {
+        let passed = match arg {
+            Arg::Real(bits) => number_of(Kind::F64, *bits),
+            Arg::Whole(number) => number.to_string(),
+            Arg::Null => "NULL".to_owned(),
+            Arg::Misaligned => "(char *)guarded(NULL, 64) + 1".to_owned(),
+            Arg::In(kind, bits) => {
+                let list: Vec<String> = bits.iter().map(|bits| number_of(*kind, *bits)).collect();
+                self.array(number, c_name(*kind), &list)
+            }
+            Arg::Texts(texts) => {
+                let string = |text: &Vec<u8>| format!("guarded({}, {})", literal(text), text.len() + 1);
+                let list: Vec<String> =
+                    texts.iter().map(|text| text.as_ref().map_or("NULL".to_owned(), string)).collect();
+                self.array(number, "void *", &list)
+            }
+            Arg::Blobs(blobs) => {
+                let list: Vec<String> =
+                    blobs.iter().map(|blob| format!("guarded({}, {})", literal(blob), blob.len())).collect();
+                self.array(number, "void *", &list)
+            }
+            Arg::Out(kind, count) => self.out(name, *kind, *count, number),
+            Arg::State(slot) => format!("s{slot}"),
+            Arg::StateOut(slot) => {
+                self.proofs.push(format!("fprintf(file, \"%d,;\", s{slot} != NULL);"));
+                format!("&s{slot}")
+            }
+            Arg::Saved(slot) => format!("guarded(b{slot}, *n{slot})"),
+            Arg::SavedSize(slot) => format!("*n{slot}"),
+            Arg::SizeOut(slot) => {
+                self.after.push(format!("print(\" -> %zu bytes\", *n{slot});"));
+                self.proofs.push(format!("put_words(file, n{slot}, 1, 8);"));
+                format!("n{slot}")
+            }
+            Arg::SavedOut(slot) => {
+                self.before.push(format!("void *a{number} = guarded(NULL, *n{slot});"));
+                self.after.push(format!("memcpy(b{slot}, a{number}, *n{slot});"));
+                self.proofs.push(format!("put_words(file, a{number}, *n{slot}, 1);"));
+                format!("a{number}")
+            }
+        };
+        self.passed.push(passed);
+    }
+
+    /// An array for reading.
+    fn array(&mut self, number: usize, of: &str, list: &[String]) -> String {
+        let (count, list) = (list.len(), if list.is_empty() { "0".to_owned() } else { list.join(", ") });
+        self.before.push(format!(
+            "{of} v{number}[] = {{{list}}}; void *a{number} = guarded(v{number}, {count} * sizeof *v{number});"
+        ));
+        self.checks.push(format!("look_at(a{number}, v{number}, {count} * sizeof *v{number});"));
+        format!("a{number}")
+    }
+
+    /// An array that is written.
+    fn out(&mut self, name: &str, kind: Kind, count: usize, number: usize) -> String {
+        let (c, width) = (c_name(kind), kind.size());
+        self.before.push(format!("void *a{number} = guarded(NULL, {count} * sizeof({c}));"));
+        let letter = match kind {
+            kind if kind.is_float() => 'f',
+            Kind::I8 | Kind::I16 | Kind::I32 | Kind::I64 => 'i',
+            _ => 'u',
+        };
+        if name == "fmi2NewDiscreteStates" {
+            // Of fmi2EventInfo the five flags, then the time.
+            let time = format!("show((char *)a{number} + 24, 1, 'f', 8);");
+            self.after.push(format!("print(\" ->\"); show(a{number}, 5, 'i', 4); {time}"));
+        } else if kind == Kind::Pointer && name != "fmi3GetBinary" {
+            self.after
+                .push(format!("print(\" ->\"); if (status < 2) show(a{number}, {count}, 's', {width});"));
+            self.proofs.push(format!("if (status < 2) put_texts(file, a{number}, {count});"));
+        } else if name != "fmi3GetBinary" {
+            self.after.push(format!("print(\" ->\"); show(a{number}, {count}, '{letter}', {width});"));
+        }
+        if kind != Kind::Pointer && name != "fmi3GetBinary" {
+            self.proofs.push(format!("put_words(file, a{number}, {count}, {width});"));
+        }
+        self.checks.push(format!("look_at(a{number}, NULL, 0);"));
+        format!("a{number}")
+    }
+}
+
 /// The names of the variables that a call is about.
-pub fn comment(args: &[Arg], description: &Description) -> Option<String> {
+fn comment(args: &[Arg], description: &Description) -> Option<String> {
     let Some(Arg::In(Kind::U32, references)) = args.first() else { return None };
     let names: Vec<&str> = references
         .iter()

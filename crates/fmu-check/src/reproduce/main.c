@@ -1,38 +1,95 @@
 /* Each phase in a process of its own, so that a crash does not end this one. */
+static void phase(int number) {
+    char path[5100];
+    out = fdopen(dup(1), "w");
+    setvbuf(out, NULL, _IOLBF, 0);
+    snprintf(path, sizeof path, "%s/printed0", folder);
+    if (!freopen(path, "a", stdout)) _exit(3);
+    alarm(20);
+    open_library();
+    load();
+    phases[number]();
+    save();
+    fflush(stdout);
+    _exit(0);
+}
+
+/* Ends the processes that this one has adopted, and tells whether there were any. */
+static bool orphans(void) {
+    bool found = false;
+    struct dirent *entry;
+    DIR *processes;
+    if (waitpid(-1, NULL, WNOHANG) == -1) return false;
+    usleep(300000);
+    processes = opendir("/proc");
+    while (processes && (entry = readdir(processes))) {
+        char path[300], state;
+        int pid, parent;
+        FILE *file;
+        snprintf(path, sizeof path, "/proc/%s/stat", entry->d_name);
+        file = fopen(path, "r");
+        if (!file) continue;
+        if (fscanf(file, "%d (%*[^)]) %c %d", &pid, &state, &parent) == 3 && parent == getpid() && state != 'Z') {
+            kill(pid, SIGKILL);
+            found = true;
+        }
+        fclose(file);
+    }
+    if (processes) closedir(processes);
+    return found;
+}
+
+static void clear(void) {
+    struct dirent *entry;
+    char path[5300];
+    DIR *files = opendir(folder);
+    while (files && (entry = readdir(files))) {
+        snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
+        unlink(path);
+    }
+    if (files) closedir(files);
+    rmdir(folder);
+}
+
 int main(int count, char **arguments) {
-    char *full = realpath(count > 1 ? arguments[1] : ".", NULL), path[5000], number[20];
-    char folder[] = "/tmp/fmu-check-XXXXXX";
+    char *full = realpath(count > 1 ? arguments[1] : ".", NULL), number[20], temporary[] = "/tmp/fmu-check-XXXXXX";
     size_t i;
     int status;
+    bool found;
     if (!full) { perror("the folder of the unpacked FMU"); return 3; }
-    if (count > 3) {
-        setvbuf(stdout, NULL, _IOLBF, 0);
-        alarm(20);
-        snprintf(resources, sizeof resources, resources_format, full);
-        snprintf(path, sizeof path, "%s/%s", full, library_name);
-        library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-        if (!library) { printf("%s\n", dlerror()); return 3; }
-        load(arguments[3]);
-        phases[atoi(arguments[2])]();
-        save(arguments[3]);
-        fflush(stdout);
-        _exit(0);
-    }
-    if (!mkdtemp(folder)) { perror("mkdtemp"); return 3; }
+    at_once = EVIDENCE == END;
+    snprintf(resources, sizeof resources, resources_format, full);
+    snprintf(library_path, sizeof library_path, "%s/%s", full, library_name);
+    if (count > 3) { folder = arguments[3]; phase(atoi(arguments[2])); }
+    if (!mkdtemp(temporary)) { perror("mkdtemp"); return 3; }
+    folder = temporary;
+#if defined(__linux__)
+    prctl(PR_SET_CHILD_SUBREAPER, 1);
+#endif
     for (i = 0; i < sizeof phases / sizeof *phases; i++) {
+        pid_t child;
+        char path[20];
         fflush(stdout);
         snprintf(number, sizeof number, "%zu", i);
-        if (fork() == 0) {
+        child = fork();
+        if (child == 0) {
+            setsid();
+            /* Memory that was not written differs between the processes. */
+            snprintf(path, sizeof path, "%zu", 1 + 90 * i);
+            setenv("MALLOC_PERTURB_", path, 1);
+            setenv("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0", 1);
             execlp(arguments[0], arguments[0], full, number, folder, (char *)NULL);
             perror(arguments[0]);
             _exit(3);
         }
-        wait(&status);
-        if (WIFSIGNALED(status)) {
-            printf("\nthe process was ended by signal %d (%s)\n", WTERMSIG(status), strsignal(WTERMSIG(status)));
-            return 1;
-        }
-        if (WEXITSTATUS(status)) { printf("\nthe process ended with exit status %d\n", WEXITSTATUS(status)); return 1; }
+        waitpid(child, &status, 0);
+        if (WIFSIGNALED(status)) printf("the process was ended by signal %d (%s)\n", WTERMSIG(status), strsignal(WTERMSIG(status)));
+        else if (WEXITSTATUS(status)) printf("the process ended with exit status %d\n", WEXITSTATUS(status));
+        if (status) { orphans(); clear(); return EVIDENCE == END ? 1 : 3; }
     }
-    return 0;
+    found = orphans();
+    if (EVIDENCE != LEFT) found = EVIDENCE == RESULTS && shows();
+    clear();
+    printf("%s\n", found ? "The finding shows." : "The finding does not show.");
+    return EVIDENCE == NONE ? 3 : found;
 }

@@ -1,32 +1,34 @@
 //! Scripts as programs in C and in Python, which show a finding without this tool.
 
 mod c;
+mod evidence;
 mod python;
 
 use crate::description::Description;
 use crate::finding::Finding;
-use crate::script::{Numbered, Script, Setting, Step};
+use crate::script::{Numbered, Run, Script, Setting, Step};
 
-/// Writes both programs of a finding.
-pub fn programs(finding: &mut Finding, setting: &Setting, description: &Description) {
-    finding.c = c::program(finding, setting, description);
-    finding.python = python::program(finding, setting, description);
+/// Writes both programs of a finding. They show what the last run of its script did.
+pub fn programs(finding: &mut Finding, run: &Run, setting: &Setting, description: &Description) {
+    let evidence = evidence::evidence(finding, run);
+    let script = evidence::as_repeated(&finding.script, run);
+    finding.c = c::program(finding, &script, &evidence, setting, description);
+    finding.python = python::program(finding, &script, &evidence, setting, description).unwrap_or_default();
 }
 
 /// What a program says of itself, in lines.
 fn head(finding: &Finding, description: &Description) -> Vec<String> {
     let mut lines = vec![
         format!(
-            "{}: {} ({}, section {} of {})",
+            "{}: {} ({}, {})",
             description.model_name,
             finding.name,
             finding.grade.name(),
-            finding.section,
-            description.standard
+            if finding.section.is_empty() { "not in the standard" } else { &finding.section }
         ),
         String::new(),
-        format!("Promised: {}", finding.promise),
-        format!("Seen: {}", finding.seen),
+        format!("Rule: {}", finding.promise),
+        format!("Observed: {}", finding.seen),
         String::new(),
     ];
     lines.iter_mut().for_each(|line| {

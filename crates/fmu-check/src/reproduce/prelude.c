@@ -6,9 +6,15 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <locale.h>
+#include <dirent.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#if defined(__linux__)
+#include <sys/prctl.h>
+#endif
 #include <sys/wait.h>
 #include <unistd.h>
 #if defined(__GLIBC__)
@@ -23,39 +29,155 @@ typedef struct {
     void *environment;
 } Callbacks;
 
+enum { NONE, END, LEFT, RESULTS };
+
 static void *library;
+static char library_path[5000];
+/* The output of this program; the standard output is the library's. */
+static FILE *out;
+static bool quiet, at_once;
+/* Where the results of calls are kept, for other processes. */
+static const char *folder = ".";
+/* The messages since the last call. */
+static __thread char said[1 << 16];
+
+#define print(...) (quiet ? 0 : fprintf(out ? out : stdout, __VA_ARGS__))
+
+static FILE *results(const char *kind, int number, const char *mode) {
+    char path[5100];
+    FILE *file;
+    snprintf(path, sizeof path, "%s/%s%d", folder, kind, number);
+    file = fopen(path, mode);
+    if (!file) exit(3);
+    return file;
+}
+
+static __attribute__((unused)) char *result(const char *kind, int number) {
+    FILE *file = results(kind, number, "r");
+    char *text = calloc(1, 1 << 24);
+    if (!fread(text, 1, (1 << 24) - 1, file)) *text = 0;
+    fclose(file);
+    return text;
+}
+
+static __attribute__((unused)) bool any_differ(const int (*pairs)[2], size_t count) {
+    size_t i;
+    bool found = false;
+    for (i = 0; i < count && !found; i++) {
+        char *one = result("r", pairs[i][0]), *other = result("r", pairs[i][1]);
+        found = strcmp(one, other) != 0;
+        free(one);
+        free(other);
+    }
+    return found;
+}
+
+static __attribute__((unused)) void put_words(FILE *file, const void *array, size_t count, size_t width) {
+    size_t i;
+    for (i = 0; i < count; i++) {
+        uint64_t word = 0;
+        memcpy(&word, (const char *)array + i * width, width);
+        fprintf(file, "%llx,", (unsigned long long)word);
+    }
+    fprintf(file, ";");
+}
+
+static char *hexes(char *to, const char *text) {
+    if (!text) return to + sprintf(to, "-");
+    for (; *text; text++) to += sprintf(to, "%02x", (unsigned char)*text);
+    *to = 0;
+    return to;
+}
+
+static __attribute__((unused)) void put_texts(FILE *file, const char *const *array, size_t count) {
+    size_t i;
+    for (i = 0; i < count; i++) {
+        static const char untouched[9] = "ZZZZZZZZ";
+        char *text = calloc(1, 1 << 20);
+        const char *one = memcmp(&array[i], untouched, sizeof one) ? array[i] : NULL;
+        if (!one || strlen(one) < (1 << 18)) hexes(text, one);
+        fprintf(file, "%s,", text);
+        free(text);
+    }
+    fprintf(file, ";");
+}
+
+static void open_library(void) {
+    library = dlopen(library_path, (at_once ? RTLD_NOW : RTLD_LAZY) | RTLD_LOCAL);
+    if (!library) { print("%s\n", dlerror()); fflush(out); _exit(4); }
+}
 
 /* A function of the library. */
 static void *function(const char *name) {
     void *found = dlsym(library, name);
-    if (!found) { printf("%s is not in the library\n", name); exit(3); }
+    if (!found) { print("%s is not in the library\n", name); exit(3); }
     return found;
 }
 
+static __thread struct { void *map; size_t length; } *maps;
+static __thread size_t arrays, capacity;
+
 /* An array that ends where memory ends: what is read or written beyond it is a crash. */
 static __attribute__((unused)) void *guarded(const void *bytes, size_t size) {
-    size_t page = (size_t)sysconf(_SC_PAGESIZE), length = ((size + page - 1) / page + 1) * page;
-    char *map = mmap(NULL, length, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    size_t page = (size_t)sysconf(_SC_PAGESIZE), length = ((size + page - 1) / page + 2) * page;
+    char *map = mmap(NULL, length, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (map == MAP_FAILED) { perror("mmap"); exit(3); }
     mprotect(map + length - page, page, PROT_NONE);
     char *array = map + length - page - size;
-    if (bytes) memcpy(array, bytes, size); else memset(array, 0x5a, size);
+    memset(map, 0x5a, length - page);
+    if (bytes) memcpy(array, bytes, size);
+    if (arrays == capacity) maps = realloc(maps, (capacity = 2 * capacity + 64) * sizeof *maps);
+    maps[arrays].map = map;
+    maps[arrays++].length = length;
     return array;
 }
 
+/* Unmaps the arrays of a call: an FMU must not use them afterwards. */
+static void release(size_t before) {
+    while (arrays > before) { arrays--; munmap(maps[arrays].map, maps[arrays].length); }
+}
+
+/* Whether bytes before an array have changed, or those of one that is for reading. */
+static __attribute__((unused)) void look_at(const void *array, const void *before, size_t size) {
+    size_t page = (size_t)sysconf(_SC_PAGESIZE);
+    const char *at = (const char *)((uintptr_t)array / page * page) - page;
+    bool bad = before && memcmp(array, before, size) != 0;
+    for (; at < (const char *)array; at++) bad |= *at != 0x5a;
+    if (bad) { print(" (an array was damaged)"); fclose(results("damage", 0, "w")); }
+}
+
+static __attribute__((unused)) bool damaged(void) {
+    char path[5100];
+    snprintf(path, sizeof path, "%s/damage0", folder);
+    return access(path, F_OK) == 0;
+}
+
+static void keep(int status, const char *category, const char *text) {
+    size_t length = strlen(said);
+    if (length + 2 * (strlen(category ? category : "") + strlen(text ? text : "")) + 64 > sizeof said) return;
+    char *to = said + length;
+    to += sprintf(to, "%d ", status);
+    to = hexes(to, category);
+    *to++ = ' ';
+    to = hexes(to, text);
+    strcpy(to, ";");
+}
+
 static __attribute__((unused)) void say2(void *environment, const char *name, int status, const char *category, const char *text, ...) {
+    char whole[8000] = "";
     va_list list;
     (void)environment;
-    printf("    log of %s: status %d, category %s: ", name ? name : "NULL", status, category ? category : "NULL");
     va_start(list, text);
-    if (text) vprintf(text, list);
+    if (text) vsnprintf(whole, sizeof whole, text, list);
     va_end(list);
-    printf("\n");
+    keep(status, category, text ? whole : NULL);
+    print("    log of %s: status %d, category %s: %s\n", name ? name : "NULL", status, category ? category : "NULL", whole);
 }
 
 static __attribute__((unused)) void say3(void *environment, int status, const char *category, const char *text) {
     (void)environment;
-    printf("    log: status %d, category %s: %s\n", status, category ? category : "NULL", text ? text : "NULL");
+    keep(status, category, text);
+    print("    log: status %d, category %s: %s\n", status, category ? category : "NULL", text ? text : "NULL");
 }
 
 /* Shows numbers that a call wrote; f is for floating-point, the width is in bytes. */
@@ -63,48 +185,74 @@ static __attribute__((unused)) void show(const void *array, size_t count, char k
     size_t i;
     for (i = 0; i < count; i++) {
         const char *at = (const char *)array + i * width;
-        if (kind == 'f' && width == 8) { double d; memcpy(&d, at, 8); printf(" %.17g", d); }
-        else if (kind == 'f') { float f; memcpy(&f, at, 4); printf(" %.9g", (double)f); }
-        else if (kind == 's') { const char *s; memcpy(&s, at, sizeof s); printf(" \"%s\"", s ? s : "NULL"); }
+        if (kind == 'f' && width == 8) { double d; memcpy(&d, at, 8); print(" %.17g", d); }
+        else if (kind == 'f') { float f; memcpy(&f, at, 4); print(" %.9g", (double)f); }
+        else if (kind == 's') { const char *s; memcpy(&s, at, sizeof s); print(" \"%s\"", s ? s : "NULL"); }
         else {
             uint64_t word = 0;
             memcpy(&word, at, width);
-            if (kind == 'u') printf(" %llu", (unsigned long long)word);
-            else if (width == 1) printf(" %d", (int8_t)word);
-            else if (width == 2) printf(" %d", (int16_t)word);
-            else if (width == 4) printf(" %d", (int32_t)word);
-            else printf(" %lld", (long long)word);
+            if (kind == 'u') print(" %llu", (unsigned long long)word);
+            else if (width == 1) print(" %d", (int8_t)word);
+            else if (width == 2) print(" %d", (int16_t)word);
+            else if (width == 4) print(" %d", (int32_t)word);
+            else print(" %lld", (long long)word);
         }
     }
 }
 
-static __attribute__((unused)) void measure(void) {
-    long pages = 0, all = 0;
+static long entries(const char *path) {
+    long count = 0;
+    DIR *directory = opendir(path);
+    while (directory && readdir(directory)) count++;
+    if (directory) closedir(directory);
+    return count;
+}
+
+/* Memory, threads and files, then settings of the process. */
+static __attribute__((unused)) void measure(int number) {
+    long pages = 0, all = 0, memory;
+    char here[5000] = "";
+    int signals[] = {SIGSEGV, SIGFPE, SIGINT, SIGABRT};
+    size_t i;
     FILE *file = fopen("/proc/self/statm", "r");
     if (file) { if (fscanf(file, "%ld %ld", &all, &pages) != 2) pages = 0; fclose(file); }
-    printf("resident memory: %ld bytes", pages * sysconf(_SC_PAGESIZE));
+    memory = pages * sysconf(_SC_PAGESIZE);
 #if defined(__GLIBC__) && __GLIBC_PREREQ(2, 33)
-    { struct mallinfo2 info = mallinfo2(); printf(", in use: %zu bytes", info.uordblks + info.hblkhd); }
+    { struct mallinfo2 info = mallinfo2(); memory = (long)(info.uordblks + info.hblkhd); }
 #endif
-    printf("\n");
+    print("memory: %ld bytes, threads: %ld, files: %ld\n", memory, entries("/proc/self/task"), entries("/proc/self/fd"));
+    file = results("r", number, "w");
+    fprintf(file, "%ld %ld %ld ;%s %s", memory, entries("/proc/self/task"), entries("/proc/self/fd"), setlocale(LC_ALL, NULL), getcwd(here, sizeof here) ? here : "");
+    for (i = 0; i < sizeof signals / sizeof *signals; i++) {
+        struct sigaction action;
+        sigaction(signals[i], NULL, &action);
+        fprintf(file, " %p", (void *)action.sa_handler);
+    }
+#if defined(__x86_64__)
+    fprintf(file, " %x", __builtin_ia32_stmxcsr() & ~0x3fu);
+#endif
+    fclose(file);
+}
+
+static __attribute__((unused)) long measured(int number, int place) {
+    long numbers[3] = {0, 0, 0};
+    if (sscanf(result("r", number), "%ld %ld %ld", &numbers[0], &numbers[1], &numbers[2]) != 3) exit(3);
+    return numbers[place];
 }
 
 /* Bytes of a saved state, from one process to the next. */
-static __attribute__((unused)) void pass_on(const char *folder, int number, const char *bytes, size_t size) {
-    char path[5000];
-    FILE *file;
-    snprintf(path, sizeof path, "%s/%d", folder, number);
-    file = fopen(path, "wb");
-    if (file) { fwrite(bytes, 1, size, file); fclose(file); }
+static __attribute__((unused)) void pass_on(int number, const char *bytes, size_t size) {
+    FILE *file = results("bytes", number, "wb");
+    fwrite(bytes, 1, size, file);
+    fclose(file);
 }
 
-static __attribute__((unused)) size_t *passed_on(const char *folder, int number, char *bytes) {
-    char path[5000];
-    FILE *file;
+static __attribute__((unused)) size_t *passed_on(int number, char *bytes) {
+    FILE *file = results("bytes", number, "ab+");
     size_t *size = guarded(NULL, sizeof *size);
-    *size = 0;
-    snprintf(path, sizeof path, "%s/%d", folder, number);
-    file = fopen(path, "rb");
-    if (file) { *size = fread(bytes, 1, 1 << 24, file); fclose(file); }
+    rewind(file);
+    *size = fread(bytes, 1, 1 << 24, file);
+    fclose(file);
     return size;
 }
+

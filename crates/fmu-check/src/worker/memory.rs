@@ -1,6 +1,7 @@
 //! Arrays that end where memory ends: what is read or written beyond them is a crash, what is written before them is seen.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 
 /// How many bytes after an array may be touched: none, so that it is a crash, or some, so that it is seen.
 pub static AFTER: AtomicUsize = AtomicUsize::new(0);
@@ -13,6 +14,49 @@ pub const FILL: u8 = 0x5a;
 
 /// As much of it as a page.
 static FILLED: [u8; 4096] = [FILL; 4096];
+
+/// The number of functions of the FMU that have not returned, in memory that a forked process shares with its parent.
+pub struct Inside(OnceLock<&'static AtomicU32>);
+
+/// The one of this process.
+pub static INSIDE: Inside = Inside(OnceLock::new());
+
+impl Inside {
+    fn count(&self) -> &AtomicU32 {
+        self.0.get_or_init(|| {
+            #[cfg(unix)]
+            // SAFETY: new memory, which is zero and is never unmapped.
+            unsafe {
+                let (access, flags) = (libc::PROT_READ | libc::PROT_WRITE, libc::MAP_SHARED | libc::MAP_ANON);
+                let map = libc::mmap(std::ptr::null_mut(), 4, access, flags, -1, 0);
+                assert!(map != libc::MAP_FAILED, "no memory");
+                &*map.cast::<AtomicU32>()
+            }
+            #[cfg(not(unix))]
+            Box::leak(Box::default())
+        })
+    }
+
+    /// A function of the FMU is called.
+    pub fn enter(&self) {
+        self.count().fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// It has returned.
+    pub fn leave(&self) {
+        self.count().fetch_sub(1, Ordering::Relaxed);
+    }
+
+    /// The number.
+    pub fn get(&self) -> u32 {
+        self.count().load(Ordering::Relaxed)
+    }
+
+    /// Sets the number before a process is forked.
+    pub fn set(&self, number: u32) {
+        self.count().store(number, Ordering::Relaxed);
+    }
+}
 
 fn untouched(bytes: &[u8]) -> bool {
     bytes.chunks(FILLED.len()).all(|part| *part == FILLED[..part.len()])

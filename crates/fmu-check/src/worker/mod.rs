@@ -1,18 +1,24 @@
 //! The process that loads the library and plays a script. It may be lost at any step: what came of each is written down
 //! before the next.
 
+mod contain;
 mod measure;
 mod memory;
 #[cfg(target_os = "linux")]
 mod server;
 
 use crate::script::{Arg, Kind, Make, Message, NOBODY, Numbered, Outcome, Script, Setting, Step, Written};
+#[cfg(not(target_os = "linux"))]
+pub use contain::end_group;
+#[cfg(target_os = "linux")]
+pub use contain::readable;
+pub use contain::{interrupted, listen_for_interrupts};
 use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmi_abi::calls;
 use fmi_abi::fmi2::types::{fmi2CallbackFunctions, fmi2CallbackLogger};
 use fmi_abi::fmi3::types::fmi3LogMessageCallback;
 pub use memory::FILL;
-use memory::Guarded;
+use memory::{Guarded, INSIDE};
 use serde::{Deserialize, Serialize};
 #[cfg(target_os = "linux")]
 pub use server::Answer;
@@ -21,12 +27,15 @@ use std::ffi::{CStr, CString};
 use std::fs::File;
 use std::io::Write as _;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// The variable that names the job of a worker.
 pub const VARIABLE: &str = "FMU_CHECK_JOB";
+
+/// The variable that names the temporary directory of a check.
+pub const SCRATCH: &str = "FMU_CHECK_SCRATCH";
 
 /// The exit status of a worker that has a fault of its own.
 pub const OWN_FAULT: i32 = 97;
@@ -94,6 +103,7 @@ fn end(result: Result<(), String>) -> ! {
 /// Plays a call sequence, and writes a line to the file for the outcome of each step.
 fn work(job: Job, file: File) {
     limit(job.setting.memory);
+    PROCESS.store(std::process::id(), Ordering::Relaxed);
     if job.setting.soft {
         memory::AFTER.store(4096, std::sync::atomic::Ordering::Relaxed);
     }
@@ -120,6 +130,7 @@ fn limit(memory: u64) {
             unsafe { libc::setrlimit(what, &limit) };
         };
         set(libc::RLIMIT_CORE, 0);
+        set(libc::RLIMIT_FSIZE, 1 << 30);
         #[cfg(target_os = "linux")]
         {
             set(libc::RLIMIT_AS, memory as _);
@@ -136,6 +147,9 @@ fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// What was said, with the environment it came with.
 static SAID: Mutex<Vec<(usize, Message)>> = Mutex::new(Vec::new());
+
+/// The process that plays the call sequence.
+static PROCESS: AtomicU32 = AtomicU32::new(0);
 
 /// An instance: its handle and the environment it was given.
 struct Instance {
@@ -179,28 +193,113 @@ unsafe fn remember(environment: *mut c_void, status: c_int, category: *const c_c
     }
 }
 
-/// The logger of FMI 2.0 with the first of its `...` as an argument.
-type PlainLogger =
-    unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, *const c_char);
+/// The logger of FMI 2.0 with its `...` as arguments: integers and pointers, then floating-point numbers, which have
+/// separate registers.
+type PlainLogger = unsafe extern "C" fn(
+    *mut c_void,
+    *const c_char,
+    c_int,
+    *const c_char,
+    *const c_char,
+    usize,
+    usize,
+    usize,
+    usize,
+    f64,
+    f64,
+    f64,
+    f64,
+);
 
-/// Without its `...`, which stable Rust cannot define: named arguments travel the same way, but for Apple's ARM. The format
-/// `%s`, which takes any text as it is, stands for its argument.
+/// Without its `...`, which stable Rust cannot define: on Linux and on Macs with Intel processors, named arguments are
+/// passed the same way.
+#[allow(clippy::too_many_arguments, reason = "the values of the message")]
 unsafe extern "C" fn log_of_fmi2(
     environment: *mut c_void,
     instance_name: *const c_char,
     status: c_int,
     category: *const c_char,
     text: *const c_char,
-    first: *const c_char,
+    first: usize,
+    second: usize,
+    third: usize,
+    fourth: usize,
+    one: f64,
+    two: f64,
+    three: f64,
+    four: f64,
 ) {
-    let all_named_alike = !cfg!(all(target_vendor = "apple", target_arch = "aarch64"));
-    // SAFETY: section 2.1.5 of FMI 2.0: the texts end with zeros. The name is read as importers that show it do.
+    // SAFETY: section 2.1.5 of FMI 2.0: the strings end with NUL. The name is read as by importers that show it.
     unsafe {
         std::hint::black_box(text_at(instance_name));
-        let plain = text_at(text).as_deref() == Some(b"%s") && all_named_alike;
-        let text = if plain { first } else { text };
+        let format = text_at(text);
+        if cfg!(all(unix, not(all(target_vendor = "apple", target_arch = "aarch64"))))
+            && let Some(format) = format.filter(|format| format.contains(&b'%'))
+        {
+            let text = expanded(&format, &[first, second, third, fourth], &[one, two, three, four]);
+            let text = CString::new(text).unwrap_or_default();
+            return remember(environment, status, category, text.as_ptr());
+        }
         remember(environment, status, category, text);
     }
+}
+
+/// The message of a format of printf with its values. A conversion without a value, or that writes, stays as it is.
+///
+/// # Safety
+/// The values of `%s` are strings that end with NUL.
+#[cfg_attr(not(unix), allow(unused_variables, reason = "values are elsewhere"))]
+unsafe fn expanded(format: &[u8], mut words: &[usize], mut numbers: &[f64]) -> Vec<u8> {
+    let mut text = Vec::new();
+    let mut rest = format;
+    while let Some(at) = rest.iter().position(|byte| *byte == b'%') {
+        text.extend_from_slice(&rest[..at]);
+        rest = &rest[at..];
+        let Some(end) = rest
+            .iter()
+            .skip(1)
+            .position(|byte| byte.is_ascii_alphabetic() && !b"hlLqjzt".contains(byte) || *byte == b'%')
+        else {
+            break;
+        };
+        let (conversion, after) = rest.split_at(end + 2);
+        if let (b"%s", [word, others @ ..]) = (conversion, words) {
+            // SAFETY: the caller's promise.
+            let string = unsafe { text_at(*word as *const c_char) };
+            text.extend(string.unwrap_or_else(|| b"(null)".to_vec()));
+            (words, rest) = (others, after);
+            continue;
+        }
+        let mut room = [0_u8; 400];
+        let written = match (conversion[conversion.len() - 1], words, numbers) {
+            (b'%', ..) => {
+                room[0] = b'%';
+                1
+            }
+            _ if conversion.contains(&b'*') => break,
+            #[cfg(unix)]
+            (kind, [word, others @ ..], _) if b"diouxXcsp".contains(&kind) => {
+                words = others;
+                let format = CString::new(conversion).unwrap_or_default();
+                // SAFETY: one value of the size that the conversion has.
+                unsafe { libc::snprintf(room.as_mut_ptr().cast(), room.len(), format.as_ptr(), *word) }
+            }
+            #[cfg(unix)]
+            (kind, _, [number, others @ ..])
+                if b"eEfFgGaA".contains(&kind) && !conversion.contains(&b'L') =>
+            {
+                numbers = others;
+                let format = CString::new(conversion).unwrap_or_default();
+                // SAFETY: one number.
+                unsafe { libc::snprintf(room.as_mut_ptr().cast(), room.len(), format.as_ptr(), *number) }
+            }
+            _ => break,
+        };
+        text.extend_from_slice(&room[..usize::try_from(written).unwrap_or(0).min(room.len() - 1)]);
+        rest = after;
+    }
+    text.extend_from_slice(rest);
+    text
 }
 
 unsafe extern "C" fn log_of_fmi3(
@@ -226,6 +325,14 @@ enum Kept {
 
 impl Player {
     fn write(&self, of: &impl Serialize) {
+        #[cfg(unix)]
+        if std::process::id() != PROCESS.load(Ordering::Relaxed) {
+            // The FMU has duplicated this process: the duplicate waits to be found and ended.
+            loop {
+                // SAFETY: waits.
+                unsafe { libc::pause() };
+            }
+        }
         let mut line = serde_json::to_vec(of).unwrap_or_default();
         line.push(b'\n');
         // An importer whose disk is full has other worries.
@@ -287,11 +394,13 @@ impl Player {
                 let Some(instance) = nobody.or_else(|| locked(&self.instances).remove(place)) else { return };
                 let name = self.named("FreeInstance");
                 if let Some(address) = self.find(instance.co_simulation, &name) {
+                    INSIDE.enter();
                     // SAFETY: the functions of both standards for this have this type.
                     unsafe {
                         let function: unsafe extern "C" fn(*mut c_void) = std::mem::transmute(address);
                         function(instance.handle as *mut c_void);
                     }
+                    INSIDE.leave();
                     outcome.status = Some(0);
                 } else {
                     outcome.missing = true;
@@ -300,16 +409,34 @@ impl Player {
             }
             Step::Version(name) => match self.find(self.setting.libraries[0].is_some(), name) {
                 Some(address) => {
+                    INSIDE.enter();
                     // SAFETY: these functions have no arguments and return a text.
                     outcome.text = unsafe {
                         let function: unsafe extern "C" fn() -> *const c_char = std::mem::transmute(address);
                         text_at(function())
                     };
+                    INSIDE.leave();
                 }
                 None => outcome.missing = true,
             },
             Step::Call { of, function, args } => self.call(*of, function, args, outcome),
             Step::Measure => outcome.measured = Some(measure::now()),
+            Step::Unload => {
+                let mut loaded: Vec<_> =
+                    locked(&self.libraries).iter_mut().filter_map(Option::take).collect();
+                loaded.dedup_by_key(|library| std::ptr::from_ref(*library));
+                INSIDE.enter();
+                for library in loaded {
+                    // SAFETY: made by Box::leak, and nothing else refers to it.
+                    drop(unsafe { Box::from_raw(std::ptr::from_ref(library).cast_mut()) });
+                }
+                INSIDE.leave();
+            }
+            Step::Quit => {
+                self.write(&Last { bytes: HashMap::new() });
+                INSIDE.enter();
+                std::process::exit(PLAYED)
+            }
             Step::Repeat(..) | Step::Parallel(_) | Step::FreshProcess => {}
         }
     }
@@ -326,8 +453,11 @@ impl Player {
             if place == 1 && self.setting.libraries[0].as_ref() == Some(path) && libraries[0].is_some() {
                 libraries[1] = libraries[0];
             } else {
+                INSIDE.enter();
                 // SAFETY: this is what the process is for.
-                match unsafe { libloading::Library::new(path) } {
+                let loaded = unsafe { libloading::Library::new(path) };
+                INSIDE.leave();
+                match loaded {
                     Ok(library) => libraries[place] = Some(Box::leak(Box::new(library))),
                     Err(error) => {
                         let why = std::error::Error::source(&error)
@@ -368,6 +498,7 @@ impl Player {
             return;
         };
         let logging = make.logging;
+        INSIDE.enter();
         // SAFETY: the functions are those of the names; each has the type that the standard gives it.
         let handle = unsafe {
             match (self.setting.fmi3, make.co_simulation) {
@@ -446,6 +577,7 @@ impl Player {
                 }
             }
         };
+        INSIDE.leave();
         for text in [name, token, resources].iter().flatten() {
             outcome.damage.extend(text.damage(true));
         }
@@ -480,8 +612,10 @@ impl Player {
         };
         let mut kept = Vec::new();
         let words: Vec<u64> = args.iter().map(|arg| self.word(arg, &mut kept)).collect();
+        INSIDE.enter();
         // SAFETY: this is what the process is for.
         let status = unsafe { calls::call(address, function, handle as *mut c_void, &words) };
+        INSIDE.leave();
         outcome.status = Some(status);
         let succeeded = status == 0 || status == 1;
         for kept in &kept {
@@ -670,4 +804,24 @@ fn location(setting: &Setting) -> CString {
 pub unsafe fn text_at(pointer: *const c_char) -> Option<Vec<u8>> {
     // SAFETY: the caller's promise.
     (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) }.to_bytes().to_vec())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::expanded;
+
+    #[test]
+    fn messages_of_fmi2_have_their_values() {
+        let (token, path) = (c"{8c4e}", c"model.fmu");
+        let words = [token.as_ptr() as usize, 7, path.as_ptr() as usize, 0];
+        // SAFETY: the values of %s are strings.
+        let text = |format: &str| unsafe {
+            String::from_utf8(expanded(format.as_bytes(), &words, &[0.5, 1e-9, 0.0, 0.0])).unwrap_or_default()
+        };
+        assert_eq!(text("Wrong GUID %s, line %d of %s"), "Wrong GUID {8c4e}, line 7 of model.fmu");
+        assert_eq!(text("t = %g, %5.1e: 100 %%"), "t = 0.5, 1.0e-09: 100 %");
+        // A conversion that writes, one that is none and one too many stay.
+        assert_eq!(text("%n %"), "%n %");
+        assert_eq!(text("%g%g%g%g%g"), "0.51e-0900%g");
+    }
 }

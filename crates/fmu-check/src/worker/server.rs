@@ -1,8 +1,11 @@
-//! A process that is forked for every call sequence, because starting a program again takes several times as long.
+//! A process that is forked for every call sequence, because starting a program again takes several times as long. It adopts
+//! and ends the descendants that a call sequence leaves.
 
-use super::{File, work};
+use super::contain::{MOST_PROCESSES, abandoned, adopt_descendants, descendants, end_descendants, isolate};
+use super::{File, SCRATCH, work};
 use serde::{Deserialize, Serialize};
 use std::io::{Read as _, Seek as _, Write as _};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Messages of a library on its standard output that are kept, in bytes.
@@ -15,25 +18,55 @@ pub struct Answer {
     pub ended: Option<i32>,
     /// The lengths of the messages and of the outcomes.
     pub lengths: [usize; 2],
+    /// Names of the processes that it has left.
+    pub left: Vec<String>,
+    /// The number of its processes, if they were too many.
+    pub flood: Option<usize>,
+    /// Whether it ended in a function of the FMU.
+    pub inside: bool,
 }
 
 /// Plays the jobs of the standard input, in lines with the limit of each in seconds, until it ends.
 pub fn serve() -> Result<(), String> {
-    jobs().map_err(|error| error.to_string())
+    adopt_descendants();
+    let result = jobs();
+    if abandoned() {
+        // The checker removes its directory itself, unless it was killed.
+        if let Some(scratch) = std::env::var_os(SCRATCH) {
+            let _ = std::env::set_current_dir("/");
+            let _ = std::fs::remove_dir_all(Path::new(&scratch));
+        }
+    }
+    result.map_err(|error| error.to_string())
 }
 
 fn jobs() -> std::io::Result<()> {
     let mut files = [tempfile::tempfile()?, tempfile::tempfile()?];
+    // SAFETY: asks for a number.
+    let checker = unsafe { libc::getppid() };
+    let mut times_left = 0;
     for line in std::io::stdin().lines() {
         let line = line?;
         let Some((limit, job)) = line.split_once(' ') else { continue };
+        super::INSIDE.set(0);
         // SAFETY: this process has one thread.
         match unsafe { libc::fork() } {
             -1 => return Err(std::io::Error::last_os_error()),
-            0 => play(job, files),
+            0 => {
+                isolate(checker);
+                play(job, files)
+            }
             child => {
-                let ended = wait(child, limit.parse().unwrap_or_default());
-                answer(ended, &mut files)?;
+                let (ended, flood) = wait(child, limit.parse().unwrap_or_default());
+                // Processes that end together with the FMU are not left. If they are left every time, waiting is in vain.
+                let patient = ended.is_some() && times_left < 3;
+                let left = end_descendants(child, Duration::from_millis(if patient { 300 } else { 0 }));
+                times_left += usize::from(ended.is_some() && !left.is_empty());
+                if abandoned() {
+                    return Ok(());
+                }
+                let inside = super::INSIDE.get() > 0;
+                answer(Answer { ended, lengths: [0; 2], left, flood, inside }, &mut files)?;
             }
         }
     }
@@ -53,39 +86,50 @@ fn play(job: &str, [said, outcomes]: [File; 2]) -> ! {
     super::end(read.map(|job| work(job, outcomes)))
 }
 
-/// The wait status of a process that ends within so many seconds; any other is killed.
-fn wait(child: libc::pid_t, limit: f64) -> Option<i32> {
-    let (begin, mut status) = (Instant::now(), 0);
+/// The wait status of a process that ends within so many seconds. Any other is ended, as is one with too many processes or
+/// whose checker has ended.
+fn wait(child: libc::pid_t, limit: f64) -> (Option<i32>, Option<usize>) {
+    let (begin, mut status, mut looked) = (Instant::now(), 0, Instant::now());
     loop {
-        // SAFETY: `child` is a process of this one that was not waited for.
-        match unsafe { libc::waitpid(child, &raw mut status, libc::WNOHANG) } {
-            0 if begin.elapsed().as_secs_f64() < limit => std::thread::sleep(Duration::from_micros(200)),
-            0 => {
-                // SAFETY: as above.
-                unsafe {
-                    libc::kill(child, libc::SIGKILL);
-                    libc::waitpid(child, &raw mut status, 0);
-                }
-                return None;
-            }
-            _ => return Some(status),
+        // SAFETY: no other code waits for children of this process.
+        match unsafe { libc::waitpid(-1, &raw mut status, libc::WNOHANG) } {
+            -1 => return (None, None),
+            pid if pid == child => return (Some(status), None),
+            0 => {}
+            // An orphan.
+            _ => continue,
         }
+        if looked.elapsed() > Duration::from_millis(20) {
+            looked = Instant::now();
+            let count = descendants().len();
+            if count > MOST_PROCESSES {
+                return (None, Some(count));
+            }
+            if abandoned() {
+                return (None, None);
+            }
+        }
+        if begin.elapsed().as_secs_f64() > limit {
+            return (None, None);
+        }
+        std::thread::sleep(Duration::from_micros(200));
     }
 }
 
 /// Passes on the results of a process, and clears its files for the next one.
-fn answer(ended: Option<i32>, files: &mut [File; 2]) -> std::io::Result<()> {
-    let mut left = [Vec::new(), Vec::new()];
-    for ((file, bytes), most) in files.iter_mut().zip(&mut left).zip([SAID, u64::MAX]) {
+fn answer(mut answer: Answer, files: &mut [File; 2]) -> std::io::Result<()> {
+    let mut results = [Vec::new(), Vec::new()];
+    for ((file, bytes), most) in files.iter_mut().zip(&mut results).zip([SAID, u64::MAX]) {
         file.rewind()?;
         file.take(most).read_to_end(bytes)?;
         file.set_len(0)?;
         file.rewind()?;
     }
-    let line = serde_json::to_string(&Answer { ended, lengths: [left[0].len(), left[1].len()] })?;
+    answer.lengths = [results[0].len(), results[1].len()];
+    let line = serde_json::to_string(&answer)?;
     let mut output = std::io::stdout().lock();
     output.write_all(format!("{line}\n").as_bytes())?;
-    left.iter().try_for_each(|bytes| output.write_all(bytes))?;
+    results.iter().try_for_each(|bytes| output.write_all(bytes))?;
     for entry in std::fs::read_dir(".")?.flatten() {
         let path = entry.path();
         let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };

@@ -180,13 +180,40 @@ fn caught(
     let folder = TempDir::new().expect("a folder");
     let path = fmu(folder.path(), fmi, &library(fmi, of_linker), change);
     // Enough for 50 cycles on a busy machine; fewer are not judged.
+    let out = folder.path().join("out");
     let options = ["--only", topic, "--no-shrink", "--limit", "2", "--repeat", "0.3"];
-    let (found, report) = found(&path, fault, &options);
+    let (found, report) = found(&path, fault, &[&options[..], &["--out", &out.to_string_lossy()]].concat());
     assert!(
         found.iter().any(|(other, _)| other == name),
         "{fault}{of_linker} is not found as {name}: {found:?} {}",
         report["unreached"]
     );
+    if fault != "none" {
+        let unpacked = folder.path().join("unpacked");
+        let file = std::fs::File::open(&path).expect("it");
+        zip::ZipArchive::new(file).expect("a ZIP").extract(&unpacked).expect("a folder");
+        reproduced(&out, name, &unpacked, fault);
+    }
+}
+
+/// Both programs of a finding show it in the FMU with the fault, and not in the one without.
+fn reproduced(out: &Path, name: &str, unpacked: &Path, fault: &str) {
+    let program = out.join("repro");
+    let source = out.join(format!("{name}.c"));
+    let compiled =
+        Command::new("cc").args(["-w", "-o"]).arg(&program).arg(source).args(["-ldl", "-lpthread"]).status();
+    assert!(compiled.expect("a C compiler").success(), "{name}.c");
+    let mut python = Command::new("python3");
+    python.arg(out.join(format!("{name}.py")));
+    for (language, mut command) in [("C", Command::new(&program)), ("Python", python)] {
+        command.arg(unpacked);
+        for (fault, expected) in [(fault, 1), ("none", 0)] {
+            let output = command.env("WAGON_FAULT", fault).output().expect("runs");
+            let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+            let text: String = text.chars().rev().take(2000).collect::<Vec<_>>().into_iter().rev().collect();
+            assert_eq!(output.status.code(), Some(expected), "{name} in {language} with {fault}: {text}");
+        }
+    }
 }
 
 macro_rules! mutants {
@@ -203,7 +230,7 @@ macro_rules! mutants {
 
 mutants! {
     2 half_set "refusals" "refusals.changed";
-    3 discard_changes "refusals" "refusals.changed";
+    3 discard_changes "refusals" "refusals.discarded";
     2 step_refused_halfway "refusals" "refusals.changed";
     2 getter_changes "results" "results.reading";
     3 reading_once "results" "results.reading";
@@ -215,7 +242,7 @@ mutants! {
     3 save_changes "states" "states.changed-by-saving";
     2 handle_not_reused "states" "states.several";
     3 freed_handle_stays "states" "states.free";
-    3 adjoint_off "derivatives" "derivatives.adjoint";
+    3 adjoint_off "derivatives" "derivatives.adjoint-digits";
     2 directional_sign "derivatives" "derivatives.directional";
     3 directional_not_linear "derivatives" "derivatives.linear";
     2 derivative_changes "derivatives" "derivatives.changed";
@@ -289,6 +316,12 @@ mutants! {
     2 step_adds "results" "results.cut";
     3 lossy_when_late "states" "states.restore-values";
     2 name_gone "life_cycle" "arrays.read-beyond";
+    3 stop_ignored "life_cycle" "life_cycle.stop-time";
+    2 order_ignored "derivatives" "derivatives.order";
+    3 pool_of_eight "life_cycle" "life_cycle.refused";
+    2 output_stale "results" "results.reading";
+    2 unload_crashes "life_cycle" "life_cycle.unload.crash";
+    3 exit_hangs "life_cycle" "life_cycle.unload.hang";
 }
 
 #[test]
@@ -304,7 +337,8 @@ fn symbol_missing() {
 }
 
 /// Faults of the description: edition, topic, name of the finding, what is replaced by what.
-const DESCRIPTIONS: [(u32, &str, &str, &str, &str); 9] = [
+const DESCRIPTIONS: [(u32, &str, &str, &str, &str); 10] = [
+    (2, "description", "encoding", "encoding=\"UTF-8\"", "encoding=\"ISO-8859-1\""),
     (2, "dependencies", "missing", "index=\"9\" dependencies=\"4 5\"", "index=\"9\" dependencies=\"5\""),
     (3, "dependencies", "missing", "dependencies=\"4 5 6\"", "dependencies=\"4 6\""),
     (3, "dependencies", "initial", "\"9\" dependencies=\"4\"", "\"9\" dependencies=\"\""),
@@ -326,6 +360,197 @@ fn descriptions() {
     }
 }
 
+/// Faults that attack the processes around the FMU, with the name of the finding.
+const ATTACKS: [(u32, &str, &str); 8] = [
+    (2, "forks", "resources.processes"),
+    (3, "daemon_left", "resources.processes"),
+    (2, "forks_without_end", "resources.processes"),
+    (3, "duplicates_itself", "resources.processes"),
+    (2, "kills_group", "life_cycle.crash"),
+    (3, "kills_parent", "life_cycle.crash"),
+    (2, "kills_all", "life_cycle.crash"),
+    (3, "stops_parent", "life_cycle.crash"),
+];
+
+/// The processes whose environment has this mark.
+#[cfg(target_os = "linux")]
+fn marked(mark: &str) -> usize {
+    let processes = std::fs::read_dir("/proc").expect("the processes").flatten();
+    let environments = processes.filter_map(|entry| std::fs::read(entry.path().join("environ")).ok());
+    environments.filter(|environment| String::from_utf8_lossy(environment).contains(mark)).count()
+}
+
+/// A check with its temporary files in a directory and its processes marked.
+#[cfg(target_os = "linux")]
+fn contained(folder: &Path, fmi: u32, fault: &str) -> Command {
+    let path = fmu(folder, fmi, &library(fmi, ""), |text| text);
+    let scratch = folder.join("scratch");
+    std::fs::create_dir_all(&scratch).expect("a folder");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
+    command.arg(path).args(["--json", "--no-shrink", "--repeat", "0.3"]);
+    command.env("WAGON_FAULT", fault).env("TMPDIR", scratch).env("WAGON_MARK", folder);
+    command
+}
+
+/// A FMU that starts processes, or that sends signals to others, is found out. Nothing of it is left, and whoever called
+/// the check lives.
+#[cfg(target_os = "linux")]
+#[test]
+fn attacks_are_contained() {
+    for (fmi, fault, name) in ATTACKS {
+        let folder = TempDir::new().expect("a folder");
+        let mut command = contained(folder.path(), fmi, fault);
+        let output = command.args(["--only", "resources", "--limit", "2"]).output().expect("runs");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(text.contains(&format!("\"name\": \"{name}\"")), "{fault}: {text} {output:?}");
+        assert_eq!(output.status.code(), Some(1), "{fault}");
+        assert_eq!(marked(&folder.path().to_string_lossy()), 0, "{fault}");
+        assert_eq!(std::fs::read_dir(folder.path().join("scratch")).expect("a folder").count(), 0, "{fault}");
+    }
+}
+
+/// Whatever signal ends the check, no process and no file of it is left.
+#[cfg(target_os = "linux")]
+#[test]
+fn interrupts_leave_nothing() {
+    for signal in ["INT", "TERM", "KILL"] {
+        let folder = TempDir::new().expect("a folder");
+        let scratch = folder.path().join("scratch");
+        let mut command = contained(folder.path(), 2, "make_hangs");
+        let mut child =
+            command.args(["--limit", "60"]).stdout(std::process::Stdio::null()).spawn().expect("runs");
+        let mark = folder.path().to_string_lossy().into_owned();
+        // The process itself, one that forks, and the one that hangs.
+        wait_until(|| marked(&mark) >= 3);
+        let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
+        assert!(sent.expect("kill").success());
+        let status = child.wait().expect("it ends");
+        if signal != "KILL" {
+            assert_eq!(status.code(), Some(130), "{signal}");
+            assert_eq!(marked(&mark), 0, "{signal}");
+            assert_eq!(std::fs::read_dir(&scratch).expect("a folder").count(), 0, "{signal}");
+        }
+        wait_until(|| marked(&mark) == 0 && std::fs::read_dir(&scratch).is_ok_and(|of| of.count() == 0));
+    }
+}
+
+/// Waits 20 seconds at most.
+#[cfg(target_os = "linux")]
+fn wait_until(holds: impl Fn() -> bool) {
+    let begin = std::time::Instant::now();
+    while !holds() {
+        assert!(begin.elapsed().as_secs() < 20, "it takes too long");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+}
+
+/// What is not checked is in every report and fails, unless it is allowed by name.
+#[test]
+fn nothing_passes_unchecked() {
+    let both = "co-simulation,model-exchange";
+    let tool = |text: String| text.replace("<CoSimulation", "<CoSimulation needsExecutionTool=\"true\"");
+    let elsewhere = |text: String| {
+        text.replace("<ModelExchange modelIdentifier=\"wagon", "<ModelExchange modelIdentifier=\"cart")
+    };
+    let scheduled = |text: String| text.replace("<CoSimulation", "<ScheduledExecution/><CoSimulation");
+    let neither = |text: String| text.replace("modelIdentifier=\"wagon", "modelIdentifier=\"cart");
+    type Change = Box<dyn Fn(String) -> String>;
+    let cases: [(u32, Change, &str, &str); 4] = [
+        (2, Box::new(tool), "co-simulation", "needsExecutionTool"),
+        (2, Box::new(elsewhere), "model-exchange", "there is no cart"),
+        (3, Box::new(scheduled), "scheduled-execution", "Scheduled Execution"),
+        (3, Box::new(neither), both, "there is no cart"),
+    ];
+    for (fmi, change, names, why) in cases {
+        let folder = TempDir::new().expect("a folder");
+        let path = fmu(folder.path(), fmi, &library(fmi, ""), change);
+        let out = folder.path().join("out");
+        let run = |options: &[&str]| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
+            command.arg(&path).args(["--only", "functions", "--out"]).arg(&out).args(options);
+            command.output().expect("runs")
+        };
+        let output = run(&[]);
+        assert_eq!(output.status.code(), Some(2), "{names}: {output:?}");
+        for name in names.split(',') {
+            let said = String::from_utf8_lossy(&output.stdout).into_owned();
+            let all = [said, "report.json".into(), "junit.xml".into(), "report.html".into()];
+            for (place, text) in all.into_iter().enumerate() {
+                let text =
+                    if place == 0 { text } else { std::fs::read_to_string(out.join(text)).expect("it") };
+                assert!(text.contains(name) && text.contains(why), "{name}: {text}");
+            }
+        }
+        assert_eq!(run(&["--allow-unchecked", names]).status.code(), Some(0), "{names}");
+    }
+    // A hang is a violation; after it nothing of the interface is checked.
+    let folder = TempDir::new().expect("a folder");
+    let path = fmu(folder.path(), 2, &library(2, ""), |text| text);
+    let (found, report) = found(&path, "make_hangs", &["--only", "states", "--no-shrink", "--limit", "0.3"]);
+    assert!(found.iter().any(|(name, _)| name == "life_cycle.hang"), "{found:?}");
+    assert_eq!(report["findings"][0]["grade"], "violation");
+    let unchecked = report["unreached"].as_array().expect("a list").iter();
+    let names: Vec<_> = unchecked.filter(|of| of["allowed"] == false).map(|of| of["name"].clone()).collect();
+    assert_eq!(names, ["co-simulation", "model-exchange"]);
+}
+
+/// A finding that a baseline accepts does not fail, in any report; one of another observation does.
+#[test]
+fn a_baseline_accepts_with_a_reason() {
+    let folder = TempDir::new().expect("a folder");
+    let path = fmu(folder.path(), 2, &library(2, ""), |text| text);
+    let (baseline, out) = (folder.path().join("baseline.txt"), folder.path().join("out"));
+    for (line, status) in [("start_values.start: known", 0), ("start_values.start \"mass\": known", 1)] {
+        std::fs::write(&baseline, line).expect("a file");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
+        command.arg(&path).args(["--only", "start_values", "--no-shrink", "--baseline"]).arg(&baseline);
+        let output = command.arg("--out").arg(&out).env("WAGON_FAULT", "start_value").output().expect("runs");
+        assert_eq!(output.status.code(), Some(status), "{line}: {output:?}");
+        let read = |name: &str| std::fs::read_to_string(out.join(name)).expect(name);
+        assert_eq!(read("junit.xml").contains("<failure"), status == 1, "{line}");
+        let sarif: serde_json::Value = serde_json::from_str(&read("report.sarif")).expect("JSON");
+        let result = &sarif["runs"][0]["results"][0];
+        assert_eq!(
+            (result["ruleId"].as_str(), result["level"].as_str()),
+            (Some("start_values.start"), Some("error"))
+        );
+        assert_eq!(result["suppressions"].is_array(), status == 0, "{line}");
+        let report: serde_json::Value = serde_json::from_str(&read("report.json")).expect("JSON");
+        assert_eq!((&report["schema"], &report["status"]), (&1.into(), &status.into()));
+        assert_eq!(String::from_utf8_lossy(&output.stdout).contains("1 accepted"), status == 0);
+    }
+}
+
+/// A quick check ends in time, names the topics that it leaves out, and passes.
+#[test]
+fn a_quick_check_is_quick() {
+    let folder = TempDir::new().expect("a folder");
+    let path = fmu(folder.path(), 2, &library(2, ""), |text| text);
+    let begin = std::time::Instant::now();
+    let (_, report) = found(&path, "none", &["--quick"]);
+    assert!(begin.elapsed().as_secs() < 30);
+    let unchecked = report["unreached"].as_array().expect("a list").iter();
+    let names: Vec<_> = unchecked.map(|of| (of["name"].clone(), of["allowed"].clone())).collect();
+    assert_eq!(names, [("resources".into(), true.into()), ("hostile".into(), true.into())]);
+    assert_eq!(report["status"], 0);
+}
+
+/// An FMU that is larger than it may be is not unpacked.
+#[test]
+fn unpacking_has_a_limit() {
+    let folder = TempDir::new().expect("a folder");
+    let path = fmu(folder.path(), 2, &library(2, ""), |text| text + &" ".repeat(3 << 20));
+    let run = |megabytes: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fmu-check"));
+        command.arg(&path).args(["--only", "description", "--unpacked", megabytes]).output().expect("runs")
+    };
+    let output = run("2");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(text.contains("it has more than 2 MB when it is unpacked"), "{text}");
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(run("4").status.code(), Some(0));
+}
+
 /// The source has no fault that is not tested, and the documentation counts them.
 #[test]
 fn no_fault_is_forgotten() {
@@ -336,13 +561,15 @@ fn no_fault_is_forgotten() {
     let faults = source.split(" X(").skip(1).filter_map(|rest| rest.split_once(')')).map(|(name, _)| name);
     let mut faults: Vec<&str> = faults.collect();
     let mut tested = FAULTS.to_vec();
+    tested.extend(ATTACKS.iter().map(|(_, name, _)| *name));
+    tested.push("make_hangs");
     faults.sort_unstable();
     tested.sort_unstable();
     assert_eq!(faults, tested);
     let page = read("../../docs/checking.md").split_whitespace().collect::<Vec<_>>().join(" ");
     let count = format!(
         "{} faults that are put into its library one at a time, {} more into its description",
-        FAULTS.len() + ["SYMBOL_MISSING", "WITHOUT_NOMINALS"].len(),
+        tested.len() + ["SYMBOL_MISSING", "WITHOUT_NOMINALS"].len(),
         DESCRIPTIONS.len()
     );
     assert!(page.contains(&count), "{count}");
@@ -391,35 +618,8 @@ fn programs_show_it() {
             assert!(std::fs::read_to_string(out.join(file)).expect(file).contains(name), "{file}");
         }
         let unpacked = folder.path().join("unpacked");
-        zip::ZipArchive::new(std::fs::File::open(&path).expect("it"))
-            .expect("a ZIP")
-            .extract(&unpacked)
-            .expect("a folder");
-        let program = folder.path().join("repro");
-        let status = Command::new("cc")
-            .arg("-o")
-            .arg(&program)
-            .arg(out.join(format!("{name}.c")))
-            .args(["-ldl", "-lpthread"])
-            .status();
-        assert!(status.expect("a C compiler").success(), "{name}.c");
-        let of_c = Command::new(&program).arg(&unpacked).env("WAGON_FAULT", mutant).output().expect("runs");
-        let of_python = Command::new("python3")
-            .arg(out.join(format!("{name}.py")))
-            .arg(&unpacked)
-            .env("WAGON_FAULT", mutant)
-            .output()
-            .expect("runs");
-        for (language, output) in [("C", of_c), ("Python", of_python)] {
-            let text = String::from_utf8_lossy(&output.stdout).into_owned()
-                + &String::from_utf8_lossy(&output.stderr);
-            let crashes = name != "states.restore-values";
-            assert_eq!(text.contains("ended by signal"), crashes, "{mutant} in {language}: {text}");
-            if !crashes {
-                // What was read before and after differs.
-                let read: Vec<&str> = text.lines().filter(|line| line.starts_with("fmi2GetReal")).collect();
-                assert!(read.len() >= 2 && read[0] != read[read.len() - 1], "{mutant} in {language}: {text}");
-            }
-        }
+        let file = std::fs::File::open(&path).expect("it");
+        zip::ZipArchive::new(file).expect("a ZIP").extract(&unpacked).expect("a folder");
+        reproduced(&out, name, &unpacked, mutant);
     }
 }

@@ -5,6 +5,7 @@
 #include <locale.h>
 #include <math.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -32,7 +33,9 @@
     X(directional_imprecise) X(directional_added) X(event_moves_silently) X(event_loses_input) X(early_time_wrong)     \
     X(early_unsaid) X(name_in_result) X(reference_once) X(start_time_ignored) X(last_step_refused)                     \
     X(step_overshoots) X(step_adds) X(lossy_when_late) X(step_prints) X(start_in_mode_ignored) X(event_again_now)      \
-    X(name_gone)                                                                                                      
+    X(name_gone) X(forks) X(daemon_left) X(forks_without_end) X(duplicates_itself) X(kills_group) X(kills_parent)       \
+    X(kills_all) X(stops_parent) X(unload_crashes) X(exit_hangs) X(make_hangs) X(stop_ignored) X(order_ignored)    \
+    X(pool_of_eight) X(output_stale)                                                                                                      
 #define NUMBER(name) M_##name,
 #define NAME(name) #name,
 enum { M_none, FAULTS(NUMBER) M_all };
@@ -81,13 +84,13 @@ typedef struct {
     void *environment;
     const char *given;
     char name[64];
-    double *scratch, began;
+    double *scratch, began, shown;
 } Model;
 
 extern int nobody_has_it(void);
 
 static State shared;
-static int runs;
+static int runs, alive;
 static double racing;
 
 static void start(State *s) {
@@ -129,10 +132,34 @@ static int no(Model *m, const char *text) { return say(m, 3, text); }
 
 static double slope(const Model *m) { return (m->s.force - (IS(start_in_mode_ignored) ? m->s.first_spring : m->s.spring) * (m->s.x + 1e-3 * IS(start_in_mode_ignored)) - m->s.damper * m->s.v) / m->s.mass; }
 
+__attribute__((destructor)) static void unloaded(void) {
+    if (IS(unload_crashes)) abort();
+    if (IS(exit_hangs)) pause();
+}
+
+/* What a process must survive that starts others, and signals that are not for it. */
+static void attack(void) {
+    if (IS(forks) && fork() == 0) for (;;) pause();
+    if (IS(daemon_left) && fork() == 0) {
+        setsid();
+        if (fork() == 0) for (;;) pause();
+        _exit(0);
+    }
+    if (IS(forks_without_end)) for (;;) if (fork() == 0) for (setsid();;) pause();
+    if (IS(duplicates_itself)) fork();
+    if (IS(kills_group)) kill(0, SIGKILL);
+    if (IS(kills_parent)) kill(getppid(), SIGKILL);
+    /* No signal is sent, in case nothing stops it. */
+    if (IS(kills_all)) kill(-1, 0);
+    if (IS(stops_parent)) kill(getppid(), SIGSTOP);
+    if (IS(make_hangs)) for (;;) pause();
+}
+
 static void *idle(void *nothing) { pause(); return nothing; }
 
 static void *make(const char *name, const char *token, int cs, int logging, Logger log, void *environment) {
     Model *m = calloc(1, sizeof *m);
+    attack();
     start(&m->s);
     m->cs = cs; m->log = log; m->logging = logging; m->environment = environment;
     snprintf(m->name, sizeof m->name, "%s", name ? name : "");
@@ -148,6 +175,8 @@ static void *make(const char *name, const char *token, int cs, int logging, Logg
     if (IS(leak_instance) && !malloc(24)) return NULL;
     if (IS(file_left)) (void)!open("/dev/null", O_RDONLY);
     if (IS(thread_left)) { pthread_t thread; pthread_create(&thread, NULL, idle, NULL); pthread_detach(thread); }
+    if (IS(pool_of_eight) && ++alive > 8) { free(m->scratch); free(m); m = NULL; alive--; }
+    if (!m) return NULL;
     if (IS(second_run_refused) && runs++ > 300) { free(m->scratch); free(m); return NULL; }
     return m;
 }
@@ -163,12 +192,13 @@ static double get(Model *m, uint32_t vr, bool *known) {
     case SPRING: return s->spring;
     case DAMPER: return s->damper;
     case FORCE: return s->force;
-    case X: return s->x;
+    case X: m->shown = s->x; return s->x;
     case V: return IS(shared_static) ? shared.v : s->v;
     case DER_X: return s->v;
     case DER_V: return slope(m) + (IS(name_in_result) ? 1e-9 * (double)strlen(m->name) : 0);
     case Y:
         if (IS(racing_static)) { racing = y; usleep(20); y = racing; }
+        if (IS(output_stale)) return 2 * s->force + m->shown;
         if (IS(getter_changes)) m->s.x += 1e-9;
         if (IS(reading_once) && m->s.steps > 3) m->s.steps = 0, m->s.v += 1e-6;
         return y;
@@ -308,6 +338,7 @@ static int step(void *c, double point, double size) {
     if (!isfinite(point) || !isfinite(size) || !(size > 0) || size > 1e4) return no(m, "no such step");
     if (fabs(point - m->s.time) > 1e-9 * (1 + fabs(point))) return no(m, "another time");
     if (IS(last_step_refused) && point + size >= m->s.stop) return no(m, "it is over");
+    if (!IS(stop_ignored) && point + size > m->s.stop * (1 + 1e-12) + 1e-12) return no(m, "beyond the stop time");
     if (IS(step_prints)) puts("a step");
 #ifdef SYMBOL_MISSING
     if (size == 0.123) return nobody_has_it();
@@ -396,6 +427,7 @@ void FREE(void *c) {
     Model *m = c;
     if (IS(free_null_crashes)) *(volatile char *)m = *(volatile char *)m;
     if (m) free(m->scratch);
+    if (m) alive--;
     free(m);
 }
 
@@ -579,6 +611,14 @@ static int directional(void *c, const uint32_t *unknown, size_t nu, const uint32
     for (i = 0; i < nu; i++) if (isnan(partial(m, unknown[i], X))) return no(m, "an unknown that is none");
     for (j = 0; j < nk; j++) if (known[j] != X && known[j] != V && known[j] != FORCE) return no(m, "a known that is none");
     sums = calloc(nu + nk + 1, sizeof *sums);
+    uint32_t own[8];
+    if (IS(order_ignored) && nu <= 8 && !adjoint) {
+        /* As in ModelStructure. */
+        static const uint32_t order[] = { Y, DER_X, DER_V };
+        size_t next = 0, k;
+        for (k = 0; k < 3; k++) for (i = 0; i < nu; i++) if (unknown[i] == order[k]) own[next++] = unknown[i];
+        if (next == nu) unknown = own;
+    }
     for (i = 0; i < nu; i++)
         for (j = 0; j < nk; j++) {
             double d = partial(m, unknown[i], known[j]);

@@ -1,0 +1,134 @@
+//! Findings that a project has accepted, with the reason of each, in a text file.
+
+use crate::finding::Finding;
+use anyhow::Context as _;
+use std::path::Path;
+
+/// An accepted rule, or the observations of a rule that contain a text.
+struct Accepted {
+    name: String,
+    text: Option<String>,
+    reason: String,
+}
+
+/// The accepted findings.
+#[derive(Default)]
+pub struct Baseline {
+    accepted: Vec<Accepted>,
+}
+
+impl Baseline {
+    /// Reads a file of lines such as `logs.silent: known since 2024` or `refusals.tolerated "J2": intended`.
+    ///
+    /// # Errors
+    /// When it cannot be read, or a line has no name or no reason.
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        let text =
+            std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        Self::parse(&text).map_err(|line| {
+            anyhow::anyhow!(
+                "{}: line {line} is not of the form NAME: REASON or NAME \"PART OF THE OBSERVATION\": REASON",
+                path.display()
+            )
+        })
+    }
+
+    /// The number of the first line that is wrong, if there is one.
+    fn parse(text: &str) -> Result<Self, usize> {
+        let lines = text.lines().enumerate().map(|(place, line)| (place + 1, line.trim()));
+        let accepted =
+            lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).map(|(number, line)| {
+                let end = line.find([':', ' ', '\t']).ok_or(number)?;
+                let (name, rest) = (&line[..end], line[end..].trim_start());
+                let (text, reason) = match rest.strip_prefix('"') {
+                    Some(rest) => {
+                        let (text, rest) = rest.split_once('"').ok_or(number)?;
+                        (Some(text.to_owned()), rest.trim_start())
+                    }
+                    None => (None, rest),
+                };
+                let reason = reason.strip_prefix(':').map(str::trim).filter(|reason| !reason.is_empty());
+                let known = crate::rules::find(name).is_some()
+                    || crate::INTERFACES.contains(&name)
+                    || crate::checks::TOPICS.contains(&name);
+                match reason {
+                    Some(reason) if known => {
+                        Ok(Accepted { name: name.to_owned(), text, reason: reason.to_owned() })
+                    }
+                    _ => Err(number),
+                }
+            });
+        Ok(Self { accepted: accepted.collect::<Result<_, _>>()? })
+    }
+
+    /// The reason for which all observations of a finding are accepted.
+    pub fn of_finding(&self, finding: &Finding) -> Option<String> {
+        let mut reasons: Vec<&str> = Vec::new();
+        for seen in std::iter::once(&finding.seen).chain(&finding.more) {
+            let fits = |of: &&Accepted| {
+                of.name == finding.name && of.text.as_ref().is_none_or(|text| seen.contains(text.as_str()))
+            };
+            let reason = self.accepted.iter().find(fits)?.reason.as_str();
+            if !reasons.contains(&reason) {
+                reasons.push(reason);
+            }
+        }
+        Some(reasons.join("; "))
+    }
+
+    /// The reason for which an interface or a topic need not be checked.
+    pub fn of_unchecked(&self, name: &str) -> Option<&str> {
+        self.accepted.iter().find(|of| of.name == name).map(|of| of.reason.as_str())
+    }
+
+    /// Names that nothing was found for.
+    pub fn unused(&self, findings: &[Finding], unchecked: &[crate::Unchecked]) -> Vec<String> {
+        let used = |of: &&Accepted| {
+            let fits = |seen: &String| of.text.as_ref().is_none_or(|text| seen.contains(text.as_str()));
+            findings.iter().any(|finding| {
+                finding.name == of.name && std::iter::once(&finding.seen).chain(&finding.more).any(fits)
+            }) || unchecked.iter().any(|unchecked| unchecked.name == of.name)
+        };
+        self.accepted.iter().filter(|of| !used(of)).map(|of| of.name.clone()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Baseline;
+    use crate::finding::{Finding, Grade};
+
+    #[test]
+    fn a_reason_is_needed_for_each_observation() {
+        let text =
+            "# known\nlogs.silent: since 2024\n\nrefusals.tolerated \"J2\": intended: see the manual\n";
+        let baseline = Baseline::parse(text).unwrap_or_default();
+        let finding = |name: &str, seen: &[&str]| {
+            let mut finding = Finding::new(name, Grade::Note, String::new(), "", seen[0].to_owned());
+            finding.more = seen[1..].iter().map(|seen| (*seen).to_owned()).collect();
+            finding
+        };
+        assert_eq!(baseline.of_finding(&finding("logs.silent", &["a", "b"])), Some("since 2024".to_owned()));
+        let of_one = finding("refusals.tolerated", &["a value for J2"]);
+        assert_eq!(baseline.of_finding(&of_one), Some("intended: see the manual".to_owned()));
+        assert_eq!(
+            baseline.of_finding(&finding("refusals.tolerated", &["a value for J2", "one for J3"])),
+            None
+        );
+        assert_eq!(baseline.of_finding(&finding("states.restore", &["x"])), None);
+        assert_eq!(baseline.unused(&[of_one], &[]), ["logs.silent"]);
+    }
+
+    #[test]
+    fn a_line_without_reason_or_with_an_unknown_name_is_an_error() {
+        for (text, line) in [
+            ("logs.silent", 1),
+            ("# all\nlogs.silent:", 2),
+            ("logs.silen: typo", 1),
+            ("logs.silent \"a: b", 1),
+        ] {
+            assert_eq!(Baseline::parse(text).err(), Some(line), "{text}");
+        }
+        assert!(Baseline::parse("scheduled-execution: not used").is_ok());
+    }
+}

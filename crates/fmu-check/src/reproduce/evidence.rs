@@ -1,0 +1,309 @@
+//! The results that show a finding, found by leaving out those that the judge does not need. A program that reproduces a
+//! finding compares them.
+
+use crate::finding::{Finding, Judge};
+use crate::script::{End, Numbered, Outcome, Run, Script, Step, Written};
+use serde::Serialize;
+use std::fmt::Write as _;
+
+/// How a program finds out whether a finding shows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub enum Evidence {
+    /// No program can.
+    #[default]
+    None,
+    /// A process does not end as it should, or the library cannot be loaded.
+    End,
+    /// Processes are left at the end.
+    Left,
+    /// Something was printed.
+    Printed,
+    /// Something was written before an array or to one that is for reading.
+    Damage,
+    /// The results of two calls differ.
+    Differ(Vec<Proof>),
+    /// The results of any of these pairs of calls differ.
+    AnyDiffer(Vec<[u32; 2]>),
+    /// The results of these calls are those that were observed.
+    Same(Vec<Proof>),
+    /// Bytes, threads or files between two measurements grow by more than a number, or settings change.
+    Grown(Measure, u32, u32, u64),
+}
+
+/// Repetitions in a program, which has as long as it needs, but not for thousands.
+const REPETITIONS: usize = 500;
+
+/// The quantity of a measurement.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "names of quantities")]
+pub enum Measure {
+    Memory,
+    Threads,
+    Files,
+    Settings,
+}
+
+/// A call whose results matter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Proof {
+    /// The number of the step.
+    pub id: u32,
+    /// Whether its status matters, the values that it wrote, its messages.
+    pub matters: [bool; 3],
+    /// The results that were observed.
+    pub observed: String,
+}
+
+/// The evidence of a finding in a run of its script.
+pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
+    let Some(judge) = &finding.judge else { return Evidence::None };
+    if run.end != End::Done || finding.name == "package.symbols" {
+        return Evidence::End;
+    }
+    let without = |change: &dyn Fn(&mut Run)| {
+        let mut changed = run.clone();
+        change(&mut changed);
+        judge(&changed).is_none()
+    };
+    if without(&|run| run.left.clear()) {
+        return Evidence::Left;
+    }
+    if without(&|run| run.said.clear()) {
+        return Evidence::Printed;
+    }
+    if without(&|run| run.outcomes.values_mut().for_each(|of| of.damage.clear())) {
+        return Evidence::Damage;
+    }
+    let pairs = pairs(&finding.script);
+    if !pairs.is_empty() {
+        return Evidence::AnyDiffer(pairs);
+    }
+    let needed = needed(judge, run);
+    let measured = |of: &&Outcome| of.measured.as_ref().is_some_and(|measured| measured.times == 0);
+    if needed.outcomes.values().any(|of| measured(&of)) {
+        return grown(finding, &needed);
+    }
+    let calls = needed.outcomes.values().filter(|of| of.measured.is_none());
+    let mut ids: Vec<u32> = calls.map(|of| of.id).collect();
+    ids.sort_unstable();
+    let proofs: Vec<Proof> = ids.iter().map(|id| proof(judge, &needed, *id)).collect();
+    let calls: Vec<_> = proofs.iter().filter_map(|proof| function(&finding.script, proof.id)).collect();
+    match &calls[..] {
+        [one, other] if one == other && proofs[0].observed != proofs[1].observed => Evidence::Differ(proofs),
+        [] => Evidence::None,
+        _ => Evidence::Same(proofs),
+    }
+}
+
+/// The queries of threads, each with the one in the simulation before them that it is compared with. Which of them differ
+/// depends on chance.
+fn pairs(script: &Script) -> Vec<[u32; 2]> {
+    let queries = |script: &[Numbered]| -> Vec<u32> {
+        let query = |numbered: &&Numbered| matches!(&numbered.step, Step::Call { function, .. } if function[4..].starts_with("Get"));
+        script.iter().filter(query).map(|numbered| numbered.id).collect()
+    };
+    let alone = queries(script);
+    let threads = script.iter().flat_map(|numbered| match &numbered.step {
+        Step::Parallel(scripts) => scripts.iter().map(|script| queries(script)).collect(),
+        _ => Vec::new(),
+    });
+    threads
+        .flat_map(|ids| {
+            ids.into_iter().zip(alone.iter().cycle()).map(|(id, one)| [*one, id]).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+/// The run with as few outcomes as the judge needs.
+fn needed(judge: &Judge, run: &Run) -> Run {
+    let mut needed = run.clone();
+    let mut ids: Vec<u32> = run.outcomes.keys().copied().collect();
+    ids.sort_unstable();
+    let mut size = ids.len().div_ceil(2);
+    while size > 0 {
+        for some in ids.chunks(size) {
+            let mut tried = needed.clone();
+            some.iter().for_each(|id| drop(tried.outcomes.remove(id)));
+            if tried.outcomes.len() < needed.outcomes.len() && judge(&tried).is_some() {
+                needed = tried;
+            }
+        }
+        size /= 2;
+    }
+    needed
+}
+
+/// The parts of an outcome without which there is no finding.
+fn proof(judge: &Judge, run: &Run, id: u32) -> Proof {
+    let without = |change: &dyn Fn(&mut Outcome)| {
+        let mut changed = run.clone();
+        changed.outcomes.entry(id).and_modify(change);
+        judge(&changed).is_none()
+    };
+    let matters = [
+        true,
+        without(&|of| of.written.clear()) || run.of(id).is_some_and(|of| of.text.is_some()),
+        without(&|of| of.log.clear())
+            || run.of(id).is_some_and(|of| of.log.is_empty() && of.status > Some(1)),
+    ];
+    Proof { id, matters, observed: run.of(id).map_or(String::new(), |of| shown(of, matters)) }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// The results as the programs write them.
+fn shown(outcome: &Outcome, [status, written, log]: [bool; 3]) -> String {
+    let mut text = String::new();
+    let or_null = |bytes: &Option<Vec<u8>>| bytes.as_ref().map_or("-".to_owned(), |bytes| hex(bytes));
+    if let Some(number) = outcome.status.filter(|_| status) {
+        let _ = write!(text, "{number};");
+    }
+    for array in outcome.written.iter().filter(|_| written) {
+        match array {
+            Written::Numbers(kind, bits) => {
+                for bits in bits {
+                    let mask = u64::MAX >> (64 - 8 * kind.size());
+                    let _ = write!(text, "{:x},", bits & mask);
+                }
+            }
+            Written::Texts(texts) => texts.iter().for_each(|string| {
+                let _ = write!(text, "{},", or_null(string));
+            }),
+        }
+        text.push(';');
+    }
+    if let Some(version) = outcome.text.as_ref().filter(|_| written) {
+        let _ = write!(text, "{},;", hex(version));
+    }
+    for message in outcome.log.iter().filter(|_| log) {
+        let _ = write!(text, "{} {} {};", message.status, or_null(&message.category), or_null(&message.text));
+    }
+    text
+}
+
+/// The function of a step at any depth, and what it reads.
+fn function(script: &[Numbered], id: u32) -> Option<String> {
+    script.iter().find_map(|numbered| match &numbered.step {
+        Step::Call { function, args, .. } if numbered.id == id => {
+            let outputs = args.iter().filter(|arg| !matches!(arg, crate::script::Arg::State(_)));
+            Some(format!("{function} {:?}", outputs.collect::<Vec<_>>()))
+        }
+        other if numbered.id == id => Some(crate::finding::step_name(other)),
+        Step::Repeat(_, steps) => function(steps, id),
+        Step::Parallel(scripts) => scripts.iter().find_map(|script| function(script, id)),
+        _ => None,
+    })
+}
+
+/// A growth between two measurements.
+fn grown(finding: &Finding, needed: &Run) -> Evidence {
+    let mut ids: Vec<(u32, bool)> =
+        needed.outcomes.values().filter_map(|of| Some((of.id, of.measured.as_ref()?.times > 0))).collect();
+    ids.sort_unstable();
+    let times = ids.iter().rev().find(|(_, repeated)| *repeated);
+    let times = times
+        .and_then(|(id, _)| needed.of(*id)?.measured.as_ref())
+        .map_or(0, |of| of.times.min(REPETITIONS) as u64);
+    let measures: Vec<u32> = ids.iter().filter(|(_, repeated)| !repeated).map(|(id, _)| *id).collect();
+    let (&[first, last], Some((_, what))) = (&measures[..], finding.name.split_once('.')) else {
+        return Evidence::None;
+    };
+    match what {
+        "memory" => Evidence::Grown(Measure::Memory, first, last, 16 * times + 4096),
+        "threads" => Evidence::Grown(Measure::Threads, first, last, 2),
+        "files" => Evidence::Grown(Measure::Files, first, last, 2),
+        "settings" => Evidence::Grown(Measure::Settings, first, last, 0),
+        _ => Evidence::None,
+    }
+}
+
+/// The script with as many repetitions as were made.
+pub fn as_repeated(script: &Script, run: &Run) -> Script {
+    let mut script = script.clone();
+    for numbered in &mut script {
+        if let (Step::Repeat(times, _), Some(measured)) =
+            (&mut numbered.step, run.of(numbered.id).and_then(|of| of.measured.as_ref()))
+        {
+            *times = measured.times.min(REPETITIONS);
+        }
+    }
+    script
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Evidence, evidence};
+    use crate::finding::{Finding, Grade, Judge};
+    use crate::script::{Arg, End, Kind, Message, Numbered, Outcome, Run, Step, Written};
+    use std::sync::Arc;
+
+    fn finding(judge: Judge) -> Finding {
+        let mut finding = Finding::new("topic.name", Grade::Note, String::new(), "", String::new());
+        let call = |id: u32, function: &str| {
+            let args = vec![Arg::Out(Kind::F64, 1)];
+            Numbered {
+                id,
+                forbidden: false,
+                step: Step::Call { of: Some(0), function: function.to_owned(), args },
+            }
+        };
+        finding.script = vec![call(1, "fmi2GetReal"), call(2, "fmi2DoStep"), call(3, "fmi2GetReal")];
+        finding.judge = Some(judge);
+        finding
+    }
+
+    fn run() -> Run {
+        let outcome = |id: u32, status: i32, value: f64| {
+            let written = vec![Written::Numbers(Kind::F64, vec![value.to_bits()])];
+            (id, Outcome { id, status: Some(status), written, ..Outcome::default() })
+        };
+        let mut run = Run {
+            outcomes: [outcome(1, 0, 1.0), outcome(2, 3, 0.0), outcome(3, 0, 2.0)].into(),
+            ..Run::default()
+        };
+        let message = Message { status: 3, category: None, text: Some(b"no".to_vec()), at_home: true };
+        run.outcomes.entry(2).and_modify(|of| of.log.push(message));
+        run
+    }
+
+    #[test]
+    fn two_reads_that_are_compared_must_differ() {
+        let judge: Judge = Arc::new(|run| {
+            let (one, other) = (run.written(1)?, run.written(3)?);
+            one.differ(other).map(|_| "they differ".to_owned())
+        });
+        let Evidence::Differ(proofs) = evidence(&finding(judge), &run()) else { panic!("two calls") };
+        assert_eq!(proofs.iter().map(|proof| proof.id).collect::<Vec<_>>(), [1, 3]);
+        assert_eq!(proofs[0].observed, "0;3ff0000000000000,;");
+    }
+
+    #[test]
+    fn a_call_that_fails_must_fail_again() {
+        let judge: Judge =
+            Arc::new(|run| run.status(2).filter(|status| *status == 3).map(|_| "it fails".to_owned()));
+        let Evidence::Same(proofs) = evidence(&finding(judge), &run()) else { panic!("a call") };
+        assert_eq!(proofs.iter().map(|proof| proof.observed.as_str()).collect::<Vec<_>>(), ["3;"]);
+    }
+
+    #[test]
+    fn messages_are_compared_where_they_matter() {
+        let judge: Judge = Arc::new(|run| run.of(2)?.log.first().map(|_| "a message".to_owned()));
+        let Evidence::Same(proofs) = evidence(&finding(judge), &run()) else { panic!("a call") };
+        assert_eq!(proofs[0].observed, "3;3 - 6e6f;");
+    }
+
+    #[test]
+    fn the_end_of_a_process_is_evidence() {
+        let judge: Judge = Arc::new(|run| (run.end != End::Done).then(|| "it crashes".to_owned()));
+        let crashed = Run { end: End::Crash(String::new()), ..run() };
+        assert_eq!(evidence(&finding(judge), &crashed), Evidence::End);
+        let left: Judge = Arc::new(|run| run.left.first().cloned());
+        let run = Run { left: vec!["sleep".to_owned()], ..run() };
+        assert_eq!(evidence(&finding(left), &run), Evidence::Left);
+    }
+}

@@ -1,0 +1,203 @@
+//! Limits for the processes of an FMU: a session for each call sequence, no signals to other processes, and an end for
+//! every descendant.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Whether the user has interrupted the check.
+pub fn interrupted() -> bool {
+    INTERRUPTED.load(Ordering::Relaxed)
+}
+
+/// The first interrupt ends the check in order; a second one ends the process.
+#[cfg(unix)]
+pub fn listen_for_interrupts() {
+    extern "C" fn interrupt(_: libc::c_int) {
+        INTERRUPTED.store(true, Ordering::Relaxed);
+    }
+    for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP] {
+        // SAFETY: the handler only stores a flag. A signal that was ignored stays so, as under nohup.
+        unsafe {
+            let mut before: libc::sigaction = std::mem::zeroed();
+            libc::sigaction(signal, std::ptr::null(), &mut before);
+            if before.sa_sigaction != libc::SIG_IGN {
+                let mut action: libc::sigaction = std::mem::zeroed();
+                action.sa_sigaction = interrupt as *const () as usize;
+                action.sa_flags = libc::SA_RESETHAND | libc::SA_RESTART;
+                libc::sigaction(signal, &action, std::ptr::null_mut());
+            }
+        }
+    }
+}
+
+/// Elsewhere an interrupt ends the process.
+#[cfg(not(unix))]
+pub fn listen_for_interrupts() {}
+
+/// Ends the process group of a worker that has ended.
+#[cfg(all(unix, not(target_os = "linux")))]
+pub fn end_group(leader: u32) {
+    // SAFETY: sends a signal to a group that this process has made.
+    unsafe { libc::kill(-(leader as libc::pid_t), libc::SIGKILL) };
+}
+
+/// Elsewhere there are no process groups.
+#[cfg(not(unix))]
+pub fn end_group(_: u32) {}
+
+#[cfg(target_os = "linux")]
+pub use linux::*;
+
+#[cfg(target_os = "linux")]
+mod linux {
+    use std::collections::HashMap;
+    use std::os::fd::AsRawFd;
+    use std::time::{Duration, Instant};
+
+    /// Processes of a call sequence at once; more are a finding.
+    pub const MOST_PROCESSES: usize = 64;
+
+    /// A process that adopts the orphans among its descendants, in a separate session.
+    pub fn adopt_descendants() {
+        // SAFETY: concern this process only.
+        unsafe {
+            libc::setsid();
+            libc::prctl(libc::PR_SET_CHILD_SUBREAPER, 1);
+        }
+    }
+
+    /// Waits up to 50 ms for data or the end of data.
+    pub fn readable(of: &impl AsRawFd) -> std::io::Result<bool> {
+        let mut poll = libc::pollfd { fd: of.as_raw_fd(), events: libc::POLLIN, revents: 0 };
+        // SAFETY: one descriptor, which is open.
+        match unsafe { libc::poll(&raw mut poll, 1, 50) } {
+            -1 if std::io::Error::last_os_error().kind() != std::io::ErrorKind::Interrupted => {
+                Err(std::io::Error::last_os_error())
+            }
+            count => Ok(count > 0),
+        }
+    }
+
+    /// Whether the process at the other end of the standard input has ended.
+    pub fn abandoned() -> bool {
+        let mut poll = libc::pollfd { fd: 0, events: 0, revents: 0 };
+        // SAFETY: one descriptor.
+        unsafe { libc::poll(&raw mut poll, 1, 0) > 0 && poll.revents & libc::POLLHUP != 0 }
+    }
+
+    /// Living descendants with their names.
+    pub fn descendants() -> Vec<(libc::pid_t, String)> {
+        let mut children: HashMap<libc::pid_t, Vec<(libc::pid_t, String)>> = HashMap::new();
+        for entry in std::fs::read_dir("/proc").into_iter().flatten().flatten() {
+            let Some(pid) = entry.file_name().to_str().and_then(|name| name.parse().ok()) else { continue };
+            let stat = std::fs::read_to_string(entry.path().join("stat")).unwrap_or_default();
+            // The name is in parentheses, and may contain some.
+            let Some((name, rest)) = stat.split_once('(').and_then(|(_, rest)| rest.rsplit_once(") ")) else {
+                continue;
+            };
+            let mut fields = rest.split(' ');
+            let state = fields.next().unwrap_or_default();
+            if let Some(parent) = fields.next().and_then(|field| field.parse().ok())
+                && !["Z", "X"].contains(&state)
+            {
+                children.entry(parent).or_default().push((pid, name.to_owned()));
+            }
+        }
+        let mut found: Vec<(libc::pid_t, String)> = Vec::new();
+        // SAFETY: asks for a number.
+        let mut next = vec![unsafe { libc::getpid() }];
+        while let Some(parent) = next.pop() {
+            for child in children.remove(&parent).into_iter().flatten() {
+                next.push(child.0);
+                found.push(child);
+            }
+        }
+        found
+    }
+
+    /// Waits for children that have ended. Whether there are others.
+    fn reap() -> bool {
+        loop {
+            // SAFETY: waits for no child that others wait for.
+            match unsafe { libc::waitpid(-1, std::ptr::null_mut(), libc::WNOHANG) } {
+                0 => return true,
+                -1 => return false,
+                _ => {}
+            }
+        }
+    }
+
+    /// Ends all descendants, the group of `leader` first. The names of those that were alive after `grace`.
+    pub fn end_descendants(leader: libc::pid_t, grace: Duration) -> Vec<String> {
+        let begin = Instant::now();
+        while reap() {
+            if begin.elapsed() >= grace {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        if !reap() {
+            return Vec::new();
+        }
+        let left = descendants().into_iter().map(|(_, name)| name).collect();
+        let begin = Instant::now();
+        while reap() && begin.elapsed() < Duration::from_secs(10) {
+            // SAFETY: the group and the processes descend from this one. A group is ended at once, so that none of it escapes
+            // by starting another process.
+            unsafe {
+                libc::kill(-leader, libc::SIGKILL);
+                for (pid, _) in descendants() {
+                    let group = libc::getpgid(pid);
+                    if group > 1 && group != libc::getpgid(0) {
+                        libc::kill(-group, libc::SIGKILL);
+                    }
+                    libc::kill(pid, libc::SIGKILL);
+                }
+            }
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        left
+    }
+
+    /// A session for this process, from which it cannot send signals to the processes of the checker or to all processes:
+    /// the attempt ends it with SIGSYS.
+    pub fn isolate(checker: libc::pid_t) {
+        // SAFETY: asks for numbers, and makes a session.
+        let (keeper, group, caller) = unsafe {
+            libc::setsid();
+            let keeper = libc::getppid();
+            (keeper, libc::getpgid(checker), parent_of(checker))
+        };
+        let mut targets = vec![-1, keeper, -keeper, checker, -checker, -group, caller];
+        targets.retain(|target| *target != 0);
+        let step = |code: u32, jt, jf, k: i32| libc::sock_filter { code: code as u16, jt, jf, k: k as u32 };
+        let load = |offset| step(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, 0, 0, offset);
+        let equals = |number: i32, jt, jf| step(libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K, jt, jf, number);
+        let end = |action: u32| step(libc::BPF_RET | libc::BPF_K, 0, 0, action as i32);
+        let count = targets.len() as u8;
+        // The number of the call is first in seccomp_data, its first argument after 16 bytes.
+        let mut program = vec![
+            load(0),
+            equals(libc::SYS_kill as i32, 2, 0),
+            equals(libc::SYS_tgkill as i32, 1, 0),
+            equals(libc::SYS_tkill as i32, 0, count + 1),
+            load(16),
+        ];
+        for (place, target) in (0..count).zip(&targets) {
+            program.push(equals(*target, count - place, 0));
+        }
+        program.extend([end(libc::SECCOMP_RET_ALLOW), end(libc::SECCOMP_RET_KILL_PROCESS)]);
+        let filter = libc::sock_fprog { len: program.len() as u16, filter: program.as_mut_ptr() };
+        // SAFETY: a filter of system calls for this process and its descendants; without it, all is allowed.
+        unsafe {
+            libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+            libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, &raw const filter);
+        }
+    }
+
+    fn parent_of(pid: libc::pid_t) -> libc::pid_t {
+        let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
+        status.lines().find_map(|line| line.strip_prefix("PPid:")?.trim().parse().ok()).unwrap_or(0)
+    }
+}
