@@ -178,19 +178,10 @@ impl Builder {
             true => self.c_sources(options.tunable, model.identifier())?,
             false => CSources::new(),
         };
-        let described = match &self.start_from {
-            Some(file) if !self.is_default => short(file),
-            _ => model.identifier().to_owned(),
-        };
         let describe = |fmi: Fmi, guid: &str| {
             let source_files = sources.iter().take(COMPILED).map(|(name, _)| name.clone()).collect();
-            let changes =
-                Changes { guid: Some(guid.to_owned()), tunable_parameters: options.tunable, source_files };
-            let text = match fmi {
-                Fmi::V2 => fmi2::describe(&model, &changes),
-                Fmi::V3 => fmi3::describe(&model, &changes),
-            };
-            text.with_context(|| described.clone())
+            let guid = Some(guid.to_owned());
+            self.describe(&model, fmi, &Changes { guid, tunable_parameters: options.tunable, source_files })
         };
         let terminals = terminals(&model, &self.terminals, &content)?;
         let versions = self.versions(options, &model);
@@ -228,19 +219,35 @@ impl Builder {
         };
         let tunable = if options.tunable { ", tunable" } else { "" };
         println!("guid {guid}{start}{tunable}");
-        if is_default
-            && !options.c_sources
-            && let Some((fmi, description)) = descriptions.first()
+        if is_default && !options.c_sources {
+            self.compare_with_kept(&kept, &descriptions, &guid);
+        }
+        Ok(())
+    }
+
+    fn describe(&self, model: &LoadedModel, fmi: Fmi, changes: &Changes) -> Result<String> {
+        let text = match fmi {
+            Fmi::V2 => fmi2::describe(model, changes),
+            Fmi::V3 => fmi3::describe(model, changes),
+        };
+        text.with_context(|| match &self.start_from {
+            Some(file) if !self.is_default => short(file),
+            _ => model.identifier().to_owned(),
+        })
+    }
+
+    /// Tells the user if the description that is kept with the sources is another one.
+    fn compare_with_kept(&self, kept: &Path, descriptions: &[(Fmi, String)], guid: &str) {
+        if let Some((fmi, description)) = descriptions.first()
             && self.fmi.first() == Some(fmi)
-            && let Ok(text) = fs::read_to_string(&kept)
-            && text != description.replace(&guid, NO_GUID)
+            && let Ok(text) = fs::read_to_string(kept)
+            && text != description.replace(guid, NO_GUID)
         {
             eprintln!(
                 "note: {DESCRIPTION} in the sources is out of date; write it anew with\n      {} --describe",
                 self.command
             );
         }
-        Ok(())
     }
 
     /// Whether the options go together with the versions that FMUs are made for.
