@@ -2,15 +2,11 @@
 
 use anyhow::{Context, Error, Result};
 use clap::Parser;
-use fmu_package::{BuildOptions, Builder, Terminal};
-use prw_testbed::TestbedFmu;
+use fmu_package::{BuildOptions, Builder, Sources, Terminal};
 use prw_testbed::fingerprint::{self, PARAMETERS};
 use prw_testbed::parameter_file;
 use std::path::{Path, PathBuf, absolute};
 use std::process::ExitCode;
-
-#[path = "crates/prw-controller/src/sources.rs"]
-mod controller;
 
 /// The folder of `Cargo.toml`.
 const PROJECT: &str = env!("CARGO_MANIFEST_DIR");
@@ -61,12 +57,15 @@ fn run(options: &Options) -> Result<()> {
         ],
         page_fmus: vec![(
             "prw_controller",
-            controller::sources(concat!(env!("CARGO_MANIFEST_DIR"), "/crates/prw-controller")),
+            Sources {
+                licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"],
+                ..Sources::of_package(concat!(env!("CARGO_MANIFEST_DIR"), "/crates/prw-controller"))
+            },
         )],
         environment: vec![("PRW_PARAMETERS", other.map(Into::into))],
         ..Builder::new(env!("CARGO_PKG_NAME"), PROJECT)
     };
-    builder.run::<TestbedFmu>(&options.build)
+    builder.run(&options.build)
 }
 
 /// Where the testbed is connected.

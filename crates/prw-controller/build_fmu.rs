@@ -2,8 +2,7 @@
 
 use clap::Parser;
 use fmu_package::terminal::exit;
-use fmu_package::{BuildOptions, Builder, Terminal};
-use prw_controller::{Controller, sources::sources};
+use fmu_package::{BuildOptions, Builder, Sources, Terminal};
 use std::process::ExitCode;
 
 /// Builds the FMU of the wrist's controller, target/fmu/prw_controller.fmu.
@@ -16,13 +15,16 @@ struct Options {
 
 fn main() -> ExitCode {
     let builder = Builder {
-        command: "cargo run --release -p prw_controller --bin build_controller",
-        sources: sources(env!("CARGO_MANIFEST_DIR")),
+        command: "cargo run --release -p prw_controller --bin build_controller --",
+        sources: Sources {
+            licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"],
+            ..Sources::of_package(env!("CARGO_MANIFEST_DIR"))
+        },
         profile: "library",
         terminals: terminals(),
         ..Builder::new(env!("CARGO_PKG_NAME"), env!("CARGO_MANIFEST_DIR"))
     };
-    exit(builder.run::<Controller>(&Options::parse().build))
+    exit(builder.run(&Options::parse().build))
 }
 
 /// Where the controller is connected: its motors and its sensors go to the terminals of the testbed that are called the

@@ -8,6 +8,7 @@ use crate::{TABLE, new, vr};
 use fmu_export::Causality::Parameter;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
+use fmu_package::LoadedModel;
 use fmu_package::structure::ModelStructure;
 use fmu_test_kit::checks::output_derivatives_fit_steps;
 use fmu_test_kit::{Either, Importer as Fmu, Random, fmi3};
@@ -16,8 +17,13 @@ use prw_testbed::variables::Name;
 use std::sync::LazyLock;
 
 /// What the description lists for FMI 2.0.
-static STRUCTURE: LazyLock<ModelStructure> =
-    LazyLock::new(|| ModelStructure::of::<TestbedFmu>(false).unwrap());
+static STRUCTURE: LazyLock<ModelStructure> = LazyLock::new(|| {
+    let (fmi2, fmi3) =
+        (fmu_export::fmi2::functions::<TestbedFmu>(), fmu_export::fmi3::functions::<TestbedFmu>());
+    // SAFETY: the functions of the same model.
+    let model = unsafe { LoadedModel::new(&fmu_export::describe::<TestbedFmu>(), fmi2, fmi3) };
+    ModelStructure::of(&model.unwrap(), false).unwrap()
+});
 
 /// Central differences of the values that getters return, each with a bound of its rounding error. The values are linear
 /// in every known except the parameters of the equations.

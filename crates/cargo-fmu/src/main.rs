@@ -2,8 +2,8 @@
 //!
 //! ## Inside
 //!
-//! `new` writes a model to grow, `project` asks cargo about the package, `builder` compiles it with a program that describes
-//! and packs it, `run` simulates what came of it, `plot` draws that.
+//! `new` writes a model to grow, `project` asks cargo about the package, `builder` compiles, describes and packs it, `run`
+//! simulates what came of it, `plot` draws that.
 
 mod builder;
 mod new;
@@ -39,9 +39,9 @@ enum Command {
         place: Place,
         #[command(flatten)]
         build: BuildOptions,
-        /// Behind `--`: what the package's own build_fmu has besides
+        /// Behind `--`: options that only the package's own build_fmu has
         #[arg(last = true, value_name = "OPTIONS")]
-        own: Vec<OsString>,
+        _own: Vec<OsString>,
     },
     /// Make the FMUs and simulate one: a table (CSV) and a picture (SVG) of the outputs
     Run(run::Options),
@@ -72,8 +72,8 @@ fn main() -> ExitCode {
 fn carry_out(command: &Command) -> Result<bool> {
     match command {
         Command::New(options) => new::new(options).map(|()| true),
-        Command::Build { place, build, own } => {
-            builder::build(&Project::find(place)?, build, Purpose::Use, own)
+        Command::Build { place, build, .. } => {
+            builder::build(&Project::find(place)?, build, Purpose::Use, &builder::words_of_build())
         }
         Command::Run(options) => run::run(options),
         Command::Check { place, fmu, check } => run::check(place, fmu, check),

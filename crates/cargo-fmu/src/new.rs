@@ -132,7 +132,7 @@ name = {name:?}
 version = "0.1.0"
 edition = "2024"
 
-# cdylib is what goes into the FMU; rlib what tests, and the program that describes the model, use.
+# cdylib is what goes into the FMU; rlib what tests use.
 [lib]
 crate-type = ["cdylib", "rlib"]
 

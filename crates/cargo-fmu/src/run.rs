@@ -92,7 +92,7 @@ pub fn check(place: &Place, given: &[PathBuf], options: &fmu_check::Options) -> 
         let folder = project.workspace.join("target/fmu");
         let begin = std::time::SystemTime::now();
         let build = BuildOptions { out: Some(folder.clone()), ..BuildOptions::default() };
-        if !builder::build(&project, &build, Purpose::Use, &[])? {
+        if !builder::build(&project, &build, Purpose::Use, &["--out".into(), folder.clone().into()])? {
             return Ok(false);
         }
         fmus.extend([folder.clone(), folder.join("fmi3")].iter().filter_map(|folder| newest(folder, begin)));
@@ -114,7 +114,11 @@ fn once(options: &Options) -> Result<bool> {
     let folder = project.workspace.join("target/fmu");
     let build = BuildOptions { fmi: options.fmi, out: Some(folder.clone()), ..BuildOptions::default() };
     let begin = std::time::SystemTime::now();
-    if !builder::build(&project, &build, Purpose::Trial, &[])? {
+    let mut words = vec!["--out".into(), folder.clone().into()];
+    if let Some(fmi) = options.fmi {
+        words.extend(["--fmi".into(), if fmi == Fmi::V2 { "2" } else { "3" }.into()]);
+    }
+    if !builder::build(&project, &build, Purpose::Trial, &words)? {
         return Ok(false);
     }
     let fmu = newest(&folder, begin).or_else(|| newest(&folder.join("fmi3"), begin));

@@ -207,7 +207,7 @@ fn what_is_no_model_is_named() {
 
     with("odd/src/lib.rs", &library.replace("export_fmu!", "offer!"));
     let said = folder.refuses("odd", &["build"]);
-    assert!(said.contains("not there? src/lib.rs of odd must end with export_fmu!(...);"), "{said}");
+    assert!(said.contains("its crate needs `export_fmu!(...)` in src/lib.rs"), "{said}");
     with("odd/src/lib.rs", &library);
 
     with("odd/Cargo.toml", &manifest.replace("\"cdylib\", ", ""));

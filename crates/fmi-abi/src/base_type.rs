@@ -37,6 +37,24 @@ pub enum BaseType {
 }
 
 impl BaseType {
+    /// All of them.
+    pub const ALL: [Self; 14] = [
+        Self::Real,
+        Self::Float32,
+        Self::Integer,
+        Self::Int8,
+        Self::UInt8,
+        Self::Int16,
+        Self::UInt16,
+        Self::UInt32,
+        Self::Int64,
+        Self::UInt64,
+        Self::Boolean,
+        Self::String,
+        Self::Binary,
+        Self::Enumeration,
+    ];
+
     /// Whether FMI 2.0 has it.
     pub const fn is_in_fmi2(self) -> bool {
         matches!(self, Self::Real | Self::Integer | Self::Boolean | Self::String | Self::Enumeration)

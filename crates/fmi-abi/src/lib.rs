@@ -5,6 +5,7 @@ pub mod c_types;
 #[cfg(feature = "calls")]
 #[allow(unsafe_code, reason = "a function is called at an address")]
 pub mod calls;
+mod causality;
 pub mod fmi2;
 pub mod fmi3;
 mod log_category;
@@ -12,13 +13,16 @@ mod mode;
 mod rule;
 mod standard;
 mod status;
+mod value;
 
 pub use base_type::BaseType;
+pub use causality::{Causality, Initial, Variability};
 pub use log_category::Category;
 pub use mode::{Mode, Situation, Situations};
 pub use rule::Rule;
 pub use standard::{Interface, Standard};
 pub use status::Status;
+pub use value::Value;
 
 /// What the list of a standard's functions says, as items of its module.
 macro_rules! table {

@@ -9,7 +9,7 @@
 
 mod boundary;
 mod capabilities;
-mod causality;
+mod describe;
 mod export;
 pub mod fmi2;
 pub mod fmi3;
@@ -30,9 +30,12 @@ pub use capabilities::{
     CoSimulation, Event, Events, InputDerivatives, ModelExchange, OutputDerivatives, Partials, Step,
     StepCompleted, Stepped,
 };
-pub use causality::{Causality, Initial, Variability};
+pub use describe::describe;
 pub use export::{CoSimulationOffer, Exported, ModelExchangeOffer};
-pub use fmi_abi::{BaseType, Category, Interface, Mode, Rule, Situations, Standard, Status};
+pub use fmi_abi::{
+    BaseType, Category, Causality, Initial, Interface, Mode, Rule, Situations, Standard, Status, Value,
+    Variability,
+};
 pub use info::{DefaultExperiment, Info};
 pub use log::Log;
 pub use model::{Error, Experiment, Model, Setup};
@@ -40,14 +43,14 @@ pub use saved::{Saved, StateVisitor};
 pub use table::Variables;
 pub use types::{Attributes, BINARY, BOOLEAN, INTEGER, Item, NUMBER, STRING, TIME, Type};
 pub use units::{BaseUnit, DisplayUnit, Unit};
-pub use value::{Enumeration, Place, Scalar, Value};
+pub use value::{Enumeration, Place, Scalar};
 pub use variable::{Index, Variable};
 
 #[doc(hidden)]
 pub use {
     boundary::{both_offsets, offset_in, offset_of_real},
+    describe::{Receive, pass_description},
     fmi_abi::{fmi2_functions, fmi3_functions},
-    instance::{SavedTrial, Trial},
     table::{
         StateOfTable, check_line, count_elements, count_letters, count_states, find_states, spread,
         spread_names, write_names,

@@ -1,6 +1,6 @@
 //! Where a variable may be set: what the standard says, and apart from it what is tolerated because importers do it.
 
-use crate::causality::{Causality, Initial, Variability};
+use fmi_abi::{Causality, Initial, Variability};
 use fmi_abi::{Situations, Standard};
 
 /// Where an importer may set a variable, in both standards, with what is tolerated.

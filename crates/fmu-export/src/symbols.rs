@@ -30,7 +30,8 @@ macro_rules! c_functions {
 }
 pub(crate) use c_functions;
 
-/// The symbols of the library for a model: the functions of both standards.
+/// The symbols of the library for a model: the functions of both standards, and one that describes the model to the program
+/// that makes its FMU.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! symbols {
@@ -78,6 +79,16 @@ macro_rules! symbols {
             use $crate::fmi3::types::*;
 
             $crate::fmi3_functions!($crate::symbols, @each fmi3 __fmu_model;);
+
+            /// See `fmu_export::pass_description`.
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn fmu_export_description(
+                receive: $crate::Receive,
+                context: *mut ::core::ffi::c_void,
+            ) {
+                // SAFETY: the caller keeps the contract of this function.
+                unsafe { $crate::pass_description::<__fmu_model>(receive, context) }
+            }
         }
     };
     (

@@ -2,54 +2,7 @@
 
 use crate::saved::{Saved, StateVisitor};
 use crate::types::Item;
-use fmi_abi::BaseType;
-use std::fmt;
-
-/// A value of a variable.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Value {
-    /// Of a Real or a Float32.
-    Real(f64),
-    /// Of a whole number of any kind or an Enumeration.
-    Integer(i128),
-    /// Of a Boolean.
-    Boolean(bool),
-    /// Of a String.
-    String(String),
-    /// Of a Binary.
-    Binary(Vec<u8>),
-}
-
-impl Value {
-    /// Of a Real; of others it is no number.
-    pub(crate) fn real(&self) -> f64 {
-        if let Self::Real(value) = self { *value } else { f64::NAN }
-    }
-}
-
-impl From<f64> for Value {
-    fn from(value: f64) -> Self {
-        Self::Real(value)
-    }
-}
-
-/// As it is written in XML.
-impl fmt::Display for Value {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            // Where hundreds of zeros may have to be written.
-            Self::Real(value) if *value != 0.0 && value.abs() < 1e-15 || value.abs() > 1e17 => {
-                write!(f, "{value:e}")
-            }
-            Self::Real(value) => write!(f, "{value}"),
-            Self::Integer(value) => write!(f, "{value}"),
-            Self::Boolean(value) => write!(f, "{value}"),
-            Self::String(value) => write!(f, "{value}"),
-            Self::Binary(value) => value.iter().try_for_each(|byte| write!(f, "{byte:02X}")),
-        }
-    }
-}
+use fmi_abi::{BaseType, Value};
 
 /// A Rust type that a variable's value may live in: `f64`, `i32`, `bool`, `String`, or an enum made by
 /// [`enumeration!`](crate::enumeration); and `f32`, whole numbers from `i8` to `u64`, and `Vec<u8>`, which FMI 2.0
@@ -388,7 +341,7 @@ mod tests {
 
     #[test]
     fn values_go_in_and_out() {
-        fn check<T: Scalar + Clone + PartialEq + fmt::Debug>(
+        fn check<T: Scalar + Clone + PartialEq + std::fmt::Debug>(
             start: T,
             other: T,
             value: Value,

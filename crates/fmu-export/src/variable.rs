@@ -1,13 +1,14 @@
 //! Variables: what each is, and how the model's value is reached.
 
-use crate::causality::{Causality, Initial, Variability};
 use crate::saved::StateVisitor;
 use crate::settable::settable;
 use crate::table::Variables;
 use crate::types::Type;
-use crate::value::{Dimensions, Place, Scalar, Value};
+use crate::value::{Dimensions, Place, Scalar};
 use fmi_abi::BaseType;
 use fmi_abi::Situations;
+use fmi_abi::Value;
+use fmi_abi::{Causality, Initial, Variability};
 use std::mem::MaybeUninit;
 
 /// A variable's line in the table. Authors write its name; see [`variables!`](crate::variables).

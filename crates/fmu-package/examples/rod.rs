@@ -1,32 +1,31 @@
-//! The FMUs of a model with arrays, for tests: rod LIBRARY FOLDER.
+//! The FMUs of a library that describes itself, for tests: rod LIBRARY FOLDER.
+#![allow(unsafe_code)]
 
 use anyhow::{Result, bail};
-use fmu_package::{Changes, Fmi, Library, Parts, Platform, fmi2, fmi3, pack};
+use fmu_package::{Changes, Fmi, Library, LoadedModel, Parts, Platform, fmi2, fmi3, pack};
 use std::path::Path;
-
-#[path = "../../fmu-export/tests/toys/rod.rs"]
-#[allow(dead_code, missing_docs)]
-mod rod;
 
 fn main() -> Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     let [library, folder] = arguments.as_slice() else { bail!("usage: rod LIBRARY FOLDER") };
+    // SAFETY: the test's library.
+    let model = unsafe { LoadedModel::load(Path::new(library)) }?;
     let libraries = [Library { platform: Platform::host()?, path: library.into() }];
-    let changes = Changes::default();
-    for (fmi, description, name) in [
-        (Fmi::V2, fmi2::describe::<rod::Rod>(&changes)?, "rod2.fmu"),
-        (Fmi::V3, fmi3::describe::<rod::Rod>(&changes)?, "rod3.fmu"),
-    ] {
+    let (changes, identifier) = (Changes::default(), model.identifier());
+    for (fmi, description) in
+        [(Fmi::V2, fmi2::describe(&model, &changes)?), (Fmi::V3, fmi3::describe(&model, &changes)?)]
+    {
         let parts = Parts {
             fmi,
-            identifier: "rod",
+            identifier,
             description: &description,
             terminals: None,
             libraries: &libraries,
             sources: &[],
             content: &[],
         };
-        pack(&Path::new(folder).join(name), &parts)?;
+        let version = if fmi == Fmi::V2 { 2 } else { 3 };
+        pack(&Path::new(folder).join(format!("{identifier}{version}.fmu")), &parts)?;
     }
     Ok(())
 }

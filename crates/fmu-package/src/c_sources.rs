@@ -2,7 +2,7 @@
 
 use crate::cross::check_targets;
 use anyhow::{Context, Result, bail, ensure};
-use fmu_export::fmi2::ALLOWED;
+use fmi_abi::fmi2::ALLOWED;
 use std::ffi::OsStr;
 use std::fmt::Write;
 use std::fs;

@@ -5,31 +5,9 @@ use crate::cross::{ZIGBUILD, rustc_for};
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 use std::ffi::OsString;
-use std::fs;
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
-
-/// Checks that no source of this program is newer than the program, by the list of files that cargo writes next to it.
-///
-/// # Errors
-/// Names the source file, and `command`, which compiles the program again.
-pub(crate) fn check_that_program_is_current(command: &str) -> Result<()> {
-    let program = std::env::current_exe().context("this program does not know its own path")?;
-    let changed = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
-    let (Ok(list), Some(compiled)) = (fs::read_to_string(program.with_extension("d")), changed(&program))
-    else {
-        return Ok(());
-    };
-    // As in a makefile: `program: file file ...`, with blanks in names escaped.
-    let (_, files) = list.split_once(": ").unwrap_or_default();
-    let files = files.replace("\\ ", "\0");
-    let mut files = files.split_whitespace().map(|file| file.replace('\0', " "));
-    match files.find(|file| changed(Path::new(file)).is_some_and(|time| time > compiled)) {
-        Some(file) => bail!("{file} has changed since this program was compiled; start it with `{command}`"),
-        None => Ok(()),
-    }
-}
 
 /// A run of cargo that makes a package's shared library.
 #[derive(Clone, Debug)]
@@ -42,6 +20,8 @@ pub struct LibraryBuild<'a> {
     pub profile: &'a str,
     /// The target; `None` for the machine this runs on.
     pub target: Option<&'a str>,
+    /// Settings of cargo, such as `profile.release.lto=false`.
+    pub settings: &'a [&'a str],
     /// Arguments for the compiler.
     pub arguments: &'a [&'a str],
     /// Environment variables to set, or to remove where the value is `None`.
@@ -76,6 +56,9 @@ impl LibraryBuild<'_> {
         if cargo == ZIGBUILD {
             let strip = !target.is_some_and(|target| target.contains("-apple-"));
             command.env(format!("CARGO_PROFILE_{}_STRIP", self.profile.to_uppercase()), strip.to_string());
+        }
+        for setting in self.settings {
+            command.args(["--config", setting]);
         }
         if !self.arguments.is_empty() {
             command.arg("--").args(self.arguments);

@@ -2,74 +2,50 @@
 //!
 //! What concerns a single variable's causality, variability and place has been refused when the model was compiled.
 
-use crate::changes::{Changes, read_value};
+use crate::instance::Instance;
+use crate::model::LoadedModel;
+use crate::table::{Attributes, Info, Start, Table, Type, Unit, Variable};
 use anyhow::{Context, Result, anyhow, bail, ensure};
-use fmu_export::{
-    Attributes, BaseType, Causality, Exported, Info, Initial, Interface, Setup, Type, Unit, Value,
-    Variability, Variable,
-};
+use fmi_abi::{BaseType, Causality, Standard, Value, Variability};
 use std::collections::HashSet;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Start values by value reference; `None` for what has none.
+/// Start values by place; `None` for what has none.
 pub(crate) type Starts = Vec<Option<Value>>;
 
-/// Checks the model and tells its start values, those of `changes` before its own.
-pub(crate) fn check<M: Exported>(changes: &Changes) -> Result<Starts> {
-    check_info(&M::INFO)?;
+/// Checks the model and tells its start values.
+pub(crate) fn check(model: &LoadedModel) -> Result<Starts> {
+    let table = &model.table;
+    check_info(&table.info)?;
     ensure!(
-        interfaces::<M>().next().is_some(),
+        table.interfaces().next().is_some(),
         "{} offers neither Co-Simulation nor Model Exchange",
-        M::INFO.name
+        table.info.name
     );
-    for variable in M::TABLE {
-        let name = variable.name();
+    for variable in &table.variables {
+        let name = &variable.name;
         ensure!(is_text(name), "the variable name '{}' is empty or more than one line", name.escape_debug());
-        ensure!(is_line(variable.description()), "the description of {name} is more than one line");
+        ensure!(is_line(&variable.description), "the description of {name} is more than one line");
         ensure!(
-            !M::ARRAYS || is_structured(name),
+            !table.arrays || is_structured(name),
             "the variable name '{}' is no name of the structured naming convention, which a model with arrays needs: \
              write names as in Modelica, such as motor.torque, der(x), or 'any text' (section 2.2.9 of FMI 2.0)",
             name.escape_debug()
         );
-        let of = variable.variable_type();
+        let of = &variable.of;
         let named = if of.name.is_empty() {
             "its type".to_owned()
         } else {
             format!("the type {}", of.name.escape_debug())
         };
         check_type(of).with_context(|| format!("{name} cannot have {named}"))?;
-        check_references::<M>(variable)?;
+        check_references(table, variable)?;
     }
-    let is_time = |variable: &&Variable<M>| variable.causality() == Causality::Independent;
-    ensure!(
-        M::TABLE.iter().filter(is_time).count() <= 1,
-        "there are two independent variables (section 2.2.7)"
-    );
-    check_derivatives::<M>()?;
-    let mut starts = check_starts::<M>()?;
-    check_indicators::<M>()?;
-    check_changes::<M>(changes, &mut starts)?;
+    let is_time = |variable: &Variable| variable.causality == Causality::Independent;
+    ensure!(table.find(is_time).len() <= 1, "there are two independent variables (section 2.2.7)");
+    check_derivatives(table)?;
+    let starts = check_starts(table)?;
+    check_model(model, &starts)?;
     Ok(starts)
-}
-
-/// The interface types that the model offers.
-pub(crate) fn interfaces<M: Exported>() -> impl Iterator<Item = Interface> {
-    let co_simulation = M::CO_SIMULATION.map(|_| Interface::CoSimulation);
-    let model_exchange = M::MODEL_EXCHANGE.map(|_| Interface::ModelExchange);
-    [co_simulation, model_exchange].into_iter().flatten()
-}
-
-/// Whether others may depend on it (section 2.2.8): inputs, states, the time, and what begins with an exact value.
-pub(crate) fn is_known<M>(variable: &Variable<M>) -> bool {
-    matches!(variable.causality(), Causality::Input | Causality::Independent)
-        || variable.is_state()
-        || is_exact(variable)
-}
-
-/// Whether it begins with exactly its start value, which may be changed.
-pub(crate) fn is_exact<M>(variable: &Variable<M>) -> bool {
-    variable.initial() == Some(Initial::Exact) && variable.variability() != Variability::Constant
 }
 
 fn is_line(text: &str) -> bool {
@@ -145,26 +121,26 @@ fn is_positive(value: f64) -> bool {
 
 fn check_info(info: &Info) -> Result<()> {
     ensure!(
-        is_text(info.name),
+        is_text(&info.name),
         "the model's name '{}' is empty or more than one line",
         info.name.escape_debug()
     );
     ensure!(
-        is_identifier(info.identifier),
+        is_identifier(&info.identifier),
         "the identifier '{}' must be one of C: letters, digits and underscores, no digit first",
         info.identifier.escape_debug()
     );
-    ensure!(is_text(info.guid), "{} has no guid", info.name);
+    ensure!(is_text(&info.guid), "{} has no guid", info.name);
     for (what, text) in [
-        ("description", info.description),
-        ("author", info.author),
-        ("version", info.version),
-        ("license", info.license),
-        ("copyright", info.copyright),
+        ("description", &info.description),
+        ("author", &info.author),
+        ("version", &info.version),
+        ("license", &info.license),
+        ("copyright", &info.copyright),
     ] {
         ensure!(is_line(text), "the {what} of {} is more than one line", info.name);
     }
-    let of = &info.default_experiment;
+    let of = info;
     for (name, value) in [("start time", of.start_time), ("stop time", of.stop_time)] {
         ensure!(value.is_finite(), "the {name} of the default experiment must be finite, it is {value}");
     }
@@ -181,18 +157,18 @@ fn check_info(info: &Info) -> Result<()> {
 }
 
 fn check_type(of: &Type) -> Result<()> {
-    ensure!(is_line(of.name), "its name is more than one line");
-    match of.attributes {
+    ensure!(is_line(&of.name), "its name is more than one line");
+    match &of.attributes {
         Attributes::Real { quantity, unit, min, max, nominal } => {
             ensure!(is_line(quantity), "its quantity '{}' is more than one line", quantity.escape_debug());
             for (what, limit) in [("min", min), ("max", max)] {
-                let limit = limit.map(|limit| rounded(of.base(), limit));
+                let limit = limit.map(|limit| rounded(of.base, limit));
                 ensure!(limit.is_none_or(f64::is_finite), "{what} must be a finite number");
             }
             if let (Some(min), Some(max)) = (min, max) {
                 ensure!(min <= max, "its range is empty: min {min} is above max {max}");
             }
-            if let Some(nominal) = nominal {
+            if let Some(nominal) = *nominal {
                 ensure!(is_positive(nominal), "the nominal value must be > 0, it is {nominal}");
             }
             check_unit(unit)
@@ -207,16 +183,16 @@ fn check_type(of: &Type) -> Result<()> {
             let (mut names, mut values) = (HashSet::new(), HashSet::new());
             for item in items {
                 ensure!(
-                    is_text(item.name),
+                    is_text(&item.name),
                     "the item '{}' is empty or more than one line",
                     item.name.escape_debug()
                 );
                 ensure!(
-                    is_line(item.description),
+                    is_line(&item.description),
                     "the description of its item {} is more than one line",
                     item.name
                 );
-                ensure!(names.insert(item.name), "it has two items with the name {}", item.name);
+                ensure!(names.insert(&item.name), "it has two items with the name {}", item.name);
                 ensure!(values.insert(item.value), "it has two items with the value {}", item.value);
             }
             Ok(())
@@ -242,8 +218,9 @@ pub(crate) fn rounded(base: BaseType, number: f64) -> f64 {
 }
 
 fn check_unit(unit: &Unit) -> Result<()> {
-    let display = unit.display.map(|display| ("display unit", display.name, display.factor, display.offset));
-    let own = ("unit", unit.name, unit.base.factor, unit.base.offset);
+    let display =
+        unit.display.as_ref().map(|(name, factor, offset)| ("display unit", name, *factor, *offset));
+    let own = ("unit", &unit.name, unit.factor, unit.offset);
     for (what, name, factor, offset) in [own].into_iter().chain(display) {
         ensure!(
             is_text(name),
@@ -260,73 +237,68 @@ fn check_unit(unit: &Unit) -> Result<()> {
 }
 
 /// What the variable differentiates, and what it depends on.
-fn check_references<M: Exported>(variable: &Variable<M>) -> Result<()> {
-    let name = variable.name();
-    if let Some(of) = variable.differentiates() {
-        let of = &M::TABLE[of as usize];
+fn check_references(table: &Table, variable: &Variable) -> Result<()> {
+    let name = &variable.name;
+    if let Some(of) = variable.differentiates {
+        let of = &table.variables[of as usize];
         ensure!(
-            of.base() == BaseType::Real && of.variability() == Variability::Continuous && of.name() != name,
+            of.base() == BaseType::Real && of.variability == Variability::Continuous && of.name != *name,
             "{name} cannot be the derivative of {}",
-            of.name()
+            of.name
         );
     }
     let mut before = HashSet::new();
-    for known in variable.dependencies().into_iter().flatten() {
-        let known = &M::TABLE[known as usize];
+    for known in variable.dependencies.iter().flatten() {
+        let known = &table.variables[*known as usize];
         ensure!(
-            is_known(known),
+            known.is_known(),
             "{name} depends on {}, which is calculated or constant; name the inputs, states and parameters that it \
              follows from",
-            known.name()
+            known.name
         );
-        ensure!(before.insert(known.name()), "{name} names {} twice among what it depends on", known.name());
+        ensure!(before.insert(&known.name), "{name} names {} twice among what it depends on", known.name);
     }
     Ok(())
 }
 
 /// A state without derivative is refused when the model is compiled.
-fn check_derivatives<M: Exported>() -> Result<()> {
-    for state in M::STATES.iter().map(|state| state.state) {
-        let is_derivative = |v: &&Variable<M>| v.differentiates() == Some(state);
-        let count = M::TABLE.iter().filter(is_derivative).count();
-        let name = M::TABLE[state as usize].name();
+fn check_derivatives(table: &Table) -> Result<()> {
+    for &(state, _) in &table.states {
+        let count = table.find(|of| of.differentiates == Some(state)).len();
+        let name = table.name(state);
         ensure!(count == 1, "the state {name} has {count} derivatives among the variables");
     }
     Ok(())
 }
 
 /// The start values are those of a new model, the same for each interface type.
-fn check_starts<M: Exported>() -> Result<Starts> {
-    let mut all: Vec<(Interface, Starts)> = Vec::new();
-    for interface in interfaces::<M>() {
-        let model = new_model::<M>(interface)?;
-        let start = |variable: &Variable<M>| {
-            let value = catch_unwind(AssertUnwindSafe(|| variable.value(&model))).map_err(|_| {
-                anyhow!(
-                    "{} cannot be read from a new model: what stands behind its `in` or `by` panics, as with an index that \
-                     is not there",
-                    variable.name()
-                )
-            })?;
-            Ok(value.filter(|_| variable.has_start()))
-        };
-        all.push((interface, M::TABLE.iter().map(start).collect::<Result<_>>()?));
+fn check_starts(table: &Table) -> Result<Starts> {
+    let (mut all, mut forgotten) = (Vec::new(), None);
+    for (interface, start) in &table.starts {
+        match start {
+            Start::Values { values, forgotten_indicator } => {
+                all.push((interface, values));
+                forgotten = forgotten.or(*forgotten_indicator);
+            }
+            Start::Unreadable(place) => bail!(
+                "{} cannot be read from a new model: what stands behind its `in` or `by` panics, as with an index that \
+                 is not there",
+                table.variables[*place].name
+            ),
+            Start::Error(error) => bail!("the model cannot be made for {interface}: {error}"),
+        }
     }
     for (_, starts) in &all {
-        for (variable, start) in M::TABLE.iter().zip(starts) {
+        for (variable, start) in table.variables.iter().zip(*starts) {
             if let Some(start) = start {
-                check_value(
-                    &format!("the start value of {}", variable.name()),
-                    variable.variable_type(),
-                    start,
-                )?;
+                check_value(&format!("the start value of {}", variable.name), &variable.of, start)?;
             }
         }
     }
     if let [(one, starts), (other, others)] = all.as_slice() {
-        for (variable, pair) in M::TABLE.iter().zip(starts.iter().zip(others)) {
+        for (variable, pair) in table.variables.iter().zip(starts.iter().zip(*others)) {
             if let (Some(start), Some(another)) = pair {
-                let name = variable.name();
+                let name = &variable.name;
                 ensure!(
                     start == another,
                     "{name} starts with {start} in {one} and with {another} in {other}"
@@ -334,47 +306,29 @@ fn check_starts<M: Exported>() -> Result<Starts> {
             }
         }
     }
-    Ok(all.swap_remove(0).1)
-}
-
-/// An indicator that is never filled in would be an event that never happens.
-fn check_indicators<M: Exported>() -> Result<()> {
-    let Some(offer) = M::MODEL_EXCHANGE else { return Ok(()) };
-    let mut model = new_model::<M>(Interface::ModelExchange)?;
-    model.calculate(0.0);
-    let fill = |mark: f64| {
-        let mut indicators = vec![mark; offer.indicators];
-        model.exported_indicators(&mut indicators);
-        indicators
-    };
-    let forgotten = fill(1.0).iter().zip(fill(2.0)).position(|(one, two)| (*one, two) == (1.0, 2.0));
-    match forgotten {
-        Some(place) => bail!("{}: indicators() does not fill in indicator {place}", M::INFO.name),
-        None => Ok(()),
+    // One that is never filled in would be an event that never happens.
+    if let Some(number) = forgotten {
+        bail!("{}: indicators() does not fill in indicator {number}", table.info.name);
     }
-}
-
-fn new_model<M: Exported>(interface: Interface) -> Result<M> {
-    M::new(&Setup::new(interface))
-        .map_err(|error| anyhow!("the model cannot be made for {interface}: {error}"))
+    Ok(all.swap_remove(0).1.clone())
 }
 
 /// Whether the type has the value.
 fn check_value(what: &str, of: &Type, value: &Value) -> Result<()> {
-    match (of.attributes, value) {
+    match (&of.attributes, value) {
         (Attributes::Real { min, max, .. }, Value::Real(real)) => {
             ensure!(real.is_finite(), "{what} must be a finite number, it is {value}");
             if let Some(min) = min {
-                let fits = *real >= rounded(of.base(), min);
-                ensure!(fits, "{what} must be >= {}, it is {value}", Value::Real(min));
+                let fits = *real >= rounded(of.base, *min);
+                ensure!(fits, "{what} must be >= {}, it is {value}", Value::Real(*min));
             }
             if let Some(max) = max {
-                let fits = *real <= rounded(of.base(), max);
-                ensure!(fits, "{what} must be <= {}, it is {value}", Value::Real(max));
+                let fits = *real <= rounded(of.base, *max);
+                ensure!(fits, "{what} must be <= {}, it is {value}", Value::Real(*max));
             }
         }
         (Attributes::Integer { min, max }, Value::Integer(value)) => {
-            ensure!((min..=max).contains(value), "{what} must be between {min} and {max}, it is {value}");
+            ensure!((min..=max).contains(&value), "{what} must be between {min} and {max}, it is {value}");
         }
         (Attributes::Enumeration(items), Value::Integer(value)) => {
             let known: Vec<_> = items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
@@ -383,9 +337,9 @@ fn check_value(what: &str, of: &Type, value: &Value) -> Result<()> {
         }
         (Attributes::Binary { max_size, .. }, Value::Binary(bytes)) => {
             let size = bytes.len();
-            ensure!(size <= max_size, "{what} must have at most {max_size} bytes, it has {size}");
+            ensure!(size <= *max_size, "{what} must have at most {max_size} bytes, it has {size}");
         }
-        (Attributes::String, Value::String(text)) => {
+        (Attributes::Other, Value::String(text)) => {
             // Lines and tabs are all that XML 1.0 has of them.
             let is_possible = |c: char| !c.is_control() || matches!(c, '\t' | '\n' | '\r');
             ensure!(text.chars().all(is_possible), "{what} has a character that XML has not: {text:?}");
@@ -395,32 +349,53 @@ fn check_value(what: &str, of: &Type, value: &Value) -> Result<()> {
     Ok(())
 }
 
-/// Other start values must be possible for their variables, and together make a model, or the FMU could not
-/// be instantiated.
-fn check_changes<M: Exported>(changes: &Changes, starts: &mut Starts) -> Result<()> {
-    for (name, text) in &changes.start {
-        let Some(place) = M::TABLE.iter().position(|variable| variable.name() == name) else {
-            bail!("there is no variable {name} to give a start value to");
-        };
-        let variable = &M::TABLE[place];
-        ensure!(
-            variable.has_start() && variable.variability() != Variability::Constant,
-            "{name} is calculated or constant: it takes no start value"
-        );
-        let value = read_value(variable.base(), text)
-            .with_context(|| format!("the start value of {name} cannot be"))?;
-        check_value(name, variable.variable_type(), &value)?;
-        starts[place] = Some(value);
-    }
-    for interface in interfaces::<M>() {
-        let mut model = new_model::<M>(interface)?;
-        for (variable, start) in M::TABLE.iter().zip(&*starts) {
-            if let Some(start) = start {
-                variable.set(&mut model, start);
-                model.calculate_start();
-            }
-        }
-        model.update().map_err(|error| anyhow!("these start values make no model: {error}"))?;
+/// The start values together must make a model, or the FMU could not be instantiated.
+fn check_model(model: &LoadedModel, starts: &Starts) -> Result<()> {
+    for interface in model.table.interfaces() {
+        let mut instance =
+            Instance::new(model, interface, Standard::Fmi3, false).map_err(|error| anyhow!("{error}"))?;
+        let is_set = |of: &Variable| of.has_start() && of.variability != Variability::Constant;
+        instance.set(starts, is_set).map_err(|error| anyhow!("these start values make no model: {error}"))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::Item;
+
+    /// The message on a value of a type.
+    fn message(base: BaseType, attributes: Attributes, value: Value) -> String {
+        let of = Type { name: String::new(), base, attributes };
+        check_value("it", &of, &value).err().map(|error| error.to_string()).unwrap_or_default()
+    }
+
+    #[test]
+    fn values_outside_of_their_type_are_named() {
+        let unit =
+            || Unit { name: "1".into(), exponents: vec![0; 8], factor: 1.0, offset: 0.0, display: None };
+        let real =
+            |min, max| Attributes::Real { quantity: String::new(), unit: unit(), min, max, nominal: None };
+        let single =
+            |value: f32| message(BaseType::Float32, real(None, Some(0.1)), Value::Real(value.into()));
+        // In single precision 0.1 is larger than in double precision.
+        assert_eq!(single(0.1), "");
+        assert_eq!(single(0.2), "it must be <= 0.1, it is 0.20000000298023224");
+        let double = |value| message(BaseType::Real, real(Some(-1.0), None), Value::Real(value));
+        assert_eq!(double(-1.5), "it must be >= -1, it is -1.5");
+        assert_eq!(double(f64::INFINITY), "it must be a finite number, it is inf");
+        let byte =
+            |value| message(BaseType::UInt8, Attributes::Integer { min: 0, max: 200 }, Value::Integer(value));
+        assert_eq!([byte(200), byte(201)], ["", "it must be between 0 and 200, it is 201"]);
+        let items = || vec![Item { name: "Off".into(), value: 0, description: String::new() }];
+        let item =
+            |value| message(BaseType::Enumeration, Attributes::Enumeration(items()), Value::Integer(value));
+        assert_eq!([item(0), item(3)], ["", "it must be one of 0 (Off), it is 3"]);
+        let binary = || Attributes::Binary { mime_type: "a/b".into(), max_size: 4 };
+        let bytes = |count| message(BaseType::Binary, binary(), Value::Binary(vec![0; count]));
+        assert_eq!([bytes(4), bytes(5)], ["", "it must have at most 4 bytes, it has 5"]);
+        let text = |text: &str| message(BaseType::String, Attributes::Other, Value::String(text.into()));
+        assert_eq!([text("a\n"), text("\u{1}")], ["", "it has a character that XML has not: \"\\u{1}\""]);
+    }
 }

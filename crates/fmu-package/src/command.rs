@@ -1,7 +1,7 @@
 //! The command `build_fmu`, the same for every model.
 
 use crate::c_sources::{COMPILED, CSources, LINKING, WEBASSEMBLY, c_sources, check_tools};
-use crate::cargo::{LibraryBuild, check_that_program_is_current};
+use crate::cargo::LibraryBuild;
 use crate::changes::Changes;
 use crate::connectors::{Terminal, terminals};
 use crate::content::ContentFile;
@@ -9,6 +9,7 @@ use crate::cross::{TARGETS, check_targets};
 use crate::files::write_atomically;
 use crate::library::check_platform;
 use crate::live::{self, Runnable};
+use crate::model::LoadedModel;
 use crate::pack::{Library, Parts, pack};
 use crate::packages::Neighbourhood;
 use crate::platform::Platform;
@@ -19,8 +20,7 @@ use crate::variant::{NO_GUID, Variant};
 use crate::version::Fmi;
 use crate::{fmi2, fmi3};
 use anyhow::{Context, Result, bail, ensure};
-use clap::{CommandFactory, FromArgMatches, ValueEnum};
-use fmu_export::Exported;
+use clap::{CommandFactory, FromArgMatches};
 use std::ffi::OsString;
 use std::fs;
 use std::io::Write;
@@ -67,40 +67,6 @@ pub struct BuildOptions {
     pub any_processor: bool,
 }
 
-impl BuildOptions {
-    /// The arguments that say the same, with paths that hold in every folder.
-    pub fn arguments(&self) -> Vec<OsString> {
-        let everywhere = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        let flags = [
-            (self.tunable, "--tunable"),
-            (self.describe, "--describe"),
-            (self.guid, "--guid"),
-            (self.all_targets, "--all-targets"),
-            (self.c_sources, "--c-sources"),
-            (self.live_page, "--live-page"),
-            (self.any_processor, "--any-processor"),
-        ];
-        let mut arguments: Vec<OsString> =
-            flags.into_iter().filter(|(given, _)| *given).map(|(_, name)| name.into()).collect();
-        let mut with = |name: &str, value: OsString| arguments.extend([name.into(), value]);
-        if let Some(fmi) = self.fmi.and_then(|fmi| fmi.to_possible_value()) {
-            with("--fmi", fmi.get_name().into());
-        }
-        if let Some(out) = &self.out {
-            with("--out", everywhere(out).into());
-        }
-        for target in &self.target {
-            with("--target", target.into());
-        }
-        for (platform, path) in &self.binary {
-            let mut binary = OsString::from(format!("{platform}="));
-            binary.push(everywhere(path));
-            with("--binary", binary);
-        }
-        arguments
-    }
-}
-
 fn binary(text: &str) -> Result<(String, PathBuf), String> {
     text.split_once('=')
         .filter(|(platform, path)| !platform.is_empty() && !path.is_empty())
@@ -108,24 +74,24 @@ fn binary(text: &str) -> Result<(String, PathBuf), String> {
         .ok_or_else(|| "write PLATFORM=PATH, for example linux64=libmodel.so".to_owned())
 }
 
-/// The `main` of a `build_fmu`: does what the arguments of the program say for model `M`.
-pub fn build<M: Exported>(builder: &Builder) -> ExitCode {
+/// The `main` of a `build_fmu`: does what the arguments of the program say.
+pub fn build(builder: &Builder) -> ExitCode {
     #[derive(clap::Parser)]
     struct Options {
         #[command(flatten)]
         build: BuildOptions,
     }
-    let command = Options::command().override_usage(format!("{} [-- OPTIONS]", builder.command));
+    let command = Options::command().override_usage(format!("{} [OPTIONS]", builder.command));
     let options = BuildOptions::from_arg_matches(&command.get_matches()).map_err(anyhow::Error::from);
-    exit(options.and_then(|options| builder.run::<M>(&options)))
+    exit(options.and_then(|options| builder.run(&options)))
 }
 
 /// How a model's FMU is built.
 #[derive(Clone, Debug)]
 pub struct Builder {
     /// The package of the model: `env!("CARGO_PKG_NAME")`.
-    pub package: &'static str,
-    /// The command that starts this program, for messages.
+    pub package: String,
+    /// The command that starts this program, for messages; options come behind it.
     pub command: &'static str,
     /// What the FMU is made from.
     pub sources: Sources,
@@ -136,7 +102,9 @@ pub struct Builder {
     pub terminals: Vec<Terminal>,
     /// The cargo profile of the library.
     pub profile: &'static str,
-    /// Start values that differ from the ones this program was compiled with, see [`Variant::start`].
+    /// Settings of cargo for this build, such as `profile.release.lto=false`.
+    pub settings: Vec<&'static str>,
+    /// Start values that the library is compiled with from elsewhere, see [`Variant::start`].
     pub start: Vec<(String, String)>,
     /// The file that those start values are from, for messages.
     pub start_from: Option<PathBuf>,
@@ -151,6 +119,9 @@ pub struct Builder {
     pub environment: Vec<(&'static str, Option<OsString>)>,
 }
 
+/// The profile of a library that is compiled only to be asked, and the usual one of those that are packed.
+const DESCRIBED_IN: &str = "release";
+
 /// The description of a model as it is built by default, where it is kept with the sources.
 const DESCRIPTION: &str = "modelDescription/modelDescription.xml";
 
@@ -158,14 +129,15 @@ impl Builder {
     /// For a package in the usual layout, started as `cargo run --release --bin build_fmu`.
     ///
     /// The arguments are `env!("CARGO_PKG_NAME")` and `env!("CARGO_MANIFEST_DIR")`.
-    pub fn new(package: &'static str, folder: &'static str) -> Self {
+    pub fn new(package: impl Into<String>, folder: impl Into<PathBuf>) -> Self {
         Self {
-            package,
-            command: "cargo run --release --bin build_fmu",
+            package: package.into(),
+            command: "cargo run --release --bin build_fmu --",
             sources: Sources::of_package(folder),
             fmi: vec![Fmi::V2, Fmi::V3],
             terminals: Vec::new(),
-            profile: "release",
+            profile: DESCRIBED_IN,
+            settings: Vec::new(),
             start: Vec::new(),
             start_from: None,
             is_default: true,
@@ -175,104 +147,71 @@ impl Builder {
         }
     }
 
-    /// Does what the options say for model `M`, and says on stdout what was made.
+    /// Does what the options say, and says on stdout what was made: compiles the libraries, asks the one for this machine
+    /// what its model is, tries that, writes the descriptions, packs.
     ///
     /// # Errors
-    /// When the sources have changed since this program was compiled, the model contradicts itself, the
-    /// library cannot be compiled or does not belong to it, or a file cannot be written.
-    pub fn run<M: Exported>(&self, options: &BuildOptions) -> Result<()> {
-        check_that_program_is_current(self.command)?;
-        let variant = self.variant(options.tunable)?;
-        let described = match &self.start_from {
-            Some(file) if !self.is_default => short(file),
-            _ => M::INFO.identifier.to_owned(),
-        };
-        let guid = variant.guid();
+    /// When the model contradicts itself, a library cannot be compiled or does not belong to the sources, or a file cannot
+    /// be written.
+    pub fn run(&self, options: &BuildOptions) -> Result<()> {
+        let guid = self.variant(options.tunable)?.guid();
         if options.guid {
             println!("{guid}");
             return Ok(());
         }
+        let is_default = self.is_default && !options.tunable;
+        let kept = self.sources.folder.join(DESCRIPTION);
+        let described_in = match &options.out {
+            _ if !options.describe => None,
+            Some(folder) => Some(folder.join("modelDescription.xml")),
+            None if is_default => Some(kept.clone()),
+            None => bail!("{DESCRIPTION} is for the defaults; name another folder with --out"),
+        };
+        self.check_versions(options)?;
+        let content = self.sources.content_files()?;
+        let workspace = Neighbourhood::of(&self.sources.folder)?.workspace;
+        // Another build would put its library in the place of this one's.
+        let _alone = lock(&workspace.join("target"));
+        let mut libraries = self.libraries(options, &guid)?;
+        let model = self.model(options.tunable, &libraries, &guid)?;
         let sources = match options.c_sources {
-            true => self.c_sources(options.tunable, M::INFO.identifier)?,
+            true => self.c_sources(options.tunable, model.identifier())?,
             false => CSources::new(),
         };
         let describe = |fmi: Fmi, guid: &str| {
             let source_files = sources.iter().take(COMPILED).map(|(name, _)| name.clone()).collect();
-            let changes = Changes { guid: Some(guid.to_owned()), source_files, ..Changes::from(&variant) };
-            let text = match fmi {
-                Fmi::V2 => fmi2::describe::<M>(&changes),
-                Fmi::V3 => fmi3::describe::<M>(&changes),
-            };
-            text.with_context(|| described.clone())
+            let guid = Some(guid.to_owned());
+            self.describe(&model, fmi, &Changes { guid, tunable_parameters: options.tunable, source_files })
         };
-        let versions = match options.fmi {
-            None if options.c_sources => vec![Fmi::V2],
-            None => self.versions::<M>(),
-            Some(fmi) => vec![fmi],
-        };
-        ensure!(!options.c_sources || versions == [Fmi::V2], "C sources are made for FMI 2.0 only");
-        ensure!(
-            !options.any_processor || versions == [Fmi::V2],
-            "FMI 3.0 has a folder for every processor; --any-processor goes with --fmi 2 only"
-        );
-        let content = self.sources.content_files()?;
-        let terminals = terminals::<M>(&self.terminals, &content)?;
+        let terminals = terminals(&model, &self.terminals, &content)?;
+        let versions = self.versions(options, &model);
+        if let Some(path) = described_in {
+            let fmi = versions.first().context("there is no version to describe it for")?;
+            // Kept with the sources, it must not change whenever they do.
+            return write_description(&path, &describe(*fmi, NO_GUID)?);
+        }
         let mut descriptions = Vec::new();
         for &fmi in &versions {
-            let guid = if options.describe { NO_GUID } else { &guid };
-            descriptions.push((fmi, describe(fmi, guid)?));
-        }
-        let committed = self.sources.folder.join(DESCRIPTION);
-        let is_default = self.is_default && !options.tunable;
-        if options.describe {
-            let path = match &options.out {
-                Some(folder) => folder.join("modelDescription.xml"),
-                None if is_default => committed,
-                None => bail!("{DESCRIPTION} is for the defaults; name another folder with --out"),
-            };
-            let (_, description) = descriptions.first().context("there is no version to describe it for")?;
-            // Kept with the sources, it must not change whenever they do.
-            return write_description(&path, description);
-        }
-
-        let mut libraries = if options.c_sources { Vec::new() } else { self.libraries(options)? };
-        for library in &libraries {
-            check_library(library, &guid, options.any_processor)?;
+            descriptions.push((fmi, describe(fmi, &guid)?));
         }
         if versions.contains(&Fmi::V2) {
             join_for_macos(&mut libraries)?;
         }
         let with_page = match options.live_page {
             true => {
-                Some(self.live_page::<M>(options.tunable, &guid, &describe(Fmi::V2, &guid)?, &content)?)
+                let description = describe(Fmi::V2, &guid)?;
+                Some(self.live_page(options.tunable, &guid, &model, description, &content)?)
             }
             false => None,
         };
         let content = with_page.as_ref().map_or(&content, |(_, content)| content);
-        let folder = match &options.out {
-            Some(folder) => folder.clone(),
-            None => Neighbourhood::of(&self.sources.folder)?.workspace.join("target/fmu"),
-        };
-        let identifier = M::INFO.identifier;
+        let folder = options.out.clone().unwrap_or_else(|| workspace.join("target/fmu"));
         for (fmi, description) in &descriptions {
-            let folder = match fmi {
-                Fmi::V2 if options.c_sources => folder.join("source"),
-                Fmi::V2 => folder.clone(),
-                Fmi::V3 => folder.join("fmi3"),
-            };
-            let fmu = folder.join(format!("{identifier}.fmu"));
-            let (libraries, sources) = (&libraries, &sources);
             // FMI Library calls those of FMI 2.0 a fatal mismatch (and goes on).
             let terminals = terminals.as_deref().filter(|_| *fmi == Fmi::V3);
+            let (identifier, libraries, sources) = (model.identifier(), &libraries[..], &sources[..]);
             let parts = Parts { fmi: *fmi, identifier, description, terminals, libraries, sources, content };
-            let size = pack(&fmu, &parts)?;
-            let mut platforms: Vec<_> =
-                libraries.iter().map(|library| library.platform.folder(*fmi)).collect();
-            platforms.sort_unstable();
-            if options.c_sources {
-                platforms.push("C sources");
-            }
-            println!("{}: {} kB, {}", short(&fmu), size.div_ceil(1000), platforms.join(", "));
+            pack_in(&folder, &parts)?;
         }
         let start = match &self.start_from {
             Some(file) => format!(", parameters from {}", short(file)),
@@ -280,26 +219,56 @@ impl Builder {
         };
         let tunable = if options.tunable { ", tunable" } else { "" };
         println!("guid {guid}{start}{tunable}");
-        if is_default
-            && !options.c_sources
-            && let Some((fmi, description)) = descriptions.first()
-            && self.fmi.first() == Some(fmi)
-            && let Ok(text) = fs::read_to_string(&committed)
-            && text != description.replace(&guid, NO_GUID)
-        {
-            eprintln!(
-                "note: {DESCRIPTION} in the sources is out of date; write it anew with\n      {} -- --describe",
-                self.command
-            );
+        if is_default && !options.c_sources {
+            self.compare_with_kept(&kept, &descriptions, &guid);
         }
         Ok(())
     }
 
-    /// Those that have all the types of the model's variables.
-    fn versions<M: Exported>(&self) -> Vec<Fmi> {
-        let lacking = M::TABLE.iter().find(|variable| !variable.base().is_in_fmi2());
+    fn describe(&self, model: &LoadedModel, fmi: Fmi, changes: &Changes) -> Result<String> {
+        let text = match fmi {
+            Fmi::V2 => fmi2::describe(model, changes),
+            Fmi::V3 => fmi3::describe(model, changes),
+        };
+        text.with_context(|| match &self.start_from {
+            Some(file) if !self.is_default => short(file),
+            _ => model.identifier().to_owned(),
+        })
+    }
+
+    /// Tells the user if the description that is kept with the sources is another one.
+    fn compare_with_kept(&self, kept: &Path, descriptions: &[(Fmi, String)], guid: &str) {
+        if let Some((fmi, description)) = descriptions.first()
+            && self.fmi.first() == Some(fmi)
+            && let Ok(text) = fs::read_to_string(kept)
+            && text != description.replace(guid, NO_GUID)
+        {
+            eprintln!(
+                "note: {DESCRIPTION} in the sources is out of date; write it anew with\n      {} --describe",
+                self.command
+            );
+        }
+    }
+
+    /// Whether the options go together with the versions that FMUs are made for.
+    fn check_versions(&self, options: &BuildOptions) -> Result<()> {
+        let only_fmi2 = options.fmi.map_or(self.fmi == [Fmi::V2], |fmi| fmi == Fmi::V2);
+        ensure!(!options.c_sources || options.fmi != Some(Fmi::V3), "C sources are made for FMI 2.0 only");
+        ensure!(
+            !options.any_processor || only_fmi2,
+            "FMI 3.0 has a folder for every processor; --any-processor goes with --fmi 2 only"
+        );
+        Ok(())
+    }
+
+    /// The versions that are asked for, or those that have all the types of the model's variables.
+    fn versions(&self, options: &BuildOptions, model: &LoadedModel) -> Vec<Fmi> {
+        if let Some(fmi) = options.fmi.or(options.c_sources.then_some(Fmi::V2)) {
+            return vec![fmi];
+        }
+        let lacking = model.table.variables.iter().find(|variable| !variable.base().is_in_fmi2());
         let Some(variable) = lacking.filter(|_| self.fmi.contains(&Fmi::V3)) else { return self.fmi.clone() };
-        println!("{} is {}, which FMI 2.0 lacks: for FMI 3.0 only", variable.name(), variable.base());
+        println!("{} is {}, which FMI 2.0 lacks: for FMI 3.0 only", variable.name, variable.base());
         vec![Fmi::V3]
     }
 
@@ -307,13 +276,16 @@ impl Builder {
         Ok(Variant { sources: self.sources.fingerprint()?, start: self.start.clone(), tunable })
     }
 
-    fn libraries(&self, options: &BuildOptions) -> Result<Vec<Library>> {
+    /// The libraries that are packed.
+    fn libraries(&self, options: &BuildOptions, guid: &str) -> Result<Vec<Library>> {
         let mut libraries = Vec::new();
         for (platform, path) in &options.binary {
             let platform = Platform::of_folder(platform)?;
             let is_fmu = path.extension().is_some_and(|suffix| suffix == "fmu");
             let path = if is_fmu { self.unpack_library(path, platform)? } else { path.clone() };
-            libraries.push(Library { platform, path });
+            let library = Library { platform, path };
+            check_library(&library, guid, options.any_processor)?;
+            libraries.push(library);
         }
         let targets = match options.all_targets {
             true => TARGETS.map(str::to_owned).to_vec(),
@@ -323,16 +295,37 @@ impl Builder {
         let platforms: Vec<_> =
             targets.iter().map(|target| Platform::of_target(target)).collect::<Result<_>>()?;
         check_targets(&targets, options.all_targets)?;
-        for (platform, target) in platforms.into_iter().zip(&targets) {
-            libraries.push(Library { platform, path: self.compile(options.tunable, Some(target), &[])? });
+        if options.c_sources {
+            check_tools(&wasm2c())?;
         }
-        if libraries.is_empty() {
-            libraries.push(Library {
-                platform: Platform::host()?,
-                path: self.compile(options.tunable, None, &[])?,
-            });
+        for (platform, target) in platforms.into_iter().zip(&targets) {
+            let path = self.compile(self.profile, options.tunable, Some(target), &[])?;
+            let library = Library { platform, path };
+            check_library(&library, guid, options.any_processor)?;
+            libraries.push(library);
+        }
+        if libraries.is_empty() && !options.describe && !options.c_sources {
+            let path = self.compile(self.profile, options.tunable, None, &[])?;
+            libraries.push(Library { platform: Platform::host()?, path });
         }
         Ok(libraries)
+    }
+
+    /// The model of a library for this machine: of one that is packed, or of one that is compiled for this.
+    fn model(&self, tunable: bool, libraries: &[Library], guid: &str) -> Result<LoadedModel> {
+        let host = Platform::host()?;
+        let is_for_here = |library: &&Library| {
+            fs::read(&library.path).is_ok_and(|bytes| check_platform(&bytes, host, false).is_ok())
+        };
+        let path = match libraries.iter().find(is_for_here) {
+            Some(library) => library.path.clone(),
+            None => self.compile(DESCRIBED_IN, tunable, None, &[])?,
+        };
+        // SAFETY: cargo has made it of the author's model just now, or it has the guid of its sources.
+        #[allow(unsafe_code)]
+        let model = unsafe { LoadedModel::load(&path) }?;
+        check_guid(&fs::read(&path)?, guid, &path)?;
+        Ok(model)
     }
 
     /// The library for a platform that is in an FMU, as another machine has made it.
@@ -355,18 +348,17 @@ impl Builder {
 
     /// The sources in C, for every platform.
     fn c_sources(&self, tunable: bool, identifier: &str) -> Result<CSources> {
-        let wasm2c = std::env::var_os("WASM2C").unwrap_or_else(|| "wasm2c".into());
-        check_tools(&wasm2c)?;
-        let module = self.compile(tunable, Some(WEBASSEMBLY), &LINKING)?;
-        c_sources(&wasm2c, &module, identifier)
+        let module = self.compile(self.profile, tunable, Some(WEBASSEMBLY), &LINKING)?;
+        c_sources(&wasm2c(), &module, identifier)
     }
 
     /// The content with the page that runs the FMU; the folder has it.
-    fn live_page<M: Exported>(
+    fn live_page(
         &self,
         tunable: bool,
         guid: &str,
-        description: &str,
+        model: &LoadedModel,
+        description: String,
         content: &[ContentFile],
     ) -> Result<(TempDir, Vec<ContentFile>)> {
         check_targets(&[WEBASSEMBLY.to_owned()], false)
@@ -376,8 +368,8 @@ impl Builder {
             check_guid(&module, guid, &path)?;
             anyhow::Ok(Runnable { description, module })
         };
-        let path = self.compile(tunable, Some(WEBASSEMBLY), &LINKING)?;
-        let mut runnables = vec![runnable(description.to_owned(), path, guid)?];
+        let path = self.compile(self.profile, tunable, Some(WEBASSEMBLY), &LINKING)?;
+        let mut runnables = vec![runnable(description, path, guid)?];
         for (package, sources) in &self.page_fmus {
             let guid = Variant { sources: sources.fingerprint()?, start: Vec::new(), tunable: false }.guid();
             let kept = sources.folder.join(DESCRIPTION);
@@ -388,27 +380,67 @@ impl Builder {
                 package,
                 profile: self.profile,
                 target: Some(WEBASSEMBLY),
+                settings: &self.settings,
                 arguments: &LINKING,
                 environment: vec![("FMU_GUID", Some(guid.clone().into()))],
             };
             runnables.push(runnable(kept.replace(NO_GUID, &guid), build.run()?, &guid)?);
         }
-        live::with_page(content, (M::INFO.name, M::INFO.description), &runnables, &self.page_scripts)
+        let info = &model.table.info;
+        live::with_page(content, (&info.name, &info.description), &runnables, &self.page_scripts)
     }
 
-    fn compile(&self, tunable: bool, target: Option<&str>, arguments: &[&str]) -> Result<PathBuf> {
+    fn compile(
+        &self,
+        profile: &str,
+        tunable: bool,
+        target: Option<&str>,
+        arguments: &[&str],
+    ) -> Result<PathBuf> {
         let mut environment = self.environment.clone();
         environment.push(("FMU_GUID", Some(self.variant(tunable)?.guid().into())));
         let build = LibraryBuild {
             folder: self.sources.folder.clone(),
-            package: self.package,
-            profile: self.profile,
+            package: &self.package,
+            profile,
             target,
+            settings: &self.settings,
             arguments,
             environment,
         };
         build.run()
     }
+}
+
+/// Writes an FMU into the folder of its version, and says so.
+fn pack_in(folder: &Path, parts: &Parts) -> Result<()> {
+    let folder = match parts.fmi {
+        Fmi::V2 if !parts.sources.is_empty() => folder.join("source"),
+        Fmi::V2 => folder.to_owned(),
+        Fmi::V3 => folder.join("fmi3"),
+    };
+    let fmu = folder.join(format!("{}.fmu", parts.identifier));
+    let size = pack(&fmu, parts)?;
+    let mut platforms: Vec<_> =
+        parts.libraries.iter().map(|library| library.platform.folder(parts.fmi)).collect();
+    platforms.sort_unstable();
+    if !parts.sources.is_empty() {
+        platforms.push("C sources");
+    }
+    println!("{}: {} kB, {}", short(&fmu), size.div_ceil(1000), platforms.join(", "));
+    Ok(())
+}
+
+/// Waits until no other build of the same workspace runs. Without a place for the lock there is none.
+fn lock(folder: &Path) -> Option<fs::File> {
+    fs::create_dir_all(folder).ok()?;
+    let file = fs::File::create(folder.join(".fmu-package.lock")).ok()?;
+    file.lock().ok()?;
+    Some(file)
+}
+
+fn wasm2c() -> OsString {
+    std::env::var_os("WASM2C").unwrap_or_else(|| "wasm2c".into())
 }
 
 /// A library for another machine would not load, one with another guid refuse every instance.

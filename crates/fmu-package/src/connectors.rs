@@ -3,9 +3,10 @@
 
 use crate::content::ContentFile;
 use crate::definitions::{filled, list};
+use crate::model::LoadedModel;
 use crate::xml::Element;
 use anyhow::{Context, Result, ensure};
-use fmu_export::{Causality, Exported};
+use fmi_abi::Causality;
 use std::collections::HashSet;
 
 /// A terminal of an FMU for FMI 3.0: a connector with variables as its members.
@@ -101,7 +102,7 @@ impl Terminal {
         Self { icon: Some((name, place)), ..self }
     }
 
-    fn check<M: Exported>(&self, content: &[ContentFile]) -> Result<()> {
+    fn check(&self, model: &LoadedModel, content: &[ContentFile]) -> Result<()> {
         for text in [self.kind, self.description] {
             ensure!(!text.contains(char::is_control), "'{}' is more than one line", text.escape_debug());
         }
@@ -111,16 +112,16 @@ impl Terminal {
                 ensure!(is_name(text), "'{}' is empty or more than one line", text.escape_debug());
             }
             ensure!(names.insert(name), "it has two members with the name {name}");
-            let of = M::TABLE.iter().find(|of| of.name() == *variable);
+            let of = model.table.variables.iter().find(|of| of.name == *variable);
             let of = of.with_context(|| format!("its member {name} is {variable}, which is no variable"))?;
             ensure!(
-                of.dimensions().is_empty(),
+                of.dimensions.is_empty(),
                 "its member {name} is {variable}, an element of an array, which terminals cannot have"
             );
             use Causality::*;
             ensure!(
                 !["signal", "inflow", "outflow"].contains(kind)
-                    || matches!(of.causality(), Input | Output | Parameter | CalculatedParameter),
+                    || matches!(of.causality, Input | Output | Parameter | CalculatedParameter),
                 "its member {name} is {variable}, which is no input, output or parameter"
             );
         }
@@ -167,13 +168,17 @@ fn is_name(text: &str) -> bool {
 /// # Errors
 /// When two terminals, or two members of one, share a name, a member is no variable that can be connected, or an icon is
 /// missing.
-pub fn terminals<M: Exported>(terminals: &[Terminal], content: &[ContentFile]) -> Result<Option<String>> {
+pub fn terminals(
+    model: &LoadedModel,
+    terminals: &[Terminal],
+    content: &[ContentFile],
+) -> Result<Option<String>> {
     let mut names = HashSet::new();
     for terminal in terminals {
         let name = terminal.name;
         ensure!(is_name(name), "the terminal '{}' is empty or more than one line", name.escape_debug());
         ensure!(names.insert(name), "there are two terminals with the name {name}");
-        terminal.check::<M>(content).with_context(|| format!("the terminal {name}"))?;
+        terminal.check(model, content).with_context(|| format!("the terminal {name}"))?;
     }
     let Some(list) = list("Terminals", terminals.iter().map(Terminal::element)) else { return Ok(None) };
     // In an FMU for FMI 2.0, too: there it is the version that defines this file (section 2.4.9 of FMI 3.0).

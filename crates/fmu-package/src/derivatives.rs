@@ -1,110 +1,198 @@
 //! The partial derivatives that a model offers, compared with differences of its values.
 
 use crate::check::Starts;
-use crate::sample::{Sampler, model_at};
+use crate::instance::Instance;
+use crate::model::LoadedModel;
+use crate::sample::{Point, Sampler, model_at};
+use crate::table::Attributes;
 use anyhow::{Result, bail};
-use fmu_export::fmi3::independent;
-use fmu_export::{Attributes, BaseType, Exported, Interface, Value, Variable};
+use fmi_abi::{BaseType, Interface, Standard, Value};
 
 /// So many points are tried; a derivative must be wrong at two of them, one may lie at a kink.
 const POINTS: usize = 16;
 
 /// Refuses a model whose partial derivatives are not those of its values, at a communication point or in Continuous-Time
 /// Mode if `running`, else in Initialization Mode.
-pub(crate) fn check<M: Exported>(
+pub(crate) fn check(
+    model: &LoadedModel,
     starts: &Starts,
     running: bool,
     unknowns: &[u32],
     knowns: &[u32],
 ) -> Result<()> {
-    if !M::PARTIALS {
+    let table = &model.table;
+    if !table.partials {
         return Ok(());
     }
-    let mut sampler = Sampler::<M>::new(starts.clone(), false);
+    let mut sampler = Sampler::new(model, starts.clone(), false);
     sampler.running = running;
     let mut points = Vec::new();
     for _ in 0..POINTS {
-        let (mut point, mut model) = sampler.draw(None, true, |_| true)?;
+        let (mut point, mut instance) = sampler.draw(None, true, |_| true)?;
         // What is set in Co-Simulation may act in the step that follows.
-        if running && M::MODEL_EXCHANGE.is_some() && point.interface != Interface::ModelExchange {
+        if running && table.model_exchange.is_some() && point.interface != Interface::ModelExchange {
             point.interface = Interface::ModelExchange;
-            let Ok(same) = model_at::<M>(&point, running) else { continue };
-            model = same;
+            let Ok(same) = model_at(model, &point, running, Standard::Fmi3) else { continue };
+            instance = same;
         }
-        points.push((model, point.time));
+        points.push((point, instance));
     }
-    let is_real = |vr: &&u32| M::TABLE.get(**vr as usize).is_none_or(|of| of.base() == BaseType::Real);
-    for unknown in unknowns.iter().filter(is_real) {
-        for known in knowns.iter().filter(is_real) {
-            check_pair(&points, running, *unknown, *known)?;
-        }
+    let is_real = |place: &u32| table.variable(*place).is_none_or(|of| of.base() == BaseType::Real);
+    let unknowns: Vec<u32> = unknowns.iter().copied().filter(is_real).collect();
+    let knowns: Vec<u32> = knowns.iter().copied().filter(is_real).collect();
+    if unknowns.is_empty() {
+        return Ok(());
     }
-    Ok(())
+    let sizes = sizes(model, &unknowns, &mut points);
+    let mut wrong = Vec::new();
+    for (number, known) in knowns.iter().enumerate() {
+        let check = Check { model, running, unknowns: &unknowns, known: *known };
+        let found = check.wrong(&mut points, &sizes).into_iter().enumerate();
+        wrong.extend(found.filter_map(|(place, pair)| Some((place, number, pair?))));
+    }
+    let Some((unknown, known, (said, found))) =
+        wrong.into_iter().min_by_key(|(place, number, _)| (*place, *number))
+    else {
+        return Ok(());
+    };
+    let known = knowns[known];
+    let (function, mode) = match (known == table.time(), running) {
+        (true, _) => ("partial_by_time", ""),
+        (_, true) => ("partial", ""),
+        (_, false) => ("initial_partial", " in Initialization Mode"),
+    };
+    bail!(
+        "the derivative of {} with respect to {}{mode} is {said:.6e} by Partials::{function}, but {found:.6e} by \
+         differences of the values",
+        table.name(unknowns[unknown]),
+        table.name(known)
+    );
 }
 
-fn check_pair<M: Exported>(points: &[(M, f64)], running: bool, unknown: u32, known: u32) -> Result<()> {
-    let (time, of_time) = independent::<M>();
-    let of = &M::TABLE[unknown as usize];
-    let nominal = match of.variable_type().attributes {
+/// How large each unknown becomes.
+fn sizes(model: &LoadedModel, unknowns: &[u32], points: &mut [(Point, Instance)]) -> Vec<f64> {
+    let nominal = |place: &u32| match model.table.variables[*place as usize].of.attributes {
         Attributes::Real { nominal, .. } => nominal.unwrap_or_default(),
         _ => 0.0,
     };
-    let size = points.iter().filter_map(|(model, _)| real(of, model)).fold(nominal, |a, b| a.max(b.abs()));
-    let mut wrong = Vec::new();
-    for (model, now) in points {
-        let by = (known != time).then(|| M::element(known));
-        let Some(said) = model.exported_partials(by, !running)(M::element(unknown)) else {
-            return Ok(());
-        };
-        let variable = M::TABLE.get(known as usize).filter(|_| known != time);
-        let Some(at) = variable.map_or(Some(*now), |known| real(known, model)) else { continue };
-        let scale = if at == 0.0 {
-            variable.map_or(1.0, |known| known.variable_type().nominal_or_one())
-        } else {
-            at.abs()
-        };
-        let value = |offset: f64| {
-            let mut model = model.clone();
-            let time = match variable {
-                Some(known) => {
-                    known.set(&mut model, &Value::Real(at + offset));
-                    model.calculate_start();
-                    model.update().ok()?;
-                    *now
-                }
-                None => now + offset,
-            };
-            model.calculate(time);
-            real(of, &model).filter(|value| value.is_finite())
-        };
-        // Central differences of two widths: how far they are apart tells what they are worth.
-        let slope = |width: f64| Some((value(width)? - value(-width)?) / (2.0 * width));
-        let (Some(wide), Some(narrow)) = (slope(1e-3 * scale), slope(5e-4 * scale)) else { continue };
-        let tolerance =
-            1e-5 * said.abs().max(narrow.abs()) + 10.0 * (wide - narrow).abs() + 1e-7 * size / scale;
-        if said.is_nan() || (said - narrow).abs() > tolerance {
-            wrong.push((said, narrow));
+    let mut sizes: Vec<f64> = unknowns.iter().map(nominal).collect();
+    for (_, instance) in points {
+        let values = instance.values();
+        for (size, place) in sizes.iter_mut().zip(unknowns) {
+            *size = size.max(values[*place as usize].real().abs());
         }
     }
-    if let [(said, found), _, ..] = wrong[..] {
-        let known = M::TABLE.get(known as usize).unwrap_or(of_time).name();
-        let (function, mode) = match (known == of_time.name(), running) {
-            (true, _) => ("partial_by_time", ""),
-            (_, true) => ("partial", ""),
-            (_, false) => ("initial_partial", " in Initialization Mode"),
-        };
-        bail!(
-            "the derivative of {} with respect to {known}{mode} is {said:.6e} by Partials::{function}, but {found:.6e} by \
-             differences of the values",
-            of.name()
-        );
-    }
-    Ok(())
+    sizes
 }
 
-fn real<M>(of: &Variable<M>, model: &M) -> Option<f64> {
-    match of.value(model) {
-        Some(Value::Real(value)) => Some(value),
-        _ => None,
+/// The derivatives with respect to one known.
+struct Check<'a> {
+    model: &'a LoadedModel,
+    running: bool,
+    unknowns: &'a [u32],
+    known: u32,
+}
+
+impl Check<'_> {
+    /// For each unknown the derivative that the model offers and the one of its values, if they differ.
+    fn wrong(&self, points: &mut [(Point, Instance)], sizes: &[f64]) -> Vec<Option<(f64, f64)>> {
+        let mut wrong: Vec<Vec<(f64, f64)>> = vec![Vec::new(); self.unknowns.len()];
+        let mut provided = vec![true; self.unknowns.len()];
+        let variable =
+            self.model.table.variable(self.known).filter(|_| self.known != self.model.table.time());
+        for (point, instance) in points {
+            let said = instance.partials(self.unknowns, self.known);
+            provided.iter_mut().zip(&said).for_each(|(provided, said)| *provided &= said.is_some());
+            if said.iter().all(Option::is_none) {
+                continue;
+            }
+            let at = match variable {
+                Some(_) => instance.values()[self.known as usize].real(),
+                None => point.time,
+            };
+            if at.is_nan() {
+                continue;
+            }
+            let scale = match at.abs() {
+                0.0 => variable.map_or(1.0, |known| known.of.nominal_or_one()),
+                size => size,
+            };
+            // Central differences of two widths: how far they are apart tells what they are worth.
+            let slopes = |width: f64| -> Option<Vec<f64>> {
+                let [above, below] = [self.values(point, at + width)?, self.values(point, at - width)?];
+                Some(
+                    above
+                        .into_iter()
+                        .zip(below)
+                        .map(|(above, below)| (above - below) / (2.0 * width))
+                        .collect(),
+                )
+            };
+            let (Some(wide), Some(narrow)) = (slopes(1e-3 * scale), slopes(5e-4 * scale)) else { continue };
+            for (place, said) in said.iter().enumerate() {
+                let (Some(said), wide, narrow) = (*said, wide[place], narrow[place]) else { continue };
+                // The time of Co-Simulation is varied by the start time, from which some models count.
+                let unseen =
+                    variable.is_none() && point.interface == Interface::CoSimulation && narrow == 0.0;
+                if !(wide - narrow).is_finite() || unseen {
+                    continue;
+                }
+                let tolerance = 1e-5 * said.abs().max(narrow.abs())
+                    + 10.0 * (wide - narrow).abs()
+                    + 1e-7 * sizes[place] / scale;
+                if said.is_nan() || (said - narrow).abs() > tolerance {
+                    wrong[place].push((said, narrow));
+                }
+            }
+        }
+        let first = |(wrong, provided): (Vec<_>, bool)| {
+            wrong.first().copied().filter(|_| provided && wrong.len() > 1)
+        };
+        wrong.into_iter().zip(provided).map(first).collect()
+    }
+
+    /// The unknowns at a point where the known has another value; `None` if the model does not take it.
+    fn values(&self, point: &Point, value: f64) -> Option<Vec<f64>> {
+        let mut point = point.clone();
+        let is_time = self.known == self.model.table.time();
+        let step_by_step = point.interface == Interface::CoSimulation;
+        if is_time && step_by_step {
+            // No function sets the time there.
+            if self.model.table.model_exchange.is_some() {
+                return None;
+            }
+            point.time = value;
+        }
+        let mut instance = model_at(self.model, &point, self.running, Standard::Fmi3).ok()?;
+        match is_time {
+            true if step_by_step => {}
+            true => instance.set_time(value).ok()?,
+            false => self.change(&mut instance, value)?,
+        }
+        let values = instance.values();
+        Some(self.unknowns.iter().map(|place| values[*place as usize].real()).collect())
+    }
+
+    fn change(&self, instance: &mut Instance, value: f64) -> Option<()> {
+        let table = &self.model.table;
+        let variable = table.variable(self.known)?;
+        if self.running && instance.interface == Interface::ModelExchange {
+            // Where everything can be set.
+            instance.enter_event_mode().ok()?;
+        }
+        if self.running && variable.state {
+            let mut states = instance.states().ok()?;
+            states[table.states.iter().position(|(state, _)| *state == self.known)?] = value;
+            return instance.set_states(&states).ok();
+        }
+        let mut values: Starts = vec![None; table.variables.len()];
+        let now = instance.values();
+        // An array is set as a whole.
+        let first = self.known as usize - variable.element;
+        for place in first..first + variable.length() {
+            values[place] = Some(now[place].clone());
+        }
+        values[self.known as usize] = Some(Value::Real(value));
+        instance.set(&values, |_| true).ok()
     }
 }

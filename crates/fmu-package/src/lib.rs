@@ -2,8 +2,8 @@
 //!
 //! ## Inside
 //!
-//! * [`fmi2::describe`] and [`fmi3::describe`] check the model and write the description; [`structure`] has the
-//!   dependencies.
+//! * [`LoadedModel`] is a library that describes itself; [`fmi2::describe`] and [`fmi3::describe`] check its model and write
+//!   the description; [`structure`] has the dependencies.
 //! * [`LibraryBuild`] compiles the library with cargo, [`pack()`] makes the FMU, [`Builder`] does all of it.
 //! * [`Fingerprint`], [`Sources`] and [`Variant`] are for the guid.
 //!
@@ -13,7 +13,8 @@
 //! |---|---|
 //! | the guid | `fingerprint`, `folder`, `content`, `packages`, `sources`, `variant` |
 //! | files | `xml`, `files` |
-//! | the description | `changes`, `check`, `sample`, `memory`, `structure`, `definitions`, `describe`, `fmi2`, `fmi3` |
+//! | the model | `table`, `model`, `instance` |
+//! | the description | `changes`, `check`, `sample`, `memory`, `derivatives`, `structure`, `definitions`, `describe`, `fmi2`, `fmi3` |
 //! | the FMU | `connectors`, `version`, `platform`, `cargo`, `pack` |
 //! | the command | `library`, `universal`, `cross`, `c_sources`, `live`, `terminal`, `command` |
 
@@ -32,35 +33,41 @@ pub mod files;
 #[cfg(feature = "files")]
 pub mod xml;
 
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 mod cargo;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 mod changes;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 mod check;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 mod connectors;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 mod definitions;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 mod derivatives;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 mod describe;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 pub mod fmi2;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 pub mod fmi3;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
+mod instance;
+#[cfg(feature = "command")]
 mod memory;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
+mod model;
+#[cfg(feature = "command")]
 mod pack;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 mod platform;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 mod sample;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
 pub mod structure;
-#[cfg(feature = "package")]
+#[cfg(feature = "command")]
+mod table;
+#[cfg(feature = "command")]
 mod version;
 
 #[cfg(feature = "command")]
@@ -84,14 +91,13 @@ pub use sources::Sources;
 pub use variant::{NO_GUID, Variant};
 
 #[cfg(feature = "command")]
-pub use c_sources::{CSources, LINKING, WEBASSEMBLY, c_sources, check_tools};
-#[cfg(feature = "command")]
-pub use command::{BuildOptions, Builder, build};
-#[cfg(feature = "package")]
 pub use {
+    c_sources::{CSources, LINKING, WEBASSEMBLY, c_sources, check_tools},
     cargo::LibraryBuild,
     changes::Changes,
+    command::{BuildOptions, Builder, build},
     connectors::{Terminal, terminals},
+    model::LoadedModel,
     pack::{Library, Parts, pack},
     platform::Platform,
     version::Fmi,

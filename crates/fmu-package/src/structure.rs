@@ -1,17 +1,17 @@
 //! Which variable depends on which, and how (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
 //!
 //! A live model is evaluated at points drawn around its start values, always the same ones. If its equations
-//! are [smooth](fmu_export::Info::smooth), what does not react at any of them does not depend, and a factor that
+//! are smooth, what does not react at any of them does not depend, and a factor that
 //! never changes is constant. Of other models that proves nothing: there an unknown depends on what it
-//! [declares](Variable::depends_on), else on everything, and trying only finds wrong declarations.
+//! declares (`depends_on`), else on everything, and trying only finds wrong declarations.
 
-use crate::changes::Changes;
-use crate::check::{check, is_exact, is_known};
+use crate::check::check;
 use crate::derivatives::check as check_derivatives;
-use crate::sample::{FactorSample, Point, Sampler};
+use crate::model::LoadedModel;
+use crate::sample::{Point, Sampler};
+use crate::table::{Table, Variable};
 use anyhow::{Result, bail, ensure};
-use fmu_export::fmi3::independent;
-use fmu_export::{BaseType, Causality, Exported, Initial, Value, Variability, Variable};
+use fmi_abi::{BaseType, Causality, Initial, Value, Variability};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
@@ -66,8 +66,8 @@ impl ModelStructure {
     /// # Errors
     /// When the model contradicts itself, reacts to what it has not declared, or refuses every set of
     /// parameters near its start values.
-    pub fn of<M: Exported>(tunable_parameters: bool) -> Result<Self> {
-        Self::with::<M>(tunable_parameters, None)
+    pub fn of(model: &LoadedModel, tunable_parameters: bool) -> Result<Self> {
+        Self::with(model, tunable_parameters, None)
     }
 
     /// The same as FMI 3.0 wants it: outputs and derivatives of states depend on parameters, too, and everything on
@@ -76,44 +76,24 @@ impl ModelStructure {
     ///
     /// # Errors
     /// As [`of`](Self::of).
-    pub fn of_fmi3<M: Exported>(tunable_parameters: bool) -> Result<Self> {
+    pub fn of_fmi3(model: &LoadedModel, tunable_parameters: bool) -> Result<Self> {
+        let table = &model.table;
         let Self { outputs, derivatives, initial_unknowns } =
-            Self::with::<M>(tunable_parameters, Some(independent::<M>().0))?;
+            Self::with(model, tunable_parameters, Some(table.time()))?;
         let [outputs, derivatives, initial_unknowns] =
-            [outputs, derivatives, initial_unknowns].map(of_arrays::<M>);
+            [outputs, derivatives, initial_unknowns].map(|list| of_arrays(table, list));
         Ok(Self { outputs, derivatives, initial_unknowns })
     }
 
-    /// With `time`, its value reference, for FMI 3.0.
-    fn with<M: Exported>(tunable_parameters: bool, time: Option<u32>) -> Result<Self> {
-        let starts = check::<M>(&Changes::default())?;
-        // Others keep their states to themselves.
-        let has_states = M::MODEL_EXCHANGE.is_some() || M::PARTIALS;
-        let outputs = find::<M>(|variable| variable.causality() == Causality::Output);
-        let states = if has_states { M::STATES } else { &[] };
-        let derivatives: Vec<u32> = states.iter().map(|state| state.derivative).collect();
-        let states: Vec<u32> = states.iter().map(|state| state.state).collect();
-        let unlisted = time.filter(|time| known::<M>(*time).is_none());
-        let mut knowns = find::<M>(|variable| {
-            matches!(variable.causality(), Causality::Input | Causality::Independent)
-                || has_states && variable.is_state()
-                || time.is_some() && variable.causality() == Causality::Parameter
-        });
-        knowns.extend(unlisted);
-        let calculated = find::<M>(|variable| variable.causality() == Causality::CalculatedParameter);
-        let mut initial_unknowns = [&outputs[..], &calculated, &states, &derivatives].concat();
-        initial_unknowns
-            .retain(|vr| matches!(variable::<M>(*vr).initial(), Some(Initial::Approx | Initial::Calculated)));
-        initial_unknowns.sort_unstable();
-        initial_unknowns.dedup();
-        let mut initial_knowns =
-            find::<M>(|variable| is_known(variable) && (!variable.is_state() || is_exact(variable)));
-        initial_knowns.extend(unlisted);
+    /// With `time`, its place, for FMI 3.0.
+    fn with(model: &LoadedModel, tunable_parameters: bool, time: Option<u32>) -> Result<Self> {
+        let starts = check(model)?;
+        let table = &model.table;
+        let Lists { outputs, derivatives, knowns, initial_unknowns, initial_knowns } = Lists::of(table, time);
+        check_derivatives(model, &starts, true, &[&outputs[..], &derivatives].concat(), &knowns)?;
+        check_derivatives(model, &starts, false, &initial_unknowns, &initial_knowns)?;
 
-        check_derivatives::<M>(&starts, true, &[&outputs[..], &derivatives].concat(), &knowns)?;
-        check_derivatives::<M>(&starts, false, &initial_unknowns, &initial_knowns)?;
-
-        let mut sampler = Sampler::<M>::new(starts, tunable_parameters);
+        let mut sampler = Sampler::new(model, starts, tunable_parameters);
         sampler.running = true;
         let outputs = by_derivative(&mut sampler, &outputs, &knowns)?;
         let derivatives = by_derivative(&mut sampler, &derivatives, &knowns)?;
@@ -127,13 +107,13 @@ impl ModelStructure {
                 ..unknown
             }
         };
-        let outputs = outputs.into_iter().map(|unknown| match variable::<M>(unknown.vr).is_state() {
+        let outputs = outputs.into_iter().map(|unknown| match table.variables[unknown.vr as usize].state {
             true => Ok(itself(unknown)),
-            false => with_declared::<M>(unknown, &knowns),
+            false => with_declared(table, unknown, &knowns),
         });
-        let derivatives = derivatives.into_iter().map(|unknown| with_declared::<M>(unknown, &knowns));
+        let derivatives = derivatives.into_iter().map(|unknown| with_declared(table, unknown, &knowns));
         let initial_unknowns =
-            initial_unknowns.into_iter().map(|unknown| with_declared::<M>(unknown, &initial_knowns));
+            initial_unknowns.into_iter().map(|unknown| with_declared(table, unknown, &initial_knowns));
         Ok(Self {
             outputs: outputs.collect::<Result<_>>()?,
             derivatives: derivatives.collect::<Result<_>>()?,
@@ -142,9 +122,45 @@ impl ModelStructure {
     }
 }
 
+/// The unknowns and the knowns, by place.
+struct Lists {
+    outputs: Vec<u32>,
+    derivatives: Vec<u32>,
+    knowns: Vec<u32>,
+    initial_unknowns: Vec<u32>,
+    initial_knowns: Vec<u32>,
+}
+
+impl Lists {
+    fn of(table: &Table, time: Option<u32>) -> Self {
+        // Others keep their states to themselves.
+        let has_states = table.model_exchange.is_some() || table.partials;
+        let outputs = table.find(|of| of.causality == Causality::Output);
+        let states = if has_states { &table.states[..] } else { &[] };
+        let (states, derivatives): (Vec<u32>, Vec<u32>) = states.iter().copied().unzip();
+        let unlisted = time.filter(|time| table.variable(*time).is_none());
+        let mut knowns = table.find(|of| {
+            matches!(of.causality, Causality::Input | Causality::Independent)
+                || has_states && of.state
+                || time.is_some() && of.causality == Causality::Parameter
+        });
+        knowns.extend(unlisted);
+        let calculated = table.find(|of| of.causality == Causality::CalculatedParameter);
+        let mut initial_unknowns = [&outputs[..], &calculated, &states, &derivatives].concat();
+        initial_unknowns.retain(|place| {
+            matches!(table.variables[*place as usize].initial, Some(Initial::Approx | Initial::Calculated))
+        });
+        initial_unknowns.sort_unstable();
+        initial_unknowns.dedup();
+        let mut initial_knowns = table.find(|of| of.is_known() && (!of.state || of.is_exact()));
+        initial_knowns.extend(unlisted);
+        Self { outputs, derivatives, knowns, initial_unknowns, initial_knowns }
+    }
+}
+
 /// The list with each array for its elements.
-fn of_arrays<M: Exported>(unknowns: Vec<Unknown>) -> Vec<Unknown> {
-    let first = |place: u32| known::<M>(place).map_or(place, |of| place - of.element() as u32);
+fn of_arrays(table: &Table, unknowns: Vec<Unknown>) -> Vec<Unknown> {
+    let first = |place: u32| table.variable(place).map_or(place, |of| place - of.element as u32);
     let mut list: Vec<Unknown> = Vec::new();
     for of in unknowns {
         let vr = first(of.vr);
@@ -164,43 +180,30 @@ fn of_arrays<M: Exported>(unknowns: Vec<Unknown>) -> Vec<Unknown> {
     list
 }
 
-fn variable<M: Exported>(vr: u32) -> &'static Variable<M> {
-    &M::TABLE[vr as usize]
-}
-
-/// `None` for a time that is no variable of the model.
-fn known<M: Exported>(vr: u32) -> Option<&'static Variable<M>> {
-    M::TABLE.get(vr as usize)
-}
-
-fn find<M: Exported>(is_it: impl Fn(&Variable<M>) -> bool) -> Vec<u32> {
-    (0..).zip(M::TABLE).filter(|(_, variable)| is_it(variable)).map(|(vr, _)| vr).collect()
-}
-
 /// Adds to what was found by trying what the model declares, or what cannot be ruled out.
-fn with_declared<M: Exported>(found: Unknown, knowns: &[u32]) -> Result<Unknown> {
-    let unknown = variable::<M>(found.vr);
-    let declared: Option<HashSet<u32>> = unknown.dependencies().map(Iterator::collect);
-    let (time, of_time) = independent::<M>();
-    let names_time = unknown.depends_on_time() == Some(true);
+fn with_declared(table: &Table, found: Unknown, knowns: &[u32]) -> Result<Unknown> {
+    let unknown = &table.variables[found.vr as usize];
+    let declared: Option<HashSet<u32>> =
+        unknown.dependencies.as_ref().map(|places| places.iter().copied().collect());
     let is_declared = |known: u32| {
-        known == time && names_time || declared.as_ref().is_none_or(|declared| declared.contains(&known))
+        known == table.time() && unknown.depends_on_time
+            || declared.as_ref().is_none_or(|declared| declared.contains(&known))
     };
-    if let Some((hidden, _)) = found.dependencies.iter().find(|(vr, _)| !is_declared(*vr)) {
-        let hidden = known::<M>(*hidden).unwrap_or(of_time).name();
-        bail!("{} reacts to {hidden}, which its depends_on does not name", unknown.name());
+    if let Some((hidden, _)) = found.dependencies.iter().find(|(place, _)| !is_declared(*place)) {
+        bail!("{} reacts to {}, which its depends_on does not name", unknown.name, table.name(*hidden));
     }
-    if unknown.variability() == Variability::Constant {
+    if unknown.variability == Variability::Constant {
         return Ok(found);
     }
     // Texts and bytes are not tried.
-    let is_tried = |vr: u32| {
-        known::<M>(vr).is_none_or(|known| !matches!(known.base(), BaseType::String | BaseType::Binary))
+    let is_tried = |place: u32| {
+        table.variable(place).is_none_or(|known| !matches!(known.base(), BaseType::String | BaseType::Binary))
     };
     let kinds: HashMap<u32, DependencyKind> = found.dependencies.iter().copied().collect();
+    let smooth = table.info.smooth;
     let kind = |known: u32| match kinds.get(&known) {
-        Some(kind) if M::INFO.smooth => Some(*kind),
-        None if M::INFO.smooth && declared.is_none() && is_tried(known) => None,
+        Some(kind) if smooth => Some(*kind),
+        None if smooth && declared.is_none() && is_tried(known) => None,
         _ => is_declared(known).then_some(DependencyKind::Dependent),
     };
     let dependencies = knowns.iter().filter_map(|&known| Some((known, kind(known)?))).collect();
@@ -209,33 +212,32 @@ fn with_declared<M: Exported>(found: Unknown, knowns: &[u32]) -> Result<Unknown>
 
 /// Dependencies at communication points and in Continuous-Time Mode, from the partial derivatives; where
 /// the model has none, from its values.
-fn by_derivative<M: Exported>(
-    sampler: &mut Sampler<M>,
-    unknowns: &[u32],
-    knowns: &[u32],
-) -> Result<Vec<Unknown>> {
-    let samples = if M::PARTIALS { sampler.factor_samples()? } else { Vec::new() };
+fn by_derivative(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
+    let table = &sampler.of.table;
+    let mut samples = if table.partials { sampler.factor_samples()? } else { Vec::new() };
+    let is_real = |place: u32| table.variable(place).is_some_and(|of| of.base() == BaseType::Real);
     // By parameters, models know their derivatives while initializing.
-    let is_variable = |of: &Variable<M>| {
-        of.base() == BaseType::Real
-            && !matches!(of.causality(), Causality::Independent | Causality::Parameter)
+    let is_variable = |place: u32| {
+        is_real(place)
+            && !matches!(
+                table.variables[place as usize].causality,
+                Causality::Independent | Causality::Parameter
+            )
     };
-    let partials = |unknown: u32, known: u32| {
-        let differentiable = M::PARTIALS
-            && variable::<M>(unknown).base() == BaseType::Real
-            && self::known::<M>(known).is_some_and(is_variable);
-        let partial = |sample: &FactorSample<M>| {
-            sample.model.exported_partials(Some(M::element(known)), false)(M::element(unknown))
-        };
-        let samples = samples.iter().filter(|_| differentiable);
-        let factors: Option<Vec<_>> = samples.map(|sample| Some((sample, partial(sample)?))).collect();
-        factors.filter(|factors| !factors.is_empty())
-    };
+    let reals: Vec<u32> = unknowns.iter().copied().filter(|place| is_real(*place)).collect();
     let mut list: Vec<Unknown> = unknowns.iter().map(none_known).collect();
     for &known in knowns {
+        let differentiable = table.partials && is_variable(known) && !reals.is_empty();
+        let partials: Vec<_> = samples
+            .iter_mut()
+            .filter(|_| differentiable)
+            .map(|sample| ((sample.fixed, sample.tunable), sample.model.partials(&reals, known)))
+            .collect();
         let mut others = Vec::new();
         for unknown in &mut list {
-            match partials(unknown.vr, known) {
+            let place = reals.iter().position(|real| *real == unknown.vr);
+            let factors = partials.iter().map(|(parameters, factors)| Some((*parameters, factors[place?]?)));
+            match factors.collect::<Option<Vec<_>>>().filter(|factors| !factors.is_empty()) {
                 Some(factors) => {
                     unknown.dependencies.extend(factor_kind(&factors).map(|kind| (known, kind)));
                 }
@@ -256,23 +258,24 @@ fn none_known(vr: &u32) -> Unknown {
     Unknown { vr: *vr, dependencies: Vec::new() }
 }
 
-/// The kind of dependency that has these factors; `None` if they are all zero.
-fn factor_kind<M>(factors: &[(&FactorSample<M>, f64)]) -> Option<DependencyKind> {
+/// The kind of dependency that has these factors, each with the numbers of its sample's fixed and tunable parameters; `None`
+/// if they are all zero.
+fn factor_kind(factors: &[((usize, usize), f64)]) -> Option<DependencyKind> {
     if factors.iter().all(|(_, factor)| *factor == 0.0) {
         return None;
     }
     // Whether the factor is the same wherever the samples have this in common.
-    let steady = |in_common: fn(&FactorSample<M>) -> (usize, usize)| {
-        factors.iter().all(|(sample, factor)| {
-            let like = |(other, _): &&(&FactorSample<M>, f64)| in_common(other) == in_common(sample);
+    let steady = |in_common: fn(&(usize, usize)) -> (usize, usize)| {
+        factors.iter().all(|(parameters, factor)| {
+            let like = |(other, _): &&((usize, usize), f64)| in_common(other) == in_common(parameters);
             factors.iter().filter(like).all(|(_, other)| close(*factor, *other, 1e-12))
         })
     };
     Some(if steady(|_| (0, 0)) {
         DependencyKind::Constant
-    } else if steady(|sample| (sample.fixed, 0)) {
+    } else if steady(|(fixed, _)| (*fixed, 0)) {
         DependencyKind::Fixed
-    } else if steady(|sample| (sample.fixed, sample.tunable)) {
+    } else if steady(|parameters| *parameters) {
         DependencyKind::Tunable
     } else {
         DependencyKind::Dependent
@@ -280,7 +283,7 @@ fn factor_kind<M>(factors: &[(&FactorSample<M>, f64)]) -> Option<DependencyKind>
 }
 
 /// Dependencies during initialization, from the values; `fixed` and `tunable` are not allowed there.
-fn by_value<M: Exported>(sampler: &mut Sampler<M>, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
+fn by_value(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
     let mut list: Vec<Unknown> = unknowns.iter().map(none_known).collect();
     for &known in knowns {
         let reactions = sampler.reactions(known, unknowns)?;
@@ -326,29 +329,29 @@ impl Reactions {
     }
 }
 
-impl<M: Exported> Sampler<M> {
+impl Sampler<'_> {
     /// Changes one known at many points and looks at the unknowns.
     fn reactions(&mut self, known: u32, unknowns: &[u32]) -> Result<Reactions> {
+        let table = &self.of.table;
         let mut reactions = Reactions { changes: Vec::new(), values: Vec::new() };
-        let known_of = self::known::<M>(known);
-        let time = known_of.is_none_or(|known| known.causality() == Causality::Independent);
-        let is_known = |of: &Variable<M>| known_of.is_some_and(|known| known.name() == of.name());
-        let value = |model: &M, vr: u32| variable::<M>(vr).value(model).unwrap_or(Value::Real(0.0));
+        let variable = table.variable(known);
+        let is_known = |of: &Variable| variable.is_some_and(|known| known.name == of.name);
         let points = if unknowns.is_empty() { 0 } else { 16 };
         for _ in 0..points {
-            let (point, before) = self.draw(None, true, |_| true)?;
-            let (changed, after) = self.draw(Some(&point), time, is_known)?;
+            let (point, mut before) = self.draw(None, true, |_| true)?;
+            let (changed, mut after) = self.draw(Some(&point), known == table.time(), is_known)?;
             if changed == point {
                 continue;
             }
             reactions.changes.push(difference(&point, &changed, known));
-            let pair = |vr: &u32| [value(&before, *vr), value(&after, *vr)];
+            let [before, after] = [before.values(), after.values()];
+            let pair = |place: &u32| [&before, &after].map(|values| values[*place as usize].clone());
             reactions.values.push(unknowns.iter().map(pair).collect());
         }
         for (place, unknown) in unknowns.iter().enumerate() {
             let values = reactions.values.iter().flat_map(|row| &row[place]);
             let is_finite = |value: &Value| !matches!(value, Value::Real(value) if !value.is_finite());
-            let name = variable::<M>(*unknown).name();
+            let name = table.name(*unknown);
             ensure!(values.into_iter().all(is_finite), "{name} is not finite near the start values");
         }
         Ok(reactions)

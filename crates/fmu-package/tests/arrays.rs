@@ -1,11 +1,14 @@
 //! The descriptions of models with arrays: one variable in FMI 3.0, a scalar for each element in FMI 2.0.
 
+mod common;
+
+use common::{fmi2, fmi3};
 use fmi_schema::fmi2::Fmi2ModelDescription;
 use fmi_schema::traits::FmiModelDescription;
 use fmu_export::*;
 use fmu_package::structure::DependencyKind::{Constant, Dependent, Fixed};
 use fmu_package::structure::{ModelStructure, Unknown};
-use fmu_package::{Changes, Terminal, fmi2, fmi3, terminals};
+use fmu_package::{Changes, Terminal, terminals};
 
 #[path = "../../fmu-export/tests/toys/rod.rs"]
 #[allow(dead_code)]
@@ -111,10 +114,10 @@ offer!(Chain: ModelExchange + Partials);
 /// Each element has its own dependencies in FMI 2.0; an array has those of all, each as the least constant of them.
 #[test]
 fn dependencies() {
-    let of_fmi2 = ModelStructure::of::<Chain>(false).unwrap().derivatives;
+    let of_fmi2 = common::structure::<Chain>(false).unwrap().derivatives;
     let unknown = |vr, dependencies| Unknown { vr, dependencies };
     assert_eq!(of_fmi2, [unknown(2, vec![(4, Constant)]), unknown(3, vec![(0, Fixed), (5, Dependent)])]);
-    let of_fmi3 = ModelStructure::of_fmi3::<Chain>(false).unwrap();
+    let of_fmi3 = ModelStructure::of_fmi3(&common::model::<Chain>(), false).unwrap();
     assert_eq!(of_fmi3.derivatives, [unknown(2, vec![(0, Fixed), (4, Dependent), (6, Dependent)])]);
     assert_eq!(of_fmi3.outputs, [unknown(0, vec![(0, Constant)])]);
 }
@@ -194,14 +197,8 @@ fn places_that_are_not_there() {
 }
 
 #[test]
-fn start_values_of_elements() {
-    let start = vec![("capacities[8]".to_owned(), "4.5".to_owned())];
-    let text = fmi3::describe::<rod::Rod>(&Changes { start, ..Changes::default() }).unwrap();
-    assert!(text.contains("2.75 4.5\""));
-}
-
-#[test]
 fn terminals_have_no_arrays() {
-    let error = terminals::<rod::Rod>(&[Terminal::plug("heat").signal("T", "T[1]")], &[]).unwrap_err();
+    let error = terminals(&common::model::<rod::Rod>(), &[Terminal::plug("heat").signal("T", "T[1]")], &[])
+        .unwrap_err();
     assert!(format!("{error:#}").contains("T[1], an element of an array"), "{error:#}");
 }

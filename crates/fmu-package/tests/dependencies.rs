@@ -1,10 +1,12 @@
 //! The dependencies of models with branches and memory, where no trying near the start values can find them.
 
+mod common;
+
+use common::fmi2::describe;
 use fmu_export::*;
 use fmu_package::Changes;
-use fmu_package::fmi2::describe;
 use fmu_package::structure::DependencyKind::Dependent;
-use fmu_package::structure::{ModelStructure, Unknown};
+use fmu_package::structure::Unknown;
 
 #[derive(Clone, Default)]
 struct Branches {
@@ -71,7 +73,7 @@ offer!(Branches: CoSimulation + Partials);
 
 #[test]
 fn what_cannot_be_ruled_out_is_listed_and_what_is_declared_narrows_it() {
-    let structure = ModelStructure::of::<Branches>(false).unwrap();
+    let structure = common::structure::<Branches>(false).unwrap();
     let known = |list: Vec<Unknown>| {
         list.into_iter()
             .map(|Unknown { vr, dependencies }| {
@@ -204,7 +206,7 @@ derivers! {
 
 #[test]
 fn derivatives_that_are_not_those_of_the_values_are_refused() {
-    use fmu_package::fmi3;
+    use common::fmi3;
     fmi3::describe::<right::Deriver>(&Changes::default()).unwrap();
     for (described, beginning, function) in [
         (

@@ -1,10 +1,12 @@
 //! All that a variable can be in FMI 2.0 comes out as the standard has it.
 
+mod common;
+
+use common::fmi2::describe;
 use fmu_export::*;
 use fmu_package::Changes;
-use fmu_package::fmi2::describe;
 use fmu_package::structure::DependencyKind::{Constant, Dependent};
-use fmu_package::structure::{ModelStructure, Unknown};
+use fmu_package::structure::Unknown;
 
 enumeration! {
     /// What the heater does.
@@ -246,7 +248,7 @@ fn every_kind_of_variable_has_its_dependencies() {
     let place = |name: Name| name as u32;
     let unknowns =
         |list: Vec<Unknown>| list.into_iter().map(|of| (of.vr, of.dependencies)).collect::<Vec<_>>();
-    let structure = ModelStructure::of::<Room>(false).unwrap();
+    let structure = common::structure::<Room>(false).unwrap();
     use Name::*;
     // Strings are not tried, so what is not declared may follow from them.
     let comment_and = |others: &[(Name, _)]| {
@@ -294,32 +296,6 @@ fn every_kind_of_variable_has_its_dependencies() {
         [outside, temperature].map(place)
     );
     assert_eq!(of(heater_now), [(place(heater), Dependent)]);
-}
-
-#[test]
-fn other_start_values_are_possible_for_every_type() {
-    let changes = |name: &str, start: &str| {
-        let changes = Changes { start: vec![(name.to_owned(), start.to_owned())], ..Changes::default() };
-        describe::<Room>(&changes).map_err(|error| format!("{error:#}"))
-    };
-    for (name, start, part) in [
-        ("heater", "5", r#"<Enumeration declaredType="Heater" start="5"/>"#),
-        ("label", "A & B", r#"<String start="A &amp; B"/>"#),
-        ("open", "true", r#"<Boolean start="true"/>"#),
-        ("wall", "-4.5", r#"start="-4.5""#),
-    ] {
-        let text = changes(name, start).unwrap();
-        assert_eq!(text.matches(part).count(), 1, "{text}");
-    }
-    for (name, start, message) in [
-        ("heater", "3", "heater must be one of 0 (Off), 2 (Low), 5 (High), it is 3"),
-        ("heater", "High", "the start value of heater cannot be: it is Enumeration, which 'High' is not"),
-        ("version", "8", "version is calculated or constant: it takes no start value"),
-        ("time", "8", "time is calculated or constant: it takes no start value"),
-        ("label", "\u{1}", "label has a character that XML has not: \"\\u{1}\""),
-    ] {
-        assert_eq!(changes(name, start).unwrap_err(), message);
-    }
 }
 
 /// What follows from tunable parameters is tunable, too.

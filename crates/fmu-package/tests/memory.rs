@@ -1,7 +1,10 @@
 //! A field that is missing in the `memory` of a model would be missing in saved states: the model is refused.
 
+mod common;
+
+use common::{fmi2, fmi3};
 use fmu_export::*;
-use fmu_package::{Changes, fmi2, fmi3};
+use fmu_package::Changes;
 
 /// A model that remembers the sum of what it was given, the last of it, what it shows, the step size and how many events there
 /// were; and a copy of the gain, which `update` makes anew.

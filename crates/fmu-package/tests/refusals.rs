@@ -1,9 +1,10 @@
 //! Models that make no sense are refused by name; what the compiler refuses already is tested in fmu-export.
 
+mod common;
+
+use common::fmi2::describe;
 use fmu_export::*;
 use fmu_package::Changes;
-use fmu_package::fmi2::describe;
-use fmu_package::structure::ModelStructure;
 
 const SHARE: Type = Type::real("Share", &units::ONE).min(0.0).max(1.0);
 const ABOVE: Type = Type::real("Above", &units::ONE).min(3.0);
@@ -127,7 +128,7 @@ macro_rules! cases {
 #[track_caller]
 fn refused<M: Exported>(message: &str) {
     assert_eq!(format!("{:#}", describe::<M>(&Changes::default()).expect_err(message)), message);
-    if let Err(error) = ModelStructure::of::<M>(false) {
+    if let Err(error) = common::structure::<M>(false) {
         assert_eq!(format!("{error:#}"), message);
     }
 }

@@ -9,8 +9,6 @@ pub mod controller;
 mod fmu;
 pub mod motor;
 pub mod parameters;
-#[cfg(feature = "packaging")]
-pub mod sources;
 pub mod variables;
 pub mod wrist;
 

@@ -3,8 +3,8 @@
 use super::{array, output, same, string};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, Reference};
-use crate::value::Value;
 use fmi_abi::BaseType;
+use fmi_abi::Value;
 use fmi_abi::c_types::c_char;
 use std::ffi::{CStr, CString};
 use std::fmt::Display;

@@ -9,8 +9,8 @@ use crate::boundary::values::*;
 use crate::boundary::{array, of_elements, output, partial_derivatives, place};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, refuse};
-use crate::value::Value;
 use fmi_abi::BaseType::{self, *};
+use fmi_abi::Value;
 
 pub unsafe fn fmi3EnterInitializationMode<M: Exported>(
     instance: &mut Instance<M>,

@@ -3,10 +3,10 @@
 
 use super::values::is_finite;
 use super::{Instance, Outcome, Reference, finite, independent, refuse};
-use crate::causality::{Causality, Initial, Variability};
 use crate::export::Exported;
 use crate::variable::Variable;
 use fmi_abi::BaseType;
+use fmi_abi::{Causality, Initial, Variability};
 use fmi_abi::{Mode, Standard};
 use std::mem::MaybeUninit;
 

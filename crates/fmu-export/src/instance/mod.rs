@@ -10,25 +10,23 @@ mod refusal;
 mod saved_states;
 mod serialized;
 mod sorted;
-mod trial;
 mod values;
 
 pub(crate) use co_simulation::no_status;
 pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
-pub use trial::{SavedTrial, Trial};
 
 use self::sorted::Sorted;
 use crate::boundary::Placed;
 use crate::capabilities::Events;
-use crate::causality::Causality;
 use crate::export::Exported;
 use crate::log::Logger;
 use crate::model::{Error, Experiment, Setup};
 use crate::types::{NUMBER, TIME};
-use crate::value::Value;
 use crate::variable::{Read, ReadAt, Variable, shape_of_calculation};
 use fmi_abi::BaseType;
+use fmi_abi::Causality;
 use fmi_abi::Status;
+use fmi_abi::Value;
 use fmi_abi::{Interface, Mode, Situation, Standard};
 
 /// An instance of model `M`.

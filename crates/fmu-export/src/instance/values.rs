@@ -1,13 +1,13 @@
 //! Values (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI 3.0).
 
 use super::{Instance, Outcome, Reference, finite, implicit_value, refuse, refuse_with};
-use crate::causality::{Causality, Initial};
 use crate::export::Exported;
 use crate::settable::STARTING;
 use crate::types::Attributes;
-use crate::value::Value;
 use crate::variable::Variable;
 use fmi_abi::BaseType;
+use fmi_abi::Value;
+use fmi_abi::{Causality, Initial};
 use std::mem::MaybeUninit;
 
 impl<M: Exported> Instance<M> {

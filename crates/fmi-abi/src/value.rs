@@ -1,0 +1,107 @@
+//! Values of variables.
+
+use crate::BaseType;
+use std::fmt;
+
+/// A value of a variable.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Of a Real or a Float32.
+    Real(f64),
+    /// Of an integer of any kind or an Enumeration.
+    Integer(i128),
+    /// Of a Boolean.
+    Boolean(bool),
+    /// Of a String.
+    String(String),
+    /// Of a Binary.
+    Binary(Vec<u8>),
+}
+
+impl Value {
+    /// The number of a Real; NaN for other values.
+    pub fn real(&self) -> f64 {
+        if let Self::Real(value) = self { *value } else { f64::NAN }
+    }
+
+    /// The value that is written as this text, as [`Display`](fmt::Display) writes it; `None` if the kind of value has none.
+    pub fn read(base: BaseType, text: &str) -> Option<Self> {
+        match base {
+            BaseType::Real => text.parse().ok().map(Self::Real),
+            BaseType::Float32 => text.parse().ok().map(|value: f32| Self::Real(value.into())),
+            BaseType::Enumeration => text.parse().ok().map(|value: i32| Self::Integer(value.into())),
+            BaseType::Boolean => text.parse().ok().map(Self::Boolean),
+            BaseType::Binary => bytes(text).map(Self::Binary),
+            BaseType::String => Some(Self::String(text.to_owned())),
+            _ => {
+                let (min, max) = base.range()?;
+                text.parse().ok().filter(|value| (min..=max).contains(value)).map(Self::Integer)
+            }
+        }
+    }
+}
+
+/// Two hexadecimal digits for each byte.
+fn bytes(text: &str) -> Option<Vec<u8>> {
+    let digit = |byte: &u8| char::from(*byte).to_digit(16);
+    let digits: Vec<u32> = text.as_bytes().iter().map(digit).collect::<Option<_>>()?;
+    let (pairs, rest) = digits.as_chunks();
+    let byte = |[high, low]: &[u32; 2]| u8::try_from(16 * high + low).ok();
+    if rest.is_empty() { pairs.iter().map(byte).collect() } else { None }
+}
+
+impl From<f64> for Value {
+    fn from(value: f64) -> Self {
+        Self::Real(value)
+    }
+}
+
+/// As written in model descriptions.
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            // Where hundreds of zeros may have to be written.
+            Self::Real(value) if *value != 0.0 && value.abs() < 1e-15 || value.abs() > 1e17 => {
+                write!(f, "{value:e}")
+            }
+            Self::Real(value) => write!(f, "{value}"),
+            Self::Integer(value) => write!(f, "{value}"),
+            Self::Boolean(value) => write!(f, "{value}"),
+            Self::String(value) => write!(f, "{value}"),
+            Self::Binary(value) => value.iter().try_for_each(|byte| write!(f, "{byte:02X}")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_read_as_they_are_written() {
+        for (base, value) in [
+            (BaseType::Real, Value::Real(0.1)),
+            (BaseType::Real, Value::Real(-1e300)),
+            (BaseType::Real, Value::Real(5e-324)),
+            (BaseType::Float32, Value::Real(f64::from(0.1_f32))),
+            (BaseType::Int8, Value::Integer(-128)),
+            (BaseType::UInt64, Value::Integer(u64::MAX.into())),
+            (BaseType::Enumeration, Value::Integer(7)),
+            (BaseType::Boolean, Value::Boolean(true)),
+            (BaseType::String, Value::String("a \"b\"\n".to_owned())),
+            (BaseType::Binary, Value::Binary(vec![0, 0x7f, 0xff])),
+        ] {
+            assert_eq!(Value::read(base, &value.to_string()), Some(value));
+        }
+        assert!(matches!(Value::read(BaseType::Real, "NaN"), Some(Value::Real(value)) if value.is_nan()));
+        for (base, text) in [
+            (BaseType::Real, "fast"),
+            (BaseType::UInt8, "256"),
+            (BaseType::Boolean, "1"),
+            (BaseType::Binary, "0"),
+            (BaseType::Binary, "0g"),
+        ] {
+            assert_eq!(Value::read(base, text), None, "{text}");
+        }
+    }
+}

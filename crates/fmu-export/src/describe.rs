@@ -1,0 +1,305 @@
+//! The description that a library gives of its model, as JSON, for the program that makes FMUs of it (`fmu-package`).
+//!
+//! Floating-point numbers and integers of types are strings, which hold them to the last digit.
+
+use crate::boundary::{forget_panic, panic_message};
+use crate::capabilities::Events;
+use crate::export::Exported;
+use crate::info::Info;
+use crate::model::Setup;
+use crate::types::{Attributes, Type};
+use crate::units::{BaseUnit, Unit};
+use crate::variable::Variable;
+use fmi_abi::Interface;
+use fmi_abi::c_types::c_void;
+use std::fmt::{Debug, Display, Write};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// The version of the description's form.
+const VERSION: u32 = 1;
+
+/// The function that receives the description: a string in UTF-8, and its length in bytes.
+#[doc(hidden)]
+pub type Receive = unsafe extern "C" fn(context: *mut c_void, text: *const u8, length: usize);
+
+/// Passes the description of a model to `receive`; an empty one if the model panics.
+///
+/// # Safety
+/// `receive` may be called with this context.
+#[doc(hidden)]
+pub unsafe fn pass_description<M: Exported>(receive: Receive, context: *mut c_void) {
+    let text = catch_unwind(describe::<M>).unwrap_or_else(|panic| {
+        forget_panic(Err(panic));
+        String::new()
+    });
+    // SAFETY: the caller's promise, and a string with its length.
+    unsafe { receive(context, text.as_ptr(), text.len()) }
+}
+
+/// The description of a model in this program.
+pub fn describe<M: Exported>() -> String {
+    let mut json = Json::default();
+    json.open("", '{');
+    json.word("version", VERSION);
+    info(&mut json, &M::INFO);
+    json.word("arrays", M::ARRAYS);
+    if let Some(offer) = M::CO_SIMULATION {
+        json.open("coSimulation", '{');
+        json.word("variableStepSize", offer.variable_step_size);
+        json.word("eventMode", !matches!(offer.events, Events::None));
+        json.word("endsEarly", offer.ends_early);
+        json.close('}');
+    }
+    if let Some(offer) = M::MODEL_EXCHANGE {
+        json.open("modelExchange", '{');
+        json.word("indicators", offer.indicators);
+        json.word("stepCompleted", offer.step_completed);
+        json.close('}');
+    }
+    json.word("partials", M::PARTIALS);
+    json.word("inputDerivatives", M::INPUT_DERIVATIVES);
+    json.word("outputDerivatives", M::OUTPUT_DERIVATIVES);
+    json.open("states", '[');
+    M::STATES.iter().for_each(|of| json.words("", [of.state, of.derivative]));
+    json.close(']');
+    json.open("variables", '[');
+    M::TABLE.iter().for_each(|of| variable(&mut json, of));
+    json.close(']');
+    json.open("starts", '[');
+    let co_simulation = M::CO_SIMULATION.map(|_| Interface::CoSimulation);
+    let model_exchange = M::MODEL_EXCHANGE.map(|_| Interface::ModelExchange);
+    for interface in [co_simulation, model_exchange].into_iter().flatten() {
+        starts::<M>(&mut json, interface);
+    }
+    json.close(']');
+    json.close('}');
+    json.0
+}
+
+fn info(json: &mut Json, of: &Info) {
+    json.text("name", of.name);
+    json.text("identifier", of.identifier);
+    json.text("guid", of.guid);
+    json.text("description", of.description);
+    json.text("author", of.author);
+    json.text("modelVersion", of.version);
+    json.text("license", of.license);
+    json.text("copyright", of.copyright);
+    json.number("startTime", of.default_experiment.start_time);
+    json.number("stopTime", of.default_experiment.stop_time);
+    json.number("stepSize", of.default_experiment.step_size);
+    json.number("tolerance", of.default_experiment.tolerance);
+    json.word("smooth", of.smooth);
+}
+
+fn variable<M: Exported>(json: &mut Json, of: &Variable<M>) {
+    json.open("", '{');
+    json.text("name", of.name());
+    json.text("array", of.name_of_array());
+    json.words("dimensions", of.dimensions());
+    json.word("element", of.element());
+    json.text("description", of.description());
+    json.number("causality", format_args!("{}", of.causality()));
+    json.number("variability", format_args!("{}", of.variability()));
+    if let Some(initial) = of.initial() {
+        json.number("initial", format_args!("{initial}"));
+    }
+    variable_type(json, of.variable_type());
+    if let Some(differentiated) = of.differentiates() {
+        json.word("differentiates", differentiated);
+    }
+    if let Some(known) = of.dependencies() {
+        json.words("dependencies", known);
+        json.word("dependsOnTime", of.depends_on_time() == Some(true));
+    }
+    json.word("state", of.is_state());
+    json.word("reinit", of.is_reinit());
+    json.close('}');
+}
+
+fn variable_type(json: &mut Json, of: &Type) {
+    json.open("type", '{');
+    json.text("name", of.name);
+    json.number("base", of.base());
+    match of.attributes {
+        Attributes::Real { quantity, unit: of, min, max, nominal } => {
+            json.text("quantity", quantity);
+            unit(json, of);
+            for (name, value) in [("min", min), ("max", max), ("nominal", nominal)] {
+                if let Some(value) = value {
+                    json.number(name, value);
+                }
+            }
+        }
+        Attributes::Integer { min, max } => {
+            json.number("smallest", min);
+            json.number("largest", max);
+        }
+        Attributes::Binary { mime_type, max_size } => {
+            json.text("mimeType", mime_type);
+            json.word("maxSize", max_size);
+        }
+        Attributes::Enumeration(items) => {
+            json.open("items", '[');
+            for item in items {
+                json.open("", '{');
+                json.text("name", item.name);
+                json.word("value", item.value);
+                json.text("description", item.description);
+                json.close('}');
+            }
+            json.close(']');
+        }
+        Attributes::Boolean | Attributes::String => {}
+    }
+    json.close('}');
+}
+
+fn unit(json: &mut Json, of: &Unit) {
+    let BaseUnit { kg, m, s, A: ampere, K: kelvin, mol, cd, rad, factor, offset } = of.base;
+    json.open("unit", '{');
+    json.text("name", of.name);
+    json.words("exponents", [kg, m, s, ampere, kelvin, mol, cd, rad]);
+    json.number("factor", factor);
+    json.number("offset", offset);
+    if let Some(display) = of.display {
+        json.open("display", '{');
+        json.text("name", display.name);
+        json.number("factor", display.factor);
+        json.number("offset", display.offset);
+        json.close('}');
+    }
+    json.close('}');
+}
+
+/// The start values of a new model, `null` for a variable without; or the reason why there are none. Of a model for Model
+/// Exchange also the first event indicator that it does not fill in.
+fn starts<M: Exported>(json: &mut Json, interface: Interface) {
+    json.open("", '{');
+    let made = catch_unwind(|| M::new(&Setup::new(interface)));
+    match made {
+        Ok(Ok(model)) => {
+            json.open("values", '[');
+            for of in M::TABLE {
+                match catch_unwind(AssertUnwindSafe(|| of.value(&model))) {
+                    Ok(value) => match value.filter(|_| of.has_start()) {
+                        Some(value) => json.text("", &value.to_string()),
+                        None => json.word("", "null"),
+                    },
+                    Err(panic) => {
+                        forget_panic(Err(panic));
+                        json.word("", false);
+                    }
+                }
+            }
+            json.close(']');
+            if interface == Interface::ModelExchange
+                && let Ok(Some(number)) = catch_unwind(AssertUnwindSafe(|| forgotten_indicator(model)))
+            {
+                json.word("forgottenIndicator", number);
+            }
+        }
+        Ok(Err(error)) => json.number("error", format_args!("{error}")),
+        Err(panic) => {
+            json.text("error", panic_message(&*panic));
+            forget_panic(Err(panic));
+        }
+    }
+    json.close('}');
+}
+
+/// The first event indicator that keeps the value that was there before.
+fn forgotten_indicator<M: Exported>(mut model: M) -> Option<usize> {
+    let count = M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators);
+    model.calculate(0.0);
+    let fill = |mark: f64| {
+        let mut indicators = vec![mark; count];
+        model.exported_indicators(&mut indicators);
+        indicators
+    };
+    fill(1.0).iter().zip(fill(2.0)).position(|(one, two)| (*one, two) == (1.0, 2.0))
+}
+
+/// JSON that is being written; members of an array have the name "".
+#[derive(Default)]
+struct Json(String);
+
+impl Json {
+    fn begin(&mut self, name: &str) {
+        if !matches!(self.0.as_bytes().last(), None | Some(b'{' | b'[')) {
+            self.0.push(',');
+        }
+        if !name.is_empty() {
+            self.quoted(name);
+            self.0.push(':');
+        }
+    }
+
+    fn open(&mut self, name: &str, bracket: char) {
+        self.begin(name);
+        self.0.push(bracket);
+    }
+
+    fn close(&mut self, bracket: char) {
+        self.0.push(bracket);
+    }
+
+    fn quoted(&mut self, text: &str) {
+        self.0.push('"');
+        for letter in text.chars() {
+            match letter {
+                '"' | '\\' => self.0.extend(['\\', letter]),
+                '\0'..='\x1f' => self.formatted(format_args!("\\u{:04x}", u32::from(letter))),
+                _ => self.0.push(letter),
+            }
+        }
+        self.0.push('"');
+    }
+
+    fn text(&mut self, name: &str, text: &str) {
+        self.begin(name);
+        self.quoted(text);
+    }
+
+    /// A number with all its digits, or the name of something, as a string.
+    fn number(&mut self, name: &str, value: impl Debug) {
+        self.text(name, &format!("{value:?}"));
+    }
+
+    /// A number, true, false or null.
+    fn word(&mut self, name: &str, word: impl Display) {
+        self.begin(name);
+        self.formatted(format_args!("{word}"));
+    }
+
+    fn words(&mut self, name: &str, words: impl IntoIterator<Item = impl Display>) {
+        self.open(name, '[');
+        words.into_iter().for_each(|word| self.word("", word));
+        self.close(']');
+    }
+
+    fn formatted(&mut self, text: std::fmt::Arguments<'_>) {
+        // Writing to a string does not fail.
+        let _ = self.0.write_fmt(text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Json;
+
+    #[test]
+    fn strings_and_lists_are_json() {
+        let mut json = Json::default();
+        json.open("", '{');
+        json.text("a", "\"\\\n\u{e9}");
+        json.words("b", [1, 2]);
+        json.number("c", 1e300);
+        json.open("d", '[');
+        json.word("", "null");
+        json.words("", [0; 0]);
+        json.close(']');
+        json.close('}');
+        assert_eq!(json.0, "{\"a\":\"\\\"\\\\\\u000a\u{e9}\",\"b\":[1,2],\"c\":\"1e300\",\"d\":[null,[]]}");
+    }
+}

@@ -1,0 +1,150 @@
+//! A model with its functions: of a shared library, or of this program.
+#![allow(unsafe_code, reason = "C functions of a library are found by their names")]
+
+use crate::table::Table;
+use anyhow::{Context, Result};
+use fmi_abi::c_types::c_void;
+use fmi_abi::{BaseType, fmi2, fmi3};
+use std::path::Path;
+
+/// The function of a library that describes its model, as `fmu-export` declares it.
+const DESCRIPTION: &str = "fmu_export_description";
+type Describe = unsafe extern "C" fn(receive: Receive, context: *mut c_void);
+type Receive = unsafe extern "C" fn(context: *mut c_void, text: *const u8, length: usize);
+
+/// A model that describes itself, with its functions of both FMI versions.
+#[derive(Debug)]
+pub struct LoadedModel {
+    pub(crate) table: Table,
+    pub(crate) fmi2: fmi2::Functions,
+    pub(crate) fmi3: fmi3::Functions,
+    /// The variables by their types.
+    pub(crate) groups: Vec<Group>,
+    _library: Option<libloading::Library>,
+}
+
+/// The variables of a type: the places of all elements, and of these the ones that FMI 3.0 has a reference for.
+#[derive(Debug)]
+pub(crate) struct Group {
+    pub base: BaseType,
+    pub places: Vec<u32>,
+    pub first: Vec<u32>,
+}
+
+impl LoadedModel {
+    /// A model in this program: the text of `fmu_export::describe`, and its functions.
+    ///
+    /// # Safety
+    /// The functions are those of the model that is described.
+    ///
+    /// # Errors
+    /// When the description cannot be read.
+    pub unsafe fn new(description: &str, fmi2: fmi2::Functions, fmi3: fmi3::Functions) -> Result<Self> {
+        Self::with(description, fmi2, fmi3, None)
+    }
+
+    /// The model of a shared library for this machine.
+    ///
+    /// # Safety
+    /// The file is the library of an FMU that was made with `fmu-export`, or no library; what the library does when it is
+    /// loaded and called is sound.
+    ///
+    /// # Errors
+    /// When the library cannot be loaded, or does not describe itself.
+    pub unsafe fn load(path: &Path) -> Result<Self> {
+        let of = || path.display().to_string();
+        // SAFETY: the caller's promise, here and below.
+        let library = unsafe { libloading::Library::new(path) }.with_context(of)?;
+        let mut description = Vec::new();
+        // SAFETY: the functions have the types of the standards, and the description that of fmu-export; `keep` gets a
+        // pointer to a vector, which lives.
+        let (fmi2, fmi3) = unsafe {
+            let fmi2 = fmi2_symbols::find(&library);
+            let (Ok(fmi2), Ok(fmi3)) = (fmi2, fmi3_symbols::find(&library)) else {
+                anyhow::bail!(
+                    "{} has no functions of FMI; its crate needs `export_fmu!(...)` in src/lib.rs (`offer!` makes none)",
+                    path.display()
+                );
+            };
+            let describe = library.get::<Describe>(DESCRIPTION).with_context(|| {
+                format!(
+                    "{} does not describe itself: its fmu-export is older than fmu-package {}; use the same version of both",
+                    path.display(),
+                    env!("CARGO_PKG_VERSION")
+                )
+            })?;
+            describe(keep, (&raw mut description).cast());
+            (fmi2, fmi3)
+        };
+        Self::with(std::str::from_utf8(&description)?, fmi2, fmi3, Some(library)).with_context(of)
+    }
+
+    fn with(
+        description: &str,
+        fmi2: fmi2::Functions,
+        fmi3: fmi3::Functions,
+        library: Option<libloading::Library>,
+    ) -> Result<Self> {
+        let table = Table::read(description)?;
+        let group = |base| {
+            let places = table.find(|of| of.base() == base);
+            let first = table.find(|of| of.base() == base && of.element == 0);
+            Group { base, places, first }
+        };
+        let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.places.is_empty()).collect();
+        Ok(Self { table, fmi2, fmi3, groups, _library: library })
+    }
+
+    /// The `modelIdentifier`.
+    pub fn identifier(&self) -> &str {
+        &self.table.info.identifier
+    }
+
+    /// The guid that the library was compiled with.
+    pub fn guid(&self) -> &str {
+        &self.table.info.guid
+    }
+}
+
+/// # Safety
+/// The context is that of [`LoadedModel::load`], and the text has this length.
+unsafe extern "C" fn keep(context: *mut c_void, text: *const u8, length: usize) {
+    // SAFETY: the caller's promise.
+    let (description, text) =
+        unsafe { (&mut *context.cast::<Vec<u8>>(), std::slice::from_raw_parts(text, length)) };
+    description.extend_from_slice(text);
+}
+
+macro_rules! find {
+    (
+        $standard:ident $handle:ident
+        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
+        with an instance {
+            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
+        }
+    ) => {
+        /// The functions of a library.
+        ///
+        /// # Safety
+        /// Functions of these names have the types of the standard.
+        pub unsafe fn find(library: &libloading::Library) -> Result<Functions, libloading::Error> {
+            // SAFETY: the caller's promise.
+            unsafe {
+                Ok(Functions {
+                    $($free: *library.get(stringify!($free))?,)+
+                    $($function: *library.get(stringify!($function))?,)+
+                })
+            }
+        }
+    };
+}
+
+mod fmi2_symbols {
+    use fmi_abi::fmi2::Functions;
+    fmi_abi::fmi2_functions!(find);
+}
+
+mod fmi3_symbols {
+    use fmi_abi::fmi3::Functions;
+    fmi_abi::fmi3_functions!(find);
+}
