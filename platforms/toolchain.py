@@ -51,7 +51,8 @@ class Toolchain:
     @property
     def commit(self) -> str:
         """The commit of the compiler, which std's own paths contain where its sources are not installed."""
-        return re.search(r"^commit-hash: (\w+)$", _output("rustc", "-vV"), re.MULTILINE)[1]
+        (commit,) = re.findall(r"^commit-hash: (\w+)$", _output("rustc", "-vV"), re.MULTILINE)
+        return str(commit)
 
 
 @cache

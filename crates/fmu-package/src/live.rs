@@ -18,8 +18,7 @@ const PAGE: &str = "documentation/index.html";
 /// The page where a model has none.
 const PLAIN: &str = include_str!("../page/page.html");
 /// Stands where the scripts put the section that runs the FMU.
-const WITHOUT_SCRIPTS: &str =
-    "<noscript><p class=\"note\">With scripts, this page runs the FMU here. All else on it is complete.</p></noscript>";
+const WITHOUT_SCRIPTS: &str = "<noscript><p class=\"note\">With scripts, this page runs the FMU here. All else on it is complete.</p></noscript>";
 const STYLE: &str = include_str!("../page/live.css");
 const SCRIPTS: [&str; 4] = [
     include_str!("../page/plot.js"),
@@ -190,14 +189,19 @@ mod tests {
     /// Each block by the hash of its bytes (Content Security Policy Level 3, section 2.3.1).
     #[test]
     fn the_policy_has_a_hash_for_each_block() {
-        let page = "<head>\n<style>a</style></head><svg><style type=\"text/css\">b</style></svg><styled>c</styled>";
+        let page =
+            "<head>\n<style>a</style></head><svg><style type=\"text/css\">b</style></svg><styled>c</styled>";
         let page = with_policy(&format!("{page}<script></script>"));
         assert_eq!(page.matches("'sha256-").count(), 3);
-        assert!(page.starts_with("<head>\n<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none';"));
+        assert!(page.starts_with(
+            "<head>\n<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none';"
+        ));
         // printf a | openssl dgst -sha256 -binary | base64
         assert!(page.contains("style-src-elem 'sha256-ypeBEsobvcr6wjGzmiPcTaeG7/gUfE5yuYB3ha/uSLs=' "));
         // The same of nothing.
-        assert!(page.contains("script-src 'wasm-unsafe-eval' 'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=';"));
+        assert!(page.contains(
+            "script-src 'wasm-unsafe-eval' 'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=';"
+        ));
     }
 
     #[test]
