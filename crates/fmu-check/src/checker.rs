@@ -41,7 +41,7 @@ pub struct Unchecked {
 /// An FMU under attack.
 pub struct Checker {
     /// What it promises.
-    pub description: Description,
+    pub description: Arc<Description>,
     /// Where its library is.
     pub setting: Setting,
     /// Play the scripts.
@@ -104,7 +104,7 @@ impl Checker {
         deadline: Instant,
     ) -> Self {
         Self {
-            description,
+            description: Arc::new(description),
             setting,
             workers,
             courses: Vec::new(),

@@ -261,95 +261,54 @@ impl Description {
                 ));
             }
         }
+        let named = |group: &str| -> HashSet<String> {
+            elements(root, group).filter_map(|node| Some(node.attribute("name")?.to_owned())).collect()
+        };
+        let (units, types) = (named("UnitDefinitions"), named("TypeDefinitions"));
         let outputs: HashSet<usize> = self.outputs.iter().map(|unknown| unknown.variable).collect();
-        let units: HashSet<&str> =
-            elements(root, "UnitDefinitions").filter_map(|node| node.attribute("name")).collect();
-        let types: HashSet<&str> =
-            elements(root, "TypeDefinitions").filter_map(|node| node.attribute("name")).collect();
-        let mut names = HashSet::new();
-        let mut references = HashSet::new();
+        let (mut names, mut references) = (HashSet::new(), HashSet::new());
         for (place, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;
+            let of_declared = |of: &Option<String>, known: &HashSet<String>| {
+                of.as_ref().filter(|of| !known.contains(of.as_str())).cloned()
+            };
+            let (listed, output) = (outputs.contains(&place), variable.causality == "output");
+            let mut tell = |rule, why: String| wrong.push((rule, why));
             if !names.insert(name) {
-                wrong.push(("description.names", format!("two variables are called {name:?}")));
+                tell("description.names", format!("two variables are called {name:?}"));
             }
             if self.standard == Standard::Fmi3 && !references.insert(variable.reference) {
                 let why =
                     format!("value reference {} of {name} is that of another variable", variable.reference);
-                wrong.push(("description.references", why));
+                tell("description.references", why);
             }
-            if variable.causality == "output" && !outputs.contains(&place) && !variable.clocked {
-                wrong.push((
+            if output && !listed && !variable.clocked {
+                tell(
                     "description.structure",
                     format!("output {name} is not among the outputs of ModelStructure"),
-                ));
+                );
             }
-            if variable.causality != "output" && outputs.contains(&place) {
-                wrong.push((
+            if !output && listed {
+                tell(
                     "description.structure",
                     format!("{name} is no output, and is among those of ModelStructure"),
-                ));
+                );
             }
-            if let Some(unit) = &variable.unit
-                && !units.contains(unit.as_str())
-            {
-                wrong.push((
+            if let Some(unit) = of_declared(&variable.unit, &units) {
+                tell(
                     "description.units",
                     format!("{name} is in {unit:?}, which is no unit of UnitDefinitions"),
-                ));
+                );
             }
-            if let Some(of) = &variable.declared_type
-                && !types.contains(of.as_str())
-            {
-                wrong.push((
+            if let Some(of) = of_declared(&variable.declared_type, &types) {
+                tell(
                     "description.types",
                     format!("{name} is of type {of:?}, which is none of TypeDefinitions"),
-                ));
+                );
             }
-            let needs_start = ["exact", "approx"].contains(&variable.initial.as_str())
-                || variable.causality == "input" && variable.base.is_some();
-            if needs_start
-                && variable.start.is_empty()
-                && variable.causality != "independent"
-                && !variable.clocked
-            {
-                wrong.push((
-                    "description.start",
-                    format!("{name} ({}) has no start value", variable.causality),
-                ));
-            }
-            if variable.initial == "calculated" && !variable.start.is_empty() && variable.base.is_some() {
-                wrong.push(("description.start", format!("{name} is calculated and has a start value")));
-            }
-            if let (Some(min), Some(max)) = (variable.min, variable.max)
-                && min > max
-            {
-                wrong.push(("description.range", format!("{name} has a min of {min} and a max of {max}")));
-            }
-            for number in variable.starts() {
-                if variable.min.is_some_and(|min| number < min)
-                    || variable.max.is_some_and(|max| number > max)
-                {
-                    wrong.push((
-                        "description.range",
-                        format!("the start value of {name}, {number}, is outside its min and max"),
-                    ));
-                }
-            }
-            if variable
-                .base
-                .is_some_and(|base| ![BaseType::String, BaseType::Binary, BaseType::Boolean].contains(&base))
-                && variable.start.iter().any(|text| {
-                    text.parse::<f64>().is_err() && !["INF", "-INF", "NaN"].contains(&text.as_str())
-                })
-            {
-                wrong.push((
-                    "description.start",
-                    format!("the start value of {name}, {:?}, is no number", variable.start.join(" ")),
-                ));
-            }
+            wrong.extend(variable.wrong());
         }
-        let listed: HashSet<usize> = self.derivatives.iter().map(|unknown| unknown.variable).collect();
+        // A derivative that is not listed may be one that is no state's (section 2.2.8 of FMI 2.0).
         for unknown in &self.derivatives {
             if self.variables[unknown.variable].derivative_of.is_none() {
                 let name = &self.variables[unknown.variable].name;
@@ -359,8 +318,6 @@ impl Description {
                 ));
             }
         }
-        // A derivative that is not listed may be one that is no state's (section 2.2.8 of FMI 2.0).
-        let _ = listed;
         if self.stop_time.is_some_and(|stop| stop <= self.start_time) {
             wrong
                 .push(("description.experiment", "the default experiment stops before it starts".to_owned()));
@@ -419,6 +376,73 @@ impl Variable {
     /// Whether it is a number or a truth value, no text and no bytes.
     pub fn is_number(&self) -> bool {
         !matches!(self.base, None | Some(BaseType::String | BaseType::Binary))
+    }
+}
+
+/// Combinations of causality and variability, each with the values of `initial` that it may have: the tables of section 2.2.7
+/// of FMI 2.0.5 and section 2.4.7.4 of FMI 3.0.2.
+const COMBINATIONS: &[(&str, &[&str], &[&str])] = &[
+    ("parameter", &["fixed", "tunable"], &["exact"]),
+    ("structuralParameter", &["fixed", "tunable"], &["exact"]),
+    ("calculatedParameter", &["fixed", "tunable"], &["calculated", "approx"]),
+    ("input", &["discrete", "continuous"], &["", "exact"]),
+    ("output", &["constant"], &["exact"]),
+    ("output", &["discrete", "continuous"], &["calculated", "exact", "approx"]),
+    ("local", &["constant"], &["exact"]),
+    ("local", &["fixed", "tunable"], &["calculated", "approx"]),
+    ("local", &["discrete", "continuous"], &["calculated", "exact", "approx"]),
+    ("independent", &["continuous"], &[""]),
+];
+
+impl Variable {
+    /// The rules that it breaks by itself.
+    fn wrong(&self) -> Vec<Observation> {
+        let (name, mut wrong) = (&self.name, Vec::new());
+        let mut tell = |rule, why: String| wrong.push((rule, why));
+        let fits = |(causality, variabilities, _): &&(&str, &[&str], &[&str])| {
+            *causality == self.causality && variabilities.contains(&self.variability.as_str())
+        };
+        let (causality, variability, initial) = (&self.causality, &self.variability, &self.initial);
+        match COMBINATIONS.iter().find(fits) {
+            _ if self.base.is_none() || self.clocked => {}
+            None => tell("description.combination", format!("{name} is {causality} and {variability}")),
+            Some((.., initials)) if !initials.contains(&initial.as_str()) => {
+                let why = format!("{name} is {causality} and {variability}, with initial = {initial}");
+                tell("description.combination", why);
+            }
+            Some(_) => {}
+        }
+        if variability == "continuous" && !self.is_float() && self.base.is_some() {
+            tell("description.combination", format!("{name} is continuous and no floating-point number"));
+        }
+        let needs_start =
+            ["exact", "approx"].contains(&initial.as_str()) || causality == "input" && self.base.is_some();
+        if needs_start && self.start.is_empty() && causality != "independent" && !self.clocked {
+            tell("description.start", format!("{name} ({causality}) has no start value"));
+        }
+        if initial == "calculated" && !self.start.is_empty() && self.base.is_some() {
+            tell("description.start", format!("{name} is calculated and has a start value"));
+        }
+        if let (Some(min), Some(max)) = (self.min, self.max)
+            && min > max
+        {
+            tell("description.range", format!("{name} has a min of {min} and a max of {max}"));
+        }
+        let outside = |number: &f64| {
+            self.min.is_some_and(|min| *number < min) || self.max.is_some_and(|max| *number > max)
+        };
+        if let Some(number) = self.starts().into_iter().find(outside) {
+            let why = format!("the start value of {name}, {number}, is outside its min and max");
+            tell("description.range", why);
+        }
+        let texts = [BaseType::String, BaseType::Binary, BaseType::Boolean];
+        let number =
+            |text: &String| text.parse::<f64>().is_ok() || ["INF", "-INF", "NaN"].contains(&text.as_str());
+        if self.base.is_some_and(|base| !texts.contains(&base)) && !self.start.iter().all(number) {
+            let why = format!("the start value of {name}, {:?}, is no number", self.start.join(" "));
+            tell("description.start", why);
+        }
+        wrong
     }
 }
 

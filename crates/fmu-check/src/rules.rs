@@ -150,6 +150,7 @@ pub static RULES: &[Rule] = &[
     rule("derivatives.order", [V; 2], DERIVATIVES, "Partial derivatives are those of the variables in the order of the call."),
     rule("derivatives.precision", [N; 2], DERIVATIVES, "Partial derivatives are as exact as differences of the model's values can show; less exact ones may be differences themselves."),
     rule("derivatives.vectors", [V; 2], ["3.2.2", "3.2.1"], "The vectors of states and derivatives have the values of their variables, in the order of ModelStructure."),
+    rule("description.combination", [V; 2], VARIABLES, "Causality, variability and initial are a combination of the tables; only floating-point numbers are continuous."),
     rule("description.encoding", [V; 2], ["2.2", "2.4"], "modelDescription.xml is encoded in UTF-8."),
     rule("description.experiment", [V; 2], ["2.2.5", "2.4.6"], "The default experiment ends after its start."),
     rule("description.identifier", [V; 2], ["2.1.1", "2.2.2"], "modelIdentifier is a name in C."),

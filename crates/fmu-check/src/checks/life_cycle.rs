@@ -29,179 +29,201 @@ fn play(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// An order of calls, and whether it is one for a course.
+type Order = (fn(&Checker, &Course) -> bool, fn(&mut Writer, &Course));
+
 /// Orders that importers are seen to use, and those at the edges.
+const ORDERS: &[Order] = &[
+    (always, made_only),
+    (always, initialized_only),
+    (always, ended_at_once),
+    (always, run_twice),
+    (always, reset_everywhere),
+    (several, many),
+    (always, long_name),
+    (stepped, up_to_the_stop),
+    (always, logging),
+    (integrated, events_everywhere),
+    (with_event_mode, event_mode),
+];
+
+fn always(_: &Checker, _: &Course) -> bool {
+    true
+}
+
+fn several(checker: &Checker, course: &Course) -> bool {
+    checker.several(course.interface)
+}
+
+fn stepped(_: &Checker, course: &Course) -> bool {
+    course.interface == Interface::CoSimulation
+}
+
+fn integrated(_: &Checker, course: &Course) -> bool {
+    course.interface == Interface::ModelExchange
+}
+
+fn with_event_mode(checker: &Checker, course: &Course) -> bool {
+    stepped(checker, course) && checker.fmi3() && checker.can(course.interface, &["hasEventMode"])
+}
+
+fn points(writer: &mut Writer, of: usize, course: &Course, count: usize) {
+    for point in course.points.iter().take(count) {
+        writer.point(of, course, point);
+    }
+}
+
+fn made_only(writer: &mut Writer, course: &Course) {
+    writer.make(0, course.interface);
+    writer.free(0);
+}
+
+fn initialized_only(writer: &mut Writer, course: &Course) {
+    writer.make(0, course.interface);
+    writer.enter(0);
+    writer.ask(0, course.interface);
+    writer.free(0);
+}
+
+fn ended_at_once(writer: &mut Writer, course: &Course) {
+    writer.begin(0, course);
+    writer.call(0, "Terminate", vec![]);
+    writer.ask(0, course.interface);
+    writer.free(0);
+}
+
+fn run_twice(writer: &mut Writer, course: &Course) {
+    writer.begin(0, course);
+    points(writer, 0, course, usize::MAX);
+    writer.call(0, "Terminate", vec![]);
+    writer.ask(0, course.interface);
+    writer.call(0, "Reset", vec![]);
+    writer.enter(0);
+    writer.leave(0, course);
+    points(writer, 0, course, usize::MAX);
+    writer.ask(0, course.interface);
+    writer.free(0);
+}
+
+fn reset_everywhere(writer: &mut Writer, course: &Course) {
+    writer.make(0, course.interface);
+    writer.call(0, "Reset", vec![]);
+    writer.enter(0);
+    writer.call(0, "Reset", vec![]);
+    writer.call(0, "Reset", vec![]);
+    writer.enter(0);
+    writer.leave(0, course);
+    writer.call(0, "Reset", vec![]);
+    writer.enter(0);
+    writer.leave(0, course);
+    points(writer, 0, course, 2);
+    writer.free(0);
+}
+
+/// More instances than a pool may have, and four that are freed in another order.
+fn many(writer: &mut Writer, course: &Course) {
+    for of in 4..20 {
+        writer.make(of, course.interface);
+    }
+    for of in 0..4 {
+        writer.begin(of, course);
+    }
+    for of in 4..20 {
+        writer.free(of);
+    }
+    writer.free(0);
+    points(writer, 1, course, 2);
+    writer.free(3);
+    points(writer, 2, course, 2);
+    writer.free(2);
+    writer.free(1);
+}
+
+/// A name with spaces and letters beyond ASCII; a stop time and a tolerance.
+fn long_name(writer: &mut Writer, course: &Course) {
+    let mut how = writer.how(course.interface);
+    how.name = Some("a long name, with Gödel in it %s #1#".to_owned());
+    writer.add(Step::Make(0, how));
+    let stop = course.end + 1.0 + course.end.abs();
+    writer.enter_with(0, Some(1e-6), writer.description.start_time, Some(stop));
+    writer.leave(0, course);
+    points(writer, 0, course, 3);
+    writer.free(0);
+}
+
+/// The last step meets the stop time.
+fn up_to_the_stop(writer: &mut Writer, course: &Course) {
+    writer.make(0, course.interface);
+    writer.enter_with(0, None, writer.description.start_time, Some(course.end));
+    writer.leave(0, course);
+    points(writer, 0, course, usize::MAX);
+    writer.free(0);
+}
+
+/// Categories, all and each, in every mode.
+fn logging(writer: &mut Writer, course: &Course) {
+    let categories: Vec<Option<Vec<u8>>> =
+        writer.description.log_categories.iter().map(|name| Some(name.clone().into_bytes())).collect();
+    let log = |writer: &mut Writer| {
+        writer.call(0, "SetDebugLogging", vec![Arg::Whole(1), Arg::Whole(0), Arg::Null]);
+        let all = std::iter::once(categories.clone()).filter(|all| !all.is_empty());
+        for some in all.chain(categories.iter().map(|category| vec![category.clone()])) {
+            let count = Arg::Whole(some.len() as i64);
+            writer.call(0, "SetDebugLogging", vec![Arg::Whole(1), count, Arg::Texts(some)]);
+        }
+    };
+    writer.make(0, course.interface);
+    log(writer);
+    writer.enter(0);
+    log(writer);
+    writer.leave(0, course);
+    log(writer);
+    points(writer, 0, course, 2);
+    log(writer);
+    writer.free(0);
+}
+
+/// An event at every point: importers may enter Event Mode at any time.
+fn events_everywhere(writer: &mut Writer, course: &Course) {
+    writer.begin(0, course);
+    for point in &course.points {
+        writer.point(0, course, point);
+        if point.updates == 0 {
+            writer.call(0, "EnterEventMode", vec![]);
+            // Whether more are needed is not known here: as many as an event needs.
+            writer.update(0, 3);
+            writer.call(0, "EnterContinuousTimeMode", vec![]);
+        }
+    }
+    writer.ask(0, course.interface);
+    writer.free(0);
+}
+
+fn event_mode(writer: &mut Writer, course: &Course) {
+    let mut how = writer.how(course.interface);
+    how.event_mode = true;
+    writer.add(Step::Make(0, how));
+    writer.enter(0);
+    writer.call(0, "ExitInitializationMode", vec![]);
+    writer.update(0, 3);
+    writer.call(0, "EnterStepMode", vec![]);
+    let start = writer.description.start_time;
+    let size = course.points.first().map_or(1e-3, |point| point.size);
+    writer.step(0, start, size);
+    writer.call(0, "EnterEventMode", vec![]);
+    writer.update(0, 3);
+    writer.call(0, "EnterStepMode", vec![]);
+    writer.ask(0, course.interface);
+    writer.call(0, "Terminate", vec![]);
+    writer.free(0);
+}
+
+/// All orders of the table, and the edges of a life.
 pub fn orders(checker: &Checker) -> anyhow::Result<()> {
     for course in &checker.courses {
-        let interface = course.interface;
-        let mut orders: Vec<Writer> = Vec::new();
-        let mut order = |write: &dyn Fn(&mut Writer)| {
+        for (_, write) in ORDERS.iter().filter(|(fits, _)| fits(checker, course)) {
             let mut writer = checker.writer();
-            write(&mut writer);
-            orders.push(writer);
-        };
-        let points = |writer: &mut Writer, of: usize, count: usize| {
-            for point in course.points.iter().take(count) {
-                writer.point(of, course, point);
-            }
-        };
-        order(&|writer| {
-            writer.make(0, interface);
-            writer.free(0);
-        });
-        order(&|writer| {
-            writer.make(0, interface);
-            writer.enter(0);
-            writer.ask(0, interface);
-            writer.free(0);
-        });
-        order(&|writer| {
-            writer.begin(0, course);
-            writer.call(0, "Terminate", vec![]);
-            writer.ask(0, interface);
-            writer.free(0);
-        });
-        order(&|writer| {
-            writer.begin(0, course);
-            points(writer, 0, usize::MAX);
-            writer.call(0, "Terminate", vec![]);
-            writer.ask(0, interface);
-            writer.call(0, "Reset", vec![]);
-            writer.enter(0);
-            writer.leave(0, course);
-            points(writer, 0, usize::MAX);
-            writer.ask(0, interface);
-            writer.free(0);
-        });
-        order(&|writer| {
-            writer.make(0, interface);
-            writer.call(0, "Reset", vec![]);
-            writer.enter(0);
-            writer.call(0, "Reset", vec![]);
-            writer.call(0, "Reset", vec![]);
-            writer.enter(0);
-            writer.leave(0, course);
-            writer.call(0, "Reset", vec![]);
-            writer.enter(0);
-            writer.leave(0, course);
-            points(writer, 0, 2);
-            writer.free(0);
-        });
-        if checker.several(interface) {
-            order(&|writer| {
-                // More than a pool may have.
-                for of in 4..20 {
-                    writer.make(of, interface);
-                }
-                for of in 0..4 {
-                    writer.begin(of, course);
-                }
-                for of in 4..20 {
-                    writer.free(of);
-                }
-                writer.free(0);
-                points(writer, 1, 2);
-                writer.free(3);
-                points(writer, 2, 2);
-                writer.free(2);
-                writer.free(1);
-            });
-        }
-        // Texts with spaces and beyond ASCII; a stop time and a tolerance.
-        order(&|writer| {
-            let mut how = writer.how(interface);
-            how.name = Some("a long name, with Gödel in it %s #1#".to_owned());
-            writer.add(Step::Make(0, how));
-            let stop = course.end + 1.0 + course.end.abs();
-            writer.enter_with(0, Some(1e-6), writer.description.start_time, Some(stop));
-            writer.leave(0, course);
-            points(writer, 0, 3);
-            writer.free(0);
-        });
-        // Up to the stop time, which the last step meets.
-        if interface == Interface::CoSimulation {
-            order(&|writer| {
-                writer.make(0, interface);
-                writer.enter_with(0, None, writer.description.start_time, Some(course.end));
-                writer.leave(0, course);
-                points(writer, 0, usize::MAX);
-                writer.free(0);
-            });
-        }
-        // Categories, all and each, in every mode.
-        order(&|writer| {
-            let categories: Vec<Option<Vec<u8>>> = writer
-                .description
-                .log_categories
-                .iter()
-                .map(|name| Some(name.clone().into_bytes()))
-                .collect();
-            let log = |writer: &mut Writer| {
-                writer.call(0, "SetDebugLogging", vec![Arg::Whole(1), Arg::Whole(0), Arg::Null]);
-                if !categories.is_empty() {
-                    let count = categories.len() as i64;
-                    writer.call(
-                        0,
-                        "SetDebugLogging",
-                        vec![Arg::Whole(1), Arg::Whole(count), Arg::Texts(categories.clone())],
-                    );
-                    for category in &categories {
-                        writer.call(
-                            0,
-                            "SetDebugLogging",
-                            vec![Arg::Whole(1), Arg::Whole(1), Arg::Texts(vec![category.clone()])],
-                        );
-                    }
-                }
-            };
-            writer.make(0, interface);
-            log(writer);
-            writer.enter(0);
-            log(writer);
-            writer.leave(0, course);
-            log(writer);
-            points(writer, 0, 2);
-            log(writer);
-            writer.free(0);
-        });
-        if interface == Interface::ModelExchange {
-            // An event at every point, as importers may enter Event Mode at any time.
-            order(&|writer| {
-                writer.begin(0, course);
-                for point in &course.points {
-                    writer.point(0, course, point);
-                    if point.updates == 0 {
-                        writer.call(0, "EnterEventMode", vec![]);
-                        // Whether more are needed is not known here: those that an event here needed are enough.
-                        writer.update(0, 3);
-                        writer.call(0, "EnterContinuousTimeMode", vec![]);
-                    }
-                }
-                writer.ask(0, interface);
-                writer.free(0);
-            });
-        }
-        if interface == Interface::CoSimulation && checker.can(interface, &["hasEventMode"]) && checker.fmi3()
-        {
-            order(&|writer| {
-                let mut how = writer.how(interface);
-                how.event_mode = true;
-                writer.add(Step::Make(0, how));
-                writer.enter(0);
-                writer.call(0, "ExitInitializationMode", vec![]);
-                writer.update(0, 3);
-                writer.call(0, "EnterStepMode", vec![]);
-                let start = writer.description.start_time;
-                let size = course.points.first().map_or(1e-3, |point| point.size);
-                writer.step(0, start, size);
-                writer.call(0, "EnterEventMode", vec![]);
-                writer.update(0, 3);
-                writer.call(0, "EnterStepMode", vec![]);
-                writer.ask(0, interface);
-                writer.call(0, "Terminate", vec![]);
-                writer.free(0);
-            });
-        }
-        for writer in orders {
+            write(&mut writer, course);
             play(checker, writer)?;
         }
         token(checker, course)?;

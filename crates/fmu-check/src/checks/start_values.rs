@@ -19,10 +19,10 @@ pub fn starts(checker: &Checker) -> anyhow::Result<()> {
         writer.enter(0);
         let reads = writer.read_these(0, &sample(description, 10_000));
         let all = reads.clone();
-        let variables = description.variables.clone();
+        let model = Arc::clone(&checker.description);
         let judge: Judge = Arc::new(move |run| {
             for (place, _) in all.iter().flat_map(|read| read.of.iter().copied()) {
-                let variable = &variables[place];
+                let variable = &model.variables[place];
                 let fixed = variable.initial == "exact" || variable.causality == "input";
                 let (true, Some(base)) =
                     (fixed && !variable.start.is_empty() && !variable.clocked, variable.base)
@@ -75,7 +75,7 @@ fn values(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<(
         writer.point(0, course, point);
         reads.push(writer.read(0));
     }
-    let variables = description.variables.clone();
+    let model = Arc::clone(&checker.description);
     let standard = description.standard;
     type Test = Arc<dyn Fn(&crate::description::Variable, &Written) -> Option<String> + Send + Sync>;
     let tests: [(&str, Test); 5] = [
@@ -126,11 +126,11 @@ fn values(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<(
     let run = checker.play(&writer.script)?;
     checker.keep_always(&writer.script, &run);
     for (name, test) in tests {
-        let (variables, reads) = (variables.clone(), reads.clone());
+        let (model, reads) = (Arc::clone(&model), reads.clone());
         let judge: Judge = Arc::new(move |run| {
             for reads in &reads {
                 for (place, _) in reads.iter().flat_map(|read| read.of.iter().copied()) {
-                    let variable = &variables[place];
+                    let variable = &model.variables[place];
                     if variable.clocked {
                         continue;
                     }
