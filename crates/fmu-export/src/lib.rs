@@ -5,7 +5,8 @@
 //! What an author writes: [`Model`] with a table of [`variables!`], the capabilities, [`export_fmu!`]. Below it, from
 //! the inside out: `instance` has what each call checks and does, free of pointers and of versions of FMI; `boundary`
 //! what C functions have in common; [`fmi2`] and [`fmi3`] the C functions of the standards, whose types and tables of
-//! allowed calls are in [`fmi_abi`]. All `unsafe` is in these three.
+//! allowed calls are in [`fmi_abi`]. All `unsafe` is in these three. [`describe`](describe()) is the library's description of its
+//! model, which the program reads that makes the FMU.
 
 mod boundary;
 mod capabilities;
