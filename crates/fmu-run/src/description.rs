@@ -343,7 +343,9 @@ fn differentiate(root: Node, standard: Standard, variables: &mut [Variable], arr
             (Standard::Fmi3, Some(own)) => {
                 let Some(state) = number(node, "derivative") else { continue };
                 let pairs = arrays.elements(own).zip(arrays.elements(state));
-                found.extend(pairs.filter_map(|(own, state)| Some((names.get(&own)?.clone(), names.get(&state)))));
+                found.extend(
+                    pairs.filter_map(|(own, state)| Some((names.get(&own)?.clone(), names.get(&state)))),
+                );
             }
             _ => {}
         }

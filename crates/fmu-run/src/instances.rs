@@ -401,8 +401,12 @@ impl Instances {
         let (unknown, known) = (self.real(unknowns)?, self.real(knowns)?);
         let why = "has no directional derivatives (providesDirectionalDerivative is not true)";
         self.system.check_offer(self.interface, |offer| offer.directional_derivatives, why)?;
-        if let Some(name) = self.description().and_then(|of| knowns.names().iter().find(|name| !of.is_known(name))) {
-            return request(format!("{name} cannot be a known; expected an input, a parameter or a continuous state"));
+        if let Some(name) =
+            self.description().and_then(|of| knowns.names().iter().find(|name| !of.is_known(name)))
+        {
+            return request(format!(
+                "{name} cannot be a known; expected an input, a parameter or a continuous state"
+            ));
         }
         let rows = rows(knowns.len(), seed.len(), self.len());
         self.fill_by_place(unknowns.len(), values, |place, _, instance, row| {

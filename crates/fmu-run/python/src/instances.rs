@@ -503,7 +503,9 @@ impl Instances {
     ) -> PyResult<()> {
         if let Some(why) = lock(&self.held).none_left() {
             let all = if self.count == 1 { "the instance has" } else { "all instances have" };
-            let why = format!("{all} dropped out before; reset() or restore() brings them back (instance 0: {why})");
+            let why = format!(
+                "{all} dropped out before; reset() or restore() brings them back (instance 0: {why})"
+            );
             return Err(FmuError::new_err(why));
         }
         self.revive(py, body)

@@ -196,12 +196,7 @@ impl<'a> Room<'a> {
 }
 
 impl<'a> Worker<'a> {
-    fn new(
-        system: &'a System,
-        plan: &'a Plan<'a>,
-        watch: &'a Watch,
-        logging: Option<time::Instant>,
-    ) -> Self {
+    fn new(system: &'a System, plan: &'a Plan<'a>, watch: &'a Watch, logging: Option<time::Instant>) -> Self {
         Self { system, plan, watch, logging, instance: None, room: Room::of(plan) }
     }
 

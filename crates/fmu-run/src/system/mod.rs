@@ -417,13 +417,14 @@ fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
     let similarity = |known: &String| {
         let known = known.to_lowercase();
         // The beginning of a name, too, but not its first letter only.
-        let short = known.len().min(wanted.len()) > 1
-            && (wanted.starts_with(&known) || known.starts_with(&wanted));
+        let short =
+            known.len().min(wanted.len()) > 1 && (wanted.starts_with(&known) || known.starts_with(&wanted));
         let derived = known.starts_with("der(") && !wanted.starts_with("der(");
         0.1 * f64::from(u8::from(short)) - f64::from(u8::from(derived))
             + strsim::jaro_winkler(&known, &wanted)
     };
-    let names = names.map(|known| (similarity(&known), known)).filter(|(similarity, _)| *similarity > SIMILAR);
+    let names =
+        names.map(|known| (similarity(&known), known)).filter(|(similarity, _)| *similarity > SIMILAR);
     names.reduce(|best, other| if other.0 > best.0 { other } else { best }).map(|(_, name)| name)
 }
 
