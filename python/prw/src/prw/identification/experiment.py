@@ -157,9 +157,7 @@ def spectra(courses: Array) -> Complex:
     return np.fft.rfft(courses, axis=0, norm="ortho")
 
 
-def prepare(
-    recording: Recording, quantum: float = 0.0, rates_of: Rates = "motors", exact: bool = False
-) -> Experiment:
+def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motors", exact: bool = False) -> Experiment:
     """Find the motors' paths in `recording`, and how far their samples and the other encoders err.
 
     quantum: of the motor angles in rad, where it is known to be coarser than it looks. rates_of: see `Rates`. exact: the
