@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import rig
+from built import ROOT
 
 import prw
 
@@ -39,6 +40,12 @@ def test_a_run_is_taken_as_it_is(run, fmu):
 def test_a_run_without_rates(run, fmu):
     angles = prw.Motion(run.time, run.motion.theta)
     check(prw.identify(prw.simulate(angles, {"k1": K1}, fmu=fmu), starts=1, fmu=fmu), K1, 1e-6)
+
+
+def test_a_run_of_a_recording(fmu):
+    """Its motors rest at first, and are as rough as the encoder that recorded them: so were the FMU's inputs."""
+    run = prw.simulate(ROOT / "examples" / "point_to_point.csv", {"k1": K1}, fmu=fmu)
+    check(prw.identify(run, starts=1, fmu=fmu), K1, 1e-5)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2, 1e-1])

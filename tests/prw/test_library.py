@@ -361,5 +361,5 @@ def test_the_programs_in_the_readme(monkeypatch: pytest.MonkeyPatch) -> None:
     exec(compile(short, "README.md", "exec"), names)
     assert names["run"].motion.name == "fig4" and names["run"].parameters["k1"] == 100.0
     exec(compile(program, "README.md", "exec"), names)
-    assert names["run"].parameters["k1"] == 100.0 and names["model"].A.shape == (6, 6)
-    assert names["table"].num_rows == 100
+    assert names["run"].parameters["k1"] == pytest.approx(1.8 * 180 / np.pi) and names["model"].A.shape == (6, 6)
+    assert names["table"].num_rows == 100 and names["found"].fits

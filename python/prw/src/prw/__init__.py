@@ -6,6 +6,14 @@ run it with thousands of parameter sets, show it moving, compare what other tool
     run = prw.simulate("motors.csv", {"k1": 100.0})  # or a prw.Motion; by default the paper's experiment
     run["roll"]  # (n,) rad, at run.time
 
+What there is to call; the modules of this package are its inside:
+
+    simulate, read, animate, sweep     runs and recordings
+    identify, excite                   parameters from measurements, and motions to measure with
+    linearize, Linearizer              linear models
+    check                              another tool's results against a reference
+    default_fmu                        the path of the FMU
+
 Everything is in SI (s, rad, rad/s, N.m, kg.m2). Nothing writes a file unless it is told where, and nothing prints but the progress
 of long work at a Python prompt or in a notebook. What the caller can put right is a `prw.UserError`, whose text says what is wrong
 and what to do.

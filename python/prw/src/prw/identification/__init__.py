@@ -145,7 +145,7 @@ def identify(
             "motors" if not isinstance(each, Run) else "angles" if each.motion.omega is None else "inputs"
             for each in several
         ]
-        experiments = [prepare(each, quantum, how) for each, how in zip(measured, rates)]
+        experiments = [prepare(each, quantum, how, how != "motors") for each, how in zip(measured, rates)]
         solution = fit(model, experiments, task, starts, seed)
         verdict = judge(solution)
         exact = [may_be_simulated(experiment) for experiment in experiments]

@@ -9,6 +9,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from prw.channels import QUANTITIES
 from prw.identification.experiment import Experiment
@@ -25,6 +26,8 @@ TOLERANCE = 1.7
 ALIKE, UNLIKE = 0.9, 0.7
 #: Values at an end of a channel's range that come one after another so often are no chance, s; so long at rest: stuck.
 FLAT, FLATS, STUCK = 4, 3, 0.25
+#: A motor that turns with no more than this share of its greatest rate rests.
+AT_REST = 1e-3
 #: So many of the sets of channels that promise most are fitted, with so many rounds of judging the noise.
 TRIED, ROUNDS = 2, 2
 #: A fault that explains this share of what the best explains is named as well; and one that explains this share in addition.
@@ -113,17 +116,18 @@ def _looks(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
             if slip and like[j, j] > UNLIKE:
                 yield f"{name} looks as if it were {SLIPS[slip]}: it is {gain[j]:.3g} times what the FMU has"
                 break
-        yield from _flat(name, experiment.sampled, column)
+        speed = np.interp(experiment.sampled, experiment.time, np.abs(experiment.omega).max(axis=1))
+        yield from _flat(name, experiment.sampled, column, speed > AT_REST * speed.max())
 
 
 def _slip(gain: float) -> float:
     return next((s for s in SLIPS if gain > 0 and abs(np.log(gain / s)) < np.log(TOLERANCE)), 0.0)
 
 
-def _flat(name: str, time: Array, column: Array) -> Iterator[str]:
-    """Whether a channel is cut off at an end of its range, or stands still while others do not."""
+def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> Iterator[str]:
+    """Whether a channel is cut off at an end of its range, or stands still while the motors are moving (n,)."""
     there = np.isfinite(column)
-    time, column = time[there], column[there]
+    time, column, moving = time[there], column[there], moving[there]
     edges = np.flatnonzero(np.diff(column) != 0)
     first, last = np.concatenate([[0], edges + 1]), np.concatenate([edges, [len(column) - 1]])
     long = last - first + 1
@@ -137,7 +141,7 @@ def _flat(name: str, time: Array, column: Array) -> Iterator[str]:
             yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, and what lies {said} is lost"
             return
     longest = int(np.argmax(long))
-    if time[last[longest]] - time[first[longest]] > STUCK:
+    if moving[first[longest] : last[longest] + 1].mean() > 0.5 and time[last[longest]] - time[first[longest]] > STUCK:
         yield f"{name} is stuck from {time[first[longest]]:.4g} to {time[last[longest]]:.4g} s, at {column[first[longest]]:.4g} (SI)"
 
 

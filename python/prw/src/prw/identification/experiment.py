@@ -157,11 +157,11 @@ def spectra(courses: Array) -> Complex:
     return np.fft.rfft(courses, axis=0, norm="ortho")
 
 
-def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motors") -> Experiment:
+def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motors", exact: bool = False) -> Experiment:
     """Find the motors' paths in `recording`, and how far their samples and the other encoders err.
 
-    quantum: of the motor angles in rad, where it is known to be coarser than it looks. rates_of: see `Rates`.
-    Raises UserError where nothing was measured, or too little of something."""
+    quantum: of the motor angles in rad, where it is known to be coarser than it looks. rates_of: see `Rates`. exact: the
+    samples are the motors' angles and rates. Raises UserError where nothing was measured, or too little of something."""
     sampled, omega = recording.time, recording.omega
     channels, values, notes = _measured(recording)
     paths = [smooth(sampled, recording.theta[:, i], None if omega is None else omega[:, i], quantum) for i in (0, 1)]
@@ -178,7 +178,7 @@ def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motor
     errors = [_drawn(path, inside, sampled) for path in paths]
     jumps = None
     if rates_of != "motors" and even:
-        if all(path.noise <= ROUNDED * max(np.ptp(path.quiet), LEAST) for path in paths):
+        if exact or all(path.noise <= ROUNDED * max(np.ptp(path.quiet), LEAST) for path in paths):
             theta, rates = recording.theta, rates if omega is None else omega
             errors = [np.zeros((1, len(time)))] * 2
         if rates_of == "angles":
