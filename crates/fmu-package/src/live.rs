@@ -72,12 +72,11 @@ fn live(page: &str, runnables: &[Runnable], resources: &[&str], scripts: &[&str]
     // In JSON, `<` occurs in strings only: a name must not end the script.
     let resources = serde_json::to_string(resources)?.replace('<', "\\u003c");
     writeln!(text, "], {resources}).catch(withoutIt);\n}})();\n</script>")?;
-    let begin = page.find("<main>").map_or(page.len(), |place| place + "<main>".len());
-    let (head, rest) = page.split_at(begin);
     // At the end, when the elements exist that the scripts change.
-    let end = rest.rfind("</body>").unwrap_or(rest.len());
-    let page = format!("{head}{WITHOUT_SCRIPTS}{}{text}{}", &rest[..end], &rest[end..]);
-    Ok(with_policy(&page))
+    let end = page.rfind("</body>").unwrap_or(page.len());
+    let begin = ["<main>", "<body>"].iter().find_map(|tag| Some(page.find(tag)? + tag.len())).unwrap_or(end);
+    let (head, content, tail) = (&page[..begin], &page[begin..end], &page[end..]);
+    Ok(with_policy(&format!("{head}{WITHOUT_SCRIPTS}{content}{text}{tail}")))
 }
 
 /// The page with a Content-Security-Policy: the scripts and the style sheets of the page run, by their hashes, and nothing is
@@ -172,7 +171,8 @@ mod tests {
             &["const ownScript = 1;\n"],
         )
         .unwrap();
-        assert!(page.contains("<body><p>text</p><style>") && page.ends_with("</script>\n</body></html>"));
+        assert!(page.contains(&format!("<body>{WITHOUT_SCRIPTS}<p>text</p><style>")));
+        assert!(page.ends_with("</script>\n</body></html>"));
         let places = ["async function live(", "const ownScript", "live([\n{ description: \""];
         assert!(places.map(|part| page.find(part).unwrap()).is_sorted());
         assert_eq!(page.matches("\n{ description: \"").count(), 2);
