@@ -199,7 +199,12 @@ impl Builder {
         }
         let with_page = match options.live_page {
             true => {
-                let description = describe(Fmi::V2, &guid)?;
+                // The page runs the FMU for FMI 2.0.
+                let known = descriptions.iter().find(|(fmi, _)| *fmi == Fmi::V2);
+                let description = match known {
+                    Some((_, description)) => description.clone(),
+                    None => describe(Fmi::V2, &guid)?,
+                };
                 Some(self.live_page(options.tunable, &guid, &model, description, &content)?)
             }
             false => None,

@@ -52,7 +52,7 @@ pub fn content_files(folder: &Path, except: &[&str]) -> Result<Vec<ContentFile>>
     Ok(content)
 }
 
-#[cfg(all(test, feature = "command"))]
+#[cfg(test)]
 mod tests {
     use super::content_files;
     use std::fs;

@@ -1,12 +1,10 @@
 //! The model description of FMI 2.0 (section 2.2).
 
 use crate::changes::Changes;
-use crate::check::check;
 use crate::definitions::{filled, items, list, type_definitions, unit_definitions, with_attributes};
 use crate::describe::{default_experiment, is_reinit, log_categories, root, with_dependencies, with_facts};
-use crate::memory;
 use crate::model::LoadedModel;
-use crate::structure::{ModelStructure, Unknown};
+use crate::structure::{ModelStructure, Unknown, checked_starts};
 use crate::table::{CoSimulation, ModelExchange, Table, Type, Variable};
 use crate::xml::Element;
 use anyhow::{Result, ensure};
@@ -28,12 +26,11 @@ pub fn describe(model: &LoadedModel, changes: &Changes) -> Result<String> {
             variable.name
         );
     }
-    let starts = check(model)?;
-    memory::check(model, &starts)?;
+    let starts = checked_starts(model)?;
     let structure = ModelStructure::of(model, changes.tunable_parameters)?;
     let types: Vec<_> = table.variables.iter().map(|of| &of.of).collect();
     let names: Vec<_> = table.variables.iter().map(|of| of.name.as_str()).collect();
-    let variables = table.variables.iter().zip(starts).zip(0..);
+    let variables = table.variables.iter().zip(starts.iter().cloned()).zip(0..);
     let variables = variables.map(|((of, start), vr)| scalar_variable(table, of, vr, start, changes));
 
     let indicators = table.model_exchange.as_ref().map(|offer| offer.indicators);

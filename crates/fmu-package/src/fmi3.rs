@@ -4,12 +4,10 @@
 //! event indicators. Value references count from 1 in this order, an array as many times as it has elements.
 
 use crate::changes::Changes;
-use crate::check::check;
 use crate::definitions::{filled, items, type_definitions, unit_definitions, with_attributes, with_range};
 use crate::describe::{default_experiment, is_reinit, log_categories, root, with_dependencies, with_facts};
-use crate::memory;
 use crate::model::LoadedModel;
-use crate::structure::{ModelStructure, Unknown};
+use crate::structure::{ModelStructure, Unknown, checked_starts};
 use crate::table::{CoSimulation, Table, Type, Variable};
 use crate::xml::Element;
 use anyhow::{Result, ensure};
@@ -21,8 +19,7 @@ use fmi_abi::{BaseType, Standard, Value};
 /// As [`fmi2::describe`](crate::fmi2::describe), and when a variable has the name of one that FMI 3.0 asks for.
 pub fn describe(model: &LoadedModel, changes: &Changes) -> Result<String> {
     let table = &model.table;
-    let starts = check(model)?;
-    memory::check(model, &starts)?;
+    let starts = checked_starts(model)?;
     let structure = ModelStructure::of_fmi3(model, changes.tunable_parameters)?;
     let types: Vec<_> = table.variables.iter().map(|of| &of.of).collect();
     let names: Vec<_> = table.variables.iter().map(|of| of.name_of_array.as_str()).collect();

@@ -18,87 +18,52 @@
 //! | the FMU | `connectors`, `version`, `platform`, `cargo`, `pack` |
 //! | the command | `library`, `universal`, `cross`, `c_sources`, `live`, `terminal`, `command` |
 
-#![cfg_attr(not(feature = "command"), allow(rustdoc::broken_intra_doc_links))]
-#![cfg_attr(docsrs, feature(doc_cfg))]
-
+mod c_sources;
+mod cargo;
+mod changes;
+mod check;
+mod command;
+mod connectors;
 mod content;
-mod fingerprint;
-mod folder;
-mod packages;
-mod sources;
-mod variant;
-
-#[cfg(feature = "files")]
+mod cross;
+mod definitions;
+mod derivatives;
+mod describe;
 pub mod files;
-#[cfg(feature = "files")]
+mod fingerprint;
+pub mod fmi2;
+pub mod fmi3;
+mod folder;
+mod instance;
+mod library;
+mod live;
+mod memory;
+mod model;
+mod pack;
+mod packages;
+mod platform;
+mod sample;
+mod sources;
+pub mod structure;
+mod table;
+pub mod terminal;
+mod universal;
+mod variant;
+mod version;
 pub mod xml;
 
-#[cfg(feature = "command")]
-mod cargo;
-#[cfg(feature = "command")]
-mod changes;
-#[cfg(feature = "command")]
-mod check;
-#[cfg(feature = "command")]
-mod connectors;
-#[cfg(feature = "command")]
-mod definitions;
-#[cfg(feature = "command")]
-mod derivatives;
-#[cfg(feature = "command")]
-mod describe;
-#[cfg(feature = "command")]
-pub mod fmi2;
-#[cfg(feature = "command")]
-pub mod fmi3;
-#[cfg(feature = "command")]
-mod instance;
-#[cfg(feature = "command")]
-mod memory;
-#[cfg(feature = "command")]
-mod model;
-#[cfg(feature = "command")]
-mod pack;
-#[cfg(feature = "command")]
-mod platform;
-#[cfg(feature = "command")]
-mod sample;
-#[cfg(feature = "command")]
-pub mod structure;
-#[cfg(feature = "command")]
-mod table;
-#[cfg(feature = "command")]
-mod version;
-
-#[cfg(feature = "command")]
-mod c_sources;
-#[cfg(feature = "command")]
-mod command;
-#[cfg(feature = "command")]
-mod cross;
-#[cfg(feature = "command")]
-mod library;
-#[cfg(feature = "command")]
-mod live;
-#[cfg(feature = "command")]
-pub mod terminal;
-#[cfg(feature = "command")]
-mod universal;
-
-pub use content::{ContentFile, content_files};
-pub use fingerprint::Fingerprint;
-pub use sources::Sources;
-pub use variant::{NO_GUID, Variant};
-
-#[cfg(feature = "command")]
 pub use {
     c_sources::{CSources, LINKING, WEBASSEMBLY, c_sources, check_tools},
     cargo::LibraryBuild,
     changes::Changes,
     command::{BuildOptions, Builder, build},
     connectors::{Terminal, terminals},
+    content::{ContentFile, content_files},
+    fingerprint::Fingerprint,
     model::LoadedModel,
     pack::{Library, Parts, pack},
     platform::Platform,
+    sources::Sources,
+    variant::{NO_GUID, Variant},
     version::Fmi,
 };

@@ -4,8 +4,9 @@
 use crate::table::Table;
 use anyhow::{Context, Result};
 use fmi_abi::c_types::c_void;
-use fmi_abi::{BaseType, fmi2, fmi3};
+use fmi_abi::{BaseType, Value, fmi2, fmi3};
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// The function of a library that describes its model, as `fmu-export` declares it.
 const DESCRIPTION: &str = "fmu_export_description";
@@ -20,6 +21,8 @@ pub struct LoadedModel {
     pub(crate) fmi3: fmi3::Functions,
     /// The variables by their types.
     pub(crate) groups: Vec<Group>,
+    /// The start values by variable, once the model has been checked.
+    pub(crate) starts: OnceLock<Vec<Option<Value>>>,
     _library: Option<libloading::Library>,
 }
 
@@ -92,7 +95,7 @@ impl LoadedModel {
             Group { base, places, first }
         };
         let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.places.is_empty()).collect();
-        Ok(Self { table, fmi2, fmi3, groups, _library: library })
+        Ok(Self { table, fmi2, fmi3, groups, starts: OnceLock::new(), _library: library })
     }
 
     /// The `modelIdentifier`.

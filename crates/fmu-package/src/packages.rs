@@ -98,7 +98,7 @@ fn packages(metadata: &Value) -> Result<Vec<LocalPackage>> {
     packages.iter().map(|value| package(value).context("cargo describes a package in another way")).collect()
 }
 
-#[cfg(all(test, feature = "command"))]
+#[cfg(test)]
 mod tests {
     use super::Neighbourhood;
     use std::fs;

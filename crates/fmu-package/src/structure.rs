@@ -5,8 +5,9 @@
 //! never changes is constant. Of other models that proves nothing: there an unknown depends on what it
 //! declares (`depends_on`), else on everything, and trying only finds wrong declarations.
 
-use crate::check::check;
+use crate::check::{Starts, check};
 use crate::derivatives::check as check_derivatives;
+use crate::memory;
 use crate::model::LoadedModel;
 use crate::sample::{Point, Sampler};
 use crate::table::{Table, Variable};
@@ -14,6 +15,19 @@ use anyhow::{Result, bail, ensure};
 use fmi_abi::{BaseType, Causality, Initial, Value, Variability};
 use std::collections::{HashMap, HashSet};
 use std::fmt;
+
+/// The start values of a model, which the first call checks.
+///
+/// # Errors
+/// When the model contradicts itself, or its saved states are incomplete.
+pub(crate) fn checked_starts(model: &LoadedModel) -> Result<&Starts> {
+    if let Some(starts) = model.starts.get() {
+        return Ok(starts);
+    }
+    let starts = check(model)?;
+    memory::check(model, &starts)?;
+    Ok(model.starts.get_or_init(|| starts))
+}
 
 /// The lists of unknowns, each unknown with what it depends on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -87,13 +101,13 @@ impl ModelStructure {
 
     /// With `time`, its place, for FMI 3.0.
     fn with(model: &LoadedModel, tunable_parameters: bool, time: Option<u32>) -> Result<Self> {
-        let starts = check(model)?;
+        let starts = checked_starts(model)?;
         let table = &model.table;
         let Lists { outputs, derivatives, knowns, initial_unknowns, initial_knowns } = Lists::of(table, time);
-        check_derivatives(model, &starts, true, &[&outputs[..], &derivatives].concat(), &knowns)?;
-        check_derivatives(model, &starts, false, &initial_unknowns, &initial_knowns)?;
+        check_derivatives(model, starts, true, &[&outputs[..], &derivatives].concat(), &knowns)?;
+        check_derivatives(model, starts, false, &initial_unknowns, &initial_knowns)?;
 
-        let mut sampler = Sampler::new(model, starts, tunable_parameters);
+        let mut sampler = Sampler::new(model, starts.clone(), tunable_parameters);
         sampler.running = true;
         let outputs = by_derivative(&mut sampler, &outputs, &knowns)?;
         let derivatives = by_derivative(&mut sampler, &derivatives, &knowns)?;

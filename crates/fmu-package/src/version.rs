@@ -3,14 +3,13 @@
 use std::fmt;
 
 /// A version of FMI that FMUs are made for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-#[cfg_attr(feature = "command", derive(clap::ValueEnum))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Fmi {
     /// FMI 2.0
-    #[cfg_attr(feature = "command", value(name = "2"))]
+    #[value(name = "2")]
     V2,
     /// FMI 3.0
-    #[cfg_attr(feature = "command", value(name = "3"))]
+    #[value(name = "3")]
     V3,
 }
 
