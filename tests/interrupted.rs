@@ -2,14 +2,16 @@
 #![cfg(unix)]
 #![allow(unsafe_code)]
 
-use fmu_test_kit::careless::random_bytes;
-use prw_testbed::{Parameters, fingerprint};
+use fmu_package::{Fmi, Platform};
+use std::env::consts::DLL_SUFFIX;
 use std::fs;
+use std::io::Read;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
-use std::sync::Once;
+use std::sync::OnceLock;
 use std::time::Instant;
+use zip::ZipArchive;
 
 const OLD: &[u8] = b"the FMU of yesterday";
 
@@ -17,32 +19,24 @@ const LIMIT: libc::rlim_t = 50_000;
 
 const ROUNDS: u32 = 20;
 
-/// The header of a universal library of macOS: number of parts, processor (x86_64) and its kind, place,
-/// length and alignment.
-const LIBRARY: [u32; 7] = [0xcafe_babe, 1, 0x0100_0007, 3, 0x1000, 0, 12];
-
-/// Packs a file that `build_fmu` takes for a library, because it begins like one and the guid is in it: with
-/// the limits of these tests none can be compiled. It does not become shorter by compression.
+/// Packs a library that exists: within the limits of these tests none can be compiled.
 fn build_fmu(out: &Path) -> Command {
-    // The library that describes the model is there then.
-    static COMPILED: Once = Once::new();
-    COMPILED.call_once(|| {
-        let described = tempfile::tempdir().unwrap();
+    static LIBRARY: OnceLock<Vec<u8>> = OnceLock::new();
+    let platform = Platform::host().unwrap().folder(Fmi::V2);
+    let library = LIBRARY.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
-        assert!(
-            command.args(["--describe", "--out"]).arg(described.path()).output().unwrap().status.success()
-        );
+        assert!(command.args(["--fmi", "2", "--out"]).arg(folder.path()).output().unwrap().status.success());
+        let fmu = fs::File::open(folder.path().join("prw_testbed.fmu")).unwrap();
+        let mut fmu = ZipArchive::new(fmu).unwrap();
+        let name = format!("binaries/{platform}/prw_testbed{DLL_SUFFIX}");
+        fmu.by_name(&name).unwrap().bytes().collect::<Result<_, _>>().unwrap()
     });
-    let library = out.with_extension("dylib");
-    let mut bytes = LIBRARY.map(u32::to_be_bytes).concat();
-    bytes.extend(random_bytes(0, 2 * LIMIT as usize));
-    let (sources, start) =
-        (fingerprint::sources(env!("CARGO_MANIFEST_DIR")), fingerprint::start(&Parameters::BUILT_IN));
-    let variant = fmu_package::Variant { sources: sources.fingerprint().unwrap(), start, tunable: false };
-    bytes.extend(variant.guid().as_bytes());
-    fs::write(&library, bytes).unwrap();
+    let path = out.with_extension("library");
+    fs::write(&path, library).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
-    command.arg("--binary").arg(format!("darwin64={}", library.display())).arg("--out").arg(out);
+    command.args(["--fmi", "2", "--out"]).arg(out);
+    command.arg("--binary").arg(format!("{platform}={}", path.display()));
     command
 }
 
@@ -109,7 +103,6 @@ fn killed_at_any_moment() {
     let out = &folder.path().join("out");
     let fmu = out.join("prw_testbed.fmu");
     fs::create_dir(out).unwrap();
-    // Without the compilation of the library that describes the model.
     let mut command = build_fmu(out);
     let begin = Instant::now();
     assert!(command.output().unwrap().status.success());

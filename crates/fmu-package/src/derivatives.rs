@@ -1,12 +1,12 @@
 //! The partial derivatives that a model offers, compared with differences of its values.
 
 use crate::check::Starts;
-use crate::instance::Instance;
+use crate::instance::{Instance, Saved};
 use crate::model::LoadedModel;
 use crate::sample::{Point, Sampler, model_at};
 use crate::table::Attributes;
 use anyhow::{Result, bail};
-use fmi_abi::{BaseType, Interface, Standard, Value};
+use fmi_abi::{BaseType, Interface, Standard};
 
 /// So many points are tried; a derivative must be wrong at two of them, one may lie at a kink.
 const POINTS: usize = 16;
@@ -35,7 +35,9 @@ pub(crate) fn check(
             let Ok(same) = model_at(model, &point, running, Standard::Fmi3) else { continue };
             instance = same;
         }
-        points.push((point, instance));
+        if let Ok(saved) = instance.save() {
+            points.push(Base { saved, time: instance.time, instance, point });
+        }
     }
     let is_real = |place: &u32| table.variable(*place).is_none_or(|of| of.base() == BaseType::Real);
     let unknowns: Vec<u32> = unknowns.iter().copied().filter(is_real).collect();
@@ -69,18 +71,24 @@ pub(crate) fn check(
     );
 }
 
-/// How large each unknown becomes.
-fn sizes(model: &LoadedModel, unknowns: &[u32], points: &mut [(Point, Instance)]) -> Vec<f64> {
+/// A model at a point, and its saved state, to which it returns after a change.
+struct Base<'a> {
+    point: Point,
+    instance: Instance<'a>,
+    time: f64,
+    saved: Saved,
+}
+
+/// The largest absolute value of each unknown.
+fn sizes(model: &LoadedModel, unknowns: &[u32], points: &mut [Base]) -> Vec<f64> {
     let nominal = |place: &u32| match model.table.variables[*place as usize].of.attributes {
         Attributes::Real { nominal, .. } => nominal.unwrap_or_default(),
         _ => 0.0,
     };
     let mut sizes: Vec<f64> = unknowns.iter().map(nominal).collect();
-    for (_, instance) in points {
-        let values = instance.values();
-        for (size, place) in sizes.iter_mut().zip(unknowns) {
-            *size = size.max(values[*place as usize].real().abs());
-        }
+    for base in points {
+        let values = base.instance.reals(unknowns);
+        sizes.iter_mut().zip(values).for_each(|(size, value)| *size = size.max(value.abs()));
     }
     sizes
 }
@@ -95,20 +103,20 @@ struct Check<'a> {
 
 impl Check<'_> {
     /// For each unknown the derivative that the model offers and the one of its values, if they differ.
-    fn wrong(&self, points: &mut [(Point, Instance)], sizes: &[f64]) -> Vec<Option<(f64, f64)>> {
+    fn wrong(&self, points: &mut [Base], sizes: &[f64]) -> Vec<Option<(f64, f64)>> {
         let mut wrong: Vec<Vec<(f64, f64)>> = vec![Vec::new(); self.unknowns.len()];
         let mut provided = vec![true; self.unknowns.len()];
         let variable =
             self.model.table.variable(self.known).filter(|_| self.known != self.model.table.time());
-        for (point, instance) in points {
-            let said = instance.partials(self.unknowns, self.known);
+        for base in points {
+            let said = base.instance.partials(self.unknowns, self.known);
             provided.iter_mut().zip(&said).for_each(|(provided, said)| *provided &= said.is_some());
             if said.iter().all(Option::is_none) {
                 continue;
             }
             let at = match variable {
-                Some(_) => instance.values()[self.known as usize].real(),
-                None => point.time,
+                Some(known) => base.instance.reals(&self.model.table.array(self.known))[known.element],
+                None => base.point.time,
             };
             if at.is_nan() {
                 continue;
@@ -118,8 +126,8 @@ impl Check<'_> {
                 size => size,
             };
             // Central differences of two widths: how far they are apart tells what they are worth.
-            let slopes = |width: f64| -> Option<Vec<f64>> {
-                let [above, below] = [self.values(point, at + width)?, self.values(point, at - width)?];
+            let mut slopes = |width: f64| -> Option<Vec<f64>> {
+                let [above, below] = [self.values(base, at + width)?, self.values(base, at - width)?];
                 Some(
                     above
                         .into_iter()
@@ -133,7 +141,7 @@ impl Check<'_> {
                 let (Some(said), wide, narrow) = (*said, wide[place], narrow[place]) else { continue };
                 // The time of Co-Simulation is varied by the start time, from which some models count.
                 let unseen =
-                    variable.is_none() && point.interface == Interface::CoSimulation && narrow == 0.0;
+                    variable.is_none() && base.point.interface == Interface::CoSimulation && narrow == 0.0;
                 if !(wide - narrow).is_finite() || unseen {
                     continue;
                 }
@@ -151,26 +159,26 @@ impl Check<'_> {
         wrong.into_iter().zip(provided).map(first).collect()
     }
 
-    /// The unknowns at a point where the known has another value; `None` if the model does not take it.
-    fn values(&self, point: &Point, value: f64) -> Option<Vec<f64>> {
-        let mut point = point.clone();
+    /// The unknowns at a point where the known has another value; `None` if the model rejects it.
+    fn values(&self, base: &mut Base, value: f64) -> Option<Vec<f64>> {
         let is_time = self.known == self.model.table.time();
-        let step_by_step = point.interface == Interface::CoSimulation;
-        if is_time && step_by_step {
-            // No function sets the time there.
+        if is_time && base.point.interface == Interface::CoSimulation {
+            // No function sets the time there. Where the FMU also offers Model Exchange, the time is varied in that.
             if self.model.table.model_exchange.is_some() {
                 return None;
             }
-            point.time = value;
+            let point = Point { time: value, ..base.point.clone() };
+            let mut instance = model_at(self.model, &point, self.running, Standard::Fmi3).ok()?;
+            return Some(instance.reals(self.unknowns));
         }
-        let mut instance = model_at(self.model, &point, self.running, Standard::Fmi3).ok()?;
-        match is_time {
-            true if step_by_step => {}
-            true => instance.set_time(value).ok()?,
-            false => self.change(&mut instance, value)?,
-        }
-        let values = instance.values();
-        Some(self.unknowns.iter().map(|place| values[*place as usize].real()).collect())
+        let instance = &mut base.instance;
+        let changed = match is_time {
+            true => instance.set_time(value).ok(),
+            false => self.change(instance, value),
+        };
+        let values = changed.map(|()| instance.reals(self.unknowns));
+        instance.restore(base.saved, base.time).ok()?;
+        values
     }
 
     fn change(&self, instance: &mut Instance, value: f64) -> Option<()> {
@@ -185,14 +193,10 @@ impl Check<'_> {
             states[table.states.iter().position(|(state, _)| *state == self.known)?] = value;
             return instance.set_states(&states).ok();
         }
-        let mut values: Starts = vec![None; table.variables.len()];
-        let now = instance.values();
         // An array is set as a whole.
-        let first = self.known as usize - variable.element;
-        for place in first..first + variable.length() {
-            values[place] = Some(now[place].clone());
-        }
-        values[self.known as usize] = Some(Value::Real(value));
-        instance.set(&values, |_| true).ok()
+        let array = table.array(self.known);
+        let mut values = instance.reals(&array);
+        values[variable.element] = value;
+        instance.set_reals(&array, &values).ok()
     }
 }

@@ -351,7 +351,24 @@ impl<'a> Instance<'a> {
         call!(self, fmi3SetBinary(vr.0, vr.1, sizes.as_ptr(), bytes.as_ptr(), bytes.len()))
     }
 
-    /// The values of all variables; what the model rejects to show is no number.
+    /// Sets variables of type Real, arrays as a whole.
+    pub fn set_reals(&mut self, places: &[u32], values: &[f64]) -> Outcome {
+        let values: Vec<Value> = values.iter().copied().map(Value::Real).collect();
+        self.set_values(BaseType::Real, &self.references(places), &values.iter().collect::<Vec<_>>())
+    }
+
+    /// The values of variables of type Real, arrays as a whole; NaN for a value that the model does not return.
+    pub fn reals(&mut self, places: &[u32]) -> Vec<f64> {
+        match self.get_values(BaseType::Real, &self.references(places), places.len()) {
+            Ok(values) => values.iter().map(Value::real).collect(),
+            Err(_) => {
+                let all = self.values();
+                places.iter().map(|place| all[*place as usize].real()).collect()
+            }
+        }
+    }
+
+    /// The values of all variables; NaN for a value that the model does not return.
     pub fn values(&mut self) -> Vec<Value> {
         let mut all = vec![Value::Real(f64::NAN); self.of.table.variables.len()];
         for Group { base, places, first } in &self.of.groups {
@@ -439,27 +456,28 @@ impl<'a> Instance<'a> {
         Ok(values.into_iter().zip(sizes).map(|pair| Value::Binary(bytes(pair))).collect())
     }
 
-    /// The partial derivatives of Reals with respect to one; `None` where the model does not know it, NaN where it is no finite
-    /// number.
+    /// The partial derivatives of Reals, arrays as a whole, with respect to one Real: `None` where the model has none, NaN
+    /// where it returns no finite number.
     pub fn partials(&mut self, unknowns: &[u32], known: u32) -> Vec<Option<f64>> {
-        match self.all_partials(unknowns, known) {
-            Ok(all) => all.into_iter().map(Some).collect(),
-            Err(_) => {
-                let each = |place: &u32| {
-                    let of = &self.of.table.variables[*place as usize];
-                    let first = place - of.element as u32;
-                    let array: Vec<u32> = (first..).take(of.length()).collect();
-                    let array = if self.standard == Standard::Fmi2 { vec![*place] } else { array };
-                    match self.all_partials(&array, known) {
-                        Ok(all) => Some(all[array.iter().position(|of| of == place)?]),
-                        // Without a message in FMI 2.0.
-                        Err(message) if message.is_empty() || message.ends_with("is not provided") => None,
-                        Err(_) => Some(f64::NAN),
-                    }
-                };
-                unknowns.iter().map(each).collect()
+        if let Ok(all) = self.all_partials(unknowns, known) {
+            return all.into_iter().map(Some).collect();
+        }
+        let mut found = Vec::with_capacity(unknowns.len());
+        while let Some(place) = unknowns.get(found.len()) {
+            let array = match self.standard {
+                Standard::Fmi2 => vec![*place],
+                Standard::Fmi3 => self.of.table.array(*place),
+            };
+            match self.all_partials(&array, known) {
+                Ok(all) => found.extend(all.into_iter().map(Some)),
+                Err(message) => {
+                    // Without a message in FMI 2.0.
+                    let has_none = message.is_empty() || message.ends_with("is not provided");
+                    found.extend(array.iter().map(|_| (!has_none).then_some(f64::NAN)));
+                }
             }
         }
+        found
     }
 
     /// The unknowns have all elements of their arrays.

@@ -240,6 +240,7 @@ fn by_derivative(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Res
     };
     let reals: Vec<u32> = unknowns.iter().copied().filter(|place| is_real(*place)).collect();
     let mut list: Vec<Unknown> = unknowns.iter().map(none_known).collect();
+    let bases = if list.is_empty() { Vec::new() } else { sampler.bases()? };
     for &known in knowns {
         let differentiable = table.partials && is_variable(known) && !reals.is_empty();
         let partials: Vec<_> = samples
@@ -259,7 +260,7 @@ fn by_derivative(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Res
             }
         }
         let places: Vec<u32> = others.iter().map(|unknown| unknown.vr).collect();
-        let reactions = sampler.reactions(known, &places)?;
+        let reactions = sampler.reactions(&bases, known, &places)?;
         for (place, unknown) in others.into_iter().enumerate() {
             let kind = reactions.of(place).map(|_| DependencyKind::Dependent);
             unknown.dependencies.extend(kind.map(|kind| (known, kind)));
@@ -299,8 +300,9 @@ fn factor_kind(factors: &[((usize, usize), f64)]) -> Option<DependencyKind> {
 /// Dependencies during initialization, from the values; `fixed` and `tunable` are not allowed there.
 fn by_value(sampler: &mut Sampler, unknowns: &[u32], knowns: &[u32]) -> Result<Vec<Unknown>> {
     let mut list: Vec<Unknown> = unknowns.iter().map(none_known).collect();
+    let bases = if list.is_empty() { Vec::new() } else { sampler.bases()? };
     for &known in knowns {
-        let reactions = sampler.reactions(known, unknowns)?;
+        let reactions = sampler.reactions(&bases, known, unknowns)?;
         for (place, unknown) in list.iter_mut().enumerate() {
             let Some(ratios) = reactions.of(place) else { continue };
             let constant =
@@ -343,23 +345,36 @@ impl Reactions {
     }
 }
 
+/// A point, and the values of all variables there.
+struct Base {
+    point: Point,
+    values: Vec<Value>,
+}
+
 impl Sampler<'_> {
-    /// Changes one known at many points and looks at the unknowns.
-    fn reactions(&mut self, known: u32, unknowns: &[u32]) -> Result<Reactions> {
+    /// The points around which each known is changed.
+    fn bases(&mut self) -> Result<Vec<Base>> {
+        let mut base = || {
+            let (point, mut instance) = self.draw(None, true, |_| true)?;
+            Ok(Base { point, values: instance.values() })
+        };
+        (0..16).map(|_| base()).collect()
+    }
+
+    /// Changes one known at many points and reads the unknowns.
+    fn reactions(&mut self, bases: &[Base], known: u32, unknowns: &[u32]) -> Result<Reactions> {
         let table = &self.of.table;
         let mut reactions = Reactions { changes: Vec::new(), values: Vec::new() };
         let variable = table.variable(known);
         let is_known = |of: &Variable| variable.is_some_and(|known| known.name == of.name);
-        let points = if unknowns.is_empty() { 0 } else { 16 };
-        for _ in 0..points {
-            let (point, mut before) = self.draw(None, true, |_| true)?;
-            let (changed, mut after) = self.draw(Some(&point), known == table.time(), is_known)?;
-            if changed == point {
+        for base in bases.iter().filter(|_| !unknowns.is_empty()) {
+            let (changed, mut after) = self.draw(Some(&base.point), known == table.time(), is_known)?;
+            if changed == base.point {
                 continue;
             }
-            reactions.changes.push(difference(&point, &changed, known));
-            let [before, after] = [before.values(), after.values()];
-            let pair = |place: &u32| [&before, &after].map(|values| values[*place as usize].clone());
+            reactions.changes.push(difference(&base.point, &changed, known));
+            let after = after.values();
+            let pair = |place: &u32| [&base.values, &after].map(|values| values[*place as usize].clone());
             reactions.values.push(unknowns.iter().map(pair).collect());
         }
         for (place, unknown) in unknowns.iter().enumerate() {

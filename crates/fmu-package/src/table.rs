@@ -183,6 +183,12 @@ impl Table {
         self.variables.iter().position(is_time).unwrap_or(self.variables.len()) as u32
     }
 
+    /// The places of all elements of the array that a variable of the list is an element of.
+    pub fn array(&self, place: u32) -> Vec<u32> {
+        let of = &self.variables[place as usize];
+        (place - of.element as u32..).take(of.length()).collect()
+    }
+
     /// The name of a variable of the list, or of the time.
     pub fn name(&self, place: u32) -> &str {
         self.variable(place).map_or("time", |of| of.name.as_str())

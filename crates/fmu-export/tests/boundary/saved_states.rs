@@ -7,7 +7,7 @@ use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Model;
 use fmu_export::fmi2::types::Status;
-use fmu_test_kit::checks::survivors;
+use fmu_test_kit::checks::{DAMAGED, survivors};
 use fmu_test_kit::serialized::*;
 use fmu_test_kit::{Either, Importer};
 use std::ptr::{null, null_mut, without_provenance_mut};
@@ -301,10 +301,10 @@ fn absurd_lengths() {
     assert_eq!(texts(&fmu, [talker::Name::heard]), ["a ard"]);
 }
 
-/// Whatever passes for a state, the instance survives it: no call is fatal.
+/// No call is fatal after a damaged state that the FMU accepts.
 #[test]
 fn random_contents_break_nothing() {
     // Texts keep their length, so that more than a few are accepted.
     let accepted = [survivors::<Importer, Counter>(12), survivors::<Importer, Talker>(13)];
-    assert!(accepted.iter().all(|accepted| *accepted > 200), "only {accepted:?} were tried");
+    assert!(accepted.iter().all(|accepted| *accepted > DAMAGED / 15), "only {accepted:?} were accepted");
 }
