@@ -30,7 +30,9 @@ fn build_fmu(out: &Path) -> Command {
         let fmu = fs::File::open(folder.path().join("prw_testbed.fmu")).unwrap();
         let mut fmu = ZipArchive::new(fmu).unwrap();
         let name = format!("binaries/{platform}/prw_testbed{DLL_SUFFIX}");
-        fmu.by_name(&name).unwrap().bytes().collect::<Result<_, _>>().unwrap()
+        let mut library = Vec::new();
+        fmu.by_name(&name).unwrap().read_to_end(&mut library).unwrap();
+        library
     });
     let path = out.with_extension("library");
     fs::write(&path, library).unwrap();
