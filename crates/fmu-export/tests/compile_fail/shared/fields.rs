@@ -2,11 +2,10 @@
 use fmu_export::*;
 
 #[derive(Clone)]
-pub struct Toy {
+pub struct Plant {
     u: f64,
     x: f64,
     n: i32,
     list: [f64; 8],
 }
 
-fn main() {}
