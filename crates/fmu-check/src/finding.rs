@@ -51,8 +51,6 @@ pub struct Finding {
     pub script: Script,
     /// The same as a program in C.
     pub c: String,
-    /// The same as a program in Python.
-    pub python: String,
     /// What is still wrong when it shows.
     #[serde(skip)]
     pub judge: Option<Judge>,
@@ -76,7 +74,6 @@ impl Finding {
             more: Vec::new(),
             script: Vec::new(),
             c: String::new(),
-            python: String::new(),
             judge: None,
             fails: false,
             accepted: None,

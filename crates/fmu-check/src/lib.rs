@@ -77,8 +77,7 @@ pub struct Options {
     /// Prints a rule, its severity and its section of the standard, or all rules as a page.
     #[arg(long, value_name = "RULE")]
     pub explain: Option<String>,
-    /// Writes report.html, report.json, junit.xml, report.sarif and a program in C and one in Python for each finding to this
-    /// folder.
+    /// Writes report.html, report.json, junit.xml, report.sarif and a program in C for each finding to this folder.
     #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
     /// Writes the report as JSON to the standard output.

@@ -238,7 +238,6 @@ impl Report {
         std::fs::write(folder.join("report.html"), page::page(self))?;
         for finding in self.findings.iter().filter(|finding| !finding.c.is_empty()) {
             std::fs::write(folder.join(format!("{}.c", finding.name)), &finding.c)?;
-            std::fs::write(folder.join(format!("{}.py", finding.name)), &finding.python)?;
         }
         Ok(())
     }

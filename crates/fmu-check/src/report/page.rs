@@ -63,15 +63,13 @@ pub fn page(report: &Report) -> String {
                 }
                 text.push_str("</ul></details>\n");
             }
-            for (language, program) in [("C", &finding.c), ("Python", &finding.python)] {
-                if !program.is_empty() {
-                    let _ = writeln!(
-                        text,
-                        "<details><summary>{} calls that show it, in {language}</summary><pre>{}</pre></details>",
-                        finding.steps.1,
-                        escape(program)
-                    );
-                }
+            if !finding.c.is_empty() {
+                let _ = writeln!(
+                    text,
+                    "<details><summary>Program in C with {} calls that shows the finding</summary><pre>{}</pre></details>",
+                    finding.steps.1,
+                    escape(&finding.c)
+                );
             }
             text.push_str("</section>\n");
         }

@@ -3,11 +3,10 @@
 
 use crate::finding::{Finding, Judge};
 use crate::script::{End, Numbered, Outcome, Run, Script, Step, Written};
-use serde::Serialize;
 use std::fmt::Write as _;
 
 /// How a program finds out whether a finding shows.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Evidence {
     /// No program can.
     #[default]
@@ -34,7 +33,7 @@ pub enum Evidence {
 const REPETITIONS: usize = 500;
 
 /// The quantity of a measurement.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs, reason = "names of quantities")]
 pub enum Measure {
     Memory,
@@ -44,7 +43,7 @@ pub enum Measure {
 }
 
 /// A call whose results matter.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Proof {
     /// The number of the step.
     pub id: u32,
@@ -54,7 +53,7 @@ pub struct Proof {
     pub observed: String,
 }
 
-/// The evidence of a finding in a run of its script.
+/// Finds the results that show a finding in a run of its call sequence.
 pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     let Some(judge) = &finding.judge else { return Evidence::None };
     if run.end != End::Done || finding.name == "package.symbols" {

@@ -1,19 +1,17 @@
-//! Scripts as programs in C and in Python, which show a finding without this tool.
+//! Call sequences as programs in C, which show a finding without this tool.
 
 mod c;
 mod evidence;
-mod python;
 
 use crate::description::Description;
 use crate::finding::Finding;
 use crate::script::{Numbered, Run, Script, Setting, Step};
 
-/// Writes both programs of a finding. They show what the last run of its script did.
-pub fn programs(finding: &mut Finding, run: &Run, setting: &Setting, description: &Description) {
+/// Writes the program of a finding, which compares its results with those of the last run of the call sequence.
+pub fn program(finding: &mut Finding, run: &Run, setting: &Setting, description: &Description) {
     let evidence = evidence::evidence(finding, run);
     let script = evidence::as_repeated(&finding.script, run);
     finding.c = c::program(finding, &script, &evidence, setting, description);
-    finding.python = python::program(finding, &script, &evidence, setting, description).unwrap_or_default();
 }
 
 /// What a program says of itself, in lines.
@@ -32,8 +30,7 @@ fn head(finding: &Finding, description: &Description) -> Vec<String> {
         String::new(),
     ];
     lines.iter_mut().for_each(|line| {
-        *line =
-            line.replace("*/", "* /").replace(['\n', '\r'], " ").replace("\"\"\"", "'''").replace('\\', "/")
+        *line = line.replace("*/", "* /").replace(['\n', '\r'], " ").replace('\\', "/");
     });
     lines
 }
