@@ -77,7 +77,7 @@ impl Kind {
 pub enum Arg {
     /// A floating-point number, as its bits.
     Real(u64),
-    /// A whole number, a size, a truth value.
+    /// A whole number, a size, a boolean value.
     Whole(i64),
     /// NULL.
     Null,
@@ -91,17 +91,17 @@ pub enum Arg {
     Blobs(Vec<Vec<u8>>),
     /// Room for so many numbers.
     Out(Kind, usize),
-    /// A saved state, by the number of its place.
+    /// A saved state, by the number of its index.
     State(usize),
-    /// The place of a saved state.
+    /// The index of a saved state.
     StateOut(usize),
-    /// Serialized bytes, by the number of their place.
+    /// Serialized bytes, by the number of their index.
     Saved(usize),
     /// How many they are.
     SavedSize(usize),
-    /// Where the size of these bytes is written.
+    /// Receives the size of these bytes.
     SizeOut(usize),
-    /// Where these bytes are written: as many as the size says.
+    /// Receives these bytes, up to the size.
     SavedOut(usize),
 }
 
@@ -119,7 +119,7 @@ pub struct Make {
     pub co_simulation: bool,
     /// Its name; `None` is NULL.
     pub name: Option<String>,
-    /// What it must be given.
+    /// Arguments of the instantiation.
     pub token: Option<String>,
     /// Whether it logs.
     pub logging: bool,
@@ -131,13 +131,13 @@ pub struct Make {
     pub resources: bool,
 }
 
-/// The place of an instance that is NULL: freeing it is allowed.
+/// The index of an instance that is NULL: freeing it is allowed.
 pub const NOBODY: usize = 999;
 
-/// A step of a script.
+/// A step of a sequence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Step {
-    /// A new instance at this place.
+    /// A new instance at this index.
     Make(usize, Make),
     /// Frees the instance.
     Free(usize),
@@ -147,12 +147,12 @@ pub enum Step {
         of: Option<usize>,
         /// The function.
         function: String,
-        /// What it is given after the instance.
+        /// Arguments after the instance.
         args: Vec<Arg>,
     },
     /// Calls that need no instance: the version and the platform.
     Version(String),
-    /// So often, or until the time is over.
+    /// Repeats steps this many times, or until the time limit.
     Repeat(usize, Vec<Numbered>),
     /// At once, each in a thread of its own.
     Parallel(Vec<Vec<Numbered>>),
@@ -178,12 +178,12 @@ pub struct Numbered {
 }
 
 /// A sequence of calls.
-pub type Script = Vec<Numbered>;
+pub type CallSequence = Vec<Numbered>;
 
 /// A message of the FMU.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Message {
-    /// What it is about.
+    /// Variables that the step concerns.
     pub status: i32,
     /// Its category, as bytes; `None` is NULL.
     pub category: Option<Vec<u8>>,
@@ -193,7 +193,7 @@ pub struct Message {
     pub at_home: bool,
 }
 
-/// What was written to an array.
+/// Values that a call wrote to an array.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Written {
     /// Numbers, as their bits.
@@ -211,7 +211,7 @@ impl Written {
         }
     }
 
-    /// So many of the values from a place on.
+    /// This many values, starting at an index.
     pub fn part(&self, begin: usize, size: usize) -> Option<Self> {
         Some(match self {
             Self::Numbers(kind, bits) => Self::Numbers(*kind, bits.get(begin..begin + size)?.to_vec()),
@@ -219,24 +219,24 @@ impl Written {
         })
     }
 
-    /// What is at a place, for people.
-    pub fn show(&self, place: usize) -> String {
+    /// The value at an index, formatted for people.
+    pub fn show(&self, index: usize) -> String {
         match self {
-            Self::Numbers(kind, bits) => bits.get(place).map_or("nothing".to_owned(), |bits| {
+            Self::Numbers(kind, bits) => bits.get(index).map_or("nothing".to_owned(), |bits| {
                 if kind.is_float() {
                     format!("{:?}", kind.number(*bits))
                 } else {
                     format!("{}", kind.number(*bits))
                 }
             }),
-            Self::Texts(texts) => match texts.get(place) {
+            Self::Texts(texts) => match texts.get(index) {
                 Some(Some(text)) => format!("{:?}", String::from_utf8_lossy(text)),
                 _ => "NULL".to_owned(),
             },
         }
     }
 
-    /// The first place at which two differ.
+    /// The first index at which two differ.
     pub fn differ(&self, other: &Self) -> Option<usize> {
         match (self, other) {
             (Self::Numbers(kind, one), Self::Numbers(_, two)) => {
@@ -253,24 +253,24 @@ impl Written {
     }
 }
 
-/// What came of one step.
+/// The result of one step.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// The step's number.
     pub id: u32,
-    /// What the function answered; of an instantiation 1 for an instance and 0 for NULL.
+    /// Status of the function; for an instantiation, 1 for an instance and 0 for NULL.
     pub status: Option<i32>,
     /// The library has no such function.
     pub missing: bool,
-    /// What was written to the arrays, in the order of the arguments.
+    /// Values that were written to the arrays, in the order of the arguments.
     pub written: Vec<Written>,
-    /// What the FMU said meanwhile.
+    /// Messages of the FMU during the step.
     pub log: Vec<Message>,
-    /// What was written where nothing belongs.
+    /// Writes outside of the arrays.
     pub damage: Vec<String>,
     /// The text of a version.
     pub text: Option<Vec<u8>>,
-    /// Of a measurement or of repetitions.
+    /// Result of a measurement or of repetitions.
     pub measured: Option<Measured>,
 }
 
@@ -285,40 +285,40 @@ pub struct Measured {
     pub threads: usize,
     /// Open files.
     pub files: usize,
-    /// What belongs to the whole process: rounding, locale, folder, signals.
+    /// Settings of the process: rounding, locale, working directory, signal handlers.
     pub settings: Vec<String>,
     /// How often repetitions came.
     pub times: usize,
 }
 
-/// How a script ended.
+/// How a sequence ended.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum End {
-    /// With its last step.
+    /// Ended after its last step.
     #[default]
     Done,
     /// The process crashed; what the system says.
     Crash(String),
-    /// It did not end in time.
+    /// The process did not end in time.
     Hang(f64),
     /// The library called `exit`.
     Exit(i32),
     /// The library cannot be loaded; what the loader says.
     Unloadable(String),
-    /// It had so many processes that they were ended.
+    /// The FMU started too many processes, which were ended.
     Flood(usize),
 }
 
-/// What came of a script.
+/// The result of a call sequence.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
-    /// By the numbers of the steps.
+    /// Results by the number of the step.
     pub outcomes: HashMap<u32, Outcome>,
     /// How it ended.
     pub end: End,
     /// The step in which it ended, if not with the last.
     pub at: Option<u32>,
-    /// What was written to the standard output and the standard error.
+    /// Output on the standard output and the standard error.
     pub said: String,
     /// Names of the processes that were left at its end.
     pub left: Vec<String>,
@@ -330,7 +330,7 @@ impl Run {
         self.outcomes.get(&id)
     }
 
-    /// What a step answered.
+    /// Status of a step.
     pub fn status(&self, id: u32) -> Option<i32> {
         self.of(id)?.status
     }
@@ -341,18 +341,18 @@ impl Run {
     }
 }
 
-/// What all scripts of an FMU have in common.
+/// The setting that all call sequences of an FMU share.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Setting {
     /// FMI 3.0, not 2.0.
     pub fmi3: bool,
     /// The library of Co-Simulation and of Model Exchange.
     pub libraries: [Option<std::path::PathBuf>; 2],
-    /// Where the resources are.
+    /// Path of the resources.
     pub resources: std::path::PathBuf,
     /// Bytes of memory at most.
     pub memory: u64,
-    /// There is room after arrays, so that it can be seen what is written there.
+    /// There is room after arrays, so that it can be observed what is written there.
     pub soft: bool,
     /// All symbols are looked up when the library is loaded, as some importers do.
     pub now: bool,
