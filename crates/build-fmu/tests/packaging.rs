@@ -3,16 +3,16 @@
 use fmi_schema::fmi2::{DependenciesKind, Fmi2ModelDescription, Fmi2VariableDependency};
 use fmi_schema::traits::FmiModelDescription;
 use fmu_export::Variables;
+use prw_testbed::TestbedFmu;
 use prw_testbed::parameters::Parameters;
 use prw_testbed::state_space::{StateSpace, state_space};
-use prw_testbed::{TestbedFmu, fingerprint};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modelDescription/modelDescription.xml");
-const TABLE_1: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modelDescription/parameters.json");
+const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/modelDescription.xml");
+const TABLE_1: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/parameters.json");
 
 fn build_fmu(arguments: &[&str], out: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_build_fmu")).args(arguments).arg("--out").arg(out).output().unwrap()
@@ -199,13 +199,16 @@ fn other_parameters_are_other_start_values() {
     assert_eq!(description(&["--parameters", &copy]), before);
 }
 
-/// What is compiled into the library is told apart by its guid, to the last digit.
+/// The guid depends on the options and on every digit of the parameters, but not on the format of their file.
 #[test]
-fn every_variant_has_a_guid_of_its_own() {
-    let table_1 = Parameters::BUILT_IN;
-    let other = Parameters { k1: f64::from_bits(table_1.k1.to_bits() + 1), ..table_1 };
-    let guids = BTreeSet::from([guid(&table_1, false), guid(&table_1, true), guid(&other, false)]);
-    assert_eq!(guids.len(), 3);
+fn every_variant_has_a_separate_guid() {
+    let folder = tempfile::tempdir().unwrap();
+    let file =
+        |value: &str| parameter_file(folder.path(), "\"value\": 2.11,", &format!("\"value\": {value},"));
+    let same = guid(&["--parameters", &file("2.110")]);
+    let other = guid(&["--parameters", &file("2.1100000000000003")]);
+    assert_eq!(same, guid(&[]));
+    assert_eq!(BTreeSet::from([same, other, guid(&["--tunable"])]).len(), 3);
 }
 
 #[test]
@@ -254,14 +257,16 @@ fn wrong_requests_are_refused_in_one_line() {
     assert!(text.contains("--out"), "{text}");
 }
 
-fn guid(parameters: &Parameters, tunable: bool) -> String {
-    let sources = fingerprint::sources(env!("CARGO_MANIFEST_DIR")).fingerprint().unwrap();
-    fmu_package::Variant { sources, start: fingerprint::start(parameters), tunable }.guid()
+fn guid(arguments: &[&str]) -> String {
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_build_fmu")).arg("--guid").args(arguments).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stdout).unwrap().trim().to_owned()
 }
 
 #[test]
 fn two_builds_give_the_same_fmu_with_the_committed_description() {
-    let (folder, guid) = (tempfile::tempdir().unwrap(), guid(&Parameters::BUILT_IN, false));
+    let (folder, guid) = (tempfile::tempdir().unwrap(), guid(&[]));
     let build = |name: &str| {
         let out = folder.path().join(name);
         let output = build_fmu(&[], &out);
@@ -306,7 +311,7 @@ fn the_licenses_of_all_packages_are_there() {
     // In parentheses: the path of a package of this project, or the mark of one that was listed before.
     let compiled: BTreeSet<&str> =
         tree.lines().filter(|line| !line.contains('(')).filter_map(|line| line.split(' ').next()).collect();
-    let list = include_str!("../modelDescription/licenses/third-party.txt");
+    let list = include_str!("../../../modelDescription/licenses/third-party.txt");
     let named: BTreeSet<&str> = list
         .lines()
         .skip_while(|line| !line.starts_with("package"))
