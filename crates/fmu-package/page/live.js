@@ -61,6 +61,11 @@ class Session {
     return { fmu, inputs: fmu.group(this.inputs), outputs: fmu.group(this.outputs) };
   }
 
+  /** Whether the FMU has rejected a value, unlike a run that the FMU has ended. */
+  get isRejected() {
+    return this.error !== "" && this.ended === Infinity;
+  }
+
   /** From the start again; the first `known` rows have the inputs that they had. @param {number} known */
   restart(known) {
     this.known = Math.min(known, Math.max(this.table.count, this.known));
@@ -366,7 +371,7 @@ async function live(packed, resources) {
   const sliders = new Fields((one, value) => byHand(one.name, Number(value)));
   /** From here on by hand. @param {string} name @param {number} value */
   const byHand = (name, value) => {
-    const isRejected = session.error !== "" && session.ended === Infinity;
+    const { isRejected } = session;
     if (isRejected && latest && !session.motion) {
       session.targets = latest.targets;
       session.restart(latest.rows);
@@ -419,7 +424,7 @@ async function live(packed, resources) {
   let said = "";
   /** Shows why a run has ended. One that the FMU has rejected stands still and is grey until something else is tried. @param {string} error */
   const say = (error) => {
-    const isRejected = error !== "" && session.ended === Infinity;
+    const { isRejected } = session;
     if (isRejected) {
       player.setPlaying(false);
     }
@@ -450,7 +455,7 @@ async function live(packed, resources) {
     session.restart(0);
     player.setPlaying(false);
     player.now = begin;
-    player.setPlaying(motion !== undefined && !matchMedia("(prefers-reduced-motion: reduce)").matches);
+    player.setPlaying(motion !== undefined && allowsMotion());
   };
   choice.addEventListener("change", () => choose(choice.value));
 
@@ -461,11 +466,11 @@ async function live(packed, resources) {
       earlier = session.table.copy();
     }
     changedAt = now;
-    const isRejected = session.error !== "" && session.ended === Infinity;
+    const { isRejected } = session;
     session.restart(session.motion ? 0 : Infinity);
     view.set?.((name) => Number(session.parameter(find(name))));
     if (isRejected && session.motion) {
-      player.setPlaying(!matchMedia("(prefers-reduced-motion: reduce)").matches);
+      player.setPlaying(allowsMotion());
     }
     player.ask();
   };

@@ -5,6 +5,9 @@
  * @typedef {{element: HTMLElement, draw(table: Table, time: number): void, set?(parameters: (name: string) => number): void, touch?(): void}} View
  */
 
+/** Whether the user's system lets pages move by themselves. */
+const allowsMotion = () => !matchMedia("(prefers-reduced-motion: reduce)").matches;
+
 /** How fast, as in the list. */
 const SPEEDS = new Map([["2", "2 × real time"], ["1", "real time"], ["0.5", "1/2 × real time"], ["0.2", "1/5 × real time"], ["0.05", "1/20 × real time"], ["0.01", "1/100 × real time"], ["Infinity", "at once"]]);
 
@@ -47,7 +50,7 @@ class Player {
       this.isSeen = entries[entries.length - 1].isIntersecting;
       this.ask();
     }).observe(this.element);
-    this.setPlaying(!matchMedia("(prefers-reduced-motion: reduce)").matches);
+    this.setPlaying(allowsMotion());
   }
 
   /** @param {number} speed */

@@ -193,34 +193,34 @@ class Plots {
   draw(table, now, begin, end, earlier = null) {
     this.span = { begin, end };
     const axes = this.panels.map(({ panel, canvas }) => {
-      const { pen } = sharp(canvas);
+      const surface = sharp(canvas);
+      const { pen } = surface;
       pen.font = FONT;
       const ranges = [table, ...(earlier ? [earlier] : [])].map((run) => range(panel, run, ...rowsOf(run, begin, end)));
       const [low, high] = [Math.min(...ranges.map(([one]) => one)), Math.max(...ranges.map(([, one]) => one))];
       const marks = ticks(low, high, 5);
-      return { low, high, marks, width: Math.max(...marks.map(({ text }) => pen.measureText(text).width)) };
+      return { surface, low, high, marks, textWidth: Math.max(...marks.map(({ text }) => pen.measureText(text).width)) };
     });
     // In steps, lest the axes move with each digit.
-    this.left = Math.max(LEFT, 8 * Math.ceil((12 + Math.max(...axes.map(({ width }) => width))) / 8));
+    this.left = Math.max(LEFT, 8 * Math.ceil((12 + Math.max(...axes.map(({ textWidth }) => textWidth))) / 8));
     for (const [place, shownPanel] of this.panels.entries()) {
       this.drawPanel(shownPanel, axes[place], table, now, place === this.panels.length - 1, earlier);
     }
   }
 
   /**
-   * @param {ReturnType<Plots["panel"]>} what @param {{low: number, high: number, marks: {place: number, text: string}[]}} axis
+   * @param {ReturnType<Plots["panel"]>} what
+   * @param {{surface: ReturnType<typeof sharp>, low: number, high: number, marks: {place: number, text: string}[]}} axis
    * @param {Table} table @param {number} now @param {boolean} isLast @param {Table | null} earlier
    */
-  drawPanel({ panel, canvas, keys }, { low, high, marks }, table, now, isLast, earlier) {
+  drawPanel({ panel, keys }, { surface: { pen, width, height }, low, high, marks }, table, now, isLast, earlier) {
     const colour = (/** @type {string} */ name) => colourAt(this.element, name);
-    const { pen, width, height } = sharp(canvas);
     const { left } = this;
     const { begin, end } = this.span;
     const [first, last] = rowsOf(table, begin, end);
     const bottom = height - (isLast ? 34 : 20);
     const x = (/** @type {number} */ time) => left + ((time - begin) / (end - begin)) * (width - left - RIGHT);
     const y = (/** @type {number} */ value) => bottom - ((value - low) / (high - low)) * (bottom - 6);
-    pen.font = FONT;
     pen.lineWidth = 1;
     pen.strokeStyle = colour("grid");
     pen.fillStyle = colour("soft");

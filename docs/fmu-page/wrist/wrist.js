@@ -35,9 +35,14 @@ const WRIST_PANELS = [
   { title: "Torques", unit: "N m", curves: [{ name: "tau1", label: "\u03c4\u2081", colour: "curve-1", factor: 1 }, { name: "tau2", label: "\u03c4\u2082", colour: "curve-2", factor: 1 }] },
 ];
 
+/** Red, green and blue of a colour such as #12ab9f, from 0 to 255. @param {string} colour */
+function channels(colour) {
+  return [1, 3, 5].map((start) => parseInt(colour.slice(start, start + 2), 16));
+}
+
 /** The bodies of the wrist, with a number of cam lobes. @param {Parts} parts @param {number} waves @returns {Solid[]} */
 function bodies(parts, waves) {
-  const rgb = (/** @type {string} */ name) => [1, 3, 5].map((place) => parseInt(parts.colours[name].slice(place, place + 2), 16));
+  const rgb = (/** @type {string} */ name) => channels(parts.colours[name]);
   // Enough corners for each lobe.
   const round = parts.round * Math.max(1, Math.ceil((6 * waves) / parts.round));
 
@@ -379,7 +384,7 @@ class Wrist {
       this.parts.couplings.map(({ from, to, x }) => {
         const [outer, inner] = [angle(shaft[/** @type {"motor"} */ (from)]), angle(shaft[/** @type {"motor"} */ (to)])];
         const points = strands(this.parts, x.map((place) => shaft.side * place), outer, inner, twist);
-        const colour = [1, 3, 5].map((place) => parseInt(this.parts.colours[shaft.colour].slice(place, place + 2), 16));
+        const colour = channels(this.parts.colours[shaft.colour]);
         const faces = Array.from({ length: points.length / 12 }, (_, k) => ({ corners: [0, 1, 2, 3].map((corner) => 4 * k + corner), colour, isClosed: false }));
         return { points, faces, turn: "" };
       }),
@@ -409,20 +414,17 @@ class Wrist {
         placed[k + 2] = near;
       }
       for (const { corners, colour, isClosed } of body.faces) {
-        let [area, near, x, y, z] = [0, 0, 0, 0, 0];
+        let [area, near] = [0, 0];
         for (let k = 0, before = corners[corners.length - 1]; k < corners.length; before = corners[k++]) {
           const [a, b] = [3 * before, 3 * corners[k]];
           area += placed[a] * placed[b + 1] - placed[b] * placed[a + 1];
           near += placed[b + 2];
-          // Newell's normal, in the body.
-          x += (points[a + 1] - points[b + 1]) * (points[a + 2] + points[b + 2]);
-          y += (points[a + 2] - points[b + 2]) * (points[a] + points[b]);
-          z += (points[a] - points[b]) * (points[a + 1] + points[b + 1]);
         }
         if (isClosed && area > 0) {
           continue;
         }
-        const sign = (area > 0 ? -1 : 1) / (Math.hypot(x, y, z) || 1);
+        const [x, y, z] = normal(points, corners);
+        const sign = area > 0 ? -1 : 1;
         const turn = turns[body.turn];
         const light = sign * (lamp[0] * (turn[0] * x + turn[1] * y + turn[2] * z) + lamp[1] * (turn[3] * x + turn[4] * y + turn[5] * z) + lamp[2] * (turn[6] * x + turn[7] * y + turn[8] * z));
         seen.push({ near: near / corners.length, points: placed, corners, colour, light, isReversed: area > 0 });
@@ -511,7 +513,9 @@ class Shaded {
     gl.linkProgram(program);
     gl.useProgram(program);
     gl.enable(gl.DEPTH_TEST);
-    this.uniform = (/** @type {string} */ name) => gl.getUniformLocation(program, name);
+    const locations = ["camera", "turn", "scale", "centre", "lamp"].map((name) => [name, gl.getUniformLocation(program, name)]);
+    /** @type {Record<string, WebGLUniformLocation | null>} */
+    this.uniforms = Object.fromEntries(locations);
     this.attributes = ["place", "normal", "colour"].map((name) => gl.getAttribLocation(program, name));
     this.attributes.forEach((attribute) => gl.enableVertexAttribArray(attribute));
     this.strands = /** @type {WebGLBuffer} */ (gl.createBuffer());
@@ -548,21 +552,34 @@ class Shaded {
     gl.viewport(0, 0, fineWidth, fineHeight);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.uniformMatrix3fv(this.uniform("camera"), false, columns(rotation));
-    gl.uniform2f(this.uniform("scale"), (2 * scale) / width, (2 * scale) / height);
-    gl.uniform2f(this.uniform("centre"), (2 * centre[0]) / width - 1, 1 - (2 * centre[1]) / height);
-    gl.uniform3f(this.uniform("lamp"), lamp[0], lamp[1], lamp[2]);
+    gl.uniformMatrix3fv(this.uniforms.camera, false, columns(rotation));
+    gl.uniform2f(this.uniforms.scale, (2 * scale) / width, (2 * scale) / height);
+    gl.uniform2f(this.uniforms.centre, (2 * centre[0]) / width - 1, 1 - (2 * centre[1]) / height);
+    gl.uniform3f(this.uniforms.lamp, lamp[0], lamp[1], lamp[2]);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.strands);
     const corners = Float32Array.from(couplings.flatMap((body) => [...triangles(body)]));
     gl.bufferData(gl.ARRAY_BUFFER, corners, gl.DYNAMIC_DRAW);
     for (const { buffer, count, turn } of [...this.meshes, { buffer: this.strands, count: corners.length / 9, turn: "" }]) {
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       this.attributes.forEach((attribute, place) => gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 36, 12 * place));
-      gl.uniformMatrix3fv(this.uniform("turn"), false, columns(turns[turn]));
+      gl.uniformMatrix3fv(this.uniforms.turn, false, columns(turns[turn]));
       gl.drawArrays(gl.TRIANGLES, 0, count);
     }
     return canvas;
   }
+}
+
+/** The unit normal of a polygon by Newell's method. @param {number[]} points @param {number[]} corners */
+function normal(points, corners) {
+  let [x, y, z] = [0, 0, 0];
+  for (let k = 0, before = corners[corners.length - 1]; k < corners.length; before = corners[k++]) {
+    const [a, b] = [3 * before, 3 * corners[k]];
+    x += (points[a + 1] - points[b + 1]) * (points[a + 2] + points[b + 2]);
+    y += (points[a + 2] - points[b + 2]) * (points[a] + points[b]);
+    z += (points[a] - points[b]) * (points[a + 1] + points[b + 1]);
+  }
+  const length = Math.hypot(x, y, z) || 1;
+  return [x / length, y / length, z / length];
 }
 
 /** A matrix (3, 3) by columns, as WebGL has them. @param {number[]} m */
@@ -574,16 +591,7 @@ function columns(m) {
 function triangles({ points, faces }) {
   const all = [];
   for (const { corners, colour } of faces) {
-    let [x, y, z] = [0, 0, 0];
-    for (let k = 0, before = corners[corners.length - 1]; k < corners.length; before = corners[k++]) {
-      const [a, b] = [3 * before, 3 * corners[k]];
-      // Newell's normal.
-      x += (points[a + 1] - points[b + 1]) * (points[a + 2] + points[b + 2]);
-      y += (points[a + 2] - points[b + 2]) * (points[a] + points[b]);
-      z += (points[a] - points[b]) * (points[a + 1] + points[b + 1]);
-    }
-    const length = Math.hypot(x, y, z) || 1;
-    const own = [x / length, y / length, z / length, ...colour.map((part) => part / 255)];
+    const own = [...normal(points, corners), ...colour.map((part) => part / 255)];
     // From both ends to the middle: a face of a ring is an arc there and an arc back.
     for (let [first, last] = [0, corners.length - 1]; last - first > 1; first++, last--) {
       const [a, b, c, d] = [corners[first], corners[first + 1], corners[last - 1], corners[last]];
