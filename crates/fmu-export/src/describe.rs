@@ -1,6 +1,7 @@
 //! The description that a library gives of its model, as JSON, for the program that makes FMUs of it (`fmu-package`).
 //!
-//! Floating-point numbers and integers of types are strings, which hold them to the last digit.
+//! Floating-point numbers and integers of types are strings, which hold them to the last digit. The functions are not inlined
+//! and take trait objects: the description runs once, and its size counts in every library.
 
 use crate::boundary::{forget_panic, panic_message};
 use crate::capabilities::Events;
@@ -40,25 +41,25 @@ pub unsafe fn pass_description<M: Exported>(receive: Receive, context: *mut c_vo
 pub fn describe<M: Exported>() -> String {
     let mut json = Json::default();
     json.open("", '{');
-    json.word("version", VERSION);
+    json.word("version", &VERSION);
     info(&mut json, &M::INFO);
-    json.word("arrays", M::ARRAYS);
+    json.word("arrays", &M::ARRAYS);
     if let Some(offer) = M::CO_SIMULATION {
         json.open("coSimulation", '{');
-        json.word("variableStepSize", offer.variable_step_size);
-        json.word("eventMode", !matches!(offer.events, Events::None));
-        json.word("endsEarly", offer.ends_early);
+        json.word("variableStepSize", &offer.variable_step_size);
+        json.word("eventMode", &!matches!(offer.events, Events::None));
+        json.word("endsEarly", &offer.ends_early);
         json.close('}');
     }
     if let Some(offer) = M::MODEL_EXCHANGE {
         json.open("modelExchange", '{');
-        json.word("indicators", offer.indicators);
-        json.word("stepCompleted", offer.step_completed);
+        json.word("indicators", &offer.indicators);
+        json.word("stepCompleted", &offer.step_completed);
         json.close('}');
     }
-    json.word("partials", M::PARTIALS);
-    json.word("inputDerivatives", M::INPUT_DERIVATIVES);
-    json.word("outputDerivatives", M::OUTPUT_DERIVATIVES);
+    json.word("partials", &M::PARTIALS);
+    json.word("inputDerivatives", &M::INPUT_DERIVATIVES);
+    json.word("outputDerivatives", &M::OUTPUT_DERIVATIVES);
     json.open("states", '[');
     M::STATES.iter().for_each(|of| json.words("", [of.state, of.derivative]));
     json.close(']');
@@ -76,6 +77,7 @@ pub fn describe<M: Exported>() -> String {
     json.0
 }
 
+#[inline(never)]
 fn info(json: &mut Json, of: &Info) {
     json.text("name", of.name);
     json.text("identifier", of.identifier);
@@ -85,11 +87,11 @@ fn info(json: &mut Json, of: &Info) {
     json.text("modelVersion", of.version);
     json.text("license", of.license);
     json.text("copyright", of.copyright);
-    json.number("startTime", of.default_experiment.start_time);
-    json.number("stopTime", of.default_experiment.stop_time);
-    json.number("stepSize", of.default_experiment.step_size);
-    json.number("tolerance", of.default_experiment.tolerance);
-    json.word("smooth", of.smooth);
+    json.number("startTime", &of.default_experiment.start_time);
+    json.number("stopTime", &of.default_experiment.stop_time);
+    json.number("stepSize", &of.default_experiment.step_size);
+    json.number("tolerance", &of.default_experiment.tolerance);
+    json.word("smooth", &of.smooth);
 }
 
 fn variable<M: Exported>(json: &mut Json, of: &Variable<M>) {
@@ -97,54 +99,55 @@ fn variable<M: Exported>(json: &mut Json, of: &Variable<M>) {
     json.text("name", of.name());
     json.text("array", of.name_of_array());
     json.words("dimensions", of.dimensions());
-    json.word("element", of.element());
+    json.word("element", &of.element());
     json.text("description", of.description());
-    json.number("causality", format_args!("{}", of.causality()));
-    json.number("variability", format_args!("{}", of.variability()));
+    json.number("causality", &format_args!("{}", of.causality()));
+    json.number("variability", &format_args!("{}", of.variability()));
     if let Some(initial) = of.initial() {
-        json.number("initial", format_args!("{initial}"));
+        json.number("initial", &format_args!("{initial}"));
     }
     variable_type(json, of.variable_type());
     if let Some(differentiated) = of.differentiates() {
-        json.word("differentiates", differentiated);
+        json.word("differentiates", &differentiated);
     }
     if let Some(known) = of.dependencies() {
         json.words("dependencies", known);
-        json.word("dependsOnTime", of.depends_on_time() == Some(true));
+        json.word("dependsOnTime", &(of.depends_on_time() == Some(true)));
     }
-    json.word("state", of.is_state());
-    json.word("reinit", of.is_reinit());
+    json.word("state", &of.is_state());
+    json.word("reinit", &of.is_reinit());
     json.close('}');
 }
 
+#[inline(never)]
 fn variable_type(json: &mut Json, of: &Type) {
     json.open("type", '{');
     json.text("name", of.name);
-    json.number("base", of.base());
+    json.number("base", &of.base());
     match of.attributes {
         Attributes::Real { quantity, unit: of, min, max, nominal } => {
             json.text("quantity", quantity);
             unit(json, of);
             for (name, value) in [("min", min), ("max", max), ("nominal", nominal)] {
                 if let Some(value) = value {
-                    json.number(name, value);
+                    json.number(name, &value);
                 }
             }
         }
         Attributes::Integer { min, max } => {
-            json.number("smallest", min);
-            json.number("largest", max);
+            json.number("smallest", &min);
+            json.number("largest", &max);
         }
         Attributes::Binary { mime_type, max_size } => {
             json.text("mimeType", mime_type);
-            json.word("maxSize", max_size);
+            json.word("maxSize", &max_size);
         }
         Attributes::Enumeration(items) => {
             json.open("items", '[');
             for item in items {
                 json.open("", '{');
                 json.text("name", item.name);
-                json.word("value", item.value);
+                json.word("value", &item.value);
                 json.text("description", item.description);
                 json.close('}');
             }
@@ -155,18 +158,19 @@ fn variable_type(json: &mut Json, of: &Type) {
     json.close('}');
 }
 
+#[inline(never)]
 fn unit(json: &mut Json, of: &Unit) {
     let BaseUnit { kg, m, s, A: ampere, K: kelvin, mol, cd, rad, factor, offset } = of.base;
     json.open("unit", '{');
     json.text("name", of.name);
     json.words("exponents", [kg, m, s, ampere, kelvin, mol, cd, rad]);
-    json.number("factor", factor);
-    json.number("offset", offset);
+    json.number("factor", &factor);
+    json.number("offset", &offset);
     if let Some(display) = of.display {
         json.open("display", '{');
         json.text("name", display.name);
-        json.number("factor", display.factor);
-        json.number("offset", display.offset);
+        json.number("factor", &display.factor);
+        json.number("offset", &display.offset);
         json.close('}');
     }
     json.close('}');
@@ -184,11 +188,11 @@ fn starts<M: Exported>(json: &mut Json, interface: Interface) {
                 match catch_unwind(AssertUnwindSafe(|| of.value(&model))) {
                     Ok(value) => match value.filter(|_| of.has_start()) {
                         Some(value) => json.text("", &value.to_string()),
-                        None => json.word("", "null"),
+                        None => json.word("", &"null"),
                     },
                     Err(panic) => {
                         forget_panic(Err(panic));
-                        json.word("", false);
+                        json.word("", &false);
                     }
                 }
             }
@@ -196,10 +200,10 @@ fn starts<M: Exported>(json: &mut Json, interface: Interface) {
             if interface == Interface::ModelExchange
                 && let Ok(Some(number)) = catch_unwind(AssertUnwindSafe(|| forgotten_indicator(model)))
             {
-                json.word("forgottenIndicator", number);
+                json.word("forgottenIndicator", &number);
             }
         }
-        Ok(Err(error)) => json.number("error", format_args!("{error}")),
+        Ok(Err(error)) => json.number("error", &format_args!("{error}")),
         Err(panic) => {
             json.text("error", panic_message(&*panic));
             forget_panic(Err(panic));
@@ -225,6 +229,7 @@ fn forgotten_indicator<M: Exported>(mut model: M) -> Option<usize> {
 struct Json(String);
 
 impl Json {
+    #[inline(never)]
     fn begin(&mut self, name: &str) {
         if !matches!(self.0.as_bytes().last(), None | Some(b'{' | b'[')) {
             self.0.push(',');
@@ -235,6 +240,7 @@ impl Json {
         }
     }
 
+    #[inline(never)]
     fn open(&mut self, name: &str, bracket: char) {
         self.begin(name);
         self.0.push(bracket);
@@ -244,6 +250,7 @@ impl Json {
         self.0.push(bracket);
     }
 
+    #[inline(never)]
     fn quoted(&mut self, text: &str) {
         self.0.push('"');
         for letter in text.chars() {
@@ -256,28 +263,32 @@ impl Json {
         self.0.push('"');
     }
 
+    #[inline(never)]
     fn text(&mut self, name: &str, text: &str) {
         self.begin(name);
         self.quoted(text);
     }
 
     /// A number with all its digits, or the name of something, as a string.
-    fn number(&mut self, name: &str, value: impl Debug) {
+    #[inline(never)]
+    fn number(&mut self, name: &str, value: &dyn Debug) {
         self.text(name, &format!("{value:?}"));
     }
 
     /// A number, true, false or null.
-    fn word(&mut self, name: &str, word: impl Display) {
+    #[inline(never)]
+    fn word(&mut self, name: &str, word: &dyn Display) {
         self.begin(name);
         self.formatted(format_args!("{word}"));
     }
 
     fn words(&mut self, name: &str, words: impl IntoIterator<Item = impl Display>) {
         self.open(name, '[');
-        words.into_iter().for_each(|word| self.word("", word));
+        words.into_iter().for_each(|word| self.word("", &word));
         self.close(']');
     }
 
+    #[inline(never)]
     fn formatted(&mut self, text: std::fmt::Arguments<'_>) {
         // Writing to a string does not fail.
         let _ = self.0.write_fmt(text);
@@ -294,9 +305,9 @@ mod tests {
         json.open("", '{');
         json.text("a", "\"\\\n\u{e9}");
         json.words("b", [1, 2]);
-        json.number("c", 1e300);
+        json.number("c", &1e300);
         json.open("d", '[');
-        json.word("", "null");
+        json.word("", &"null");
         json.words("", [0; 0]);
         json.close(']');
         json.close('}');

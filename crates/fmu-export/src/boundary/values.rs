@@ -131,7 +131,7 @@ pub(crate) fn get_float32<M: Exported, R: Reference>(
     values: &mut [MaybeUninit<f32>],
     bases: &[BaseType],
 ) -> Outcome {
-    instance.get(vr, bases, |place, value| {
+    instance.get(vr, bases, &mut |place, value| {
         if let Value::Real(value) = value {
             values[place].write(value as f32);
         }
@@ -144,7 +144,7 @@ pub(crate) fn set_float32<M: Exported, R: Reference>(
     values: &[f32],
     bases: &[BaseType],
 ) -> Outcome {
-    instance.set(vr, bases, values.iter().map(|value| Value::Real((*value).into())))
+    instance.set(vr, bases, &|index| Value::Real(values[index].into()))
 }
 
 /// `Value` has them in a wider type, and no value is outside of the narrow one.
@@ -154,7 +154,7 @@ pub(crate) fn get_integers<M: Exported, R: Reference, T: TryFrom<i128> + Default
     values: &mut [MaybeUninit<T>],
     bases: &[BaseType],
 ) -> Outcome {
-    instance.get(vr, bases, |place, value| {
+    instance.get(vr, bases, &mut |place, value| {
         if let Value::Integer(value) = value {
             values[place].write(T::try_from(value).unwrap_or_default());
         }
@@ -167,7 +167,7 @@ pub(crate) fn set_integers<M: Exported, R: Reference, T: Into<i128> + Copy>(
     values: &[T],
     bases: &[BaseType],
 ) -> Outcome {
-    instance.set(vr, bases, values.iter().map(|value| Value::Integer((*value).into())))
+    instance.set(vr, bases, &|index| Value::Integer(values[index].into()))
 }
 
 pub(crate) fn get_booleans<M: Exported, R: Reference, T: From<bool>>(
@@ -176,7 +176,7 @@ pub(crate) fn get_booleans<M: Exported, R: Reference, T: From<bool>>(
     values: &mut [MaybeUninit<T>],
     bases: &[BaseType],
 ) -> Outcome {
-    instance.get(vr, bases, |place, value| {
+    instance.get(vr, bases, &mut |place, value| {
         values[place].write((value == Value::Boolean(true)).into());
     })
 }
@@ -194,7 +194,7 @@ pub(crate) fn set_booleans<M: Exported, R: Reference, T: From<bool> + PartialEq 
             format!("{name} must be 0 (false) or 1 (true), it is {}", values[place])
         });
     }
-    instance.set(vr, bases, values.iter().map(|value| Value::Boolean(*value == known[1])))
+    instance.set(vr, bases, &|index| Value::Boolean(values[index] == known[1]))
 }
 
 /// The texts are the instance's until the next call on it.
@@ -205,7 +205,7 @@ pub(crate) fn get_texts<M: Exported, R: Reference>(
     bases: &[BaseType],
 ) -> Outcome {
     let mut texts = Vec::with_capacity(vr.len());
-    instance.get(vr, bases, |_, value| {
+    instance.get(vr, bases, &mut |_, value| {
         if let Value::String(text) = value {
             // A zero byte would end the text for C.
             texts.push(CString::new(text.replace('\0', " ")).unwrap_or_default());
@@ -239,5 +239,5 @@ pub(crate) unsafe fn set_texts<M: Exported, R: Reference>(
         };
         return instance.refuse_value(vr, bases, place, |name| format!("the text for {name} is {fault}"));
     }
-    instance.set(vr, bases, texts.iter().cloned())
+    instance.set(vr, bases, &|index| texts[index].clone())
 }

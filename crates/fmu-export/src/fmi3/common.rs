@@ -60,7 +60,7 @@ pub unsafe fn fmi3GetBinary<M: Exported>(
             let values = output(values, value_count, "values")?;
             let sizes = output(sizes, value_count, "valueSizes")?;
             let mut found = Vec::with_capacity(vr.len());
-            instance.get(vr, &[BaseType::Binary], |_, value| {
+            instance.get(vr, &[BaseType::Binary], &mut |_, value| {
                 if let Value::Binary(bytes) = value {
                     found.push(bytes);
                 }
@@ -93,7 +93,7 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
                 let name = instance.name(*vr, BaseType::Binary)?;
                 bytes.push(Value::Binary(array(*value, *size, name)?.to_vec()));
             }
-            instance.set(vr, &[BaseType::Binary], bytes.iter().cloned())
+            instance.set(vr, &[BaseType::Binary], &|index| bytes[index].clone())
         })
     }
 }

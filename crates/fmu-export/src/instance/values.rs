@@ -150,15 +150,16 @@ impl<M: Exported> Instance<M> {
     #[cold]
     #[inline(never)]
     fn set_reals_and_parameters<R: Reference>(&mut self, vr: &[R], values: &[f64]) -> Outcome {
-        self.set(vr, &[BaseType::Real], values.iter().map(|value| Value::Real(*value)))
+        self.set(vr, &[BaseType::Real], &|index| Value::Real(values[index]))
     }
 
     /// Values of any other type: all are checked, then each is handed over with its place.
+    #[inline(never)]
     pub fn get<R: Reference>(
         &mut self,
         vr: &[R],
         bases: &[BaseType],
-        mut each: impl FnMut(usize, Value),
+        each: &mut dyn FnMut(usize, Value),
     ) -> Outcome {
         for vr in vr {
             self.variable_of(vr.place(), bases)?;
@@ -183,22 +184,24 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Sets values of any type: all are checked, then all are set.
+    /// Sets values of any type, which `value` returns by index: all are checked, then all are set. One function for all
+    /// types keeps libraries small.
+    #[inline(never)]
     pub fn set<R: Reference>(
         &mut self,
         vr: &[R],
         bases: &[BaseType],
-        values: impl Iterator<Item = Value> + Clone,
+        value: &dyn Fn(usize) -> Value,
     ) -> Outcome {
         self.check_all_settable(vr, bases)?;
-        let to_blame = vr.iter().zip(values.clone()).find_map(|(vr, value)| {
-            let refusal = check_value(&M::TABLE[vr.place() as usize], &value).err()?;
+        let to_blame = vr.iter().enumerate().find_map(|(index, vr)| {
+            let refusal = check_value(&M::TABLE[vr.place() as usize], &value(index)).err()?;
             Some((*vr, refusal))
         });
         match to_blame {
             Some((blamed, refusal)) => self.remember(vr, Some(blamed.place()), Err(refusal)),
             None => {
-                let set = self.set_settable(vr, values);
+                let set = self.set_settable(vr, value);
                 self.remember(vr, None, set)
             }
         }
@@ -258,17 +261,13 @@ impl<M: Exported> Instance<M> {
         if reasons.is_empty() { Ok(()) } else { refuse(reasons.join("; ")) }
     }
 
-    fn set_settable<R: Reference>(
-        &mut self,
-        vr: &[R],
-        values: impl Iterator<Item = Value> + Clone,
-    ) -> Outcome {
+    fn set_settable<R: Reference>(&mut self, vr: &[R], value: &dyn Fn(usize) -> Value) -> Outcome {
         let parameters =
             vr.iter().any(|vr| M::TABLE[vr.place() as usize].causality() == Causality::Parameter);
         let started = self.state.started;
         let set = |model: &mut M| {
-            for (vr, value) in vr.iter().zip(values) {
-                M::TABLE[vr.place() as usize].set(model, &value);
+            for (index, vr) in vr.iter().enumerate() {
+                M::TABLE[vr.place() as usize].set(model, &value(index));
                 if !started {
                     model.calculate_start();
                 }
