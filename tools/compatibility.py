@@ -12,9 +12,9 @@ from prw.errors import UserError
 from prw.files import write_text
 
 #: Where tests/importers leave what they saw, a file each, and where it goes; within the project.
-SEEN, PAGE, HEADING = Path("target/importers"), Path("docs/compatibility.md"), "Seen by tests/importers"
+SEEN, PAGE, HEADING = Path("target/importers"), Path("docs/compatibility.md"), "Results of tests/importers"
 HEADS = ("tool", "version", "fmu", "run", "seen", "date")
-TITLES = ("tool", "version", "FMU", "what was run", "what was seen", "date")
+TITLES = ("tool", "version", "FMU", "run", "result", "date")
 
 
 def add_parser(subparsers: Any) -> None:
