@@ -1,4 +1,4 @@
-"""`tools examples`: runs the examples and writes docs/examples.md: what each is for, its figure, what it prints, its code."""
+"""`tools examples`: runs the examples and writes docs/examples.md: the purpose, the figure and the output of each example."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ HEAD = """# Examples
 
 <!-- written by make docs -->
 
-Short programs on top of the FMU and of the Python package `prw`, to read and to change. `make examples` installs what
-they need and builds the FMUs; each runs from the project's folder."""
+These short programs use the FMU and the package prw. `make examples` installs their packages and builds the FMUs. Run them
+from the root of the repository."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -62,7 +62,5 @@ def section(name: str) -> str:
     if isinstance(found, tuple):
         write_small_png(FIGURES / f"{name}.png", found[0])
         parts.append(f"![{title}](examples/{name}.png)")
-    parts.append(f"It prints\n\n```text\n{said.getvalue().strip()}\n```")
-    code = path.read_text(encoding="utf-8").split('"""\n', 1)[1].strip()
-    parts.append(f"<details><summary><code>{path.as_posix()}</code></summary>\n\n```python\n{code}\n```\n\n</details>")
+    parts.append(f"[{path.name}](../{path.as_posix()}) prints\n\n```text\n{said.getvalue().strip()}\n```")
     return "\n\n".join(parts)
