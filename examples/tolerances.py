@@ -1,7 +1,7 @@
 """Effect of tolerances in stiffness and damping on tracking: 10,000 wrists
 
-You learn to run an FMU ten thousand times with random parameters (fmu_run), to see how far pitch and roll deviate from
-those of a wrist with stiff couplings, and which parameter causes it.
+You learn to run an FMU ten thousand times with random parameters (fmu_run). The plots show how far pitch and roll
+deviate from a wrist with stiff couplings, and which parameter causes it.
 
     make examples; .venv/bin/python examples/tolerances.py
 """
