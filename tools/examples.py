@@ -21,8 +21,8 @@ HEAD = """# Examples
 
 <!-- written by make docs -->
 
-These short programs use the FMU and the package prw. `make examples` installs their packages and builds the FMUs. Run them
-from the root of the repository."""
+These short programs use the FMU and the package prw. `make examples` installs their packages and builds the FMUs. To run one from
+the root of the repository: `.venv/bin/python examples/lqr.py`."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -55,10 +55,10 @@ def section(name: str) -> str:
     path = Path("examples", f"{name}.py")
     example, said = runpy.run_path(str(path)), io.StringIO()
     title, _, about = example["__doc__"].strip().partition("\n\n")
-    about, _, command = about.rpartition("\n\n    ")
+    about = about.rpartition("\n\n    ")[0]
     with contextlib.redirect_stdout(said):
         found = example["main"]()
-    parts = [f"## {title}", about, f"```sh\n{command}\n```"]
+    parts = [f"## {title}", about]
     if isinstance(found, tuple):
         write_small_png(FIGURES / f"{name}.png", found[0])
         parts.append(f"![{title}](examples/{name}.png)")
