@@ -89,7 +89,7 @@ def test_prose_is_plain(name: str) -> None:
 
 
 def test_uncovered_pages_exist() -> None:
-    assert NOT_COVERED <= set(FILES)
+    assert set(FILES) >= NOT_COVERED
 
 
 @pytest.mark.parametrize(
