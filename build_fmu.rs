@@ -3,13 +3,17 @@
 use anyhow::{Context, Error, Result};
 use clap::Parser;
 use fmu_package::{BuildOptions, Builder, Sources, Terminal};
-use prw_testbed::fingerprint::{self, PARAMETERS};
-use prw_testbed::parameter_file;
 use std::path::{Path, PathBuf, absolute};
 use std::process::ExitCode;
 
-/// The folder of `Cargo.toml`.
-const PROJECT: &str = env!("CARGO_MANIFEST_DIR");
+#[path = "src/parameter_file.rs"]
+mod parameter_file;
+#[allow(dead_code, reason = "the model needs the rest")]
+#[path = "src/parameters.rs"]
+mod parameters;
+
+/// Table 1.
+const PARAMETERS: &str = "modelDescription/parameters.json";
 
 /// Builds the FMU of the pitch-roll wrist testbed: target/fmu/prw_testbed.fmu for FMI 2.0 and
 /// target/fmu/fmi3/prw_testbed.fmu for FMI 3.0.
@@ -42,12 +46,13 @@ fn run(options: &Options) -> Result<()> {
         Some(file) => Some(absolute(file).with_context(|| format!("{} is no file", file.display()))?),
         None => None,
     };
-    let file = other.clone().unwrap_or_else(|| Path::new(PROJECT).join(PARAMETERS));
+    let project = project();
+    let file = other.clone().unwrap_or_else(|| project.join(PARAMETERS));
     let builder = Builder {
-        sources: fingerprint::sources(PROJECT),
+        sources: sources(project),
         profile: "library",
         terminals: terminals(),
-        start: fingerprint::start(&parameter_file::read(&file).map_err(Error::msg)?),
+        start: parameter_file::read(&file).map_err(Error::msg)?.start_values(),
         is_default: other.is_none(),
         start_from: Some(file),
         page_scripts: vec![
@@ -59,16 +64,33 @@ fn run(options: &Options) -> Result<()> {
             "prw_controller",
             Sources {
                 licenses: vec!["../../LICENSE-APACHE", "../../LICENSE-MIT"],
-                ..Sources::of_package(concat!(env!("CARGO_MANIFEST_DIR"), "/crates/prw-controller"))
+                ..Sources::of_package(project.join("crates/prw-controller"))
             },
         )],
         environment: vec![("PRW_PARAMETERS", other.map(Into::into))],
-        ..Builder::new(env!("CARGO_PKG_NAME"), PROJECT)
+        ..Builder::new("prw_testbed", project)
     };
     builder.run(&options.build)
 }
 
-/// Where the testbed is connected.
+/// The directory of the project.
+fn project() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("crates/build-fmu is in it")
+}
+
+/// The files that the library and its description are made from. The guid is a hash of them.
+fn sources(project: &Path) -> Sources {
+    Sources {
+        folder: project.to_owned(),
+        code: vec!["Cargo.toml", "build.rs", "build_fmu.rs", "src"],
+        content: Some("modelDescription"),
+        // The description is generated, and the parameters are compiled in.
+        not_content: vec!["modelDescription.xml", "parameters.json"],
+        licenses: vec!["LICENSE-APACHE", "LICENSE-MIT"],
+    }
+}
+
+/// The terminals of the testbed.
 fn terminals() -> Vec<Terminal> {
     vec![
         Terminal::plug("motor1")

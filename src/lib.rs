@@ -46,15 +46,13 @@
 mod capabilities;
 pub mod decoupled;
 pub mod energies;
-#[cfg(feature = "packaging")]
-pub mod fingerprint;
 mod fmu;
 pub mod instant;
 pub mod motor;
 pub mod number;
 pub mod pair;
-#[cfg(feature = "packaging")]
-pub mod parameter_file;
+#[cfg(test)]
+mod parameter_file;
 pub mod parameters;
 pub mod propagator;
 pub mod start;

@@ -34,7 +34,7 @@ macro_rules! table {
         }
     };
 }
-#[allow(unused_imports, reason = "only what reads parameters.json and the guid need it")]
+#[allow(unused_imports, reason = "only parameter_file.rs needs it")]
 pub(crate) use table;
 
 macro_rules! parameters {
@@ -47,6 +47,11 @@ macro_rules! parameters {
         }
 
         impl Parameters {
+            /// The parameters by name, as strings that are read back to the same numbers.
+            pub fn start_values(&self) -> Vec<(String, String)> {
+                vec![$((stringify!($name).to_owned(), self.$name.to_string())),+]
+            }
+
             /// No parameters: a direction in which none changes.
             pub const ZERO: Self = Self { $($name: 0 as $kind,)+ };
 

@@ -16,7 +16,9 @@ ROOT = Path(__file__).resolve().parents[1]
 #: Tests of the testbed that compile no FMU.
 QUICK = ("--lib", "--test", "paper", "--test", "stepping", "--test", "fmu")
 #: Crates that the FMU is made of or made with.
-OF_THE_FMU = {"prw_testbed", "fmi-abi", "fmu-export", "fmu-package"}
+OF_THE_FMU = {"build_fmu", "prw_testbed", "fmi-abi", "fmu-export", "fmu-package"}
+#: Packages without unit tests in Rust.
+UNTESTED = {"build_fmu", "fmu-run-python"}
 CORE = [f"tests/fmpy/test_{name}.py" for name in ("fig4", "exactness", "description")]
 
 
@@ -35,6 +37,8 @@ def changed_files() -> list[str]:
 
 def crate(name: str) -> str:
     """The Rust package that a file belongs to."""
+    if name == "build_fmu.rs":
+        return "build_fmu"
     for folder in (ROOT / name).parents:
         manifest = folder / "Cargo.toml"
         if manifest.is_file():
@@ -54,7 +58,7 @@ def commands(names: list[str]) -> list[list[str]]:
         listed += [
             ["cargo", "test", "--locked", "--package", name, *(QUICK if name == "prw_testbed" else ("--lib",))]
             for name in rust
-            if name != "fmu-run-python"
+            if name not in UNTESTED
         ]
     if scripts:
         listed.append([sys.executable, "-m", "ruff", "check", *scripts])

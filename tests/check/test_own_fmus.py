@@ -39,9 +39,9 @@ def test_nothing_is_found_but_what_is_listed(version: str, model: str) -> None:
     assert report["unreached"] == []
     # An observation begins with the function, whose name depends on the FMI version.
     found = [
-        (finding["grade"], finding["name"], seen.split(" with ", 1)[-1])
+        (finding["severity"], finding["name"], seen.split(" with ", 1)[-1])
         for finding in report["findings"]
-        for seen in [finding["seen"], *finding["more"]]
+        for seen in [finding["observed"], *finding["more"]]
         if finding["name"] != "package.glibc"
     ]
     assert sorted(found) == sorted(listed(model))

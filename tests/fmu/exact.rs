@@ -105,7 +105,7 @@ pub fn start_at(fmu: &dyn Either, x: [f64; 6]) {
 /// Sets all parameters that eq. (11) has, the Reals at once, because they are checked together.
 pub fn set_parameters(fmu: &dyn Either, p: &Parameters) {
     let (mut reals, mut values) = (Vec::new(), Vec::new());
-    for (name, value) in prw_testbed::fingerprint::start(p) {
+    for (name, value) in p.start_values() {
         let vr = TABLE.iter().position(|variable| variable.name() == name).unwrap();
         if TABLE[vr].base() == BaseType::Real {
             reals.push(vr as u32);

@@ -94,11 +94,12 @@ fn grows(from: &str, arguments: &[&str], columns: &str, course: &str) -> Folder 
 fn findings(report: &Value) -> BTreeSet<String> {
     let all = report["findings"].as_array().unwrap().iter();
     let all = all.filter(|finding| finding["name"] != "package.glibc");
-    let seen = all.flat_map(|finding| {
-        let seen = std::iter::once(&finding["seen"]).chain(finding["more"].as_array().unwrap());
-        seen.map(|seen| [&finding["grade"], &finding["name"], seen].map(|text| text.as_str().unwrap()))
+    let observed = all.flat_map(|finding| {
+        let one = std::iter::once(&finding["observed"]).chain(finding["more"].as_array().unwrap());
+        one.map(|text| [&finding["severity"], &finding["name"], text].map(|text| text.as_str().unwrap()))
     });
-    seen.map(|[grade, name, seen]| format!("{grade} {name} {}", seen.split(" with ").last().unwrap()))
+    observed
+        .map(|[severity, name, text]| format!("{severity} {name} {}", text.split(" with ").last().unwrap()))
         .collect()
 }
 

@@ -1,10 +1,10 @@
 //! Rules that hold for every run: nothing is written where it does not belong, statuses are those of the standard, messages
 //! are such that importers can show them.
 
+use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Written};
 use crate::description::Description;
 use crate::finding::{Finding, Judge, status_name, step_name};
 use crate::rules::claim;
-use crate::script::{Message, Numbered, Run, Script, Step, Written};
 use fmi_abi::Standard;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -13,20 +13,20 @@ use std::sync::Arc;
 type Broken = (&'static str, Judge);
 
 /// The findings in a run that came to its end.
-pub fn findings(description: &Description, script: &Script, run: &Run) -> Vec<Finding> {
+pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -> Vec<Finding> {
     let mut all = Vec::new();
-    walk(script, &mut all);
+    walk(sequence, &mut all);
     let mut broken: Vec<Broken> = processes(&all, run).into_iter().collect();
     for numbered in &all {
         if run.of(numbered.id).is_some() {
             broken.extend(call(numbered));
             broken.extend(messages(description, numbered.id));
-            broken.extend(silence(script, numbered));
+            broken.extend(silence(sequence, numbered));
         }
     }
     let found = broken.into_iter().filter_map(|(name, judge)| {
-        let seen = judge(run)?;
-        Some(claim(description.standard, name).finding(seen, script.clone(), judge))
+        let observed = judge(run)?;
+        Some(claim(description.standard, name).finding(observed, sequence.clone(), judge))
     });
     let mut names: Vec<String> = Vec::new();
     found
@@ -38,18 +38,18 @@ pub fn findings(description: &Description, script: &Script, run: &Run) -> Vec<Fi
         .collect()
 }
 
-fn walk<'s>(script: &'s [Numbered], all: &mut Vec<&'s Numbered>) {
-    for numbered in script {
+fn walk<'s>(sequence: &'s [Numbered], all: &mut Vec<&'s Numbered>) {
+    for numbered in sequence {
         all.push(numbered);
         match &numbered.step {
             Step::Repeat(_, steps) => walk(steps, all),
-            Step::Parallel(scripts) => scripts.iter().for_each(|script| walk(script, all)),
+            Step::Parallel(sequences) => sequences.iter().for_each(|sequence| walk(sequence, all)),
             _ => {}
         }
     }
 }
 
-/// Processes that were left by a script that has freed all instances.
+/// Processes that were left by a sequence that has freed all instances.
 fn processes(all: &[&Numbered], run: &Run) -> Option<Broken> {
     if run.left.is_empty() {
         return None;
@@ -66,21 +66,21 @@ fn processes(all: &[&Numbered], run: &Run) -> Option<Broken> {
     Some(("resources.processes", judge))
 }
 
-/// The instantiations of a script, each with the call that frees the instance; none if an instance is not freed.
+/// The instantiations of a sequence, each with the call that frees the instance; none if an instance is not freed.
 fn lives(all: &[&Numbered]) -> Option<Vec<(u32, u32)>> {
     let mut alive = HashMap::new();
     let mut pairs = Vec::new();
     for numbered in all {
         match &numbered.step {
-            Step::Make(place, _) if alive.insert(*place, numbered.id).is_some() => return None,
-            Step::Free(place) => pairs.extend(alive.remove(place).map(|make| (make, numbered.id))),
+            Step::Make(index, _) if alive.insert(*index, numbered.id).is_some() => return None,
+            Step::Free(index) => pairs.extend(alive.remove(index).map(|make| (make, numbered.id))),
             _ => {}
         }
     }
     alive.is_empty().then_some(pairs)
 }
 
-/// What a call wrote and returned.
+/// Values that a call wrote, and its status.
 fn call(numbered: &Numbered) -> Vec<Broken> {
     let (id, name) = (numbered.id, step_name(&numbered.step));
     let mut broken: Vec<Broken> = Vec::new();
@@ -160,8 +160,8 @@ fn messages(description: &Description, id: u32) -> Vec<Broken> {
 }
 
 /// A call that fails without a message, where logging is on.
-fn silence(script: &Script, numbered: &Numbered) -> Option<Broken> {
-    let off = script.iter().any(|numbered| {
+fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
+    let off = sequence.iter().any(|numbered| {
         matches!(&numbered.step, Step::Make(_, make) if !make.logging)
             || matches!(&numbered.step, Step::Call { function, .. } if function.ends_with("SetDebugLogging"))
     });

@@ -35,7 +35,7 @@ impl Baseline {
 
     /// The number of the first line that is wrong, if there is one.
     fn parse(text: &str) -> Result<Self, usize> {
-        let lines = text.lines().enumerate().map(|(place, line)| (place + 1, line.trim()));
+        let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
         let accepted =
             lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).map(|(number, line)| {
                 let end = line.find([':', ' ', '\t']).ok_or(number)?;
@@ -64,9 +64,10 @@ impl Baseline {
     /// The reason for which all observations of a finding are accepted.
     pub fn of_finding(&self, finding: &Finding) -> Option<String> {
         let mut reasons: Vec<&str> = Vec::new();
-        for seen in std::iter::once(&finding.seen).chain(&finding.more) {
+        for observed in std::iter::once(&finding.observed).chain(&finding.more) {
             let fits = |of: &&Accepted| {
-                of.name == finding.name && of.text.as_ref().is_none_or(|text| seen.contains(text.as_str()))
+                of.name == finding.name
+                    && of.text.as_ref().is_none_or(|text| observed.contains(text.as_str()))
             };
             let reason = self.accepted.iter().find(fits)?.reason.as_str();
             if !reasons.contains(&reason) {
@@ -84,9 +85,10 @@ impl Baseline {
     /// Names that nothing was found for.
     pub fn unused(&self, findings: &[Finding], unchecked: &[crate::Unchecked]) -> Vec<String> {
         let used = |of: &&Accepted| {
-            let fits = |seen: &String| of.text.as_ref().is_none_or(|text| seen.contains(text.as_str()));
+            let fits =
+                |observed: &String| of.text.as_ref().is_none_or(|text| observed.contains(text.as_str()));
             findings.iter().any(|finding| {
-                finding.name == of.name && std::iter::once(&finding.seen).chain(&finding.more).any(fits)
+                finding.name == of.name && std::iter::once(&finding.observed).chain(&finding.more).any(fits)
             }) || unchecked.iter().any(|unchecked| unchecked.name == of.name)
         };
         self.accepted.iter().filter(|of| !used(of)).map(|of| of.name.clone()).collect()
@@ -96,16 +98,16 @@ impl Baseline {
 #[cfg(test)]
 mod tests {
     use super::Baseline;
-    use crate::finding::{Finding, Grade};
+    use crate::finding::{Finding, Severity};
 
     #[test]
     fn a_reason_is_needed_for_each_observation() {
         let text =
             "# known\nlogs.silent: since 2024\n\nrefusals.tolerated \"J2\": intended: see the manual\n";
         let baseline = Baseline::parse(text).unwrap_or_default();
-        let finding = |name: &str, seen: &[&str]| {
-            let mut finding = Finding::new(name, Grade::Note, String::new(), "", seen[0].to_owned());
-            finding.more = seen[1..].iter().map(|seen| (*seen).to_owned()).collect();
+        let finding = |name: &str, observed: &[&str]| {
+            let mut finding = Finding::new(name, Severity::Note, String::new(), "", observed[0].to_owned());
+            finding.more = observed[1..].iter().map(|observed| (*observed).to_owned()).collect();
             finding
         };
         assert_eq!(baseline.of_finding(&finding("logs.silent", &["a", "b"])), Some("since 2024".to_owned()));

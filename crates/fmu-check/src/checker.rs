@@ -1,14 +1,14 @@
-//! What all checks share: it plays scripts, judges what came of them, and keeps what is found.
+//! The shared part of all checks: runs call sequences, judges the results and keeps the findings.
 
 use crate::always;
+use crate::call_sequence::{CallSequence, End, Run, Setting};
 use crate::description::Description;
-use crate::finding::{Event, Finding, Grade, Judge, ending, event, step_name};
+use crate::finding::{Event, Finding, Judge, Severity, ending, event, step_name};
 use crate::legal::first_illegal;
 use crate::rules::{self, Claim};
 use crate::run::Workers;
-use crate::script::{End, Run, Script, Setting};
 use crate::shrink::shrink;
-use crate::writer::{Course, Writer};
+use crate::writer::{Trajectory, Writer};
 use fmi_abi::{Interface, Standard};
 use std::collections::HashSet;
 use std::fmt;
@@ -40,17 +40,17 @@ pub struct Unchecked {
 
 /// An FMU under attack.
 pub struct Checker {
-    /// What it promises.
+    /// Model description of the FMU.
     pub description: Arc<Description>,
-    /// Where its library is.
+    /// Path of the library.
     pub setting: Setting,
-    /// Play the scripts.
+    /// Play the sequences.
     pub workers: Workers,
     /// A simulation that goes well, by Co-Simulation and by Model Exchange.
-    pub courses: Vec<Course>,
+    pub trajectories: Vec<Trajectory>,
     /// Chooses what is chosen at random.
     pub seed: u64,
-    /// Seconds for one script.
+    /// Seconds for one sequence.
     pub limit: f64,
     /// When all must be over.
     pub deadline: Instant,
@@ -76,25 +76,25 @@ fn keep(found: &mut Vec<Finding>, mut finding: Finding) {
         found.push(finding);
         return;
     };
-    let rank = |finding: &Finding| (finding.grade, std::cmp::Reverse(finding.script.len()));
+    let rank = |finding: &Finding| (finding.severity, std::cmp::Reverse(finding.sequence.len()));
     if rank(&finding) > rank(kept) {
         std::mem::swap(kept, &mut finding);
     }
-    for seen in std::iter::once(finding.seen).chain(finding.more) {
-        if seen != kept.seen && !kept.more.contains(&seen) {
-            kept.more.push(seen);
+    for observed in std::iter::once(finding.observed).chain(finding.more) {
+        if observed != kept.observed && !kept.more.contains(&observed) {
+            kept.more.push(observed);
         }
     }
 }
 
 /// An observation without its numbers: another one is another finding.
-fn outline(seen: &str) -> String {
-    let names = seen.split(|letter: char| !(letter.is_alphabetic() || letter == '_'));
+fn outline(observed: &str) -> String {
+    let names = observed.split(|letter: char| !(letter.is_alphabetic() || letter == '_'));
     names.filter(|name| name.len() > 1 && !["NaN", "inf"].contains(name)).collect::<Vec<_>>().join(" ")
 }
 
 impl Checker {
-    /// An FMU whose courses are not yet known.
+    /// An FMU whose trajectories are not yet known.
     pub fn new(
         description: Description,
         setting: Setting,
@@ -107,7 +107,7 @@ impl Checker {
             description: Arc::new(description),
             setting,
             workers,
-            courses: Vec::new(),
+            trajectories: Vec::new(),
             seed,
             limit,
             deadline,
@@ -120,12 +120,12 @@ impl Checker {
         }
     }
 
-    /// A writer of scripts.
+    /// A writer of sequences.
     pub fn writer(&self) -> Writer<'_> {
         Writer::new(&self.description)
     }
 
-    /// As many values or orders as are tried at most: of so many, some in a quick check.
+    /// The number of values or orders that are tried; fewer in a quick check.
     pub fn most(&self, many: usize) -> usize {
         if self.quick { many.div_ceil(8) } else { many }
     }
@@ -155,14 +155,14 @@ impl Checker {
         !self.can(interface, &["canBeInstantiatedOnlyOncePerProcess"])
     }
 
-    /// Plays a script.
-    pub fn play(&self, script: &Script) -> anyhow::Result<Run> {
-        self.play_for(script, self.limit)
+    /// Plays a sequence.
+    pub fn play(&self, sequence: &CallSequence) -> anyhow::Result<Run> {
+        self.play_for(sequence, self.limit)
     }
 
-    /// Plays a script for so many seconds at most.
-    pub fn play_for(&self, script: &Script, limit: f64) -> anyhow::Result<Run> {
-        debug_assert_eq!(self.illegal(script), None);
+    /// Plays a sequence for so many seconds at most.
+    pub fn play_for(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
+        debug_assert_eq!(self.illegal(sequence), None);
         let left = self.deadline.saturating_duration_since(Instant::now()).as_secs_f64();
         if left <= 0.0 {
             return Err(TimeOver.into());
@@ -170,28 +170,28 @@ impl Checker {
         *locked(&self.played) += 1;
         let run = {
             let _with_others = self.alone.read().unwrap_or_else(PoisonError::into_inner);
-            self.workers.play(&self.setting, script, limit.min(left.max(0.5)))?
+            self.workers.play(&self.setting, sequence, limit.min(left.max(0.5)))?
         };
         match run.end {
             End::Hang(seconds) if seconds < limit => Err(TimeOver.into()),
-            End::Hang(_) => self.patiently(script, run, limit),
+            End::Hang(_) => self.patiently(sequence, run, limit),
             _ => Ok(run),
         }
     }
 
-    /// What a script has wrong by itself, for those who work on this tool.
-    fn illegal(&self, script: &Script) -> Option<String> {
-        let id = first_illegal(&self.description, script)?;
-        let at = script.iter().find(|numbered| numbered.id == id)?;
+    /// An error in a call sequence itself, for developers of this tool.
+    fn illegal(&self, sequence: &CallSequence) -> Option<String> {
+        let id = first_illegal(&self.description, sequence)?;
+        let at = sequence.iter().find(|numbered| numbered.id == id)?;
         Some(format!("{id} {:?}", at.step))
     }
 
-    /// How many scripts were played.
+    /// How many sequences were played.
     pub fn played(&self) -> u64 {
         *locked(&self.played)
     }
 
-    /// What was found.
+    /// The findings.
     pub fn take(&self) -> Vec<Finding> {
         std::mem::take(&mut locked(&self.found))
     }
@@ -220,9 +220,10 @@ impl Checker {
     }
 
     /// Keeps the finding that a run breaks a rule. Whether it does.
-    pub fn keep(&self, name: &str, run: &Run, script: &Script, judge: Judge) -> bool {
-        let seen = if run.end == End::Done { judge(run) } else { None };
-        let found = seen.map(|seen| self.add(self.claim(name).finding(seen, script.clone(), judge)));
+    pub fn keep(&self, name: &str, run: &Run, sequence: &CallSequence, judge: Judge) -> bool {
+        let observed = if run.end == End::Done { judge(run) } else { None };
+        let found =
+            observed.map(|observed| self.add(self.claim(name).finding(observed, sequence.clone(), judge)));
         found.is_some()
     }
 
@@ -232,30 +233,30 @@ impl Checker {
     }
 
     /// Keeps the findings of the rules that hold for every run.
-    pub fn keep_always(&self, script: &Script, run: &Run) {
-        always::findings(&self.description, script, run).into_iter().for_each(|finding| self.add(finding));
+    pub fn keep_always(&self, sequence: &CallSequence, run: &Run) {
+        always::findings(&self.description, sequence, run).into_iter().for_each(|finding| self.add(finding));
     }
 
-    /// Plays a script that keeps to the standard but for forbidden calls, and judges: first how it ended, then what holds
+    /// Plays a sequence that keeps to the standard but for forbidden calls, and judges: first how it ended, then what holds
     /// of every run, then `judge`.
-    pub fn judge(&self, name: &str, script: Script, judge: Judge) -> anyhow::Result<Run> {
-        let hostile = script.iter().any(|numbered| numbered.forbidden);
+    pub fn judge(&self, name: &str, sequence: CallSequence, judge: Judge) -> anyhow::Result<Run> {
+        let hostile = sequence.iter().any(|numbered| numbered.forbidden);
         let limit = if hostile { self.limit.min(3.0) } else { self.limit };
-        let run = self.play_for(&script, limit)?;
+        let run = self.play_for(&sequence, limit)?;
         if run.end != End::Done {
-            self.ended(name, &script, &run, hostile)?;
+            self.ended(name, &sequence, &run, hostile)?;
             return Ok(run);
         }
-        self.keep_always(&script, &run);
-        self.keep(name, &run, &script, judge);
+        self.keep_always(&sequence, &run);
+        self.keep(name, &run, &sequence, judge);
         Ok(run)
     }
 
     /// The run of a call sequence that seems to hang, played again with nothing beside it and three times the time: the machine
     /// may be busy. A function that has not returned then is not tried again.
-    fn patiently(&self, script: &Script, run: Run, limit: f64) -> anyhow::Result<Run> {
+    fn patiently(&self, sequence: &CallSequence, run: Run, limit: f64) -> anyhow::Result<Run> {
         let name = |run: &Run| {
-            let at = run.at.and_then(|id| script.iter().find(|numbered| numbered.id == id));
+            let at = run.at.and_then(|id| sequence.iter().find(|numbered| numbered.id == id));
             at.map_or(String::new(), |at| format!("{}{}", step_name(&at.step), at.forbidden))
         };
         if locked(&self.hung).contains(&name(&run)) {
@@ -265,7 +266,7 @@ impl Checker {
         let run = {
             let _alone = self.alone.write().unwrap_or_else(PoisonError::into_inner);
             *locked(&self.played) += 1;
-            self.workers.play(&self.setting, script, (3.0 * limit).min(left.max(0.5)))?
+            self.workers.play(&self.setting, sequence, (3.0 * limit).min(left.max(0.5)))?
         };
         match run.end {
             End::Hang(seconds) if seconds < 3.0 * limit => Err(TimeOver.into()),
@@ -278,30 +279,30 @@ impl Checker {
     }
 
     /// A run that did not come to its end.
-    fn ended(&self, rule: &str, script: &Script, run: &Run, hostile: bool) -> anyhow::Result<()> {
-        let Some(seen) = ending(run, script) else { return Ok(()) };
+    fn ended(&self, rule: &str, sequence: &CallSequence, run: &Run, hostile: bool) -> anyhow::Result<()> {
+        let Some(observed) = ending(run, sequence) else { return Ok(()) };
         let ends: Judge = {
-            let (script, kind) = (script.clone(), std::mem::discriminant(&run.end));
+            let (sequence, kind) = (sequence.clone(), std::mem::discriminant(&run.end));
             let at = run
                 .at
-                .and_then(|id| script.iter().find(|numbered| numbered.id == id))
+                .and_then(|id| sequence.iter().find(|numbered| numbered.id == id))
                 .map(|at| step_name(&at.step));
             Arc::new(move |run: &Run| {
                 let here = run
                     .at
-                    .and_then(|id| script.iter().find(|numbered| numbered.id == id))
+                    .and_then(|id| sequence.iter().find(|numbered| numbered.id == id))
                     .map(|at| step_name(&at.step));
-                (std::mem::discriminant(&run.end) == kind && here == at).then(|| ending(run, &script))?
+                (std::mem::discriminant(&run.end) == kind && here == at).then(|| ending(run, &sequence))?
             })
         };
         let keep = |name: &str| {
-            self.add(self.claim(name).finding(seen.clone(), script.clone(), Arc::clone(&ends)));
+            self.add(self.claim(name).finding(observed.clone(), sequence.clone(), Arc::clone(&ends)));
             Ok(())
         };
         // Whether memory beyond an array was touched: with room after it, it shows.
         if matches!(run.end, End::Crash(_)) && cfg!(unix) && !hostile {
             let soft = Setting { soft: true, ..self.setting.clone() };
-            let again = self.workers.play(&soft, script, self.limit)?;
+            let again = self.workers.play(&soft, sequence, self.limit)?;
             let wrote = again.outcomes.values().any(|outcome| !outcome.damage.is_empty());
             let beyond = match again.end {
                 _ if wrote => Some(("arrays.written-beyond", "it writes beyond an array")),
@@ -311,7 +312,7 @@ impl Checker {
                 _ => None,
             };
             if let Some((name, how)) = beyond {
-                self.add(self.claim(name).finding(format!("{seen}: {how}"), script.clone(), ends));
+                self.add(self.claim(name).finding(format!("{observed}: {how}"), sequence.clone(), ends));
                 return Ok(());
             }
         }
@@ -330,9 +331,9 @@ impl Checker {
         };
         let mut ended = self.claim(&format!("{name}.{what}"));
         if hostile {
-            ended.grade = ended.grade.max(Grade::Fragile);
+            ended.severity = ended.severity.max(Severity::Fragile);
         }
-        self.add(ended.finding(seen, script.clone(), ends));
+        self.add(ended.finding(observed, sequence.clone(), ends));
         Ok(())
     }
 
@@ -347,20 +348,21 @@ impl Checker {
         Setting { soft: self.setting.soft && !ends, ..self.setting.clone() }
     }
 
-    /// The programs of a finding.
+    /// Writes the program of a finding. A call sequence without a hang has ten times the time: the machine may be busy.
     pub fn reproduce(&self, finding: &mut Finding) -> anyhow::Result<()> {
         let late = Instant::now() > self.deadline && self.quick;
         if finding.judge.is_some() && !late {
-            let limit = self.limit + 3.0 * self.setting.repetitions;
-            let run = self.workers.play(&self.hard(finding), &finding.script, limit)?;
-            crate::reproduce::programs(finding, &run, &self.setting, &self.description);
+            let patience = if finding.name.ends_with("hang") { 1.0 } else { 10.0 };
+            let limit = patience * (self.limit + 3.0 * self.setting.repetitions);
+            let run = self.workers.play(&self.hard(finding), &finding.sequence, limit)?;
+            crate::reproduce::program(finding, &run, &self.setting, &self.description);
         }
         Ok(())
     }
 
-    /// A shorter script for each finding, as long as there is time.
+    /// A shorter sequence for each finding, as long as there is time.
     pub fn shorten(&self, finding: &mut Finding) {
-        finding.steps = (finding.script.len(), finding.script.len());
+        finding.steps = (finding.sequence.len(), finding.sequence.len());
         let Some(judge) = finding.judge.clone() else { return };
         let setting = self.hard(finding);
         let hangs = finding.name.ends_with("hang");
@@ -370,7 +372,7 @@ impl Checker {
             "resources" => 15,
             _ => 400,
         };
-        // What is compared must be what was to be compared: without these calls there are other differences.
+        // A comparison needs the same calls on both sides; without these calls there are other differences.
         let ends = ["crash", "hang", "exit"].iter().any(|end| finding.name.ends_with(end));
         let pinned: &[&str] = match finding.topic() {
             _ if ends => &[],
@@ -388,7 +390,7 @@ impl Checker {
             "results" | "life_cycle" => &["SetTime", "DoStep", "CompletedIntegratorStep"],
             _ => &[],
         };
-        // Where nothing is compared, one call shows it.
+        // If nothing is compared, one call shows the finding.
         let alone = [
             "life_cycle.refused",
             "life_cycle.states-changed",
@@ -398,54 +400,54 @@ impl Checker {
         ]
         .contains(&finding.name.as_str());
         let pinned = if alone { &[] } else { pinned };
-        // A shorter script may show other numbers, but not another observation.
-        let (same, mut seen) = (outline(&finding.seen), finding.seen.clone());
-        let mut shows = |tried: &Script| {
+        // A shorter sequence may show other numbers, but not another observation.
+        let (same, mut observed) = (outline(&finding.observed), finding.observed.clone());
+        let mut shows = |tried: &CallSequence| {
             let run = self.workers.play(&setting, tried, limit).ok();
             let now = run.and_then(|run| judge(&run)).filter(|now| outline(now) == same);
             now.is_some_and(|now| {
-                seen = now;
+                observed = now;
                 true
             })
         };
-        let mut short = shrink(&self.description, &finding.script, pinned, !alone, |tried| {
+        let mut short = shrink(&self.description, &finding.sequence, pinned, !alone, |tried| {
             left -= 1;
             left >= 0 && Instant::now() <= self.deadline && shows(tried)
         });
         // A finding that shows itself only sometimes is not shortened.
-        if short.len() < finding.script.len() && !shows(&short) {
-            (short, seen) = (finding.script.clone(), finding.seen.clone());
+        if short.len() < finding.sequence.len() && !shows(&short) {
+            (short, observed) = (finding.sequence.clone(), finding.observed.clone());
         }
-        finding.seen = seen;
+        finding.observed = observed;
         finding.steps.1 = short.len();
-        finding.script = short;
+        finding.sequence = short;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::keep;
-    use crate::finding::{Finding, Grade};
+    use crate::finding::{Finding, Severity};
 
-    /// A graver finding of a name takes the place of the one before, whose evidence is listed.
+    /// A graver finding of a name takes the index of the one before, whose evidence is listed.
     #[test]
     fn no_evidence_is_lost() {
         let mut found = Vec::new();
-        for (grade, seen) in [
-            (Grade::Note, "a"),
-            (Grade::Note, "b"),
-            (Grade::Violation, "c"),
-            (Grade::Fragile, "d"),
-            (Grade::Violation, "c"),
-            (Grade::Violation, "e"),
-            (Grade::Note, "b"),
+        for (severity, observed) in [
+            (Severity::Note, "a"),
+            (Severity::Note, "b"),
+            (Severity::Violation, "c"),
+            (Severity::Fragile, "d"),
+            (Severity::Violation, "c"),
+            (Severity::Violation, "e"),
+            (Severity::Note, "b"),
         ] {
-            keep(&mut found, Finding::new("topic.name", grade, String::new(), "", seen.to_owned()));
+            keep(&mut found, Finding::new("topic.name", severity, String::new(), "", observed.to_owned()));
         }
-        keep(&mut found, Finding::new("topic.other", Grade::Note, String::new(), "", "a".to_owned()));
+        keep(&mut found, Finding::new("topic.other", Severity::Note, String::new(), "", "a".to_owned()));
         let [one, other] = &found[..] else { panic!("{} findings", found.len()) };
-        assert_eq!((one.grade, one.seen.as_str()), (Grade::Violation, "c"));
+        assert_eq!((one.severity, one.observed.as_str()), (Severity::Violation, "c"));
         assert_eq!(one.more, ["a", "b", "d", "e"]);
-        assert_eq!((other.grade, other.seen.as_str(), other.more.len()), (Grade::Note, "a", 0));
+        assert_eq!((other.severity, other.observed.as_str(), other.more.len()), (Severity::Note, "a", 0));
     }
 }

@@ -1,8 +1,8 @@
-//! The model description, read for what it promises. `fmu-run` reads what it needs to run an FMU; here it is all that can
+//! The model description, read for what it requirements. `fmu-run` reads what it needs to run an FMU; here it is all that can
 //! be held against the library, arrays and clocks too, and what is wrong is told instead of refused.
 
+use crate::call_sequence::Kind;
 use crate::rules::Observation;
-use crate::script::Kind;
 use fmi_abi::{BaseType, Interface, Standard};
 use roxmltree::{Document, Node};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -36,24 +36,24 @@ pub struct Variable {
     pub unit: Option<String>,
     /// The name of its declared type.
     pub declared_type: Option<String>,
-    /// It is the derivative of this variable: by place.
+    /// Index of the variable that this variable is the derivative of.
     pub derivative_of: Option<usize>,
-    /// It is set by clocks.
+    /// Whether clocks set the variable.
     pub clocked: bool,
-    /// It may not be set twice at one time.
+    /// Whether the variable may be set only once per time instant.
     pub once_per_instant: bool,
 }
 
 /// An unknown of the model structure.
 #[derive(Clone, Debug)]
 pub struct Unknown {
-    /// The variable, by place.
+    /// The variable, by index.
     pub variable: usize,
-    /// What it depends on, by places, with kinds; `None` if nothing is said.
+    /// Indices and kinds of the dependencies; `None` if the attribute is missing.
     pub dependencies: Option<Vec<(usize, String)>>,
 }
 
-/// What it offers for a type of interface.
+/// Capabilities of an interface type.
 #[derive(Clone, Debug)]
 pub struct Offer {
     /// The name of its library.
@@ -95,25 +95,25 @@ pub struct Description {
     pub model_exchange: Option<Offer>,
     /// Whether it offers Scheduled Execution.
     pub scheduled_execution: bool,
-    /// In the order of the text.
+    /// Variables in the order of the description.
     pub variables: Vec<Variable>,
-    /// Of the model structure.
+    /// List of the model structure.
     pub outputs: Vec<Unknown>,
-    /// Of the model structure.
+    /// List of the model structure.
     pub derivatives: Vec<Unknown>,
-    /// Of the model structure.
+    /// List of the model structure.
     pub initial_unknowns: Vec<Unknown>,
     /// How many event indicators there are.
     pub event_indicators: Option<usize>,
     /// Their names.
     pub log_categories: Vec<String>,
-    /// Where it starts.
+    /// Start time of the default experiment.
     pub start_time: f64,
-    /// Where it stops, if it is said.
+    /// Stop time of the default experiment, if it has one.
     pub stop_time: Option<f64>,
     /// The size of its steps, if it is said.
     pub step_size: Option<f64>,
-    /// What is wrong in it: the name of a finding, the section, a sentence.
+    /// Errors in the description: the name of the finding, the section, a sentence.
     pub wrong: Vec<Observation>,
 }
 
@@ -172,7 +172,7 @@ impl Description {
         Ok(description)
     }
 
-    /// What it offers for this type of interface.
+    /// Capabilities of this interface type.
     pub fn offer(&self, interface: Interface) -> Option<&Offer> {
         match interface {
             Interface::CoSimulation => self.co_simulation.as_ref(),
@@ -182,14 +182,14 @@ impl Description {
 
     fn structure(&mut self, root: Node) {
         let by_reference: HashMap<u32, usize> =
-            self.variables.iter().enumerate().rev().map(|(place, of)| (of.reference, place)).collect();
+            self.variables.iter().enumerate().rev().map(|(index, of)| (of.reference, index)).collect();
         let (count, standard) = (self.variables.len(), self.standard);
         let mut lost = Vec::new();
         let mut find = |text: &str| {
             let number: Option<u32> = text.parse().ok();
             let found = match standard {
                 Standard::Fmi2 => {
-                    number.map(|number| (number as usize).wrapping_sub(1)).filter(|place| *place < count)
+                    number.map(|number| (number as usize).wrapping_sub(1)).filter(|index| *index < count)
                 }
                 Standard::Fmi3 => number.and_then(|number| by_reference.get(&number).copied()),
             };
@@ -208,9 +208,9 @@ impl Description {
                 .map(str::to_owned)
                 .collect();
             let dependencies = node.attribute("dependencies").map(|list| {
-                let kind = |place: usize| kinds.get(place).cloned().unwrap_or_else(|| "dependent".to_owned());
+                let kind = |index: usize| kinds.get(index).cloned().unwrap_or_else(|| "dependent".to_owned());
                 let found = list.split_whitespace().enumerate();
-                found.filter_map(|(place, text)| Some((find(text)?, kind(place)))).collect()
+                found.filter_map(|(index, text)| Some((find(text)?, kind(index)))).collect()
             });
             Some(Unknown { variable, dependencies })
         };
@@ -241,7 +241,7 @@ impl Description {
         self.wrong.extend(lost.into_iter().map(|why| ("description.structure", why)));
     }
 
-    /// What the text itself has wrong.
+    /// Errors of the XML itself.
     fn judge(&mut self, root: Node) {
         let mut wrong = Vec::new();
         if self.token.is_empty() {
@@ -267,12 +267,12 @@ impl Description {
         let (units, types) = (named("UnitDefinitions"), named("TypeDefinitions"));
         let outputs: HashSet<usize> = self.outputs.iter().map(|unknown| unknown.variable).collect();
         let (mut names, mut references) = (HashSet::new(), HashSet::new());
-        for (place, variable) in self.variables.iter().enumerate() {
+        for (index, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;
             let of_declared = |of: &Option<String>, known: &HashSet<String>| {
                 of.as_ref().filter(|of| !known.contains(of.as_str())).cloned()
             };
-            let (listed, output) = (outputs.contains(&place), variable.causality == "output");
+            let (listed, output) = (outputs.contains(&index), variable.causality == "output");
             let mut tell = |rule, why: String| wrong.push((rule, why));
             if !names.insert(name) {
                 tell("description.names", format!("two variables are called {name:?}"));
@@ -331,18 +331,18 @@ impl Description {
         has_clocks && self.co_simulation.as_ref().is_some_and(|offer| offer.can(&["hasEventMode"]))
     }
 
-    /// The variables that a place of the same type and reference stands for.
-    pub fn aliases(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
-        let of = &self.variables[place];
+    /// The variables that an index of the same type and reference stands for.
+    pub fn aliases(&self, index: usize) -> impl Iterator<Item = usize> + '_ {
+        let of = &self.variables[index];
         let (reference, kind) = (of.reference, of.base.map(|base| kind_of(self.standard, base)));
-        self.variables.iter().enumerate().filter_map(move |(place, other)| {
+        self.variables.iter().enumerate().filter_map(move |(index, other)| {
             let same =
                 other.reference == reference && other.base.map(|base| kind_of(self.standard, base)) == kind;
-            same.then_some(place)
+            same.then_some(index)
         })
     }
 
-    /// The continuous states, by places, in the order of their derivatives.
+    /// The continuous states, by indices, in the order of their derivatives.
     pub fn states(&self) -> Vec<usize> {
         self.derivatives.iter().filter_map(|unknown| self.variables[unknown.variable].derivative_of).collect()
     }
@@ -373,7 +373,7 @@ impl Variable {
         self.base.is_some_and(BaseType::is_float)
     }
 
-    /// Whether it is a number or a truth value, no text and no bytes.
+    /// Whether it is a number or a boolean value, no text and no bytes.
     pub fn is_number(&self) -> bool {
         !matches!(self.base, None | Some(BaseType::String | BaseType::Binary))
     }
@@ -515,7 +515,7 @@ fn base_of(standard: Standard, name: &str) -> Option<BaseType> {
     })
 }
 
-/// What `initial` is where nothing is said: the table of section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0.
+/// The default of `initial`: the table of section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0.
 fn default_initial(causality: &str, variability: &str) -> &'static str {
     match (causality, variability) {
         ("parameter" | "structuralParameter", _) => "exact",
@@ -533,7 +533,7 @@ fn variables(root: Node, standard: Standard, wrong: &mut Vec<Observation>) -> Ve
         .iter()
         .enumerate()
         .rev()
-        .filter_map(|(place, node)| Some((node.attribute("valueReference")?.parse().ok()?, place)))
+        .filter_map(|(index, node)| Some((node.attribute("valueReference")?.parse().ok()?, index)))
         .collect();
     let mut found: Vec<Variable> = Vec::new();
     let mut sizes: HashMap<u32, Option<usize>> = HashMap::new();
@@ -602,7 +602,7 @@ fn variables(root: Node, standard: Standard, wrong: &mut Vec<Observation>) -> Ve
         {
             start = vec![start[0].clone(); size];
         }
-        // What says how large others are.
+        // Structural parameters, which define the sizes of arrays.
         if base.is_some_and(|base| base == BaseType::UInt64) {
             sizes.insert(reference, start.first().and_then(|text| text.parse().ok()));
         }

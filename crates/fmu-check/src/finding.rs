@@ -1,6 +1,6 @@
-//! What is found: graded, with the section of the standard and the shortest script that shows it.
+//! Findings: severity, section of the standard, and the shortest call sequence that shows the finding.
 
-use crate::script::{End, Run, Script, Step, Written};
+use crate::call_sequence::{CallSequence, End, Run, Step, Written};
 
 use serde::Serialize;
 use std::sync::Arc;
@@ -8,16 +8,16 @@ use std::sync::Arc;
 /// How bad it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Grade {
+pub enum Severity {
     /// Good to know.
     Note,
-    /// Nothing in the standard forbids it, but it hurts.
+    /// The standard allows it, but importers fail.
     Fragile,
     /// The standard says must.
     Violation,
 }
 
-impl Grade {
+impl Severity {
     /// Its name.
     pub const fn name(self) -> &'static str {
         match self {
@@ -28,7 +28,7 @@ impl Grade {
     }
 }
 
-/// What must hold of a run; the sentence says what does not.
+/// Judges a run; returns a sentence that describes the violation.
 pub type Judge = Arc<dyn Fn(&Run) -> Option<String> + Send + Sync>;
 
 /// A finding.
@@ -37,46 +37,43 @@ pub struct Finding {
     /// Its name: the topic, a dot, what is wrong.
     pub name: String,
     /// How bad it is.
-    pub grade: Grade,
+    pub severity: Severity,
     /// The edition and section of the standard; empty if the rule is not part of it.
     pub section: String,
-    /// What is promised.
-    pub promise: String,
-    /// What was seen.
-    pub seen: String,
-    /// What else of this name was found.
+    /// The requirement.
+    pub requirement: String,
+    /// The observation.
+    pub observed: String,
+    /// Further observations of this rule.
     pub more: Vec<String>,
     /// The calls that show it; none where the text alone does.
     #[serde(skip)]
-    pub script: Script,
-    /// The same as a program in C.
+    pub sequence: CallSequence,
+    /// The call sequence as a program in C.
     pub c: String,
-    /// The same as a program in Python.
-    pub python: String,
-    /// What is still wrong when it shows.
+    /// Judges whether a run shows the finding.
     #[serde(skip)]
     pub judge: Option<Judge>,
     /// Whether it fails the check.
     pub fails: bool,
     /// The reason for which it is accepted, if the baseline has one.
     pub accepted: Option<String>,
-    /// The steps of the script, and what they were before it was shortened.
+    /// The steps of the sequence, and what they were before it was shortened.
     pub steps: (usize, usize),
 }
 
 impl Finding {
     /// A finding without a call sequence.
-    pub fn new(name: &str, grade: Grade, section: String, promise: &str, seen: String) -> Self {
+    pub fn new(name: &str, severity: Severity, section: String, requirement: &str, observed: String) -> Self {
         Self {
             name: name.to_owned(),
-            grade,
+            severity,
             section,
-            promise: promise.to_owned(),
-            seen,
+            requirement: requirement.to_owned(),
+            observed,
             more: Vec::new(),
-            script: Vec::new(),
+            sequence: Vec::new(),
             c: String::new(),
-            python: String::new(),
             judge: None,
             fails: false,
             accepted: None,
@@ -91,8 +88,8 @@ impl Finding {
 }
 
 /// How a run ended that was not to end so: a sentence with the function it ended in.
-pub fn ending(run: &Run, script: &Script) -> Option<String> {
-    let at = run.at.and_then(|id| script.iter().find(|numbered| numbered.id == id));
+pub fn ending(run: &Run, sequence: &CallSequence) -> Option<String> {
+    let at = run.at.and_then(|id| sequence.iter().find(|numbered| numbered.id == id));
     let name = at.map_or("the end of the process".to_owned(), |numbered| step_name(&numbered.step));
     Some(match &run.end {
         End::Done => return None,
@@ -104,7 +101,7 @@ pub fn ending(run: &Run, script: &Script) -> Option<String> {
     })
 }
 
-/// What a step does, in a few words.
+/// A short description of a step.
 pub fn step_name(step: &Step) -> String {
     match step {
         Step::Make(..) => "the instantiation".to_owned(),
@@ -114,7 +111,7 @@ pub fn step_name(step: &Step) -> String {
             "one of {times} repetitions of {}",
             steps.first().map_or("nothing".to_owned(), |numbered| step_name(&numbered.step))
         ),
-        Step::Parallel(scripts) => format!("a call on one of {} threads", scripts.len()),
+        Step::Parallel(sequences) => format!("a call on one of {} threads", sequences.len()),
         Step::Measure => "a measurement".to_owned(),
         Step::FreshProcess => "a fresh process".to_owned(),
         Step::Unload => "unloading the library".to_owned(),
@@ -122,7 +119,7 @@ pub fn step_name(step: &Step) -> String {
     }
 }
 
-/// What an event did.
+/// The result of an event.
 #[derive(Clone, Copy, Debug)]
 pub struct Event {
     /// Another update is needed.
@@ -139,8 +136,8 @@ pub struct Event {
 pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
     let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
     let (flags, time) = if fmi3 {
-        let number = |place: usize| outcome.written.get(place)?.numbers().first().copied();
-        ([0, 1, 3, 4].map(|place| number(place) == Some(1.0)), number(5)?)
+        let number = |index: usize| outcome.written.get(index)?.numbers().first().copied();
+        ([0, 1, 3, 4].map(|index| number(index) == Some(1.0)), number(5)?)
     } else {
         // fmi2EventInfo has five flags, two to a word, and the time.
         let Written::Numbers(_, words) = outcome.written.first()? else { return None };
@@ -153,17 +150,17 @@ pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
 }
 
 /// A sentence on a call that answered otherwise than OK.
-pub fn refused(script: &Script, run: &Run, ids: &[u32]) -> Option<String> {
+pub fn refused(sequence: &CallSequence, run: &Run, ids: &[u32]) -> Option<String> {
     let id = ids
         .iter()
         .find(|id| run.of(**id).is_some_and(|of| of.missing || of.status.is_some_and(|status| status > 1)))?;
-    refused_one(script, run, *id)
+    refused_one(sequence, run, *id)
 }
 
 /// A sentence on this call, if it did not answer OK.
-pub fn refused_one(script: &Script, run: &Run, id: u32) -> Option<String> {
+pub fn refused_one(sequence: &CallSequence, run: &Run, id: u32) -> Option<String> {
     let outcome = run.of(id)?;
-    let name = script
+    let name = sequence
         .iter()
         .find(|numbered| numbered.id == id)
         .map(|numbered| (step_name(&numbered.step), &numbered.step));

@@ -1,7 +1,7 @@
-//! Whether a script keeps to the standard: a finding must not come from a call that may not be made there.
+//! Whether a sequence keeps to the standard: a finding must not come from a call that may not be made there.
 
+use crate::call_sequence::{Arg, NOBODY, Numbered, Step};
 use crate::description::Description;
-use crate::script::{Arg, NOBODY, Numbered, Step};
 use fmi_abi::calls::signature;
 use fmi_abi::{Interface, Mode, Standard};
 use std::collections::HashMap;
@@ -18,27 +18,27 @@ struct State {
 }
 
 /// The first call that may not be made where it is, by its number; forbidden calls apart, which change nothing.
-pub fn first_illegal(description: &Description, script: &[Numbered]) -> Option<u32> {
-    walk(description, script, &mut Course::default())
+pub fn first_illegal(description: &Description, sequence: &[Numbered]) -> Option<u32> {
+    walk(description, sequence, &mut Trajectory::default())
 }
 
-/// Where all instances, states and bytes are.
+/// State of all instances, saved states and byte buffers.
 #[derive(Default)]
-struct Course {
+struct Trajectory {
     instances: HashMap<usize, State>,
     slots: HashMap<usize, (usize, State)>,
     bytes: HashMap<usize, State>,
 }
 
-fn walk(description: &Description, script: &[Numbered], course: &mut Course) -> Option<u32> {
+fn walk(description: &Description, sequence: &[Numbered], trajectory: &mut Trajectory) -> Option<u32> {
     let standard = description.standard;
-    for Numbered { id, forbidden, step } in script {
-        let Course { instances, slots, bytes } = &mut *course;
+    for Numbered { id, forbidden, step } in sequence {
+        let Trajectory { instances, slots, bytes } = &mut *trajectory;
         if *forbidden {
             continue;
         }
         let good = match step {
-            Step::Make(place, make) => {
+            Step::Make(index, make) => {
                 let interface =
                     if make.co_simulation { Interface::CoSimulation } else { Interface::ModelExchange };
                 let once = description
@@ -53,23 +53,23 @@ fn walk(description: &Description, script: &[Numbered], course: &mut Course) -> 
                     set_up: standard == Standard::Fmi3,
                     updated: false,
                 };
-                let free = !instances.contains_key(place) && (!once || instances.is_empty());
-                instances.insert(*place, state);
+                let free = !instances.contains_key(index) && (!once || instances.is_empty());
+                instances.insert(*index, state);
                 free
             }
-            Step::Free(place) if *place == NOBODY => true,
-            Step::Free(place) => {
-                slots.retain(|_, (owner, _)| owner != place);
-                instances.remove(place).is_some()
+            Step::Free(index) if *index == NOBODY => true,
+            Step::Free(index) => {
+                slots.retain(|_, (owner, _)| owner != index);
+                instances.remove(index).is_some()
             }
             Step::Call { of, function, args } => {
-                let Some((place, state)) = of.and_then(|place| Some((place, instances.get_mut(&place)?)))
+                let Some((index, state)) = of.and_then(|index| Some((index, instances.get_mut(&index)?)))
                 else {
                     return Some(*id);
                 };
                 let allowed = signature(function)
                     .is_some_and(|of| of.rule.standard.contain(standard, state.interface, state.mode));
-                let real = |place: usize| match args.get(place) {
+                let real = |index: usize| match args.get(index) {
                     Some(Arg::Real(bits)) => f64::from_bits(*bits),
                     _ => 0.0,
                 };
@@ -109,7 +109,7 @@ fn walk(description: &Description, script: &[Numbered], course: &mut Course) -> 
                     }
                     "DoStep" => {
                         let off = real(0) - state.time;
-                        // Where the last step has returned early, only the run knows.
+                        // After an early return, only the run knows the time.
                         let here =
                             off.abs() <= 1e-9 * (1.0 + state.time.abs()) || state.early_return && off < 0.0;
                         good &= here && real(1) > 0.0;
@@ -126,12 +126,12 @@ fn walk(description: &Description, script: &[Numbered], course: &mut Course) -> 
                     }
                     "GetFMUstate" | "GetFMUState" => {
                         if let Some(Arg::StateOut(slot)) = args.first() {
-                            slots.insert(*slot, (place, *state));
+                            slots.insert(*slot, (index, *state));
                         }
                     }
                     "SetFMUstate" | "SetFMUState" => match args.first() {
                         Some(Arg::State(slot)) => match slots.get(slot) {
-                            Some((owner, saved)) if *owner == place => *state = *saved,
+                            Some((owner, saved)) if *owner == index => *state = *saved,
                             _ => good = false,
                         },
                         _ => good = false,
@@ -154,7 +154,7 @@ fn walk(description: &Description, script: &[Numbered], course: &mut Course) -> 
                     },
                     "DeSerializeFMUstate" | "DeserializeFMUState" => match (args.first(), args.get(2)) {
                         (Some(Arg::Saved(from)), Some(Arg::StateOut(slot))) if bytes.contains_key(from) => {
-                            slots.insert(*slot, (place, bytes[from]));
+                            slots.insert(*slot, (index, bytes[from]));
                         }
                         _ => good = false,
                     },
@@ -162,13 +162,14 @@ fn walk(description: &Description, script: &[Numbered], course: &mut Course) -> 
                 }
                 good
             }
-            // What is allowed twice is allowed again.
+            // A call that is allowed twice is allowed any number of times.
             Step::Repeat(_, steps) => {
-                walk(description, steps, course).is_none() && walk(description, steps, course).is_none()
+                walk(description, steps, trajectory).is_none()
+                    && walk(description, steps, trajectory).is_none()
             }
-            Step::Parallel(scripts) => {
+            Step::Parallel(sequences) => {
                 // Each thread has instances of its own.
-                scripts.iter().all(|script| first_illegal(description, script).is_none())
+                sequences.iter().all(|sequence| first_illegal(description, sequence).is_none())
             }
             Step::FreshProcess => {
                 instances.clear();

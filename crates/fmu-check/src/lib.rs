@@ -2,15 +2,15 @@
 //!
 //! ## Inside
 //!
-//! A check writes scripts (`writer`), sequences of calls as data (`script`), has them played by a process of its own
+//! A check writes sequences (`writer`), sequences of calls as data (`sequence`), has them played by a process of its own
 //! (`run`, `worker`) and judges what came of them. What is found is shortened (`shrink`) as long as it keeps to the
 //! standard (`legal`), and written as programs (`reproduce`). `unsafe` is in `worker` alone: the process that may be lost.
 
 mod always;
 mod baseline;
+mod call_sequence;
 mod checker;
 mod checks;
-mod course;
 mod description;
 mod finding;
 mod legal;
@@ -18,21 +18,20 @@ mod report;
 mod reproduce;
 mod rules;
 mod run;
-mod script;
 mod shrink;
+mod trajectory;
 mod values;
 #[allow(unsafe_code, reason = "the library under attack is loaded and called here")]
 mod worker;
 mod writer;
 
 pub use checker::Unchecked;
-pub use finding::{Finding, Grade};
+pub use finding::{Finding, Severity};
 pub use report::Report;
 pub use worker::work_if_asked;
 
 use anyhow::Context as _;
 use checker::{Checker, TimeOver};
-use course::{NoCourse, find_course};
 use description::Description;
 use fmi_abi::Interface;
 use std::io::{IsTerminal as _, Write as _};
@@ -41,6 +40,7 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
+use trajectory::{NoTrajectory, find_trajectory};
 
 /// How an FMU is checked.
 #[derive(Clone, Debug, clap::Args)]
@@ -56,7 +56,7 @@ pub struct Options {
     /// Seconds for all of it.
     #[arg(long, default_value_t = 120.0)]
     pub time: f64,
-    /// Seconds for one script; longer is a hang.
+    /// Seconds for one sequence; longer is a hang.
     #[arg(long, default_value_t = 10.0)]
     pub limit: f64,
     /// Megabytes of memory that the FMU may use.
@@ -77,20 +77,19 @@ pub struct Options {
     /// Prints a rule, its severity and its section of the standard, or all rules as a page.
     #[arg(long, value_name = "RULE")]
     pub explain: Option<String>,
-    /// Writes report.html, report.json, junit.xml, report.sarif and a program in C and one in Python for each finding to this
-    /// folder.
+    /// Writes report.html, report.json, junit.xml, report.sarif and a program in C for each finding to this directory.
     #[arg(long, value_name = "FOLDER")]
     pub out: Option<PathBuf>,
     /// Writes the report as JSON to the standard output.
     #[arg(long)]
     pub json: bool,
-    /// Fails for findings of this grade and worse.
+    /// Fails for findings of this severity and worse.
     #[arg(long, value_enum, default_value_t = FailOn::Violation)]
     pub fail_on: FailOn,
     /// Seconds of each of the simulations that are repeated to see what is left behind.
     #[arg(long, default_value_t = 1.5)]
     pub repeat: f64,
-    /// Leaves scripts as long as they are.
+    /// Leaves sequences as long as they are.
     #[arg(long)]
     pub no_shrink: bool,
     /// Runs an FMU that starts another program, which must be installed.
@@ -98,12 +97,12 @@ pub struct Options {
     pub execution_tool: bool,
 }
 
-/// From which grade on a command fails.
+/// Lowest severity that fails the check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum FailOn {
     /// The standard says must.
     Violation,
-    /// It hurts.
+    /// Fragile findings and violations.
     Fragile,
     /// Good to know.
     Note,
@@ -121,7 +120,7 @@ const LONG: [&str; 2] = ["hostile", "resources"];
 const INTERFACES: [&str; 3] = ["co-simulation", "model-exchange", "scheduled-execution"];
 
 /// Checks an FMU, tells what is found and writes the reports. The exit status: 0 for nothing that is to fail, 1 for
-/// findings of a grade that is to fail, 2 if it, one of its interfaces or a topic could not be checked.
+/// findings of a severity that is to fail, 2 if it, one of its interfaces or a topic could not be checked.
 ///
 /// The program must call [`work_if_asked`] before anything else: it is started anew for every sequence of calls.
 pub fn command(fmu: &Path, options: &Options) -> ExitCode {
@@ -145,14 +144,14 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
             true => format!("{}\n", report.json()?),
             false => report.terminal(std::io::stdout().is_terminal()),
         };
-        // Who stops reading has seen enough.
+        // Who stops reading has observed enough.
         let written = std::io::stdout().write_all(text.as_bytes());
         written.or_else(|error| match error.kind() {
             std::io::ErrorKind::BrokenPipe => Ok(()),
             _ => Err(error).context("the report cannot be written to the standard output"),
         })?;
-        if let Some(folder) = &options.out {
-            report.write(folder).with_context(|| format!("{}: cannot be written", folder.display()))?;
+        if let Some(directory) = &options.out {
+            report.write(directory).with_context(|| format!("{}: cannot be written", directory.display()))?;
         }
         Ok(report)
     }) {
@@ -174,13 +173,13 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     let scratch = tempfile::Builder::new().prefix("fmu-check-").tempdir()?;
     // The workers end, and write nothing any more, before the directory is removed.
     let workers = run::Workers::new(scratch.path().to_owned())?;
-    let folder = &scratch.path().join("fmu");
-    let of_zip = checks::package::unpack(path, folder, options.unpacked << 20)?;
-    let text = std::fs::read(folder.join("modelDescription.xml")).with_context(|| {
+    let directory = &scratch.path().join("fmu");
+    let of_zip = checks::package::unpack(path, directory, options.unpacked << 20)?;
+    let text = std::fs::read(directory.join("modelDescription.xml")).with_context(|| {
         format!("{}: there is no modelDescription.xml in it; it is no FMU", path.display())
     })?;
     let encoding = encoding(&text);
-    // Other encodings are read for the checks that follow.
+    // Other encodings are decoded for the checks that follow.
     let text = match std::str::from_utf8(&text) {
         Ok(text) => text.to_owned(),
         Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
@@ -194,52 +193,52 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     let mut of_files = Vec::new();
     if wanted("package") {
         of_files.extend(of_zip);
-        of_files.extend(checks::package::look(folder, &description));
+        of_files.extend(checks::package::look(directory, &description));
     }
     if wanted("description") {
         of_files.extend(encoding);
         of_files.extend(description.wrong.iter().cloned());
     }
-    let (setting, without) = setting(options, folder, &description);
+    let (setting, without) = setting(options, directory, &description);
     let time = if options.quick { QUICK } else { options.time.max(1.0) };
     let deadline = begin + Duration::from_secs_f64(time);
     let limit = if options.quick { options.limit.min(QUICK / 10.0) } else { options.limit };
     let mut checker = Checker::new(description, setting, workers, options.seed, limit, deadline);
     checker.quick = options.quick;
-    of_files.into_iter().for_each(|(name, seen)| checker.add(checker.claim(name).of_files(seen)));
+    of_files.into_iter().for_each(|(name, observed)| checker.add(checker.claim(name).of_files(observed)));
     without.into_iter().for_each(|(name, why)| checker.unchecked(name, why));
-    for (place, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
-        if checker.setting.libraries[place].is_none() {
+    for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
+        if checker.setting.libraries[index].is_none() {
             continue;
         }
         match reach(&mut checker, interface) {
-            Ok(course) => checker.courses.push(course),
-            Err(error) if error.is::<NoCourse>() => {
-                checker.unchecked(INTERFACES[place], format!("no simulation succeeds: {error}"));
+            Ok(trajectory) => checker.trajectories.push(trajectory),
+            Err(error) if error.is::<NoTrajectory>() => {
+                checker.unchecked(INTERFACES[index], format!("no simulation succeeds: {error}"));
             }
             Err(error) if error.is::<TimeOver>() || error.is::<run::OutOfMemory>() => {
-                checker.unchecked(INTERFACES[place], error.to_string());
+                checker.unchecked(INTERFACES[index], error.to_string());
             }
             Err(error) => return Err(error),
         }
     }
     attack(&checker, progress, &wanted)?;
     let mut findings = checker.take();
-    // What shows in every call, whatever it is made for, and what keeps others from being checked.
+    // Findings that show in any call come first, and so do those that prevent other checks.
     let always = |finding: &Finding| {
         ["arrays", "logs"].contains(&finding.topic())
             || [
                 "functions.status",
                 "package.unloadable",
                 "package.symbols",
-                "life_cycle.course",
+                "life_cycle.simulation",
                 "life_cycle.crash",
                 "life_cycle.hang",
             ]
             .contains(&finding.name.as_str())
     };
     findings.retain(|finding| options.only.is_empty() || wanted(finding.topic()) || always(finding));
-    findings.sort_by(|one, other| other.grade.cmp(&one.grade).then_with(|| one.name.cmp(&other.name)));
+    findings.sort_by(|one, other| other.severity.cmp(&one.severity).then_with(|| one.name.cmp(&other.name)));
     shorten(&checker, &mut findings, options, progress);
     if worker::interrupted() {
         return Err(run::Interrupted.into());
@@ -257,7 +256,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     Ok(report)
 }
 
-/// What is wrong with the encoding of a model description, by its first line and its bytes.
+/// Errors in the encoding of a model description, from its first line and its bytes.
 fn encoding(text: &[u8]) -> Option<rules::Observation> {
     let declaration = text.split(|byte| *byte == b'>').next().unwrap_or_default();
     let declaration = String::from_utf8_lossy(declaration);
@@ -276,47 +275,48 @@ fn encoding(text: &[u8]) -> Option<rules::Observation> {
 }
 
 /// A simulation that succeeds. That there is none is a finding, too.
-fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::Course> {
-    let course = find_course(checker, interface);
-    let Some(NoCourse(_, script)) = course.as_ref().err().and_then(|error| error.downcast_ref()) else {
-        return course;
+fn reach(checker: &mut Checker, interface: Interface) -> anyhow::Result<writer::Trajectory> {
+    let trajectory = find_trajectory(checker, interface);
+    let Some(NoTrajectory(_, sequence)) = trajectory.as_ref().err().and_then(|error| error.downcast_ref())
+    else {
+        return trajectory;
     };
-    no_course(checker, script.clone())?;
+    no_trajectory(checker, sequence.clone())?;
     // One that reads or writes beyond arrays may have more to show where there is room for it.
     if ["arrays.read-beyond", "arrays.written-beyond"].iter().any(|name| checker.has(name)) {
         checker.setting.soft = true;
-        return find_course(checker, interface);
+        return find_trajectory(checker, interface);
     }
-    course
+    trajectory
 }
 
 /// The libraries, and the interfaces that cannot be checked with the reason of each.
 fn setting(
     options: &Options,
-    folder: &Path,
+    directory: &Path,
     description: &Description,
-) -> (script::Setting, Vec<(&'static str, String)>) {
+) -> (call_sequence::Setting, Vec<(&'static str, String)>) {
     let mut libraries = [None, None];
     let mut without = Vec::new();
     if description.scheduled_execution {
         without.push((INTERFACES[2], "fmu-check has no checks for Scheduled Execution".to_owned()));
     }
-    for (place, offer) in [&description.co_simulation, &description.model_exchange].into_iter().enumerate() {
+    for (index, offer) in [&description.co_simulation, &description.model_exchange].into_iter().enumerate() {
         let Some(offer) = offer else { continue };
         if offer.can(&["needsExecutionTool"]) && !options.execution_tool {
             let why = "it starts another program (needsExecutionTool); to check it, give --execution-tool";
-            without.push((INTERFACES[place], why.to_owned()));
+            without.push((INTERFACES[index], why.to_owned()));
             continue;
         }
-        match checks::package::library(folder, description.standard, offer) {
-            Ok(library) => libraries[place] = Some(library),
-            Err(why) => without.push((INTERFACES[place], why)),
+        match checks::package::library(directory, description.standard, offer) {
+            Ok(library) => libraries[index] = Some(library),
+            Err(why) => without.push((INTERFACES[index], why)),
         }
     }
-    let setting = script::Setting {
+    let setting = call_sequence::Setting {
         fmi3: description.standard == fmi_abi::Standard::Fmi3,
         libraries,
-        resources: folder.join("resources"),
+        resources: directory.join("resources"),
         memory: options.memory << 20,
         soft: false,
         now: false,
@@ -326,20 +326,20 @@ fn setting(
 }
 
 /// A simulation as the standard has it fails: that is the finding.
-fn no_course(checker: &Checker, script: script::Script) -> anyhow::Result<()> {
-    let copy = script.clone();
+fn no_trajectory(checker: &Checker, sequence: call_sequence::CallSequence) -> anyhow::Result<()> {
+    let copy = sequence.clone();
     let judge: finding::Judge = std::sync::Arc::new(move |run| {
         let ids: Vec<u32> = copy.iter().map(|numbered| numbered.id).collect();
         let makes: Vec<u32> = copy
             .iter()
-            .filter(|numbered| matches!(numbered.step, script::Step::Make(..)))
+            .filter(|numbered| matches!(numbered.step, call_sequence::Step::Make(..)))
             .map(|numbered| numbered.id)
             .collect();
         let rest: Vec<u32> = ids.into_iter().filter(|id| !makes.contains(id)).collect();
         let of_makes = makes.iter().find_map(|id| finding::refused_one(&copy, run, *id));
         of_makes.or_else(|| finding::refused(&copy, run, &rest))
     });
-    checker.judge("life_cycle.course", script, judge)?;
+    checker.judge("life_cycle.simulation", sequence, judge)?;
     Ok(())
 }
 
@@ -365,7 +365,7 @@ fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + S
                     if progress {
                         let left = checker.deadline.saturating_duration_since(Instant::now()).as_secs();
                         eprint!(
-                            "\r{done} of {} checks, {} scripts played, {left} s left: {topic:20}",
+                            "\r{done} of {} checks, {} call sequences run, {left} s left: {topic:20}",
                             checks.len(),
                             checker.played()
                         );
@@ -400,7 +400,7 @@ fn shorten(checker: &Checker, findings: &mut [Finding], options: &Options, progr
                         eprint!("\rthe shortest calls for {count} findings: {:40}", finding.name);
                         let _ = std::io::stderr().flush();
                     }
-                    // Without a run there is no program; the finding stays.
+                    // If the run fails, the finding has no program.
                     let _ = checker.reproduce(&mut finding);
                 }
             });

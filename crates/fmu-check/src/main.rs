@@ -1,4 +1,4 @@
-//! `fmu-check model.fmu`: attacks an FMU and says, graded, which promises it breaks.
+//! `fmu-check model.fmu`: attacks an FMU and says, ranked, which requirements it breaks.
 
 use clap::Parser as _;
 use std::process::ExitCode;

@@ -1,8 +1,8 @@
 //! All rules in one table: the name of a finding, its severity and the section for FMI 2.0 and FMI 3.0, and the requirement.
 
-use crate::finding::Grade::{self, Fragile as F, Note as N, Violation as V};
+use crate::call_sequence::CallSequence;
+use crate::finding::Severity::{self, Fragile as F, Note as N, Violation as V};
 use crate::finding::{Finding, Judge};
-use crate::script::Script;
 use fmi_abi::Standard;
 
 /// The editions of the standard whose sections the table names, for FMI 2.0 and FMI 3.0.
@@ -16,17 +16,17 @@ pub struct Rule {
     /// Its name: the topic, a dot, the observation.
     pub name: &'static str,
     /// The severity of a finding in FMI 2.0 and in FMI 3.0.
-    pub grades: [Grade; 2],
+    pub severities: [Severity; 2],
     /// The sections of the two editions; empty where the rule is not part of the standard.
     pub sections: [&'static str; 2],
     /// The requirement in a sentence.
-    pub promise: &'static str,
+    pub requirement: &'static str,
 }
 
 impl Rule {
     /// The severity of a finding.
-    pub fn grade(&self, standard: Standard) -> Grade {
-        self.grades[usize::from(standard == Standard::Fmi3)]
+    pub fn severity(&self, standard: Standard) -> Severity {
+        self.severities[usize::from(standard == Standard::Fmi3)]
     }
 
     /// The section with the edition.
@@ -45,7 +45,7 @@ const QUOTES: &[(&str, u8, &str, &str)] = &[
     ("description.encoding", 2, "2.2", "The first line of an XML file, such as modelDescription.xml, must contain the encoding scheme of the XML file. It is required that the encoding scheme is always UTF-8."),
     ("description.start", 2, "2.2.7", "If initial = \"exact\" or \"approx\", or causality = \"input\", a start value must be provided."),
     ("description.structure", 2, "2.2.8", "Ordered list of all outputs, in other words, a list of ScalarVariable indices where every corresponding ScalarVariable must have causality = \"output\" (and every variable with causality=\"output\" must be listed here)."),
-    ("life_cycle.course", 3, "2.3.1", "For FMUs that have clocks, eventModeUsed = fmi3True is required."),
+    ("life_cycle.simulation", 3, "2.3.1", "For FMUs that have clocks, eventModeUsed = fmi3True is required."),
     ("life_cycle.free-null", 2, "2.1.5", "If a null pointer is provided for c, the function call is ignored (does not have an effect)."),
     ("life_cycle.states-changed", 2, "3.2.2", "If valuesOfContinuousStatesChanged = fmi2True, then at least one element of the continuous state vector has changed its value due to the function call."),
     ("life_cycle.stop-time", 3, "2.3.2", "If the environment tries to compute past stopTime, the FMU has to return fmi3Status = fmi3Error."),
@@ -68,11 +68,11 @@ const QUOTES: &[(&str, u8, &str, &str)] = &[
 
 const fn rule(
     name: &'static str,
-    grades: [Grade; 2],
+    severities: [Severity; 2],
     sections: [&'static str; 2],
-    promise: &'static str,
+    requirement: &'static str,
 ) -> Rule {
-    Rule { name, grades, sections, promise }
+    Rule { name, severities, sections, requirement }
 }
 
 /// The rule of this name. The end of a process (`crash`, `exit`, `hang`) is one of the call sequence's rule, such as
@@ -99,12 +99,12 @@ pub fn explain(name: &str) -> Option<String> {
 fn page(rule: &Rule, name: &str) -> String {
     let (standards, mut lines) = ([Standard::Fmi2, Standard::Fmi3], Vec::new());
     for standard in standards {
-        let grade = rule.grade(standard).name();
+        let severity = rule.severity(standard).name();
         match rule.section(standard) {
             section if section.is_empty() => {
-                lines.push(format!("* {standard}: {grade}, not in the standard"))
+                lines.push(format!("* {standard}: {severity}, not in the standard"))
             }
-            section => lines.push(format!("* {grade} in {section}")),
+            section => lines.push(format!("* {severity} in {section}")),
         }
     }
     let quote = QUOTES.iter().find(|(of, ..)| *of == rule.name);
@@ -112,7 +112,7 @@ fn page(rule: &Rule, name: &str) -> String {
         let edition = EDITIONS[usize::from(*standard == 3)];
         format!("\n> {text}\n>\n> {edition} section {section}\n")
     });
-    format!("## {name}\n\n{}\n\n{}\n{quote}", rule.promise, lines.join("\n"))
+    format!("## {name}\n\n{}\n\n{}\n{quote}", rule.requirement, lines.join("\n"))
 }
 
 const SAVING: [&str; 2] = ["2.1.8", "2.2.7.4"];
@@ -161,7 +161,7 @@ pub static RULES: &[Rule] = &[
     rule("description.start", [V; 2], VARIABLES, "Variables with initial = exact or approx and inputs have a start value of their type; calculated variables have none."),
     rule("description.structure", [V; 2], STRUCTURE, "ModelStructure lists all outputs and only derivatives and outputs of the model."),
     rule("description.token", [V; 2], ["2.2.1", "2.4.1"], "guid or instantiationToken is not empty."),
-    rule("description.types", [V; 2], ["2.2.3", "2.4.4"], "Each variable has a type, and declared types are in TypeDefinitions."),
+    rule("description.types", [V; 2], ["2.2.3", "2.4.4"], "Each variable has a type. Each declaredType is the name of a type in TypeDefinitions."),
     rule("description.units", [V; 2], ["2.2.2", "2.4.3"], "Units of variables are in UnitDefinitions."),
     rule("functions.capability", [V; 2], ["3.3.1 and 4.3.1", "2.4.2"], "The library can do what a capability flag declares."),
     rule("functions.missing", [V; 2], ["2.3", "2.2.2"], "The library exports all functions of its interface types, including those of capabilities that it lacks."),
@@ -174,13 +174,13 @@ pub static RULES: &[Rule] = &[
     rule("hostile.sizes", [F; 2], ["", ""], "Wrong sizes are rejected, and the process lives on."),
     rule("hostile.times", [F; 2], ["", ""], "Times and steps that are impossible are rejected, and the process lives on."),
     rule("hostile.values", [F; 2], ["", ""], "Values that are impossible are accepted or rejected, and the process lives on."),
-    rule("life_cycle.course", [V; 2], MACHINES, "A simulation with the numbers of the model description succeeds."),
     rule("life_cycle.event-iteration", [F; 2], EVENTS, "The iteration of an event ends."),
     rule("life_cycle.exit", [V; 2], CREATION, "A process whose instances were freed exits; the destructors of the library return."),
     rule("life_cycle.free-null", [V; 2], CREATION, "FreeInstance ignores NULL."),
     rule("life_cycle.late-event", [N; 2], EVENTS, "After time events were skipped, the next one is in the future."),
     rule("life_cycle.next-event-time", [F; 2], EVENTS, "The next time event is in the future: importers integrate up to it."),
     rule("life_cycle.refused", [V; 2], MACHINES, "A call that the state machine allows, with valid arguments, succeeds."),
+    rule("life_cycle.simulation", [V; 2], MACHINES, "A simulation with the numbers of the model description succeeds."),
     rule("life_cycle.states-changed", [V; 2], EVENTS, "An event that changes continuous states reports valuesOfContinuousStatesChanged; otherwise importers do not read them."),
     rule("life_cycle.stop-time", [V; 2], ["2.1.6", "2.3.2"], "A step beyond the stop time returns Error."),
     rule("life_cycle.token", [N; 2], CREATION, "Instantiation fails for a guid or instantiationToken that is not that of the model description."),
@@ -260,21 +260,27 @@ pub struct Claim {
     /// The name of the finding if it does not hold.
     pub name: String,
     /// Its severity.
-    pub grade: Grade,
+    pub severity: Severity,
 }
 
 impl Claim {
     /// The finding that it does not hold.
-    pub fn finding(&self, seen: String, script: Script, judge: Judge) -> Finding {
-        let mut finding = self.of_files(seen);
-        finding.script = script;
+    pub fn finding(&self, observed: String, sequence: CallSequence, judge: Judge) -> Finding {
+        let mut finding = self.of_files(observed);
+        finding.sequence = sequence;
         finding.judge = Some(judge);
         finding
     }
 
     /// The finding that the files do not meet it.
-    pub fn of_files(&self, seen: String) -> Finding {
-        Finding::new(&self.name, self.grade, self.rule.section(self.standard), self.rule.promise, seen)
+    pub fn of_files(&self, observed: String) -> Finding {
+        Finding::new(
+            &self.name,
+            self.severity,
+            self.rule.section(self.standard),
+            self.rule.requirement,
+            observed,
+        )
     }
 }
 /// The requirement of a rule, by its name.
@@ -283,7 +289,7 @@ impl Claim {
 /// If there is no such rule. A test looks for such names.
 pub fn claim(standard: Standard, name: &str) -> Claim {
     let rule = find(name).unwrap_or_else(|| panic!("no rule is called {name}"));
-    Claim { rule, standard, name: name.to_owned(), grade: rule.grade(standard) }
+    Claim { rule, standard, name: name.to_owned(), severity: rule.severity(standard) }
 }
 
 #[cfg(test)]
@@ -303,8 +309,8 @@ mod tests {
     #[test]
     fn ends_of_processes_have_a_rule_in_every_topic() {
         assert_eq!(find("states.crash").map(|rule| rule.name), Some("*.crash"));
-        let of_script = find("states.fresh-process.crash").map(|rule| rule.name);
-        assert_eq!(of_script, Some("states.fresh-process"));
+        let of_sequence = find("states.fresh-process.crash").map(|rule| rule.name);
+        assert_eq!(of_sequence, Some("states.fresh-process"));
         assert_eq!(find("states.restore").map(|rule| rule.name), Some("states.restore"));
         assert!(find("nothing.crash").is_none() && find("states.nothing").is_none());
     }

@@ -1,6 +1,6 @@
-//! Plays scripts in processes of their own.
+//! Plays sequences in processes of their own.
 
-use crate::script::{End, Numbered, Outcome, Run, Script, Setting, Step};
+use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Setting, Step};
 #[cfg(target_os = "linux")]
 use crate::worker::Answer;
 use crate::worker::{Job, Last, OWN_FAULT, PLAYED, SCRATCH, Unloadable, VARIABLE, interrupted};
@@ -32,7 +32,7 @@ struct Left {
     left: Vec<String>,
     /// The number of its processes, if that is why it was ended.
     flood: Option<usize>,
-    /// It ended outside the functions of the FMU.
+    /// The process ended outside the functions of the FMU.
     outside: bool,
 }
 
@@ -90,12 +90,12 @@ impl Workers {
         })
     }
 
-    /// Plays a script: each part up to a fresh process in one of its own, `limit` seconds at most.
-    pub fn play(&self, setting: &Setting, script: &Script, limit: f64) -> anyhow::Result<Run> {
+    /// Plays a sequence: each part up to a fresh process in one of its own, `limit` seconds at most.
+    pub fn play(&self, setting: &Setting, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
         let mut run = Run::default();
         let mut bytes = HashMap::new();
-        for (phase, part) in script.split(|numbered| numbered.step == Step::FreshProcess).enumerate() {
-            let job = Job { setting: setting.clone(), script: part.to_vec(), bytes };
+        for (phase, part) in sequence.split(|numbered| numbered.step == Step::FreshProcess).enumerate() {
+            let job = Job { setting: setting.clone(), sequence: part.to_vec(), bytes };
             let left = self.process(&job, (phase, setting.now), limit)?;
             bytes = read(part, left, limit, &mut run)?;
             if run.end != End::Done {
@@ -130,8 +130,8 @@ impl Workers {
     #[cfg(not(target_os = "linux"))]
     fn process(&self, job: &Job, situation: Situation, limit: f64) -> anyhow::Result<Left> {
         use std::process::Stdio;
-        let folder = tempfile::Builder::new().prefix("run-").tempdir_in(&self.scratch)?;
-        let at = |name: &str| folder.path().join(name);
+        let directory = tempfile::Builder::new().prefix("run-").tempdir_in(&self.scratch)?;
+        let at = |name: &str| directory.path().join(name);
         std::fs::write(at("job"), serde_json::to_vec(job)?)?;
         std::fs::create_dir(at("here"))?;
         let said = std::fs::File::create(at("said"))?;
@@ -207,7 +207,7 @@ impl Drop for Server {
 
 /// Reads the outcomes of a process, and returns the bytes that it has serialized.
 fn read(
-    script: &[Numbered],
+    sequence: &[Numbered],
     Left { ended, said, outcomes, left, flood, outside }: Left,
     limit: f64,
     run: &mut Run,
@@ -236,7 +236,7 @@ fn read(
     {
         return Err(OutOfMemory.into());
     }
-    run.at = script.iter().map(|numbered| numbered.id).find(|id| !run.outcomes.contains_key(id));
+    run.at = sequence.iter().map(|numbered| numbered.id).find(|id| !run.outcomes.contains_key(id));
     run.end = match ended {
         _ if flood.is_some() => End::Flood(flood.unwrap_or_default()),
         None => End::Hang(limit),
@@ -252,7 +252,7 @@ fn read(
     Ok(HashMap::new())
 }
 
-/// What the system says of a process that crashed.
+/// The system's description of a crash.
 fn crash(status: ExitStatus, said: &str) -> String {
     #[cfg(unix)]
     let why = {

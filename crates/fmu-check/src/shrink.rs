@@ -1,19 +1,19 @@
 //! The shortest sequence of calls that still shows a finding.
 
+use crate::call_sequence::{CallSequence, Numbered, Step};
 use crate::description::Description;
 use crate::legal::first_illegal;
-use crate::script::{Numbered, Script, Step};
 use std::collections::HashMap;
 
 /// Calls that belong together: they are left out together or not at all.
-fn units(script: &[Numbered]) -> Vec<Vec<u32>> {
+fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
     let name = |numbered: &Numbered| match &numbered.step {
         Step::Call { function, .. } => function.get(4..).unwrap_or_default().to_owned(),
         _ => String::new(),
     };
     let mut units: Vec<Vec<u32>> = Vec::new();
     let mut open = false;
-    for numbered in script {
+    for numbered in sequence {
         let function = name(numbered);
         let goes_on = match function.as_str() {
             "NewDiscreteStates" | "UpdateDiscreteStates" => open,
@@ -21,7 +21,7 @@ fn units(script: &[Numbered]) -> Vec<Vec<u32>> {
             "EnterInitializationMode" | "SerializeFMUstate" | "SerializeFMUState" => {
                 units.last().is_some_and(|unit| {
                     let last = unit.last().copied();
-                    script.iter().find(|other| Some(other.id) == last).is_some_and(|other| {
+                    sequence.iter().find(|other| Some(other.id) == last).is_some_and(|other| {
                         ["SetupExperiment", "SerializedFMUstateSize", "SerializedFMUStateSize"]
                             .contains(&name(other).as_str())
                     })
@@ -40,7 +40,7 @@ fn units(script: &[Numbered]) -> Vec<Vec<u32>> {
     units
 }
 
-/// What a step is, but for the instance it is of; nothing for what only reads.
+/// A key of a step without its instance; `None` for calls that only read.
 fn content(step: &Step) -> Option<String> {
     match step {
         Step::Call { function, args, .. } => {
@@ -52,32 +52,32 @@ fn content(step: &Step) -> Option<String> {
     }
 }
 
-/// The calls of a script and of its threads.
-fn flat(script: &[Numbered]) -> Vec<&Numbered> {
-    script.iter().fold(Vec::new(), |mut all, numbered| {
+/// The calls of a sequence and of its threads.
+fn flat(sequence: &[Numbered]) -> Vec<&Numbered> {
+    sequence.iter().fold(Vec::new(), |mut all, numbered| {
         all.push(numbered);
-        if let Step::Parallel(scripts) = &numbered.step {
-            all.extend(scripts.iter().flat_map(|script| flat(script)));
+        if let Step::Parallel(sequences) = &numbered.step {
+            all.extend(sequences.iter().flat_map(|sequence| flat(sequence)));
         }
         all
     })
 }
 
-/// A script without some calls, also of its threads.
-fn without(script: &[Numbered], ids: &[u32]) -> Script {
-    let kept = script.iter().filter(|numbered| !ids.contains(&numbered.id)).cloned();
+/// A sequence without some calls, also of its threads.
+fn without(sequence: &[Numbered], ids: &[u32]) -> CallSequence {
+    let kept = sequence.iter().filter(|numbered| !ids.contains(&numbered.id)).cloned();
     kept.map(|mut numbered| {
-        if let Step::Parallel(scripts) = &mut numbered.step {
-            scripts.iter_mut().for_each(|script| *script = without(script, ids));
+        if let Step::Parallel(sequences) = &mut numbered.step {
+            sequences.iter_mut().for_each(|sequence| *sequence = without(sequence, ids));
         }
         numbered
     })
     .collect()
 }
 
-/// The same units of compared simulations are left out together: one that lacks a call differs for that alone.
-fn together(script: &Script, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
-    let contents: HashMap<u32, String> = flat(script)
+/// Removes corresponding units of compared simulations together: a simulation that lacks a call would differ for that reason only.
+fn together(sequence: &CallSequence, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
+    let contents: HashMap<u32, String> = flat(sequence)
         .into_iter()
         .filter_map(|numbered| Some((numbered.id, content(&numbered.step)?)))
         .collect();
@@ -97,21 +97,21 @@ fn together(script: &Script, units: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
 /// functions stay; what is the same in simulations that are compared goes together.
 pub fn shrink(
     description: &Description,
-    script: &Script,
+    sequence: &CallSequence,
     pinned: &[&str],
     compared: bool,
-    mut shows: impl FnMut(&Script) -> bool,
-) -> Script {
-    let legal = first_illegal(description, script).is_none();
-    let mut best = script.clone();
-    let threads = script.iter().flat_map(|numbered| match &numbered.step {
-        Step::Parallel(scripts) => scripts.iter().flat_map(|script| units(script)).collect(),
+    mut shows: impl FnMut(&CallSequence) -> bool,
+) -> CallSequence {
+    let legal = first_illegal(description, sequence).is_none();
+    let mut best = sequence.clone();
+    let threads = sequence.iter().flat_map(|numbered| match &numbered.step {
+        Step::Parallel(sequences) => sequences.iter().flat_map(|sequence| units(sequence)).collect(),
         _ => Vec::new(),
     });
-    let all: Vec<Vec<u32>> = units(script).into_iter().chain(threads).collect();
-    let mut units = if compared { together(script, all) } else { all };
+    let all: Vec<Vec<u32>> = units(sequence).into_iter().chain(threads).collect();
+    let mut units = if compared { together(sequence, all) } else { all };
     let stays = |id: &u32| {
-        flat(script).into_iter().any(|numbered| match &numbered.step {
+        flat(sequence).into_iter().any(|numbered| match &numbered.step {
             Step::Call { function, .. } => {
                 numbered.id == *id && pinned.iter().any(|name| function[4..].eq_ignore_ascii_case(name))
             }
@@ -145,11 +145,11 @@ pub fn shrink(
 #[cfg(test)]
 mod tests {
     use super::{flat, shrink};
+    use crate::call_sequence::{CallSequence, Numbered, Step};
     use crate::description::Description;
     use crate::legal::first_illegal;
-    use crate::script::{Numbered, Script, Step};
     use crate::values::Value;
-    use crate::writer::{Course, Point, Writer};
+    use crate::writer::{Point, Trajectory, Writer};
     use fmi_abi::Interface;
 
     fn description() -> Description {
@@ -159,38 +159,39 @@ mod tests {
         Description::parse(text).expect("a model description")
     }
 
-    fn course() -> Course {
+    fn trajectory() -> Trajectory {
         let point = |number: usize| {
             let inputs = vec![(0, Value::Numbers(vec![number as f64]))];
             Point { time: number as f64, size: 1.0, inputs, ..Point::default() }
         };
         let points = (0..6).map(point).collect();
-        Course { interface: Interface::CoSimulation, updates: 0, points, end: 6.0 }
+        Trajectory { interface: Interface::CoSimulation, updates: 0, points, end: 6.0 }
     }
 
-    fn played(writer: &mut Writer, of: usize, course: &Course) {
-        writer.begin(of, course);
-        for point in &course.points {
-            writer.point(of, course, point);
-            writer.ask(of, course.interface);
+    fn played(writer: &mut Writer, of: usize, trajectory: &Trajectory) {
+        writer.begin(of, trajectory);
+        for point in &trajectory.points {
+            writer.point(of, trajectory, point);
+            writer.ask(of, trajectory.interface);
         }
         writer.free(of);
     }
 
-    fn names(script: &[Numbered]) -> Vec<String> {
-        flat(script).into_iter().map(|numbered| crate::finding::step_name(&numbered.step)).collect()
+    fn names(sequence: &[Numbered]) -> Vec<String> {
+        flat(sequence).into_iter().map(|numbered| crate::finding::step_name(&numbered.step)).collect()
     }
 
-    fn count(script: &Script, name: &str) -> usize {
-        names(script).iter().filter(|of| *of == name).count()
+    fn count(sequence: &CallSequence, name: &str) -> usize {
+        names(sequence).iter().filter(|of| *of == name).count()
     }
 
     #[test]
     fn what_is_left_is_needed_and_legal() {
-        let (description, course) = (description(), course());
+        let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description);
-        played(&mut writer, 0, &course);
-        let short = shrink(&description, &writer.script, &[], false, |tried| count(tried, "fmi2DoStep") >= 2);
+        played(&mut writer, 0, &trajectory);
+        let short =
+            shrink(&description, &writer.sequence, &[], false, |tried| count(tried, "fmi2DoStep") >= 2);
         let calls = ["the instantiation", "fmi2SetupExperiment", "fmi2EnterInitializationMode"];
         let rest = ["fmi2ExitInitializationMode", "fmi2DoStep", "fmi2DoStep"];
         assert_eq!(names(&short), [calls, rest].concat());
@@ -199,27 +200,28 @@ mod tests {
 
     #[test]
     fn nothing_is_left_out_that_is_pinned() {
-        let (description, course) = (description(), course());
+        let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description);
-        played(&mut writer, 0, &course);
-        let short = shrink(&description, &writer.script, &["SetReal"], false, |_| true);
+        played(&mut writer, 0, &trajectory);
+        let short = shrink(&description, &writer.sequence, &["SetReal"], false, |_| true);
         assert_eq!((count(&short, "fmi2SetReal"), count(&short, "fmi2DoStep")), (6, 0));
     }
 
     /// A simulation that is compared with others on threads loses no call that these keep.
     #[test]
     fn compared_simulations_stay_alike() {
-        let (description, course) = (description(), course());
+        let (description, trajectory) = (description(), trajectory());
         let mut writer = Writer::new(&description);
-        played(&mut writer, 0, &course);
+        played(&mut writer, 0, &trajectory);
         let mut thread = Writer { next: writer.next, ..Writer::new(&description) };
-        played(&mut thread, 1, &course);
+        played(&mut thread, 1, &trajectory);
         writer.next = thread.next;
-        writer.add(Step::Parallel(vec![thread.script]));
-        let parallel =
-            |script: &Script| matches!(script.last(), Some(Numbered { step: Step::Parallel(_), .. }));
-        let shows = |tried: &Script| parallel(tried) && count(tried, "fmi2DoStep") >= 4;
-        let short = shrink(&description, &writer.script, &[], true, shows);
+        writer.add(Step::Parallel(vec![thread.sequence]));
+        let parallel = |sequence: &CallSequence| {
+            matches!(sequence.last(), Some(Numbered { step: Step::Parallel(_), .. }))
+        };
+        let shows = |tried: &CallSequence| parallel(tried) && count(tried, "fmi2DoStep") >= 4;
+        let short = shrink(&description, &writer.sequence, &[], true, shows);
         let Some(Step::Parallel(threads)) = short.last().map(|numbered| &numbered.step) else {
             panic!("{short:?}")
         };

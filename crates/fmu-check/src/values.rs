@@ -1,7 +1,7 @@
 //! Values for variables: within their ranges, near their start values or other than these.
 
+use crate::call_sequence::{Kind, Written};
 use crate::description::{Description, Variable, kind_of};
-use crate::script::{Kind, Written};
 use fmi_abi::BaseType;
 
 /// A value for a variable.
@@ -27,10 +27,10 @@ impl Value {
     }
 }
 
-/// Other values than at the start that a variable may well take: a text beyond ASCII, bytes with zeros among them, the next
-/// number, the other truth value.
-pub fn other_values(description: &Description, place: usize) -> Option<Value> {
-    let variable = &description.variables[place];
+/// Values other than the start value that a variable can take: a non-ASCII string, bytes with NULs, the next
+/// number, the other boolean value.
+pub fn other_values(description: &Description, index: usize) -> Option<Value> {
+    let variable = &description.variables[index];
     let starts = variable.starts();
     Some(match variable.base? {
         BaseType::Real | BaseType::Float32 => {
@@ -60,7 +60,7 @@ pub fn other_values(description: &Description, place: usize) -> Option<Value> {
     })
 }
 
-/// What is read is what was set.
+/// Each value that is read is the value that was set.
 pub fn is_read(read: &Written, value: &Value) -> bool {
     match (read, value) {
         (Written::Numbers(kind, bits), Value::Numbers(numbers)) => {
@@ -78,7 +78,7 @@ pub fn is_read(read: &Written, value: &Value) -> bool {
 /// Values for inputs: near their start values, within their ranges.
 pub fn input_values(description: &Description, phase: usize, discrete: bool) -> Vec<(usize, Value)> {
     let mut values = Vec::new();
-    for (place, variable) in description.variables.iter().enumerate() {
+    for (index, variable) in description.variables.iter().enumerate() {
         if values.len() == 1000 {
             break;
         }
@@ -92,13 +92,13 @@ pub fn input_values(description: &Description, phase: usize, discrete: bool) -> 
         if variable.is_float() && variable.variability != "discrete" {
             let numbers = (0..size).map(|element| {
                 let start = starts.get(element).copied().unwrap_or(0.0);
-                near(variable, start, 0.1 * ((phase * 7 + place * 3 + element) as f64 * 0.7).sin())
+                near(variable, start, 0.1 * ((phase * 7 + index * 3 + element) as f64 * 0.7).sin())
             });
-            values.push((place, Value::Numbers(numbers.collect())));
+            values.push((index, Value::Numbers(numbers.collect())));
         } else if discrete && variable.base == Some(BaseType::Boolean) {
             let on = f64::from(u8::from(phase / 4 % 2 == 1));
             let numbers = (0..size).map(|element| (starts.get(element).copied().unwrap_or(0.0) - on).abs());
-            values.push((place, Value::Numbers(numbers.collect())));
+            values.push((index, Value::Numbers(numbers.collect())));
         }
     }
     values

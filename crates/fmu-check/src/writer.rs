@@ -1,12 +1,12 @@
-//! Writes scripts: the calls of an importer that does what the standard says, with the numbers of this FMU.
+//! Writes sequences: the calls of an importer that does what the standard says, with the numbers of this FMU.
 
+use crate::call_sequence::{Arg, CallSequence, Kind, Make, Numbered, Run, Step, Written, steps_itself};
 use crate::description::{Description, kind_of, type_name};
 use crate::finding::status_name;
-use crate::script::{Arg, Kind, Make, Numbered, Run, Script, Step, Written, steps_itself};
 use crate::values::Value;
 use fmi_abi::{BaseType, Interface, Standard};
 
-/// What a call read: the step's number and whose values it wrote, by places, with how many each has.
+/// A read: the number of the step, and the indices of the variables with the number of values of each.
 #[derive(Clone, Debug)]
 pub struct Read {
     /// The step.
@@ -18,25 +18,25 @@ pub struct Read {
 /// The variables of a type, with how many values each has.
 type Group = (&'static str, Kind, Vec<(usize, usize)>);
 
-/// One point of a course.
+/// One point of a trajectory.
 #[derive(Clone, Debug, Default)]
 pub struct Point {
-    /// Where the step begins; in Model Exchange where the states are set.
+    /// Time at which the step begins; in Model Exchange the time at which states are set.
     pub time: f64,
     /// How long it is.
     pub size: f64,
-    /// What is set before.
+    /// Values that are set before the step.
     pub inputs: Vec<(usize, Value)>,
     /// Model Exchange: what the states are set to.
     pub states: Vec<f64>,
-    /// So many updates of the discrete states in an event here; 0 for no event.
+    /// Number of updates of the discrete states in an event at this point; 0 if there is no event.
     pub updates: usize,
 }
 
 /// A simulation that goes well, as data.
 #[derive(Clone, Debug)]
-pub struct Course {
-    /// By which type of interface.
+pub struct Trajectory {
+    /// The interface type.
     pub interface: Interface,
     /// Updates of the discrete states after the initialization.
     pub updates: usize,
@@ -46,22 +46,22 @@ pub struct Course {
     pub end: f64,
 }
 
-/// Writes a script.
+/// Writes a sequence.
 pub struct Writer<'a> {
-    /// What the FMU promises.
+    /// Model description of the FMU.
     pub description: &'a Description,
-    /// What has been written.
-    pub script: Script,
+    /// The steps so far.
+    pub sequence: CallSequence,
     /// The next number.
     pub next: u32,
-    /// What is written is forbidden.
+    /// Whether the steps that follow are forbidden by the standard.
     pub forbidden: bool,
 }
 
 impl<'a> Writer<'a> {
-    /// An empty script.
+    /// An empty sequence.
     pub fn new(description: &'a Description) -> Self {
-        Self { description, script: Vec::new(), next: 0, forbidden: false }
+        Self { description, sequence: Vec::new(), next: 0, forbidden: false }
     }
 
     /// Whether the standard is 3.0.
@@ -73,7 +73,7 @@ impl<'a> Writer<'a> {
     pub fn add(&mut self, step: Step) -> u32 {
         let id = self.next;
         self.next += 1;
-        self.script.push(Numbered { id, forbidden: self.forbidden, step });
+        self.sequence.push(Numbered { id, forbidden: self.forbidden, step });
         id
     }
 
@@ -121,7 +121,7 @@ impl<'a> Writer<'a> {
         self.enter_with(of, None, self.description.start_time, None)
     }
 
-    /// The same with this tolerance, start time and stop time.
+    /// Sets tolerance, start time and stop time.
     pub fn enter_with(&mut self, of: usize, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> u32 {
         let defined = |number: Option<f64>| {
             [Arg::Whole(number.is_some().into()), Arg::real(number.unwrap_or_default())]
@@ -137,9 +137,9 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// The same with another start time.
+    /// Sets another start time.
     pub fn start_at(&mut self, time: f64) {
-        for numbered in &mut self.script {
+        for numbered in &mut self.sequence {
             if let Step::Call { function, args, .. } = &mut numbered.step
                 && ["SetupExperiment", "EnterInitializationMode"].contains(&&function[4..])
                 && let Some(start) = args.get_mut(2)
@@ -149,7 +149,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// So many updates of the discrete states; their numbers.
+    /// Writes this many updates of the discrete states; returns their numbers.
     pub fn update(&mut self, of: usize, times: usize) -> Vec<u32> {
         let flag = || Arg::Out(Kind::U8, 1);
         (0..times)
@@ -166,22 +166,22 @@ impl<'a> Writer<'a> {
     }
 
     /// Leaves Initialization Mode, for the mode in which time goes on.
-    pub fn leave(&mut self, of: usize, course: &Course) -> Vec<u32> {
+    pub fn leave(&mut self, of: usize, trajectory: &Trajectory) -> Vec<u32> {
         let mut ids = vec![self.call(of, "ExitInitializationMode", vec![])];
-        if course.interface == Interface::ModelExchange {
-            ids.extend(self.update(of, course.updates));
+        if trajectory.interface == Interface::ModelExchange {
+            ids.extend(self.update(of, trajectory.updates));
             ids.push(self.call(of, "EnterContinuousTimeMode", vec![]));
         } else if self.description.event_mode() {
-            ids.extend(self.update(of, course.updates));
+            ids.extend(self.update(of, trajectory.updates));
             ids.push(self.call(of, "EnterStepMode", vec![]));
         }
         ids
     }
 
-    /// From nothing to the mode in which time goes on.
-    pub fn begin(&mut self, of: usize, course: &Course) -> Vec<u32> {
-        let mut ids = vec![self.make(of, course.interface), self.enter(of)];
-        ids.extend(self.leave(of, course));
+    /// Instantiates and initializes, up to the mode in which time advances.
+    pub fn begin(&mut self, of: usize, trajectory: &Trajectory) -> Vec<u32> {
+        let mut ids = vec![self.make(of, trajectory.interface), self.enter(of)];
+        ids.extend(self.leave(of, trajectory));
         ids
     }
 
@@ -190,21 +190,21 @@ impl<'a> Writer<'a> {
         let mut ids = Vec::new();
         let standard = self.description.standard;
         let mut types: Vec<&str> = Vec::new();
-        for (place, _) in values {
-            if let Some(base) = self.description.variables[*place].base
+        for (index, _) in values {
+            if let Some(base) = self.description.variables[*index].base
                 && !types.contains(&type_name(standard, base))
             {
                 types.push(type_name(standard, base));
             }
         }
         for name in types {
-            let of_type = |place: usize| {
-                self.description.variables[place].base.is_some_and(|base| type_name(standard, base) == name)
+            let of_type = |index: usize| {
+                self.description.variables[index].base.is_some_and(|base| type_name(standard, base) == name)
             };
-            let these: Vec<_> = values.iter().filter(|(place, _)| of_type(*place)).collect();
+            let these: Vec<_> = values.iter().filter(|(index, _)| of_type(*index)).collect();
             let references = these
                 .iter()
-                .map(|(place, _)| u64::from(self.description.variables[*place].reference))
+                .map(|(index, _)| u64::from(self.description.variables[*index].reference))
                 .collect();
             let count = these.len() as i64;
             let kind =
@@ -245,25 +245,25 @@ impl<'a> Writer<'a> {
         ids
     }
 
-    /// Reads the variables at these places: a call for each type.
-    pub fn read_these(&mut self, of: usize, places: &[usize]) -> Vec<Read> {
+    /// Reads the variables at these indices: a call for each type.
+    pub fn read_these(&mut self, of: usize, indices: &[usize]) -> Vec<Read> {
         let standard = self.description.standard;
         let mut groups: Vec<Group> = Vec::new();
-        for place in places {
-            let variable = &self.description.variables[*place];
+        for index in indices {
+            let variable = &self.description.variables[*index];
             let (Some(base), Some(size)) = (variable.base, variable.size) else { continue };
             let name = type_name(standard, base);
             let at = groups.iter().position(|group| group.0 == name).unwrap_or_else(|| {
                 groups.push((name, kind_of(standard, base), Vec::new()));
                 groups.len() - 1
             });
-            groups[at].2.push((*place, size));
+            groups[at].2.push((*index, size));
         }
         let mut reads = Vec::new();
         for (name, kind, group) in groups {
             let references = group
                 .iter()
-                .map(|(place, _)| u64::from(self.description.variables[*place].reference))
+                .map(|(index, _)| u64::from(self.description.variables[*index].reference))
                 .collect();
             let total: usize = group.iter().map(|(_, size)| size).sum();
             let mut args = vec![Arg::In(Kind::U32, references), Arg::Whole(group.len() as i64)];
@@ -287,9 +287,9 @@ impl<'a> Writer<'a> {
     }
 
     /// Goes on to the time of a point, in Model Exchange, or takes the step, in Co-Simulation.
-    pub fn point(&mut self, of: usize, course: &Course, point: &Point) -> Vec<u32> {
+    pub fn point(&mut self, of: usize, trajectory: &Trajectory, point: &Point) -> Vec<u32> {
         let mut ids = Vec::new();
-        match course.interface {
+        match trajectory.interface {
             Interface::CoSimulation => {
                 ids.extend(self.set(of, &point.inputs));
                 ids.push(self.step(of, point.time, point.size));
@@ -414,18 +414,18 @@ pub fn readable(description: &Description) -> Vec<usize> {
     sample(description, READ)
 }
 
-/// So many of the variables that can be read at any time.
+/// At most this many of the variables that can be read at any time.
 pub fn sample(description: &Description, most: usize) -> Vec<usize> {
-    let known = |place: &usize| {
-        let variable = &description.variables[*place];
+    let known = |index: &usize| {
+        let variable = &description.variables[*index];
         variable.base.is_some() && variable.size.is_some()
     };
     let all: Vec<usize> = (0..description.variables.len()).filter(known).collect();
     if all.len() <= most {
         return all;
     }
-    let first = |place: &usize| {
-        let variable = &description.variables[*place];
+    let first = |index: &usize| {
+        let variable = &description.variables[*index];
         ["input", "output", "independent"].contains(&variable.causality.as_str())
             || variable.derivative_of.is_some()
     };
@@ -454,22 +454,22 @@ pub fn difference(
                 |status: Option<i32>| format!("status {}", status.map_or("none".to_owned(), status_name));
             return Some(("a call".to_owned(), show(of_one.status), show(of_other.status)));
         }
-        // After an error nothing is promised of what was written.
+        // After an error nothing is required of what was written.
         if of_one.status.is_none_or(|status| status > 1) {
             continue;
         }
         for (first, second) in of_one.written.iter().zip(&of_other.written) {
-            if let Some(place) = first.differ(second) {
-                return Some((name_at(description, one, place), first.show(place), second.show(place)));
+            if let Some(index) = first.differ(second) {
+                return Some((name_at(description, one, index), first.show(index), second.show(index)));
             }
         }
     }
     None
 }
 
-/// Whose value is at a place of what was read.
-pub fn name_at(description: &Description, read: &Read, place: usize) -> String {
-    let mut rest = place;
+/// Whose value is at an index of what was read.
+pub fn name_at(description: &Description, read: &Read, index: usize) -> String {
+    let mut rest = index;
     for (variable, size) in &read.of {
         if rest < *size {
             let name = &description.variables[*variable].name;
@@ -477,15 +477,15 @@ pub fn name_at(description: &Description, read: &Read, place: usize) -> String {
         }
         rest -= size;
     }
-    format!("number {}", place + 1)
+    format!("number {}", index + 1)
 }
 
 /// The value of a variable in what was read.
 pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Written> {
     for read in reads {
         let mut begin = 0;
-        for (place, size) in &read.of {
-            if *place == variable {
+        for (index, size) in &read.of {
+            if *index == variable {
                 let outcome = run.of(read.id)?;
                 if outcome.status.is_none_or(|status| status > 1) {
                     return None;

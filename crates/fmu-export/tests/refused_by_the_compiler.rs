@@ -1,7 +1,7 @@
-//! What the macros refuse, and the words in which they do; each file of compile_fail says what it is about.
+//! The models that the macros reject, and the messages: each module in the files of compile_fail is one mistake.
 
-/// What the compiler adds to the words varies from version to version: `TRYBUILD=overwrite` writes the files anew, after
-/// which a look at the difference shows whether a message got worse.
+/// A compiler reports only the mistakes of its first failing phase, so there is a file for each phase. `TRYBUILD=overwrite`
+/// writes the messages again after an update of the compiler; compare them with the old ones.
 #[test]
 fn messages_of_the_compiler() {
     trybuild::TestCases::new().compile_fail("tests/compile_fail/*.rs");

@@ -1,8 +1,8 @@
-//! What depends on something is declared to.
+//! Dependencies that the FMU shows are declared.
 
+use crate::call_sequence::Written;
 use crate::checker::Checker;
 use crate::finding::Judge;
-use crate::script::Written;
 use crate::values::{Value, near};
 use crate::writer::{Read, value_of};
 use fmi_abi::Interface;
@@ -18,10 +18,10 @@ fn undeclared(checker: &Checker, unknowns: &[crate::description::Unknown], known
             unknown
                 .dependencies
                 .as_ref()
-                .is_some_and(|list| !list.iter().any(|(place, _)| aliases.contains(place)))
+                .is_some_and(|list| !list.iter().any(|(index, _)| aliases.contains(index)))
         })
         .map(|unknown| unknown.variable)
-        .filter(|place| !aliases.contains(place))
+        .filter(|index| !aliases.contains(index))
         .collect()
 }
 
@@ -37,7 +37,7 @@ fn judge(
     Arc::new(move |run| {
         unknowns.iter().find_map(|unknown| {
             let (one, other) = (value_of(run, &before, *unknown)?, value_of(run, &after, *unknown)?);
-            // With the old value the old result: it is this known that it depends on.
+            // The old value gives the old result, so the unknown depends on this known.
             let again = value_of(run, &back, *unknown)?;
             let at = one.differ(&other)?;
             let same = |one: &Written, other: &Written| one.differ(other).is_none();
@@ -56,18 +56,18 @@ fn judge(
 /// Inputs and, in Model Exchange, states, moved one at a time.
 pub fn missing(checker: &Checker) -> anyhow::Result<()> {
     let description = &checker.description;
-    for course in &checker.courses {
-        let listed = match course.interface {
+    for trajectory in &checker.trajectories {
+        let listed = match trajectory.interface {
             Interface::CoSimulation => description.outputs.clone(),
             Interface::ModelExchange => {
                 description.outputs.iter().chain(&description.derivatives).cloned().collect()
             }
         };
         let states =
-            if course.interface == Interface::ModelExchange { description.states() } else { Vec::new() };
+            if trajectory.interface == Interface::ModelExchange { description.states() } else { Vec::new() };
         let scalar = states.len() == description.states_count().unwrap_or(0);
-        let inputs = (0..description.variables.len()).filter(|place| {
-            let variable = &description.variables[*place];
+        let inputs = (0..description.variables.len()).filter(|index| {
+            let variable = &description.variables[*index];
             variable.causality == "input"
                 && variable.is_float()
                 && variable.variability == "continuous"
@@ -76,16 +76,16 @@ pub fn missing(checker: &Checker) -> anyhow::Result<()> {
         });
         let knowns: Vec<usize> =
             inputs.chain(if scalar { states.clone() } else { Vec::new() }).take(checker.most(60)).collect();
-        let to = course.points.len() / 2;
+        let to = trajectory.points.len() / 2;
         let mut writer = checker.writer();
-        writer.begin(0, course);
-        for point in &course.points[..to] {
-            writer.point(0, course, point);
+        writer.begin(0, trajectory);
+        for point in &trajectory.points[..to] {
+            writer.point(0, trajectory, point);
         }
         let read = writer.read_these(0, &knowns);
         let now =
             (!states.is_empty() && scalar).then(|| writer.vector(0, "GetContinuousStates", states.len()));
-        let now_run = checker.play(&writer.script)?;
+        let now_run = checker.play(&writer.sequence)?;
         let vector = now.and_then(|id| now_run.written(id)).map(|of| of.numbers()).unwrap_or_default();
         for known in knowns {
             let unknowns = undeclared(checker, &listed, known);
@@ -96,13 +96,13 @@ pub fn missing(checker: &Checker) -> anyhow::Result<()> {
             let Some(value) = value_of(&now_run, &read, known).map(|value| value.numbers()) else { continue };
             let other: Vec<f64> = value.iter().map(|value| near(variable, *value, 1.0 / 16.0)).collect();
             let mut writer = checker.writer();
-            writer.begin(0, course);
-            for point in &course.points[..to] {
-                writer.point(0, course, point);
+            writer.begin(0, trajectory);
+            for point in &trajectory.points[..to] {
+                writer.point(0, trajectory, point);
             }
             let set = |writer: &mut crate::writer::Writer, numbers: &[f64]| match states
                 .iter()
-                .position(|place| *place == known)
+                .position(|index| *index == known)
             {
                 Some(at) => {
                     let mut states = vector.clone();
@@ -121,7 +121,7 @@ pub fn missing(checker: &Checker) -> anyhow::Result<()> {
             let back = writer.read_these(0, &unknowns);
             checker.judge(
                 "dependencies.missing",
-                writer.script,
+                writer.sequence,
                 judge(checker, known, unknowns, before, after, back),
             )?;
         }
@@ -132,10 +132,10 @@ pub fn missing(checker: &Checker) -> anyhow::Result<()> {
 /// Parameters and inputs, moved one at a time in Initialization Mode.
 pub fn initial(checker: &Checker) -> anyhow::Result<()> {
     let description = &checker.description;
-    for course in &checker.courses {
+    for trajectory in &checker.trajectories {
         let knowns: Vec<usize> = (0..description.variables.len())
-            .filter(|place| {
-                let variable = &description.variables[*place];
+            .filter(|index| {
+                let variable = &description.variables[*index];
                 let known = variable.causality == "input"
                     || variable.initial == "exact" && variable.variability != "constant";
                 known
@@ -155,7 +155,7 @@ pub fn initial(checker: &Checker) -> anyhow::Result<()> {
             let value = variable.starts();
             let other: Vec<f64> = value.iter().map(|value| near(variable, *value, 1.0 / 16.0)).collect();
             let mut writer = checker.writer();
-            writer.make(0, course.interface);
+            writer.make(0, trajectory.interface);
             writer.enter(0);
             writer.set(0, &[(known, Value::Numbers(value.clone()))]);
             let before = writer.read_these(0, &unknowns);
@@ -165,7 +165,7 @@ pub fn initial(checker: &Checker) -> anyhow::Result<()> {
             let back = writer.read_these(0, &unknowns);
             checker.judge(
                 "dependencies.initial",
-                writer.script,
+                writer.sequence,
                 judge(checker, known, unknowns, before, after, back),
             )?;
         }

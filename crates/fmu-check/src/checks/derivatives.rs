@@ -1,53 +1,53 @@
 //! Partial derivatives against differences, adjoint against directional ones, vectors against variables.
 
+use crate::call_sequence::{Arg, Kind, Run};
 use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::Judge;
-use crate::script::{Arg, Kind, Run};
 use crate::values::Value;
-use crate::writer::{Course, Read, Writer, value_of};
+use crate::writer::{Read, Trajectory, Writer, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
 
-/// A scalar unknown and a known that are continuous, of which the unknown may depend on the known.
+/// Finds a continuous scalar unknown and a continuous scalar known on which the unknown may depend.
 pub fn pair(description: &Description, interface: Interface) -> Option<(usize, usize)> {
     let unknowns = unknowns(description, interface);
     let knowns = knowns(description, interface);
     let mut listed = description.outputs.iter().chain(&description.derivatives);
     listed.find_map(|unknown| {
         let depends = |known: &&usize| {
-            unknown.dependencies.as_ref().is_none_or(|list| list.iter().any(|(place, _)| place == *known))
+            unknown.dependencies.as_ref().is_none_or(|list| list.iter().any(|(index, _)| index == *known))
         };
         let known = knowns.iter().find(depends).filter(|_| unknowns.contains(&unknown.variable))?;
         Some((unknown.variable, *known))
     })
 }
 
-fn continuous(description: &Description, place: usize) -> bool {
-    let variable = &description.variables[place];
+fn continuous(description: &Description, index: usize) -> bool {
+    let variable = &description.variables[index];
     variable.base == Some(BaseType::Real)
         && variable.variability == "continuous"
         && variable.size == Some(1)
         && !variable.clocked
 }
 
-/// What can be asked for: outputs, and in Model Exchange derivatives.
+/// The unknowns: outputs, and in Model Exchange state derivatives.
 fn unknowns(description: &Description, interface: Interface) -> Vec<usize> {
     let derivatives: &[_] =
         if interface == Interface::ModelExchange { &description.derivatives } else { &[] };
     let listed = description.outputs.iter().chain(derivatives).map(|unknown| unknown.variable);
-    let mut found: Vec<usize> = listed.filter(|place| continuous(description, *place)).collect();
+    let mut found: Vec<usize> = listed.filter(|index| continuous(description, *index)).collect();
     found.dedup();
     found.truncate(200);
     found
 }
 
-/// With respect to what: inputs, and in Model Exchange states.
+/// The knowns: inputs, and in Model Exchange states.
 fn knowns(description: &Description, interface: Interface) -> Vec<usize> {
     let inputs =
-        (0..description.variables.len()).filter(|place| description.variables[*place].causality == "input");
+        (0..description.variables.len()).filter(|index| description.variables[*index].causality == "input");
     let states = if interface == Interface::ModelExchange { description.states() } else { Vec::new() };
-    inputs.chain(states).filter(|place| continuous(description, *place)).collect()
+    inputs.chain(states).filter(|index| continuous(description, *index)).collect()
 }
 
 fn derivative(
@@ -76,13 +76,13 @@ fn derivative(
     writer.call(0, function, args)
 }
 
-/// Where partial derivatives are asked for: amid the course, where it is not in an event.
-fn amid(writer: &mut Writer, course: &Course) -> Vec<f64> {
-    let to = course.points.len() / 2;
-    writer.begin(0, course);
+/// The point of the trajectory at which partial derivatives are requested: near its middle and outside of events.
+fn amid(writer: &mut Writer, trajectory: &Trajectory) -> Vec<f64> {
+    let to = trajectory.points.len() / 2;
+    writer.begin(0, trajectory);
     let mut states = Vec::new();
-    for point in &course.points[..to] {
-        writer.point(0, course, point);
+    for point in &trajectory.points[..to] {
+        writer.point(0, trajectory, point);
         if !point.states.is_empty() {
             states.clone_from(&point.states);
         }
@@ -92,8 +92,8 @@ fn amid(writer: &mut Writer, course: &Course) -> Vec<f64> {
 
 /// Each column against differences, the transposed against the adjoint, a sum of seeds against the sum.
 pub fn directional(checker: &Checker) -> anyhow::Result<()> {
-    for course in &checker.courses {
-        let interface = course.interface;
+    for trajectory in &checker.trajectories {
+        let interface = trajectory.interface;
         let has_directional =
             checker.can(interface, &["providesDirectionalDerivative", "providesDirectionalDerivatives"]);
         let has_adjoint = checker.can(interface, &["providesAdjointDerivatives"]);
@@ -107,25 +107,25 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
         if unknowns.is_empty() || knowns.is_empty() {
             continue;
         }
-        let reference = |places: &[usize]| -> Vec<u32> {
-            places.iter().map(|place| description.variables[*place].reference).collect()
+        let reference = |indices: &[usize]| -> Vec<u32> {
+            indices.iter().map(|index| description.variables[*index].reference).collect()
         };
         let (of_unknowns, of_knowns) = (reference(&unknowns), reference(&knowns));
         let mut writer = checker.writer();
-        amid(&mut writer, course);
+        amid(&mut writer, trajectory);
         let first = writer.read(0);
-        let unit = |place: usize, count: usize| -> Vec<f64> {
-            (0..count).map(|at| f64::from(u8::from(at == place))).collect()
+        let unit = |index: usize, count: usize| -> Vec<f64> {
+            (0..count).map(|at| f64::from(u8::from(at == index))).collect()
         };
         let columns: Vec<u32> = if has_directional {
             (0..knowns.len())
-                .map(|place| {
+                .map(|index| {
                     derivative(
                         &mut writer,
                         "GetDirectionalDerivative",
                         &of_unknowns,
                         &of_knowns,
-                        &unit(place, knowns.len()),
+                        &unit(index, knowns.len()),
                         unknowns.len(),
                     )
                 })
@@ -145,13 +145,13 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
         });
         let rows: Vec<u32> = if has_adjoint {
             (0..unknowns.len())
-                .map(|place| {
+                .map(|index| {
                     derivative(
                         &mut writer,
                         "GetAdjointDerivative",
                         &of_unknowns,
                         &of_knowns,
-                        &unit(place, unknowns.len()),
+                        &unit(index, unknowns.len()),
                         knowns.len(),
                     )
                 })
@@ -161,10 +161,10 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
         };
         let last = writer.read(0);
         let names: Vec<String> =
-            unknowns.iter().map(|place| description.variables[*place].name.clone()).collect();
+            unknowns.iter().map(|index| description.variables[*index].name.clone()).collect();
         let knows: Vec<String> =
-            knowns.iter().map(|place| description.variables[*place].name.clone()).collect();
-        let script = writer.script.clone();
+            knowns.iter().map(|index| description.variables[*index].name.clone()).collect();
+        let sequence = writer.sequence.clone();
 
         // Asking changes nothing.
         let model = description.clone();
@@ -172,8 +172,8 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
             let (name, before, after) = crate::writer::difference(&model, run, &first, &last)?;
             Some(format!("{name} was {before}, after derivatives were asked for it is {after}"))
         });
-        let run = checker.judge("derivatives.changed", script.clone(), judge)?;
-        if run.end != crate::script::End::Done {
+        let run = checker.judge("derivatives.changed", sequence.clone(), judge)?;
+        if run.end != crate::call_sequence::End::Done {
             continue;
         }
         if has_directional {
@@ -199,7 +199,7 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
                     })
                 })
             });
-            checker.keep("derivatives.linear", &run, &script, judge);
+            checker.keep("derivatives.linear", &run, &sequence, judge);
         }
         if has_directional && has_adjoint {
             for (name, tolerance) in [("derivatives.adjoint", 1e-6), ("derivatives.adjoint-digits", 1e-11)] {
@@ -227,27 +227,27 @@ pub fn directional(checker: &Checker) -> anyhow::Result<()> {
                     }
                     None
                 });
-                if checker.keep(name, &run, &script, judge) {
+                if checker.keep(name, &run, &sequence, judge) {
                     break;
                 }
             }
         }
         if has_directional {
-            order(checker, course, &of_unknowns, &of_knowns)?;
+            order(checker, trajectory, &of_unknowns, &of_knowns)?;
         }
         let by_column = has_directional;
-        differences(checker, course, &unknowns, &knowns, by_column)?;
+        differences(checker, trajectory, &unknowns, &knowns, by_column)?;
     }
     Ok(())
 }
 
-/// The same derivatives in another order of unknowns and knowns.
-fn order(checker: &Checker, course: &Course, unknowns: &[u32], knowns: &[u32]) -> anyhow::Result<()> {
+/// Requests the derivatives again with unknowns and knowns in another order.
+fn order(checker: &Checker, trajectory: &Trajectory, unknowns: &[u32], knowns: &[u32]) -> anyhow::Result<()> {
     let reversed = |list: &[u32]| list.iter().rev().copied().collect::<Vec<_>>();
     let seed: Vec<f64> = (1..=knowns.len()).map(|number| number as f64).collect();
     let back: Vec<f64> = seed.iter().rev().copied().collect();
     let mut writer = checker.writer();
-    amid(&mut writer, course);
+    amid(&mut writer, trajectory);
     let name = "GetDirectionalDerivative";
     let one = derivative(&mut writer, name, unknowns, knowns, &seed, unknowns.len());
     let other = derivative(&mut writer, name, &reversed(unknowns), &reversed(knowns), &back, unknowns.len());
@@ -263,15 +263,15 @@ fn order(checker: &Checker, course: &Course, unknowns: &[u32], knowns: &[u32]) -
             at + 1
         ))
     });
-    checker.judge("derivatives.order", writer.script, judge)?;
+    checker.judge("derivatives.order", writer.sequence, judge)?;
     Ok(())
 }
 
 /// Sets one known and reads what depends on it.
-fn moved(writer: &mut Writer, states: &[f64], course: &Course, known: usize, value: f64) {
+fn moved(writer: &mut Writer, states: &[f64], trajectory: &Trajectory, known: usize, value: f64) {
     let description = writer.description;
-    match description.states().iter().position(|place| *place == known) {
-        Some(at) if course.interface == Interface::ModelExchange => {
+    match description.states().iter().position(|index| *index == known) {
+        Some(at) if trajectory.interface == Interface::ModelExchange => {
             let mut states = states.to_vec();
             states[at] = value;
             writer.set_states(0, &states);
@@ -285,29 +285,29 @@ fn moved(writer: &mut Writer, states: &[f64], course: &Course, known: usize, val
 /// Each derivative against differences with two distances, whose own error shows in what they differ by.
 fn differences(
     checker: &Checker,
-    course: &Course,
+    trajectory: &Trajectory,
     unknowns: &[usize],
     knowns: &[usize],
     by_column: bool,
 ) -> anyhow::Result<()> {
     let description = &checker.description;
-    if course.interface == Interface::ModelExchange
+    if trajectory.interface == Interface::ModelExchange
         && description.states().len() != description.states_count().unwrap_or(0)
     {
         return Ok(());
     }
-    let reference = |places: &[usize]| -> Vec<u32> {
-        places.iter().map(|place| description.variables[*place].reference).collect()
+    let reference = |indices: &[usize]| -> Vec<u32> {
+        indices.iter().map(|index| description.variables[*index].reference).collect()
     };
     let of_unknowns = reference(unknowns);
-    // Where the values are now is needed to move them.
+    // The current values are the base of the differences.
     let mut writer = checker.writer();
-    amid(&mut writer, course);
+    amid(&mut writer, trajectory);
     let read = writer.read_these(0, knowns);
     let count = description.states_count().unwrap_or(0);
-    let of_states = (course.interface == Interface::ModelExchange && count > 0)
+    let of_states = (trajectory.interface == Interface::ModelExchange && count > 0)
         .then(|| writer.vector(0, "GetContinuousStates", count));
-    let run = checker.play(&writer.script)?;
+    let run = checker.play(&writer.sequence)?;
     let states = of_states.and_then(|id| run.written(id)).map(|of| of.numbers()).unwrap_or_default();
     for known in knowns {
         let variable = &description.variables[*known];
@@ -326,7 +326,7 @@ fn differences(
             continue;
         }
         let mut writer = checker.writer();
-        amid(&mut writer, course);
+        amid(&mut writer, trajectory);
         let of_known = [variable.reference];
         let analytic: Vec<u32> = if by_column {
             vec![derivative(
@@ -353,17 +353,17 @@ fn differences(
         };
         let mut reads: Vec<Vec<Read>> = Vec::new();
         for by in [step, -step, step / 2.0, -step / 2.0] {
-            moved(&mut writer, &states, course, *known, value + by);
+            moved(&mut writer, &states, trajectory, *known, value + by);
             reads.push(writer.read_these(0, unknowns));
         }
-        moved(&mut writer, &states, course, *known, value);
+        moved(&mut writer, &states, trajectory, *known, value);
         let back = writer.read_these(0, unknowns);
         let same: Vec<usize> = description.aliases(*known).collect();
-        let stepped = course.interface == Interface::CoSimulation;
+        let stepped = trajectory.interface == Interface::CoSimulation;
         let (unknowns, model, known_name) = (unknowns.to_vec(), description.clone(), variable.name.clone());
         let compare = Arc::new(move |run: &Run, tolerance: f64| {
             for (row, unknown) in unknowns.iter().enumerate() {
-                // Of a state by itself: the standard does not say.
+                // The standard does not define the derivative of a state with respect to itself.
                 if same.contains(unknown) {
                     continue;
                 }
@@ -400,7 +400,7 @@ fn differences(
                     continue;
                 }
                 let scale = narrow.abs().max(answer.abs());
-                // What the FMU does not show until its next step has no differences here.
+                // An output that changes only in the next step has no difference here.
                 let silent = narrow == 0.0 && wide == 0.0;
                 if silent && stepped {
                     continue;
@@ -416,15 +416,15 @@ fn differences(
             None
         });
         let precise = Arc::clone(&compare);
-        let script = writer.script.clone();
+        let sequence = writer.sequence.clone();
         let run = checker.judge(
             "derivatives.directional",
-            script.clone(),
+            sequence.clone(),
             Arc::new(move |run| compare(run, 1e-4)),
         )?;
         let judge: Judge = Arc::new(move |run| precise(run, 2e-7));
         if !checker.has("derivatives.directional") {
-            checker.keep("derivatives.precision", &run, &script, judge);
+            checker.keep("derivatives.precision", &run, &sequence, judge);
         }
     }
     Ok(())
@@ -432,7 +432,8 @@ fn differences(
 
 /// The vectors of states and derivatives are the values of their variables, in the order of the model structure.
 pub fn vectors(checker: &Checker) -> anyhow::Result<()> {
-    let Some(course) = checker.courses.iter().find(|course| course.interface == Interface::ModelExchange)
+    let Some(trajectory) =
+        checker.trajectories.iter().find(|trajectory| trajectory.interface == Interface::ModelExchange)
     else {
         return Ok(());
     };
@@ -442,13 +443,13 @@ pub fn vectors(checker: &Checker) -> anyhow::Result<()> {
         return Ok(());
     }
     let mut writer = checker.writer();
-    writer.begin(0, course);
+    writer.begin(0, trajectory);
     let derivatives: Vec<usize> = description.derivatives.iter().map(|unknown| unknown.variable).collect();
     let states = description.states();
     let mut asked = Vec::new();
     let mut nominals = None;
-    for point in &course.points {
-        writer.point(0, course, point);
+    for point in &trajectory.points {
+        writer.point(0, trajectory, point);
         nominals = Some(writer.vector(0, "GetNominalsOfContinuousStates", count));
         asked.push([
             (writer.vector(0, "GetContinuousStates", count), writer.read_these(0, &states), states.clone()),
@@ -457,14 +458,14 @@ pub fn vectors(checker: &Checker) -> anyhow::Result<()> {
     }
     let model = description.clone();
     let judge: Judge = Arc::new(move |run| {
-        for (vector, reads, places) in asked.iter().flatten() {
+        for (vector, reads, indices) in asked.iter().flatten() {
             if run.status(*vector).is_none_or(|status| status > 1) {
                 continue;
             }
             let numbers = run.written(*vector)?.numbers();
-            let of_variables: Vec<f64> = places
+            let of_variables: Vec<f64> = indices
                 .iter()
-                .filter_map(|place| value_of(run, reads, *place))
+                .filter_map(|index| value_of(run, reads, *index))
                 .flat_map(|value| value.numbers())
                 .collect();
             if of_variables.len() != numbers.len() {
@@ -475,7 +476,7 @@ pub fn vectors(checker: &Checker) -> anyhow::Result<()> {
                 .zip(&of_variables)
                 .position(|(one, other)| one.to_bits() != other.to_bits() && one != other)
             {
-                let name = model.variables[places[at.min(places.len() - 1)]].name.clone();
+                let name = model.variables[indices[at.min(indices.len() - 1)]].name.clone();
                 return Some(format!(
                     "number {} of the vector is {:?}, {name} is {:?}",
                     at + 1,
@@ -486,13 +487,13 @@ pub fn vectors(checker: &Checker) -> anyhow::Result<()> {
         }
         None
     });
-    let run = checker.judge("derivatives.vectors", writer.script.clone(), judge)?;
+    let run = checker.judge("derivatives.vectors", writer.sequence.clone(), judge)?;
     let judge: Judge = Arc::new(move |run| {
         let numbers =
             run.written(nominals?).filter(|_| run.status(nominals.unwrap_or(0)) == Some(0))?.numbers();
         let bad = numbers.iter().find(|number| !(**number > 0.0 && number.is_finite()))?;
         Some(format!("a nominal value is {bad:?}"))
     });
-    checker.keep("derivatives.nominals", &run, &writer.script, judge);
+    checker.keep("derivatives.nominals", &run, &writer.sequence, judge);
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! Event Mode and early returns of FMI 3.0 in Co-Simulation.
 
+use crate::call_sequence::{Run, Step};
 use crate::checker::Checker;
 use crate::finding::Judge;
-use crate::script::{Run, Step};
 use crate::writer::{Writer, value_of};
 use fmi_abi::Interface;
 use std::sync::Arc;
@@ -10,8 +10,9 @@ use std::sync::Arc;
 /// Steps over events in FMI 3.0, by importers that handle them, that let steps return early, or both: what a step says of
 /// where it ended and why is so.
 pub fn told(checker: &Checker) -> anyhow::Result<()> {
-    let course = checker.courses.iter().find(|course| course.interface == Interface::CoSimulation);
-    let (true, Some(course)) = (checker.fmi3(), course) else { return Ok(()) };
+    let trajectory =
+        checker.trajectories.iter().find(|trajectory| trajectory.interface == Interface::CoSimulation);
+    let (true, Some(trajectory)) = (checker.fmi3(), trajectory) else { return Ok(()) };
     let time = checker.description.variables.iter().position(|variable| variable.causality == "independent");
     let has_events = checker.can(Interface::CoSimulation, &["hasEventMode"]);
     for (event_mode, early_return) in [(true, true), (true, false), (false, true)] {
@@ -31,9 +32,9 @@ pub fn told(checker: &Checker) -> anyhow::Result<()> {
         }
         let (mut steps, mut handled) = (Vec::new(), Vec::new());
         let (mut at, mut number) = (checker.description.start_time, 0);
-        // Steps of the course, which may now end at events between its points.
-        while number < course.points.len() && steps.len() < 30 {
-            let point = &course.points[number];
+        // Steps of the trajectory, which may now end at events between its points.
+        while number < trajectory.points.len() && steps.len() < 30 {
+            let point = &trajectory.points[number];
             let end = point.time + point.size;
             // Section 4.2.1: Event Mode at the time that was told, or where the step says so; none is passed by.
             let goal = next.filter(|next| !early_return && *next > at && *next < end).unwrap_or(end);
@@ -44,13 +45,13 @@ pub fn told(checker: &Checker) -> anyhow::Result<()> {
             }
             let id = writer.step(0, at, size);
             let values = writer.read_these(0, time.as_slice());
-            let run = checker.play(&writer.script)?;
+            let run = checker.play(&writer.sequence)?;
             steps.push((id, values, goal));
             handled.push(None);
             let Some(outcome) = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1)) else {
                 break;
             };
-            let flag = |place: usize| outcome.written[place].numbers() == [1.0];
+            let flag = |index: usize| outcome.written[index].numbers() == [1.0];
             let reached = outcome.written[3].numbers()[0];
             // A step that went nowhere, without an event, would do so again.
             if flag(1) || !(reached > at || flag(0) && reached == at) || reached > goal + point.size {
@@ -65,7 +66,7 @@ pub fn told(checker: &Checker) -> anyhow::Result<()> {
                 writer.call(0, "EnterStepMode", vec![]);
             }
         }
-        // Of a shorter sequence: events that must be handled were.
+        // In a shortened call sequence, the required events were still handled.
         let ids: Vec<u32> = steps.iter().map(|(id, ..)| *id).collect();
         let ended = move |run: &Run, id: u32| {
             let before = ids.iter().zip(&handled).take_while(|(step, _)| **step != id);
@@ -73,7 +74,7 @@ pub fn told(checker: &Checker) -> anyhow::Result<()> {
                 run.of(*step).is_some() && event.is_some_and(|event| run.of(event).is_none())
             };
             let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
-            let flag = |place: usize| outcome.written[place].numbers() == [1.0];
+            let flag = |index: usize| outcome.written[index].numbers() == [1.0];
             let reached = outcome.written.get(3)?.numbers()[0];
             (!before.into_iter().any(passed_by)).then(|| (flag(0), flag(2), reached))
         };
@@ -95,7 +96,7 @@ pub fn told(checker: &Checker) -> anyhow::Result<()> {
                 })
             })
         });
-        let run = checker.judge("results.early-return", writer.script.clone(), judge)?;
+        let run = checker.judge("results.early-return", writer.sequence.clone(), judge)?;
         let judge: Judge = Arc::new(move |run| {
             steps.iter().find_map(|(id, _, end)| {
                 let (event, early, reached) = told(run, *id)?;
@@ -105,16 +106,16 @@ pub fn told(checker: &Checker) -> anyhow::Result<()> {
                 })
             })
         });
-        checker.keep("results.early-unsaid", &run, &writer.script, judge);
+        checker.keep("results.early-unsaid", &run, &writer.sequence, judge);
     }
     Ok(())
 }
 
-/// As many updates as the event needs, found by playing them; the next time event.
+/// Runs the updates to count how many the event needs; returns the next time event.
 fn over_event(checker: &Checker, writer: &mut Writer<'_>) -> anyhow::Result<Option<f64>> {
     for _ in 0..10 {
         let ids = writer.update(0, 1);
-        let run = checker.play(&writer.script)?;
+        let run = checker.play(&writer.sequence)?;
         match checker.event(&run, ids[0]) {
             Some(event) if event.again => {}
             other => return Ok(other.and_then(|event| event.next)),

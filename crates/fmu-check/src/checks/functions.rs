@@ -1,9 +1,9 @@
-//! What must be there: functions, versions, an instance for the right token, and what the capabilities promise.
+//! Functions, versions, an instance for the right token, and the calls that declared capabilities allow.
 
+use crate::call_sequence::{Arg, End, Kind, Setting, Step};
 use crate::checker::Checker;
 use crate::finding::Judge;
 use crate::finding::refused_one;
-use crate::script::{Arg, End, Kind, Setting, Step};
 use fmi_abi::calls::{fmi2, fmi3, signatures};
 use fmi_abi::{Interface, Standard};
 use std::sync::Arc;
@@ -14,11 +14,11 @@ fn symbols(checker: &Checker) -> anyhow::Result<()> {
     writer.add(Step::Version(if checker.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned()));
     let [late, now] = [false, true].map(|now| {
         let setting = Setting { now, ..checker.setting.clone() };
-        checker.workers.play(&setting, &writer.script, checker.limit)
+        checker.workers.play(&setting, &writer.sequence, checker.limit)
     });
     if let (End::Done, End::Unloadable(why)) = (late?.end, now?.end) {
         let nothing: Judge = Arc::new(|_| None);
-        checker.add(checker.claim("package.symbols").finding(why, writer.script, nothing));
+        checker.add(checker.claim("package.symbols").finding(why, writer.sequence, nothing));
     }
     Ok(())
 }
@@ -26,10 +26,10 @@ fn symbols(checker: &Checker) -> anyhow::Result<()> {
 /// Whether every function that must be there is there.
 pub fn present(checker: &Checker) -> anyhow::Result<()> {
     let standard = checker.description.standard;
-    let places = [(Interface::CoSimulation, 0), (Interface::ModelExchange, 1)];
+    let indices = [(Interface::CoSimulation, 0), (Interface::ModelExchange, 1)];
     let mut missing: Vec<String> = Vec::new();
-    for (interface, place) in places {
-        let Some(path) = &checker.setting.libraries[place] else { continue };
+    for (interface, index) in indices {
+        let Some(path) = &checker.setting.libraries[index] else { continue };
         let Some(symbols) = super::package::exported(path) else { continue };
         let of_all: &[&str] = if standard == Standard::Fmi2 { fmi2::FREE } else { fmi3::FREE };
         let wanted = of_all.iter().copied().filter(|name| match *name {
@@ -61,13 +61,13 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
         }
     }
     if !missing.is_empty() {
-        let seen = format!("the library lacks {}", missing.join(", "));
-        checker.add(checker.claim("functions.missing").of_files(seen));
+        let observed = format!("the library lacks {}", missing.join(", "));
+        checker.add(checker.claim("functions.missing").of_files(observed));
     }
     symbols(checker)?;
     version(checker)?;
-    for course in &checker.courses {
-        capabilities(checker, course.interface)?;
+    for trajectory in &checker.trajectories {
+        capabilities(checker, trajectory.interface)?;
     }
     Ok(())
 }
@@ -97,19 +97,20 @@ fn version(checker: &Checker) -> anyhow::Result<()> {
         let answer = answer.unwrap_or_else(|| "NULL".to_owned());
         (answer != "default").then(|| format!("fmi2GetTypesPlatform returns {answer}"))
     });
-    checker.judge("functions.version", writer.script, judge)?;
+    checker.judge("functions.version", writer.sequence, judge)?;
     Ok(())
 }
 
-/// What is declared must answer.
+/// Each declared function returns.
 fn capabilities(checker: &Checker, interface: Interface) -> anyhow::Result<()> {
-    let Some(course) = checker.courses.iter().find(|course| course.interface == interface) else {
+    let Some(trajectory) = checker.trajectories.iter().find(|trajectory| trajectory.interface == interface)
+    else {
         return Ok(());
     };
     let mut asked: Vec<(&str, Vec<u32>, crate::writer::Writer)> = Vec::new();
     if checker.saves(interface) {
         let mut writer = checker.writer();
-        writer.begin(0, course);
+        writer.begin(0, trajectory);
         let mut ids = vec![writer.save(0, 0), writer.restore(0, 0)];
         if checker.serializes(interface) {
             ids.extend(writer.serialize(0, 0));
@@ -119,10 +120,10 @@ fn capabilities(checker: &Checker, interface: Interface) -> anyhow::Result<()> {
         asked.push(("canGetAndSetFMUstate and canSerializeFMUstate", ids, writer));
     }
     if let Some((unknown, known)) = super::derivatives::pair(&checker.description, interface) {
-        let reference = |place: usize| {
-            Arg::In(Kind::U32, vec![u64::from(checker.description.variables[place].reference)])
+        let reference = |index: usize| {
+            Arg::In(Kind::U32, vec![u64::from(checker.description.variables[index].reference)])
         };
-        let sizes = |place: usize| checker.description.variables[place].size.unwrap_or(1);
+        let sizes = |index: usize| checker.description.variables[index].size.unwrap_or(1);
         for (names, function) in [
             (["providesDirectionalDerivative", "providesDirectionalDerivatives"], "GetDirectionalDerivative"),
             (["providesAdjointDerivatives", "providesAdjointDerivatives"], "GetAdjointDerivative"),
@@ -131,7 +132,7 @@ fn capabilities(checker: &Checker, interface: Interface) -> anyhow::Result<()> {
                 continue;
             }
             let mut writer = checker.writer();
-            writer.begin(0, course);
+            writer.begin(0, trajectory);
             let (seeds, results) = if function.contains("Adjoint") {
                 (sizes(unknown), sizes(known))
             } else {
@@ -151,16 +152,16 @@ fn capabilities(checker: &Checker, interface: Interface) -> anyhow::Result<()> {
         }
     }
     for (flag, ids, writer) in asked {
-        let script = writer.script.clone();
+        let sequence = writer.sequence.clone();
         let flag = flag.to_owned();
         let judge: Judge = Arc::new(move |run| {
             if run.end != End::Done {
                 return None;
             }
-            let why = ids.iter().find_map(|id| refused_one(&script, run, *id))?;
+            let why = ids.iter().find_map(|id| refused_one(&sequence, run, *id))?;
             Some(format!("declared by {flag}, but {why}"))
         });
-        checker.judge("functions.capability", writer.script, judge)?;
+        checker.judge("functions.capability", writer.sequence, judge)?;
     }
     Ok(())
 }

@@ -1,27 +1,31 @@
-//! What no importer ought to do, and some do: a crash or a hang is fragile, where the standard does not forbid it.
+//! Calls that importers should not make, but some do. A crash or a hang is fragile if the standard does not forbid it.
 
 use super::refusals::unknown_reference;
+use crate::call_sequence::{Arg, CallSequence, End, Kind, NOBODY, Step};
 use crate::checker::Checker;
 use crate::description::{kind_of, type_name};
 use crate::finding::Judge;
-use crate::script::{Arg, End, Kind, NOBODY, Script, Step};
 use crate::values::Value;
-use crate::writer::{Course, Writer, readable};
+use crate::writer::{Trajectory, Writer, readable};
 use fmi_abi::calls::signatures;
 use fmi_abi::{Interface, Mode};
 use std::sync::Arc;
 
-/// Crashes after which further scripts would only repeat what is known.
+/// Crashes after which further sequences would only repeat what is known.
 const CRASHES: usize = 40;
 /// Hangs after which it is not worth while to wait for more.
 const HANGS: usize = 2;
 
-/// Plays scripts until `CRASHES` of them have crashed or `HANGS` have hung.
-fn all(checker: &Checker, name: &str, scripts: impl IntoIterator<Item = Script>) -> anyhow::Result<()> {
+/// Plays sequences until `CRASHES` of them have crashed or `HANGS` have hung.
+fn all(
+    checker: &Checker,
+    name: &str,
+    sequences: impl IntoIterator<Item = CallSequence>,
+) -> anyhow::Result<()> {
     let nothing: Judge = Arc::new(|_| None);
     let (mut crashes, mut hangs) = (0, 0);
-    for script in scripts {
-        match checker.judge(name, script, Arc::clone(&nothing))?.end {
+    for sequence in sequences {
+        match checker.judge(name, sequence, Arc::clone(&nothing))?.end {
             End::Hang(_) => hangs += 1,
             End::Done => {}
             _ => crashes += 1,
@@ -39,14 +43,14 @@ pub fn free_null(checker: &Checker) -> anyhow::Result<()> {
     writer.forbidden = true;
     writer.add(Step::Free(NOBODY));
     let nothing: Judge = Arc::new(|_| None);
-    checker.judge("life_cycle.free-null", writer.script, nothing)?;
+    checker.judge("life_cycle.free-null", writer.sequence, nothing)?;
     Ok(())
 }
 
 /// NULL for the instance, NULL for arrays, unknown references, sizes that do not fit.
 pub fn calls(checker: &Checker) -> anyhow::Result<()> {
     let standard = checker.description.standard;
-    for course in &checker.courses {
+    for trajectory in &checker.trajectories {
         let offered = |name: &str| {
             let modes = [
                 Mode::Instantiated,
@@ -60,7 +64,7 @@ pub fn calls(checker: &Checker) -> anyhow::Result<()> {
                 modes
                     .into_iter()
                     .rev()
-                    .find(|mode| of.rule.standard.contain(standard, course.interface, *mode))
+                    .find(|mode| of.rule.standard.contain(standard, trajectory.interface, *mode))
             })
         };
         let mut of_null = Vec::new();
@@ -69,7 +73,7 @@ pub fn calls(checker: &Checker) -> anyhow::Result<()> {
             let name = &signature.rule.name[4..];
             let Some(mode) = offered(signature.rule.name) else { continue };
             let states = name.to_lowercase().contains("fmustate");
-            if states && !checker.saves(course.interface) {
+            if states && !checker.saves(trajectory.interface) {
                 continue;
             }
             let plain = |of: &str| match of {
@@ -87,7 +91,7 @@ pub fn calls(checker: &Checker) -> anyhow::Result<()> {
             let args: Vec<Arg> = signature.arguments.iter().map(|argument| plain(argument.of)).collect();
             let mut writer = checker.writer();
             writer.forbidden(None, name, args);
-            of_null.push(writer.script);
+            of_null.push(writer.sequence);
             // Each array NULL where one value is asked for.
             let pointers = signature.arguments.iter().filter(|argument| argument.of.starts_with('*')).count();
             for null in 0..pointers {
@@ -120,40 +124,40 @@ pub fn calls(checker: &Checker) -> anyhow::Result<()> {
                 });
                 let args: Vec<Arg> = args.collect();
                 let mut writer = checker.writer();
-                to_mode(&mut writer, course, mode);
+                to_mode(&mut writer, trajectory, mode);
                 writer.forbidden(Some(0), name, args);
-                nulls.push(writer.script);
+                nulls.push(writer.sequence);
             }
         }
         all(checker, "hostile.null-instance", of_null)?;
         all(checker, "hostile.null", nulls)?;
-        references(checker, course)?;
+        references(checker, trajectory)?;
     }
     Ok(())
 }
 
-fn to_mode(writer: &mut Writer, course: &Course, mode: Mode) {
+fn to_mode(writer: &mut Writer, trajectory: &Trajectory, mode: Mode) {
     match mode {
         Mode::Instantiated => {
-            writer.make(0, course.interface);
+            writer.make(0, trajectory.interface);
         }
         Mode::Initialization => {
-            writer.make(0, course.interface);
+            writer.make(0, trajectory.interface);
             writer.enter(0);
         }
         Mode::Event => {
-            writer.make(0, course.interface);
+            writer.make(0, trajectory.interface);
             writer.enter(0);
             writer.call(0, "ExitInitializationMode", vec![]);
         }
         _ => {
-            writer.begin(0, course);
+            writer.begin(0, trajectory);
         }
     }
 }
 
 /// References that no variable has, in all functions; in FMI 3.0 sizes that do not fit.
-fn references(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+fn references(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let fmi3 = checker.fmi3();
     let types: &[(&str, Kind)] = if fmi3 {
@@ -182,7 +186,7 @@ fn references(checker: &Checker, course: &Course) -> anyhow::Result<()> {
         for (name, kind) in types {
             for get in [true, false] {
                 let mut writer = checker.writer();
-                writer.begin(0, course);
+                writer.begin(0, trajectory);
                 let values = match (get, kind) {
                     (true, _) => Arg::Out(*kind, 1),
                     (false, Kind::Pointer) => Arg::Texts(vec![Some(b"text".to_vec())]),
@@ -193,14 +197,14 @@ fn references(checker: &Checker, course: &Course) -> anyhow::Result<()> {
                     args.push(Arg::Whole(1));
                 }
                 writer.forbidden(Some(0), &format!("{}{name}", if get { "Get" } else { "Set" }), args);
-                wrong.push(writer.script);
+                wrong.push(writer.sequence);
             }
         }
     }
     all(checker, "hostile.references", wrong)?;
     let mut sizes = Vec::new();
-    for place in readable(description) {
-        let variable = &description.variables[place];
+    for index in readable(description) {
+        let variable = &description.variables[index];
         let (Some(base), Some(size)) = (variable.base, variable.size) else { continue };
         let (name, kind) = (type_name(description.standard, base), kind_of(description.standard, base));
         if !fmi3 || kind == Kind::Pointer || sizes.len() > 60 {
@@ -209,16 +213,16 @@ fn references(checker: &Checker, course: &Course) -> anyhow::Result<()> {
         for count in [0, size - 1, size + 1] {
             for get in [true, false] {
                 let mut writer = checker.writer();
-                to_mode(&mut writer, course, Mode::Initialization);
+                to_mode(&mut writer, trajectory, Mode::Initialization);
                 let values = if get { Arg::Out(kind, count) } else { Arg::In(kind, vec![0; count]) };
                 let reference = Arg::In(Kind::U32, vec![u64::from(variable.reference)]);
                 let args = vec![reference, Arg::Whole(1), values, Arg::Whole(count as i64)];
                 writer.forbidden(Some(0), &format!("{}{name}", if get { "Get" } else { "Set" }), args);
-                sizes.push(writer.script);
+                sizes.push(writer.sequence);
             }
         }
     }
-    if course.interface == Interface::ModelExchange {
+    if trajectory.interface == Interface::ModelExchange {
         let states = description.states_count().unwrap_or(0);
         for (function, right, get) in [
             ("GetContinuousStates", states, true),
@@ -232,11 +236,11 @@ fn references(checker: &Checker, course: &Course) -> anyhow::Result<()> {
                     continue;
                 }
                 let mut writer = checker.writer();
-                writer.begin(0, course);
+                writer.begin(0, trajectory);
                 let values =
                     if get { Arg::Out(Kind::F64, count) } else { Arg::In(Kind::F64, vec![0; count]) };
                 writer.forbidden(Some(0), function, vec![values, Arg::Whole(count as i64)]);
-                sizes.push(writer.script);
+                sizes.push(writer.sequence);
             }
         }
     }
@@ -246,12 +250,12 @@ fn references(checker: &Checker, course: &Course) -> anyhow::Result<()> {
 /// Numbers that are none, too great or too small, and texts that are none, for parameters and inputs.
 pub fn values(checker: &Checker) -> anyhow::Result<()> {
     let description = &checker.description;
-    for course in &checker.courses {
-        let mut scripts = Vec::new();
+    for trajectory in &checker.trajectories {
+        let mut sequences = Vec::new();
         let settable: Vec<usize> = readable(description)
             .into_iter()
-            .filter(|place| {
-                let variable = &description.variables[*place];
+            .filter(|index| {
+                let variable = &description.variables[*index];
                 !variable.clocked
                     && (variable.causality == "input"
                         || variable.initial == "exact"
@@ -260,16 +264,16 @@ pub fn values(checker: &Checker) -> anyhow::Result<()> {
             })
             .collect();
         let play = |writer: &mut Writer, inputs: &[(usize, Value)], parameters: &[(usize, Value)]| {
-            writer.make(0, course.interface);
+            writer.make(0, trajectory.interface);
             writer.enter(0);
             writer.forbidden = true;
             writer.set(0, parameters);
             writer.set(0, inputs);
-            writer.leave(0, course);
-            for point in course.points.iter().take(3) {
+            writer.leave(0, trajectory);
+            for point in trajectory.points.iter().take(3) {
                 let point = crate::writer::Point { inputs: inputs.to_vec(), ..point.clone() };
-                writer.point(0, course, &point);
-                writer.ask(0, course.interface);
+                writer.point(0, trajectory, &point);
+                writer.ask(0, trajectory.interface);
             }
             writer.free(0);
             writer.forbidden = false;
@@ -279,14 +283,14 @@ pub fn values(checker: &Checker) -> anyhow::Result<()> {
                 let these = |want: bool| -> Vec<(usize, Value)> {
                     settable
                         .iter()
-                        .filter(|place| {
-                            let variable = &description.variables[**place];
+                        .filter(|index| {
+                            let variable = &description.variables[**index];
                             variable.is_float() && (variable.causality == "input") == want && want == input
                         })
-                        .map(|place| {
+                        .map(|index| {
                             (
-                                *place,
-                                Value::Numbers(vec![number; description.variables[*place].size.unwrap_or(1)]),
+                                *index,
+                                Value::Numbers(vec![number; description.variables[*index].size.unwrap_or(1)]),
                             )
                         })
                         .collect()
@@ -297,13 +301,13 @@ pub fn values(checker: &Checker) -> anyhow::Result<()> {
                 }
                 let mut writer = checker.writer();
                 play(&mut writer, &inputs, &parameters);
-                scripts.push(writer.script);
+                sequences.push(writer.sequence);
             }
         }
-        for (place, base) in
-            settable.iter().filter_map(|place| Some((*place, description.variables[*place].base?)))
+        for (index, base) in
+            settable.iter().filter_map(|index| Some((*index, description.variables[*index].base?)))
         {
-            let size = description.variables[place].size.unwrap_or(1);
+            let size = description.variables[index].size.unwrap_or(1);
             let kind = kind_of(description.standard, base);
             let tries: Vec<Value> = match kind {
                 Kind::Pointer if type_name(description.standard, base) == "String" => {
@@ -328,74 +332,76 @@ pub fn values(checker: &Checker) -> anyhow::Result<()> {
                     .to_vec(),
             };
             for value in tries {
-                let of = vec![(place, value)];
+                let of = vec![(index, value)];
                 let mut writer = checker.writer();
-                let input = description.variables[place].causality == "input"
-                    && course.interface == Interface::CoSimulation;
+                let input = description.variables[index].causality == "input"
+                    && trajectory.interface == Interface::CoSimulation;
                 if input {
                     play(&mut writer, &of, &[])
                 } else {
                     play(&mut writer, &[], &of)
                 }
-                scripts.push(writer.script);
+                sequences.push(writer.sequence);
             }
         }
-        scripts.truncate(120);
-        all(checker, "hostile.values", scripts)?;
+        sequences.truncate(120);
+        all(checker, "hostile.values", sequences)?;
     }
     Ok(())
 }
 
 /// Times and steps that are none, too great or too small.
 pub fn times(checker: &Checker) -> anyhow::Result<()> {
-    for course in &checker.courses {
-        let mut scripts = Vec::new();
+    for trajectory in &checker.trajectories {
+        let mut sequences = Vec::new();
         let start = checker.description.start_time;
-        let size = course.points.first().map_or(1e-3, |point| point.size).max(1e-9);
+        let size = trajectory.points.first().map_or(1e-3, |point| point.size).max(1e-9);
         for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, 1e12 * size, -size, 0.0, 5e-324] {
             let mut writer = checker.writer();
-            writer.begin(0, course);
+            writer.begin(0, trajectory);
             writer.forbidden = true;
-            match course.interface {
+            match trajectory.interface {
                 Interface::CoSimulation => {
                     writer.step(0, start, number);
                 }
                 Interface::ModelExchange => {
                     writer.call(0, "SetTime", vec![Arg::real(number)]);
-                    writer.ask(0, course.interface);
+                    writer.ask(0, trajectory.interface);
                     writer.call(0, "EnterEventMode", vec![]);
                     writer.update(0, 1);
                 }
             }
             writer.read(0);
             writer.free(0);
-            scripts.push(writer.script);
+            sequences.push(writer.sequence);
             let mut writer = checker.writer();
-            writer.make(0, course.interface);
+            writer.make(0, trajectory.interface);
             writer.forbidden = true;
             writer.enter_with(0, None, number, None);
-            writer.leave(0, course);
-            if course.interface == Interface::CoSimulation {
+            writer.leave(0, trajectory);
+            if trajectory.interface == Interface::CoSimulation {
                 writer.step(0, number, size);
             }
             writer.read(0);
             writer.free(0);
-            scripts.push(writer.script);
+            sequences.push(writer.sequence);
         }
-        all(checker, "hostile.times", scripts)?;
+        all(checker, "hostile.times", sequences)?;
     }
     Ok(())
 }
 
 /// Bytes that are no state, and some that almost are.
 pub fn bytes(checker: &Checker) -> anyhow::Result<()> {
-    for course in checker.courses.iter().filter(|course| checker.serializes(course.interface)) {
+    for trajectory in
+        checker.trajectories.iter().filter(|trajectory| checker.serializes(trajectory.interface))
+    {
         let mut writer = checker.writer();
-        writer.begin(0, course);
+        writer.begin(0, trajectory);
         writer.save(0, 0);
         let [_, saved] = writer.serialize(0, 0);
-        let run = checker.play(&writer.script)?;
-        let Some(crate::script::Written::Numbers(_, bytes)) = run.written(saved) else { continue };
+        let run = checker.play(&writer.sequence)?;
+        let Some(crate::call_sequence::Written::Numbers(_, bytes)) = run.written(saved) else { continue };
         let mut tries: Vec<Vec<u64>> =
             vec![Vec::new(), vec![0; 8], vec![0; bytes.len()], vec![255; bytes.len()]];
         tries.push(bytes[..bytes.len() / 2].to_vec());
@@ -414,26 +420,26 @@ pub fn bytes(checker: &Checker) -> anyhow::Result<()> {
         }
         let name = if checker.fmi3() { "DeserializeFMUState" } else { "DeSerializeFMUstate" };
         let set = if checker.fmi3() { "SetFMUState" } else { "SetFMUstate" };
-        let scripts: Vec<Script> = tries
+        let sequences: Vec<CallSequence> = tries
             .into_iter()
             .map(|bytes| {
                 let mut writer = checker.writer();
-                writer.begin(0, course);
+                writer.begin(0, trajectory);
                 writer.forbidden = true;
                 let count = bytes.len() as i64;
                 writer.call(0, name, vec![Arg::In(Kind::U8, bytes), Arg::Whole(count), Arg::StateOut(1)]);
                 writer.call(0, set, vec![Arg::State(1)]);
-                writer.ask(0, course.interface);
-                if course.interface == Interface::CoSimulation
-                    && let Some(point) = course.points.first()
+                writer.ask(0, trajectory.interface);
+                if trajectory.interface == Interface::CoSimulation
+                    && let Some(point) = trajectory.points.first()
                 {
                     writer.step(0, point.time, point.size);
                 }
                 writer.free(0);
-                writer.script
+                writer.sequence
             })
             .collect();
-        all(checker, "hostile.bytes", scripts)?;
+        all(checker, "hostile.bytes", sequences)?;
     }
     Ok(())
 }

@@ -1,16 +1,16 @@
 //! The life of an instance in every order that the standard allows.
 
+use crate::call_sequence::{Arg, Step};
 use crate::checker::Checker;
 use crate::finding::Judge;
 use crate::finding::{event, refused, refused_one};
-use crate::script::{Arg, Step};
-use crate::writer::{Course, Point, Writer};
+use crate::writer::{Point, Trajectory, Writer};
 use fmi_abi::Interface;
 use std::sync::Arc;
 
 fn play(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
-    let script = writer.script;
-    let copy = script.clone();
+    let sequence = writer.sequence;
+    let copy = sequence.clone();
     let judge: Judge = Arc::new(move |run| {
         let ids: Vec<u32> = copy
             .iter()
@@ -25,14 +25,14 @@ fn play(checker: &Checker, writer: Writer) -> anyhow::Result<()> {
             .next()
             .or_else(|| ids.iter().find(error).and_then(|id| refused(&copy, run, &[*id])))
     });
-    checker.judge("life_cycle.refused", script, judge)?;
+    checker.judge("life_cycle.refused", sequence, judge)?;
     Ok(())
 }
 
-/// An order of calls, and whether it is one for a course.
-type Order = (fn(&Checker, &Course) -> bool, fn(&mut Writer, &Course));
+/// An order of calls, and whether it is one for a trajectory.
+type Order = (fn(&Checker, &Trajectory) -> bool, fn(&mut Writer, &Trajectory));
 
-/// Orders that importers are seen to use, and those at the edges.
+/// Orders that importers are observed to use, and those at the edges.
 const ORDERS: &[Order] = &[
     (always, made_only),
     (always, initialized_only),
@@ -47,121 +47,121 @@ const ORDERS: &[Order] = &[
     (with_event_mode, event_mode),
 ];
 
-fn always(_: &Checker, _: &Course) -> bool {
+fn always(_: &Checker, _: &Trajectory) -> bool {
     true
 }
 
-fn several(checker: &Checker, course: &Course) -> bool {
-    checker.several(course.interface)
+fn several(checker: &Checker, trajectory: &Trajectory) -> bool {
+    checker.several(trajectory.interface)
 }
 
-fn stepped(_: &Checker, course: &Course) -> bool {
-    course.interface == Interface::CoSimulation
+fn stepped(_: &Checker, trajectory: &Trajectory) -> bool {
+    trajectory.interface == Interface::CoSimulation
 }
 
-fn integrated(_: &Checker, course: &Course) -> bool {
-    course.interface == Interface::ModelExchange
+fn integrated(_: &Checker, trajectory: &Trajectory) -> bool {
+    trajectory.interface == Interface::ModelExchange
 }
 
-fn with_event_mode(checker: &Checker, course: &Course) -> bool {
-    stepped(checker, course) && checker.fmi3() && checker.can(course.interface, &["hasEventMode"])
+fn with_event_mode(checker: &Checker, trajectory: &Trajectory) -> bool {
+    stepped(checker, trajectory) && checker.fmi3() && checker.can(trajectory.interface, &["hasEventMode"])
 }
 
-fn points(writer: &mut Writer, of: usize, course: &Course, count: usize) {
-    for point in course.points.iter().take(count) {
-        writer.point(of, course, point);
+fn points(writer: &mut Writer, of: usize, trajectory: &Trajectory, count: usize) {
+    for point in trajectory.points.iter().take(count) {
+        writer.point(of, trajectory, point);
     }
 }
 
-fn made_only(writer: &mut Writer, course: &Course) {
-    writer.make(0, course.interface);
+fn made_only(writer: &mut Writer, trajectory: &Trajectory) {
+    writer.make(0, trajectory.interface);
     writer.free(0);
 }
 
-fn initialized_only(writer: &mut Writer, course: &Course) {
-    writer.make(0, course.interface);
+fn initialized_only(writer: &mut Writer, trajectory: &Trajectory) {
+    writer.make(0, trajectory.interface);
     writer.enter(0);
-    writer.ask(0, course.interface);
+    writer.ask(0, trajectory.interface);
     writer.free(0);
 }
 
-fn ended_at_once(writer: &mut Writer, course: &Course) {
-    writer.begin(0, course);
+fn ended_at_once(writer: &mut Writer, trajectory: &Trajectory) {
+    writer.begin(0, trajectory);
     writer.call(0, "Terminate", vec![]);
-    writer.ask(0, course.interface);
+    writer.ask(0, trajectory.interface);
     writer.free(0);
 }
 
-fn run_twice(writer: &mut Writer, course: &Course) {
-    writer.begin(0, course);
-    points(writer, 0, course, usize::MAX);
+fn run_twice(writer: &mut Writer, trajectory: &Trajectory) {
+    writer.begin(0, trajectory);
+    points(writer, 0, trajectory, usize::MAX);
     writer.call(0, "Terminate", vec![]);
-    writer.ask(0, course.interface);
+    writer.ask(0, trajectory.interface);
     writer.call(0, "Reset", vec![]);
     writer.enter(0);
-    writer.leave(0, course);
-    points(writer, 0, course, usize::MAX);
-    writer.ask(0, course.interface);
+    writer.leave(0, trajectory);
+    points(writer, 0, trajectory, usize::MAX);
+    writer.ask(0, trajectory.interface);
     writer.free(0);
 }
 
-fn reset_everywhere(writer: &mut Writer, course: &Course) {
-    writer.make(0, course.interface);
+fn reset_everywhere(writer: &mut Writer, trajectory: &Trajectory) {
+    writer.make(0, trajectory.interface);
     writer.call(0, "Reset", vec![]);
     writer.enter(0);
     writer.call(0, "Reset", vec![]);
     writer.call(0, "Reset", vec![]);
     writer.enter(0);
-    writer.leave(0, course);
+    writer.leave(0, trajectory);
     writer.call(0, "Reset", vec![]);
     writer.enter(0);
-    writer.leave(0, course);
-    points(writer, 0, course, 2);
+    writer.leave(0, trajectory);
+    points(writer, 0, trajectory, 2);
     writer.free(0);
 }
 
 /// More instances than a pool may have, and four that are freed in another order.
-fn many(writer: &mut Writer, course: &Course) {
+fn many(writer: &mut Writer, trajectory: &Trajectory) {
     for of in 4..20 {
-        writer.make(of, course.interface);
+        writer.make(of, trajectory.interface);
     }
     for of in 0..4 {
-        writer.begin(of, course);
+        writer.begin(of, trajectory);
     }
     for of in 4..20 {
         writer.free(of);
     }
     writer.free(0);
-    points(writer, 1, course, 2);
+    points(writer, 1, trajectory, 2);
     writer.free(3);
-    points(writer, 2, course, 2);
+    points(writer, 2, trajectory, 2);
     writer.free(2);
     writer.free(1);
 }
 
 /// A name with spaces and letters beyond ASCII; a stop time and a tolerance.
-fn long_name(writer: &mut Writer, course: &Course) {
-    let mut how = writer.how(course.interface);
+fn long_name(writer: &mut Writer, trajectory: &Trajectory) {
+    let mut how = writer.how(trajectory.interface);
     how.name = Some("a long name, with Gödel in it %s #1#".to_owned());
     writer.add(Step::Make(0, how));
-    let stop = course.end + 1.0 + course.end.abs();
+    let stop = trajectory.end + 1.0 + trajectory.end.abs();
     writer.enter_with(0, Some(1e-6), writer.description.start_time, Some(stop));
-    writer.leave(0, course);
-    points(writer, 0, course, 3);
+    writer.leave(0, trajectory);
+    points(writer, 0, trajectory, 3);
     writer.free(0);
 }
 
 /// The last step meets the stop time.
-fn up_to_the_stop(writer: &mut Writer, course: &Course) {
-    writer.make(0, course.interface);
-    writer.enter_with(0, None, writer.description.start_time, Some(course.end));
-    writer.leave(0, course);
-    points(writer, 0, course, usize::MAX);
+fn up_to_the_stop(writer: &mut Writer, trajectory: &Trajectory) {
+    writer.make(0, trajectory.interface);
+    writer.enter_with(0, None, writer.description.start_time, Some(trajectory.end));
+    writer.leave(0, trajectory);
+    points(writer, 0, trajectory, usize::MAX);
     writer.free(0);
 }
 
 /// Categories, all and each, in every mode.
-fn logging(writer: &mut Writer, course: &Course) {
+fn logging(writer: &mut Writer, trajectory: &Trajectory) {
     let categories: Vec<Option<Vec<u8>>> =
         writer.description.log_categories.iter().map(|name| Some(name.clone().into_bytes())).collect();
     let log = |writer: &mut Writer| {
@@ -172,22 +172,22 @@ fn logging(writer: &mut Writer, course: &Course) {
             writer.call(0, "SetDebugLogging", vec![Arg::Whole(1), count, Arg::Texts(some)]);
         }
     };
-    writer.make(0, course.interface);
+    writer.make(0, trajectory.interface);
     log(writer);
     writer.enter(0);
     log(writer);
-    writer.leave(0, course);
+    writer.leave(0, trajectory);
     log(writer);
-    points(writer, 0, course, 2);
+    points(writer, 0, trajectory, 2);
     log(writer);
     writer.free(0);
 }
 
 /// An event at every point: importers may enter Event Mode at any time.
-fn events_everywhere(writer: &mut Writer, course: &Course) {
-    writer.begin(0, course);
-    for point in &course.points {
-        writer.point(0, course, point);
+fn events_everywhere(writer: &mut Writer, trajectory: &Trajectory) {
+    writer.begin(0, trajectory);
+    for point in &trajectory.points {
+        writer.point(0, trajectory, point);
         if point.updates == 0 {
             writer.call(0, "EnterEventMode", vec![]);
             // Whether more are needed is not known here: as many as an event needs.
@@ -195,12 +195,12 @@ fn events_everywhere(writer: &mut Writer, course: &Course) {
             writer.call(0, "EnterContinuousTimeMode", vec![]);
         }
     }
-    writer.ask(0, course.interface);
+    writer.ask(0, trajectory.interface);
     writer.free(0);
 }
 
-fn event_mode(writer: &mut Writer, course: &Course) {
-    let mut how = writer.how(course.interface);
+fn event_mode(writer: &mut Writer, trajectory: &Trajectory) {
+    let mut how = writer.how(trajectory.interface);
     how.event_mode = true;
     writer.add(Step::Make(0, how));
     writer.enter(0);
@@ -208,62 +208,63 @@ fn event_mode(writer: &mut Writer, course: &Course) {
     writer.update(0, 3);
     writer.call(0, "EnterStepMode", vec![]);
     let start = writer.description.start_time;
-    let size = course.points.first().map_or(1e-3, |point| point.size);
+    let size = trajectory.points.first().map_or(1e-3, |point| point.size);
     writer.step(0, start, size);
     writer.call(0, "EnterEventMode", vec![]);
     writer.update(0, 3);
     writer.call(0, "EnterStepMode", vec![]);
-    writer.ask(0, course.interface);
+    writer.ask(0, trajectory.interface);
     writer.call(0, "Terminate", vec![]);
     writer.free(0);
 }
 
 /// All orders of the table, and the edges of a life.
 pub fn orders(checker: &Checker) -> anyhow::Result<()> {
-    for course in &checker.courses {
-        for (_, write) in ORDERS.iter().filter(|(fits, _)| fits(checker, course)) {
+    for trajectory in &checker.trajectories {
+        for (_, write) in ORDERS.iter().filter(|(fits, _)| fits(checker, trajectory)) {
             let mut writer = checker.writer();
-            write(&mut writer, course);
+            write(&mut writer, trajectory);
             play(checker, writer)?;
         }
-        token(checker, course)?;
-        unload(checker, course)?;
-        beyond(checker, course)?;
+        token(checker, trajectory)?;
+        unload(checker, trajectory)?;
+        beyond(checker, trajectory)?;
     }
     super::hostile::free_null(checker)
 }
 
 /// A step that goes beyond the stop time fails.
-fn beyond(checker: &Checker, course: &Course) -> anyhow::Result<()> {
-    let Some(last) = course.points.last().filter(|_| course.interface == Interface::CoSimulation) else {
+fn beyond(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let Some(last) = trajectory.points.last().filter(|_| trajectory.interface == Interface::CoSimulation)
+    else {
         return Ok(());
     };
     let mut writer = checker.writer();
-    writer.make(0, course.interface);
-    writer.enter_with(0, None, checker.description.start_time, Some(course.end));
-    let mut ids = writer.leave(0, course);
-    for point in &course.points {
-        ids.extend(writer.point(0, course, point));
+    writer.make(0, trajectory.interface);
+    writer.enter_with(0, None, checker.description.start_time, Some(trajectory.end));
+    let mut ids = writer.leave(0, trajectory);
+    for point in &trajectory.points {
+        ids.extend(writer.point(0, trajectory, point));
     }
     writer.forbidden = true;
-    let id = writer.step(0, course.end, last.size);
-    let end = course.end;
+    let id = writer.step(0, trajectory.end, last.size);
+    let end = trajectory.end;
     let judge: Judge = Arc::new(move |run| {
         let good = |id: &u32| run.status(*id).is_some_and(|status| status <= 1);
         (ids.iter().all(good) && good(&id)).then(|| format!("a step from the stop time {end:?} on succeeds"))
     });
-    checker.judge("life_cycle.stop-time", writer.script, judge)?;
+    checker.judge("life_cycle.stop-time", writer.sequence, judge)?;
     Ok(())
 }
 
 /// After all instances were freed, the library can be unloaded and loaded again, and the process can exit.
-fn unload(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+fn unload(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     for (name, step) in [("life_cycle.unload", Step::Unload), ("life_cycle.exit", Step::Quit)] {
         let mut writer = checker.writer();
         for _ in 0..2 {
-            writer.begin(0, course);
-            for point in course.points.iter().take(2) {
-                writer.point(0, course, point);
+            writer.begin(0, trajectory);
+            for point in trajectory.points.iter().take(2) {
+                writer.point(0, trajectory, point);
             }
             writer.call(0, "Terminate", vec![]);
             writer.free(0);
@@ -273,22 +274,22 @@ fn unload(checker: &Checker, course: &Course) -> anyhow::Result<()> {
             }
         }
         let nothing: Judge = Arc::new(|_| None);
-        checker.judge(name, writer.script, nothing)?;
+        checker.judge(name, writer.sequence, nothing)?;
     }
     Ok(())
 }
 
 /// The library of another description is not this one's.
-fn token(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+fn token(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer();
-    let mut how = writer.how(course.interface);
+    let mut how = writer.how(trajectory.interface);
     how.token = Some("no token of this FMU".to_owned());
     writer.forbidden = true;
     let id = writer.add(Step::Make(0, how));
     let judge: Judge = Arc::new(move |run| {
         (run.status(id) == Some(1)).then(|| "an instance is made for another one".to_owned())
     });
-    checker.judge("life_cycle.token", writer.script, judge)?;
+    checker.judge("life_cycle.token", writer.sequence, judge)?;
     Ok(())
 }
 
@@ -299,13 +300,13 @@ pub fn random(checker: &Checker) -> anyhow::Result<()> {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (state >> 33) as usize % below
     };
-    for course in &checker.courses {
+    for trajectory in &checker.trajectories {
         for _ in 0..checker.most(20) {
             let mut writer = checker.writer();
-            // Nothing, initializing, in the course at a point, terminated.
+            // Instantiated, in Initialization Mode, at a point of the trajectory, terminated.
             let (mut mode, mut at) = (0, 0);
             let mut saved: Option<(i32, usize)> = None;
-            writer.make(0, course.interface);
+            writer.make(0, trajectory.interface);
             for _ in 0..40 {
                 match (mode, pick(10)) {
                     (0, 0..=6) => {
@@ -313,11 +314,11 @@ pub fn random(checker: &Checker) -> anyhow::Result<()> {
                         mode = 1;
                     }
                     (1, 0..=4) => {
-                        writer.leave(0, course);
+                        writer.leave(0, trajectory);
                         (mode, at) = (2, 0);
                     }
-                    (2, 0..=4) if at < course.points.len() => {
-                        writer.point(0, course, &course.points[at]);
+                    (2, 0..=4) if at < trajectory.points.len() => {
+                        writer.point(0, trajectory, &trajectory.points[at]);
                         at += 1;
                     }
                     (2, 5) => {
@@ -328,7 +329,7 @@ pub fn random(checker: &Checker) -> anyhow::Result<()> {
                         writer.call(0, "Reset", vec![]);
                         (mode, at) = (0, 0);
                     }
-                    (_, 7) if checker.saves(course.interface) => {
+                    (_, 7) if checker.saves(trajectory.interface) => {
                         writer.save(0, 0);
                         saved = Some((mode, at));
                     }
@@ -339,7 +340,7 @@ pub fn random(checker: &Checker) -> anyhow::Result<()> {
                         }
                     }
                     (1..=3, _) => {
-                        writer.ask(0, course.interface);
+                        writer.ask(0, trajectory.interface);
                     }
                     _ => {}
                 }
@@ -356,25 +357,26 @@ pub fn random(checker: &Checker) -> anyhow::Result<()> {
 
 /// Time events lie ahead, and come to an end.
 pub fn events(checker: &Checker) -> anyhow::Result<()> {
-    let Some(course) = checker.courses.iter().find(|course| course.interface == Interface::ModelExchange)
+    let Some(trajectory) =
+        checker.trajectories.iter().find(|trajectory| trajectory.interface == Interface::ModelExchange)
     else {
         return Ok(());
     };
-    changed_states(checker, course)?;
+    changed_states(checker, trajectory)?;
     let mut writer = checker.writer();
     let mut asked: Vec<(u32, f64)> = Vec::new();
     let of_updates = |writer: &Writer, ids: &[u32], time: f64| -> Vec<(u32, f64)> {
         let update = |id: &&u32| {
-            writer.script.iter().any(|numbered| {
+            writer.sequence.iter().any(|numbered| {
                 numbered.id == **id && crate::finding::step_name(&numbered.step).ends_with("DiscreteStates")
             })
         };
         ids.iter().filter(update).map(|id| (*id, time)).collect()
     };
-    let ids = writer.begin(0, course);
+    let ids = writer.begin(0, trajectory);
     asked.extend(of_updates(&writer, &ids, checker.description.start_time));
-    for point in &course.points {
-        let mut ids = writer.point(0, course, point);
+    for point in &trajectory.points {
+        let mut ids = writer.point(0, trajectory, point);
         if point.updates == 0 {
             writer.call(0, "EnterEventMode", vec![]);
             ids.extend(writer.update(0, 3));
@@ -390,11 +392,11 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
             past.then(|| format!("at {time:?} the next event is at {:?}", event.next.unwrap_or_default()))
         })
     });
-    checker.judge("life_cycle.next-event-time", writer.script, judge)?;
+    checker.judge("life_cycle.next-event-time", writer.sequence, judge)?;
     // One who comes late, too, is told of an event that lies ahead.
-    let late = course.end.abs() * 10.0 + 10.0;
+    let late = trajectory.end.abs() * 10.0 + 10.0;
     let mut writer = checker.writer();
-    writer.begin(0, course);
+    writer.begin(0, trajectory);
     writer.forbidden = true;
     writer.call(0, "SetTime", vec![Arg::real(late)]);
     writer.call(0, "EnterEventMode", vec![]);
@@ -410,10 +412,10 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
             )
         })
     });
-    checker.judge("life_cycle.late-event", writer.script, judge)?;
+    checker.judge("life_cycle.late-event", writer.sequence, judge)?;
     // An event that needs more and more updates never ends.
     let mut writer = checker.writer();
-    writer.make(0, course.interface);
+    writer.make(0, trajectory.interface);
     writer.enter(0);
     writer.call(0, "ExitInitializationMode", vec![]);
     let ids = writer.update(0, 100);
@@ -421,21 +423,21 @@ pub fn events(checker: &Checker) -> anyhow::Result<()> {
         let all = ids.iter().all(|id| event(run, *id, fmi3).is_some_and(|event| event.again));
         all.then(|| "after 100 updates of the discrete states another one is needed".to_owned())
     });
-    checker.judge("life_cycle.event-iteration", writer.script, judge)?;
+    checker.judge("life_cycle.event-iteration", writer.sequence, judge)?;
     Ok(())
 }
 
 /// An event that changes states says so: else importers go on with those that they have.
-fn changed_states(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+fn changed_states(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let count = checker.description.states_count().unwrap_or(0);
     if count == 0 {
         return Ok(());
     }
     let mut writer = checker.writer();
-    writer.begin(0, course);
+    writer.begin(0, trajectory);
     let mut asked = Vec::new();
-    for point in &course.points {
-        writer.point(0, course, &Point { updates: 0, ..point.clone() });
+    for point in &trajectory.points {
+        writer.point(0, trajectory, &Point { updates: 0, ..point.clone() });
         let before = writer.vector(0, "GetContinuousStates", count);
         writer.call(0, "EnterEventMode", vec![]);
         // Entering Event Mode where nothing happens is allowed, too.
@@ -447,15 +449,15 @@ fn changed_states(checker: &Checker, course: &Course) -> anyhow::Result<()> {
     let fmi3 = checker.fmi3();
     let judge: Judge = Arc::new(move |run| {
         asked.iter().find_map(|(time, before, updates, after)| {
-            // What did not succeed is another finding.
+            // A call that fails is a separate finding.
             let said = |id: &u32| event(run, *id, fmi3).is_none_or(|event| event.states_changed);
             let (was, is) = (run.written(*before)?, run.written(*after)?);
             let good = [before, after].iter().all(|id| run.status(**id).is_some_and(|status| status <= 1));
-            let place = was.differ(is).filter(|_| good && !updates.iter().any(said))?;
-            let (was, is) = (was.show(place), is.show(place));
-            Some(format!("at {time:?} state {} was {was}, after the event it is {is}", place + 1))
+            let index = was.differ(is).filter(|_| good && !updates.iter().any(said))?;
+            let (was, is) = (was.show(index), is.show(index));
+            Some(format!("at {time:?} state {} was {was}, after the event it is {is}", index + 1))
         })
     });
-    checker.judge("life_cycle.states-changed", writer.script, judge)?;
+    checker.judge("life_cycle.states-changed", writer.sequence, judge)?;
     Ok(())
 }

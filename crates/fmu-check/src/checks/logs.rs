@@ -1,17 +1,17 @@
-//! With logging off there are no messages.
+//! Messages with logging off and on.
 
+use crate::call_sequence::{Arg, Step};
 use crate::checker::Checker;
 use crate::finding::Judge;
-use crate::script::{Arg, Step};
 use std::sync::Arc;
 
-/// With logging off no message, and switched on and off at any time.
+/// With logging off there is no message; logging can be switched at any time.
 pub fn switches(checker: &Checker) -> anyhow::Result<()> {
     let fmi3 = checker.fmi3();
-    for course in &checker.courses {
+    for trajectory in &checker.trajectories {
         for by_call in [false, true] {
             let mut writer = checker.writer();
-            let mut how = writer.how(course.interface);
+            let mut how = writer.how(trajectory.interface);
             how.logging = by_call;
             let mut ids = vec![writer.add(Step::Make(0, how))];
             if by_call {
@@ -19,16 +19,16 @@ pub fn switches(checker: &Checker) -> anyhow::Result<()> {
                 ids.clear();
             }
             ids.push(writer.enter(0));
-            ids.extend(writer.leave(0, course));
-            for point in &course.points {
-                ids.extend(writer.point(0, course, point));
+            ids.extend(writer.leave(0, trajectory));
+            for point in &trajectory.points {
+                ids.extend(writer.point(0, trajectory, point));
             }
-            ids.extend(writer.ask(0, course.interface).iter().map(|read| read.id));
+            ids.extend(writer.ask(0, trajectory.interface).iter().map(|read| read.id));
             ids.push(writer.call(0, "Terminate", vec![]));
             ids.push(writer.free(0));
             let judge: Judge = Arc::new(move |run| {
                 let message = ids.iter().find_map(|id| {
-                    // Of a refusal, FMI 3.0 says both that there must be a message and that there must be none.
+                    // For a rejected call, FMI 3.0 requires a message in one place and forbids it in another.
                     let of = run.of(*id).filter(|of| of.status.is_none_or(|status| status < 2))?;
                     // In FMI 2.0 it is debug messages that are off.
                     of.log.iter().find(|message| fmi3 || message.status < 2)
@@ -36,7 +36,7 @@ pub fn switches(checker: &Checker) -> anyhow::Result<()> {
                 let text = String::from_utf8_lossy(message.text.as_deref().unwrap_or_default()).into_owned();
                 Some(format!("{text:?}"))
             });
-            checker.judge("logs.off", writer.script, judge)?;
+            checker.judge("logs.off", writer.sequence, judge)?;
         }
     }
     Ok(())

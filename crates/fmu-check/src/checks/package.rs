@@ -1,4 +1,4 @@
-//! The ZIP, its folders, the names of the libraries, and what these need.
+//! The ZIP, its directories, the names of the libraries, and what these need.
 
 use crate::description::{Description, Offer};
 use crate::rules::Observation;
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// When it cannot be unpacked.
-pub fn unpack(path: &Path, folder: &Path, most: u64) -> anyhow::Result<Vec<Observation>> {
+pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Observation>> {
     let at = path.display();
     let file = File::open(path).map_err(|error| anyhow::anyhow!("{at}: cannot be opened ({error})"))?;
     let mut archive = zip::ZipArchive::new(file)
@@ -23,21 +23,21 @@ pub fn unpack(path: &Path, folder: &Path, most: u64) -> anyhow::Result<Vec<Obser
     let mut found = Vec::new();
     let mut names = BTreeSet::new();
     let mut left = most;
-    for place in 0..archive.len() {
-        let name = entry(&mut archive, place, &mut names, &mut found)?;
+    for index in 0..archive.len() {
+        let name = entry(&mut archive, index, &mut names, &mut found)?;
         if crate::worker::interrupted() {
             return Err(crate::run::Interrupted.into());
         }
         let Some(inside) = name else { continue };
         let mut entry =
-            archive.by_index(place).map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
-        let target = folder.join(inside);
+            archive.by_index(index).map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
+        let target = directory.join(inside);
         if entry.is_dir() {
             std::fs::create_dir_all(target)?;
             continue;
         }
-        std::fs::create_dir_all(target.parent().unwrap_or(folder))?;
-        // What the entry says of its size need not be true.
+        std::fs::create_dir_all(target.parent().unwrap_or(directory))?;
+        // The size that the entry declares may be wrong.
         let written = std::io::copy(&mut (&mut entry).take(left + 1), &mut File::create(&target)?)
             .map_err(|error| anyhow::anyhow!("{at}: cannot be unpacked ({error})"))?;
         left = left.checked_sub(written).with_context(|| {
@@ -58,20 +58,20 @@ pub fn unpack(path: &Path, folder: &Path, most: u64) -> anyhow::Result<Vec<Obser
 /// Looks at an entry of a ZIP file. The path within the FMU's directory, if it has one.
 fn entry(
     archive: &mut zip::ZipArchive<File>,
-    place: usize,
+    index: usize,
     names: &mut BTreeSet<String>,
     found: &mut Vec<Observation>,
 ) -> anyhow::Result<Option<PathBuf>> {
-    let mut tell = |name: &'static str, seen: String| found.push((name, seen));
-    let entry = archive.by_index_raw(place)?;
+    let mut tell = |name: &'static str, observed: String| found.push((name, observed));
+    let entry = archive.by_index_raw(index)?;
     let name = entry.name()?.into_owned();
     let inside = entry.enclosed_name();
     if inside.is_none() || name.contains('\\') {
         tell("package.paths", name.clone());
     }
     if !matches!(entry.compression(), zip::CompressionMethod::Stored | zip::CompressionMethod::Deflated) {
-        let seen = format!("{name} is compressed by {}", entry.compression());
-        tell("package.compression", seen);
+        let observed = format!("{name} is compressed by {}", entry.compression());
+        tell("package.compression", observed);
     }
     if !names.insert(name.to_lowercase()) {
         tell("package.names", name);
@@ -79,8 +79,8 @@ fn entry(
     Ok(inside)
 }
 
-/// The folders of `binaries/` for this machine.
-fn folders(standard: Standard) -> Vec<String> {
+/// The directories of `binaries/` for this machine.
+fn directories(standard: Standard) -> Vec<String> {
     let system = if OS == "macos" { "darwin" } else { OS };
     let tuple = format!("{ARCH}-{system}");
     let short = format!("{}{}", if system == "windows" { "win" } else { system }, usize::BITS);
@@ -95,13 +95,13 @@ fn folders(standard: Standard) -> Vec<String> {
 ///
 /// # Errors
 /// The reason for which there is none.
-pub fn library(folder: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
+pub fn library(directory: &Path, standard: Standard, offer: &Offer) -> Result<PathBuf, String> {
     let name = format!("{}{DLL_SUFFIX}", offer.identifier);
-    let wanted = folders(standard);
+    let wanted = directories(standard);
     let library =
-        wanted.iter().map(|of| folder.join("binaries").join(of).join(&name)).find(|path| path.is_file());
+        wanted.iter().map(|of| directory.join("binaries").join(of).join(&name)).find(|path| path.is_file());
     let Some(library) = library else {
-        let binaries = std::fs::read_dir(folder.join("binaries")).into_iter().flatten().flatten();
+        let binaries = std::fs::read_dir(directory.join("binaries")).into_iter().flatten().flatten();
         let mut others: Vec<String> =
             binaries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
         others.sort_unstable();
@@ -141,15 +141,15 @@ pub fn exported(library: &Path) -> Option<Vec<String>> {
     Some(of_exports.flatten().filter_map(|export| export.name().name().map(strip)).collect())
 }
 
-/// What the folders and libraries have to say.
-pub fn look(folder: &Path, description: &Description) -> Vec<Observation> {
+/// Checks directories and libraries.
+pub fn look(directory: &Path, description: &Description) -> Vec<Observation> {
     let mut found = Vec::new();
-    let mut tell = |name: &'static str, seen: String| found.push((name, seen));
+    let mut tell = |name: &'static str, observed: String| found.push((name, observed));
     let known: &[&str] = match description.standard {
         Standard::Fmi2 => &["win32", "win64", "linux32", "linux64", "darwin32", "darwin64"],
         Standard::Fmi3 => &[],
     };
-    let platforms = std::fs::read_dir(folder.join("binaries")).into_iter().flatten().flatten();
+    let platforms = std::fs::read_dir(directory.join("binaries")).into_iter().flatten().flatten();
     for platform in platforms.filter(|entry| entry.path().is_dir()) {
         let name = platform.file_name().to_string_lossy().into_owned();
         let tuple = name.split_once('-');
@@ -165,15 +165,15 @@ pub fn look(folder: &Path, description: &Description) -> Vec<Observation> {
         } else {
             ".so"
         };
-        let standard_folder = tuple.is_some() || known.contains(&name.as_str());
+        let standard_directory = tuple.is_some() || known.contains(&name.as_str());
         for offer in [&description.co_simulation, &description.model_exchange].into_iter().flatten() {
             let file = platform.path().join(format!("{}{end}", offer.identifier));
             if !file.is_file()
-                && standard_folder
+                && standard_directory
                 && (description.standard == Standard::Fmi2) == known.contains(&name.as_str())
             {
-                let seen = format!("binaries/{name} has no {}{end}", offer.identifier);
-                tell("package.library", seen);
+                let observed = format!("binaries/{name} has no {}{end}", offer.identifier);
+                tell("package.library", observed);
             }
         }
         for file in std::fs::read_dir(platform.path()).into_iter().flatten().flatten() {
@@ -184,7 +184,7 @@ pub fn look(folder: &Path, description: &Description) -> Vec<Observation> {
     found
 }
 
-/// What a library needs of the system.
+/// System requirements of a library.
 fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String)) {
     let Ok(bytes) = std::fs::read(path) else { return };
     let Ok(file) = object::File::parse(bytes.as_slice()) else { return };
@@ -208,7 +208,7 @@ fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String
             libraries.flatten().map(|library| String::from_utf8_lossy(library.name()).into_owned()).collect()
         })
         .unwrap_or_default();
-    let folder = path.parent().unwrap_or(path);
+    let directory = path.parent().unwrap_or(path);
     let of_system = |library: &str| {
         let lower = library.to_lowercase();
         let linux = [
@@ -243,13 +243,13 @@ fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String
             || lower.is_empty()
     };
     let foreign: Vec<&String> =
-        libraries.iter().filter(|library| !of_system(library) && !folder.join(library).exists()).collect();
+        libraries.iter().filter(|library| !of_system(library) && !directory.join(library).exists()).collect();
     let unlinked = unlinked(&bytes).unwrap_or_default();
     if libraries.iter().all(|library| of_system(library)) && !unlinked.is_empty() {
         let list = unlinked.join(", ");
-        let seen =
+        let observed =
             format!("binaries/{platform}/{name} needs {list}, which none of the libraries that it names has");
-        tell("package.symbols", seen);
+        tell("package.symbols", observed);
     }
     if !foreign.is_empty() {
         let list: Vec<&str> = foreign.iter().map(|name| name.as_str()).collect();
@@ -286,10 +286,10 @@ fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
 fn glibc(bytes: &[u8], platform: &str, name: &str, tell: &mut impl FnMut(&'static str, String)) {
     let marker = b"GLIBC_2.";
     let mut newest = (0, 0);
-    for place in
-        bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker).map(|(place, _)| place)
+    for index in
+        bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker).map(|(index, _)| index)
     {
-        let digits = bytes[place + marker.len()..]
+        let digits = bytes[index + marker.len()..]
             .iter()
             .take_while(|byte| byte.is_ascii_digit())
             .map(|byte| *byte as char);

@@ -1,11 +1,11 @@
 //! A rejected call changes nothing.
 
+use crate::call_sequence::{Arg, Kind, Run};
 use crate::checker::Checker;
 use crate::description::{Variable, kind_of, type_name};
 use crate::finding::{Judge, status_name};
-use crate::script::{Arg, Kind, Run};
 use crate::values::near;
-use crate::writer::{Course, Point, Read, Writer, difference, readable};
+use crate::writer::{Point, Read, Trajectory, Writer, difference, readable};
 use fmi_abi::Interface;
 use std::sync::Arc;
 
@@ -45,9 +45,9 @@ fn set(checker: &Checker, references: Vec<u64>, kind: Kind, bits: Vec<u64>) -> V
 fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
     let description = &checker.description;
     let unknown = unknown_reference(checker);
-    let (mut attacks, mut seen, mut inputs_tried) = (Vec::new(), Vec::new(), 0);
-    for place in readable(description) {
-        let variable = &description.variables[place];
+    let (mut attacks, mut observed, mut inputs_tried) = (Vec::new(), Vec::new(), 0);
+    for index in readable(description) {
+        let variable = &description.variables[index];
         let (Some(base), Some(1)) = (variable.base, variable.size) else { continue };
         let (name, kind) = (type_name(description.standard, base), kind_of(description.standard, base));
         if kind == Kind::Pointer {
@@ -65,8 +65,8 @@ fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
         let tunable = variable.causality == "parameter"
             && variable.variability == "tunable"
             && interface == Interface::CoSimulation;
-        if (input || tunable) && !seen.contains(&name) {
-            seen.push(name);
+        if (input || tunable) && !observed.contains(&name) {
+            observed.push(name);
             let what = format!("a value for {} and one for a reference that no variable has", variable.name);
             let args = set(checker, vec![reference, unknown], kind, vec![other; 2]);
             attacks.push(Attack::new(&function, args, &what, None));
@@ -86,8 +86,8 @@ fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
         } else {
             continue;
         };
-        if !seen.contains(&once) {
-            seen.push(once);
+        if !observed.contains(&once) {
+            observed.push(once);
             let first = input_of(checker, kind).filter(|_| once != "constant");
             let references: Vec<u64> = first.into_iter().chain([reference]).collect();
             let bits = vec![other; references.len()];
@@ -242,33 +242,33 @@ struct Played {
     attack: Option<u32>,
 }
 
-/// A course, with an attack or without.
-fn play(writer: &mut Writer, of: usize, course: &Course, attack: Option<&Attack>) -> Played {
+/// A trajectory, with an attack or without.
+fn play(writer: &mut Writer, of: usize, trajectory: &Trajectory, attack: Option<&Attack>) -> Played {
     let mut played = Played::default();
-    let to = course.points.len() / 2;
-    writer.begin(of, course);
-    for point in &course.points[..to] {
-        writer.point(of, course, point);
+    let to = trajectory.points.len() / 2;
+    writer.begin(of, trajectory);
+    for point in &trajectory.points[..to] {
+        writer.point(of, trajectory, point);
     }
     played.attack = attack.map(|attack| writer.forbidden(Some(of), &attack.function, attack.args.clone()));
-    played.at_once = writer.ask(of, course.interface);
-    for (number, point) in course.points[to..].iter().enumerate() {
+    played.at_once = writer.ask(of, trajectory.interface);
+    for (number, point) in trajectory.points[to..].iter().enumerate() {
         // A value that was set has most effect where no other is set.
         let inputs = if number < 2 { Vec::new() } else { point.inputs.clone() };
-        played.calls.extend(writer.point(of, course, &Point { inputs, ..point.clone() }));
-        played.later.extend(writer.ask(of, course.interface));
+        played.calls.extend(writer.point(of, trajectory, &Point { inputs, ..point.clone() }));
+        played.later.extend(writer.ask(of, trajectory.interface));
     }
     writer.free(of);
     played
 }
 
-/// Each attack amid a course; the simulation continues as it does without the attack.
+/// Each attack amid a trajectory; the simulation continues as it does without the attack.
 pub fn change_nothing(checker: &Checker) -> anyhow::Result<()> {
-    for course in &checker.courses {
-        let interface = course.interface;
-        let to = course.points.len() / 2;
-        let Some(here) = course.points.get(to) else { continue };
-        let before = course.points[..to].last();
+    for trajectory in &checker.trajectories {
+        let interface = trajectory.interface;
+        let to = trajectory.points.len() / 2;
+        let Some(here) = trajectory.points.get(to) else { continue };
+        let before = trajectory.points[..to].last();
         let mut attacks = of_variables(checker, interface);
         match interface {
             Interface::CoSimulation => {
@@ -281,17 +281,17 @@ pub fn change_nothing(checker: &Checker) -> anyhow::Result<()> {
             }
         }
         for attack in attacks {
-            attacked(checker, course, attack)?;
+            attacked(checker, trajectory, attack)?;
         }
     }
     Ok(())
 }
 
 /// An attack is rejected and changes nothing.
-fn attacked(checker: &Checker, course: &Course, attack: Attack) -> anyhow::Result<()> {
+fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyhow::Result<()> {
     let mut writer = checker.writer();
-    let alone = play(&mut writer, 0, course, None);
-    let beside = play(&mut writer, 1, course, Some(&attack));
+    let alone = play(&mut writer, 0, trajectory, None);
+    let beside = play(&mut writer, 1, trajectory, Some(&attack));
     let Some(id) = beside.attack else { return Ok(()) };
     let Attack { function, what, accepted, .. } = attack;
     let call = format!("{function} with {what} returns");
@@ -319,16 +319,17 @@ fn attacked(checker: &Checker, course: &Course, attack: Attack) -> anyhow::Resul
         false => Some("refusals.changed").filter(|_| function != "DoStep"),
     };
     let error = Arc::clone(&changed);
-    let run = checker.judge("refusals.changed", writer.script.clone(), Arc::new(move |run| error(run, 3)))?;
+    let run =
+        checker.judge("refusals.changed", writer.sequence.clone(), Arc::new(move |run| error(run, 3)))?;
     if let Some(rule) = discarded {
-        checker.keep(rule, &run, &writer.script, Arc::new(move |run| changed(run, 2)));
+        checker.keep(rule, &run, &writer.sequence, Arc::new(move |run| changed(run, 2)));
     }
     if let Some(rule) = accepted {
         let judge: Judge = Arc::new(move |run| {
             let status = run.status(id).filter(|status| *status <= 1)?;
             Some(format!("{call} {}", status_name(status)))
         });
-        checker.keep(rule, &run, &writer.script, judge);
+        checker.keep(rule, &run, &writer.sequence, judge);
     }
     Ok(())
 }

@@ -1,28 +1,28 @@
 //! Start values are what the description says; what is set is what is read; values are of their types and within their
 //! ranges.
 
+use crate::call_sequence::Written;
 use crate::checker::Checker;
 use crate::finding::Judge;
-use crate::script::Written;
 use crate::values::{Value, is_read, other_values};
 use crate::worker::FILL;
-use crate::writer::{Course, Writer, readable, sample, value_of};
+use crate::writer::{Trajectory, Writer, readable, sample, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
 
 /// The values of the variables in Initialization Mode, before anything is set.
 pub fn starts(checker: &Checker) -> anyhow::Result<()> {
-    for course in &checker.courses {
+    for trajectory in &checker.trajectories {
         let description = &checker.description;
         let mut writer = checker.writer();
-        writer.make(0, course.interface);
+        writer.make(0, trajectory.interface);
         writer.enter(0);
         let reads = writer.read_these(0, &sample(description, 10_000));
         let all = reads.clone();
         let model = Arc::clone(&checker.description);
         let judge: Judge = Arc::new(move |run| {
-            for (place, _) in all.iter().flat_map(|read| read.of.iter().copied()) {
-                let variable = &model.variables[place];
+            for (index, _) in all.iter().flat_map(|read| read.of.iter().copied()) {
+                let variable = &model.variables[index];
                 let fixed = variable.initial == "exact" || variable.causality == "input";
                 let (true, Some(base)) =
                     (fixed && !variable.start.is_empty() && !variable.clocked, variable.base)
@@ -30,7 +30,7 @@ pub fn starts(checker: &Checker) -> anyhow::Result<()> {
                     continue;
                 };
                 // A parameter may be the start of a state that has the same reference: a start value for each is not known.
-                let Some(value) = value_of(run, &all, place) else { continue };
+                let Some(value) = value_of(run, &all, index) else { continue };
                 let wrong = match &value {
                     Written::Texts(texts) if base == BaseType::String => texts
                         .iter()
@@ -58,21 +58,21 @@ pub fn starts(checker: &Checker) -> anyhow::Result<()> {
             }
             None
         });
-        checker.judge("start_values.start", writer.script.clone(), judge)?;
-        values(checker, course)?;
-        constants(checker, course)?;
+        checker.judge("start_values.start", writer.sequence.clone(), judge)?;
+        values(checker, trajectory)?;
+        constants(checker, trajectory)?;
     }
     Ok(())
 }
 
-/// What is read in the whole course is written at all, of its type and within its range.
-fn values(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<()> {
+/// Each value that is read along the trajectory is written, valid for its type and within its range.
+fn values(checker: &Checker, trajectory: &crate::writer::Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let mut writer = checker.writer();
-    writer.begin(0, course);
+    writer.begin(0, trajectory);
     let mut reads = vec![writer.read(0)];
-    for point in &course.points {
-        writer.point(0, course, point);
+    for point in &trajectory.points {
+        writer.point(0, trajectory, point);
         reads.push(writer.read(0));
     }
     let model = Arc::clone(&checker.description);
@@ -123,18 +123,18 @@ fn values(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<(
         ),
     ];
     let _ = standard;
-    let run = checker.play(&writer.script)?;
-    checker.keep_always(&writer.script, &run);
+    let run = checker.play(&writer.sequence)?;
+    checker.keep_always(&writer.sequence, &run);
     for (name, test) in tests {
         let (model, reads) = (Arc::clone(&model), reads.clone());
         let judge: Judge = Arc::new(move |run| {
             for reads in &reads {
-                for (place, _) in reads.iter().flat_map(|read| read.of.iter().copied()) {
-                    let variable = &model.variables[place];
+                for (index, _) in reads.iter().flat_map(|read| read.of.iter().copied()) {
+                    let variable = &model.variables[index];
                     if variable.clocked {
                         continue;
                     }
-                    if let Some(value) = value_of(run, reads, place)
+                    if let Some(value) = value_of(run, reads, index)
                         && let Some(why) = test(variable, &value)
                     {
                         return Some(format!("{} {why}", variable.name));
@@ -143,18 +143,18 @@ fn values(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<(
             }
             None
         });
-        checker.keep(name, &run, &writer.script, judge);
+        checker.keep(name, &run, &writer.sequence, judge);
     }
     Ok(())
 }
 
 /// Constants and fixed parameters do not change while time goes on.
-fn constants(checker: &Checker, course: &crate::writer::Course) -> anyhow::Result<()> {
+fn constants(checker: &Checker, trajectory: &crate::writer::Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let fixed: Vec<usize> = readable(description)
         .into_iter()
-        .filter(|place| {
-            let variable = &description.variables[*place];
+        .filter(|index| {
+            let variable = &description.variables[*index];
             let tunable = description.variables.iter().any(|other| {
                 other.variability == "tunable" || other.causality == "input" && other.variability == "fixed"
             });
@@ -163,14 +163,14 @@ fn constants(checker: &Checker, course: &crate::writer::Course) -> anyhow::Resul
                 || variable.causality == "parameter"
         })
         .collect();
-    if fixed.is_empty() || course.points.is_empty() {
+    if fixed.is_empty() || trajectory.points.is_empty() {
         return Ok(());
     }
     let mut writer = checker.writer();
-    writer.begin(0, course);
+    writer.begin(0, trajectory);
     let first = writer.read_these(0, &fixed);
-    for point in &course.points {
-        writer.point(0, course, point);
+    for point in &trajectory.points {
+        writer.point(0, trajectory, point);
     }
     let last = writer.read_these(0, &fixed);
     let description = description.clone();
@@ -178,48 +178,48 @@ fn constants(checker: &Checker, course: &crate::writer::Course) -> anyhow::Resul
         let (name, before, after) = crate::writer::difference(&description, run, &first, &last)?;
         Some(format!("{name} was {before} and has become {after}"))
     });
-    checker.judge("start_values.fixed", writer.script, judge)?;
+    checker.judge("start_values.fixed", writer.sequence, judge)?;
     Ok(())
 }
 
-/// What is set is what is read: before and in Initialization Mode, amid the simulation, and after it.
+/// Values that are set are read back: before and in Initialization Mode, during the simulation and after it.
 pub fn set(checker: &Checker) -> anyhow::Result<()> {
     let description = &checker.description;
-    for course in &checker.courses {
-        let places: Vec<usize> = readable(description)
+    for trajectory in &checker.trajectories {
+        let indices: Vec<usize> = readable(description)
             .into_iter()
-            .filter(|place| {
-                let variable = &description.variables[*place];
+            .filter(|index| {
+                let variable = &description.variables[*index];
                 let settable = variable.causality == "input"
                     || variable.initial == "exact" && variable.variability != "constant";
                 settable
                     && !variable.clocked
                     && !variable.start.is_empty()
-                    && description.aliases(*place).count() == 1
+                    && description.aliases(*index).count() == 1
             })
             .collect();
-        let near: Vec<(usize, Value)> = places
+        let near: Vec<(usize, Value)> = indices
             .iter()
-            .filter(|place| description.variables[**place].is_float())
-            .filter_map(|place| Some((*place, other_values(description, *place)?)))
+            .filter(|index| description.variables[**index].is_float())
+            .filter_map(|index| Some((*index, other_values(description, *index)?)))
             .collect();
-        when(checker, course, &near)?;
+        when(checker, trajectory, &near)?;
         // Together what every model takes; alone what it may refuse.
-        let alone = places
+        let alone = indices
             .iter()
-            .filter(|place| !description.variables[**place].is_float())
+            .filter(|index| !description.variables[**index].is_float())
             .take(checker.most(40))
-            .flat_map(|place| {
+            .flat_map(|index| {
                 // Longer than buffers are.
                 let long =
-                    Value::Texts(vec![b"long ".repeat(100); description.variables[*place].start.len()]);
-                let long = (description.variables[*place].base == Some(BaseType::String)).then_some(long);
-                other_values(description, *place).into_iter().chain(long).map(|value| vec![(*place, value)])
+                    Value::Texts(vec![b"long ".repeat(100); description.variables[*index].start.len()]);
+                let long = (description.variables[*index].base == Some(BaseType::String)).then_some(long);
+                other_values(description, *index).into_iter().chain(long).map(|value| vec![(*index, value)])
             });
         for values in std::iter::once(near).filter(|near| !near.is_empty()).chain(alone) {
             for within in [true, false] {
                 let mut writer = checker.writer();
-                writer.make(0, course.interface);
+                writer.make(0, trajectory.interface);
                 if within {
                     writer.enter(0);
                 }
@@ -231,40 +231,40 @@ pub fn set(checker: &Checker) -> anyhow::Result<()> {
             }
         }
         // At a communication point, where event modes are not needed for it.
-        for place in places.into_iter().take(checker.most(400)) {
-            let variable = &description.variables[place];
-            let late = match course.interface {
+        for index in indices.into_iter().take(checker.most(400)) {
+            let variable = &description.variables[index];
+            let late = match trajectory.interface {
                 Interface::CoSimulation => variable.causality == "input" || variable.variability == "tunable",
                 Interface::ModelExchange => variable.causality == "input" && variable.is_float(),
             };
             let late = late && (variable.is_float() || variable.variability != "discrete");
             if let Some(value) =
-                other_values(description, place).filter(|_| late && !variable.once_per_instant)
+                other_values(description, index).filter(|_| late && !variable.once_per_instant)
             {
-                let values = vec![(place, value)];
+                let values = vec![(index, value)];
                 let mut writer = checker.writer();
-                writer.begin(0, course);
-                for point in course.points.iter().take(2) {
-                    writer.point(0, course, point);
+                writer.begin(0, trajectory);
+                for point in trajectory.points.iter().take(2) {
+                    writer.point(0, trajectory, point);
                 }
                 let sets = writer.set(0, &values);
                 what_was_set(checker, writer, values, sets)?;
             }
         }
-        inputs(checker, course)?;
+        inputs(checker, trajectory)?;
     }
     Ok(())
 }
 
 /// Start values count, whether they are set before Initialization Mode or in it, and whatever is read in between.
-fn when(checker: &Checker, course: &Course, values: &[(usize, Value)]) -> anyhow::Result<()> {
+fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Value)]) -> anyhow::Result<()> {
     if values.is_empty() {
         return Ok(());
     }
     let mut writer = checker.writer();
     let (mut sets, mut reads) = (Vec::new(), [Vec::new(), Vec::new()]);
     for (of, reads) in reads.iter_mut().enumerate() {
-        writer.make(of, course.interface);
+        writer.make(of, trajectory.interface);
         if of == 1 {
             writer.enter(of);
             writer.read(of);
@@ -274,8 +274,8 @@ fn when(checker: &Checker, course: &Course, values: &[(usize, Value)]) -> anyhow
             writer.enter(of);
         }
         reads.extend(writer.read(of));
-        writer.leave(of, course);
-        reads.extend(writer.ask(of, course.interface));
+        writer.leave(of, trajectory);
+        reads.extend(writer.ask(of, trajectory.interface));
         writer.free(of);
     }
     let [before, within] = reads;
@@ -289,7 +289,7 @@ fn when(checker: &Checker, course: &Course, values: &[(usize, Value)]) -> anyhow
             "{name} is {one} with values set before Initialization Mode, {other} with those set in it"
         ))
     });
-    checker.judge("start_values.when", writer.script, judge)?;
+    checker.judge("start_values.when", writer.sequence, judge)?;
     Ok(())
 }
 
@@ -299,32 +299,32 @@ fn what_was_set(
     values: Vec<(usize, Value)>,
     sets: Vec<u32>,
 ) -> anyhow::Result<()> {
-    let places: Vec<usize> = values.iter().map(|(place, _)| *place).collect();
-    let reads = writer.read_these(0, &places);
+    let indices: Vec<usize> = values.iter().map(|(index, _)| *index).collect();
+    let reads = writer.read_these(0, &indices);
     let description = checker.description.clone();
     let judge: Judge = Arc::new(move |run| {
         if sets.iter().any(|id| run.status(*id).is_none_or(|status| status > 1)) {
             return None;
         }
-        values.iter().find_map(|(place, value)| {
-            let read = value_of(run, &reads, *place).filter(|read| !is_read(read, value))?;
-            let name = &description.variables[*place].name;
+        values.iter().find_map(|(index, value)| {
+            let read = value_of(run, &reads, *index).filter(|read| !is_read(read, value))?;
+            let name = &description.variables[*index].name;
             Some(format!("{name} was set to {} and reads {}", value.show(), read.show(0)))
         })
     });
-    checker.judge("start_values.set", writer.script, judge)?;
+    checker.judge("start_values.set", writer.sequence, judge)?;
     Ok(())
 }
 
-/// What inputs were set to stays, through steps and events.
-fn inputs(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+/// Inputs keep their values through steps and events.
+fn inputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer();
-    writer.begin(0, course);
+    writer.begin(0, trajectory);
     let mut asked = Vec::new();
-    for point in &course.points {
-        let ids = writer.point(0, course, point);
-        let places: Vec<usize> = point.inputs.iter().map(|(place, _)| *place).collect();
-        asked.push((ids, writer.read_these(0, &places), point.inputs.clone()));
+    for point in &trajectory.points {
+        let ids = writer.point(0, trajectory, point);
+        let indices: Vec<usize> = point.inputs.iter().map(|(index, _)| *index).collect();
+        asked.push((ids, writer.read_these(0, &indices), point.inputs.clone()));
     }
     let description = checker.description.clone();
     let judge: Judge = Arc::new(move |run| {
@@ -332,13 +332,13 @@ fn inputs(checker: &Checker, course: &Course) -> anyhow::Result<()> {
             if ids.iter().any(|id| run.status(*id).is_none_or(|status| status > 1)) {
                 return None;
             }
-            inputs.iter().find_map(|(place, value)| {
-                let read = value_of(run, reads, *place).filter(|read| !is_read(read, value))?;
-                let name = &description.variables[*place].name;
+            inputs.iter().find_map(|(index, value)| {
+                let read = value_of(run, reads, *index).filter(|read| !is_read(read, value))?;
+                let name = &description.variables[*index].name;
                 Some(format!("{name} was set to {} and has become {}", value.show(), read.show(0)))
             })
         })
     });
-    checker.judge("start_values.inputs", writer.script, judge)?;
+    checker.judge("start_values.inputs", writer.sequence, judge)?;
     Ok(())
 }

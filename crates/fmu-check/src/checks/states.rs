@@ -1,37 +1,37 @@
 //! Saved states: what follows a restored one is what followed the first time, in the same instance, after a reset, from
 //! bytes, and in a fresh process.
 
+use crate::call_sequence::{Step, Written};
 use crate::checker::Checker;
 use crate::finding::Judge;
 use crate::finding::refused;
-use crate::script::{Step, Written};
-use crate::writer::{Course, Read, Writer, difference};
+use crate::writer::{Read, Trajectory, Writer, difference};
 use std::sync::Arc;
 
-/// Where in a course states are saved: at its beginning, after a point, near its end.
-fn places(course: &Course) -> Vec<usize> {
-    let count = course.points.len();
-    let mut places = vec![0, 1, count / 2, count.saturating_sub(2)];
-    places.retain(|place| *place < count);
-    places.sort_unstable();
-    places.dedup();
-    places
+/// The points at which states are saved: the first, one in the middle, one near the end.
+fn indices(trajectory: &Trajectory) -> Vec<usize> {
+    let count = trajectory.points.len();
+    let mut indices = vec![0, 1, count / 2, count.saturating_sub(2)];
+    indices.retain(|index| *index < count);
+    indices.sort_unstable();
+    indices.dedup();
+    indices
 }
 
-/// From a point of the course to its end, reading after each.
-fn rest(writer: &mut Writer, of: usize, course: &Course, from: usize) -> (Vec<u32>, Vec<Read>) {
+/// Continues from a point of the trajectory to its end and reads after each point.
+fn rest(writer: &mut Writer, of: usize, trajectory: &Trajectory, from: usize) -> (Vec<u32>, Vec<Read>) {
     let (mut ids, mut reads) = (Vec::new(), Vec::new());
-    for point in &course.points[from..] {
-        ids.extend(writer.point(of, course, point));
-        reads.extend(writer.ask(of, course.interface));
+    for point in &trajectory.points[from..] {
+        ids.extend(writer.point(of, trajectory, point));
+        reads.extend(writer.ask(of, trajectory.interface));
     }
     (ids, reads)
 }
 
-fn up_to(writer: &mut Writer, of: usize, course: &Course, to: usize) {
-    writer.begin(of, course);
-    for point in &course.points[..to] {
-        writer.point(of, course, point);
+fn up_to(writer: &mut Writer, of: usize, trajectory: &Trajectory, to: usize) {
+    writer.begin(of, trajectory);
+    for point in &trajectory.points[..to] {
+        writer.point(of, trajectory, point);
     }
 }
 
@@ -45,23 +45,23 @@ fn same(checker: &Checker, what: &'static str, one: Vec<Read>, other: Vec<Read>)
 
 /// Saved, gone on, restored, gone on: the same; twice; and saving changes nothing.
 pub fn restore(checker: &Checker) -> anyhow::Result<()> {
-    for course in checker.courses.iter().filter(|course| checker.saves(course.interface)) {
-        for place in places(course) {
+    for trajectory in checker.trajectories.iter().filter(|trajectory| checker.saves(trajectory.interface)) {
+        for index in indices(trajectory) {
             let mut writer = checker.writer();
-            up_to(&mut writer, 0, course, place);
-            let before = writer.ask(0, course.interface);
+            up_to(&mut writer, 0, trajectory, index);
+            let before = writer.ask(0, trajectory.interface);
             writer.save(0, 0);
-            let after = writer.ask(0, course.interface);
-            let (_, first) = rest(&mut writer, 0, course, place);
+            let after = writer.ask(0, trajectory.interface);
+            let (_, first) = rest(&mut writer, 0, trajectory, index);
             writer.restore(0, 0);
-            let at_once = writer.ask(0, course.interface);
-            let (_, second) = rest(&mut writer, 0, course, place);
+            let at_once = writer.ask(0, trajectory.interface);
+            let (_, second) = rest(&mut writer, 0, trajectory, index);
             writer.restore(0, 0);
-            let (_, third) = rest(&mut writer, 0, course, place);
-            let script = writer.script;
+            let (_, third) = rest(&mut writer, 0, trajectory, index);
+            let sequence = writer.sequence;
             let run = checker.judge(
                 "states.changed-by-saving",
-                script.clone(),
+                sequence.clone(),
                 same(checker, "after the state was saved", before.clone(), after),
             )?;
             let judges = [
@@ -70,71 +70,71 @@ pub fn restore(checker: &Checker) -> anyhow::Result<()> {
                 ("states.twice", same(checker, "from the state restored a second time", first, third)),
             ];
             for (name, judge) in judges {
-                if checker.keep(name, &run, &script, judge) {
+                if checker.keep(name, &run, &sequence, judge) {
                     break;
                 }
             }
         }
-        modes(checker, course)?;
-        reused(checker, course)?;
-        free_null(checker, course)?;
+        modes(checker, trajectory)?;
+        reused(checker, trajectory)?;
+        free_null(checker, trajectory)?;
     }
     Ok(())
 }
 
 /// A state of one mode, restored in another.
-fn modes(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+fn modes(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer();
-    writer.make(0, course.interface);
+    writer.make(0, trajectory.interface);
     writer.save(0, 0);
     writer.enter(0);
     writer.save(0, 1);
-    writer.leave(0, course);
-    let (_, first) = rest(&mut writer, 0, course, 0);
+    writer.leave(0, trajectory);
+    let (_, first) = rest(&mut writer, 0, trajectory, 0);
     writer.call(0, "Terminate", vec![]);
     // Back to the initialization, then to the beginning.
     let back = writer.restore(0, 1);
-    let mut ids = writer.leave(0, course);
-    let (more, second) = rest(&mut writer, 0, course, 0);
+    let mut ids = writer.leave(0, trajectory);
+    let (more, second) = rest(&mut writer, 0, trajectory, 0);
     ids.extend(more);
     let again = writer.restore(0, 0);
     writer.enter(0);
-    writer.leave(0, course);
-    let (more, third) = rest(&mut writer, 0, course, 0);
+    writer.leave(0, trajectory);
+    let (more, third) = rest(&mut writer, 0, trajectory, 0);
     ids.extend(more);
     ids.extend([back, again]);
-    let (script, one) = (
-        writer.script.clone(),
+    let (sequence, one) = (
+        writer.sequence.clone(),
         same(checker, "from the state of Initialization Mode", first.clone(), second),
     );
     let two = same(checker, "from the state of the new instance", first, third);
     let judge: Judge =
-        Arc::new(move |run| refused(&script, run, &ids).or_else(|| one(run)).or_else(|| two(run)));
-    checker.judge("states.modes", writer.script, judge)?;
+        Arc::new(move |run| refused(&sequence, run, &ids).or_else(|| one(run)).or_else(|| two(run)));
+    checker.judge("states.modes", writer.sequence, judge)?;
     Ok(())
 }
 
 /// A handle that is used for another state, and two states side by side.
-fn reused(checker: &Checker, course: &Course) -> anyhow::Result<()> {
-    let count = course.points.len();
+fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let count = trajectory.points.len();
     if count < 3 {
         return Ok(());
     }
     let mut writer = checker.writer();
-    up_to(&mut writer, 0, course, 1);
+    up_to(&mut writer, 0, trajectory, 1);
     writer.save(0, 0);
     writer.save(0, 1);
-    writer.point(0, course, &course.points[1]);
-    let values = writer.ask(0, course.interface);
+    writer.point(0, trajectory, &trajectory.points[1]);
+    let values = writer.ask(0, trajectory.interface);
     writer.save(0, 1);
-    let (_, first) = rest(&mut writer, 0, course, 2);
+    let (_, first) = rest(&mut writer, 0, trajectory, 2);
     writer.restore(0, 0);
     writer.restore(0, 1);
-    let again = writer.ask(0, course.interface);
-    let (_, second) = rest(&mut writer, 0, course, 2);
+    let again = writer.ask(0, trajectory.interface);
+    let (_, second) = rest(&mut writer, 0, trajectory, 2);
     writer.restore(0, 0);
-    writer.point(0, course, &course.points[1]);
-    let from_first = writer.ask(0, course.interface);
+    writer.point(0, trajectory, &trajectory.points[1]);
+    let from_first = writer.ask(0, trajectory.interface);
     writer.drop_state(0, 0);
     writer.drop_state(0, 1);
     let judges = [
@@ -143,14 +143,14 @@ fn reused(checker: &Checker, course: &Course) -> anyhow::Result<()> {
         same(checker, "from the other state", values, from_first),
     ];
     let judge: Judge = Arc::new(move |run| judges.iter().find_map(|judge| judge(run)));
-    checker.judge("states.several", writer.script, judge)?;
+    checker.judge("states.several", writer.sequence, judge)?;
     Ok(())
 }
 
 /// NULL is ignored, and a freed state leaves NULL.
-fn free_null(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer();
-    writer.begin(0, course);
+    writer.begin(0, trajectory);
     writer.save(0, 0);
     let freed = writer.drop_state(0, 0);
     let nothing = writer.drop_state(0, 1);
@@ -161,38 +161,40 @@ fn free_null(checker: &Checker, course: &Course) -> anyhow::Result<()> {
         let left = run.status(freed) == Some(0) && run.written(freed)?.numbers() != [0.0];
         left.then(|| "the handle of a freed state is not NULL".to_owned())
     });
-    checker.judge("states.free", writer.script, judge)?;
+    checker.judge("states.free", writer.sequence, judge)?;
     Ok(())
 }
 
-/// From bytes: in the same instance, in a new one, in a fresh process.
+/// Deserializes a state in the same instance, in a new one and in a fresh process.
 pub fn serialized(checker: &Checker) -> anyhow::Result<()> {
-    for course in checker.courses.iter().filter(|course| checker.serializes(course.interface)) {
-        for place in places(course) {
+    for trajectory in
+        checker.trajectories.iter().filter(|trajectory| checker.serializes(trajectory.interface))
+    {
+        for index in indices(trajectory) {
             for fresh in [false, true] {
                 let mut writer = checker.writer();
-                up_to(&mut writer, 0, course, place);
-                let before = writer.ask(0, course.interface);
+                up_to(&mut writer, 0, trajectory, index);
+                let before = writer.ask(0, trajectory.interface);
                 writer.save(0, 0);
                 let [size, bytes] = writer.serialize(0, 0);
-                let (_, first) = rest(&mut writer, 0, course, place);
+                let (_, first) = rest(&mut writer, 0, trajectory, index);
                 if fresh {
                     writer.add(Step::FreshProcess);
                 } else {
                     writer.drop_state(0, 0);
                     writer.free(0);
                 }
-                // As much as needed for states to be taken: both procedures that are in use, made and initialized.
-                if place == 0 && fresh {
-                    writer.make(1, course.interface);
+                // States may be set in two situations that importers use: after instantiation and after initialization.
+                if index == 0 && fresh {
+                    writer.make(1, trajectory.interface);
                 } else {
-                    writer.begin(1, course);
+                    writer.begin(1, trajectory);
                 }
                 let read = writer.deserialize(1, 0, 1);
                 let set = writer.restore(1, 1);
-                let at_once = writer.ask(1, course.interface);
-                let (_, second) = rest(&mut writer, 1, course, place);
-                let script = writer.script.clone();
+                let at_once = writer.ask(1, trajectory.interface);
+                let (_, second) = rest(&mut writer, 1, trajectory, index);
+                let sequence = writer.sequence.clone();
                 let name = if fresh { "states.fresh-process" } else { "states.serialized" };
                 let one = same(checker, "from the bytes", before, at_once);
                 let two = same(checker, "from the bytes", first, second);
@@ -202,20 +204,20 @@ pub fn serialized(checker: &Checker) -> anyhow::Result<()> {
                     {
                         return None;
                     }
-                    refused(&script, run, &[read, set]).or_else(|| one(run)).or_else(|| two(run))
+                    refused(&sequence, run, &[read, set]).or_else(|| one(run)).or_else(|| two(run))
                 });
-                checker.judge(name, writer.script, judge)?;
+                checker.judge(name, writer.sequence, judge)?;
             }
         }
-        again(checker, course)?;
+        again(checker, trajectory)?;
     }
     Ok(())
 }
 
 /// Serializing twice gives the same bytes, and serializing what was read gives them, too.
-fn again(checker: &Checker, course: &Course) -> anyhow::Result<()> {
+fn again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let mut writer = checker.writer();
-    up_to(&mut writer, 0, course, course.points.len() / 2);
+    up_to(&mut writer, 0, trajectory, trajectory.points.len() / 2);
     writer.save(0, 0);
     let [_, first] = writer.serialize(0, 0);
     writer.deserialize(0, 0, 1);
@@ -226,9 +228,9 @@ fn again(checker: &Checker, course: &Course) -> anyhow::Result<()> {
             (Written::Numbers(_, one), Written::Numbers(_, two)) if one.len() != two.len() => {
                 Some(format!("{} bytes, and {} of the same state", one.len(), two.len()))
             }
-            _ => one.differ(two).map(|place| format!("byte {place} of {} differs", one.numbers().len())),
+            _ => one.differ(two).map(|index| format!("byte {index} of {} differs", one.numbers().len())),
         }
     });
-    checker.judge("states.bytes", writer.script, judge)?;
+    checker.judge("states.bytes", writer.sequence, judge)?;
     Ok(())
 }

@@ -5,12 +5,12 @@ mod sarif;
 
 use crate::baseline::Baseline;
 use crate::checker::{Checker, Unchecked};
-use crate::finding::{Finding, Grade};
+use crate::finding::{Finding, Severity};
 use crate::{FailOn, Options};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// What was found in an FMU.
+/// The report on an FMU.
 #[derive(Clone, serde::Serialize)]
 pub struct Report {
     /// The version of the report's structure: 1. It changes when a field changes or goes.
@@ -28,7 +28,7 @@ pub struct Report {
     /// The types of interface that were checked.
     pub interfaces: Vec<String>,
     /// How many sequences of calls were played.
-    pub scripts: u64,
+    pub sequences: u64,
     /// How long it took.
     pub seconds: f64,
     /// Chose what was chosen at random.
@@ -53,8 +53,12 @@ impl Report {
             fmu: path.display().to_string(),
             model: checker.description.model_name.clone(),
             standard: checker.description.standard.to_string(),
-            interfaces: checker.courses.iter().map(|course| course.interface.to_string()).collect(),
-            scripts: checker.played(),
+            interfaces: checker
+                .trajectories
+                .iter()
+                .map(|trajectory| trajectory.interface.to_string())
+                .collect(),
+            sequences: checker.played(),
             seconds: 0.0,
             seed: checker.seed,
             variables: [
@@ -69,15 +73,15 @@ impl Report {
     /// Decides which findings fail and what is allowed, for all outputs.
     pub(crate) fn judge(&mut self, options: &Options, baseline: &Baseline) {
         let from = match options.fail_on {
-            FailOn::Violation => Some(Grade::Violation),
-            FailOn::Fragile => Some(Grade::Fragile),
-            FailOn::Note => Some(Grade::Note),
+            FailOn::Violation => Some(Severity::Violation),
+            FailOn::Fragile => Some(Severity::Fragile),
+            FailOn::Note => Some(Severity::Note),
             FailOn::Never => None,
         };
         self.unused = baseline.unused(&self.findings, &self.unreached);
         for finding in &mut self.findings {
             finding.accepted = baseline.of_finding(finding);
-            finding.fails = finding.accepted.is_none() && from.is_some_and(|from| finding.grade >= from);
+            finding.fails = finding.accepted.is_none() && from.is_some_and(|from| finding.severity >= from);
         }
         for unchecked in self.unreached.iter_mut().filter(|unchecked| !unchecked.allowed) {
             let reason = baseline.of_unchecked(&unchecked.name);
@@ -91,9 +95,12 @@ impl Report {
         self.status = if fails { 1 } else { 2 * u8::from(unchecked) };
     }
 
-    /// How many findings there are of a grade.
-    pub fn count(&self, grade: Grade) -> usize {
-        self.findings.iter().filter(|finding| finding.grade == grade && finding.accepted.is_none()).count()
+    /// How many findings there are of a severity.
+    pub fn count(&self, severity: Severity) -> usize {
+        self.findings
+            .iter()
+            .filter(|finding| finding.severity == severity && finding.accepted.is_none())
+            .count()
     }
 
     /// The interfaces that were checked.
@@ -115,29 +122,29 @@ impl Report {
         };
         format!(
             "{}, {} fragile, {}{accepted}{unchecked}",
-            many(self.count(Grade::Violation), "violation", "violations"),
-            self.count(Grade::Fragile),
-            many(self.count(Grade::Note), "note", "notes")
+            many(self.count(Severity::Violation), "violation", "violations"),
+            self.count(Severity::Fragile),
+            many(self.count(Severity::Note), "note", "notes")
         )
     }
 
-    /// For a terminal.
+    /// Formats the report for a terminal.
     pub fn terminal(&self, colours: bool) -> String {
         let mut text = String::new();
         let _ = writeln!(text, "{} ({}, {}): {}", self.fmu, self.standard, self.offers(), self.summary());
         for finding in &self.findings {
-            let (on, off) = match (colours, finding.grade) {
+            let (on, off) = match (colours, finding.severity) {
                 (false, _) => ("", ""),
-                (true, Grade::Violation) => ("\u{1b}[31m", "\u{1b}[0m"),
-                (true, Grade::Fragile) => ("\u{1b}[33m", "\u{1b}[0m"),
-                (true, Grade::Note) => ("\u{1b}[36m", "\u{1b}[0m"),
+                (true, Severity::Violation) => ("\u{1b}[31m", "\u{1b}[0m"),
+                (true, Severity::Fragile) => ("\u{1b}[33m", "\u{1b}[0m"),
+                (true, Severity::Note) => ("\u{1b}[36m", "\u{1b}[0m"),
             };
             let _ = writeln!(
                 text,
                 "{on}{:9}{off} {:26} {}",
-                finding.grade.name(),
+                finding.severity.name(),
                 finding.name,
-                short(&finding.seen, 160)
+                short(&finding.observed, 160)
             );
             let more = match finding.more.len() {
                 0 => String::new(),
@@ -156,11 +163,12 @@ impl Report {
             let allowed = if *allowed { " (allowed)" } else { "" };
             let _ = writeln!(text, "not checked{allowed}: {name}: {why}");
         }
-        let _ = writeln!(text, "{} call sequences, {:.1} s, seed {}", self.scripts, self.seconds, self.seed);
+        let _ =
+            writeln!(text, "{} call sequences, {:.1} s, seed {}", self.sequences, self.seconds, self.seed);
         text
     }
 
-    /// As JSON.
+    /// Formats the report as JSON.
     ///
     /// # Errors
     /// None that is known.
@@ -168,7 +176,7 @@ impl Report {
         serde_json::to_string_pretty(self)
     }
 
-    /// As JUnit: a test for each finding, which fails if the finding fails the check.
+    /// Formats the report as JUnit: one test for each finding, which fails if the finding fails the check.
     pub fn junit(&self) -> String {
         let escape = |text: &str| {
             let printable =
@@ -205,20 +213,23 @@ impl Report {
             );
             let body = escape(&format!(
                 "{}\n{}: {}\n{}",
-                finding.seen,
+                finding.observed,
                 finding.section,
-                finding.promise,
+                finding.requirement,
                 finding.more.join("\n")
             ));
-            let (grade, seen) = (finding.grade.name(), escape(&finding.seen));
+            let (severity, observed) = (finding.severity.name(), escape(&finding.observed));
             if !finding.fails {
                 let reason = finding
                     .accepted
                     .as_ref()
                     .map_or(String::new(), |reason| escape(&format!("\nAccepted: {reason}")));
-                let _ = writeln!(text, "    <system-out>{grade}: {body}{reason}</system-out>");
+                let _ = writeln!(text, "    <system-out>{severity}: {body}{reason}</system-out>");
             } else {
-                let _ = writeln!(text, "    <failure type=\"{grade}\" message=\"{seen}\">{body}</failure>");
+                let _ = writeln!(
+                    text,
+                    "    <failure type=\"{severity}\" message=\"{observed}\">{body}</failure>"
+                );
             }
             let _ = writeln!(text, "  </testcase>");
         }
@@ -226,19 +237,18 @@ impl Report {
         text
     }
 
-    /// Writes all of it to a folder.
+    /// Writes all of it to a directory.
     ///
     /// # Errors
     /// When a file cannot be written.
-    pub fn write(&self, folder: &Path) -> anyhow::Result<()> {
-        std::fs::create_dir_all(folder)?;
-        std::fs::write(folder.join("report.json"), self.json()?)?;
-        std::fs::write(folder.join("junit.xml"), self.junit())?;
-        std::fs::write(folder.join("report.sarif"), serde_json::to_vec_pretty(&sarif::sarif(self))?)?;
-        std::fs::write(folder.join("report.html"), page::page(self))?;
+    pub fn write(&self, directory: &Path) -> anyhow::Result<()> {
+        std::fs::create_dir_all(directory)?;
+        std::fs::write(directory.join("report.json"), self.json()?)?;
+        std::fs::write(directory.join("junit.xml"), self.junit())?;
+        std::fs::write(directory.join("report.sarif"), serde_json::to_vec_pretty(&sarif::sarif(self))?)?;
+        std::fs::write(directory.join("report.html"), page::page(self))?;
         for finding in self.findings.iter().filter(|finding| !finding.c.is_empty()) {
-            std::fs::write(folder.join(format!("{}.c", finding.name)), &finding.c)?;
-            std::fs::write(folder.join(format!("{}.py", finding.name)), &finding.python)?;
+            std::fs::write(directory.join(format!("{}.c", finding.name)), &finding.c)?;
         }
         Ok(())
     }
@@ -246,7 +256,7 @@ impl Report {
 
 fn short(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
-        Some((place, _)) => format!("{}...", &text[..place]),
+        Some((index, _)) => format!("{}...", &text[..index]),
         None => text.to_owned(),
     }
 }

@@ -1,7 +1,7 @@
 //! The report as one page that needs nothing else.
 
 use super::Report;
-use crate::finding::Grade;
+use crate::finding::Severity;
 use std::fmt::Write as _;
 
 fn escape(text: &str) -> String {
@@ -18,7 +18,7 @@ pub fn page(report: &Report) -> String {
          pre {{ overflow: auto; background: #f4f4f4; padding: .8rem; max-height: 30rem }}\n\
          section {{ border-left: .4rem solid; padding: .2rem 0 .2rem 1rem; margin: 1.2rem 0 }} p {{ margin: .3rem 0 }}\n\
          .violation {{ border-color: #b3261e }} .fragile {{ border-color: #b26a00 }} .note {{ border-color: #3567a8 }}\n\
-         .grade {{ float: right; font-weight: 600 }}\n\
+         .severity {{ float: right; font-weight: 600 }}\n\
          @media (prefers-color-scheme: dark) {{ body {{ color: #ddd; background: #181818 }} pre {{ background: #242424 }} }}\n\
          </style></head><body>\n<h1>{}</h1>\n<p>{}, {}, {}: <strong>{}</strong></p>\n",
         escape(&report.model),
@@ -31,27 +31,28 @@ pub fn page(report: &Report) -> String {
     let _ = writeln!(
         text,
         "<p>{} call sequences were played in separate processes, in {:.1} s, with seed {}.</p>",
-        report.scripts, report.seconds, report.seed
+        report.sequences, report.seconds, report.seed
     );
-    for (grade, what) in [
-        (Grade::Violation, "Violation: the standard says must."),
-        (Grade::Fragile, "Fragile: nothing forbids it, but it hurts."),
-        (Grade::Note, "Note: good to know."),
+    for (severity, what) in [
+        (Severity::Violation, "Violation: the standard says must."),
+        (Severity::Fragile, "Fragile: nothing forbids it, but it hurts."),
+        (Severity::Note, "Note: good to know."),
     ] {
-        let findings: Vec<_> = report.findings.iter().filter(|finding| finding.grade == grade).collect();
+        let findings: Vec<_> =
+            report.findings.iter().filter(|finding| finding.severity == severity).collect();
         if findings.is_empty() {
             continue;
         }
         let _ = writeln!(text, "<p><em>{what}</em></p>");
         for finding in findings {
-            let name = grade.name();
+            let name = severity.name();
             let _ = write!(
                 text,
-                "<section class=\"{name}\"><span class=\"grade\">{name}</span><h2>{}</h2>\n<p>{}</p>\n<p>{}: {}</p>\n",
+                "<section class=\"{name}\"><span class=\"severity\">{name}</span><h2>{}</h2>\n<p>{}</p>\n<p>{}: {}</p>\n",
                 finding.name,
-                escape(&finding.seen),
+                escape(&finding.observed),
                 if finding.section.is_empty() { "Not in the standard" } else { &finding.section },
-                escape(&finding.promise)
+                escape(&finding.requirement)
             );
             if let Some(reason) = &finding.accepted {
                 let _ = writeln!(text, "<p>Accepted: {}</p>", escape(reason));
@@ -63,15 +64,13 @@ pub fn page(report: &Report) -> String {
                 }
                 text.push_str("</ul></details>\n");
             }
-            for (language, program) in [("C", &finding.c), ("Python", &finding.python)] {
-                if !program.is_empty() {
-                    let _ = writeln!(
-                        text,
-                        "<details><summary>{} calls that show it, in {language}</summary><pre>{}</pre></details>",
-                        finding.steps.1,
-                        escape(program)
-                    );
-                }
+            if !finding.c.is_empty() {
+                let _ = writeln!(
+                    text,
+                    "<details><summary>Program in C with {} calls that shows the finding</summary><pre>{}</pre></details>",
+                    finding.steps.1,
+                    escape(&finding.c)
+                );
             }
             text.push_str("</section>\n");
         }

@@ -1,14 +1,14 @@
 //! The report in SARIF 2.1.0, which code scanning services read.
 
 use super::Report;
-use crate::finding::{Finding, Grade};
+use crate::finding::{Finding, Severity};
 use serde_json::{Value, json};
 
-const fn level(grade: Grade) -> &'static str {
-    match grade {
-        Grade::Violation => "error",
-        Grade::Fragile => "warning",
-        Grade::Note => "note",
+const fn level(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Violation => "error",
+        Severity::Fragile => "warning",
+        Severity::Note => "note",
     }
 }
 
@@ -18,21 +18,21 @@ pub fn sarif(report: &Report) -> Value {
         .findings
         .iter()
         .map(|finding| {
-            let help = format!("{} {}", finding.promise, finding.section);
+            let help = format!("{} {}", finding.requirement, finding.section);
             json!({
                 "id": finding.name,
-                "shortDescription": {"text": finding.promise},
+                "shortDescription": {"text": finding.requirement},
                 "help": {"text": help.trim()},
-                "defaultConfiguration": {"level": level(finding.grade)},
+                "defaultConfiguration": {"level": level(finding.severity)},
             })
         })
         .collect();
-    let result = |(place, finding): (usize, &Finding)| {
-        let text = [std::slice::from_ref(&finding.seen), &finding.more].concat().join("\n");
+    let result = |(index, finding): (usize, &Finding)| {
+        let text = [std::slice::from_ref(&finding.observed), &finding.more].concat().join("\n");
         let mut result = json!({
             "ruleId": finding.name,
-            "ruleIndex": place,
-            "level": level(finding.grade),
+            "ruleIndex": index,
+            "level": level(finding.severity),
             "message": {"text": text},
             "locations": [{"physicalLocation": {"artifactLocation": {"uri": report.fmu.replace('\\', "/")}}}],
         });

@@ -1,17 +1,17 @@
-//! A script as a program in C.
+//! A sequence as a program in C.
 
 use super::evidence::{Evidence, Measure, Proof};
 use super::{Names, head, library, phases};
+use crate::call_sequence::{Arg, CallSequence, Kind, Make, NOBODY, Numbered, Setting, Step};
 use crate::description::Description;
 use crate::finding::Finding;
-use crate::script::{Arg, Kind, Make, NOBODY, Numbered, Script, Setting, Step};
 use fmi_abi::calls::signature;
 use std::fmt::Write as _;
 
 /// The program.
 pub fn program(
     finding: &Finding,
-    script: &Script,
+    sequence: &CallSequence,
     evidence: &Evidence,
     setting: &Setting,
     description: &Description,
@@ -25,9 +25,9 @@ pub fn program(
          * Exit status: 1 if the finding shows, 0 if it does not, 3 if that cannot be told.\n */\n",
     );
     text.push_str(include_str!("prelude.c"));
-    let names = Names::of(script);
-    for place in names.instances.iter().filter(|place| **place != NOBODY) {
-        let _ = writeln!(text, "static void *c{place};");
+    let names = Names::of(sequence);
+    for index in names.instances.iter().filter(|index| **index != NOBODY) {
+        let _ = writeln!(text, "static void *c{index};");
     }
     for slot in &names.states {
         let _ = writeln!(text, "static void *s{slot};");
@@ -40,7 +40,7 @@ pub fn program(
     );
     let mut writer = Writer { fmi3: setting.fmi3, evidence, description, next: 0, threads: String::new() };
     let mut bodies = String::new();
-    let parts = phases(script);
+    let parts = phases(sequence);
     for (number, part) in parts.iter().enumerate() {
         let mut body = String::new();
         writer.steps(part, &mut body, "    ");
@@ -50,7 +50,7 @@ pub fn program(
     text.push_str(&bodies);
     let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
     let _ = writeln!(text, "static void (*const phases[])(void) = {{{}}};", list.join(", "));
-    let _ = writeln!(text, "static const char library_name[] = \"{}\";", library(setting, script));
+    let _ = writeln!(text, "static const char library_name[] = \"{}\";", library(setting, sequence));
     let format = if setting.fmi3 { "%s/resources/" } else { "file://%s/resources" };
     let _ = writeln!(text, "static const char resources_format[] = \"{format}\";");
     // Serialized bytes are passed on to the next process in files.
@@ -76,7 +76,7 @@ fn shows(evidence: &Evidence) -> String {
         Evidence::Printed => ("RESULTS", "*result(\"printed\", 0) != 0".to_owned()),
         Evidence::Damage => ("RESULTS", "damaged()".to_owned()),
         Evidence::Differ(proofs) => {
-            let of = |place: usize| proofs.get(place).map_or(0, |proof| proof.id);
+            let of = |index: usize| proofs.get(index).map_or(0, |proof| proof.id);
             ("RESULTS", format!("strcmp(result(\"r\", {}), result(\"r\", {})) != 0", of(0), of(1)))
         }
         Evidence::AnyDiffer(pairs) => {
@@ -95,8 +95,8 @@ fn shows(evidence: &Evidence) -> String {
             ("RESULTS", format!("strcmp({}, {}) != 0", settings(first), settings(last)))
         }
         Evidence::Grown(measure, first, last, most) => {
-            let place = *measure as usize;
-            ("RESULTS", format!("measured({last}, {place}) - measured({first}, {place}) > {most}"))
+            let index = *measure as usize;
+            ("RESULTS", format!("measured({last}, {index}) - measured({first}, {index}) > {most}"))
         }
     };
     format!("#define EVIDENCE {kind}\n\nstatic bool shows(void) {{\n    return {expression};\n}}\n\n")
@@ -111,8 +111,8 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    fn steps(&mut self, script: &[Numbered], text: &mut String, indent: &str) {
-        for Numbered { id, step, .. } in script {
+    fn steps(&mut self, sequence: &[Numbered], text: &mut String, indent: &str) {
+        for Numbered { id, step, .. } in sequence {
             let matters = match self.evidence {
                 Evidence::Differ(proofs) | Evidence::Same(proofs) => {
                     proofs.iter().find(|proof| proof.id == *id).map(|proof| proof.matters)
@@ -123,7 +123,7 @@ impl Writer<'_> {
                 _ => None,
             };
             match step {
-                Step::Make(place, make) => self.make(*id, *place, make, matters, text, indent),
+                Step::Make(index, make) => self.make(*id, *index, make, matters, text, indent),
                 Step::Call { of, function, args } => {
                     self.call(*id, *of, function, args, matters, text, indent)
                 }
@@ -143,9 +143,9 @@ impl Writer<'_> {
     /// A step that is no call of the FMU.
     fn around(&mut self, id: u32, step: &Step, text: &mut String, indent: &str) {
         let _ = match step {
-            Step::Free(place) => {
+            Step::Free(index) => {
                 let name = if self.fmi3 { "fmi3FreeInstance" } else { "fmi2FreeInstance" };
-                let instance = if *place == NOBODY { "NULL".to_owned() } else { format!("c{place}") };
+                let instance = if *index == NOBODY { "NULL".to_owned() } else { format!("c{index}") };
                 writeln!(text, "{indent}((void (*)(void *))function(\"{name}\"))({instance});")
             }
             Step::Measure => writeln!(text, "{indent}measure({id});"),
@@ -162,13 +162,13 @@ impl Writer<'_> {
                      {indent}quiet = false;"
                 )
             }
-            Step::Parallel(scripts) => {
+            Step::Parallel(sequences) => {
                 let mut joins = String::new();
-                for script in scripts {
+                for sequence in sequences {
                     let number = self.next;
                     self.next += 1;
                     let mut body = String::new();
-                    self.steps(script, &mut body, "    ");
+                    self.steps(sequence, &mut body, "    ");
                     let _ = write!(
                         self.threads,
                         "static void *thread{number}(void *nothing) {{\n{body}    return nothing;\n}}\n\n"
@@ -189,7 +189,7 @@ impl Writer<'_> {
     fn make(
         &self,
         id: u32,
-        place: usize,
+        index: usize,
         make: &Make,
         matters: Option<[bool; 3]>,
         text: &mut String,
@@ -222,13 +222,13 @@ impl Writer<'_> {
         };
         let _ = writeln!(
             text,
-            "{indent}{{ size_t before = arrays; *said = 0; c{place} = {made}; release(before); }}\n{indent}print(\"instance {place}: %s\\n\", c{place} ? \"made\" : \"NULL\");"
+            "{indent}{{ size_t before = arrays; *said = 0; c{index} = {made}; release(before); }}\n{indent}print(\"instance {index}: %s\\n\", c{index} ? \"made\" : \"NULL\");"
         );
         if let Some([_, _, log]) = matters {
             let log = if log { "said" } else { "\"\"" };
             let _ = writeln!(
                 text,
-                "{indent}{{ FILE *file = results(\"r\", {id}, \"w\"); fprintf(file, \"%d;%s\", c{place} != NULL, {log}); fclose(file); }}"
+                "{indent}{{ FILE *file = results(\"r\", {id}, \"w\"); fprintf(file, \"%d;%s\", c{index} != NULL, {log}); fclose(file); }}"
             );
         }
     }
@@ -252,7 +252,7 @@ impl Writer<'_> {
             parts.add(arg, name, self.next);
             self.next += 1;
         }
-        let instance = of.map_or("NULL".to_owned(), |place| format!("c{place}"));
+        let instance = of.map_or("NULL".to_owned(), |index| format!("c{index}"));
         let list = |parts: &[String]| parts.iter().map(|part| format!(", {part}")).collect::<String>();
         let types: Vec<String> = parts.types.iter().map(|of| (*of).to_owned()).collect();
         let comment =
@@ -277,7 +277,7 @@ impl Writer<'_> {
         if *self.evidence == Evidence::Damage {
             after.push_str(&lines(&parts.checks));
         }
-        let guard = of.map_or(String::new(), |place| format!("if (c{place}) "));
+        let guard = of.map_or(String::new(), |index| format!("if (c{index}) "));
         let _ = write!(
             text,
             "{indent}{guard}{{{comment}\n{inner}size_t before = arrays;\n{}{inner}*said = 0;\n\
@@ -368,7 +368,7 @@ impl Parts {
             _ => 'u',
         };
         if name == "fmi2NewDiscreteStates" {
-            // Of fmi2EventInfo the five flags, then the time.
+            // fmi2EventInfo has five flags, then the time.
             let time = format!("show((char *)a{number} + 24, 1, 'f', 8);");
             self.after.push(format!("print(\" ->\"); show(a{number}, 5, 'i', 4); {time}"));
         } else if kind == Kind::Pointer && name != "fmi3GetBinary" {

@@ -1,13 +1,12 @@
 //! The results that show a finding, found by leaving out those that the judge does not need. A program that reproduces a
 //! finding compares them.
 
+use crate::call_sequence::{CallSequence, End, Numbered, Outcome, Run, Step, Written};
 use crate::finding::{Finding, Judge};
-use crate::script::{End, Numbered, Outcome, Run, Script, Step, Written};
-use serde::Serialize;
 use std::fmt::Write as _;
 
 /// How a program finds out whether a finding shows.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Evidence {
     /// No program can.
     #[default]
@@ -34,7 +33,7 @@ pub enum Evidence {
 const REPETITIONS: usize = 500;
 
 /// The quantity of a measurement.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs, reason = "names of quantities")]
 pub enum Measure {
     Memory,
@@ -44,7 +43,7 @@ pub enum Measure {
 }
 
 /// A call whose results matter.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Proof {
     /// The number of the step.
     pub id: u32,
@@ -54,7 +53,7 @@ pub struct Proof {
     pub observed: String,
 }
 
-/// The evidence of a finding in a run of its script.
+/// Finds the results that show a finding in a run of its call sequence.
 pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     let Some(judge) = &finding.judge else { return Evidence::None };
     if run.end != End::Done || finding.name == "package.symbols" {
@@ -74,7 +73,7 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     if without(&|run| run.outcomes.values_mut().for_each(|of| of.damage.clear())) {
         return Evidence::Damage;
     }
-    let pairs = pairs(&finding.script);
+    let pairs = pairs(&finding.sequence);
     if !pairs.is_empty() {
         return Evidence::AnyDiffer(pairs);
     }
@@ -87,7 +86,7 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     let mut ids: Vec<u32> = calls.map(|of| of.id).collect();
     ids.sort_unstable();
     let proofs: Vec<Proof> = ids.iter().map(|id| proof(judge, &needed, *id)).collect();
-    let calls: Vec<_> = proofs.iter().filter_map(|proof| function(&finding.script, proof.id)).collect();
+    let calls: Vec<_> = proofs.iter().filter_map(|proof| function(&finding.sequence, proof.id)).collect();
     match &calls[..] {
         [one, other] if one == other && proofs[0].observed != proofs[1].observed => Evidence::Differ(proofs),
         [] => Evidence::None,
@@ -97,14 +96,14 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
 
 /// The queries of threads, each with the one in the simulation before them that it is compared with. Which of them differ
 /// depends on chance.
-fn pairs(script: &Script) -> Vec<[u32; 2]> {
-    let queries = |script: &[Numbered]| -> Vec<u32> {
+fn pairs(sequence: &CallSequence) -> Vec<[u32; 2]> {
+    let queries = |sequence: &[Numbered]| -> Vec<u32> {
         let query = |numbered: &&Numbered| matches!(&numbered.step, Step::Call { function, .. } if function[4..].starts_with("Get"));
-        script.iter().filter(query).map(|numbered| numbered.id).collect()
+        sequence.iter().filter(query).map(|numbered| numbered.id).collect()
     };
-    let alone = queries(script);
-    let threads = script.iter().flat_map(|numbered| match &numbered.step {
-        Step::Parallel(scripts) => scripts.iter().map(|script| queries(script)).collect(),
+    let alone = queries(sequence);
+    let threads = sequence.iter().flat_map(|numbered| match &numbered.step {
+        Step::Parallel(sequences) => sequences.iter().map(|sequence| queries(sequence)).collect(),
         _ => Vec::new(),
     });
     threads
@@ -187,15 +186,15 @@ fn shown(outcome: &Outcome, [status, written, log]: [bool; 3]) -> String {
 }
 
 /// The function of a step at any depth, and what it reads.
-fn function(script: &[Numbered], id: u32) -> Option<String> {
-    script.iter().find_map(|numbered| match &numbered.step {
+fn function(sequence: &[Numbered], id: u32) -> Option<String> {
+    sequence.iter().find_map(|numbered| match &numbered.step {
         Step::Call { function, args, .. } if numbered.id == id => {
-            let outputs = args.iter().filter(|arg| !matches!(arg, crate::script::Arg::State(_)));
+            let outputs = args.iter().filter(|arg| !matches!(arg, crate::call_sequence::Arg::State(_)));
             Some(format!("{function} {:?}", outputs.collect::<Vec<_>>()))
         }
         other if numbered.id == id => Some(crate::finding::step_name(other)),
         Step::Repeat(_, steps) => function(steps, id),
-        Step::Parallel(scripts) => scripts.iter().find_map(|script| function(script, id)),
+        Step::Parallel(sequences) => sequences.iter().find_map(|sequence| function(sequence, id)),
         _ => None,
     })
 }
@@ -222,28 +221,28 @@ fn grown(finding: &Finding, needed: &Run) -> Evidence {
     }
 }
 
-/// The script with as many repetitions as were made.
-pub fn as_repeated(script: &Script, run: &Run) -> Script {
-    let mut script = script.clone();
-    for numbered in &mut script {
+/// The sequence with as many repetitions as were made.
+pub fn as_repeated(sequence: &CallSequence, run: &Run) -> CallSequence {
+    let mut sequence = sequence.clone();
+    for numbered in &mut sequence {
         if let (Step::Repeat(times, _), Some(measured)) =
             (&mut numbered.step, run.of(numbered.id).and_then(|of| of.measured.as_ref()))
         {
             *times = measured.times.min(REPETITIONS);
         }
     }
-    script
+    sequence
 }
 
 #[cfg(test)]
 mod tests {
     use super::{Evidence, evidence};
-    use crate::finding::{Finding, Grade, Judge};
-    use crate::script::{Arg, End, Kind, Message, Numbered, Outcome, Run, Step, Written};
+    use crate::call_sequence::{Arg, End, Kind, Message, Numbered, Outcome, Run, Step, Written};
+    use crate::finding::{Finding, Judge, Severity};
     use std::sync::Arc;
 
     fn finding(judge: Judge) -> Finding {
-        let mut finding = Finding::new("topic.name", Grade::Note, String::new(), "", String::new());
+        let mut finding = Finding::new("topic.name", Severity::Note, String::new(), "", String::new());
         let call = |id: u32, function: &str| {
             let args = vec![Arg::Out(Kind::F64, 1)];
             Numbered {
@@ -252,7 +251,7 @@ mod tests {
                 step: Step::Call { of: Some(0), function: function.to_owned(), args },
             }
         };
-        finding.script = vec![call(1, "fmi2GetReal"), call(2, "fmi2DoStep"), call(3, "fmi2GetReal")];
+        finding.sequence = vec![call(1, "fmi2GetReal"), call(2, "fmi2DoStep"), call(3, "fmi2GetReal")];
         finding.judge = Some(judge);
         finding
     }

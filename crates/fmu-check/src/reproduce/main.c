@@ -1,3 +1,8 @@
+/* Seconds after which a phase counts as a hang. */
+#ifndef PATIENCE
+#define PATIENCE 20
+#endif
+
 /* Each phase in a process of its own, so that a crash does not end this one. */
 static void phase(int number) {
     char path[5100];
@@ -5,7 +10,7 @@ static void phase(int number) {
     setvbuf(out, NULL, _IOLBF, 0);
     snprintf(path, sizeof path, "%s/printed0", folder);
     if (!freopen(path, "a", stdout)) _exit(3);
-    alarm(20);
+    alarm(PATIENCE);
     open_library();
     load();
     phases[number]();

@@ -1,59 +1,56 @@
-//! Scripts as programs in C and in Python, which show a finding without this tool.
+//! Call sequences as programs in C, which show a finding without this tool.
 
 mod c;
 mod evidence;
-mod python;
 
+use crate::call_sequence::{CallSequence, Numbered, Run, Setting, Step};
 use crate::description::Description;
 use crate::finding::Finding;
-use crate::script::{Numbered, Run, Script, Setting, Step};
 
-/// Writes both programs of a finding. They show what the last run of its script did.
-pub fn programs(finding: &mut Finding, run: &Run, setting: &Setting, description: &Description) {
+/// Writes the program of a finding, which compares its results with those of the last run of the call sequence.
+pub fn program(finding: &mut Finding, run: &Run, setting: &Setting, description: &Description) {
     let evidence = evidence::evidence(finding, run);
-    let script = evidence::as_repeated(&finding.script, run);
-    finding.c = c::program(finding, &script, &evidence, setting, description);
-    finding.python = python::program(finding, &script, &evidence, setting, description).unwrap_or_default();
+    let sequence = evidence::as_repeated(&finding.sequence, run);
+    finding.c = c::program(finding, &sequence, &evidence, setting, description);
 }
 
-/// What a program says of itself, in lines.
+/// The comment at the top of a program, in lines.
 fn head(finding: &Finding, description: &Description) -> Vec<String> {
     let mut lines = vec![
         format!(
             "{}: {} ({}, {})",
             description.model_name,
             finding.name,
-            finding.grade.name(),
+            finding.severity.name(),
             if finding.section.is_empty() { "not in the standard" } else { &finding.section }
         ),
         String::new(),
-        format!("Rule: {}", finding.promise),
-        format!("Observed: {}", finding.seen),
+        format!("Rule: {}", finding.requirement),
+        format!("Observed: {}", finding.observed),
         String::new(),
     ];
     lines.iter_mut().for_each(|line| {
-        *line =
-            line.replace("*/", "* /").replace(['\n', '\r'], " ").replace("\"\"\"", "'''").replace('\\', "/")
+        *line = line.replace("*/", "* /").replace(['\n', '\r'], " ").replace('\\', "/");
     });
     lines
 }
 
-/// The library below the folder of the unpacked FMU.
-fn library(setting: &Setting, script: &Script) -> String {
+/// The library below the directory of the unpacked FMU.
+fn library(setting: &Setting, sequence: &CallSequence) -> String {
     let model_exchange =
-        script.iter().any(|numbered| matches!(&numbered.step, Step::Make(_, make) if !make.co_simulation));
-    let place = usize::from(model_exchange || setting.libraries[0].is_none());
-    let path = setting.libraries[place].clone().unwrap_or_default();
-    let folder = setting.resources.parent().unwrap_or(&setting.resources);
-    path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace('\\', "/")
+        sequence.iter().any(|numbered| matches!(&numbered.step, Step::Make(_, make) if !make.co_simulation));
+    let index = usize::from(model_exchange || setting.libraries[0].is_none());
+    let path = setting.libraries[index].clone().unwrap_or_default();
+    let directory = setting.resources.parent().unwrap_or(&setting.resources);
+    path.strip_prefix(directory).unwrap_or(&path).to_string_lossy().replace('\\', "/")
 }
 
-/// The parts of a script, a process for each.
-fn phases(script: &Script) -> Vec<&[Numbered]> {
-    script.split(|numbered| numbered.step == Step::FreshProcess).collect()
+/// The parts of a sequence, a process for each.
+fn phases(sequence: &CallSequence) -> Vec<&[Numbered]> {
+    sequence.split(|numbered| numbered.step == Step::FreshProcess).collect()
 }
 
-/// All instances, states and bytes that a script names.
+/// All instances, states and bytes that a sequence names.
 #[derive(Default)]
 struct Names {
     instances: Vec<usize>,
@@ -62,9 +59,9 @@ struct Names {
 }
 
 impl Names {
-    fn of(script: &[Numbered]) -> Self {
+    fn of(sequence: &[Numbered]) -> Self {
         let mut names = Self::default();
-        names.look(script);
+        names.look(sequence);
         for list in [&mut names.instances, &mut names.states, &mut names.bytes] {
             list.sort_unstable();
             list.dedup();
@@ -72,11 +69,11 @@ impl Names {
         names
     }
 
-    fn look(&mut self, script: &[Numbered]) {
-        use crate::script::Arg;
-        for numbered in script {
+    fn look(&mut self, sequence: &[Numbered]) {
+        use crate::call_sequence::Arg;
+        for numbered in sequence {
             match &numbered.step {
-                Step::Make(place, _) | Step::Free(place) => self.instances.push(*place),
+                Step::Make(index, _) | Step::Free(index) => self.instances.push(*index),
                 Step::Call { of, args, .. } => {
                     self.instances.extend(of);
                     for arg in args {
@@ -91,7 +88,7 @@ impl Names {
                     }
                 }
                 Step::Repeat(_, steps) => self.look(steps),
-                Step::Parallel(scripts) => scripts.iter().for_each(|script| self.look(script)),
+                Step::Parallel(sequences) => sequences.iter().for_each(|sequence| self.look(sequence)),
                 _ => {}
             }
         }

@@ -117,7 +117,7 @@ static void *function(const char *name) {
 static __thread struct { void *map; size_t length; } *maps;
 static __thread size_t arrays, capacity;
 
-/* An array that ends where memory ends: what is read or written beyond it is a crash. */
+/* Allocates an array that ends at a guard page: access beyond the array is a crash. */
 static __attribute__((unused)) void *guarded(const void *bytes, size_t size) {
     size_t page = (size_t)sysconf(_SC_PAGESIZE), length = ((size + page - 1) / page + 2) * page;
     char *map = mmap(NULL, length, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);

@@ -184,8 +184,8 @@ mod linux {
             equals(libc::SYS_tkill as i32, 0, count + 1),
             load(16),
         ];
-        for (place, target) in (0..count).zip(&targets) {
-            program.push(equals(*target, count - place, 0));
+        for (index, target) in (0..count).zip(&targets) {
+            program.push(equals(*target, count - index, 0));
         }
         program.extend([end(libc::SECCOMP_RET_ALLOW), end(libc::SECCOMP_RET_KILL_PROCESS)]);
         let filter = libc::sock_fprog { len: program.len() as u16, filter: program.as_mut_ptr() };

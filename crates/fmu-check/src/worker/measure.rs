@@ -1,11 +1,11 @@
-//! What the process uses, and what belongs to all of it.
+//! Resources that the process uses, and settings that belong to the whole process.
 
-use crate::script::Measured;
+use crate::call_sequence::Measured;
 
-/// What it is now.
+/// Measures now.
 pub fn now() -> Measured {
     let (memory, exact) = memory();
-    let entries = |folder: &str| std::fs::read_dir(folder).map_or(0, Iterator::count);
+    let entries = |directory: &str| std::fs::read_dir(directory).map_or(0, Iterator::count);
     Measured {
         memory,
         exact,
@@ -18,7 +18,7 @@ pub fn now() -> Measured {
 
 #[cfg(unix)]
 fn memory() -> (u64, bool) {
-    /// As `malloc.h` of glibc 2.33 has it.
+    /// Layout as in `malloc.h` of glibc 2.33.
     #[repr(C)]
     struct Info {
         arena: usize,
@@ -50,7 +50,7 @@ fn memory() -> (u64, bool) {
     (0, false)
 }
 
-/// Rounding, locale, folder and signals: an FMU must leave them as they are.
+/// Rounding, locale, directory and signals: an FMU must leave them as they are.
 fn settings() -> Vec<String> {
     let mut found = Vec::new();
     found.push(format!("working directory {}", std::env::current_dir().unwrap_or_default().display()));
@@ -59,7 +59,7 @@ fn settings() -> Vec<String> {
         let mut word = 0_u32;
         // SAFETY: stores the control word of SSE, which every x86-64 has.
         unsafe { std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut word, options(nostack)) };
-        // Without the flags of what has happened.
+        // The status flags are masked.
         found.push(format!("floating-point control word {:#x}", word & !0x3f));
     }
     #[cfg(unix)]

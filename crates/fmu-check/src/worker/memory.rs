@@ -1,18 +1,18 @@
-//! Arrays that end where memory ends: what is read or written beyond them is a crash, what is written before them is seen.
+//! Arrays that end at a guard page. Access beyond an array is a crash; a write before it is detected after the call.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 
-/// How many bytes after an array may be touched: none, so that it is a crash, or some, so that it is seen.
+/// How many bytes after an array may be touched: none, so that it is a crash, or some, so that it is observed.
 pub static AFTER: AtomicUsize = AtomicUsize::new(0);
 
-/// Memory is kept for the next array: to map it again takes time in repetitions, and lets threads wait for each other.
+/// Whether freed arrays stay mapped for reuse. Mapping takes time in repetitions and makes threads wait for each other.
 pub static KEEP: AtomicBool = AtomicBool::new(false);
 
-/// What memory is filled with before a call.
+/// The byte that fills memory before a call.
 pub const FILL: u8 = 0x5a;
 
-/// As much of it as a page.
+/// One page of it.
 static FILLED: [u8; 4096] = [FILL; 4096];
 
 /// The number of functions of the FMU that have not returned, in memory that a forked process shares with its parent.
@@ -42,7 +42,7 @@ impl Inside {
         self.count().fetch_add(1, Ordering::Relaxed);
     }
 
-    /// It has returned.
+    /// The call has returned.
     pub fn leave(&self) {
         self.count().fetch_sub(1, Ordering::Relaxed);
     }
@@ -87,8 +87,8 @@ mod pages {
             let page = page();
             let length = (size.div_ceil(page) + 1) * page;
             let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some(place) = kept.iter().position(|(other, _)| *other == length) {
-                return Self { map: kept.swap_remove(place).1 as *mut u8, length };
+            if let Some(index) = kept.iter().position(|(other, _)| *other == length) {
+                return Self { map: kept.swap_remove(index).1 as *mut u8, length };
             }
             // SAFETY: new memory, the last page of which is closed.
             let map = unsafe {
@@ -107,7 +107,7 @@ mod pages {
             Self { map, length }
         }
 
-        /// All that may be touched.
+        /// The accessible bytes.
         pub fn open(&self) -> (*mut u8, usize) {
             (self.map, self.length - page())
         }
@@ -115,7 +115,7 @@ mod pages {
 
     impl Drop for Pages {
         fn drop(&mut self) {
-            // Where there is room after arrays, memory that is gone can be read as well.
+            // If arrays have room after them, freed memory stays readable, too.
             if KEEP.load(Ordering::Relaxed) {
                 KEPT.lock().unwrap_or_else(PoisonError::into_inner).push((self.length, self.map as usize));
             } else if AFTER.load(Ordering::Relaxed) == 0 {
@@ -128,7 +128,7 @@ mod pages {
 
 #[cfg(not(unix))]
 mod pages {
-    /// Without pages that may not be touched: what is written beyond an array is seen after the call.
+    /// No guard pages: a write beyond an array is detected after the call.
     pub struct Pages(Box<[std::cell::UnsafeCell<u8>]>);
 
     impl Pages {
@@ -174,7 +174,7 @@ impl Guarded {
         Self::new(&vec![FILL; size])
     }
 
-    /// Where it begins.
+    /// Address of the first byte.
     pub fn address(&self) -> u64 {
         self.pages.open().0.wrapping_add(self.begin) as u64
     }
@@ -190,12 +190,12 @@ impl Guarded {
         &self.all()[self.begin..self.begin + self.size]
     }
 
-    /// What happened that must not: bytes around it that were written, or its own if it was for reading.
+    /// Damage: bytes around the array that were written, or bytes of the array if it is an input.
     pub fn damage(&self, for_reading: bool) -> Option<String> {
         let all = self.all();
         if !untouched(&all[..self.begin]) {
-            let place = all[..self.begin].iter().rposition(|byte| *byte != FILL).unwrap_or_default();
-            return Some(format!("{} bytes before an array", self.begin - place));
+            let index = all[..self.begin].iter().rposition(|byte| *byte != FILL).unwrap_or_default();
+            return Some(format!("{} bytes before an array", self.begin - index));
         }
         if !untouched(&all[self.begin + self.size..]) {
             return Some("bytes after an array".to_owned());

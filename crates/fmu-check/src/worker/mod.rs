@@ -1,4 +1,4 @@
-//! The process that loads the library and plays a script. It may be lost at any step: what came of each is written down
+//! The process that loads the library and plays a sequence. It may be lost at any step: what came of each is written down
 //! before the next.
 
 mod contain;
@@ -7,7 +7,9 @@ mod memory;
 #[cfg(target_os = "linux")]
 mod server;
 
-use crate::script::{Arg, Kind, Make, Message, NOBODY, Numbered, Outcome, Script, Setting, Step, Written};
+use crate::call_sequence::{
+    Arg, CallSequence, Kind, Make, Message, NOBODY, Numbered, Outcome, Setting, Step, Written,
+};
 #[cfg(not(target_os = "linux"))]
 pub use contain::end_group;
 #[cfg(target_os = "linux")]
@@ -40,16 +42,16 @@ pub const SCRATCH: &str = "FMU_CHECK_SCRATCH";
 /// The exit status of a worker that has a fault of its own.
 pub const OWN_FAULT: i32 = 97;
 
-/// The exit status of a worker that has played its script.
+/// The exit status of a worker that has played its sequence.
 pub const PLAYED: i32 = 96;
 
-/// What a worker is given.
+/// The job of a worker.
 #[derive(Serialize, Deserialize)]
 pub struct Job {
-    /// What all scripts have in common.
+    /// The setting that all call sequences share.
     pub setting: Setting,
     /// The steps.
-    pub script: Script,
+    pub sequence: CallSequence,
     /// Serialized bytes of processes before.
     pub bytes: HashMap<usize, Vec<u8>>,
 }
@@ -116,11 +118,11 @@ fn work(job: Job, file: File) {
         sizes: Mutex::default(),
         file: Mutex::new(file),
     };
-    player.play(&job.script, true);
+    player.play(&job.sequence, true);
     player.write(&Last { bytes: std::mem::take(&mut locked(&player.bytes)) });
 }
 
-/// What the process may use.
+/// Limits of the process.
 fn limit(memory: u64) {
     #[cfg(unix)]
     {
@@ -145,7 +147,7 @@ fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What was said, with the environment it came with.
+/// Messages with the environment pointer that came with them.
 static SAID: Mutex<Vec<(usize, Message)>> = Mutex::new(Vec::new());
 
 /// The process that plays the call sequence.
@@ -156,7 +158,7 @@ struct Instance {
     handle: usize,
     environment: usize,
     co_simulation: bool,
-    /// Of FMI 2.0, where they must live as long as it.
+    /// Callbacks of FMI 2.0, which must outlive the instance.
     _callbacks: Option<Box<fmi2CallbackFunctions>>,
 }
 
@@ -168,7 +170,7 @@ unsafe impl Send for Instance {}
 
 struct Player {
     setting: Setting,
-    /// Of Co-Simulation and Model Exchange, when they are loaded.
+    /// The libraries of Co-Simulation and Model Exchange, once they are loaded.
     libraries: Mutex<[Option<&'static libloading::Library>; 2]>,
     instances: Mutex<HashMap<usize, Instance>>,
     states: Mutex<HashMap<usize, usize>>,
@@ -185,7 +187,7 @@ unsafe extern "C" {
 /// # Safety
 /// The texts end with zeros, or the process may be lost.
 unsafe fn remember(environment: *mut c_void, status: c_int, category: *const c_char, text: *const c_char) {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller's requirement.
     let [category, text] = [category, text].map(|pointer| unsafe { text_at(pointer) });
     let mut said = locked(&SAID);
     if said.len() < 1000 {
@@ -211,7 +213,7 @@ type PlainLogger = unsafe extern "C" fn(
     f64,
 );
 
-/// Without its `...`, which stable Rust cannot define: on Linux and on Macs with Intel processors, named arguments are
+/// The logger is declared without `...`, which stable Rust cannot define: on Linux and on Macs with Intel processors, named arguments are
 /// passed the same way.
 #[allow(clippy::too_many_arguments, reason = "the values of the message")]
 unsafe extern "C" fn log_of_fmi2(
@@ -264,7 +266,7 @@ unsafe fn expanded(format: &[u8], mut words: &[usize], mut numbers: &[f64]) -> V
         };
         let (conversion, after) = rest.split_at(end + 2);
         if let (b"%s", [word, others @ ..]) = (conversion, words) {
-            // SAFETY: the caller's promise.
+            // SAFETY: the caller's requirement.
             let string = unsafe { text_at(*word as *const c_char) };
             text.extend(string.unwrap_or_else(|| b"(null)".to_vec()));
             (words, rest) = (others, after);
@@ -312,7 +314,7 @@ unsafe extern "C" fn log_of_fmi3(
     unsafe { remember(environment, status, category, text) }
 }
 
-/// What is kept for a call.
+/// Values that live until a call returns.
 enum Kept {
     /// An array for reading.
     In(Guarded),
@@ -339,9 +341,9 @@ impl Player {
         let _ = locked(&self.file).write_all(&line);
     }
 
-    fn play(&self, script: &[Numbered], tell: bool) -> Vec<Outcome> {
+    fn play(&self, sequence: &[Numbered], tell: bool) -> Vec<Outcome> {
         let mut outcomes = Vec::new();
-        for numbered in script {
+        for numbered in sequence {
             let mut outcome = Outcome { id: numbered.id, ..Outcome::default() };
             match &numbered.step {
                 Step::Repeat(times, steps) => {
@@ -356,16 +358,17 @@ impl Player {
                         }
                     }
                     memory::KEEP.store(false, Ordering::Relaxed);
-                    outcome.measured = Some(crate::script::Measured { times: done, ..Default::default() });
+                    outcome.measured =
+                        Some(crate::call_sequence::Measured { times: done, ..Default::default() });
                     if tell {
                         last.iter().for_each(|outcome| self.write(outcome));
                     }
                 }
-                Step::Parallel(scripts) => {
+                Step::Parallel(sequences) => {
                     memory::KEEP.store(true, Ordering::Relaxed);
                     std::thread::scope(|scope| {
-                        for script in scripts {
-                            scope.spawn(|| self.play(script, tell));
+                        for sequence in sequences {
+                            scope.spawn(|| self.play(sequence, tell));
                         }
                     });
                     memory::KEEP.store(false, Ordering::Relaxed);
@@ -383,15 +386,15 @@ impl Player {
 
     fn one(&self, step: &Step, outcome: &mut Outcome) {
         match step {
-            Step::Make(place, make) => self.make(*place, make, outcome),
-            Step::Free(place) => {
-                let nobody = (*place == NOBODY).then_some(Instance {
+            Step::Make(index, make) => self.make(*index, make, outcome),
+            Step::Free(index) => {
+                let nobody = (*index == NOBODY).then_some(Instance {
                     handle: 0,
                     environment: 0,
                     co_simulation: self.setting.libraries[0].is_some(),
                     _callbacks: None,
                 });
-                let Some(instance) = nobody.or_else(|| locked(&self.instances).remove(place)) else { return };
+                let Some(instance) = nobody.or_else(|| locked(&self.instances).remove(index)) else { return };
                 let name = self.named("FreeInstance");
                 if let Some(address) = self.find(instance.co_simulation, &name) {
                     INSIDE.enter();
@@ -446,11 +449,11 @@ impl Player {
     }
 
     fn find(&self, co_simulation: bool, name: &str) -> Option<*const c_void> {
-        let place = usize::from(!co_simulation);
+        let index = usize::from(!co_simulation);
         let mut libraries = locked(&self.libraries);
-        if libraries[place].is_none() {
-            let path = self.setting.libraries[place].as_ref()?;
-            if place == 1 && self.setting.libraries[0].as_ref() == Some(path) && libraries[0].is_some() {
+        if libraries[index].is_none() {
+            let path = self.setting.libraries[index].as_ref()?;
+            if index == 1 && self.setting.libraries[0].as_ref() == Some(path) && libraries[0].is_some() {
                 libraries[1] = libraries[0];
             } else {
                 INSIDE.enter();
@@ -458,7 +461,7 @@ impl Player {
                 let loaded = unsafe { libloading::Library::new(path) };
                 INSIDE.leave();
                 match loaded {
-                    Ok(library) => libraries[place] = Some(Box::leak(Box::new(library))),
+                    Ok(library) => libraries[index] = Some(Box::leak(Box::new(library))),
                     Err(error) => {
                         let why = std::error::Error::source(&error)
                             .map_or_else(|| error.to_string(), |source| source.to_string());
@@ -469,11 +472,11 @@ impl Player {
             }
         }
         // SAFETY: only the address is asked for.
-        let found = unsafe { libraries[place]?.get::<*const c_void>(name.as_bytes()) };
+        let found = unsafe { libraries[index]?.get::<*const c_void>(name.as_bytes()) };
         found.ok().map(|symbol| *symbol).filter(|address| !address.is_null())
     }
 
-    fn make(&self, place: usize, make: &Make, outcome: &mut Outcome) {
+    fn make(&self, index: usize, make: &Make, outcome: &mut Outcome) {
         // Texts are gone after the call: what is needed of them must have been copied.
         let text = |text: &Option<String>| {
             text.as_ref()
@@ -590,18 +593,18 @@ impl Player {
             _callbacks: callbacks,
         };
         let before = match handle.is_null() {
-            true => locked(&self.instances).remove(&place),
-            false => locked(&self.instances).insert(place, instance),
+            true => locked(&self.instances).remove(&index),
+            false => locked(&self.instances).insert(index, instance),
         };
-        // What an instance that was not freed was given stays.
+        // Arguments of an instance that was not freed stay allocated.
         std::mem::forget(before);
     }
 
     fn call(&self, of: Option<usize>, function: &str, args: &[Arg], outcome: &mut Outcome) {
         let (handle, environment, co_simulation) = match of {
-            Some(place) => match locked(&self.instances).get(&place) {
+            Some(index) => match locked(&self.instances).get(&index) {
                 Some(instance) => (instance.handle, instance.environment, instance.co_simulation),
-                // It was not made: there is nothing to call.
+                // Instantiation failed, so the call is skipped.
                 None => return,
             },
             None => (0, 0, self.setting.libraries[0].is_some()),
@@ -746,7 +749,7 @@ impl Player {
 /// The loader's reason, as the only line.
 #[derive(Serialize, Deserialize)]
 pub struct Unloadable {
-    /// What it says.
+    /// The messages.
     pub unloadable: String,
 }
 
@@ -772,7 +775,7 @@ fn read(array: &Guarded, kind: Kind, count: usize, succeeded: bool) -> Written {
     Written::Numbers(kind, words.collect())
 }
 
-/// What was said with this environment, and with one that nobody was given.
+/// Messages with this environment pointer, and with an unknown pointer.
 fn messages(environment: usize) -> Vec<Message> {
     let mut said = locked(&SAID);
     let mut own = Vec::new();
@@ -785,7 +788,7 @@ fn messages(environment: usize) -> Vec<Message> {
     own
 }
 
-/// The folder as importers write it: a URI in FMI 2.0 (section 2.1.5), a path with an end in FMI 3.0 (section 2.3.1).
+/// The directory as importers write it: a URI in FMI 2.0 (section 2.1.5), a path with an end in FMI 3.0 (section 2.3.1).
 fn location(setting: &Setting) -> CString {
     let path = setting.resources.display().to_string();
     let text = if setting.fmi3 {
@@ -800,9 +803,9 @@ fn location(setting: &Setting) -> CString {
 /// A text that a function returns or passes, NULL or not.
 ///
 /// # Safety
-/// It ends with a zero, or the process may be lost.
+/// The string has a NUL at its end.
 pub unsafe fn text_at(pointer: *const c_char) -> Option<Vec<u8>> {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller's requirement.
     (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) }.to_bytes().to_vec())
 }
 

@@ -1,0 +1,323 @@
+//! What `build_fmu` makes: the description, its variants, the FMU.
+
+use fmi_schema::fmi2::{DependenciesKind, Fmi2ModelDescription, Fmi2VariableDependency};
+use fmi_schema::traits::FmiModelDescription;
+use fmu_export::Variables;
+use prw_testbed::TestbedFmu;
+use prw_testbed::parameters::Parameters;
+use prw_testbed::state_space::{StateSpace, state_space};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/modelDescription.xml");
+const TABLE_1: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../modelDescription/parameters.json");
+
+fn build_fmu(arguments: &[&str], out: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_build_fmu")).args(arguments).arg("--out").arg(out).output().unwrap()
+}
+
+fn errors(output: &Output) -> String {
+    assert!(!output.status.success(), "{output:?}");
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The description that `build_fmu` writes with these arguments.
+fn description(arguments: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let output = build_fmu(&[&["--describe"], arguments].concat(), folder.path());
+    assert!(output.status.success(), "{output:?}");
+    fs::read_to_string(folder.path().join("modelDescription.xml")).unwrap()
+}
+
+/// Table 1 with some text replaced.
+fn parameter_file(folder: &Path, from: &str, to: &str) -> String {
+    let table = fs::read_to_string(TABLE_1).unwrap();
+    assert!(table.contains(from));
+    let path = folder.join("mine.json");
+    fs::write(&path, table.replace(from, to)).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn the_committed_description_is_up_to_date() {
+    assert!(
+        fs::read_to_string(COMMITTED).unwrap_or_default() == description(&[]),
+        "modelDescription/modelDescription.xml is out of date; write it anew with\n    \
+         cargo run --release --bin build_fmu -- --describe"
+    );
+}
+
+#[test]
+fn it_reads_back_as_the_model_that_was_compiled() {
+    let read = Fmi2ModelDescription::deserialize(&description(&[])).unwrap();
+    // What is kept with the sources does not change with them.
+    assert_eq!(read.guid, fmu_package::NO_GUID);
+    assert_eq!(read.model_name, "PitchRollWristTestbed");
+    assert_eq!(read.num_states(), 6);
+    let names: Vec<&str> = read.get_model_variables().map(|variable| variable.name.as_str()).collect();
+    let table: Vec<&str> = TestbedFmu::TABLE.iter().map(|variable| variable.name()).collect();
+    assert_eq!(names, table);
+}
+
+/// The non-zeros of a row of a matrix over the states and one over the inputs.
+fn knowns(names: [&[&'static str]; 2], rows: [Vec<f64>; 2]) -> BTreeSet<&'static str> {
+    let pairs = names.into_iter().zip(rows).flat_map(|(names, row)| names.iter().zip(row));
+    pairs.filter(|(_, factor)| *factor != 0.0).map(|(name, _)| *name).collect()
+}
+
+/// The dependencies are found from the model's partial derivatives; the matrices of eq. (11) come from
+/// other code.
+#[test]
+fn dependencies_are_the_sparsity_of_the_matrices() {
+    let read = Fmi2ModelDescription::deserialize(&description(&[])).unwrap();
+    let name = |index: u32| read.model_variables.variables[index as usize - 1].name.as_str();
+    let listed = |list: &[Fmi2VariableDependency], unknown: &str| -> BTreeSet<String> {
+        let Some(entry) = list.iter().find(|entry| name(entry.index) == unknown) else {
+            panic!("{unknown} is not listed");
+        };
+        assert_eq!(entry.dependencies.len(), entry.dependencies_kind.len());
+        assert!(entry.dependencies.is_sorted());
+        entry.dependencies.iter().map(|index| name(*index).to_owned()).collect()
+    };
+    let inputs = ["theta1", "theta2", "omega1", "omega2"];
+    let states = ["theta3", "theta4", "theta5", "theta6", "omega5", "omega6"];
+    let StateSpace { A, B, C, D } = state_space(&Parameters::BUILT_IN);
+    let owned = |set: BTreeSet<&str>| set.into_iter().map(str::to_owned).collect::<BTreeSet<_>>();
+
+    let structure = &read.model_structure;
+    for (row, state) in states.iter().enumerate() {
+        let expected = knowns(
+            [&states, &inputs],
+            [A.row(row).iter().copied().collect(), B.row(row).iter().copied().collect()],
+        );
+        assert_eq!(listed(&structure.derivatives.unknowns, &format!("der({state})")), owned(expected));
+    }
+    // y of eq. (11) is theta3, theta4, theta1, theta2, tau1, tau2.
+    for (row, output) in [(0, "theta3"), (1, "theta4"), (4, "tau1"), (5, "tau2")] {
+        let expected = knowns(
+            [&states, &inputs],
+            [C.row(row).iter().copied().collect(), D.row(row).iter().copied().collect()],
+        );
+        assert_eq!(listed(&structure.outputs.unknowns, output), owned(expected));
+    }
+    for (output, expected) in [
+        ("pitch", ["theta5", "theta6"]),
+        ("roll", ["theta5", "theta6"]),
+        ("pitch_rate", ["omega5", "omega6"]),
+        ("roll_rate", ["omega5", "omega6"]),
+    ] {
+        assert_eq!(listed(&structure.outputs.unknowns, output), owned(expected.into()));
+    }
+    for (unknown, expected) in [
+        // What a state starts from, then what starts from states.
+        ("theta3", &["theta1", "theta3_start"][..]),
+        ("theta4", &["theta2", "theta4_start"]),
+        ("theta5", &["theta1", "theta5_start"]),
+        ("theta6", &["theta2", "theta6_start"]),
+        ("omega5", &["omega5_start"]),
+        ("omega6", &["omega6_start"]),
+        (
+            "tau1",
+            &[
+                "theta1",
+                "omega1",
+                "theta3_start",
+                "theta5_start",
+                "omega5_start",
+                "k1",
+                "k2",
+                "c1",
+                "c2",
+                "use_omega",
+            ],
+        ),
+        (
+            "der(theta4)",
+            &[
+                "theta2",
+                "omega2",
+                "theta4_start",
+                "theta6_start",
+                "omega6_start",
+                "k1",
+                "k2",
+                "c1",
+                "c2",
+                "use_omega",
+            ],
+        ),
+        ("roll_rate", &["omega5_start", "omega6_start", "M", "N"]),
+        ("pitch", &["theta1", "theta2", "theta5_start", "theta6_start"]),
+        ("der(theta5)", &["omega5_start"]),
+    ] {
+        let expected: BTreeSet<&str> = expected.iter().copied().chain(["start_at_rest"]).collect();
+        assert_eq!(listed(&structure.initial_unknowns.unknowns, unknown), owned(expected));
+    }
+    assert_eq!(structure.initial_unknowns.unknowns.len(), 18);
+}
+
+#[test]
+fn tunable_parameters_make_another_fmu() {
+    let (fixed, tunable) = (description(&[]), description(&["--tunable"]));
+    let [fixed, tunable] = [fixed, tunable].map(|text| Fmi2ModelDescription::deserialize(&text).unwrap());
+    let kinds = |read: &Fmi2ModelDescription, kind: &DependenciesKind| {
+        let lists = [&read.model_structure.outputs.unknowns, &read.model_structure.derivatives.unknowns];
+        lists
+            .into_iter()
+            .flatten()
+            .flat_map(|unknown| &unknown.dependencies_kind)
+            .filter(|k| *k == kind)
+            .count()
+    };
+    use DependenciesKind::{Constant, Fixed, Tunable};
+    assert_eq!(kinds(&fixed, &Tunable), 0);
+    assert_eq!(kinds(&tunable, &Fixed), 0);
+    assert_eq!(kinds(&fixed, &Fixed), kinds(&tunable, &Tunable));
+    assert_eq!(kinds(&fixed, &Constant), kinds(&tunable, &Constant));
+}
+
+#[test]
+fn other_parameters_are_other_start_values() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = parameter_file(
+        folder.path(),
+        "\"value\": 2.11, \"unit\": \"N.m/deg\"",
+        "\"value\": 99.5, \"unit\": \"N.m/rad\"",
+    );
+    let (before, after) = (description(&[]), description(&["--parameters", &file]));
+    let changed: Vec<_> =
+        before.lines().zip(after.lines()).filter(|(a, b)| a != b).map(|(_, b)| b.trim()).collect();
+    assert_eq!(changed.len(), 1, "{changed:?}");
+    assert!(
+        changed[0].starts_with(r#"<Real declaredType="RotationalSpringConstant" start="99.5" "#),
+        "{changed:?}"
+    );
+    // The same values from another file are the same FMU.
+    let copy = parameter_file(folder.path(), "meaning", "meaning");
+    assert_eq!(description(&["--parameters", &copy]), before);
+}
+
+/// The guid depends on the options and on every digit of the parameters, but not on the format of their file.
+#[test]
+fn every_variant_has_a_separate_guid() {
+    let folder = tempfile::tempdir().unwrap();
+    let file =
+        |value: &str| parameter_file(folder.path(), "\"value\": 2.11,", &format!("\"value\": {value},"));
+    let same = guid(&["--parameters", &file("2.110")]);
+    let other = guid(&["--parameters", &file("2.1100000000000003")]);
+    assert_eq!(same, guid(&[]));
+    assert_eq!(BTreeSet::from([same, other, guid(&["--tunable"])]).len(), 3);
+}
+
+#[test]
+fn wrong_requests_are_refused_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let file = parameter_file(folder.path(), "\"value\": 2.11", "\"value\": -2.11");
+    let extreme = tempfile::tempdir().unwrap();
+    let extreme = parameter_file(extreme.path(), "\"value\": 2.11", "\"value\": 1e306");
+    // The header of a universal library of macOS, for Intel alone, with nothing else or a function of FMI.
+    let header = [0xcafe_babe_u32, 1, 0x0100_0007, 3, 0x1000, 0, 12].map(u32::to_be_bytes).concat();
+    let [empty, library] = [("empty", &b""[..]), ("a", b"fmi2Instantiate")].map(|(name, content)| {
+        let library = folder.path().join(name).with_extension("dylib");
+        fs::write(&library, [&header, content].concat()).unwrap();
+        library.to_str().unwrap().to_owned()
+    });
+    for (arguments, message) in [
+        (&["--parameters", file.as_str()][..], "mine.json: in SI units: k1 must be > 0, it is -120.89"),
+        (
+            &["--parameters", extreme.as_str()],
+            "mine.json: the model cannot be made for Co-Simulation: the parameters are too far",
+        ),
+        (&["--parameters", "none.json"], "none.json: cannot be read"),
+        (&["--binary", "linux65=a.so"], "'linux65' is no platform of FMI 2.0"),
+        (&["--binary", "linux64=none.so"], "cannot read none.so, the library for linux64"),
+        (&["--binary", &format!("linux64={file}")], "it is no shared library"),
+        (&["--binary", &format!("win64={library}")], "it is for darwin64, not for win64"),
+        (&["--binary", &format!("aarch64-darwin={library}")], "add --any-processor"),
+        (
+            &["--fmi", "2", "--any-processor", "--binary", &format!("aarch64-darwin={library}")],
+            "was not compiled from these sources and parameters",
+        ),
+        (&["--binary", &format!("darwin64={library}")], "was not compiled from these sources and parameters"),
+        (&["--binary", &format!("darwin64={empty}")], "has no functions of FMI"),
+        (&["--target", "sparc"], "no FMU platform is known for the target 'sparc'"),
+    ] {
+        let text = errors(&build_fmu(arguments, &out));
+        // What cargo says of its progress may come before.
+        let last = text.lines().last().unwrap_or_default();
+        assert!(last.starts_with("error: ") && last.contains(message), "{text}");
+    }
+    assert!(!out.exists());
+    let into_the_sources =
+        Command::new(env!("CARGO_BIN_EXE_build_fmu")).args(["--describe", "--tunable"]).output();
+    let text = errors(&into_the_sources.unwrap());
+    assert!(text.contains("--out"), "{text}");
+}
+
+fn guid(arguments: &[&str]) -> String {
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_build_fmu")).arg("--guid").args(arguments).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stdout).unwrap().trim().to_owned()
+}
+
+#[test]
+fn two_builds_give_the_same_fmu_with_the_committed_description() {
+    let (folder, guid) = (tempfile::tempdir().unwrap(), guid(&[]));
+    let build = |name: &str| {
+        let out = folder.path().join(name);
+        let output = build_fmu(&[], &out);
+        assert!(output.status.success(), "{output:?}");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(text.contains(&guid) && text.contains("parameters.json"), "{text}");
+        fs::read(out.join("prw_testbed.fmu")).unwrap()
+    };
+    let (one, other) = (build("one"), build("other"));
+    assert!(one == other, "the same sources gave two different FMUs");
+
+    let mut zip = zip::ZipArchive::new(std::io::Cursor::new(one)).unwrap();
+    let mut read = |name: &str| std::io::read_to_string(zip.by_name(name).unwrap()).unwrap();
+    let described = description(&[]).replace(fmu_package::NO_GUID, &guid);
+    assert!(read("modelDescription.xml") == described, "the FMU has another description than the sources");
+    for name in ["license.txt", "third-party.txt", "LICENSE-APACHE", "LICENSE-MIT"] {
+        assert!(!read(&format!("documentation/licenses/{name}")).is_empty(), "{name}");
+    }
+}
+
+/// The packages that are compiled into the library are those whose licenses the FMU names.
+#[test]
+fn the_licenses_of_all_packages_are_there() {
+    let cargo = env!("CARGO");
+    let arguments = [
+        "tree",
+        "--locked",
+        "--package",
+        "prw_testbed",
+        "--no-default-features",
+        "--edges",
+        "normal,no-proc-macro",
+    ];
+    let output = Command::new(cargo)
+        .args(arguments)
+        .args(["--prefix", "none", "--format", "{p}"])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let tree = String::from_utf8(output.stdout).unwrap();
+    // In parentheses: the path of a package of this project, or the mark of one that was listed before.
+    let compiled: BTreeSet<&str> =
+        tree.lines().filter(|line| !line.contains('(')).filter_map(|line| line.split(' ').next()).collect();
+    let list = include_str!("../../../modelDescription/licenses/third-party.txt");
+    let named: BTreeSet<&str> = list
+        .lines()
+        .skip_while(|line| !line.starts_with("package"))
+        .skip(1)
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.split(' ').next())
+        .collect();
+    assert_eq!(compiled, named, "modelDescription/licenses/third-party.txt is out of date");
+}

@@ -1,0 +1,366 @@
+//! Sequences of calls as data, and what came of them. A worker plays them, a shrinker shortens them, a printer writes them
+//! as programs.
+
+use fmi_abi::Interface;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+
+/// The kinds of numbers in arrays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "names of types")]
+pub enum Kind {
+    F64,
+    F32,
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    I64,
+    U64,
+    /// `size_t`.
+    Size,
+    /// Pointers to texts or to bytes.
+    Pointer,
+}
+
+impl Kind {
+    /// The bytes of one.
+    pub const fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::F32 | Self::I32 | Self::U32 => 4,
+            Self::F64 | Self::I64 | Self::U64 => 8,
+            Self::Size | Self::Pointer => size_of::<usize>(),
+        }
+    }
+
+    /// Whether it is a floating-point number.
+    pub const fn is_float(self) -> bool {
+        matches!(self, Self::F64 | Self::F32)
+    }
+
+    /// The number behind bits.
+    pub fn number(self, bits: u64) -> f64 {
+        match self {
+            Self::F64 => f64::from_bits(bits),
+            Self::F32 => f64::from(f32::from_bits(bits as u32)),
+            Self::I8 => f64::from(bits as i8),
+            Self::I16 => f64::from(bits as i16),
+            Self::I32 => f64::from(bits as i32),
+            Self::I64 => bits as i64 as f64,
+            _ => bits as f64,
+        }
+    }
+
+    /// The bits of a number.
+    pub fn bits(self, number: f64) -> u64 {
+        match self {
+            Self::F64 => number.to_bits(),
+            Self::F32 => u64::from((number as f32).to_bits()),
+            Self::I8 => number as i8 as u8 as u64,
+            Self::I16 => number as i16 as u16 as u64,
+            Self::I32 => number as i32 as u32 as u64,
+            Self::I64 => number as i64 as u64,
+            Self::U8 => number as u8 as u64,
+            Self::U16 => number as u16 as u64,
+            Self::U32 => number as u32 as u64,
+            Self::U64 | Self::Size | Self::Pointer => number as u64,
+        }
+    }
+}
+
+/// One argument of a call.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Arg {
+    /// A floating-point number, as its bits.
+    Real(u64),
+    /// A whole number, a size, a boolean value.
+    Whole(i64),
+    /// NULL.
+    Null,
+    /// A pointer that is no multiple of what it points to.
+    Misaligned,
+    /// An array of numbers, as their bits.
+    In(Kind, Vec<u64>),
+    /// An array of texts; `None` is NULL.
+    Texts(Vec<Option<Vec<u8>>>),
+    /// An array of pointers to bytes.
+    Blobs(Vec<Vec<u8>>),
+    /// Room for so many numbers.
+    Out(Kind, usize),
+    /// A saved state, by the number of its index.
+    State(usize),
+    /// The index of a saved state.
+    StateOut(usize),
+    /// Serialized bytes, by the number of their index.
+    Saved(usize),
+    /// How many they are.
+    SavedSize(usize),
+    /// Receives the size of these bytes.
+    SizeOut(usize),
+    /// Receives these bytes, up to the size.
+    SavedOut(usize),
+}
+
+impl Arg {
+    /// A floating-point number.
+    pub fn real(number: f64) -> Self {
+        Self::Real(number.to_bits())
+    }
+}
+
+/// How an instance is made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Make {
+    /// Whether it steps itself.
+    pub co_simulation: bool,
+    /// Its name; `None` is NULL.
+    pub name: Option<String>,
+    /// Arguments of the instantiation.
+    pub token: Option<String>,
+    /// Whether it logs.
+    pub logging: bool,
+    /// Whether the importer handles events (FMI 3.0).
+    pub event_mode: bool,
+    /// Whether steps may return early (FMI 3.0).
+    pub early_return: bool,
+    /// Whether its environment is told where its resources are.
+    pub resources: bool,
+}
+
+/// The index of an instance that is NULL: freeing it is allowed.
+pub const NOBODY: usize = 999;
+
+/// A step of a sequence.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Step {
+    /// A new instance at this index.
+    Make(usize, Make),
+    /// Frees the instance.
+    Free(usize),
+    /// Calls a function of an instance; of NULL without one.
+    Call {
+        /// The instance.
+        of: Option<usize>,
+        /// The function.
+        function: String,
+        /// Arguments after the instance.
+        args: Vec<Arg>,
+    },
+    /// Calls that need no instance: the version and the platform.
+    Version(String),
+    /// Repeats steps this many times, or until the time limit.
+    Repeat(usize, Vec<Numbered>),
+    /// At once, each in a thread of its own.
+    Parallel(Vec<Vec<Numbered>>),
+    /// Memory, threads and settings of the process.
+    Measure,
+    /// Goes on in a new process, to which only serialized bytes are passed on.
+    FreshProcess,
+    /// Unloads the library.
+    Unload,
+    /// Ends the process as programs do: with the destructors of its libraries. Nothing follows.
+    Quit,
+}
+
+/// A step with a number of its own, which it keeps when others are left out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Numbered {
+    /// The number.
+    pub id: u32,
+    /// Whether the standard forbids the call: what it answers changes nothing of what is allowed after it.
+    pub forbidden: bool,
+    /// The step.
+    pub step: Step,
+}
+
+/// A sequence of calls.
+pub type CallSequence = Vec<Numbered>;
+
+/// A message of the FMU.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Message {
+    /// Variables that the step concerns.
+    pub status: i32,
+    /// Its category, as bytes; `None` is NULL.
+    pub category: Option<Vec<u8>>,
+    /// Its text, as bytes; `None` is NULL.
+    pub text: Option<Vec<u8>>,
+    /// Whether it came with the environment that the instance was given.
+    pub at_home: bool,
+}
+
+/// Values that a call wrote to an array.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Written {
+    /// Numbers, as their bits.
+    Numbers(Kind, Vec<u64>),
+    /// Texts or bytes; `None` is NULL.
+    Texts(Vec<Option<Vec<u8>>>),
+}
+
+impl Written {
+    /// The numbers.
+    pub fn numbers(&self) -> Vec<f64> {
+        match self {
+            Self::Numbers(kind, bits) => bits.iter().map(|bits| kind.number(*bits)).collect(),
+            Self::Texts(_) => Vec::new(),
+        }
+    }
+
+    /// This many values, starting at an index.
+    pub fn part(&self, begin: usize, size: usize) -> Option<Self> {
+        Some(match self {
+            Self::Numbers(kind, bits) => Self::Numbers(*kind, bits.get(begin..begin + size)?.to_vec()),
+            Self::Texts(texts) => Self::Texts(texts.get(begin..begin + size)?.to_vec()),
+        })
+    }
+
+    /// The value at an index, formatted for people.
+    pub fn show(&self, index: usize) -> String {
+        match self {
+            Self::Numbers(kind, bits) => bits.get(index).map_or("nothing".to_owned(), |bits| {
+                if kind.is_float() {
+                    format!("{:?}", kind.number(*bits))
+                } else {
+                    format!("{}", kind.number(*bits))
+                }
+            }),
+            Self::Texts(texts) => match texts.get(index) {
+                Some(Some(text)) => format!("{:?}", String::from_utf8_lossy(text)),
+                _ => "NULL".to_owned(),
+            },
+        }
+    }
+
+    /// The first index at which two differ.
+    pub fn differ(&self, other: &Self) -> Option<usize> {
+        match (self, other) {
+            (Self::Numbers(kind, one), Self::Numbers(_, two)) => {
+                // Zeros of both signs are equal, and so are all NaNs.
+                let equal =
+                    |one: f64, two: f64| kind.is_float() && (one == two || one.is_nan() && two.is_nan());
+                one.iter()
+                    .zip(two)
+                    .position(|(one, two)| one != two && !equal(kind.number(*one), kind.number(*two)))
+            }
+            (Self::Texts(one), Self::Texts(two)) => one.iter().zip(two).position(|(one, two)| one != two),
+            _ => Some(0),
+        }
+    }
+}
+
+/// The result of one step.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// The step's number.
+    pub id: u32,
+    /// Status of the function; for an instantiation, 1 for an instance and 0 for NULL.
+    pub status: Option<i32>,
+    /// The library has no such function.
+    pub missing: bool,
+    /// Values that were written to the arrays, in the order of the arguments.
+    pub written: Vec<Written>,
+    /// Messages of the FMU during the step.
+    pub log: Vec<Message>,
+    /// Writes outside of the arrays.
+    pub damage: Vec<String>,
+    /// The text of a version.
+    pub text: Option<Vec<u8>>,
+    /// Result of a measurement or of repetitions.
+    pub measured: Option<Measured>,
+}
+
+/// Memory, threads and settings of the process.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// Bytes in use, as the C library counts them; of the whole process where it does not count.
+    pub memory: u64,
+    /// Whether the C library counted them.
+    pub exact: bool,
+    /// Threads.
+    pub threads: usize,
+    /// Open files.
+    pub files: usize,
+    /// Settings of the process: rounding, locale, working directory, signal handlers.
+    pub settings: Vec<String>,
+    /// How often repetitions came.
+    pub times: usize,
+}
+
+/// How a sequence ended.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub enum End {
+    /// Ended after its last step.
+    #[default]
+    Done,
+    /// The process crashed; what the system says.
+    Crash(String),
+    /// The process did not end in time.
+    Hang(f64),
+    /// The library called `exit`.
+    Exit(i32),
+    /// The library cannot be loaded; what the loader says.
+    Unloadable(String),
+    /// The FMU started too many processes, which were ended.
+    Flood(usize),
+}
+
+/// The result of a call sequence.
+#[derive(Clone, Debug, Default)]
+pub struct Run {
+    /// Results by the number of the step.
+    pub outcomes: HashMap<u32, Outcome>,
+    /// How it ended.
+    pub end: End,
+    /// The step in which it ended, if not with the last.
+    pub at: Option<u32>,
+    /// Output on the standard output and the standard error.
+    pub said: String,
+    /// Names of the processes that were left at its end.
+    pub left: Vec<String>,
+}
+
+impl Run {
+    /// The outcome of a step.
+    pub fn of(&self, id: u32) -> Option<&Outcome> {
+        self.outcomes.get(&id)
+    }
+
+    /// Status of a step.
+    pub fn status(&self, id: u32) -> Option<i32> {
+        self.of(id)?.status
+    }
+
+    /// The first array that a step wrote.
+    pub fn written(&self, id: u32) -> Option<&Written> {
+        self.of(id)?.written.first()
+    }
+}
+
+/// The setting that all call sequences of an FMU share.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Setting {
+    /// FMI 3.0, not 2.0.
+    pub fmi3: bool,
+    /// The library of Co-Simulation and of Model Exchange.
+    pub libraries: [Option<std::path::PathBuf>; 2],
+    /// Path of the resources.
+    pub resources: std::path::PathBuf,
+    /// Bytes of memory at most.
+    pub memory: u64,
+    /// There is room after arrays, so that it can be observed what is written there.
+    pub soft: bool,
+    /// All symbols are looked up when the library is loaded, as some importers do.
+    pub now: bool,
+    /// Seconds of repetitions at most.
+    pub repetitions: f64,
+}
+
+/// Whether an interface is Co-Simulation.
+pub fn steps_itself(interface: Interface) -> bool {
+    interface == Interface::CoSimulation
+}

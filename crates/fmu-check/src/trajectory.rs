@@ -1,0 +1,322 @@
+//! A simulation that succeeds, found by playing it: all checks vary it.
+
+use crate::call_sequence::{CallSequence, End, Run, Step, Written};
+use crate::checker::Checker;
+use crate::description::Description;
+use crate::finding::{Event, ending, refused, refused_one, step_name};
+use crate::values::input_values;
+use crate::writer::{Point, Trajectory, Writer};
+use fmi_abi::Interface;
+use std::time::{Duration, Instant};
+
+/// A trajectory that takes longer is played too often.
+const LONG: Duration = Duration::from_millis(250);
+
+/// Updates of the discrete states that an event may need.
+const UPDATES: usize = 10;
+
+/// The reason for which a simulation fails, and its calls.
+#[derive(Debug)]
+pub struct NoTrajectory(pub String, pub CallSequence);
+
+impl std::fmt::Display for NoTrajectory {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for NoTrajectory {}
+
+/// A simulation that succeeds: in Co-Simulation steps with changing inputs, in Model Exchange an integration by Euler's
+/// method with its events.
+///
+/// # Errors
+/// [`NoTrajectory`] when there is none, and any other that ends the check.
+pub fn find_trajectory(checker: &Checker, interface: Interface) -> anyhow::Result<Trajectory> {
+    let start = checker.description.start_time;
+    let trajectory = Trajectory { interface, updates: 0, points: Vec::new(), end: start };
+    match interface {
+        Interface::CoSimulation if checker.description.event_mode() => with_events(checker, trajectory),
+        Interface::CoSimulation => in_steps(checker, trajectory),
+        Interface::ModelExchange => integrated(checker, trajectory),
+    }
+}
+
+/// The time from the start to the end of the default experiment.
+fn range(description: &Description) -> f64 {
+    description.stop_time.map_or(1.0, |stop| stop - description.start_time).max(1e-6)
+}
+
+/// The size of a step; section 4.4.1 of FMI 3.0: steps are multiples of the solver's.
+fn step_size(description: &Description) -> f64 {
+    let size = description.step_size.unwrap_or(range(description) / 100.0);
+    let internal = description.co_simulation.as_ref().and_then(|offer| offer.number("fixedInternalStepSize"));
+    internal.map_or(size, |internal| internal * (size / internal).round().clamp(1.0, 100.0))
+}
+
+/// A trajectory of these points, as far as its calls are good.
+fn up_to(mut trajectory: Trajectory, good: usize) -> Trajectory {
+    trajectory.points.truncate(good);
+    if let Some(last) = trajectory.points.last() {
+        trajectory.end = last.time + last.size;
+    }
+    trajectory
+}
+
+/// Steps of several sizes to the end of the default experiment, if they may have several and that takes no time; otherwise
+/// of one size. Without changes of Booleans, if these fail.
+fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Trajectory> {
+    let description = &checker.description;
+    let size = step_size(description);
+    let times = ((range(description) / size - 4.0) / 8.0).round();
+    let far = checker.can(trajectory.interface, &["canHandleVariableCommunicationStepSize"]) && times > 1.0;
+    for (reach, discrete) in [(times, true), (times, false), (1.0, true), (1.0, false)] {
+        if reach > 1.0 && !far {
+            continue;
+        }
+        let sizes: Vec<f64> = (0..12).map(|number| if number < 4 { size } else { reach * size }).collect();
+        let points = steps(description, description.start_time, &sizes, discrete);
+        let trajectory = Trajectory { points, ..trajectory.clone() };
+        let mut writer = checker.writer();
+        let mut ids = writer.begin(0, &trajectory);
+        for point in &trajectory.points {
+            ids.extend(writer.point(0, &trajectory, point));
+        }
+        let begin = Instant::now();
+        let run = checker.play(&writer.sequence)?;
+        if reach > 1.0 && (run.end != End::Done || begin.elapsed() > LONG) {
+            continue;
+        }
+        made(&run, &writer, ids[0])?;
+        let (good, discarded) = good_steps(checker, &run, &writer.sequence);
+        match refused(&writer.sequence, &run, &ids) {
+            None => return Ok(up_to(trajectory, good)),
+            // A model may end its simulation.
+            Some(_) if discarded && good >= 2 => return Ok(up_to(trajectory, good)),
+            Some(why) if !discrete && reach == 1.0 => return Err(NoTrajectory(why, writer.sequence).into()),
+            Some(_) => {}
+        }
+    }
+    Ok(trajectory)
+}
+
+/// The number of steps before one that fails or ends the simulation, and whether one was discarded.
+fn good_steps(checker: &Checker, run: &Run, sequence: &CallSequence) -> (usize, bool) {
+    let step = |step: &Step| matches!(step, Step::Call { function, .. } if function.ends_with("DoStep"));
+    let ids = sequence.iter().filter(|numbered| step(&numbered.step)).map(|numbered| numbered.id);
+    let mut good = 0;
+    for id in ids {
+        let flags = run.of(id).map_or(&[][..], |of| &of.written);
+        let flag = |index: usize| flags.get(index).is_some_and(|flag| flag.numbers().first() == Some(&1.0));
+        // Before one that returns early as well, from where the next step would have to go on.
+        if run.status(id).is_none_or(|status| status > 1) || checker.fmi3() && (0..3).any(flag) {
+            return (good, run.status(id) == Some(2));
+        }
+        good += 1;
+    }
+    (good, false)
+}
+
+/// Fails if a run has not ended well or its first instance was not made.
+fn made(run: &Run, writer: &Writer, make: u32) -> anyhow::Result<()> {
+    match ending(run, &writer.sequence).or_else(|| refused_one(&writer.sequence, run, make)) {
+        Some(why) => Err(NoTrajectory(why, writer.sequence.clone()).into()),
+        None => Ok(()),
+    }
+}
+
+/// Counts the updates that the initialization needs, and returns the event after them.
+fn initialized(checker: &Checker, trajectory: &mut Trajectory) -> anyhow::Result<Option<Event>> {
+    for updates in 1..=UPDATES {
+        trajectory.updates = updates;
+        let mut writer = checker.writer();
+        let make = writer.make(0, trajectory.interface);
+        let mut ids = vec![writer.enter(0), writer.call(0, "ExitInitializationMode", vec![])];
+        let updated = writer.update(0, updates);
+        ids.extend(&updated);
+        let run = checker.play(&writer.sequence)?;
+        made(&run, &writer, make)?;
+        if let Some(why) = refused(&writer.sequence, &run, &ids) {
+            return Err(NoTrajectory(why, writer.sequence).into());
+        }
+        match updated.last().and_then(|id| checker.event(&run, *id)) {
+            Some(event) if event.again => {}
+            event => return Ok(event),
+        }
+    }
+    Ok(None)
+}
+
+/// The event of the last update among these calls.
+fn last_event(checker: &Checker, run: &Run, writer: &Writer, ids: &[u32]) -> Option<Event> {
+    ids.iter().rev().find_map(|id| {
+        let named = |end: &str| {
+            let mut calls = writer.sequence.iter().filter(|numbered| numbered.id == *id);
+            calls.any(|numbered| step_name(&numbered.step).ends_with(end))
+        };
+        named("DiscreteStates").then(|| checker.event(run, *id)).flatten()
+    })
+}
+
+/// Steps of Co-Simulation with Event Mode, in which the events are handled that steps report.
+fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
+    initialized(checker, &mut trajectory)?;
+    let description = &checker.description;
+    for mut point in steps(description, description.start_time, &[step_size(description); 12], false) {
+        loop {
+            let mut writer = checker.writer();
+            let make = writer.begin(0, &trajectory)[0];
+            for other in &trajectory.points {
+                writer.point(0, &trajectory, other);
+            }
+            let ids = writer.point(0, &trajectory, &point);
+            let run = checker.play(&writer.sequence)?;
+            made(&run, &writer, make)?;
+            if let Some(why) = refused(&writer.sequence, &run, &ids) {
+                let few = trajectory.points.len() < 3;
+                return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(trajectory) };
+            }
+            let step = ids.iter().filter_map(|id| run.of(*id)).find(|of| of.written.len() == 4);
+            let flag = |index: usize| step.is_some_and(|of| of.written[index].numbers() == [1.0]);
+            let again = last_event(checker, &run, &writer, &ids).is_some_and(|event| event.again);
+            if flag(1) || flag(2) {
+                return Ok(trajectory);
+            }
+            if point.updates == UPDATES || !(again || flag(0) && point.updates == 0) {
+                break;
+            }
+            point.updates += 1;
+        }
+        trajectory.end = point.time + point.size;
+        trajectory.points.push(point);
+    }
+    Ok(trajectory)
+}
+
+/// The result of integrating to a point.
+struct Reached {
+    states: Vec<f64>,
+    slopes: Vec<f64>,
+    indicators: Vec<f64>,
+    /// The event there, if there was one.
+    event: Option<Event>,
+    /// The model ends.
+    ends: bool,
+}
+
+/// Adds a point to an integration, with as many updates as an event there needs; none if a call there fails after some
+/// points.
+fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> anyhow::Result<Option<Reached>> {
+    let count = checker.description.states_count().unwrap_or(0);
+    let indicators = checker.description.event_indicators.unwrap_or(0);
+    loop {
+        let mut writer = checker.writer();
+        let mut ids = writer.begin(0, trajectory);
+        for other in &trajectory.points {
+            ids.extend(writer.point(0, trajectory, other));
+        }
+        let here = writer.point(0, trajectory, point);
+        ids.extend(&here);
+        let asked = [
+            (count > 0).then(|| writer.vector(0, "GetContinuousStates", count)),
+            (count > 0).then(|| writer.derivatives(0, count)),
+            (indicators > 0).then(|| writer.vector(0, "GetEventIndicators", indicators)),
+        ];
+        let run = checker.play(&writer.sequence)?;
+        if let Some(why) = ending(&run, &writer.sequence) {
+            return Err(NoTrajectory(why, writer.sequence).into());
+        }
+        if let Some(why) = refused(&writer.sequence, &run, &ids[1..]) {
+            let few = trajectory.points.len() < 3;
+            return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(None) };
+        }
+        let completed = writer.sequence.iter().rev().find(|numbered| {
+            here.contains(&numbered.id) && step_name(&numbered.step).ends_with("CompletedIntegratorStep")
+        });
+        let flag = |index: usize| {
+            let written = completed.and_then(|numbered| run.of(numbered.id)?.written.get(index));
+            written.is_some_and(|of| of.numbers().first() == Some(&1.0))
+        };
+        let event = last_event(checker, &run, &writer, &here).filter(|_| point.updates > 0);
+        let again = event.is_some_and(|event| event.again) && point.updates < UPDATES;
+        if again || point.updates == 0 && flag(0) {
+            point.updates += 1;
+            continue;
+        }
+        let [states, slopes, indicators] =
+            asked.map(|id| id.and_then(|id| run.written(id)).map(Written::numbers).unwrap_or_default());
+        let ends = flag(1);
+        return Ok(Some(Reached { states, slopes, indicators, event, ends }));
+    }
+}
+
+/// Euler's method from the start on: first every point, then some on the way to the end of the default experiment, and those
+/// with events.
+fn integrated(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<Trajectory> {
+    let description = &checker.description;
+    let (count, range) = (description.states_count().unwrap_or(0), range(description));
+    let small = match count {
+        0 => range / 10.0,
+        _ => (range / 500.0).min(description.step_size.unwrap_or(f64::INFINITY)),
+    };
+    let (near, far, most) = if count > 0 { (6, range / 160.0, 166) } else { (14, small, 14) };
+    let mut next_event = initialized(checker, &mut trajectory)?.and_then(|event| event.next);
+    let (mut states, mut slopes, mut before) = (Vec::new(), Vec::<f64>::new(), Vec::<f64>::new());
+    let (mut time, mut event_now) = (description.start_time, false);
+    let begin = Instant::now();
+    for number in 0..most {
+        if trajectory.points.len() > 20 || number >= near && begin.elapsed() > 16 * LONG {
+            break;
+        }
+        // The first point is the start of the integration.
+        let mut size = if number == 0 { 0.0 } else { [far, small][usize::from(number < near)] };
+        if let Some(next) = next_event.filter(|next| *next > time) {
+            // Time events are reached at once where nothing is integrated.
+            if next <= time + size || count == 0 && number > 0 && number % 3 == 0 {
+                size = next - time;
+                event_now = true;
+            }
+        }
+        time += size;
+        for (state, slope) in states.iter_mut().zip(&slopes) {
+            *state += size * slope;
+        }
+        let phase = if number < near { number } else { near + number / 20 };
+        let (inputs, updates) = (input_values(description, phase, false), usize::from(event_now));
+        let mut point = Point { time, size, inputs, states: states.clone(), updates };
+        let Some(reached) = reached(checker, &trajectory, &mut point)? else { return Ok(trajectory) };
+        if reached.event.is_some_and(|event| event.terminate) {
+            return Ok(trajectory);
+        }
+        if reached.ends {
+            break;
+        }
+        next_event = reached.event.map_or(next_event, |event| event.next);
+        (states, slopes) = (reached.states, reached.slopes);
+        event_now =
+            before.iter().zip(&reached.indicators).any(|(before, now)| (*before > 0.0) != (*now > 0.0));
+        before = reached.indicators;
+        if number < near || number % 20 == 0 || point.updates > 0 {
+            trajectory.points.push(point);
+            trajectory.end = time;
+        }
+        if states.iter().chain(&slopes).any(|number| !number.is_finite() || number.abs() > 1e100) {
+            break;
+        }
+    }
+    Ok(trajectory)
+}
+
+/// Steps of Co-Simulation.
+pub fn steps(description: &Description, start: f64, sizes: &[f64], discrete: bool) -> Vec<Point> {
+    let mut time = start;
+    let points = sizes.iter().enumerate();
+    points
+        .map(|(number, &size)| {
+            let point =
+                Point { time, size, inputs: input_values(description, number, discrete), ..Point::default() };
+            time += size;
+            point
+        })
+        .collect()
+}

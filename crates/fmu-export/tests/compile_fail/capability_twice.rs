@@ -1,4 +1,0 @@
-//! A capability is named once.
-include!("toy/model.rs");
-
-offer!(Toy: CoSimulation + CoSimulation);

@@ -1,4 +1,0 @@
-//! There are five capabilities.
-include!("toy/model.rs");
-
-offer!(Toy: CoSimulation + Magic);

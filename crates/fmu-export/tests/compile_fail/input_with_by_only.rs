@@ -1,7 +1,0 @@
-//! An input lives somewhere.
-include!("toy/fields.rs");
-
-variables! { for Toy;
-    /// An input
-    u = input(&NUMBER) by |toy| toy.u;
-}

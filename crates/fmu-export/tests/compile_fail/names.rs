@@ -1,0 +1,42 @@
+//! Names that are defined twice, and names that nothing has.
+
+// Names are unique.
+mod two_of_one_name {
+    include!("shared/fields.rs");
+
+    variables! { for Plant;
+        /// An input
+        u = input(&NUMBER) in u;
+        /// Another
+        u = input(&NUMBER) in x;
+    }
+}
+
+// Other variables are named by their names.
+mod unknown_name_in_depends_on {
+    include!("shared/fields.rs");
+
+    variables! { for Plant;
+        /// An output
+        y = output(&NUMBER).depends_on(&[w]) by |plant| plant.u;
+    }
+}
+
+// Other variables are named by their names.
+mod unknown_name_in_derivative_of {
+    include!("shared/fields.rs");
+
+    variables! { for Plant;
+        /// A rate
+        dx = local(&NUMBER).derivative_of(w) by |plant| plant.u;
+    }
+}
+
+// There are five capabilities.
+mod capability_unknown {
+    include!("shared/model.rs");
+
+    offer!(Plant: CoSimulation + Magic);
+}
+
+fn main() {}

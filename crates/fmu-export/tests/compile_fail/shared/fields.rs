@@ -1,0 +1,11 @@
+// What the models here have in common.
+use fmu_export::*;
+
+#[derive(Clone)]
+pub struct Plant {
+    u: f64,
+    x: f64,
+    n: i32,
+    list: [f64; 8],
+}
+

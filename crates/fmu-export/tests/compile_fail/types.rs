@@ -1,0 +1,60 @@
+//! Types, fields and functions that do not exist or do not fit.
+
+// A capability that is named is implemented.
+mod capability_not_implemented {
+    include!("shared/fields.rs");
+
+    variables! { for Plant;
+        /// In
+        u = input(&NUMBER) in u;
+    }
+
+    impl Model for Plant {
+        const INFO: Info = info!("Plant", "plant");
+
+        fn new(_: &Setup) -> Result<Self, Error> {
+            Ok(Self { u: 0.0, x: 0.0, n: 0, list: [0.0; 8] })
+        }
+    }
+
+    offer!(Plant: CoSimulation);
+}
+
+// A capability is named once.
+mod capability_twice {
+    include!("shared/model.rs");
+
+    offer!(Plant: CoSimulation + CoSimulation);
+}
+
+// No variable is a character.
+mod no_type_for_values {
+    include!("shared/fields.rs");
+
+    variables! { for Plant;
+        /// An output
+        y = output(&INTEGER) by |_| '7';
+    }
+}
+
+// A place is a field of the model.
+mod unknown_field {
+    include!("shared/fields.rs");
+
+    variables! { for Plant;
+        /// An input
+        u = input(&NUMBER) in w;
+    }
+}
+
+// A kind is a function of Variable.
+mod unknown_kind {
+    include!("shared/fields.rs");
+
+    variables! { for Plant;
+        /// An input
+        u = inlet(&NUMBER) in u;
+    }
+}
+
+fn main() {}
