@@ -58,6 +58,62 @@ macro_rules! table {
             $(pub $free: unsafe extern "C" fn($($free_type),*) -> $result,)+
             $(pub $function: unsafe extern "C" fn($handle $(, $type)*) -> $crate::c_types::c_int,)+
         }
+
+        impl Functions {
+            /// The names of all functions.
+            pub const NAMES: &[&str] = &[$(stringify!($free),)+ $(stringify!($function),)+];
+
+            /// Finds the functions of a library by their names. A function that the library lacks is replaced by one that
+            /// returns Error, a null pointer or nothing.
+            ///
+            /// # Safety
+            /// Each pointer that `symbol` returns is a function of that name with the type of the standard. The library stays
+            /// loaded while the functions are used.
+            #[allow(unsafe_code)]
+            pub unsafe fn find(mut symbol: impl FnMut(&'static str) -> Option<*const $crate::c_types::c_void>) -> Self {
+                Self {
+                    $($free: match symbol(stringify!($free)) {
+                        // SAFETY: the caller guarantees the type.
+                        Some(found) => unsafe { std::mem::transmute::<*const _, unsafe extern "C" fn($($free_type),*) -> $result>(found) },
+                        None => {
+                            unsafe extern "C" fn absent($(_: $free_type),*) -> $result {
+                                $crate::Absent::RESULT
+                            }
+                            absent
+                        }
+                    },)+
+                    $($function: match symbol(stringify!($function)) {
+                        // SAFETY: the caller guarantees the type.
+                        Some(found) => unsafe {
+                            std::mem::transmute::<*const _, unsafe extern "C" fn($handle $(, $type)*) -> $crate::c_types::c_int>(found)
+                        },
+                        None => {
+                            unsafe extern "C" fn absent(_: $handle $(, _: $type)*) -> $crate::c_types::c_int {
+                                $crate::Status::Error as _
+                            }
+                            absent
+                        }
+                    },)+
+                }
+            }
+        }
     };
 }
 pub(crate) use table;
+
+/// The result of a function that a library lacks.
+trait Absent {
+    const RESULT: Self;
+}
+
+impl Absent for () {
+    const RESULT: Self = ();
+}
+
+impl Absent for *mut c_types::c_void {
+    const RESULT: Self = std::ptr::null_mut();
+}
+
+impl Absent for *const c_types::c_char {
+    const RESULT: Self = std::ptr::null();
+}

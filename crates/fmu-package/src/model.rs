@@ -2,7 +2,7 @@
 #![allow(unsafe_code, reason = "C functions of a library are found by their names")]
 
 use crate::table::Table;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use fmi_abi::c_types::c_void;
 use fmi_abi::{BaseType, Value, fmi2, fmi3};
 use std::path::Path;
@@ -62,13 +62,14 @@ impl LoadedModel {
         // SAFETY: the functions have the types of the standards, and the description that of fmu-export; `keep` gets a
         // pointer to a vector, which lives.
         let (fmi2, fmi3) = unsafe {
-            let fmi2 = fmi2_symbols::find(&library);
-            let (Ok(fmi2), Ok(fmi3)) = (fmi2, fmi3_symbols::find(&library)) else {
-                anyhow::bail!(
-                    "{} has no functions of FMI; its crate needs `export_fmu!(...)` in src/lib.rs (`offer!` makes none)",
-                    path.display()
-                );
-            };
+            let symbol = |name: &str| library.get::<*const c_void>(name).ok().map(|found| *found);
+            let mut names = fmi2::Functions::NAMES.iter().chain(fmi3::Functions::NAMES);
+            ensure!(
+                names.all(|name| symbol(name).is_some()),
+                "{} has no functions of FMI; its crate needs `export_fmu!(...)` in src/lib.rs (`offer!` makes none)",
+                path.display()
+            );
+            let (fmi2, fmi3) = (fmi2::Functions::find(symbol), fmi3::Functions::find(symbol));
             let describe = library.get::<Describe>(DESCRIPTION).with_context(|| {
                 format!(
                     "{} does not describe itself: its fmu-export is older than fmu-package {}; use the same version of both",
@@ -116,38 +117,4 @@ unsafe extern "C" fn keep(context: *mut c_void, text: *const u8, length: usize) 
     let (description, text) =
         unsafe { (&mut *context.cast::<Vec<u8>>(), std::slice::from_raw_parts(text, length)) };
     description.extend_from_slice(text);
-}
-
-macro_rules! find {
-    (
-        $standard:ident $handle:ident
-        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
-        with an instance {
-            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
-        }
-    ) => {
-        /// The functions of a library.
-        ///
-        /// # Safety
-        /// Functions of these names have the types of the standard.
-        pub unsafe fn find(library: &libloading::Library) -> Result<Functions, libloading::Error> {
-            // SAFETY: the caller's promise.
-            unsafe {
-                Ok(Functions {
-                    $($free: *library.get(stringify!($free))?,)+
-                    $($function: *library.get(stringify!($function))?,)+
-                })
-            }
-        }
-    };
-}
-
-mod fmi2_symbols {
-    use fmi_abi::fmi2::Functions;
-    fmi_abi::fmi2_functions!(find);
-}
-
-mod fmi3_symbols {
-    use fmi_abi::fmi3::Functions;
-    fmi_abi::fmi3_functions!(find);
 }

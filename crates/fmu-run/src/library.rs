@@ -1,10 +1,9 @@
 //! The shared library of an FMU, loaded for as long as anything needs it.
 
-use fmi_abi::Standard;
-use fmi_abi::c_types::{c_char, c_int, c_void};
+use fmi_abi::c_types::c_void;
+use fmi_abi::{Standard, fmi2, fmi3};
 use std::ffi::CString;
 use std::path::Path;
-use std::ptr::{null, null_mut};
 use std::sync::Arc;
 use tempfile::TempDir;
 
@@ -22,8 +21,8 @@ pub(crate) struct Library {
 /// Its functions, of the one standard or the other.
 #[derive(Debug)]
 pub(crate) enum Functions {
-    Fmi2(Box<fmi_abi::fmi2::Functions>),
-    Fmi3(Box<fmi_abi::fmi3::Functions>),
+    Fmi2(Box<fmi2::Functions>),
+    Fmi3(Box<fmi3::Functions>),
 }
 
 impl Library {
@@ -44,86 +43,21 @@ impl Library {
     ) -> Result<Self, libloading::Error> {
         // SAFETY: the caller's promise, here and below.
         let loaded = unsafe { libloading::Library::new(path) }?;
+        // SAFETY: the symbol is only looked up.
+        let symbol = |name: &str| unsafe { loaded.get::<*const c_void>(name) }.map(|found| *found);
         // SAFETY: see above.
         let functions = unsafe {
             match standard {
                 Standard::Fmi2 => {
-                    loaded.get::<*const c_void>("fmi2FreeInstance")?;
-                    Functions::Fmi2(fmi2::find(&loaded).into())
+                    symbol("fmi2FreeInstance")?;
+                    Functions::Fmi2(Box::new(fmi2::Functions::find(|name| symbol(name).ok())))
                 }
                 Standard::Fmi3 => {
-                    loaded.get::<*const c_void>("fmi3FreeInstance")?;
-                    Functions::Fmi3(fmi3::find(&loaded).into())
+                    symbol("fmi3FreeInstance")?;
+                    Functions::Fmi3(Box::new(fmi3::Functions::find(|name| symbol(name).ok())))
                 }
             }
         };
         Ok(Self { functions, resources, _loaded: loaded, _folder: folder })
     }
-}
-
-/// What a function answers that is not there.
-trait Absent {
-    const ANSWER: Self;
-}
-
-impl Absent for () {
-    const ANSWER: Self = ();
-}
-
-impl Absent for *mut c_void {
-    const ANSWER: Self = null_mut();
-}
-
-impl Absent for *const c_char {
-    const ANSWER: Self = null();
-}
-
-macro_rules! find {
-    (
-        $standard:ident $handle:ident
-        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
-        with an instance {
-            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
-        }
-    ) => {
-        /// The functions of a library.
-        ///
-        /// # Safety
-        /// As of [`Library::load`](super::Library::load).
-        pub unsafe fn find(library: &libloading::Library) -> Functions {
-            // SAFETY: by the caller's promise functions of these names have these types.
-            unsafe {
-                Functions {
-                    $($free: library.get(stringify!($free)).map_or(
-                        {
-                            unsafe extern "C" fn absent($(_: $free_type),*) -> $result {
-                                super::Absent::ANSWER
-                            }
-                            absent
-                        },
-                        |found| *found,
-                    ),)+
-                    $($function: library.get(stringify!($function)).map_or(
-                        {
-                            unsafe extern "C" fn absent(_: $handle $(, _: $type)*) -> super::c_int {
-                                fmi_abi::Status::Error as _
-                            }
-                            absent
-                        },
-                        |found| *found,
-                    ),)+
-                }
-            }
-        }
-    };
-}
-
-mod fmi2 {
-    use fmi_abi::fmi2::{Functions, types::*};
-    fmi_abi::fmi2_functions!(find);
-}
-
-mod fmi3 {
-    use fmi_abi::fmi3::{Functions, types::*};
-    fmi_abi::fmi3_functions!(find);
 }

@@ -1,35 +1,10 @@
 //! The shared library of an FMU, loaded for as long as the program runs.
 
+use fmi_abi::c_types::c_void;
 use fmi_abi::fmi2::Functions;
 use fmu_export::Exported;
 use std::path::Path;
 use std::sync::OnceLock;
-
-macro_rules! find_all {
-    (
-        $standard:ident $handle:ident
-        without an instance { $($free:ident($($free_argument:ident: $free_type:ty),*) -> $result:ty;)+ }
-        with an instance {
-            $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
-        }
-    ) => {
-        /// Finds the functions.
-        ///
-        /// # Safety
-        /// As of [`load`].
-        unsafe fn find_all(library: &libloading::Library) -> Result<Functions, libloading::Error> {
-            // SAFETY: by the caller's promise functions of these names have these types.
-            unsafe {
-                Ok(Functions {
-                    $($free: *library.get(stringify!($free))?,)+
-                    $($function: *library.get(stringify!($function))?,)+
-                })
-            }
-        }
-    };
-}
-
-fmi_abi::fmi2_functions!(find_all);
 
 /// Loads the shared library of an FMU that has all functions; it stays.
 ///
@@ -41,9 +16,14 @@ fmi_abi::fmi2_functions!(find_all);
 /// When it cannot be loaded, or lacks a function; the message names it.
 pub unsafe fn load(path: &Path) -> Result<Functions, libloading::Error> {
     // SAFETY: the caller's promise.
-    let library = unsafe { libloading::Library::new(path) }?;
+    let library = Box::leak(Box::new(unsafe { libloading::Library::new(path) }?));
+    // SAFETY: the symbol is only looked up.
+    let symbol = |name: &str| unsafe { library.get::<*const c_void>(name) }.map(|found| *found);
+    for name in Functions::NAMES {
+        symbol(name)?;
+    }
     // SAFETY: the caller's promise; the library is never unloaded.
-    unsafe { find_all(Box::leak(Box::new(library))) }
+    Ok(unsafe { Functions::find(|name| symbol(name).ok()) })
 }
 
 /// The functions of a model: those in this program or, for tests of what else was made of the model, those of the library
