@@ -29,8 +29,8 @@ def add_parser(subparsers: Any) -> None:
     """Add `examples` to the subcommands."""
     parser = subparsers.add_parser(
         "examples",
-        help=f"run the examples and write {PAGE} anew",
-        description=f"Runs the examples and writes {PAGE} and its figures anew. To be run in the project's folder.",
+        help=f"run the examples and write {PAGE}",
+        description=f"Runs the examples and writes {PAGE} and its figures. Run it in the repository root.",
     )
     parser.set_defaults(run=run)
 
@@ -46,12 +46,12 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def without_times(page: str) -> str:
-    """The page without what depends on the speed of the computer, which differs from run to run."""
+    """The page without the durations and rates, which differ from run to run."""
     return TIMES.sub("", page)
 
 
 def section(name: str) -> str:
-    """The part of the page about one example, which is run; its figure is written beside the page."""
+    """Runs one example, writes its figure, and returns its section of the page."""
     path = Path("examples", f"{name}.py")
     example, said = runpy.run_path(str(path)), io.StringIO()
     title, _, about = example["__doc__"].strip().partition("\n\n")
