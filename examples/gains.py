@@ -1,7 +1,7 @@
 """The controller's gains tuned over 10,000 wrists with tolerances, in a closed loop
 
-You learn to run controller and testbed as one system (fmu_run.System, seconds for 10,000 closed loops), with parameters
-of either, and to choose gains that serve nearly every wrist instead of the one in the data sheet.
+You learn to run controller and testbed as one system (fmu_run.System), with parameters of both, and to choose gains that
+suit nearly every wrist instead of the nominal one.
 
     make examples; .venv/bin/python examples/gains.py
 """

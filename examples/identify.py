@@ -1,7 +1,7 @@
 """Stiffness and damping of your wrist from a recording, in ten lines
 
-You learn to estimate the parameters from what the rig's sensors have recorded, with standard errors and 95 % intervals,
-and to look at the report. Here the rig is a pretended one, so that the truth is known.
+You learn to estimate parameters from recorded sensor signals, with standard errors and 95 % intervals, and to read the
+report. A simulated rig replaces the real one, so the true values are known.
 
     make examples; .venv/bin/python examples/identify.py
 """

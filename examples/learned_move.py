@@ -1,8 +1,8 @@
 """A move without vibration, learned on 1,024 wrists at a time
 
-You learn to make Gymnasium's environments of an FMU (`fmu_run.gymnasium`), each with a stiffness and a load of its own, and
-to search with NumPy alone, by the cross-entropy method, for a motors' course and the gains of a feedback. What was learned
-is tried on 1,000 other wrists with noisy sensors, beside input shapers (ZV, ZVD), which need no sensors.
+You learn to make Gymnasium environments from an FMU (`fmu_run.gymnasium`), each with other stiffness and load. The
+cross-entropy method finds a motor trajectory and feedback gains. The result is tested on 1,000 other wrists
+with noisy sensors, and compared with input shapers (ZV, ZVD), which need no sensors.
 
     make examples; .venv/bin/python examples/learned_move.py
 """

@@ -1,7 +1,7 @@
 """LQR and Kalman filter for the wrist, against the PI controller
 
-You learn to go from the FMU to its linear model (`prw.linearize`), to design a state feedback and a Kalman filter with
-python-control, and to close the loop around the FMU itself, sample by sample, with encoders that are noisy.
+You learn to linearize the FMU (`prw.linearize`) and to design a state feedback and a Kalman filter with python-control.
+The loop is closed around the FMU, sample by sample, with noisy encoders.
 
     make examples; .venv/bin/python examples/lqr.py
 """

@@ -1,7 +1,7 @@
-"""Predictive control of a model that is a black box, by 1,024 rollouts a decision
+"""Predictive control with a black-box model, by 1,024 rollouts per decision
 
-You learn to plan with any FMU as its own model (MPPI: model predictive path integral control): the state of the plant goes
-as bytes to 1,024 instances (`serialize`, `deserialize`), which try as many motions of the motors from there.
+You learn to plan with any FMU as its own model (MPPI: model predictive path integral control). The state of the plant is
+serialized and passed to 1,024 instances (`serialize`, `deserialize`), and each tries another motion of the motors.
 
     make examples; .venv/bin/python examples/predictive_control.py
 """

@@ -1,7 +1,7 @@
-"""The quietest way from rest to rest, found with CasADi
+"""The quietest motion from rest to rest, found with CasADi
 
-You learn to load the FMU into CasADi, to take the optimal control problem's matrices from the FMU's own derivatives,
-and to replay what was found on the FMU: the couplings are wound up and unwound so that nothing vibrates at the end.
+You learn to load the FMU into CasADi and to take the matrices of an optimal control problem from the FMU's derivatives.
+The motion is then replayed on the FMU: nothing vibrates at the end.
 
     make examples; .venv/bin/python examples/quiet_motion.py
 """

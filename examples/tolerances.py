@@ -1,7 +1,7 @@
-"""What tolerances in stiffness and damping do to tracking: 10,000 wrists
+"""Effect of tolerances in stiffness and damping on tracking: 10,000 wrists
 
-You learn to run an FMU ten thousand times with parameters drawn at random (fmu_run, seconds), to see how far pitch and
-roll stray from where stiff couplings would take them, and which parameter is to blame.
+You learn to run an FMU ten thousand times with random parameters (fmu_run). The plots show how far pitch and roll
+deviate from a wrist with stiff couplings, and which parameter causes it.
 
     make examples; .venv/bin/python examples/tolerances.py
 """

@@ -60,13 +60,13 @@ def readme(experiment: dict[str, Any]) -> str:
 
 {experiment["description"]}.
 
-Set the parameters of `{name}.ssv` first, `use_omega` among them. `{name}_ref.csv` does not come from the FMU, but from a
-solution that shares nothing with it. How far a result may be off, in rad, rad/s and N.m, at communication steps of
-{interfaces["CoSimulation"]["step_size"]:g} s, in Model Exchange with inputs that are interpolated as the solver goes on:
+Set the parameters of `{name}.ssv` first, including `use_omega`. `{name}_ref.csv` comes from a solution that shares no code with
+the FMU. The table lists the tolerances in rad, rad/s and N.m, for communication steps of
+{interfaces["CoSimulation"]["step_size"]:g} s. In Model Exchange the inputs are interpolated at every evaluation.
 
 | output |{heads}
 |---|{"---|" * len(interfaces)}
 {rows}
 
-`documentation/fmi-ls-ref.txt` in the FMU says more.
+`documentation/fmi-ls-ref.txt` in the FMU explains the experiments.
 """

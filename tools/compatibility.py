@@ -1,4 +1,4 @@
-"""`tools compatibility`: the table of docs/compatibility.md that is written from what tests/importers saw."""
+"""`tools compatibility`: writes the table of results of tests/importers in docs/compatibility.md."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from prw.errors import UserError
 from prw.files import write_text
 
 #: Where tests/importers leave what they saw, a file each, and where it goes; within the project.
-SEEN, PAGE, HEADING = Path("target/importers"), Path("docs/compatibility.md"), "Seen by tests/importers"
+SEEN, PAGE, HEADING = Path("target/importers"), Path("docs/compatibility.md"), "Results of tests/importers"
 HEADS = ("tool", "version", "fmu", "run", "seen", "date")
-TITLES = ("tool", "version", "FMU", "what was run", "what was seen", "date")
+TITLES = ("tool", "version", "FMU", "run", "result", "date")
 
 
 def add_parser(subparsers: Any) -> None:
     """Add `compatibility` to the subcommands."""
     parser = subparsers.add_parser(
         "compatibility",
-        help="write what tests/importers saw into docs/compatibility.md",
-        description=f"Writes the table “{HEADING}” of {PAGE} anew from {SEEN}, where `make test-importers` leaves it.",
+        help="write the results of tests/importers into docs/compatibility.md",
+        description=f"Writes the table “{HEADING}” of {PAGE} from the results of `make test-importers` in {SEEN}.",
     )
     parser.set_defaults(run=run)
 

@@ -1,4 +1,4 @@
-"""`tools examples`: runs the examples and writes docs/examples.md: what each is for, its figure, what it prints, its code."""
+"""`tools examples`: runs the examples and writes docs/examples.md: the purpose, the figure and the output of each example."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ HEAD = """# Examples
 
 <!-- written by make docs -->
 
-Short programs on top of the FMU and of the Python package `prw`, to read and to change. `make examples` installs what
-they need and builds the FMUs; each runs from the project's folder."""
+These short programs use the FMU and the package prw. `make examples` installs their packages and builds the FMUs. To run one from
+the root of the repository: `.venv/bin/python examples/lqr.py`."""
 
 
 def add_parser(subparsers: Any) -> None:
     """Add `examples` to the subcommands."""
     parser = subparsers.add_parser(
         "examples",
-        help=f"run the examples and write {PAGE} anew",
-        description=f"Runs the examples and writes {PAGE} and its figures anew. To be run in the project's folder.",
+        help=f"run the examples and write {PAGE}",
+        description=f"Runs the examples and writes {PAGE} and its figures. Run it in the repository root.",
     )
     parser.set_defaults(run=run)
 
@@ -46,23 +46,21 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def without_times(page: str) -> str:
-    """The page without what depends on the speed of the computer, which differs from run to run."""
+    """The page without the durations and rates, which differ from run to run."""
     return TIMES.sub("", page)
 
 
 def section(name: str) -> str:
-    """The part of the page about one example, which is run; its figure is written beside the page."""
+    """Runs one example, writes its figure, and returns its section of the page."""
     path = Path("examples", f"{name}.py")
     example, said = runpy.run_path(str(path)), io.StringIO()
     title, _, about = example["__doc__"].strip().partition("\n\n")
-    about, _, command = about.rpartition("\n\n    ")
+    about = about.rpartition("\n\n    ")[0]
     with contextlib.redirect_stdout(said):
         found = example["main"]()
-    parts = [f"## {title}", about, f"```sh\n{command}\n```"]
+    parts = [f"## {title}", about]
     if isinstance(found, tuple):
         write_small_png(FIGURES / f"{name}.png", found[0])
         parts.append(f"![{title}](examples/{name}.png)")
-    parts.append(f"It prints\n\n```text\n{said.getvalue().strip()}\n```")
-    code = path.read_text(encoding="utf-8").split('"""\n', 1)[1].strip()
-    parts.append(f"<details><summary><code>{path.as_posix()}</code></summary>\n\n```python\n{code}\n```\n\n</details>")
+    parts.append(f"[{path.name}](../{path.as_posix()}) prints\n\n```text\n{said.getvalue().strip()}\n```")
     return "\n\n".join(parts)

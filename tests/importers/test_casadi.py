@@ -103,6 +103,6 @@ def test_derivatives_by_parameters(tunable, version, unpack, saw):
         "CasADi, `DaeBuilder`",
         "casadi",
         of,
-        "derivatives by all eight Real parameters",
+        "derivatives with respect to all eight Real parameters",
         f"agree with differences to {worst:.0e}",
     )

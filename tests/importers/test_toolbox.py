@@ -57,5 +57,5 @@ def test_the_closed_loop_as_one_fmu(closed_loop, tmp_path, saw):
     share = max(difference.largest / difference.allowed for difference in agreement.variables.values())
     assert share < 0.6 and len(agreement.variables) == 6
     seen = f"agrees with the reference experiment closed_loop, within {share:.0%} of its tolerance"
-    run = "`fmucontainer` with `-auto-local` at 1 ms, what it makes run by FMPy"
+    run = "`fmucontainer` with `-auto-local` at 1 ms, the result run by FMPy"
     saw("FMU containers (fmucontainer)", TOOLBOX, "SSP of controller and testbed, CS", run, seen)

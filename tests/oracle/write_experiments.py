@@ -118,8 +118,8 @@ def about(found: list[Experiment]) -> str:
     kinds = ", ".join(" ".join(names) for names in KINDS)
     return f"""Reference experiments
 
-The folder extra/{LAYER} has experiments to try an importer with. What the testbed does in them was
-calculated from the energies of its parts by a program that shares nothing with the FMU.
+The folder extra/{LAYER} has experiments to test an importer. A program that shares no code with
+the FMU calculated the outputs from the energies of the testbed's parts.
 
 {listed}
 
@@ -131,13 +131,13 @@ For each experiment NAME:
   experiments.json  start and stop time, step size and tolerances (in the outputs' units) for each interface type
 
 The tolerances are for communication steps of {INTERFACES["CoSimulation"] * 1e3:g} ms in Co-Simulation, with use_omega = true, and in Model Exchange
-for solvers with a relative tolerance of {SOLVER:g} or less that see interpolated inputs at every evaluation. Inputs that are
-held between communication points cost an error of first order and miss them. Variables of a kind share a tolerance:
-{kinds}. In Co-Simulation that of torques is wider, because many
-importers read outputs before they set the next inputs: torques are then those of the last rates.
+for solvers with a relative tolerance of {SOLVER:g} or less that interpolate inputs at every evaluation. Inputs that are held
+between communication points cause a first-order error that exceeds the tolerances. Variables of one kind share a tolerance:
+{kinds}. In Co-Simulation the tolerance of torques is wider, because many
+importers read outputs before they set the next inputs: torques then belong to the last rates.
 
 rate_step is exact in both interface types at any step size, because its motors turn at constant rates. The motors of
-the others are sampled every {SAMPLE * 1e3:g} ms.
+the other experiments are sampled every {SAMPLE * 1e3:g} ms.
 
 `prw check RESULT` compares a table of any tool with an experiment.
 """
