@@ -172,7 +172,7 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
     let (runs, watch) = follow(&fmu, &time, table.as_ref(), &starts, &shown)?;
     let (runs, watch) = match watch.ended().first() {
         // The last values are those at the end, which is between the communication points.
-        Some((_, end)) if runs.errors.first().is_some() => {
+        Some((_, end)) if !runs.errors.is_empty() => {
             time.retain(|time| time < end);
             time.push(*end);
             follow(&fmu, &time, table.as_ref(), &starts, &shown)?

@@ -61,7 +61,7 @@ impl<M: Exported> Simulation<M> {
 
     fn with(setup: Setup) -> Result<Self, Error> {
         let importer = Importer { standard: Standard::Fmi3, event_mode: false, early_return: true };
-        let instance = Instance::new(setup, importer, true).map_err(error)?;
+        let instance = Instance::new(setup, importer, true)?;
         Ok(Self { instance, step_size: M::INFO.default_experiment.step_size })
     }
 
@@ -118,7 +118,7 @@ impl<M: Exported> Simulation<M> {
             let (name, base) = (variable.name(), variable.base());
             return Err(Error::new(format!("{name} is of type {base} and cannot be {value:?}")));
         }
-        self.instance.set(places, &[variable.base()], values.into_iter()).map_err(error)?;
+        self.instance.set(places, &[variable.base()], values.into_iter())?;
         self.instance.listen();
         Ok(self)
     }
@@ -129,8 +129,8 @@ impl<M: Exported> Simulation<M> {
     /// When the model cannot start there.
     pub fn initialize(&mut self) -> Result<&mut Self, Error> {
         if self.instance.mode() == Mode::Instantiated {
-            self.instance.enter_initialization_mode_at(Experiment::default()).map_err(error)?;
-            self.instance.exit_initialization_mode().map_err(error)?;
+            self.instance.enter_initialization_mode_at(Experiment::default())?;
+            self.instance.exit_initialization_mode()?;
             self.instance.listen();
         }
         Ok(self)
@@ -149,7 +149,7 @@ impl<M: Exported> Simulation<M> {
             // A step may end early, and the next one then begins there.
             while self.time() < end && !self.has_ended() {
                 let time = self.time();
-                self.instance.do_step_to(time, end - time).map_err(error)?;
+                self.instance.do_step_to(time, end - time)?;
                 self.instance.listen();
             }
         }
@@ -195,7 +195,7 @@ impl<M: Exported> Simulation<M> {
         let places = places::<M>(name)?;
         let mut values = Vec::new();
         let base = variable::<M>(places[0]).base();
-        self.instance.get(&places, &[base], |_, value| values.push(value)).map_err(error)?;
+        self.instance.get(&places, &[base], |_, value| values.push(value))?;
         self.instance.listen();
         Ok(values)
     }
@@ -206,8 +206,10 @@ impl<M: Exported> Simulation<M> {
     }
 }
 
-fn error(refusal: Box<Refusal>) -> Error {
-    Error::new(refusal.message)
+impl From<Box<Refusal>> for Error {
+    fn from(refusal: Box<Refusal>) -> Self {
+        Self::new(refusal.message)
+    }
 }
 
 fn variable<M: Variables>(place: u32) -> &'static Variable<M> {

@@ -382,7 +382,7 @@ impl Sampler<'_> {
         {
             let name = table.name(known);
             bail!(
-                "{name} cannot be tried alone: the model rejects every other value that is near, from 50 % of it down to \
+                "{name} cannot be tried separately: the model rejects every other value that is near, from 50 % of it down to \
                  0.0008 %: {message}; let `update` accept some, or leave `smooth` out of INFO and name what follows from \
                  {name} with `depends_on`"
             );

@@ -315,12 +315,16 @@ fn parameters_that_must_rise_are_tried_within_their_order() {
     assert_eq!(initial::<twenty::Table>(), all(20));
     assert_eq!(initial::<signed::Table>(), all(7));
     assert_eq!(initial::<close::Table>(), all(4));
-    // None of them can change alone, so each may act.
+    // None of them can change separately, so each may act.
     assert_eq!(initial::<even::Table>(), all(5));
     let message = describe::<smooth_and_even::Table>(&Changes::default()).unwrap_err().to_string();
-    for word in
-        ["x[1] cannot be tried alone", "0.0008 %", "the breakpoints do not fit", "`smooth`", "`depends_on`"]
-    {
+    for word in [
+        "x[1] cannot be tried separately",
+        "0.0008 %",
+        "the breakpoints do not fit",
+        "`smooth`",
+        "`depends_on`",
+    ] {
         assert!(message.contains(word), "{message}");
     }
 }

@@ -202,5 +202,5 @@ fn an_early_end_that_the_model_has_not_announced() {
 #[test]
 #[should_panic(expected = "add `const EVENTS: Events = Events::Stop;` to its impl CoSimulation")]
 fn an_event_that_the_model_has_not_declared() {
-    let _ = Simulation::<hasty::Hasty>::new().unwrap().set("u", 1.0).unwrap().run(1.0);
+    let _ = fmu_export::Simulation::<hasty::Hasty>::new().unwrap().set("u", 1.0).unwrap().run(1.0);
 }

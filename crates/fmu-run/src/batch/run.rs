@@ -329,6 +329,7 @@ fn follow(
         if let Some(logged) = until.logging {
             // Messages about earlier steps are no reason.
             instance.forget_log();
+            drop(instance.take_messages());
             if time::Instant::now() > logged {
                 return Ok(());
             }
