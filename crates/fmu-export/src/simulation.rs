@@ -200,6 +200,29 @@ impl<M: Exported> Simulation<M> {
         Ok(values)
     }
 
+    /// The state as bytes, as an importer keeps it: the values of the table and what it lists as `memory`.
+    ///
+    /// # Errors
+    /// When the state cannot be saved.
+    pub fn save(&mut self) -> Result<Vec<u8>, Error> {
+        let handle = self.instance.save(0)?;
+        let mut bytes = vec![0; self.instance.serialized_size(handle)?];
+        self.instance.serialize(handle, &mut bytes)?;
+        drop(self.instance.give(handle)?);
+        Ok(bytes)
+    }
+
+    /// Continues from a state that this or another simulation has saved.
+    ///
+    /// # Errors
+    /// When the bytes are no state of this model, or the model rejects them.
+    pub fn restore(&mut self, bytes: &[u8]) -> Result<&mut Self, Error> {
+        let handle = self.instance.deserialize(bytes, 0)?;
+        self.instance.restore(handle)?;
+        drop(self.instance.give(handle)?);
+        Ok(self)
+    }
+
     /// The messages since the last time, with those of the FMU itself.
     pub fn messages(&mut self) -> Vec<(Status, String)> {
         self.instance.logger.take().into_iter().map(|message| (message.status, message.text)).collect()

@@ -46,3 +46,17 @@ fn events_are_handled() {
     assert!(ticker.has_ended() && ticker.time() == 0.75);
     assert_eq!(ticker.get("ticks").unwrap(), 4.0);
 }
+
+/// `next`, by which a tick is due, is memory of the model.
+#[test]
+fn a_state_goes_on_in_another_simulation() {
+    let mut ticker = Simulation::<Ticker>::new().unwrap();
+    let saved = ticker.step_size(0.3).set("amount", 2.0).unwrap().run(0.6).unwrap().save().unwrap();
+    let mut other = Simulation::<Ticker>::new().unwrap();
+    other.step_size(0.3).restore(&saved).unwrap();
+    assert_eq!(other.time(), 0.6);
+    for simulation in [&mut ticker, &mut other] {
+        assert_eq!(simulation.run(1.2).unwrap().get("sum").unwrap(), 10.0);
+    }
+    assert!(other.restore(&saved[1..]).is_err());
+}
