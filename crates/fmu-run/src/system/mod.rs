@@ -410,7 +410,7 @@ impl Whole {
 }
 
 /// The name that is most like another, if one is. The derivative of a variable is seldom meant.
-fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
+pub fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
     /// Names less similar than this have little in common.
     const SIMILAR: f64 = 0.8;
     let wanted = name.to_lowercase();
