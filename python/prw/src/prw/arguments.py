@@ -24,31 +24,33 @@ def names_of(argument: str, given: str | Iterable[str]) -> tuple[str, ...]:
     if isinstance(given, str):
         return (given,)
     if not isinstance(given, Iterable):
-        raise UserError(f"{argument}: {given!r} is neither a name nor several")
+        raise UserError(f"{given!r} is neither a name nor several", argument=argument)
     return tuple(given)
 
 
 def counted(argument: str, value: Any) -> int:
     """A whole number of at least 1."""
     if not isinstance(value, Integral) or value < 1:
-        raise UserError(f"{argument} {value!r}: at least 1 is needed")
+        raise UserError("at least 1 is needed", argument=argument, given=repr(value))
     return int(value)
 
 
-def positive(what: str, value: Any) -> float:
-    """A finite number above 0."""
+def positive(argument: str, value: Any, name: str = "") -> float:
+    """A finite number above 0; name: the parameter or channel that it belongs to."""
     if not isinstance(value, Real) or not 0 < float(value) < math.inf:
-        raise UserError(f"{what} {value!r} is not a positive number")
+        raise UserError(f"{name} {value!r} is not a positive number".lstrip(), argument=argument)
     return float(value)
 
 
-def spread_of(what: str, given: Any, start: float) -> tuple[float, float]:
+def spread_of(argument: str, name: str, given: Any, start: float) -> tuple[float, float]:
     """What a parameter varies about, and its relative standard deviation: `given` is this alone, then `start` is the
     other, or both."""
     value, relative = given if isinstance(given, Sequence) and len(given) == 2 else (start, given)
-    value, relative = positive(what, value), positive(what, relative)
+    value, relative = positive(argument, value, name), positive(argument, relative, name)
     if relative > MOST_RELATIVE:
-        raise UserError(f"{what} has a standard deviation of {relative:.0%}; 100 % is the most, as a fraction 1")
+        raise UserError(
+            f"{name} has a standard deviation of {relative:.0%}; 100 % is the most, as a fraction 1", argument=argument
+        )
     return value, relative
 
 

@@ -30,13 +30,17 @@ def run(program: str, description: str, commands: Sequence[ModuleType], argv: Se
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for command in commands:
         command.add_parser(subparsers)
-    arguments = parser.parse_args(argv)
-    progress.show()
+    # `options`: the option of an argument whose names differ.
+    arguments = argparse.Namespace(options={})
     try:
+        parser.parse_args(argv, arguments)
+        progress.show()
         arguments.run(arguments)
         sys.stdout.flush()
     except UserError as error:
-        print(f"{program} {arguments.command}: {error}", file=sys.stderr)
+        default = f"--{error.argument}" if hasattr(arguments, error.argument) else error.argument
+        option = arguments.options.get(error.argument, default)
+        print(f"{program} {arguments.command}: {option}{error.detail}", file=sys.stderr)
         return error.status
     except KeyboardInterrupt:
         print(f"\n{program} {arguments.command}: interrupted", file=sys.stderr)

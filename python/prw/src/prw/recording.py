@@ -155,10 +155,10 @@ def _read(
     for what, known in (("units", units or {}), ("names", names)):
         for name in known:
             if name not in QUANTITIES:
-                raise UserError(f"{what}: {name} is not known; there are {', '.join(QUANTITIES)}")
+                raise UserError(f"{name} is not known; there are {', '.join(QUANTITIES)}", argument=what)
     called = {header: name for name, header in names.items()}
     if skip < 0:
-        raise UserError(f"skip {skip}: it must be 0 or more lines")
+        raise UserError("it must be 0 or more lines", argument="skip", given=skip)
 
     found = Columns([], {}, [])
 

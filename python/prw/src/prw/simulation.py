@@ -193,7 +193,9 @@ def simulated(
         values = testbed.with_starts(given)
         for name in names:
             if name not in testbed.loaded.variables:
-                raise UserError(f"outputs: {name} is not known; there are {', '.join(testbed.loaded.variables)}")
+                raise UserError(
+                    f"{name} is not known; there are {', '.join(testbed.loaded.variables)}", argument="outputs"
+                )
         found = testbed.respond(course, names, given)
         coarse = Motion(course.time[::2], course.theta[::2], None if course.omega is None else course.omega[::2])
         other = testbed.respond(coarse, names, given) if len(coarse.time) >= FEWEST else {}

@@ -61,7 +61,7 @@ class StateSpace:
         """The inputs that are not among `rates`: the columns of `transfer` and `response_at_hz`."""
         for name in (*rates, *rates.values()):
             if name not in self.inputs:
-                raise UserError(f"rates: {name} is no input; there are {', '.join(self.inputs)}")
+                raise UserError(f"{name} is no input; there are {', '.join(self.inputs)}", argument="rates")
         return tuple(name for name in self.inputs if name not in rates)
 
     def response_at_hz(self, frequency: ArrayLike, rates: Mapping[str, str] | None = None) -> Complex:

@@ -54,7 +54,7 @@ def read_table(
             f"{_where(path, _undecodable_line(path))}: not UTF-8 text; give its encoding, or save it as UTF-8 CSV"
         ) from None
     except LookupError:
-        raise UserError(f"encoding: {encoding!r} is not known; try utf-16 or latin-1") from None
+        raise UserError(f"{encoding!r} is not known; try utf-16 or latin-1", argument="encoding") from None
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
 

@@ -108,9 +108,11 @@ class Testbed:
         }
         for name, value in parameters.items():
             if name not in known:
-                raise UserError(f"parameters: {name} is not known; there are {', '.join(known)}")
+                raise UserError(f"{name} is not known; there are {', '.join(known)}", argument="parameters")
             if not isinstance(value, (Real, np.bool_)):
-                raise UserError(f"parameters: {name} is {value!r}, not a number; prw.sweep takes many values")
+                raise UserError(
+                    f"{name} is {value!r}, not a number; prw.sweep takes many values", argument="parameters"
+                )
         return {**known, **parameters}
 
     def respond(

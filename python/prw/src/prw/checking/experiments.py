@@ -69,7 +69,7 @@ def find(known: Sequence[Experiment], name: str) -> Experiment:
     for experiment in known:
         if experiment.name == name:
             return experiment
-    raise UserError(f"experiment: {name} is not known; there are {', '.join(e.name for e in known)}")
+    raise UserError(f"{name} is not known; there are {', '.join(e.name for e in known)}", argument="experiment")
 
 
 def _text(archive: zipfile.ZipFile, name: str) -> str:

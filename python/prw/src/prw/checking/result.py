@@ -37,7 +37,7 @@ def read_result(path: Path, units: Mapping[str, str] = {}, component: str | None
     where inputs and outputs belong together. Raises UserError naming the file, and what is wrong with it."""
     for name in units:
         if name not in QUANTITIES:
-            raise UserError(f"units: {name} is not known; there are {', '.join(QUANTITIES)}")
+            raise UserError(f"{name} is not known; there are {', '.join(QUANTITIES)}", argument="units")
     if not path.is_file():
         raise UserError(f"{path}: no such file")
     columns = _mat(path) if path.suffix.lower() == ".mat" else _csv(path)
@@ -77,7 +77,9 @@ def _choose(
             continue
         if any(not np.array_equal(other[2], same[0][2]) for other in same[1:]):
             owners = ", ".join(owner or "none" for owner, _, _ in same)
-            raise UserError(f"component: there are several {name} in {path}, of the components {owners}; say which")
+            raise UserError(
+                f"there are several {name} in {path}, of the components {owners}; say which", argument="component"
+            )
         _, unit, values = same[0]
         try:
             found[name] = values * factor(name, unit or units.get(name, "") or si_unit(name))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from prw.checking import check
-from prw.commands.assignments import FORMATTER, pairs, said_of_options
+from prw.commands.assignments import FORMATTER, Named
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.commands.simulate import write_png
 from prw.errors import MissingPackage, UserError
@@ -45,7 +45,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--component", metavar="NAME", help="where several have a column of one name (default: testbed)"
     )
-    parser.add_argument("--units", default="", metavar="NAME=UNIT,...", help="units of columns whose header has none")
+    parser.add_argument("--units", action=Named, metavar="NAME=UNIT,...", help="units of columns whose header has none")
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
     parser.add_argument(
         "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where the figure goes (default: %(default)s)"
@@ -55,16 +55,14 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw check`. Raises UserError with one line on what is wrong, also where the result does not agree."""
-    units = pairs([part for part in arguments.units.split(",") if part], "--units")
-    with said_of_options(experiment="experiment", component="component", units="units"):
-        found = check(
-            arguments.file,
-            arguments.experiment,
-            model_exchange=arguments.model_exchange,
-            component=arguments.component,
-            units=units,
-            fmu=arguments.fmu,
-        )
+    found = check(
+        arguments.file,
+        arguments.experiment,
+        model_exchange=arguments.model_exchange,
+        component=arguments.component,
+        units=arguments.units,
+        fmu=arguments.fmu,
+    )
     print(found.summary())
     if found.agrees:
         print("agrees      with the reference")

@@ -10,15 +10,14 @@ from typing import Any
 from prw.channels import factor
 from prw.commands.assignments import (
     FORMATTER,
+    Named,
     add_reading_options,
     add_task_options,
     bounds,
     listed,
     number,
-    numbers,
     reading_options,
-    said_of_options,
-    spreads,
+    spread,
 )
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import DoesNotFit, UserError
@@ -62,16 +61,16 @@ def add_parser(subparsers: Any) -> None:
     add_task_options(parser)
     parser.add_argument(
         "--prior",
-        action="append",
-        default=[],
+        action=Named,
+        read=spread,
         metavar="NAME=[VALUE:]PERCENT%",
         help="what is known of a parameter beforehand, one sigma; VALUE in SI (default: its start value). It is then "
         "estimated along. May be repeated",
     )
     parser.add_argument(
         "--bounds",
-        action="append",
-        default=[],
+        action=Named,
+        read=bounds,
         metavar="NAME=LOW:HIGH",
         help="range of a parameter in SI (default: a factor of 100 about its start value). May be repeated",
     )
@@ -101,40 +100,29 @@ def add_parser(subparsers: Any) -> None:
         metavar="DIR",
         help="where report.html, report.json, identified.json and identified.ssv go (default: %(default)s)",
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, options={"parameters": "--set", "priors": "--prior", "skip": "--skip-lines"})
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw identify`. Raises UserError with one line on what is wrong."""
     need("scipy", "jinja2", "threadpoolctl")
-    with said_of_options(
-        estimate="estimate",
-        parameters="set",
-        priors="prior",
-        noise="noise",
-        units="units",
-        names="names",
-        skip="skip-lines",
-        encoding="encoding",
-        starts="starts",
-    ):
-        found = identify(
-            arguments.files,
-            estimate=listed(arguments.estimate),
-            priors=spreads(arguments.prior, "--prior"),
-            parameters=numbers(arguments.set, "--set"),
-            bounds=bounds(arguments.bounds),
-            noise=numbers(arguments.noise, "--noise"),
-            **reading_options(arguments),
-            quantum=_quantum(arguments.quantum),
-            offsets=not arguments.no_offsets,
-            starts=arguments.starts,
-            seed=arguments.seed,
-            delay=listed(arguments.delay),
-            lag=listed(arguments.lag),
-            gain=listed(arguments.gain),
-            fmu=arguments.fmu,
-        )
+    found = identify(
+        arguments.files,
+        estimate=listed(arguments.estimate),
+        priors=arguments.prior,
+        parameters=arguments.set,
+        bounds=arguments.bounds,
+        noise=arguments.noise,
+        **reading_options(arguments),
+        quantum=_quantum(arguments.quantum),
+        offsets=not arguments.no_offsets,
+        starts=arguments.starts,
+        seed=arguments.seed,
+        delay=listed(arguments.delay),
+        lag=listed(arguments.lag),
+        gain=listed(arguments.gain),
+        fmu=arguments.fmu,
+    )
     report, numbers_, parameters, ssv = (
         arguments.out / name for name in ("report.html", "report.json", "identified.json", "identified.ssv")
     )
@@ -173,5 +161,8 @@ def _quantum(text: str | None) -> float:
         return 0.0
     match = re.fullmatch(r"\s*([-+.\deE]+)\s*([^\d\s].*)?", text)
     if not match:
-        raise UserError(f"--quantum {text}: write an angle like 0.036deg")
-    return number(match.group(1), "--quantum") * factor("theta1", match.group(2) or "rad")
+        raise UserError("write an angle like 0.036deg", argument="quantum", given=text)
+    try:
+        return number(match[1]) * factor("theta1", match[2] or "rad")
+    except ValueError as error:
+        raise UserError(str(error), argument="quantum") from None

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from prw.commands.assignments import add_parameter_options, parameters_of, said_of_options
+from prw.commands.assignments import add_parameter_options, parameters_of
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.files import replacing
 from prw.linearization import linearize
@@ -36,8 +36,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw linearize`. Raises UserError with one line on what is wrong."""
-    with said_of_options(parameters="parameters"):
-        model = linearize(parameters_of(arguments, arguments.fmu), fmu=arguments.fmu)
+    model = linearize(parameters_of(arguments, arguments.fmu), fmu=arguments.fmu)
     with replacing(arguments.out) as temporary:
         temporary.write_text(json.dumps(content(model), indent=2) + "\n", encoding="utf-8")
     for kind in ("states", "inputs", "outputs"):

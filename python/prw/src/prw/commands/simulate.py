@@ -15,7 +15,6 @@ from prw.commands.assignments import (
     add_reading_options,
     parameters_of,
     reading_options,
-    said_of_options,
 )
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import MissingPackage, UserError
@@ -80,10 +79,8 @@ def run(arguments: argparse.Namespace) -> None:
         raise UserError(
             f"{table}: is the recording itself and would be overwritten; choose another directory with --out"
         )
-    with said_of_options(parameters="parameters"):
-        given = parameters_of(arguments, arguments.fmu)
-    with said_of_options(parameters="set" if arguments.set else "parameters"):
-        response = simulated(motion, given, fmu=arguments.fmu)
+    given = parameters_of(arguments, arguments.fmu)
+    response = simulated(motion, given, fmu=arguments.fmu)
     response.to_csv(table)
     written, missing = [table], ""
     try:

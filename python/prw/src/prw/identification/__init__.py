@@ -121,7 +121,7 @@ def identify(
     one = is_path(files) or is_table(files) or isinstance(files, Recording) or not isinstance(files, Iterable)
     several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
     if not several:
-        raise UserError("files: there are none")
+        raise UserError("there are none", argument="files")
     delay, lag, gain = names_of("delay", delay), names_of("lag", lag), names_of("gain", gain)
     # Many small matrices: more threads only get into each other's way.
     with Model(fmu) as model, threadpool_limits(1):
@@ -192,21 +192,23 @@ def task_of(
     _check("noise", noise, MEASURED)
     start = {**known.starts, **parameters}
     if not estimate and not priors:
-        raise UserError(f"estimate: nothing is named; there are {', '.join(known.real)}")
-    beliefs = {name: Prior(*spread_of(f"priors: {name}", p, start[name])) for name, p in priors.items()}
+        raise UserError(f"nothing is named; there are {', '.join(known.real)}", argument="estimate")
+    beliefs = {name: Prior(*spread_of("priors", name, p, start[name])) for name, p in priors.items()}
     chosen = tuple(name for name in known.real if name in estimate or name in beliefs)
     for what, values in (("parameters", parameters), ("noise", noise)):
         for name, value in values.items():
-            positive(f"{what}: {name}", value)
+            positive(what, value, name)
     for name in chosen:
         if start[name] <= 0:
             raise UserError(f"{name} starts at {start[name]:g} and cannot be estimated from there; fix another value")
     spans = {**{name: (value / REACH, value * REACH) for name, value in start.items()}, **bounds}
     for name, span in bounds.items():
         if not isinstance(span, Sequence) or len(span) != 2:
-            raise UserError(f"bounds: {name} {span!r}; write (least, greatest)")
-        if not positive(f"bounds: {name}", span[0]) < positive(f"bounds: {name}", span[1]):
-            raise UserError(f"bounds: {name} from {span[0]:g} to {span[1]:g}; the first must be below the second")
+            raise UserError(f"{name} {span!r}; write (least, greatest)", argument="bounds")
+        if not positive("bounds", span[0], name) < positive("bounds", span[1], name):
+            raise UserError(
+                f"{name} from {span[0]:g} to {span[1]:g}; the first must be below the second", argument="bounds"
+            )
     return Task(chosen, start, spans, beliefs, dict(noise), offsets)
 
 
@@ -214,4 +216,4 @@ def _check(what: str, names: Iterable[str], known: Collection[str], others: str 
     """Raise UserError for a name that is not known."""
     for name in names:
         if name not in known:
-            raise UserError(f"{what}: {name} is not known; there are {', '.join(known)}{others}")
+            raise UserError(f"{name} is not known; there are {', '.join(known)}{others}", argument=what)

@@ -93,15 +93,15 @@ def excite(
     channels = tuple(MEASURED) if measure is None else names_of("measure", measure)
     for name in channels:
         if name not in MEASURED:
-            raise UserError(f"measure: {name} is not known; there are {', '.join(MEASURED)}")
+            raise UserError(f"{name} is not known; there are {', '.join(MEASURED)}", argument="measure")
     if not channels:
-        raise UserError(f"measure: nothing is named; there are {', '.join(MEASURED)}")
+        raise UserError(f"nothing is named; there are {', '.join(MEASURED)}", argument="measure")
     if not 4 * design.FADE <= duration <= MOST_SAMPLES / rate:
-        raise UserError(
-            f"duration {duration:g}: it must be {4 * design.FADE:g} s or more, and at most 2 million samples"
-        )
+        least = f"it must be {4 * design.FADE:g} s or more, and at most 2 million samples"
+        raise UserError(least, argument="duration", given=f"{duration:g}")
     if rate < SLOWEST:
-        raise UserError(f"rate {rate:g}: the testbed moves at up to 30 Hz; sample with 50 Hz or more")
+        reason = "the testbed moves at up to 30 Hz; sample with 50 Hz or more"
+        raise UserError(reason, argument="rate", given=f"{rate:g}")
     ranking = []
     with Model(fmu) as model, threadpool_limits(1):
         task = task_of(model.known, estimate, parameters=parameters, noise=noise)

@@ -149,7 +149,7 @@ def layout(
     for name in (*grid, *random):
         if name not in testbed.starts:
             argument = "grid" if name in grid else "random"
-            raise UserError(f"{argument}: {name} is not known; there are {', '.join(testbed.starts)}")
+            raise UserError(f"{name} is not known; there are {', '.join(testbed.starts)}", argument=argument)
         if (name in grid) + (name in random) + (name in fixed and name in grid) > 1:
             raise UserError(f"{name} is in more than one of grid, random and parameters; choose one")
     if not grid and not random:
@@ -165,15 +165,15 @@ def layout(
     table = dict(zip(axes, np.repeat(combinations, draws, axis=0).T))
     generator = np.random.default_rng(seed)
     for name, spread in random.items():
-        table[name] = drawn(f"random: {name}", spread, starts[name], generator, total)
+        table[name] = drawn(name, spread, starts[name], generator, total)
     return table
 
 
-def drawn(what: str, spread: Spread, start: float, generator: np.random.Generator, count: int) -> Array:
+def drawn(name: str, spread: Spread, start: float, generator: np.random.Generator, count: int) -> Array:
     """So many values (count,) of a spread, see `sweep`. Raises UserError for what is none."""
     kind, *numbers = spread if isinstance(spread, tuple) and isinstance(spread[0], str) else ("lognormal", spread)
     if kind == "lognormal":
-        median, relative = spread_of(what, tuple(numbers) if len(numbers) > 1 else numbers[0], start)
+        median, relative = spread_of("random", name, tuple(numbers) if len(numbers) > 1 else numbers[0], start)
         return median * np.exp(relative * generator.standard_normal(count))
     finite = len(numbers) == 2 and all(isinstance(n, Real) and math.isfinite(float(n)) for n in numbers)
     one, other = map(float, numbers) if finite else (math.nan, math.nan)  # type: ignore[arg-type]
@@ -182,7 +182,8 @@ def drawn(what: str, spread: Spread, start: float, generator: np.random.Generato
     if kind == "normal" and other > 0:
         return generator.normal(one, other, count)
     raise UserError(
-        f'{what} {spread!r}: write ("uniform", low, high), ("normal", mean, deviation) or ("lognormal", median, relative)'
+        f'{name} {spread!r}: write ("uniform", low, high), ("normal", mean, deviation) or ("lognormal", median, relative)',
+        argument="random",
     )
 
 

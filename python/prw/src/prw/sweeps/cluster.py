@@ -62,8 +62,10 @@ def _connect(address: str) -> Any:
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise UserError(f"scheduler {address}: no Dask scheduler answers there ({error or 'timeout'})") from None
+        reason = f"no Dask scheduler answers there ({error or 'timeout'})"
+        raise UserError(reason, argument="scheduler", given=address) from None
     if not client.scheduler_info()["workers"]:
         client.close()
-        raise UserError(f"scheduler {address}: the cluster has no workers; start some with `dask worker {address}`")
+        reason = f"the cluster has no workers; start some with `dask worker {address}`"
+        raise UserError(reason, argument="scheduler", given=address)
     return client

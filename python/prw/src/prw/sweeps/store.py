@@ -53,7 +53,7 @@ class Store:
         self._schema = schema(study)
         if self._about.exists() or self.table.exists():
             if self._key() != study.key:
-                raise UserError(f"out: {folder} holds another study; choose another, or remove it")
+                raise UserError(f"{folder} holds another study; choose another, or remove it", argument="out")
         else:
             with replacing(self._about) as temporary:
                 about = {"study": study.key, "runs": len(study.table), "parameters": study.names}
