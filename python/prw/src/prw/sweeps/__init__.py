@@ -23,21 +23,19 @@ from prw.parameters import Given, in_own_unit, values_of
 from prw.progress import Progress
 from prw.recording import Recording
 from prw.simulation import Run, motion_of
-from prw.sweeps.study import Rows, Study, chunks, run_chunk
+from prw.sweeps.study import Chunk, Study, run_chunk
 from prw.testbed import Testbed, existing_fmu
 
 if TYPE_CHECKING:
     import pyarrow
 
-#: A chunk is kept when it is done, and is the unit of what an interruption loses: so many in a study, of so many runs.
-CHUNKS, LONGEST_CHUNK = 16, 256
 MOST_RUNS = 10_000_000
 #: How a parameter varies, see `sweep`.
 Spread = float | tuple[float, float] | tuple[str, float, float]
 
 
 class Swept(NamedTuple):
-    """table: a row each run. runs: how many were made now, the others were there already. seconds: what they took."""
+    """table: a row for each run. runs: the number made now; others were there already. seconds: the time they took."""
 
     table: pyarrow.Table
     runs: int
@@ -111,26 +109,24 @@ def sweep(
 
 def carry_out(study: Study, testbed: Testbed, out: Path | None, threads: int | None, scheduler: str | None) -> Swept:
     """Make the runs of the study that are missing in the folder `out`, here with `testbed`; the rest as for `sweep`."""
-    from prw.sweeps.store import Memory, Store
+    from prw.sweeps.store import Store
 
     threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
-    store = Memory(study) if out is None else Store(out, study)
-    total, done = len(study.table), store.done()
-    missing = [number for number in range(total) if number not in done]
-    start, finished = time.monotonic(), len(done)
-    if missing:
-        parts = chunks(missing, max(threads, min(LONGEST_CHUNK, -(-len(missing) // CHUNKS))))
-        results: Iterable[Rows] = (run_chunk(study, testbed, part, threads) for part in parts)
-        if scheduler:
-            from prw.sweeps.cluster import on_cluster
+    store, start = Store(out, study), time.monotonic()
+    missing, total = store.missing, len(study.table)
+    runs = sum(last - first for first, last in missing)
+    results: Iterable[tuple[Chunk, Any]] = ((chunk, run_chunk(study, testbed, chunk, threads)) for chunk in missing)
+    if scheduler and missing:
+        from prw.sweeps.cluster import on_cluster
 
-            results = on_cluster(study, parts, scheduler)
-        with Progress(f"{total} runs", total) as progress:
-            for rows in results:
-                store.add(rows)
-                finished += len(rows)
-                progress(finished)
-    return Swept(store.finish(), len(missing), time.monotonic() - start)
+        results = on_cluster(study, missing, scheduler)
+    with Progress(f"{total} runs", total) as progress:
+        finished = total - runs
+        for chunk, table in results:
+            store.add(chunk, table)
+            finished += len(table)
+            progress(finished)
+    return Swept(store.finish(), runs, time.monotonic() - start)
 
 
 def layout(
