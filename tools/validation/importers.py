@@ -21,23 +21,24 @@ from prw.testbed import OUTPUTS, Testbed
 #: Relative tolerance of the solver in Model Exchange.
 SOLVER_TOLERANCE = 1e-7
 
-Run = Callable[[Path, Experiment, Mapping[str, Value]], Result]
-
 
 @dataclass(frozen=True)
-class Importer:
-    """run(fmu, experiment, parameters) gives what the FMU does, with these parameters instead of the experiment's.
-    interface: the type that it imports. package: of Python, where it comes from."""
+class Tool:
+    """An importer or a co-simulation master. package: the Python package that contains it. interface: the type that it
+    imports. run: of an importer run(fmu, experiment, parameters), with these parameters instead of the experiment's; of
+    a master run(system)."""
 
     name: str
     package: str
     interface: str
-    run: Run
+    run: Callable[..., Any]
 
-    @property
-    def version(self) -> str:
-        """The version that is installed."""
-        return metadata.version(self.package)
+    def version(self) -> str | None:
+        """The installed version, or None."""
+        try:
+            return metadata.version(self.package)
+        except metadata.PackageNotFoundError:
+            return None
 
 
 def at_rest(description: Any, experiment: Experiment) -> dict[str, float]:
@@ -135,7 +136,7 @@ def by_fmu_run(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value
 
 
 IMPORTERS = (
-    Importer("FMPy", "fmpy", "CoSimulation", by_fmpy),
-    Importer("fmu_run", "fmu-run", "CoSimulation", by_fmu_run),
-    Importer("SciPy's RK45 through FMPy's calls", "fmpy", "ModelExchange", by_scipy),
+    Tool("FMPy", "fmpy", "CoSimulation", by_fmpy),
+    Tool("fmu_run", "fmu-run", "CoSimulation", by_fmu_run),
+    Tool("SciPy's RK45 through FMPy's calls", "fmpy", "ModelExchange", by_scipy),
 )

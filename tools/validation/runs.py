@@ -16,8 +16,8 @@ from prw.checking.experiments import Experiment, find, read_experiments
 from prw.checking.result import Result
 from prw.motion import Array
 from prw.testbed import existing_fmu
-from tools.closed_loop import masters, system
-from tools.validation.importers import IMPORTERS, by_fmu_run
+from tools.validation import masters, system
+from tools.validation.importers import IMPORTERS, Tool, by_fmu_run
 
 #: Where the FMUs are, by version of FMI.
 FMUS = {"2.0": Path("prw_testbed.fmu"), "3.0": Path("fmi3/prw_testbed.fmu")}
@@ -81,21 +81,18 @@ def validate(fmus: Path, results: Sequence[tuple[str, Path]] = ()) -> Validation
 
     paths = {fmi: existing_fmu(fmus / name) for fmi, name in FMUS.items()}
     known = read_experiments(paths["2.0"])
-    rows = []
-    for importer in IMPORTERS:
+    rows, absent = [], [f"{t.name} (pip {t.package})" for t in (*IMPORTERS, *masters.MASTERS) if t.version() is None]
+    for importer in filter(Tool.version, IMPORTERS):
         for fmi, path in paths.items():
             for experiment in known:
                 found = importer.run(path, experiment, experiment.parameters)
                 agreement = compare(found, experiment, importer.interface)
-                rows.append(row(importer.name, importer.version, fmi, agreement))
-    loop, absent = system.read(fmus / "prw_closed_loop.ssp", fmus / "prw_closed_loop"), []
-    for master in masters.MASTERS:
-        version = master.version()
-        if version is None:
-            absent.append(f"{master.name} (pip {master.package})")
-            continue
-        agreement = compare(of_testbed(masters.run_apart(master, loop)), find(known, "closed_loop"), "CoSimulation")
-        rows.append(row(f"{master.name}, with the controller's FMU", version, "2.0", agreement))
+                rows.append(row(importer.name, str(importer.version()), fmi, agreement))
+    loop = system.read(fmus / "prw_closed_loop.ssp", fmus / "prw_closed_loop")
+    for master in filter(Tool.version, masters.MASTERS):
+        found = of_testbed(masters.run_apart(master, loop))
+        agreement = compare(found, find(known, "closed_loop"), master.interface)
+        rows.append(row(f"{master.name}, with the controller's FMU", str(master.version()), "2.0", agreement))
     for tool, file in results:
         told = row(f"{tool}, from the file {file.name}", "", "", check(file, fmu=paths["2.0"]))
         rows.append(replace(told, interface=""))

@@ -99,16 +99,20 @@ def draw_response(title: str, motion: Motion, response: Mapping[str, Array], ang
 
     `angles`: show motor and output angles, as for a recording; otherwise motor velocities, as in Fig. 4.
     """
-    panels = [motion_panel(motion, angles), *response_panels(response, angles)]
+    return draw_panels(title, motion.time, [motion_panel(motion, angles), *response_panels(response, angles)])
+
+
+def draw_panels(title: str, time: Array, panels: Sequence[Panel]) -> Figure:
+    """A figure of panels, one below the other, over the same time (n,) in s."""
     with matplotlib.rc_context(STYLE):
         figure = ShownFigure(figsize=(8, 0.8 + 2.1 * len(panels)), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
         axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
         for axis, panel in zip(axes, panels):
-            draw_panel(axis, motion.time, panel)
+            draw_panel(axis, time, panel)
         figure.align_ylabels(axes)
         axes[-1].set_xlabel("time (s)")
-        axes[-1].set_xlim(motion.time[0], motion.time[-1])
+        axes[-1].set_xlim(time[0], time[-1])
     return figure
 
 
