@@ -13,7 +13,7 @@ Sec. 9.11). The noise of each channel is what its residuals have beyond that, or
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -23,11 +23,11 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from prw.errors import UserError
 from prw.identification.experiment import Experiment
-from prw.identification.model import Matrices, Model, stacked
+from prw.identification.model import Model
 from prw.identification.response import Discrete, Response, discrete
 from prw.motion import Array
 from prw.progress import Progress
-from prw.state_space import Complex
+from prw.state_space import Complex, StateSpace
 
 #: Step of the logarithms for the central differences: errors of 1e-8 in the sensitivities.
 DIFFERENCE = 1e-4
@@ -307,13 +307,6 @@ class Fitter:
         self._responses: tuple[bytes, list[Response]] = b"", []
         self._comparisons: tuple[tuple[object, ...], list[Comparison]] = (), []
 
-    def _model(self, logarithms: Array, experiment: Experiment) -> Discrete:
-        """The FMU's linear model over the experiment's steps."""
-        one = discrete(
-            self._matrices(logarithms[None]), experiment.step, experiment.channels, experiment.jumps is not None
-        )
-        return Discrete(*(block[0] for block in one))
-
     def _response(self, logarithms: Array, experiment: Experiment, bins: int) -> Response:
         x = logarithms[len(self.task.names) :]
         distortions = [
@@ -322,7 +315,8 @@ class Fitter:
             else None
             for d, xi in zip(self.task.distortions, x)
         ]
-        return Response(self._model(logarithms, experiment), experiment, bins, distortions)
+        models = self._discrete(self._models([logarithms]), experiment)
+        return Response(Discrete(*(block[0] for block in models)), experiment, bins, distortions)
 
     def compare(self, logarithms: Array) -> list[Comparison]:
         """Every experiment beside the FMU at one set of parameters."""
@@ -352,12 +346,11 @@ class Fitter:
         """For each experiment the derivatives (2, bins, c, p) of the residuals by the logarithms; and the part (p, p)
         of all their squares that is noise."""
         steps = DIFFERENCE * np.eye(len(self.task.names), len(logarithms))
-        around = self._matrices(np.vstack([logarithms + steps, logarithms - steps]))
+        around = self._models([*(logarithms + steps), *(logarithms - steps)])
         self.evaluations += 2 * len(steps)
         tables, noise = [], np.zeros((len(logarithms), len(logarithms)))
         for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
-            steps_of = discrete(around, experiment.step, experiment.channels, experiment.jumps is not None)
-            table, of_noise = comparison.slopes(steps_of.slopes(DIFFERENCE))
+            table, of_noise = comparison.slopes(self._discrete(around, experiment).slopes(DIFFERENCE))
             tables.append(table)
             noise += of_noise
         return tables, noise
@@ -437,8 +430,12 @@ class Fitter:
             abs(np.sqrt((noise[n] ** 2 + e) / (other[n] ** 2 + e)) - 1) < SETTLED for n, e in self._stepped.items()
         )
 
-    def _matrices(self, points: Array) -> Matrices:
-        return stacked([self.model.at(self.task.values(point)) for point in points])
+    def _models(self, points: Iterable[Array]) -> list[StateSpace]:
+        return [self.model.at(self.task.values(point)) for point in points]
+
+    def _discrete(self, models: Sequence[StateSpace], experiment: Experiment) -> Discrete:
+        """The models over the experiment's steps."""
+        return discrete(models, experiment.step, experiment.channels, experiment.jumps is not None)
 
     def _priors(self) -> tuple[Array, Array]:
         """Logarithms (p,) of the priors' values, and 1/sigma (p,), 0 where there is none."""

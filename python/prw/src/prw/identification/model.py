@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 import fmu_run
-import numpy as np
 
 from prw.description import CONTINUOUS, Description, read_description
 from prw.linearization import Linearizer
-from prw.motion import Array
-from prw.state_space import StateSpace
 from prw.testbed import OUTPUTS
 
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
@@ -30,16 +27,6 @@ class Parameter(NamedTuple):
     shown: str
     factor: float
     meaning: str
-
-
-class Matrices(NamedTuple):
-    """x' = A x + B u, y = C x + D u of m models at a time: A (m, 6, 6), B (m, 6, 4), C (m, 8, 6), D (m, 8, 4), with the
-    FMU's states and inputs in its order, theta before omega, and the outputs in the order of OUTPUTS."""
-
-    A: Array
-    B: Array
-    C: Array
-    D: Array
 
 
 class Parameters:
@@ -101,34 +88,13 @@ class Parameters:
         return found.decode("utf-8") + "\n"
 
 
-class Model:
-    """The FMU's linear model, eq. (11), as a function of its parameters. A context manager; leaving it unloads the FMU.
+class Model(Linearizer):
+    """The FMU's linear model, eq. (11), as a function of its parameters: `at(values)`, with the outputs OUTPUTS.
 
-    known: the FMU's parameters. Raises UserError where the FMU is missing, is not the testbed, or refuses something
-    (with what it logged).
+    known: the FMU's parameters. Raises UserError if the FMU is missing, is not the testbed, or rejects a value.
     """
 
     def __init__(self, fmu: str | os.PathLike[str] | None = None):
-        """Unpack, load and instantiate the FMU file `fmu` (default: see prw.testbed.default_fmu)."""
-        self._linearizer = Linearizer(fmu, outputs=OUTPUTS)
-        self.fmu, self.loaded = self._linearizer.fmu, self._linearizer.loaded
-        self.known = Parameters(self._linearizer.loaded, read_description(self.fmu))
-
-    def __enter__(self) -> Model:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Unload the FMU. Harmless when called again."""
-        self._linearizer.close()
-
-    def at(self, values: Mapping[str, float]) -> StateSpace:
-        """The model with the parameters `values` (SI, by name); its outputs are OUTPUTS."""
-        return self._linearizer.at(values)
-
-
-def stacked(models: Sequence[StateSpace]) -> Matrices:
-    """Several models as one with a leading axis."""
-    return Matrices(*(np.stack([getattr(model, block) for model in models]) for block in Matrices._fields))
+        """Load and instantiate the FMU file `fmu` (default: see prw.testbed.default_fmu)."""
+        super().__init__(fmu, outputs=OUTPUTS)
+        self.known = Parameters(self.loaded, read_description(self.fmu))

@@ -19,9 +19,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from prw.identification.experiment import Experiment
-from prw.identification.model import Matrices
 from prw.motion import Array
-from prw.state_space import Complex
+from prw.state_space import Complex, StateSpace
 from prw.testbed import OUTPUTS
 
 #: The number of a channel, and its frequency response and the derivative of that's logarithm at s = 2 pi i f (f,).
@@ -44,17 +43,17 @@ class Discrete(NamedTuple):
         return Discrete(*((block[:half] - block[half:]) / (2 * step) for block in self))
 
 
-def discrete(models: Matrices, step: float, channels: tuple[str, ...], simulated: bool = False) -> Discrete:
-    """`models`, one or m of them, over steps of `step` s, with the rows of `channels`. simulated: in steps of the FMU."""
+def discrete(models: Sequence[StateSpace], step: float, channels: tuple[str, ...], simulated: bool = False) -> Discrete:
+    """m models over steps of `step` s, with the rows of `channels`. simulated: in steps of the FMU."""
     rows = [OUTPUTS.index(name) for name in channels]
-    angle, rate = models.B[..., :2], models.B[..., 2:]
+    A, B, C, D = (np.stack([getattr(model, block) for model in models]) for block in "ABCD")
+    angle, rate, C, D = B[..., :2], B[..., 2:], C[..., rows, :], D[..., rows, :]
     # The state, and the motors' angles with three derivatives, in units of the step.
-    whole = np.zeros((*models.A.shape[:-2], 14, 14))
-    whole[..., :6, :6], whole[..., :6, 6:8], whole[..., :6, 8:10] = models.A * step, angle * step, rate
+    whole = np.zeros((len(models), 14, 14))
+    whole[..., :6, :6], whole[..., :6, 6:8], whole[..., :6, 8:10] = A * step, angle * step, rate
     whole[..., 6:12, 8:14] = np.eye(6)
     solved = expm(whole)[..., :6, :]
     e0, e1, e2, e3 = (solved[..., 6 + 2 * i : 8 + 2 * i] for i in range(4))
-    C, D = models.C[..., rows, :], models.D[..., rows, :]
     if simulated:
         before = np.concatenate([e0, step * e1, solved[..., :6] @ rate], axis=-1)
         direct = np.concatenate([D, np.zeros((*D.shape[:-1], 2))], axis=-1)
