@@ -47,7 +47,7 @@ def add_task_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_reading_options(parser: argparse.ArgumentParser) -> None:
-    """Options on how recordings are written."""
+    """Options on the format of recordings."""
     parser.add_argument(
         "--units",
         action=Named,
@@ -59,7 +59,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         "--names",
         action=Named,
         metavar="NAME=HEADER",
-        help="what a column is called in the file, as in 'theta1=Motor 1'. May be repeated",
+        help="name of a column in the file, as in 'theta1=Motor 1'. May be repeated",
     )
     parser.add_argument(
         "--skip-lines", type=int, default=0, metavar="N", help="lines above the header, as dSPACE writes them"
@@ -81,7 +81,7 @@ def reading_options(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 class Named(argparse.Action):
-    """Collects NAME=VALUE, several with commas or by repetition, as a dict of `read(name, text)` by name."""
+    """Collects NAME=VALUE, with commas or by repetition, as a dict of `read(name, string)` by name."""
 
     def __init__(self, read: Callable[[str, str], Any] = lambda _, text: text, **options: Any):
         super().__init__(default={}, **options)
@@ -134,7 +134,7 @@ def add_parameter_options(parser: argparse.ArgumentParser, unit: str) -> None:
         "--parameters",
         type=Path,
         metavar="FILE",
-        help="parameters in JSON, as `prw identify` writes; --set is stronger",
+        help="parameters in JSON, as `prw identify` writes; --set has precedence",
     )
 
 

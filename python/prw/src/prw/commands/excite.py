@@ -1,4 +1,4 @@
-"""`prw excite`: motor motions to identify parameters with, ranked by what they tell."""
+"""`prw excite`: motor motions for identification, ranked by the expected standard errors."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from prw.identification.excitation import excite
 from prw.output import write_motion
 
 DESCRIPTION = """\
-Proposes motor motions within the motors' limits and ranks them by what they tell about the parameters: the standard
-errors to be expected from measuring the given channels once, with unknown sensor offsets. The noise that is assumed:
-torques 0.02 N.m, angles 0.001 rad, rates 0.01 rad/s, white, a standard deviation; --noise has yours. "typical" is the root
+Proposes motor motions within the motors' limits and ranks them by the standard errors of the parameters that are
+expected from measuring the given channels once, with unknown sensor offsets. The assumed noise is white, with standard
+deviations of 0.02 N.m (torques), 0.001 rad (angles) and 0.01 rad/s (rates); --noise sets others. "typical" is the root
 mean square of a row. Kinds: multisines (slow,
 wide, and one whose spectrum is optimal for the parameters), chirps; with equal, opposite, single and independent
 motors. Each motion becomes a CSV file for `prw simulate` or for your motor controller (s, rad, rad/s).
@@ -29,7 +29,7 @@ motors. Each motion becomes a CSV file for `prw simulate` or for your motor cont
 EXAMPLES = """\
 examples:
   prw excite                                        all channels, a 10 s experiment at 1 kHz
-  prw excite --measure tau1,tau2                    what torque sensors alone can tell
+  prw excite --measure tau1,tau2                    with torque sensors only
   prw excite --angle 20 --speed 120 --acceleration 3000 --duration 30      your motors, in deg, deg/s, deg/s2
   prw excite --estimate J2,J3,H3                    motions for the inertias
 """
@@ -75,7 +75,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `prw excite`. Raises UserError with one line on what is wrong."""
+    """Carry out `prw excite`. Raises UserError with a message of one line."""
     need("scipy", "threadpoolctl")
     for name in ("angle", "speed", "acceleration", "duration", "rate"):
         positive(name, getattr(arguments, name))

@@ -35,7 +35,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `prw linearize`. Raises UserError with one line on what is wrong."""
+    """Carry out `prw linearize`. Raises UserError with a message of one line."""
     model = linearize(parameters_of(arguments, arguments.fmu), fmu=arguments.fmu)
     with replacing(arguments.out) as temporary:
         temporary.write_text(json.dumps(content(model), indent=2) + "\n", encoding="utf-8")
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def content(model: StateSpace) -> dict[str, Any]:
-    """What is written, by name."""
+    """The content of the JSON file."""
     matrices = {name: getattr(model, name).tolist() for name in "ABCD"}
     names = {kind: list(getattr(model, kind)) for kind in ("states", "inputs", "outputs")}
     return {**matrices, **names, "units": dict(model.units)}

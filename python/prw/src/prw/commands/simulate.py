@@ -54,13 +54,13 @@ def add_parser(subparsers: Any) -> None:
         "--animate",
         type=Path,
         metavar="FILE",
-        help="also show the wrist moving: a .gif, an .mp4 (needs the extra prw[movie]) or an .html",
+        help="also write an animation: a .gif, an .mp4 (needs the extra prw[movie]) or an .html",
     )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `prw simulate`. Raises UserError with one line on what is wrong."""
+    """Carry out `prw simulate`. Raises UserError with a message of one line."""
     if arguments.file is not None and arguments.input is not None:
         raise UserError(f"{arguments.file} and --input {arguments.input}: give one recording")
     arguments.input = arguments.file or arguments.input
@@ -95,7 +95,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def write_png(path: Path, figure: Figure) -> None:
-    """Write the figure to `path`, whole or not at all."""
+    """Write the figure to `path` atomically."""
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=150)
 
@@ -103,7 +103,7 @@ def write_png(path: Path, figure: Figure) -> None:
 def _summary(
     arguments: argparse.Namespace, response: Run, given: Mapping[str, Any], written: Sequence[Path], missing: str
 ) -> list[str]:
-    """What was done, the key figures, and what to do next; one line each."""
+    """The inputs, the key figures and a hint, one line each."""
     motion = response.motion
     time, steps = motion.time, np.diff(motion.time)
     even = np.ptp(steps) < 1e-6 * steps.mean() + 4 * np.spacing(np.abs(time).max())
@@ -142,7 +142,7 @@ def _summary(
 
 
 def _tidy(value: float) -> str:
-    # Below 1e-12 it is zero but for rounding.
+    # Smaller values are rounding errors of zero.
     return "0" if value < 1e-12 else f"{value:.3g}"
 
 

@@ -20,11 +20,11 @@ from prw.sweeps.study import Study
 from prw.testbed import Testbed
 
 DESCRIPTION = """\
-Runs the FMU over and over with other parameters, on all cores of this machine or on a Dask cluster, and writes one row
+Runs the FMU many times with different parameters, on all cores of this machine or on a Dask cluster, and writes one row
 for each run into runs.parquet: its parameters and each output's peak, rms and value at the end (SI).
 
---grid parameters make all combinations; --random ones are drawn for each of --runs runs (per combination). What is
-done is kept: the same command goes on after an interruption. A run that fails is recorded with its message.
+--grid parameters make all combinations; --random ones are drawn for each of --runs runs (per combination). Finished
+chunks are kept: the same command continues after an interruption. A run that fails is recorded with its message.
 """
 
 EXAMPLES = """\
@@ -86,7 +86,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `prw sweep`. Raises UserError with one line on what is wrong."""
+    """Carry out `prw sweep`. Raises UserError with a message of one line."""
     need("pyarrow", *(["distributed"] if arguments.scheduler else []))
     motion = fig4() if arguments.input is None else read_motion(arguments.input, degrees=arguments.degrees)
     threads = arguments.threads if arguments.threads is not None else os.cpu_count() or 1
@@ -104,7 +104,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def _summary(arguments: argparse.Namespace, swept: Swept, threads: int) -> list[str]:
-    """What was done, one line each."""
+    """The number of runs, failures and files, one line each."""
     where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
     total = swept.table.num_rows
     lines = [f"ran         nothing: all {total} runs were there already"]
