@@ -1,4 +1,4 @@
-"""The testbed FMU as identification sees it: its parameters, and its linear model with any of them."""
+"""The testbed FMU for identification: its parameters, and its linear model at any parameters."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 
 
 class Parameter(NamedTuple):
-    """A Real parameter as the FMU declares it. start: its start value in SI. shown, factor: the unit it is shown in,
-    and what a value in that unit is multiplied with to be in SI. meaning: its description."""
+    """A Real parameter of the model description. start: its start value in SI. shown, factor: its display unit, and the
+    factor from that unit to SI. meaning: its description."""
 
     start: float
     unit: str
@@ -30,8 +30,8 @@ class Parameter(NamedTuple):
 
 
 class Parameters:
-    """The parameters that the model description of the testbed declares. real: by name. counts: those that are whole
-    numbers, with their start values. guid: of the FMU, a hash of its sources and start values."""
+    """The parameters that the model description of the testbed declares. real: by name. counts: start values of the
+    Integer parameters. guid: of the FMU, a hash of its sources and start values."""
 
     def __init__(self, fmu: fmu_run.Fmu, description: Description):
         self.guid: str = fmu.token
@@ -40,7 +40,7 @@ class Parameters:
         self._units, self._meanings = description.units, {}
         for v in fmu.variables.values():
             unit, start = v.unit or "", v.start or "0"
-            # Where a run starts is no property of the testbed.
+            # Initial states of a run are no properties of the testbed.
             if v.causality == "parameter" and v.type in CONTINUOUS and not v.name.endswith("_start"):
                 shown = description.display_units[v.name] or unit
                 factor = description.units[unit].displayed.get(shown, 1.0) if unit in description.units else 1.0
@@ -55,7 +55,7 @@ class Parameters:
 
     def for_building(self, values: Mapping[str, float]) -> str:
         """All parameters in the format of modelDescription/parameters.json, for `build_fmu --parameters`; `values` are
-        in SI, and what is shown in another unit is written in that."""
+        in SI and are written in their display units."""
         entries: dict[str, dict[str, object]] = {}
         for name, parameter in self.real.items():
             value = values[name] / parameter.factor

@@ -1,4 +1,4 @@
-"""The fit report as one HTML page that needs nothing beside it."""
+"""The fit report as one HTML page that loads no other file."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from prw.motion import Array, envelope
 WIDTH, HEIGHT, LEFT, RIGHT, ABOVE, BELOW = 640, 180, 66, 10, 26, 30
 #: Marks along an axis, at least, and the steps that are round.
 MARKS, ROUND = 4, (5.0, 2.0, 1.0)
-#: Time intervals in which a curve is drawn by its extremes; about one for each point on the screen.
+#: Time intervals in which a curve is drawn by its extremes; about one per screen pixel.
 INTERVALS = 500
-#: Shown in these units: more telling than radians.
+#: Units of the figures.
 SHOWN = {"rad": ("deg", np.degrees(1.0)), "rad/s": ("deg/s", np.degrees(1.0))}
 #: Seconds of the close-up.
 CLOSE = 1.0
@@ -37,8 +37,8 @@ def page(
     estimates: Mapping[str, Any],
     **shown: Any,
 ) -> str:
-    """The page as text. residuals: (s, c) of each experiment. channels: the fields of each ChannelFit. estimates: by
-    name. shown: what the template takes besides."""
+    """The page as HTML. residuals: (s, c) of each experiment. channels: the fields of each ChannelFit. estimates: by
+    name. shown: further variables of the template."""
     environment = Environment(
         loader=PackageLoader("prw.identification", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
@@ -80,7 +80,7 @@ def figures(experiments: Sequence[Experiment], solution: Solution, residuals: Se
 def _curves(time: Array, modelled: Array, residual: Array, unit: str) -> str:
     """Measured and modelled (n,), close by, and the residual (n,) at the times (n,) s, as SVG with the page's colours."""
     measured, unit = modelled + residual, unit.replace("N.m", "N m")
-    # The liveliest second, where measured and modelled can be told apart.
+    # The second with the largest values shows the difference of measured and modelled best.
     centre = time[np.argmax(np.abs(measured - measured.mean()))]
     part = (time >= centre - CLOSE / 2) & (time <= centre + CLOSE / 2)
     close = [("blue", "", measured[part]), ("red", ' stroke-dasharray="5 3"', modelled[part])]
@@ -159,6 +159,6 @@ def _percent(value: float | None) -> str:
 
 
 def _shade(value: float) -> str:
-    """Background of a correlation: blue for positive, vermilion for negative, as strong as it is."""
+    """Background of a correlation: blue for positive, vermilion for negative, opaque by its magnitude."""
     colour = "0 114 178" if value > 0 else "213 94 0"
     return f"rgb({colour} / {0.75 * abs(value):.2f})"
