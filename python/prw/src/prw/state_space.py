@@ -44,8 +44,8 @@ class StateSpace:
     def transfer(self, s: ArrayLike, rates: Mapping[str, str] | None = None) -> Complex:
         """The transfer matrix C (s 1 - A)^-1 B + D, for s (k,) in 1/s: complex, (k, p, m).
 
-        rates: inputs that are the derivative of another input, with that one, such as {"omega1": "theta1"}. They move
-        along with it: their columns, times s, are added to its column and left out, see `moved`. Raises UserError for
+        rates: inputs that are the derivative of another input, by name: {"omega1": "theta1"}. Their columns, times s, are
+        added to the column of the other input and left out, see `moved`. Raises UserError for
         names that are no inputs.
         """
         s = np.atleast_1d(np.asarray(s, dtype=np.complex128))
@@ -71,7 +71,7 @@ class StateSpace:
         return self.transfer(2j * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64)), rates)
 
     def to_control(self) -> control.StateSpace:
-        """The same for python-control, with the signals' names. Raises UserError without the package `control`."""
+        """Convert to python-control, with the signals' names. Raises UserError without the package `control`."""
         need("control")
         import control
 
@@ -79,7 +79,7 @@ class StateSpace:
         return control.ss(self.A, self.B, self.C, self.D, **names)
 
     def to_scipy(self) -> scipy.signal.StateSpace:
-        """The same for scipy.signal, without names. Raises UserError without the package `scipy`."""
+        """Convert to scipy.signal, without names. Raises UserError without the package `scipy`."""
         need("scipy")
         import scipy.signal
 

@@ -2,14 +2,13 @@
 
 Parameters are sought as logarithms, which keeps them positive and makes their errors relative. Sensor offsets and the
 initial state of each experiment enter linearly; they are eliminated in every evaluation by projection (variable
-projection in the form of Kaufman, BIT 15 (1975) 49), so that the search is over the parameters alone.
+projection in the form of Kaufman, BIT 15 (1975) 49), so that the search is only over the parameters.
 
 Errors of the motors' encoders pass through the model: at every frequency the difference of measured and modelled
 spectra has the covariance of the channels' noise plus G P G^H, with the model's transfer G and the power P of the
 encoders' errors. The difference is weighted with the inverse of this covariance, which depends on the parameters, too.
-Without P the fit would
-bias the dampers (errors in variables; Soderstrom, Automatica 43 (2007) 939, Sec. 8; Pintelon and Schoukens, 2nd ed.,
-Sec. 9.11). The noise of each channel is given, or estimated from its residuals.
+Without P the dampers are biased (errors in variables; Soderstrom, Automatica 43 (2007) 939, Sec. 8; Pintelon and
+Schoukens, 2nd ed., Sec. 9.11). The noise of each channel is given, or estimated from its residuals.
 """
 
 from __future__ import annotations

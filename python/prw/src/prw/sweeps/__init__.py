@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pyarrow
 
 MOST_RUNS = 10_000_000
-#: How a parameter varies, see `sweep`.
+#: The distribution of a parameter, see `sweep`.
 Spread = float | tuple[float, float] | tuple[str, float, float]
 
 
@@ -63,31 +63,31 @@ def sweep(
         Values by parameter, in SI or with a unit as ([1.5, 1.9], "N.m/deg"); all combinations are run.
     random
         By parameter ("uniform", low, high), ("normal", mean, standard deviation) or ("lognormal", median, relative standard
-        deviation), in SI; for the last also the relative standard deviation alone (0.1 is 10 %), about the start value, or
+        deviation), in SI; for the last also only the relative standard deviation (0.1 is 10 %), about the start value, or
         (median, relative). `runs` draws for each combination of the grid, from the seed `seed`.
     parameters
         Values that are the same in all runs, as for `prw.simulate`.
     motion
-        As for `prw.simulate`; so is `fmu`.
+        As for `prw.simulate`, as is `fmu`.
     threads
-        How many make the runs (default: one for each processor).
+        Number of threads (default: one for each processor).
     scheduler
         The address of a Dask cluster that makes the runs instead.
     out
-        A folder in which what is done is kept, so that the same call goes on after an interruption, and the table
-        in the end.
+        A directory in which finished chunks of runs are kept, so that the same call continues after an interruption, and
+        at the end the table.
 
     Returns
     -------
     pyarrow.Table
-        An Arrow table (`.to_pandas()` makes a DataFrame of it), a row each run: `run`; `status`, "done" or
-        "failed"; `message`, why it failed, as where the FMU refuses a value; the parameters; and of each output the
-        peak (of its magnitude), rms and value at the end, such as `roll_peak`, in SI.
+        An Arrow table (`.to_pandas()` makes a DataFrame of it), a row for each run: `run`; `status`, "done" or
+        "failed"; `message`, the cause of a failure, for example that the FMU rejects a value; the parameters; and of each
+        output the peak (of its magnitude), rms and value at the end, such as `roll_peak`, in SI.
 
     Raises
     ------
     UserError
-        An argument makes no sense, a file cannot be read or written, or the cluster does not answer.
+        An argument is out of range, a file cannot be read or written, or the cluster does not answer.
 
     Warns
     -----
@@ -108,7 +108,8 @@ def sweep(
 
 
 def carry_out(study: Study, testbed: Testbed, out: Path | None, threads: int | None, scheduler: str | None) -> Swept:
-    """Make the runs of the study that are missing in the folder `out`, here with `testbed`; the rest as for `sweep`."""
+    """Make the runs of the study that are missing in the directory `out`. testbed: for runs on this machine. Other arguments
+    as for `sweep`."""
     from prw.sweeps.store import Store
 
     threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
@@ -138,7 +139,7 @@ def layout(
     parameters: Given = None,
 ) -> dict[str, Array]:
     """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws, about
-    `parameters` or the FMU's start values. Raises UserError for what does not fit."""
+    `parameters` or the FMU's start values. Raises UserError for invalid arguments."""
     fixed = values_of(parameters, testbed.loaded)
     testbed.with_starts(fixed)
     starts = {**testbed.starts, **fixed}
@@ -166,7 +167,7 @@ def layout(
 
 
 def drawn(name: str, spread: Spread, start: float, generator: np.random.Generator, count: int) -> Array:
-    """So many values (count,) of a spread, see `sweep`. Raises UserError for what is none."""
+    """Draw values (count,) from a distribution, see `sweep`. Raises UserError for an invalid distribution."""
     kind, *numbers = spread if isinstance(spread, tuple) and isinstance(spread[0], str) else ("lognormal", spread)
     if kind == "lognormal":
         median, relative = spread_of("random", name, tuple(numbers) if len(numbers) > 1 else numbers[0], start)
@@ -188,7 +189,7 @@ def _column(name: str, values: Any) -> Array:
         column = np.atleast_1d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError):
         column = np.empty(0)
-    # Values that the FMU refuses are runs that fail, not a reason to stop.
+    # If the FMU rejects a value, the run fails and the sweep continues.
     if column.ndim != 1 or not len(column) or not np.isfinite(column).all():
         raise UserError(f"{name}: {values!r} are not the values of a parameter, one or more finite numbers")
     return column

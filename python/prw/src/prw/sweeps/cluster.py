@@ -16,7 +16,7 @@ from prw.errors import UserError
 from prw.sweeps.study import Chunk, Study, lost, run_chunk
 from prw.testbed import Testbed
 
-#: How long to wait for a cluster's scheduler, s.
+#: Timeout of a connection to the scheduler, s.
 PATIENCE = 15
 
 
@@ -45,14 +45,14 @@ def _on_worker(study: Study, chunk: Chunk) -> pa.Table:
 
 @lru_cache(maxsize=1)
 def _loaded(fmu: bytes) -> Testbed:
-    """The FMU, which a worker keeps from chunk to chunk."""
+    """The FMU, which a worker loads once."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.fmu"
         path.write_bytes(fmu)
         return Testbed(path)
 
 
-# Removes the unpacked files, which an interpreter that ends does not wait for.
+# Removes the unpacked files at exit.
 atexit.register(_loaded.cache_clear)
 
 

@@ -27,8 +27,8 @@ CHUNKS, SHORTEST_CHUNK, LONGEST_CHUNK = 16, 16, 256
 
 @dataclass(frozen=True)
 class Study:
-    """fmu: the FMU file's content. motion: what the motors do. names: parameters that vary; table: their values in SI,
-    (runs, len(names)). fixed: values of others. key: a hash of all this."""
+    """The runs of a sweep. fmu: the FMU file's content. motion: of the motors. names: parameters that vary; table: their
+    values in SI, (runs, len(names)). fixed: values of others. key: a hash of all this."""
 
     fmu: bytes
     motion: Motion
@@ -55,7 +55,7 @@ class Study:
         object.__setattr__(self, "key", digest.hexdigest()[:16])
 
     def chunks(self) -> list[Chunk]:
-        """All runs in chunks. They depend on nothing but the number of runs, so that a repeated call finds its files."""
+        """All runs in chunks. The chunks depend only on the number of runs, so that a repeated call finds its files."""
         total = len(self.table)
         size = min(LONGEST_CHUNK, max(SHORTEST_CHUNK, -(-total // CHUNKS)))
         return [(first, min(first + size, total)) for first in range(0, total, size)]
@@ -78,7 +78,7 @@ class Study:
 
 
 def run_chunk(study: Study, testbed: Testbed, chunk: Chunk, threads: int) -> pa.Table:
-    """Results of the runs of the chunk, made by so many threads."""
+    """Make the runs of the chunk with this number of threads."""
     first, last = chunk
     varied = dict(zip(study.names, study.table[first:last].T))
     runs = testbed.loaded.run(
