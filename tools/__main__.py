@@ -7,4 +7,4 @@ from tools import compatibility, documentation, examples, figures, validation
 from tools.validation import closed_loop
 
 COMMANDS = (documentation, examples, figures, validation, closed_loop, compatibility)
-sys.exit(run("tools", "What only this repository needs.", COMMANDS, None))
+sys.exit(run("tools", "Tools of this repository.", COMMANDS, None))

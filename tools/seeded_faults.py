@@ -1,4 +1,4 @@
-"""Puts faults into the sources, one at a time, and runs the tests with each: a fault that no test finds has escaped.
+"""Puts faults into the sources, one at a time, and runs the tests with each. A fault that no test finds has escaped.
 
     python tools/seeded_faults.py [--only TEXT] [--check] [LIST.toml ...]
 
@@ -36,7 +36,7 @@ class Fault:
     tests: tuple[str, ...]
 
     def put_into(self, text: str) -> str:
-        """The text of the file with the fault."""
+        """Return the content of the file with the fault."""
         if text.count(self.old) != 1:
             raise ValueError(f"{self.file}: the text to replace occurs {text.count(self.old)} times: {self.name}")
         return text.replace(self.old, self.new)

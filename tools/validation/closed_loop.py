@@ -44,7 +44,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `tools closed-loop`. Raises UserError with one line on what is wrong."""
+    """Carry out `tools closed-loop`. Raises UserError with a message of one line."""
     from tools.validation import coupling, masters, plots
     from tools.validation.system import read
 

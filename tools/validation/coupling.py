@@ -74,7 +74,7 @@ def couple(
         for k, row in enumerate(rows):
             row[:] = [instance.get(variable)[0] for instance, variable in watched]
             if k < n:
-                # All outputs before any input: setting one must not change what another reads.
+                # All outputs are read before any input is set, because an input may change outputs.
                 for source, variables, _, _, read, slopes in connections:
                     source.get(variables, read)
                     if derivatives:

@@ -42,7 +42,7 @@ class Tool:
 
 
 def at_rest(description: Any, experiment: Experiment) -> dict[str, float]:
-    """Start values of the motors, and of the states where the testbed has to be told where it rests."""
+    """Start values of the motors, and of the states if they are settable."""
     first = {name: float(experiment.inputs[name][0]) for name in ANGLES}
     states = {f"theta{i}": first["theta1" if i % 2 else "theta2"] for i in (3, 4, 5, 6)}
     settable = {v.name for v in description.modelVariables if v.initial == "exact"}
@@ -71,8 +71,8 @@ def by_fmpy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value]) 
 
 
 def by_scipy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value]) -> Result:
-    """Model Exchange through FMPy's calls, solved by SciPy, with inputs interpolated whenever the solver asks. (FMPy's
-    own master holds inputs between communication points, and so is of first order in these.)"""
+    """Model Exchange through FMPy's calls, solved by SciPy, with inputs interpolated at every evaluation. (FMPy's
+    own master holds inputs between communication points, and so is of first order in the inputs.)"""
     import fmpy
     from fmpy.simulation import apply_start_values, instantiate_fmu
     from scipy.integrate import solve_ivp

@@ -72,7 +72,7 @@ def libcosim(system: System) -> np.ndarray:
 def ecos(system: System) -> np.ndarray:
     """Ecos, connected call by call: its SSP import knows no connectors of the system itself ("No element named").
 
-    It shows outputs after the inputs of the next step have been set. Torques follow from those directly, so they differ
+    Ecos returns outputs after the inputs of the next step have been set. Torques depend on these inputs directly, so they differ
     from the other masters' by the jump of an input at a communication point. Signals that are fed back do not differ.
     """
     # Ecos does not name the path of its dependency: the wheel `tbb` puts it into the environment's lib.
@@ -108,8 +108,8 @@ MASTERS = (
 def run_apart(master: Tool, system: System) -> dict[str, np.ndarray]:
     """Run the system under the master in a separate process.
 
-    Returns `time` and RECORDED by name, each (steps,): the values at the end of every step. Raises UserError with what
-    the process said if it fails, or if it logs a warning or an error.
+    Returns `time` and RECORDED by name, each (steps,): the values at the end of every step. Raises UserError with the
+    output of the process if it fails, or if it logs a warning or an error.
     """
     with tempfile.TemporaryDirectory() as folder:
         result = Path(folder, "result.npy")

@@ -99,7 +99,7 @@ class _Model:
         read_before_set: bool = False,
         progress: Callable[[int, int], Any] | None = None,
     ) -> Runs:
-        """Run the FMU once for each of the given values per run, or once if there are none.
+        """Run the FMU, once for each run that has values, or once if all values are for all runs.
 
         time: (times,), the communication points, s. At each the inputs are set, the outputs read, and the step to the next
         is taken.
@@ -115,7 +115,7 @@ class _Model:
         time_of_peak, mean and rms (of the samples), end.
         threads: default one for each processor; FMUs with at most one instance per process get one.
         read_before_set: read outputs before the inputs of their time are set, as FMPy does.
-        progress: called with the number of finished runs and of all, ten times a second.
+        progress: called with the numbers of finished runs and of all runs, ten times per second.
 
         A run that the FMU rejects or ends does not stop the others, see `Runs.errors` and `Runs.check`. A run that fails
         without a message is repeated with logging on, after all others, only to get the message. Raises ValueError for
