@@ -108,7 +108,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw identify`. Raises UserError with a message of one line."""
-    need("scipy", "jinja2", "threadpoolctl")
+    need("scipy", "jinja2", "matplotlib", "threadpoolctl")
     found = identify(
         arguments.files,
         estimate=listed(arguments.estimate),

@@ -217,8 +217,8 @@ class Identification:
 
     def report(self, path: str | os.PathLike[str]) -> None:
         """Write the report, an HTML page that loads no other file: estimates, doubts, residuals. Raises UserError without
-        jinja2, or if the file cannot be written."""
-        need("jinja2")
+        jinja2 or matplotlib, or if the file cannot be written."""
+        need("jinja2", "matplotlib")
         from prw.identification.report import page
 
         residuals = [self.residual(i) for i in range(len(self.experiments))]
