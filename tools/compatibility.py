@@ -1,4 +1,4 @@
-"""`tools compatibility`: writes the table of docs/compatibility.md from the results of tests/importers."""
+"""`tools compatibility`: the table of docs/compatibility.md that is written from what tests/importers saw."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from prw.errors import UserError
 from prw.files import write_text
 
-#: The directory of the results of tests/importers, the page for them, and its heading.
+#: Where tests/importers leave what they saw, a file each, and where it goes; within the project.
 SEEN, PAGE, HEADING = Path("target/importers"), Path("docs/compatibility.md"), "Seen by tests/importers"
 HEADS = ("tool", "version", "fmu", "run", "seen", "date")
 TITLES = ("tool", "version", "FMU", "what was run", "what was seen", "date")
@@ -28,7 +28,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(_: argparse.Namespace) -> None:
-    """Carry out `tools compatibility`. Raises UserError if there are no results, or no heading for them."""
+    """Carry out `tools compatibility`. Raises UserError where there is nothing to write, or no place for it."""
     rows = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(SEEN.glob("*.json"))]
     if not rows:
         raise UserError(f"{SEEN}: there is nothing; run `make test-importers` in the project's folder")

@@ -1,4 +1,4 @@
-"""`tools examples`: runs the examples and writes docs/examples.md: purpose, figure, output and code of each."""
+"""`tools examples`: runs the examples and writes docs/examples.md: what each is for, its figure, what it prints, its code."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `tools examples`. Raises UserError with a message of one line."""
+    """Carry out `tools examples`. Raises UserError with one line on what is wrong."""
     page = "\n\n".join([HEAD, *map(section, EXAMPLES)]) + "\n"
     if PAGE.is_file() and without_times(page) == without_times(PAGE.read_text(encoding="utf-8")):
         print(f"{PAGE} is up to date")
@@ -46,12 +46,12 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def without_times(page: str) -> str:
-    """The page without the parts that depend on the speed of the computer."""
+    """The page without what depends on the speed of the computer, which differs from run to run."""
     return TIMES.sub("", page)
 
 
 def section(name: str) -> str:
-    """Run one example and return its part of the page; its figure is written next to the page."""
+    """The part of the page about one example, which is run; its figure is written beside the page."""
     path = Path("examples", f"{name}.py")
     example, said = runpy.run_path(str(path)), io.StringIO()
     title, _, about = example["__doc__"].strip().partition("\n\n")
