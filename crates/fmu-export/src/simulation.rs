@@ -1,4 +1,4 @@
-//! A model in the hand of its author: [`Simulation`].
+//! [`Simulation`]: a model in the tests of its author.
 
 use crate::export::Exported;
 use crate::instance::{Importer, Instance, Refusal};
@@ -7,9 +7,9 @@ use crate::table::Variables;
 use crate::variable::Variable;
 use fmi_abi::{BaseType, Interface, Mode, Standard, Status, Value};
 
-/// A model that is simulated in this process, as an importer of Co-Simulation does it: for the tests of a model.
+/// Simulates a model in this process as an importer of Co-Simulation does, for the tests of the model.
 ///
-/// Every value goes through the checks of the FMU, events within a step are handled, and messages are kept.
+/// The FMU checks every value, handles events within a step and keeps messages.
 ///
 /// ```
 /// # use fmu_export::*;
@@ -50,7 +50,7 @@ impl<M: Exported> Simulation<M> {
         Self::with(Setup::new(Interface::CoSimulation))
     }
 
-    /// The same with the directory of its resources, such as `modelDescription/resources` of the package.
+    /// The model with the directory of its resources, such as `modelDescription/resources` of the package.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -65,7 +65,7 @@ impl<M: Exported> Simulation<M> {
         Ok(Self { instance, step_size: M::INFO.default_experiment.step_size })
     }
 
-    /// Steps have this size from now on, s.
+    /// Sets the size of the steps that follow, s.
     pub fn step_size(&mut self, size: f64) -> &mut Self {
         self.step_size = size;
         self
@@ -118,7 +118,7 @@ impl<M: Exported> Simulation<M> {
             let (name, base) = (variable.name(), variable.base());
             return Err(Error::new(format!("{name} is of type {base} and cannot be {value:?}")));
         }
-        self.instance.set(places, &[variable.base()], values.into_iter())?;
+        self.instance.set(places, &[variable.base()], &|index| values[index].clone())?;
         self.instance.listen();
         Ok(self)
     }
@@ -195,7 +195,7 @@ impl<M: Exported> Simulation<M> {
         let places = places::<M>(name)?;
         let mut values = Vec::new();
         let base = variable::<M>(places[0]).base();
-        self.instance.get(&places, &[base], |_, value| values.push(value))?;
+        self.instance.get(&places, &[base], &mut |_, value| values.push(value))?;
         self.instance.listen();
         Ok(values)
     }
