@@ -56,7 +56,7 @@ pub fn potential_energy(p: &Parameters, q: &Angles) -> f64 {
 
 /// Returns Rayleigh's dissipation function, eq. (7), W.
 ///
-/// It equals V of eq. (6) with rates for angles and c for k, plus `c3/2 (theta7'^2 + theta8'^2)`. The
+/// The function equals V of eq. (6) with rates for angles and c for k, plus `c3/2 (theta7'^2 + theta8'^2)`. The
 /// dissipated power is twice this value.
 pub fn dissipation(p: &Parameters, rates: &Angles) -> f64 {
     let (pitch_rate, roll_rate) = sect(p, rates.theta5, rates.theta6);

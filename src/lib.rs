@@ -26,8 +26,7 @@
 //! 9. [`start`]: the state at the start of the simulation.
 //! 10. [`TestbedFmu`] and [`variables`]: names and units of the variables, and the capabilities of the FMU.
 //!
-//! Where a printed equation is wrong, the documentation of the function that implements it describes the
-//! correction.
+//! Some printed equations are wrong; the documentation of the corresponding function describes each correction.
 //!
 //! ```
 //! use prw_testbed::{Parameters, Testbed};
