@@ -106,9 +106,9 @@ pub trait ModelExchange: Model {
     /// Writes the event indicators. A change of sign signals an event.
     fn indicators(&self, _indicators: &mut [f64]) {}
 
-    /// Handles an event at a time, s. The importer causes it at the start of the simulation, when an
-    /// indicator changes its sign, at the time that the last event requested, or at any other time. This
-    /// crate calls it again while its result has `again` set.
+    /// Handles an event at a time, s. The importer triggers events at the start of the simulation, at a
+    /// change of sign of an indicator, and at the time that the last event requested. It may trigger further
+    /// events. This crate calls it again while its result has `again` set.
     ///
     /// # Errors
     /// Fails if the model cannot continue. The model must then be unchanged.
@@ -173,7 +173,7 @@ pub trait Partials: Model {
     /// parameters as well. The knowns are the inputs and all variables with `initial` "exact" (section 2.2.8
     /// of FMI 2.0).
     ///
-    /// By default it is the [`partial`](Self::partial), which is correct if no state is calculated and the
+    /// The default is [`partial`](Self::partial). The default is correct if no state is calculated and the
     /// equations are the same as after initialization.
     fn initial_partial(&self, unknown: Self::Name, known: Self::Name) -> Option<f64> {
         self.partial(unknown, known)

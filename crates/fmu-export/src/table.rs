@@ -370,9 +370,9 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// the table. A PLACE is a path of fields, such as `motors[0].theta`. Start values are those of the model
 /// that [`Model::new`](crate::Model::new) makes.
 ///
-/// Both `names` and `memory` are optional. Access to a Real is fastest if its place is an `f64` in a path of
-/// fields and array elements, without a block after `then`: getting and setting need no function call. A path
-/// through a `Box`, a `Vec` or an `Index` needs a call.
+/// Both `names` and `memory` are optional. Access to a Real needs no function call if its place is an `f64`
+/// in a path of fields and array elements, without a block after `then`. A path through a `Box`, a `Vec` or
+/// an `Index` needs a call.
 ///
 /// If the value is an array, in a place or calculated, the line is an array: `[f64; 8]`, or `[[f64; 2]; 3]`
 /// as a matrix, row by row. FMI 3.0 has one variable for an array. FMI 2.0 has a scalar for each element,
@@ -446,8 +446,8 @@ macro_rules! variables {
             }
 
             $(
-                // A function with the name of the kind makes the compiler point at the author's line: tokens
-                // keep their position in the author's file where a macro uses them first.
+                // A function with the name of the kind makes the compiler point at the author's line. Tokens
+                // keep their position in the author's file at their first use in a macro.
                 #[allow(long_running_const_eval, clippy::needless_borrows_for_generic_args)]
                 const _: () = {
                     #[track_caller]

@@ -1,9 +1,9 @@
 //! Implementation of the C functions of FMI 3.0, with the structure of [`fmi2`](crate::fmi2).
 //!
 //! A model needs nothing special for FMI 3.0. It has the variables of FMI 2.0, and the instantiation token is
-//! the guid. An array is one variable, whereas FMI 2.0 has one variable for each element. Functions of
-//! clocks, structural parameters, intermediate update and Scheduled Execution return an error with the
-//! reason.
+//! the guid. An array is one variable, whereas FMI 2.0 has one variable for each element. Clocks, structural
+//! parameters, intermediate update and Scheduled Execution are not supported; their functions return an error
+//! with the reason.
 //!
 //! Every model has a time, as the FMI standard requires: the independent variable of the table, or an
 //! additional one after all variables ([`independent`]). After it there is a local variable for each event

@@ -114,7 +114,7 @@ impl<M: Exported> Instance<M> {
             });
         }
         if Self::ENDS_EARLY {
-            // The importer ignores an earlier request to end the simulation.
+            // The importer has not received the request to end the simulation, or ignores it.
             if self.state.ended {
                 self.state.time = point;
                 return Ok(Stepped::Terminate(point));

@@ -421,7 +421,7 @@ impl<M: 'static> Implicit<M> {
         .finished("eventIndicator", "An event happens where it changes its sign");
 }
 
-/// Returns a variable that FMI 3.0 requires in every model and that follows the table: the time (section
+/// Returns a variable that FMI 3.0 requires and that follows the table. These variables are the time (section
 /// 2.4.7.4), if the table has none, and the event indicators (section 2.4.8).
 #[cold]
 fn implicit<M: Exported>(place: u32) -> Option<&'static Variable<M>> {

@@ -80,7 +80,7 @@ impl Room {
     ) -> PyResult<(Bound<'py, PyAny>, Self)> {
         let array = match given {
             Some(array) => array,
-            // NumPy asks the kernel for large pages, unlike a Rust vector.
+            // NumPy's `zeros` asks the kernel for large pages.
             None => {
                 static ZEROS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
                 ZEROS.import(py, "numpy", "zeros")?.call1((PyTuple::new(py, shape)?,))?

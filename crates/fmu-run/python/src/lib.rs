@@ -252,7 +252,7 @@ fn carry_out(
 ) -> PyResult<[Told; 2]> {
     let watch = Watch::default();
     let (sender, receiver) = channel();
-    // A receiver can be used only by one thread at a time.
+    // `Receiver` is not `Sync`, so `detach` needs a mutex around it.
     let receiver = Mutex::new(receiver);
     std::thread::scope(|scope| {
         scope.spawn(|| sender.send(planned.run(&watch, courses, measures)));

@@ -1,10 +1,10 @@
 //! A fault-injecting importer for both FMI versions: it decodes bytes into calls on several instances, and
 //! checks every result.
 //!
-//! It checks after every call that the status is valid, and that a rejected or reading call has left the
-//! serialized state unchanged. It also checks that values are valid, that nothing is written after the end of
-//! an array, and that messages are clean. Sometimes it restores the last saved state of an instance, here or
-//! in another instance, and repeats the calls made since. All results and the final state must be
+//! After every call, the importer checks that the status is valid, and that a rejected or reading call has
+//! left the serialized state unchanged. Values must be valid, nothing may be written after the end of an
+//! array, and messages must be clean. Sometimes the importer restores the last saved state of an instance,
+//! here or in another instance, and repeats the calls made since. All results and the final state must be
 //! bit-identical.
 //!
 //! The bytes come from [`random_bytes`] or from a fuzzer.
