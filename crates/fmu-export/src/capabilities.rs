@@ -156,7 +156,7 @@ pub struct StepCompleted {
     pub terminate: bool,
 }
 
-/// A model that provides its partial derivatives (section 2.1.9 of FMI 2.0, 2.2.11 of FMI 3.0). This crate
+/// A model that provides its partial derivatives (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0). This crate
 /// computes directional and adjoint derivatives from them. Before fmu-package describes the model, it
 /// compares all of them with finite differences.
 pub trait Partials: Model {

@@ -676,7 +676,7 @@ impl Instance {
         Ok(self.keep(state))
     }
 
-    /// Computes directional derivatives of unknowns for a seed (section 2.1.9 of FMI 2.0, 2.2.11 of FMI 3.0).
+    /// Computes directional derivatives of unknowns for a seed (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0).
     pub(crate) fn directional_derivative(
         &mut self,
         unknowns: &[u32],

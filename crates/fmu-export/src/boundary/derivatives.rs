@@ -5,7 +5,7 @@ use crate::export::Exported;
 use crate::instance::{Instance, Outcome, Reference, elements_of};
 use std::mem::MaybeUninit;
 
-/// Computes partial derivatives (section 2.1.9 of FMI 2.0, 2.2.11 of FMI 3.0). The arguments are unknowns,
+/// Computes partial derivatives (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0). The arguments are unknowns,
 /// knowns, seed and result, each with its length; `names` are their names in messages.
 ///
 /// # Safety

@@ -179,8 +179,8 @@ pub fn fmpy<M: Exported>() {
 }
 
 /// Maestro (INTO-CPS) requests the derivative of an output by the value reference of the derivative variable.
-/// PyFMI extrapolates inputs with orders 1 and 2, uses the orders in the description, and raises an exception
-/// for any status but `fmi2OK`.
+/// PyFMI extrapolates inputs with orders 1 and 2 and requests output derivatives of the orders in the
+/// description. PyFMI raises an exception for any status but `fmi2OK`.
 pub fn maestro_and_pyfmi<M: Exported>() {
     let fmu = Importer::in_mode::<M>(CoSimulation, StepComplete);
     let inputs = inputs::<M>();
