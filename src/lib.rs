@@ -6,16 +6,18 @@
 //! couplings. A massless shaft (theta3, theta4) connects the two couplings. The output shaft of the SECT
 //! pitches (theta7) and rolls (theta8).
 //!
-//! The modules follow the derivation in the paper, *Modelling and Simulation of the Testbed for a Pitch-Roll
-//! Wrist Prototype Based on Spherical Cam-Rollers*. Later modules are additions of this project:
+//! In this order, the modules follow the derivation in the paper, *Modelling and Simulation of the Testbed for
+//! a Pitch-Roll Wrist Prototype Based on Spherical Cam-Rollers*. From [`motor`] on, they are additions of
+//! this project:
 //!
 //! 1. [`parameters`]: inertias, stiffnesses, damping (Table 1).
 //! 2. [`energies`]: the kinematics of the SECT, eq. (1); kinetic energy, eqs. (3) to (5); potential energy,
 //!    eq. (6); dissipation, eq. (7).
-//! 3. [`state_space`]: the matrices that follow from Lagrange's equation, eq. (2). Eq. (8) is `M q'' + Delta
-//!    q' + K q = f`. The shafts between the couplings have no mass, so their rows are of first order. Solved
-//!    for `q_I'`, they give a system of six states, eq. (11). Its outputs include the sensor torques, eqs.
-//!    (9) and (10). The transfer matrices are G(s), eqs. (12) and (13), and H(s), eqs. (14) and (15).
+//! 3. [`state_space`]: the matrices that follow from Lagrange's equation, eq. (2). Eq. (8) is
+//!    `M q'' + Delta q' + K q = f`. The shafts between the couplings have no mass, so their rows are of first
+//!    order. Solved for `q_I'`, they give a system of six states, eq. (11). Its outputs include the sensor
+//!    torques, eqs. (9) and (10). The transfer matrices are G(s), eqs. (12) and (13), and H(s), eqs. (14) and
+//!    (15).
 //! 4. [`motor`]: the motion of a motor between samples of its angle.
 //! 5. [`decoupled`]: the same equations for pitch and roll, the mean and the half difference of the two
 //!    sides. Pitch and roll do not influence each other.

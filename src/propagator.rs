@@ -45,8 +45,8 @@ impl<T: Arithmetic> Equations<T> {
     /// Computes growth and ramp for step size `h` in s. A Taylor series covers a fraction of the step in
     /// which it converges quickly. Doublings extend the result to the full step.
     ///
-    /// Two steps in sequence give the doubling: `growth(2h) = 2 growth + growth^2` and `ramp(2h) = 2 ramp +
-    /// growth (ramp - [1, 1, 0] h)`.
+    /// Two steps in sequence give the doubling: `growth(2h) = 2 growth + growth^2` and
+    /// `ramp(2h) = 2 ramp + growth (ramp - [1, 1, 0] h)`.
     fn propagate(&self, h: f64, doublings: i32) -> Propagator<T> {
         // Two factors, because a single factor would underflow for the longest steps.
         let mut h = T::from(h * 0.5_f64.powi(doublings / 2) * 0.5_f64.powi(doublings - doublings / 2));

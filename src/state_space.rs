@@ -6,19 +6,19 @@
 use crate::parameters::Parameters;
 use nalgebra::{Complex, Matrix2, Matrix4, Matrix4x2, SMatrix, Vector4};
 
-/// Returns the mass matrix M of eq. (8), `M q'' + Delta q' + K q = f` with `q = [theta3, theta4, theta5,
-/// theta6]`, kg.m2.
+/// Returns the mass matrix M of eq. (8), `M q'' + Delta q' + K q = f` with
+/// `q = [theta3, theta4, theta5, theta6]`, kg.m2.
 ///
-/// All entries are zero except the block M_II of theta5 and theta6. Its diagonal is `J2 + H3/4 + J3
-/// N^2/4M^2`; its off-diagonal is `H3/4 - J3 N^2/4M^2`.
+/// All entries are zero except the block M_II of theta5 and theta6. Its diagonal is
+/// `J2 + H3/4 + J3 N^2/4M^2`; its off-diagonal is `H3/4 - J3 N^2/4M^2`.
 pub fn mass_matrix(p: &Parameters) -> Matrix4<f64> {
     let (same, other) = sect_terms(p.H3, p.J3, p);
     lower_block(Matrix2::new(p.J2 + same, other, other, p.J2 + same))
 }
 
 /// Returns the damping matrix Delta of eq. (8), N.m.s/rad, from c1 and c2 of the couplings and c3 of the
-/// load. In the block of theta5 and theta6, c3 adds `c3/4 + c3 N^2/4M^2` to the diagonal and `c3/4 - c3
-/// N^2/4M^2` to the off-diagonal.
+/// load. In the block of theta5 and theta6, c3 adds `c3/4 + c3 N^2/4M^2` to the diagonal and
+/// `c3/4 - c3 N^2/4M^2` to the off-diagonal.
 pub fn damping_matrix(p: &Parameters) -> Matrix4<f64> {
     let (same, other) = sect_terms(p.c3, p.c3, p);
     couplings(p.c1, p.c2) + lower_block(Matrix2::new(same, other, other, same))

@@ -1,7 +1,7 @@
 //! Checks that code may run in a control loop: it must not allocate, call the kernel, or lock.
 //!
-//! * An allocator that the test installs counts allocations: `#[global_allocator] static COUNTING: Counting =
-//!   Counting;`, see [`allocations`].
+//! * An allocator that the test installs counts allocations:
+//!   `#[global_allocator] static COUNTING: Counting = Counting;`, see [`allocations`].
 //! * The work runs in a copy of the process that the kernel ends at the first system call, see
 //!   [`without_kernel`].
 //! * The source must not contain the names of locks, see [`assert_nothing_to_lock`]. A free lock is only an

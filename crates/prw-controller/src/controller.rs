@@ -179,8 +179,8 @@ impl Controller {
         true
     }
 
-    /// Returns the time of the next sample, s, if it is before or at the end of a step from `time` to `time +
-    /// h` (s).
+    /// Returns the time of the next sample, s, if it is before or at the end of a step from `time` to
+    /// `time + h` (s).
     pub fn sample_within(&self, time: f64, h: f64) -> Option<f64> {
         let (next, end) = (self.next_sample(), time + h);
         (next <= end + self.rounding(end, h)).then_some(next.min(end))
