@@ -71,9 +71,9 @@ impl Running {
         self.stepped()
     }
 
-    /// Passes values along connections during the initialization. Outputs may depend on inputs there although
-    /// they do not later. Repeats until no value changes; for [`Order::Jacobi`], once for each component, as
-    /// libcosim does.
+    /// Passes outputs to inputs in Initialization Mode, where the dependencies may differ from the later ones.
+    /// Repeats until no value changes; with [`Order::Jacobi`], at most once for each component, as libcosim
+    /// does.
     fn agree(&mut self) -> Result<(), Refusal> {
         let Exchange { order, stages } = self.system.exchange();
         let order = *order;

@@ -95,8 +95,8 @@ pub fn offset_of_real<M>(model: *const M, place: &impl Place, otherwise: usize) 
     place.as_real().map_or(otherwise, |real| offset_in(model, real, otherwise))
 }
 
-/// Returns both offsets as one number, because two numbers would produce two tables. Returns `None` if an
-/// offset is too large.
+/// Returns both offsets as one number, because two numbers would produce two tables. Returns `None` if one of
+/// them is missing (`usize::MAX`) or too large.
 #[doc(hidden)]
 #[inline(always)]
 pub const fn both_offsets(place: usize, mark: usize) -> Option<u64> {
