@@ -96,7 +96,8 @@ pub struct Runs {
     /// of the FMU. Either a call failed or the FMU ended the simulation. If a run failed without a message,
     /// it is repeated with logging on after all other runs, unless this takes much longer.
     pub errors: Vec<(usize, String)>,
-    /// Notes about runs that reached the last time: the FMU ended the simulation there, or its termination failed.
+    /// Notes about runs that reached the last time: the FMU ended the simulation there, or its termination
+    /// failed.
     pub notes: Vec<(usize, String)>,
 }
 
