@@ -1,5 +1,5 @@
-//! Compiles the parameters into the library: those of Table 1, or of the file that `PRW_PARAMETERS` names (relative to
-//! this directory; `build_fmu --parameters` sets it).
+//! Compiles the parameters into the library: Table 1, or the file that `PRW_PARAMETERS` names. A relative
+//! path starts at this directory. `build_fmu --parameters` sets the variable.
 
 #[path = "src/parameter_file.rs"]
 mod parameter_file;

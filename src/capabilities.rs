@@ -1,4 +1,4 @@
-//! What the FMU of the testbed offers.
+//! Capabilities of the testbed FMU.
 
 use crate::fmu::{Moving, TestbedFmu};
 use crate::instant::Instant;
@@ -73,7 +73,8 @@ impl Model for TestbedFmu {
         Ok(())
     }
 
-    /// Until the testbed has started, its state follows the motors, or what is given.
+    /// Until the simulation has started, the state follows from the start parameters or from the motor
+    /// angles.
     fn calculate_start(&mut self) {
         if !self.start.is_over {
             self.testbed.state = self.start.from(self.testbed.motors.theta());
@@ -119,8 +120,8 @@ impl ModelExchange for TestbedFmu {
 }
 
 impl InputDerivatives for TestbedFmu {
-    /// Order 1 of theta is its slope over the next step. Higher orders, and derivatives of omega, are
-    /// not needed: between communication points the motors move on straight lines.
+    /// Accepts order 1 of theta, the slope over the next step. Higher orders and derivatives of omega are
+    /// ignored: between communication points the motors move on straight lines.
     fn set_input_derivative(&mut self, of: Name, order: u32, value: f64) {
         match (of, order) {
             (Name::theta1, 1) => self.testbed.motors.set_rate(0, value),
@@ -136,9 +137,9 @@ impl OutputDerivatives for TestbedFmu {
     }
 }
 
-/// The derivatives of the values that a getter returns, while initializing and later. In Co-Simulation the rates that
-/// are estimated from the angles react to an angle, and until the start is over the states react to it too. Else these
-/// are A, B, C and D of eq. (11).
+/// Derivatives of the values that a getter returns, in Initialization Mode and later. In Co-Simulation, the
+/// rates that are estimated from the angles depend on the angles. Until the simulation has started, the
+/// states may depend on the angles too. All other derivatives are entries of A, B, C and D of eq. (11).
 impl Partials for TestbedFmu {
     fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
         self.partials(Some((known, 0)), false)((unknown, 0))
@@ -156,7 +157,8 @@ impl Partials for TestbedFmu {
 }
 
 impl TestbedFmu {
-    /// The changes when a known is set to a value that is larger by 1; nothing depends on the time.
+    /// Returns the change of each variable per unit change of a known. No variable depends explicitly on
+    /// time.
     #[inline(never)]
     fn reactions(&self, known: Option<Name>) -> Cow<'_, Moving> {
         let [_, _, _, _, of_states @ ..] = &self.jacobian;
@@ -184,7 +186,8 @@ impl TestbedFmu {
         })
     }
 
-    /// With the rate that is estimated from the angle, and with the states that follow the motor until the start is over.
+    /// Includes the rate that is estimated from the angle, and the states that follow the motor until the
+    /// start.
     #[inline(never)]
     fn reactions_to_angle(&self, motor: usize) -> Cow<'_, Moving> {
         let mut inputs = [Inputs::default(); 2];
@@ -204,7 +207,7 @@ impl TestbedFmu {
         if takes_omega { &self.jacobian[2 + motor] } else { &[0.0; _] }
     }
 
-    /// The partial derivatives of all that moves with respect to angles and rates of the motors and to the states.
+    /// Returns the partial derivatives with respect to angles and rates of the motors and to the states.
     fn jacobian(&self) -> [Moving; 10] {
         std::array::from_fn(|column| {
             let mut unit = Instant::default();
@@ -217,7 +220,7 @@ impl TestbedFmu {
         })
     }
 
-    /// The values of the variables at an instant, in which they are linear.
+    /// Returns the values of the variables at an instant. They are linear in the instant.
     #[inline]
     fn moving(&self, instant: &Instant) -> Moving {
         let system = self.system();
@@ -234,7 +237,7 @@ impl TestbedFmu {
         ]
     }
 
-    /// The changes when a parameter of the equations is larger by 1: the table knows where it lives.
+    /// Returns the changes per unit change of a parameter. The variable table sets the unit change.
     #[cold]
     #[inline(never)]
     fn reactions_to_parameter(&self, parameter: Name) -> Cow<'_, Moving> {

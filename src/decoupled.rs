@@ -1,8 +1,8 @@
-//! The same model split into pitch and roll.
+//! The model split into pitch and roll.
 //!
-//! The testbed is mirror-symmetric, so the mean of its two sides and half their difference do not
-//! influence each other: the mean is the pitch subsystem, the half difference the roll subsystem. Both
-//! obey the same three equations, with the inertia and damping that the load has in that motion:
+//! The testbed is mirror-symmetric, so the mean of its two sides and half their difference do not influence
+//! each other. The mean is the pitch subsystem; the half difference is the roll subsystem. Both obey these
+//! equations, each with its own inertia J and load damping c:
 //!
 //! ```text
 //! (c1 + c2) q_I' = c1 w + c2 v - k1 (q_I - u) - k2 (q_I - q_II)        massless shaft, eq. (8) row 1
@@ -10,10 +10,10 @@
 //! J v'           = c2 (q_I' - v) + k2 (q_I - q_II) - c v               SECT input shaft, eq. (8) row 3
 //! ```
 //!
-//! where u and w are the mean (half difference) of the motor angles and rates. With `q_I'` inserted and
-//! the abbreviations [`stiffness_motor`](Side::stiffness_motor), [`stiffness_sect`](Side::stiffness_sect)
-//! and [`damping`](Side::damping) the differences of large terms disappear, which keeps extreme
-//! parameters accurate.
+//! Here u and w are the mean (or half difference) of the motor angles and rates. The code inserts `q_I'` and
+//! uses the abbreviations [`stiffness_motor`](Side::stiffness_motor),
+//! [`stiffness_sect`](Side::stiffness_sect) and [`damping`](Side::damping). This avoids differences of large
+//! terms and keeps extreme parameters accurate.
 
 use crate::motor::Motion;
 use crate::number::Number;
@@ -23,12 +23,12 @@ use crate::propagator::Balance;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::{Add, Mul, Sub};
 
-/// The coupling pair of one side: motor - k1, c1 - massless shaft - k2, c2 - SECT.
+/// Couplings of one side: motor - k1, c1 - massless shaft - k2, c2 - SECT.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Side<T = f64> {
-    /// `c1 / (c1 + c2)`: the share of a motor's motion that passes to the massless shaft at once.
+    /// `c1 / (c1 + c2)`: the share of the motor rate in the rate of the massless shaft.
     pub motor_share: T,
-    /// `c2 / (c1 + c2)`: the share of the SECT shaft's motion that does.
+    /// `c2 / (c1 + c2)`: the share of the SECT shaft's rate in the rate of the massless shaft.
     pub sect_share: T,
     /// `k1 / (c1 + c2)`, 1/s.
     pub rate_motor: T,
@@ -43,7 +43,7 @@ pub struct Side<T = f64> {
 }
 
 impl<T: Number> Side<T> {
-    /// The side of a testbed with these parameters.
+    /// Creates a side of a testbed with these parameters.
     pub fn new(p: &Parameters) -> Self {
         let [k1, k2, c1, c2] = [p.k1, p.k2, p.c1, p.c2].map(T::from);
         let c = c1 + c2;
@@ -60,7 +60,8 @@ impl<T: Number> Side<T> {
 }
 
 impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Side<T> {
-    /// Rate of the massless shaft of one side, or of both in pairs, the first row of eq. (8) solved for `q_I'`.
+    /// Returns the rate of the massless shaft: the first row of eq. (8), solved for `q_I'`. `T` is a number
+    /// for one side, or [`Sides`] for both.
     #[inline]
     pub fn shaft_rate(&self, q_i: T, q_ii: T, v: T, motor: Motion<T>) -> T {
         let Motion { angle: u, rate: w, .. } = motor;
@@ -69,8 +70,8 @@ impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Side<T> {
             - (q_i - q_ii) * self.rate_sect
     }
 
-    /// Sensor torque of one side, or of both in pairs, eq. (9), with [`shaft_rate`](Self::shaft_rate)
-    /// inserted.
+    /// Returns the sensor torque, eq. (9), with [`shaft_rate`](Self::shaft_rate) inserted. `T` is a number
+    /// for one side, or [`Sides`] for both.
     #[inline]
     pub fn torque(&self, q_i: T, q_ii: T, v: T, motor: Motion<T>) -> T {
         let Motion { angle: u, rate: w, .. } = motor;
@@ -79,7 +80,7 @@ impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Side<T> {
 }
 
 impl Side {
-    /// The same for both sides at once.
+    /// Returns the coefficients as pairs, to evaluate both sides at once.
     fn of_both(&self) -> Side<Sides> {
         let Self { motor_share, sect_share, rate_motor, rate_sect, stiffness_motor, stiffness_sect, damping } =
             *self;
@@ -111,7 +112,7 @@ pub struct Subsystem<T = f64> {
 }
 
 impl<T: Number> Subsystem<T> {
-    /// The pitch and the roll subsystem of a testbed with these parameters.
+    /// Creates the pitch and the roll subsystem of a testbed with these parameters.
     pub fn pitch_and_roll(p: &Parameters) -> [Self; 2] {
         let side = Side::new(p);
         let [j2, j3, h3, c3, half] = [p.J2, p.J3, p.H3, p.c3, 0.5].map(T::from);
@@ -147,17 +148,17 @@ impl<T: Number> Subsystem<T> {
 /// The decoupled testbed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decoupled {
-    /// What it was made from.
+    /// Parameters of the testbed.
     pub parameters: Parameters,
-    /// The coupling pair, the same on both sides.
+    /// Couplings of one side; both sides have equal couplings.
     pub side: Side,
-    /// The same, for both sides at once.
+    /// The coefficients of `side` as pairs, to evaluate both sides at once.
     pub both_sides: Side<Sides>,
-    /// Mean of the sides.
+    /// Mean of the two sides.
     pub pitch: Subsystem,
-    /// Half difference of the sides.
+    /// Half difference of the two sides.
     pub roll: Subsystem,
-    /// The units in which pitch and roll are propagated.
+    /// Velocity units in which pitch and roll are propagated.
     pub balances: [Balance; 2],
     /// N / 2M of eq. (1).
     pub roll_ratio: f64,
@@ -166,11 +167,10 @@ pub struct Decoupled {
 }
 
 impl Decoupled {
-    /// The testbed with these parameters.
+    /// Creates the testbed with these parameters.
     ///
     /// # Errors
-    /// When a parameter is out of its range, or the parameters are so far apart that a coefficient is
-    /// no finite number.
+    /// Fails if a parameter is out of its range, or if a coefficient of eq. (11) is not finite.
     pub fn new(p: &Parameters) -> Result<Self, InvalidParameter> {
         p.check()?;
         let [pitch, roll] = Subsystem::pitch_and_roll(p);
@@ -195,12 +195,12 @@ impl Decoupled {
         })
     }
 
-    /// The inertias of pitch and of roll.
+    /// Returns the inertias of pitch and of roll.
     pub fn inertia(&self) -> PitchRoll {
         PitchRoll::new(self.pitch.inertia, self.roll.inertia)
     }
 
-    /// The damping of the load in pitch and in roll.
+    /// Returns the damping of the load in pitch and in roll.
     pub fn load_damping(&self) -> PitchRoll {
         PitchRoll::new(self.pitch.load_damping, self.roll.load_damping)
     }

@@ -1,7 +1,7 @@
-//! Energies and power of the testbed, eqs. (1) and (3) to (7): what the whole model follows from.
+//! Energies and power of the testbed, eqs. (1) and (3) to (7), from which the paper derives the model.
 //!
-//! The stepping does not use this module. It is here for the reader, and for the tests, which check
-//! that the energy that the motors feed in is stored or dissipated and nothing else.
+//! The stepping does not use this module. Tests use it to check the energy balance: the energy that the
+//! motors supply is stored or dissipated.
 
 use crate::parameters::Parameters;
 
@@ -22,7 +22,7 @@ pub struct Angles {
     pub theta6: f64,
 }
 
-/// Pitch theta7 and roll theta8 of the output shaft from theta5 and theta6, eq. (1):
+/// Returns pitch theta7 and roll theta8 of the output shaft from theta5 and theta6, eq. (1):
 /// `theta7 = (theta5 + theta6) / 2`, `theta8 = N/2M (theta5 - theta6)`.
 ///
 /// The paper's list of symbols calls theta7 "rolling"; eq. (1), the frame of eq. (4a) and Sec. 4
@@ -31,10 +31,12 @@ pub fn sect(p: &Parameters, theta5: f64, theta6: f64) -> (f64, f64) {
     (0.5 * (theta5 + theta6), p.roll_ratio() * (theta5 - theta6))
 }
 
-/// Kinetic energy `T = J2/2 (theta5'^2 + theta6'^2) + H3/2 theta7'^2 + J3/2 theta8'^2`, eq. (5), J.
+/// Returns the kinetic energy `T = J2/2 (theta5'^2 + theta6'^2) + H3/2 theta7'^2 + J3/2 theta8'^2`, eq. (5),
+/// J.
 ///
-/// Without the motors' own, `J1/2 (theta1'^2 + theta2'^2)`: their motion is given. Eqs. (3) and (4) have
-/// the load's inertia as a matrix in a frame with X along the pitch and Y along the roll axis.
+/// The kinetic energy of the motors, `J1/2 (theta1'^2 + theta2'^2)`, is left out because their motion is an
+/// input. Eqs. (3) and (4) contain the load's inertia as a matrix in a frame with X along the pitch axis and
+/// Y along the roll axis.
 pub fn kinetic_energy(p: &Parameters, rates: &Angles) -> f64 {
     let (pitch_rate, roll_rate) = sect(p, rates.theta5, rates.theta6);
     0.5 * p.J2 * (square(rates.theta5) + square(rates.theta6))
@@ -42,7 +44,7 @@ pub fn kinetic_energy(p: &Parameters, rates: &Angles) -> f64 {
         + 0.5 * p.J3 * square(roll_rate)
 }
 
-/// Potential energy of the couplings,
+/// Returns the potential energy of the couplings,
 /// `V = k1/2 ((theta1 - theta3)^2 + (theta2 - theta4)^2) + k2/2 ((theta3 - theta5)^2 + (theta4 - theta6)^2)`,
 /// eq. (6), J.
 ///
@@ -52,8 +54,10 @@ pub fn potential_energy(p: &Parameters, q: &Angles) -> f64 {
         + 0.5 * p.k2 * (square(q.theta3 - q.theta5) + square(q.theta4 - q.theta6))
 }
 
-/// Rayleigh's dissipation function: like V of eq. (6) with rates for angles and c for k, plus
-/// `c3/2 (theta7'^2 + theta8'^2)`, eq. (7), W. The power lost is twice this.
+/// Returns Rayleigh's dissipation function, eq. (7), W.
+///
+/// The function equals V of eq. (6) with rates for angles and c for k, plus `c3/2 (theta7'^2 + theta8'^2)`. The
+/// dissipated power is twice this value.
 pub fn dissipation(p: &Parameters, rates: &Angles) -> f64 {
     let (pitch_rate, roll_rate) = sect(p, rates.theta5, rates.theta6);
     0.5 * p.c1 * (square(rates.theta1 - rates.theta3) + square(rates.theta2 - rates.theta4))

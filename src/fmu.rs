@@ -1,4 +1,4 @@
-//! The testbed as an importer has it: with an interface type, and with what several of its variables share.
+//! The testbed with the values that the FMU needs in addition: the interface type, the start and the outputs.
 
 use crate::decoupled::Decoupled;
 use crate::instant::{Instant, output_shaft, torques};
@@ -8,22 +8,23 @@ use crate::start::Start;
 use crate::testbed::Testbed;
 use fmu_export::Interface;
 
-/// The testbed in an FMU. Its [table of variables](crate::variables) says which variable is what.
+/// The testbed in an FMU. The [table of variables](crate::variables) maps its fields to variables.
 #[derive(Debug)]
 pub struct TestbedFmu {
     pub(crate) testbed: Testbed,
     pub(crate) interface: Interface,
     pub(crate) start: Start,
-    /// Sensor torques, pitch and roll, pitch rate and roll rate, of the last time they were calculated.
+    /// Sensor torques at the last calculation of the outputs. `angles` are pitch and roll; `rates` are pitch
+    /// rate and roll rate.
     pub(crate) torques: [f64; 2],
     pub(crate) angles: [f64; 2],
     pub(crate) rates: [f64; 2],
-    /// The partial derivatives of all that moves with respect to angles and rates of the motors and to the states; they
-    /// follow from the parameters.
+    /// Partial derivatives with respect to angles and rates of the motors and to the states. They depend only
+    /// on the parameters.
     pub(crate) jacobian: [Moving; 10],
 }
 
-/// A number for each variable before the parameters, in the order of the table.
+/// One number for each variable before the parameters, in the order of the table.
 pub(crate) type Moving = [f64; 22];
 
 impl Clone for TestbedFmu {
@@ -31,7 +32,7 @@ impl Clone for TestbedFmu {
         Self { testbed: self.testbed.clone(), ..*self }
     }
 
-    /// Passes on to the testbed, which copies little if the parameters are the same.
+    /// Copies the testbed with [`Testbed::copy_from`], which copies less if the parameters are equal.
     fn clone_from(&mut self, source: &Self) {
         let Self { testbed, interface, start, torques, angles, rates, jacobian } = source;
         if self.testbed.copy_from(testbed) {
@@ -47,8 +48,8 @@ impl TestbedFmu {
         self.testbed.system()
     }
 
-    /// The motion of these motors now. Model Exchange takes theta and omega as they are set (u of eq. (11));
-    /// Co-Simulation knows the motors by their samples.
+    /// Returns the current motion of these motors. Model Exchange takes theta and omega as the importer sets
+    /// them (u of eq. (11)). Co-Simulation computes the motion from samples.
     #[inline]
     pub(crate) fn motions(&self, motors: &Motors) -> Motions {
         match self.interface {
@@ -59,7 +60,7 @@ impl TestbedFmu {
         }
     }
 
-    /// Calculates the outputs with the motors in this motion.
+    /// Calculates the outputs for this motion of the motors.
     #[inline(always)]
     pub(crate) fn calculate_with(&mut self, motors: Motions) {
         let (state, system) = (&self.testbed.state, self.testbed.system());
@@ -67,7 +68,7 @@ impl TestbedFmu {
         [self.angles, self.rates] = output_shaft(state, system).map(Sides::array);
     }
 
-    /// State and motors now.
+    /// Returns the current state and motor motion.
     #[inline]
     pub(crate) fn now(&self) -> Instant {
         Instant { x: self.testbed.state, motors: self.motions(&self.testbed.motors) }

@@ -1,5 +1,5 @@
-//! What the equations say at one instant: sensor torques, rates and accelerations, and how these react to the
-//! parameters.
+//! The equations at one instant: sensor torques, rates, accelerations, and their derivatives with respect to
+//! the parameters.
 //!
 //! With `q_I' = (c1 w + c2 v - k1 (q_I - u) - k2 (q_I - q_II)) / (c1 + c2)`, eq. (8) row 1, the sensor torque is
 //! `tau = k1 (q_I - u) + c1 (q_I' - w)`, eq. (9), and the motion of the SECT shafts splits into pitch and roll,
@@ -11,24 +11,24 @@ use crate::pair::{PitchRoll, Sides, sides, sum_difference};
 use crate::parameters::Parameters;
 use crate::testbed::{State, by_sides};
 
-/// State x and motion of the motors at one instant. All that is calculated from it is linear in it, so the same
-/// functions serve for values, for partial derivatives (at unit points) and for time derivatives (at a point's rates).
+/// State x and motion of the motors at one instant. All functions are linear in the instant, so they return
+/// values, partial derivatives (at unit points) or time derivatives (at the rates of a point).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Instant {
     /// State x of eq. (11).
     pub x: State,
-    /// Motors: angles and rates are u of eq. (11).
+    /// Motion of the motors: angles and rates are u of eq. (11).
     pub motors: Motions,
 }
 
-/// Sensor torques, eq. (9), N.m.
+/// Returns the sensor torques, eq. (9), N.m.
 #[inline]
 pub fn torques(x: &State, motors: &Motions, system: &Decoupled) -> Sides {
     let [q_i, q_ii, v] = by_sides(x);
     system.both_sides.torque(q_i, q_ii, v, *motors)
 }
 
-/// Pitch and roll of the output shaft and their rates, eq. (1), rad and rad/s.
+/// Returns pitch and roll of the output shaft and their rates, eq. (1), rad and rad/s.
 #[inline]
 pub fn output_shaft(x: &State, system: &Decoupled) -> [PitchRoll; 2] {
     let [_, q_ii, v] = by_sides(x);
@@ -36,18 +36,18 @@ pub fn output_shaft(x: &State, system: &Decoupled) -> [PitchRoll; 2] {
 }
 
 impl Instant {
-    /// Sensor torques, eq. (9), N.m.
+    /// Returns the sensor torques, eq. (9), N.m.
     pub fn torques(&self, system: &Decoupled) -> Sides {
         torques(&self.x, &self.motors, system)
     }
 
-    /// Rates of the massless shafts, eq. (11a), rad/s.
+    /// Returns the rates of the massless shafts, eq. (11a), rad/s.
     pub fn shaft_rates(&self, system: &Decoupled) -> Sides {
         let [q_i, q_ii, v] = by_sides(&self.x);
         system.both_sides.shaft_rate(q_i, q_ii, v, self.motors)
     }
 
-    /// Accelerations of the SECT input shafts, eq. (11a), rad/s2.
+    /// Returns the accelerations of the SECT input shafts, eq. (11a), rad/s2.
     pub fn accelerations(&self, system: &Decoupled) -> Sides {
         // M_II v_II' = -gamma - (load damping), split into pitch and roll.
         let torque = sum_difference(self.torques(system)) * 0.5;
@@ -56,31 +56,31 @@ impl Instant {
         sides((-torque - system.load_damping() * rate) / system.inertia())
     }
 
-    /// Pitch angle theta7, eq. (1), rad.
+    /// Returns the pitch angle theta7, eq. (1), rad.
     #[inline]
     pub fn pitch(&self, _: &Decoupled) -> f64 {
         0.5 * (self.x[2] + self.x[3])
     }
 
-    /// Roll angle theta8, eq. (1), rad.
+    /// Returns the roll angle theta8, eq. (1), rad.
     #[inline]
     pub fn roll(&self, system: &Decoupled) -> f64 {
         system.roll_ratio * (self.x[2] - self.x[3])
     }
 
-    /// How fast the pitch angle changes, rad/s.
+    /// Returns the pitch rate, rad/s.
     #[inline]
     pub fn pitch_rate(&self, _: &Decoupled) -> f64 {
         0.5 * (self.x[4] + self.x[5])
     }
 
-    /// How fast the roll angle changes, rad/s.
+    /// Returns the roll rate, rad/s.
     #[inline]
     pub fn roll_rate(&self, system: &Decoupled) -> f64 {
         system.roll_ratio * (self.x[4] - self.x[5])
     }
 
-    /// How fast all of this changes, by eq. (11a).
+    /// Returns the time derivatives of state and motion, eq. (11a).
     pub fn rates(&self, system: &Decoupled) -> Self {
         let [.., v] = by_sides(&self.x);
         let [shafts, v, accelerations] =
@@ -90,8 +90,8 @@ impl Instant {
         Self { x, motors: Motion { angle: rate, rate: acceleration, ..Motion::default() } }
     }
 
-    /// By how much [`shaft_rates`](Self::shaft_rates) change when the parameters change by little, `change` being the
-    /// direction.
+    /// Returns the derivative of [`shaft_rates`](Self::shaft_rates) with respect to the parameters in the
+    /// direction `change`.
     pub fn change_of_shaft_rates(&self, system: &Decoupled, change: &Parameters) -> Sides {
         let [q_i, q_ii, v] = by_sides(&self.x);
         let Motions { angle, rate, .. } = self.motors;
@@ -103,7 +103,8 @@ impl Instant {
         force * (1.0 / (system.parameters.c1 + system.parameters.c2))
     }
 
-    /// The same of [`torques`](Self::torques).
+    /// Returns the derivative of [`torques`](Self::torques) with respect to the parameters in the direction
+    /// `change`.
     pub fn change_of_torques(&self, system: &Decoupled, change: &Parameters) -> Sides {
         let [q_i, ..] = by_sides(&self.x);
         let Motions { angle, rate, .. } = self.motors;
@@ -112,7 +113,8 @@ impl Instant {
             + self.change_of_shaft_rates(system, change) * system.parameters.c1
     }
 
-    /// The same of [`accelerations`](Self::accelerations).
+    /// Returns the derivative of [`accelerations`](Self::accelerations) with respect to the parameters in the
+    /// direction `change`.
     pub fn change_of_accelerations(&self, system: &Decoupled, change: &Parameters) -> Sides {
         let torque = sum_difference(self.change_of_torques(system, change)) * 0.5;
         let [.., v] = by_sides(&self.x);

@@ -1,29 +1,34 @@
-//! The McGill pitch-roll wrist testbed: its equations, their exact solution from one communication point
-//! to the next, and the FMU made of them.
+//! The McGill pitch-roll wrist testbed: its equations, their exact solution from one communication point to
+//! the next, and the FMU made from them.
 //!
-//! Two motors turn by theta1 and theta2. Each drives, through a torque sensor and two flexible couplings
-//! with a massless shaft between them (theta3, theta4), an input shaft of the spherical epicyclic cam train
-//! (SECT; theta5, theta6), whose output shaft pitches (theta7) and rolls (theta8). Read in this order, the
-//! modules are the derivation of the paper, *Modelling and Simulation of the Testbed for a Pitch-Roll Wrist
-//! Prototype Based on Spherical Cam-Rollers*, and what the project adds to it:
+//! Two motors turn by theta1 and theta2. Each motor drives one input shaft of the spherical epicyclic cam
+//! train (SECT; theta5, theta6). Between motor and input shaft are a torque sensor and two flexible
+//! couplings. A massless shaft (theta3, theta4) connects the two couplings. The output shaft of the SECT
+//! pitches (theta7) and rolls (theta8).
+//!
+//! In this order, the modules follow the derivation in the paper, *Modelling and Simulation of the Testbed for
+//! a Pitch-Roll Wrist Prototype Based on Spherical Cam-Rollers*. From [`motor`] on, they are additions of
+//! this project:
 //!
 //! 1. [`parameters`]: inertias, stiffnesses, damping (Table 1).
-//! 2. [`energies`]: what the SECT does to motions, eq. (1); kinetic energy, eqs. (3) to (5); potential
-//!    energy, eq. (6); dissipation, eq. (7).
-//! 3. [`state_space`]: Lagrange's equation, eq. (2), makes of them `M q'' + Delta q' + K q = f`, eq. (8).
-//!    The shafts between the couplings have no mass, so their rows are of first order; solved for
-//!    `q_I'` they leave six states, eq. (11), with the sensor torques, eqs. (9) and (10), as outputs. Then
-//!    the transfer matrices G(s), eqs. (12) and (13), and H(s), eqs. (14) and (15).
-//! 4. [`motor`]: what is known of a motor between samples of its angle.
-//! 5. [`decoupled`]: the same equations for the mean and the half difference of the two sides, pitch and
-//!    roll, which do not influence each other.
-//! 6. [`propagator`]: their solution over a step on which the motors move on straight lines.
-//! 7. [`testbed`]: motors and state, advanced from point to point.
-//! 8. [`instant`]: torques, rates and accelerations at one instant, and how they react to the parameters.
-//! 9. [`start`]: where the motion begins.
-//! 10. [`TestbedFmu`] and [`variables`]: the names and units that an importer sees, and what the FMU offers.
+//! 2. [`energies`]: the kinematics of the SECT, eq. (1); kinetic energy, eqs. (3) to (5); potential energy,
+//!    eq. (6); dissipation, eq. (7).
+//! 3. [`state_space`]: the matrices that follow from Lagrange's equation, eq. (2). Eq. (8) is
+//!    `M q'' + Delta q' + K q = f`. The shafts between the couplings have no mass, so their rows are of first
+//!    order. Solved for `q_I'`, they give a system of six states, eq. (11). Its outputs include the sensor
+//!    torques, eqs. (9) and (10). The transfer matrices are G(s), eqs. (12) and (13), and H(s), eqs. (14) and
+//!    (15).
+//! 4. [`motor`]: the motion of a motor between samples of its angle.
+//! 5. [`decoupled`]: the same equations for pitch and roll, the mean and the half difference of the two
+//!    sides. Pitch and roll do not influence each other.
+//! 6. [`propagator`]: the exact solution over one step during which the motors move on straight lines.
+//! 7. [`testbed`]: motors and state, advanced from one communication point to the next.
+//! 8. [`instant`]: torques, rates and accelerations at one instant, and their derivatives with respect to the
+//!    parameters.
+//! 9. [`start`]: the state at the start of the simulation.
+//! 10. [`TestbedFmu`] and [`variables`]: names and units of the variables, and the capabilities of the FMU.
 //!
-//! Where the printed equations are wrong, the item that mends them says so.
+//! Some printed equations are wrong; the documentation of the corresponding function describes each correction.
 //!
 //! ```
 //! use prw_testbed::{Parameters, Testbed};
@@ -65,8 +70,8 @@ pub use parameters::Parameters;
 pub use testbed::Testbed;
 
 impl Parameters {
-    /// Table 1, or what the library was built with instead; read from `modelDescription/parameters.json`
-    /// when it is compiled.
+    /// The built-in parameters: Table 1, or the file that replaced it when the library was built. The build
+    /// script reads Table 1 from `modelDescription/parameters.json`.
     pub const BUILT_IN: Self = include!(concat!(env!("OUT_DIR"), "/table_1.rs"));
 }
 

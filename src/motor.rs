@@ -1,8 +1,8 @@
-//! How the motors move between communication points, known only by samples of their angles.
+//! Motion of the motors between communication points, estimated from samples of their angles.
 
 use crate::pair::Sides;
 
-/// When the last two samples before the current one were taken.
+/// Times of the last two samples before the current one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SampleTimes {
     /// Number of earlier samples: 0, 1, or 2 for two and more.
@@ -11,16 +11,16 @@ pub struct SampleTimes {
     pub last_step: f64,
     /// Step before that, s.
     pub step_before: f64,
-    /// The step size that leaves all of this as it is, if there is one, else 0.
+    /// The step size that leaves these fields unchanged; 0 if there is none.
     steady_step: f64,
-    /// 1 / last_step, 1 / step_before and 1 / mean of both, and half of last_step, each for both motors:
-    /// a step needs no division.
+    /// 1 / last_step, 1 / step_before and 1 / mean of both, each for both motors. With them and
+    /// `half_last_step`, a step needs no division.
     inverses: [Sides; 3],
     half_last_step: Sides,
 }
 
 impl SampleTimes {
-    /// The current sample becomes the previous one after a step of size `h`.
+    /// Makes the current sample the previous one after a step of size `h`.
     #[inline]
     pub fn shift(&mut self, h: f64) {
         if h != self.steady_step {
@@ -36,14 +36,14 @@ impl SampleTimes {
         self.update();
     }
 
-    /// Whether the number of samples is one that counts, and there was time between them.
+    /// Returns whether the number of samples is in range and the time between them is positive.
     pub fn are_possible(&self) -> bool {
         (0..=2).contains(&self.count)
             && (self.count < 1 || self.last_step > 0.0)
             && (self.count < 2 || self.step_before > 0.0)
     }
 
-    /// Brings what follows from the steps up to date.
+    /// Updates the fields that are derived from the steps.
     pub fn update(&mut self) {
         let Self { count, last_step, step_before, .. } = *self;
         let is_steady = count == 2 && last_step == step_before;
@@ -54,7 +54,7 @@ impl SampleTimes {
     }
 }
 
-/// A motor's angle, rate and angular acceleration at one instant.
+/// Angle, rate and angular acceleration of a motor at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion<T = f64> {
     /// Angle, rad.
@@ -65,11 +65,11 @@ pub struct Motion<T = f64> {
     pub acceleration: T,
 }
 
-/// The motions of both motors.
+/// Motions of both motors.
 pub type Motions = Motion<Sides>;
 
 impl Motions {
-    /// The motions of both.
+    /// Creates the motions of both motors.
     #[inline]
     pub const fn new(motor1: Motion, motor2: Motion) -> Self {
         Self {
@@ -79,14 +79,14 @@ impl Motions {
         }
     }
 
-    /// The motion of motor 0 or 1.
+    /// Returns the motion of motor 0 or 1.
     #[inline]
     pub fn of(&self, motor: usize) -> Motion {
         Motion { angle: self.angle[motor], rate: self.rate[motor], acceleration: self.acceleration[motor] }
     }
 
-    /// After time `h`: the angle on a straight line, the rate as the parabola predicts it, so that
-    /// torques read before the next sample are second-order accurate too.
+    /// Returns the motion after time `h`. The angle moves on a straight line. The rate follows the parabola,
+    /// so that torques before the next sample are second-order accurate too.
     #[inline]
     pub fn after(&self, h: f64) -> Self {
         Self {
@@ -97,10 +97,10 @@ impl Motions {
     }
 }
 
-/// The inputs of one motor.
+/// Inputs of one motor.
 ///
-/// By motor and not in pairs: an importer sets one number at a time, and a pair that is read at once right
-/// after its halves were written makes the processor wait.
+/// Stored per motor, not in pairs: an importer sets one number at a time. Reading a pair right after its
+/// halves were written stalls the processor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inputs {
     /// Angle, rad; see [`Motors::theta_changed`].
@@ -109,65 +109,67 @@ pub struct Inputs {
     pub omega: f64,
 }
 
-/// The motors as the FMU sees them: their inputs and what is remembered of earlier steps.
+/// The motors of the FMU: their inputs and the values stored from earlier steps.
 ///
-/// Inputs may be set as fields; then [`theta_changed`](Self::theta_changed) or its like must follow.
+/// A caller that sets inputs as fields must then call [`theta_changed`](Self::theta_changed),
+/// [`omega_changed`](Self::omega_changed) or [`use_omega_changed`](Self::use_omega_changed).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motors {
-    /// What the importer sets.
+    /// Values that the importer sets.
     pub inputs: [Inputs; 2],
-    /// Whether the rates come from omega where no derivative is set, else from a backward difference of
-    /// the sampled angles; see [`use_omega_changed`](Self::use_omega_changed).
+    /// Whether the rates come from omega if no derivative is set. Otherwise they come from a backward
+    /// difference of the sampled angles. See [`use_omega_changed`](Self::use_omega_changed).
     pub use_omega: bool,
-    /// Whether theta has been set since the last step; if not, the path's end stands in for it.
+    /// Whether theta has been set since the last step. If not, the end of the path replaces the sample.
     pub is_sampled: [bool; 2],
     /// Derivatives of theta that the importer has set since the last step, rad/s.
     pub given_rate: [Option<f64>; 2],
-    /// theta of the previous samples and of those before, rad.
+    /// theta of the previous two samples, rad; the newer sample first.
     pub earlier: [Sides; 2],
-    /// Where the last step's straight lines ended.
+    /// Motion at the end of the straight lines of the last step.
     pub path_end: Motions,
-    /// When the angles were sampled.
+    /// Times of the samples.
     pub times: SampleTimes,
-    /// Whether a rate is given for the next step, or comes from omega; see [`rates_changed`](Self::rates_changed).
+    /// Whether a rate is given for the next step or comes from omega; see
+    /// [`rates_changed`](Self::rates_changed).
     has_rates: bool,
 }
 
 impl Motors {
-    /// The angles that are set, rad.
+    /// Returns the motor angles that the importer set, rad.
     #[inline(always)]
     pub fn theta(&self) -> Sides {
         Sides::new(self.inputs[0].theta, self.inputs[1].theta)
     }
 
-    /// Both rates, rad/s.
+    /// Returns the rates that the importer set, rad/s.
     #[inline]
     pub fn omega(&self) -> Sides {
         Sides::new(self.inputs[0].omega, self.inputs[1].omega)
     }
 
-    /// Takes a new angle of motor 0 or 1.
+    /// Sets the angle of motor 0 or 1.
     #[inline]
     pub fn set_theta(&mut self, motor: usize, theta: f64) {
         self.inputs[motor].theta = theta;
         self.theta_changed(motor);
     }
 
-    /// Takes a new rate of motor 0 or 1 from the input omega.
+    /// Sets the input omega of motor 0 or 1.
     #[inline]
     pub fn set_omega(&mut self, motor: usize, omega: f64) {
         self.inputs[motor].omega = omega;
         self.omega_changed(motor);
     }
 
-    /// After theta of motor 0 or 1 has been set: there is a new sample.
+    /// Records a new sample. Call this after theta of motor 0 or 1 has been set.
     #[inline]
     pub fn theta_changed(&mut self, motor: usize) {
         self.is_sampled[motor] = true;
     }
 
-    /// After omega of motor 0 or 1 has been set. If rates come from there, it holds at once, but for a
-    /// derivative that is set.
+    /// Makes a new omega effective at once, if the rate of motor 0 or 1 comes from omega. Call this after
+    /// omega has been set.
     #[inline]
     pub fn omega_changed(&mut self, motor: usize) {
         if self.takes_omega(motor) {
@@ -175,26 +177,26 @@ impl Motors {
         }
     }
 
-    /// Whether the rate of motor 0 or 1 comes from omega.
+    /// Returns whether the rate of motor 0 or 1 comes from omega.
     #[inline]
     pub fn takes_omega(&self, motor: usize) -> bool {
         self.use_omega && self.given_rate[motor].is_none()
     }
 
-    /// After `use_omega` has been set.
+    /// Makes a new value of `use_omega` effective. Call this after `use_omega` has been set.
     pub fn use_omega_changed(&mut self) {
         self.omega_changed(0);
         self.omega_changed(1);
         self.rates_changed();
     }
 
-    /// After the sources of the rates have changed.
+    /// Updates `has_rates`. Call this after the sources of the rates have changed.
     pub fn rates_changed(&mut self) {
         self.has_rates = self.use_omega || self.given_rate.iter().any(Option::is_some);
     }
 
-    /// Takes the derivative of theta of motor 0 or 1 at the current communication point. It precedes
-    /// omega, in whatever order they are set.
+    /// Sets the derivative of theta of motor 0 or 1 at the current communication point. The derivative takes
+    /// precedence over omega, in any order of the calls.
     #[inline]
     pub fn set_rate(&mut self, motor: usize, rate: f64) {
         self.given_rate[motor] = Some(rate);
@@ -202,26 +204,28 @@ impl Motors {
         self.has_rates = true;
     }
 
-    /// Forgets the samples: the next one is the first.
+    /// Forgets the samples: the next sample is the first.
     pub fn forget_samples(&mut self) {
         let Self { inputs, use_omega, given_rate, has_rates, .. } = *self;
         *self = Self { inputs, use_omega, given_rate, has_rates, ..Self::default() };
     }
 
-    /// Whether the step size `h` is that of the last two steps.
+    /// Returns whether each of the last two steps had the size `h`.
     #[inline]
     pub fn are_steady(&self, h: f64) -> bool {
         h == self.times.steady_step
     }
 
-    /// The motions at the current communication point after three samples or more; see [`sampled`](Self::sampled).
+    /// Returns the motions at the current communication point after three samples or more; see
+    /// [`sampled`](Self::sampled).
     #[inline(always)]
     pub fn steady(&self) -> Motions {
         let motions = self.parabolas();
         if self.has_rates { self.with_rates(motions) } else { motions }
     }
 
-    /// The motions at the current communication point that the last three samples let expect.
+    /// Returns the motions at the current communication point that the parabolas through the last three
+    /// samples give.
     #[inline(always)]
     fn parabolas(&self) -> Motions {
         let [inverse_last, inverse_before, inverse_mean] = self.times.inverses;
@@ -231,9 +235,9 @@ impl Motors {
         Motion { angle: self.theta(), rate: last + acceleration * self.times.half_last_step, acceleration }
     }
 
-    /// The motions at the current communication point, from the current samples and the rates' sources:
-    /// what the importer has set, or omega, or the parabolas through the last three samples (straight
-    /// lines through two; with one sample the motors rest).
+    /// Returns the motions at the current communication point. The rates come from the importer's derivative,
+    /// from omega, or from the parabolas through the last three samples. Two samples give a straight line;
+    /// with one sample the motors are at rest.
     pub fn sampled(&self) -> Motions {
         let steady = |rate| Motion { angle: self.theta(), rate, acceleration: Sides::default() };
         self.with_rates(match self.times.count {
@@ -243,7 +247,7 @@ impl Motors {
         })
     }
 
-    /// The motions with the rates that are given or come from omega.
+    /// Replaces the rates that are given or come from omega; their accelerations are 0.
     #[inline]
     fn with_rates(&self, motions: Motions) -> Motions {
         let [rate, acceleration] = [motions.rate, motions.acceleration].map(Sides::array);
@@ -258,13 +262,14 @@ impl Motors {
         }
     }
 
-    /// Whether motor 0 or 1 is where the last step left off: the importer has set no sample since.
+    /// Returns whether motor 0 or 1 is at the end of the last path because no new sample has been set.
     #[inline]
     pub fn is_at_path_end(&self, motor: usize) -> bool {
         !self.is_sampled[motor] && self.times.count > 0
     }
 
-    /// The motions of both motors now: the sample's, or that at the end of the path.
+    /// Returns the current motions: the motion at the sample, or at the end of the path if there is no new
+    /// sample.
     pub fn now(&self) -> Motions {
         if self.is_at_path_end(0) && self.is_at_path_end(1) {
             return self.path_end;
@@ -275,8 +280,8 @@ impl Motors {
         Motions::new(now(0), now(1))
     }
 
-    /// The reaction of these motors to a change of their inputs: their motions are linear in the inputs, in
-    /// earlier samples and in given rates, so here the latter are 0.
+    /// Returns the change of these motors per change `inputs` of their inputs. The motions are linear in
+    /// inputs, earlier samples and given rates, so the latter two are 0 here.
     pub fn reaction(&self, inputs: [Inputs; 2]) -> Self {
         Self {
             inputs,
@@ -287,15 +292,15 @@ impl Motors {
         }
     }
 
-    /// The jumps from the ends of the last paths to the current samples, rad. The first samples jump
-    /// from nowhere.
+    /// Returns the jumps from the ends of the last paths to the current samples, rad. The first samples do
+    /// not jump.
     #[inline]
     pub fn jumps(&self) -> Sides {
         if self.times.count == 0 { Sides::default() } else { self.theta() - self.path_end.angle }
     }
 
-    /// After a step that led from the angles `theta` to `end`: the samples become earlier ones. The times are another
-    /// matter.
+    /// Makes the samples the earlier ones after a step from the angles `theta` to `end`. The caller updates
+    /// `times`.
     #[inline(always)]
     pub fn go_on(&mut self, theta: Sides, end: &Motions) {
         self.earlier = [theta, self.earlier[0]];

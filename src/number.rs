@@ -1,15 +1,15 @@
-//! The numbers that step matrices are calculated with: `f64`, or twice its precision.
+//! The number types for the calculation of step matrices: `f64`, and a type of twice its precision.
 //!
-//! On its way to the full step the matrix of a stiff testbed loses up to 15 of the 16 digits of an `f64`.
-//! A [`TwoFloat`] has 32, so that the 16 that count are right. Its products use the fused multiply-add of the
-//! crate libm, not that of the platform: every platform gets the same bits.
+//! During the doublings, the matrix of a stiff testbed loses up to 15 of the 16 digits of an `f64`. A
+//! [`TwoFloat`] has 32 digits, so that the result has 16 correct digits. Its products use the fused
+//! multiply-add of the crate libm, so that the results are bit-identical on every platform.
 
 use crate::pair::Pair;
 use nalgebra::{ClosedAddAssign, ClosedMulAssign, ClosedSubAssign, Scalar};
 use num_traits::{One, Zero};
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A number, or a [`Pair`] of numbers that take the same steps.
+/// A number, or a [`Pair`] of numbers on which the same operations act.
 pub trait Arithmetic:
     Scalar
     + Copy
@@ -22,17 +22,17 @@ pub trait Arithmetic:
     + ClosedMulAssign
     + Div<f64, Output = Self>
 {
-    /// The last term that matters of the series of exp(1/4): `0.25^n / n!` is below the precision from
-    /// the next one on.
+    /// Order of the last significant term in the series of exp(1/4). Later terms `0.25^n / n!` are below the
+    /// precision.
     const TAYLOR_ORDER: i32;
 }
 
 /// `f64` or [`TwoFloat`].
 pub trait Number: Arithmetic {
-    /// The quotient, to full precision.
+    /// Returns the quotient, to full precision.
     fn over(self, divisor: Self) -> Self;
 
-    /// The nearest `f64`.
+    /// Returns the nearest `f64`.
     fn rounded(self) -> f64;
 }
 
@@ -58,7 +58,7 @@ impl Number for f64 {
     }
 }
 
-/// The unevaluated sum of two `f64`: the nearest `f64`, and the rest.
+/// The unevaluated sum of two `f64`: the nearest `f64`, and the remainder.
 ///
 /// The algorithms are those of Joldes, Muller and Popescu, *Tight and rigorous error bounds for basic building
 /// blocks of double-word arithmetic*, ACM Transactions on Mathematical Software 44 (2017).
@@ -69,32 +69,32 @@ pub struct TwoFloat {
 }
 
 impl TwoFloat {
-    /// The exact sum if `|a| >= |b|` (algorithm 1).
+    /// Returns the exact sum if `|a| >= |b|` (algorithm 1).
     fn fast_sum(a: f64, b: f64) -> Self {
         let high = a + b;
         Self { high, low: b - (high - a) }
     }
 
-    /// The exact sum (algorithm 2).
+    /// Returns the exact sum (algorithm 2).
     fn sum(a: f64, b: f64) -> Self {
         let high = a + b;
         let rounded_a = high - b;
         Self { high, low: (a - rounded_a) + (b - (high - rounded_a)) }
     }
 
-    /// The exact product (algorithm 3).
+    /// Returns the exact product (algorithm 3).
     fn product(a: f64, b: f64) -> Self {
         let high = a * b;
         Self { high, low: libm::fma(a, b, -high) }
     }
 
-    /// The product with an `f64` (algorithm 9).
+    /// Returns the product with an `f64` (algorithm 9).
     fn times(self, factor: f64) -> Self {
         let high = Self::product(self.high, factor);
         Self::fast_sum(high.high, libm::fma(self.low, factor, high.low))
     }
 
-    /// The inverse, to some 31 digits (the first part of algorithm 18).
+    /// Returns the inverse, to about 31 digits (the first part of algorithm 18).
     fn inverse(self) -> Self {
         let estimate = self.high.recip();
         let error = Self::fast_sum(1.0 - self.high * estimate, -(self.low * estimate));
@@ -190,7 +190,7 @@ impl One for TwoFloat {
 }
 
 impl Number for TwoFloat {
-    /// Corrected once, because the product with the inverse loses a few bits.
+    /// Corrects the quotient once, because the product with the inverse loses a few bits.
     fn over(self, divisor: Self) -> Self {
         let inverse = divisor.inverse();
         let quotient = self * inverse;
@@ -210,7 +210,7 @@ mod tests {
         value.into()
     }
 
-    /// Differences that `f64` rounds away.
+    /// Checks differences that `f64` rounds to 0.
     #[test]
     fn no_digit_of_thirty_is_lost() {
         let tiny = 2.0_f64.powi(-100);

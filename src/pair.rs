@@ -1,33 +1,33 @@
-//! Two numbers that take every step of a calculation together.
+//! Two numbers on which the same operations act.
 
 use num_traits::{One, Zero};
 #[cfg(target_arch = "x86_64")]
 use safe_arch::{bitxor_m128d, m128d, unpack_high_m128d, unpack_low_m128d};
 use std::ops::{Add, AddAssign, Div, DivAssign, Index, IndexMut, Mul, MulAssign, Neg, Sub, SubAssign};
 
-/// A quantity of side 1 next to the same quantity of side 2 (or pitch next to roll). Aligned as the registers that hold
-/// both.
+/// A quantity of side 1 and the same quantity of side 2 (or pitch and roll). The alignment is that of a
+/// vector register.
 ///
-/// Its operators are written with the vectors of the processor: of two numbers the compiler would take the sides apart.
-/// The results are the same bits.
+/// The operators use vector instructions explicitly, because the compiler would handle the two numbers
+/// separately. The results are bit-identical.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(16))]
 pub struct Pair([f64; 2]);
 
 impl Pair {
-    /// The pair of these two.
+    /// Creates a pair of two numbers.
     #[inline]
     pub const fn new(first: f64, second: f64) -> Self {
         Self([first, second])
     }
 
-    /// Twice the same.
+    /// Creates a pair of two equal numbers.
     #[inline]
     pub const fn both(value: f64) -> Self {
         Self([value; 2])
     }
 
-    /// The two as an array.
+    /// Returns the two numbers as an array.
     #[inline]
     pub const fn array(self) -> [f64; 2] {
         self.0
@@ -40,8 +40,8 @@ pub type Sides = Pair;
 /// A quantity of the pitch and of the roll subsystem.
 pub type PitchRoll = Pair;
 
-/// Sum and difference of the two sides, twice the quantities of pitch and roll. The factor 1/2 is left
-/// to the matrices that they meet.
+/// Returns the sum and the difference of the two sides, twice the quantities of pitch and roll. The step
+/// matrices contain the factor 1/2.
 #[inline]
 pub fn sum_difference(sides: Sides) -> PitchRoll {
     #[cfg(target_arch = "x86_64")]
@@ -58,7 +58,7 @@ pub fn sum_difference(sides: Sides) -> PitchRoll {
     }
 }
 
-/// The two sides from the quantities of pitch and roll, their mean and half difference.
+/// Returns the two sides from the quantities of pitch and roll, their mean and half difference.
 #[inline]
 pub fn sides(z: PitchRoll) -> Sides {
     sum_difference(z)
@@ -80,7 +80,7 @@ impl IndexMut<usize> for Pair {
     }
 }
 
-/// Operators on both numbers, each with that of the other pair.
+/// Implements operators between two pairs, number by number.
 macro_rules! operators {
     ($($operator:ident $function:ident $symbol:tt, $assigning:ident $assign:ident;)*) => {
         $(
@@ -113,7 +113,7 @@ operators! {
     Div div /, DivAssign div_assign;
 }
 
-/// Operators with the same number for both.
+/// Implements operators between a pair and one number.
 macro_rules! with_number {
     ($($operator:ident $function:ident)*) => {
         $(impl $operator<f64> for Pair {

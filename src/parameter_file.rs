@@ -1,7 +1,8 @@
-//! Reads `modelDescription/parameters.json`, Table 1 of the paper as printed, or a file like it.
+//! Reads `modelDescription/parameters.json`, Table 1 of the paper as printed, or a file of the same format.
 //!
-//! The build script compiles the values into the library, `build_fmu` writes them into the model description;
-//! nothing is read at run time. Without derive macros, because every build of the library begins with this file.
+//! The build script compiles the values into the library; `build_fmu` writes them into the model description.
+//! The FMU reads no file at run time. The module uses no derive macros because every build of the library
+//! begins by compiling it.
 
 use crate::parameters::{Integer, Parameters, Real, table};
 use serde_core::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
@@ -11,14 +12,14 @@ use std::fs;
 use std::marker::PhantomData;
 use std::path::Path;
 
-/// Turns "per degree" into "per radian". The value in SI is the printed value, read to the nearest double,
-/// times this double, rounded once: `value * (180 / math.pi)` in Python gives the same bits.
+/// Factor from "per degree" to "per radian". The SI value is the printed value, read to the nearest double,
+/// times this double, rounded once. In Python, `value * (180 / math.pi)` gives the same bits.
 const DEG_PER_RAD: f64 = 180.0 / PI;
 
-/// Reads and checks a file.
+/// Reads and checks a parameter file.
 ///
 /// # Errors
-/// Names the file, the parameter and what is wrong with it.
+/// The message names the file, the parameter and the fault.
 pub fn read(file: &Path) -> Result<Parameters, String> {
     let name = file.display();
     let text = fs::read_to_string(file).map_err(|error| format!("{name}: cannot be read: {error}"))?;
@@ -76,7 +77,7 @@ macro_rules! file {
 }
 table!(file);
 
-/// Stores a member of an object that must not occur twice.
+/// Stores a member of an object; rejects a second value.
 fn fill<T, E: Error>(member: &mut Option<T>, value: T, name: &'static str) -> Result<(), E> {
     match member.replace(value) {
         None => Ok(()),
@@ -123,7 +124,7 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for EntryVisitor<T> {
 }
 
 impl<T: Into<f64>> Entry<T> {
-    /// The value in an SI unit; a value per radian may be given per degree.
+    /// Converts the value to an SI unit; a value per radian may be given per degree.
     fn in_unit(self, si: &str) -> Result<f64, String> {
         let per_degree = si.strip_suffix("/rad").map(|quantity| format!("{quantity}/deg"));
         let factor = match &per_degree {
@@ -149,7 +150,7 @@ mod tests {
 
     const TABLE_1: &str = include_str!("../modelDescription/parameters.json");
 
-    /// The line of Table 1 with this key.
+    /// Returns the line of Table 1 that contains this key.
     fn line(key: &str) -> &'static str {
         TABLE_1.lines().find(|line| line.contains(&format!("\"{key}\""))).unwrap()
     }
@@ -161,7 +162,7 @@ mod tests {
     #[test]
     fn table_1_is_read_to_the_last_bit() {
         let p = parse(TABLE_1).unwrap();
-        // From Python: 2.11 * (180 / math.pi) and so on.
+        // The expected values come from Python: 2.11 * (180 / math.pi) and so on.
         assert_eq!((p.J2, p.k1, p.k2), (3.8681291e-3, 120.8940947726037, 43.54479242994257));
         assert_eq!((p.c1, p.c2, p.c3), (0.4486259535874346, 0.4784197589342374, 0.3815898915571283));
         assert_eq!((p.M, p.N), (4, 7));

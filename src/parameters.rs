@@ -2,12 +2,12 @@
 
 use std::fmt;
 
-/// What a parameter that is measured is, as FMI calls it.
+/// Type of a measured parameter; FMI calls it Real.
 pub type Real = f64;
-/// What a parameter that is counted is.
+/// Type of a counted parameter; FMI calls it Integer.
 pub type Integer = i32;
 
-/// Hands the table of parameters to the macro `$make`: meaning, name, type, range and unit of each.
+/// Passes the table of parameters to the macro `$make`: description, name, type, range and unit of each.
 macro_rules! table {
     ($make:ident) => {
         $make! {
@@ -47,15 +47,15 @@ macro_rules! parameters {
         }
 
         impl Parameters {
-            /// The parameters by name, as strings that are read back to the same numbers.
+            /// Returns names and values of the parameters; the strings parse back to the same numbers.
             pub fn start_values(&self) -> Vec<(String, String)> {
                 vec![$((stringify!($name).to_owned(), self.$name.to_string())),+]
             }
 
-            /// No parameters: a direction in which none changes.
+            /// All parameters 0: a direction in which no parameter changes.
             pub const ZERO: Self = Self { $($name: 0 as $kind,)+ };
 
-            /// With every measured value replaced, in the order of Table 1.
+            /// Returns the parameters with every measured value replaced, in the order of Table 1.
             #[must_use]
             pub fn map_reals(&self, mut change: impl FnMut(f64) -> f64) -> Self {
                 Self { $($name: self.$name.mapped(&mut change),)+ }
@@ -75,7 +75,7 @@ macro_rules! parameters {
 }
 table!(parameters);
 
-/// What [`Parameters::map_reals`] does to each kind.
+/// Applies the function of [`Parameters::map_reals`] to a parameter of each type.
 trait Mapped {
     fn mapped(self, change: &mut impl FnMut(f64) -> f64) -> Self;
 }
@@ -93,15 +93,15 @@ impl Mapped for Integer {
 }
 
 impl Parameters {
-    /// Transmission ratio from the motors' difference to roll: N / 2M of eq. (1).
+    /// Returns the transmission ratio from the difference of the motors to roll, N / 2M of eq. (1).
     pub fn roll_ratio(&self) -> f64 {
         f64::from(self.N) / (2.0 * f64::from(self.M))
     }
 
-    /// Checks the ranges in which the equations make sense.
+    /// Checks that the parameters are in the ranges in which the equations are valid.
     ///
     /// # Errors
-    /// Names the parameter and what it must be.
+    /// The message names the parameter and its valid range.
     pub fn check(&self) -> Result<(), InvalidParameter> {
         self.check_ranges()?;
         if self.c1 + self.c2 <= 0.0 {
@@ -115,7 +115,7 @@ impl Parameters {
     }
 }
 
-/// Why a set of parameters makes no testbed.
+/// Reason for which a set of parameters is invalid.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InvalidParameter(pub(crate) String);
 

@@ -1,4 +1,4 @@
-//! The exact step of a subsystem over which its motor angle moves on a straight line.
+//! The exact solution for a subsystem over one step during which its motor angle moves on a straight line.
 //!
 //! With the motor angle `u0 + w s` for `0 <= s <= h`, the solution of `z' = A z + b_angle u + b_rate w` is
 //!
@@ -8,8 +8,8 @@
 //! ramp   = integral over 0..h of exp(A (h - s)) (b_angle s + b_rate) ds
 //! ```
 //!
-//! because `A [1, 1, 0] + b_angle = 0`. The step is an increment of z: a testbed at rest stays at rest to
-//! the last bit, and tiny steps lose nothing to `exp(A h)` being close to 1.
+//! The form follows from `A [1, 1, 0] + b_angle = 0`. Each step adds an increment to z. So a testbed at rest
+//! stays exactly at rest. Tiny steps lose no precision, although `exp(A h)` is close to 1.
 
 use crate::decoupled::{Decoupled, Subsystem};
 use crate::number::{Arithmetic, Number, TwoFloat};
@@ -26,14 +26,14 @@ pub struct Propagator<T = f64> {
 }
 
 impl<T: Number> Propagator<T> {
-    /// The propagator for step size `h` in s.
+    /// Computes the propagator for step size `h` in s.
     pub fn new(system: &Subsystem<T>, h: f64) -> Self {
         let balance = Balance::new(&system.a);
         balance.propagator(balance.equations(system).propagate(h, balance.doublings(h.log2())))
     }
 }
 
-/// The equations of a subsystem; of two in pairs.
+/// Equations of one subsystem, or of both in pairs.
 #[derive(Clone, Copy)]
 struct Equations<T> {
     a: Matrix3<T>,
@@ -42,13 +42,13 @@ struct Equations<T> {
 }
 
 impl<T: Arithmetic> Equations<T> {
-    /// Growth and ramp for step size `h` in s: a Taylor series over a fraction of the step in which it converges quickly,
-    /// then doubled until the step is full.
+    /// Computes growth and ramp for step size `h` in s. A Taylor series covers a fraction of the step in
+    /// which it converges quickly. Doublings extend the result to the full step.
     ///
-    /// Doubling follows from taking two steps: `growth(2h) = 2 growth + growth^2` and
+    /// Two steps in sequence give the doubling: `growth(2h) = 2 growth + growth^2` and
     /// `ramp(2h) = 2 ramp + growth (ramp - [1, 1, 0] h)`.
     fn propagate(&self, h: f64, doublings: i32) -> Propagator<T> {
-        // In two factors, because one would underflow for the longest steps.
+        // Two factors, because a single factor would underflow for the longest steps.
         let mut h = T::from(h * 0.5_f64.powi(doublings / 2) * 0.5_f64.powi(doublings - doublings / 2));
         let ah = self.a * h;
         let mut growth_term = ah;
@@ -62,7 +62,7 @@ impl<T: Arithmetic> Equations<T> {
             ramp_term = (ah * ramp_term).map(|entry| entry / f64::from(n + 1));
             ramp += ramp_term;
         }
-        // Both shafts turned, no velocity.
+        // Both shafts turned by 1, no velocity.
         let turned = Vector3::new(T::one(), T::one(), T::zero());
         let two = T::from(2.0);
         for _ in 0..doublings {
@@ -74,21 +74,22 @@ impl<T: Arithmetic> Equations<T> {
     }
 }
 
-/// The unit of the velocity in which the series of a subsystem converges best, and the rate of convergence.
+/// The velocity unit in which the series of a subsystem converges best, and the rate of convergence.
 ///
-/// Angles and velocities differ in magnitude. With the velocity in this unit (a power of 2, so that nothing is rounded)
-/// the entries that couple them have the same magnitude: the norm is smaller, and the error of the doublings with it.
+/// Angles and velocities differ in magnitude. With the velocity in this unit, the entries that couple them
+/// have the same magnitude. This makes the norm smaller, and the error of the doublings too. The unit is a
+/// power of 2, so the scaling is exact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance {
-    /// The unit of the velocity, rad/s.
+    /// Velocity unit, rad/s.
     scale: f64,
-    /// How often a step of 1 s must be halved for the series to converge. As logarithm: for a long step of a stiff
-    /// system the product may be out of range.
+    /// Base-2 logarithm of the factor by which a step of 1 s must be divided for the series to converge. The
+    /// logarithm avoids overflow for long steps of stiff systems.
     halvings: f64,
 }
 
 impl Balance {
-    /// That of the state matrix `a`.
+    /// Computes the balance for the state matrix `a`.
     pub fn new<T: Number>(a: &Matrix3<T>) -> Self {
         let rounded = a.map(T::rounded);
         let into_velocity = rounded[(2, 0)].abs().max(rounded[(2, 1)].abs());
@@ -99,7 +100,7 @@ impl Balance {
         Self { scale, halvings: (norm / 0.25).log2() }
     }
 
-    /// How often a step must be halved whose size has this logarithm.
+    /// Returns the number of halvings for a step size with this base-2 logarithm.
     fn doublings(&self, log2_of_h: f64) -> i32 {
         (self.halvings + log2_of_h).ceil().clamp(0.0, 2100.0) as i32
     }
@@ -113,7 +114,7 @@ impl Balance {
         }
     }
 
-    /// A propagator of such equations with the velocity in rad/s.
+    /// Converts a propagator of these scaled equations to a velocity in rad/s.
     fn propagator<T: Number>(&self, Propagator { growth, ramp }: Propagator<T>) -> Propagator<T> {
         Propagator {
             growth: rescaled(&growth, 1.0 / self.scale),
@@ -122,7 +123,7 @@ impl Balance {
     }
 }
 
-/// The matrix for a velocity in units of `scale`.
+/// Returns the matrix for a velocity in units of `scale`.
 fn rescaled<T: Number>(a: &Matrix3<T>, scale: f64) -> Matrix3<T> {
     let mut b = *a;
     b[(2, 0)] = b[(2, 0)] / scale;
@@ -132,13 +133,13 @@ fn rescaled<T: Number>(a: &Matrix3<T>, scale: f64) -> Matrix3<T> {
     b
 }
 
-/// A propagator to step with.
+/// A propagator rounded to `f64`, as used for stepping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Rounded {
     growth: Matrix3<f64>,
     ramp: Vector3<f64>,
-    /// 1, or 0 if little is left of the velocity: then the step does not add to it, but replaces it, for
-    /// the sum would only keep the digits that the old velocity had.
+    /// 1, or 0 if at most half of the velocity remains after the step. With 0, the step replaces the velocity
+    /// instead of adding to it, because a sum would only keep the digits of the old velocity.
     keeps_velocity: f64,
 }
 
@@ -153,17 +154,17 @@ impl Rounded {
         Self { growth, ramp: exact.ramp.map(T::rounded), keeps_velocity: f64::from(u8::from(keeps)) }
     }
 
-    /// What is left at the end of the step of a jump of the motor angle by 1 at its begin.
+    /// Returns the effect at the end of the step of a unit jump of the motor angle at its start.
     fn after_jump(&self, system: &Subsystem) -> Vector3<f64> {
         let jump = system.b_rate;
         self.growth * jump + Vector3::new(jump.x, jump.y, jump.z * self.keeps_velocity)
     }
 
-    /// For the pitch and the roll subsystem.
+    /// Computes the propagators of the pitch and the roll subsystem.
     ///
-    /// Up to 8 doublings cost an `f64` 3 digits at most. More may cost all of them: stiff testbeds have
-    /// motions of very different rates, and what is left after the fast one is a small difference. So is
-    /// what is left of a velocity that damping has used up. Both need twice the digits.
+    /// Up to 8 doublings cost an `f64` at most 3 digits; more doublings may cost all digits. Stiff testbeds
+    /// have motions of very different rates. The remainder after the fast motion is a small difference, and
+    /// so is the remainder of a strongly damped velocity. Both need twice the digits.
     fn pitch_and_roll(system: &Decoupled, h: f64) -> [Self; 2] {
         let Decoupled { pitch, roll, balances, .. } = system;
         let log2_of_h = h.log2();
@@ -172,7 +173,7 @@ impl Rounded {
         if doublings.into_iter().any(|doublings| doublings > 8) || uses_up(pitch) || uses_up(roll) {
             let exact = Subsystem::<TwoFloat>::pitch_and_roll(&system.parameters);
             let rounded = exact.map(|subsystem| Self::new(&Propagator::new(&subsystem, h)));
-            // A TwoFloat that leaves the range of f64 on its way is no number.
+            // An overflow of a TwoFloat gives NaN.
             if rounded.iter().all(Self::is_finite) {
                 return rounded;
             }
@@ -183,7 +184,7 @@ impl Rounded {
             b_angle: pitch.b_angle.zip_map(&roll.b_angle, Pair::new),
             b_rate: pitch.b_rate.zip_map(&roll.b_rate, Pair::new),
         };
-        // Both at once; most often they need as many doublings.
+        // Propagates both at once; usually they need equal numbers of doublings.
         let of_pitch = pairs.propagate(h, doublings[0]);
         let of_roll = if doublings[0] == doublings[1] { of_pitch } else { pairs.propagate(h, doublings[1]) };
         let propagated = [(of_pitch, 0), (of_roll, 1)].map(|(Propagator { growth, ramp }, i)| Propagator {
@@ -198,15 +199,15 @@ impl Rounded {
     }
 }
 
-/// The propagators of both subsystems for one step size, entry beside entry, halved because they meet
-/// sums and differences.
+/// The propagators of both subsystems for one step size, entry by entry in pairs. They contain the factor 1/2
+/// because they multiply sums and differences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepMatrices {
     half_growth: [[PitchRoll; 3]; 3],
     half_ramp: [PitchRoll; 3],
-    /// What a jump of the motor angle by 1 at the begin of the step adds to z at its end.
+    /// Change of z at the end of the step per unit jump of the motor angle at its start.
     half_jump: [PitchRoll; 3],
-    /// See [`Rounded`]; halved like the rest, and whether both are kept whole.
+    /// Half of [`Rounded::keeps_velocity`] of both subsystems. `keeps_velocities` is true if both are 1.
     half_kept: PitchRoll,
     keeps_velocities: bool,
     /// Step size, s; 0 marks an unused entry.
@@ -223,7 +224,7 @@ impl StepMatrices {
         h: 0.0,
     };
 
-    /// The matrices for step size `h` in s.
+    /// Computes the matrices for step size `h` in s.
     pub fn new(system: &Decoupled, h: f64) -> Self {
         let [pitch, roll] = Rounded::pitch_and_roll(system, h);
         let beside = |pitch: Vector3<f64>, roll: Vector3<f64>| {
@@ -241,8 +242,8 @@ impl StepMatrices {
         }
     }
 
-    /// What is left of the sides' velocities, if that is not all of them: what the velocity's increment
-    /// adds to, from the sum and difference at the begin.
+    /// Returns the velocity to which the increment adds, from the sum and difference at the start of the
+    /// step. Returns `None` if the increment adds to the full velocity.
     #[inline]
     pub fn left_velocity(&self, v: PitchRoll) -> Option<PitchRoll> {
         if self.keeps_velocities { None } else { self.left_velocity_of(v) }
@@ -253,9 +254,9 @@ impl StepMatrices {
         Some(self.half_kept * v)
     }
 
-    /// The change of `z = [q_I, q_II, v]` over the step, from sums and differences of the sides'
-    /// deviations `z - [1, 1, 0] u` from the motors at its begin, of the motor rates w, and of the jumps
-    /// of the motor angles.
+    /// Returns the change of `z = [q_I, q_II, v]` over the step. The arguments are sums and differences of
+    /// the sides: deviations `z - [1, 1, 0] u` from the motors at the start, motor rates w, and jumps of the
+    /// motor angles.
     #[inline]
     pub fn increment(&self, deviation: &[PitchRoll; 3], w: PitchRoll, jump: PitchRoll) -> [PitchRoll; 3] {
         let [of_q_i, of_q_ii, of_v] = &self.half_growth;
@@ -270,12 +271,12 @@ impl StepMatrices {
 
 const ZERO: PitchRoll = PitchRoll::both(0.0);
 
-/// The step matrices of the step sizes used last. Masters use one step size or alternate among a few.
+/// The step matrices of the most recent step sizes. Importers use one step size or alternate among a few.
 #[derive(Debug)]
 pub struct StepCache {
-    /// One of the others, at a place that needs no looking up.
+    /// Copy of the current entry, so that a step needs no lookup.
     current: StepMatrices,
-    /// As many as there is room for, so that a step does not allocate.
+    /// Never grows beyond its first capacity, so that a step does not allocate.
     entries: Vec<StepMatrices>,
     oldest: usize,
 }
@@ -283,31 +284,33 @@ pub struct StepCache {
 impl StepCache {
     const SIZE: usize = 8;
 
-    /// A cache with room for a few step sizes. That of [`default`](Self::default) has room for the current one only.
+    /// Creates a cache with room for `SIZE` step sizes. A cache from [`default`](Self::default)
+    /// has room only for the current one.
     pub fn new() -> Self {
         Self { entries: Vec::with_capacity(Self::SIZE), ..Self::default() }
     }
 
-    /// Forgets all of them.
+    /// Forgets all matrices.
     pub fn clear(&mut self) {
         self.current.h = 0.0;
         self.entries.clear();
         self.oldest = 0;
     }
 
-    /// The matrices of the last step size.
+    /// Returns the matrices of the last step size.
     #[inline]
     pub fn current(&self) -> &StepMatrices {
         &self.current
     }
 
-    /// Whether the [current](Self::current) matrices are those for step size `h > 0`.
+    /// Returns whether the [current](Self::current) matrices are for step size `h > 0`.
     #[inline]
     pub fn has(&self, h: f64) -> bool {
         self.current.h == h
     }
 
-    /// Makes the matrices for step size `h > 0` the current ones; computes them if they are not at hand.
+    /// Makes the matrices for step size `h > 0` the current ones; computes them if the cache does not contain
+    /// them.
     pub fn prepare(&mut self, system: &Decoupled, h: f64) {
         if self.has(h) {
             return;
@@ -327,7 +330,7 @@ impl StepCache {
 }
 
 impl Default for StepCache {
-    /// A cache without entries.
+    /// Creates a cache without entries.
     fn default() -> Self {
         Self { current: StepMatrices::UNUSED, entries: Vec::new(), oldest: 0 }
     }

@@ -1,16 +1,16 @@
-//! Where the motion begins.
+//! Initial state.
 
 use crate::pair::Sides;
 use crate::testbed::State;
 
-/// Where the testbed starts, and whether it has.
+/// Initial state, and whether the simulation has started.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Start {
-    /// Whether it starts at rest, wherever the motors are then.
+    /// Whether the testbed starts at rest at the current motor angles.
     pub at_rest: bool,
-    /// Where it starts otherwise: x of eq. (11), rad and rad/s.
+    /// Initial state if `at_rest` is false: x of eq. (11), rad and rad/s.
     pub state: State,
-    /// Whether it has started, so that its state no longer follows from these.
+    /// Whether the simulation has started. If so, the state no longer follows from the other fields.
     pub is_over: bool,
 }
 
@@ -21,8 +21,8 @@ impl Default for Start {
 }
 
 impl Start {
-    /// The state to start from with the motors at `theta`, rad. At rest nothing is twisted: the shafts of each side are
-    /// where its motor is.
+    /// Returns the initial state for motor angles `theta`, rad. At rest, no coupling is twisted: the shafts
+    /// of each side have the angle of the motor.
     pub fn from(&self, theta: Sides) -> State {
         match self.at_rest {
             true => [theta[0], theta[1], theta[0], theta[1], 0.0, 0.0],

@@ -1,47 +1,50 @@
-//! The model in matrices, eqs. (8) to (15), with the errors of the printed eq. (11) mended.
+//! The model in matrix form, eqs. (8) to (15), with corrections of the printed eq. (11).
 //!
-//! These are the paper's matrices as a reader finds them there, and the reference for the rest:
-//! [`decoupled`](crate::decoupled) holds the same equations split into pitch and roll, which is what
-//! the FMU evaluates.
+//! These matrices use the paper's notation and are the reference for the tests. The FMU evaluates
+//! [`decoupled`](crate::decoupled), which contains the same equations split into pitch and roll.
 
 use crate::parameters::Parameters;
 use nalgebra::{Complex, Matrix2, Matrix4, Matrix4x2, SMatrix, Vector4};
 
-/// Mass matrix M of eq. (8), `M q'' + Delta q' + K q = f` with `q = [theta3, theta4, theta5, theta6]`, kg.m2.
+/// Returns the mass matrix M of eq. (8), `M q'' + Delta q' + K q = f` with
+/// `q = [theta3, theta4, theta5, theta6]`, kg.m2.
 ///
-/// Zero but for M_II, which belongs to theta5 and theta6: `J2 + H3/4 + J3 N^2/4M^2` on the diagonal and
-/// `H3/4 - J3 N^2/4M^2` beside it.
+/// All entries are zero except the block M_II of theta5 and theta6. Its diagonal is
+/// `J2 + H3/4 + J3 N^2/4M^2`; its off-diagonal is `H3/4 - J3 N^2/4M^2`.
 pub fn mass_matrix(p: &Parameters) -> Matrix4<f64> {
     let (same, other) = sect_terms(p.H3, p.J3, p);
     lower_block(Matrix2::new(p.J2 + same, other, other, p.J2 + same))
 }
 
-/// Damping matrix Delta of eq. (8), N.m.s/rad: c1 and c2 of the couplings and the load's c3, which adds
-/// `c3/4 + c3 N^2/4M^2` to the diagonal of theta5 and theta6 and `c3/4 - c3 N^2/4M^2` beside it.
+/// Returns the damping matrix Delta of eq. (8), N.m.s/rad, from c1 and c2 of the couplings and c3 of the
+/// load. In the block of theta5 and theta6, c3 adds `c3/4 + c3 N^2/4M^2` to the diagonal and
+/// `c3/4 - c3 N^2/4M^2` to the off-diagonal.
 pub fn damping_matrix(p: &Parameters) -> Matrix4<f64> {
     let (same, other) = sect_terms(p.c3, p.c3, p);
     couplings(p.c1, p.c2) + lower_block(Matrix2::new(same, other, other, same))
 }
 
-/// Stiffness matrix K of eq. (8), N.m/rad: k1 and k2 of the couplings.
+/// Returns the stiffness matrix K of eq. (8), N.m/rad, from k1 and k2 of the couplings.
 pub fn stiffness_matrix(p: &Parameters) -> Matrix4<f64> {
     couplings(p.k1, p.k2)
 }
 
-/// Generalized force f of eq. (8), N.m: `f = [c1 omega1 + k1 theta1, c1 omega2 + k1 theta2, 0, 0]`, for the
-/// motors' angles theta in rad and rates omega in rad/s.
+/// Returns the generalized force of eq. (8), N.m, `f = [c1 omega1 + k1 theta1, c1 omega2 + k1 theta2, 0, 0]`,
+/// for the motors' angles theta in rad and rates omega in rad/s.
 pub fn force(p: &Parameters, theta: [f64; 2], omega: [f64; 2]) -> Vector4<f64> {
     Vector4::new(p.c1 * omega[0] + p.k1 * theta[0], p.c1 * omega[1] + p.k1 * theta[1], 0.0, 0.0)
 }
 
-/// What pitch and roll add to theta5 and theta6, to the diagonal and beside it:
+/// Returns the contributions of pitch and roll to the diagonal and the off-diagonal of the block of theta5
+/// and theta6:
 /// `of_pitch/4 + of_roll N^2/4M^2` and `of_pitch/4 - of_roll N^2/4M^2`.
 fn sect_terms(of_pitch: f64, of_roll: f64, p: &Parameters) -> (f64, f64) {
     let roll = of_roll * p.roll_ratio() * p.roll_ratio();
     (0.25 * of_pitch + roll, 0.25 * of_pitch - roll)
 }
 
-/// The pattern that stiffness and damping of the couplings share: two chains motor - 1 - 2 - SECT.
+/// Returns the common pattern of the couplings' stiffness and damping matrices: two chains motor - 1 - 2 -
+/// SECT.
 fn couplings(motor_side: f64, sect_side: f64) -> Matrix4<f64> {
     let (sum, d) = (motor_side + sect_side, sect_side);
     Matrix4::new(
@@ -74,16 +77,16 @@ pub struct StateSpace {
     pub D: SMatrix<f64, 6, 4>,
 }
 
-/// A, B, C and D of eq. (11), corrected.
+/// Computes A, B, C and D of eq. (11), corrected.
 ///
-/// The first block row of eq. (8), `C_I q_I' + K_I q_I + C_I,II v_II + K_I,II q_II = f_I`, solved for
-/// `q_I'` gives A11, A12 and A13 with **negative** signs (the paper prints positive ones, with which A
-/// has an eigenvalue at +183 1/s). Inserted into eq. (10) it makes the first terms of D31 and D32
+/// The first block row of eq. (8) is `C_I q_I' + K_I q_I + C_I,II v_II + K_I,II q_II = f_I`. Solved for
+/// `q_I'`, it gives A11, A12 and A13 with **negative** signs. The paper prints positive signs, with which A
+/// has an eigenvalue at +183 1/s. Inserted into eq. (10), it makes the first terms of D31 and D32
 /// **positive** (printed negative).
 ///
 /// # Panics
-/// When the parameters do not pass [`Parameters::check`], or inertias are so far apart that `M_II` cannot be
-/// inverted in double precision.
+/// Panics if the parameters do not pass [`Parameters::check`], or if inertias differ so much that `M_II`
+/// cannot be inverted in double precision.
 #[allow(non_snake_case, reason = "the paper's symbols")]
 pub fn state_space(p: &Parameters) -> StateSpace {
     let block = |matrix: &Matrix4<f64>, row, column| matrix.fixed_view::<2, 2>(row, column).into_owned();
@@ -94,7 +97,7 @@ pub fn state_space(p: &Parameters) -> StateSpace {
     let K_1in = Matrix2::identity() * p.k1;
     let C_1in = Matrix2::identity() * p.c1;
 
-    // Scaled, because the determinant of very small or large entries is no number.
+    // Scaled, because the determinant of very small or large entries underflows or overflows.
     let invert = |matrix: Matrix2<f64>| {
         let scale = matrix.amax();
         (matrix / scale).try_inverse().expect("checked parameters give regular blocks") / scale
@@ -127,14 +130,15 @@ pub fn state_space(p: &Parameters) -> StateSpace {
     }
 }
 
-/// A matrix from its 2 x 2 blocks.
+/// Assembles a matrix from its 2 x 2 blocks.
 fn assemble<const BLOCKS: usize, const COLUMNS: usize>(
     blocks: [[Matrix2<f64>; BLOCKS]; 3],
 ) -> SMatrix<f64, 6, COLUMNS> {
     SMatrix::from_fn(|row, column| blocks[row / 2][column / 2][(row % 2, column % 2)])
 }
 
-/// Transfer matrix `G(s) = C (s 1 - A)^-1 B + D` from u to y, eq. (13); `None` at an eigenvalue of A.
+/// Returns the transfer matrix `G(s) = C (s 1 - A)^-1 B + D` from u to y, eq. (13); `None` at an eigenvalue
+/// of A.
 pub fn transfer_matrix(p: &Parameters, s: Complex<f64>) -> Option<SMatrix<Complex<f64>, 6, 4>> {
     let system = state_space(p);
     let complex = |x: f64| Complex::new(x, 0.0);
@@ -142,7 +146,7 @@ pub fn transfer_matrix(p: &Parameters, s: Complex<f64>) -> Option<SMatrix<Comple
     Some(system.C.map(complex) * resolvent * system.B.map(complex) + system.D.map(complex))
 }
 
-/// Transfer matrix `H(s) = (s^2 M + s Delta + K)^-1 F_u (c1 s + k1)` from the motor angles to q,
+/// Returns the transfer matrix `H(s) = (s^2 M + s Delta + K)^-1 F_u (c1 s + k1)` from the motor angles to q,
 /// eq. (15); `None` at a pole.
 pub fn angle_transfer_matrix(p: &Parameters, s: Complex<f64>) -> Option<Matrix4x2<Complex<f64>>> {
     let complex = |x: f64| Complex::new(x, 0.0);

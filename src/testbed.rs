@@ -1,4 +1,4 @@
-//! The testbed: parameters, motors and state, advanced exactly from point to point.
+//! The testbed: parameters, motors and state, advanced exactly from one communication point to the next.
 
 use crate::decoupled::Decoupled;
 use crate::motor::{Motions, Motors};
@@ -12,7 +12,7 @@ pub type State = [f64; 6];
 /// The testbed between two communication points.
 #[derive(Debug)]
 pub struct Testbed {
-    /// Parameters; call [`parameters_changed`](Self::parameters_changed) after a change.
+    /// Parameters. Call [`parameters_changed`](Self::parameters_changed) after a change.
     pub parameters: Parameters,
     /// State x.
     pub state: State,
@@ -23,14 +23,15 @@ pub struct Testbed {
 }
 
 impl Clone for Testbed {
-    /// Without the step matrices, and without room for several of them: most copies are saved states.
+    /// Copies neither the step matrices nor the capacity of the cache, because most copies are saved states.
     fn clone(&self) -> Self {
         Self { cache: StepCache::default(), ..*self }
     }
 }
 
 impl Testbed {
-    /// Copies all but the step matrices, which stay good with the same parameters. Returns whether these differ.
+    /// Copies all fields except the step matrices, which stay valid if the parameters are equal. Returns
+    /// whether the parameters differ.
     pub fn copy_from(&mut self, source: &Self) -> bool {
         let differs = self.parameters != source.parameters;
         if differs {
@@ -41,10 +42,10 @@ impl Testbed {
         differs
     }
 
-    /// A testbed at rest at angle 0.
+    /// Creates a testbed at rest at angle 0.
     ///
     /// # Errors
-    /// When the parameters make no testbed.
+    /// Fails if the parameters are invalid.
     pub fn new(parameters: Parameters) -> Result<Self, InvalidParameter> {
         Ok(Self {
             parameters,
@@ -55,27 +56,27 @@ impl Testbed {
         })
     }
 
-    /// The equations that follow from the parameters.
+    /// Returns the equations for the current parameters.
     pub fn system(&self) -> &Decoupled {
         &self.system
     }
 
-    /// Brings what follows from the parameters up to date.
+    /// Updates the fields that are derived from the parameters.
     ///
     /// # Errors
-    /// When the parameters make no testbed; they stay as they are.
+    /// Fails if the parameters are invalid; the derived fields then stay unchanged.
     pub fn parameters_changed(&mut self) -> Result<(), InvalidParameter> {
         self.system = Decoupled::new(&self.parameters)?;
         self.cache.clear();
         Ok(())
     }
 
-    /// Advances the state by step size `h > 0` in s, exactly for motors on straight lines.
+    /// Advances the state by step size `h > 0` in s; exact for motors on straight lines.
     ///
-    /// An angle that differs from the end of the last line does so by a jump, which passes through the
-    /// dampers as an impulse: x jumps by B2 d, B2 being the rate columns of B in eq. (11).
+    /// If an angle differs from the end of the last line, it jumps by d. The jump passes through the dampers
+    /// as an impulse: x jumps by B2 d, where B2 are the rate columns of B in eq. (11).
     ///
-    /// Returns false, with nothing changed, if the state would leave the range of numbers.
+    /// Returns false and changes nothing if the state would overflow.
     #[must_use]
     pub fn step(&mut self, h: f64) -> bool {
         self.cache.prepare(&self.system, h);
@@ -86,8 +87,8 @@ impl Testbed {
         is_possible
     }
 
-    /// The same [step](Self::step), if its size is that of the last two: few questions are left. Returns false also if
-    /// it is not.
+    /// Does the same [step](Self::step) with fewer checks, if the size is that of the last two steps. Returns
+    /// false if the size differs or the state would overflow.
     #[inline(always)]
     #[must_use]
     pub fn step_at_once(&mut self, h: f64) -> bool {
@@ -112,7 +113,7 @@ impl Testbed {
             Some(left) => sides(left + d_v),
         };
 
-        // A sum is finite only if all its terms are.
+        // A sum is finite only if all its terms are finite.
         let end = motions.after(h);
         let [sum1, sum2] = ((q_i + q_ii) + v + (end.angle + end.rate)).array();
         let sum = sum1 + sum2;
@@ -127,7 +128,7 @@ impl Testbed {
     }
 }
 
-/// The pairs `[q_I, q_II, v]` of a state.
+/// Returns the pairs `[q_I, q_II, v]` of a state.
 #[inline]
 pub fn by_sides(x: &State) -> [Sides; 3] {
     [0, 2, 4].map(|i| Sides::new(x[i], x[i + 1]))

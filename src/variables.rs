@@ -1,4 +1,4 @@
-//! The variables of the FMU: every name, unit and range, and where its value lives or how it is calculated.
+//! The variables of the FMU: name, unit, range, and the field or function that gives the value.
 
 use crate::fmu::TestbedFmu;
 use fmu_export::units::{KG_M2, N_M, N_M_PER_RAD, N_M_S_PER_RAD, RAD, RAD_PER_S, RAD_PER_S2};
@@ -8,8 +8,8 @@ const ANGLE: Type = Type::real("Angle", &RAD).nominal(1.0);
 const ANGULAR_VELOCITY: Type = Type::real("AngularVelocity", &RAD_PER_S).nominal(1.0);
 const ANGULAR_ACCELERATION: Type = Type::real("AngularAcceleration", &RAD_PER_S2).nominal(100.0);
 const TORQUE: Type = Type::real("Torque", &N_M).nominal(1.0);
-/// FMI's ranges include their ends, so this is what is more than 0. Below 1e-307 C++ refuses to read numbers (`std::stod`),
-/// and in another unit they may become 0.
+/// Smallest positive value that is allowed. FMI ranges include their ends, so a range "> 0" needs a smallest
+/// value. C++ (`std::stod`) rejects numbers below about 1e-307, and in another unit they may underflow to 0.
 const MORE_THAN_0: f64 = 1e-300;
 const INERTIA: Type = Type::real("MomentOfInertia", &KG_M2).min(MORE_THAN_0).nominal(0.01);
 const STIFFNESS: Type = Type::real("RotationalSpringConstant", &N_M_PER_RAD).min(MORE_THAN_0).nominal(100.0);
@@ -100,7 +100,8 @@ variables! {
     M = parameter(&COUNT) in testbed.parameters.M;
     /// Number of rollers on each side of the roller-carriers
     N = parameter(&COUNT) in testbed.parameters.N;
-    // Before the other Boolean: OpenModelica 1.27.0 hands over the second one of an array as false.
+    // This Boolean precedes the other one: OpenModelica 1.27.0 passes the second Boolean of an array as
+    // false.
     /// Start at rest wherever the motors are (theta3 = theta5 = theta1, theta4 = theta6 = theta2, rates 0); if false, start at theta3_start ... omega6_start
     start_at_rest = parameter(&BOOLEAN) in start.at_rest;
     /// Co-Simulation: take the motor rates from omega1 and omega2 instead of differentiating theta1 and theta2

@@ -1,11 +1,11 @@
-//! The FMU's C sources, compiled, against the library that is made of the same Rust: `make test-source-fmu`, which names
-//! the compiled sources in the environment variable `FMU_LIBRARY`.
+//! Comparison of the FMU's compiled C sources with the library from the same Rust code. `make
+//! test-source-fmu` names the compiled sources in the environment variable `FMU_LIBRARY`.
 
 use fmu_test_kit::careless::{random_bytes, record};
 use fmu_test_kit::functions_of;
 use prw_testbed::TestbedFmu;
 
-/// Any calls in any order: the same bits, statuses and texts.
+/// Checks that random sequences of calls give equal bits, statuses and messages.
 #[test]
 #[ignore = "needs compiled C sources"]
 fn random_sessions_are_answered_alike() {

@@ -1,4 +1,5 @@
-//! The model against the paper: its anchors, and each of its errors with the printed version shown to fail.
+//! Comparison of the model with the paper: its reference values, and a test for each erratum that shows that
+//! the printed version fails.
 
 use nalgebra::{Complex, Matrix2, Matrix4, Matrix6, Vector4};
 use prw_testbed::Parameters;
@@ -17,7 +18,7 @@ fn sorted_eigenvalues(a: Matrix6<f64>) -> Vec<Complex<f64>> {
     eigenvalues
 }
 
-/// Eigenvalues of A with Table 1, to the digits they are known to, 1/s.
+/// Eigenvalues of A with Table 1, with all known digits, 1/s.
 const EIGENVALUES: [(f64, f64); 6] = [
     (-174.87270665, 0.0),
     (-174.36733032, 0.0),
@@ -50,7 +51,7 @@ fn dc_gains() {
     assert!((g[(0, 0)] - 1.0).norm() < 1e-12 && g[(1, 0)].norm() < 1e-12);
 }
 
-/// Eqs. (13) and (15) are two ways to the same gain from motor angles (whose rates are s times them).
+/// Checks that eqs. (13) and (15) give equal gains from motor angles (whose rates are s times them).
 #[test]
 fn transfer_matrices_agree() {
     for hertz in [0.1, 1.0, 5.0, 30.0, 500.0] {
@@ -68,16 +69,17 @@ fn transfer_matrices_agree() {
 
 #[test]
 fn erratum_theta7_is_pitch_and_theta8_is_roll() {
-    // Sec. 4: with opposite motors the pitch rate is zero. As printed, theta7 would be roll.
+    // Sec. 4: with opposite motors the pitch rate is zero. With the printed definition, theta7 would be roll.
     let (pitch, roll) = sect(&TABLE_1, 0.3, -0.3);
     assert_eq!(pitch, 0.0);
     assert!((roll - 7.0 / 4.0 * 0.3).abs() < 1e-15);
-    // Eq. (4b): the inertia about the pitch axis is H3. Swapped as printed, H3 would go with roll.
+    // Eq. (4b): the inertia about the pitch axis is H3. With the printed, swapped inertias, H3 would belong
+    // to roll.
     let rates = Angles { theta5: 1.0, theta6: 1.0, ..Angles::default() };
     assert!((kinetic_energy(&TABLE_1, &rates) - (TABLE_1.J2 + 0.5 * TABLE_1.H3)).abs() < 1e-15);
 }
 
-/// The Hessian of a quadratic form of theta3..theta6.
+/// Returns the Hessian of a quadratic form of theta3..theta6.
 fn hessian(form: impl Fn(&Angles) -> f64) -> Matrix4<f64> {
     let at = |i: usize, j: usize, si: f64, sj: f64| {
         let mut q = [0.0; 4];
@@ -125,7 +127,7 @@ fn erratum_signs_of_d31_d32() {
     let system = state_space(p);
     let (theta, omega) = ([0.3, -0.7], [1.1, 0.4]);
     let (q, v) = (Vector4::new(0.1, 0.2, -0.5, 0.6), Vector4::new(0.0, 0.0, 0.8, -0.9));
-    // q_I' from the first two rows of eq. (8), then eq. (10) as it stands.
+    // Computes q_I' from the first two rows of eq. (8), then evaluates eq. (10) directly.
     let rest = force(p, theta, omega) - stiffness_matrix(p) * q - damping_matrix(p) * v;
     let tau = |i: usize| {
         let q_rate = rest[i] / (p.c1 + p.c2);
@@ -156,7 +158,8 @@ fn erratum_table_1_counts_in_degrees() {
     assert!(!has_the_known_eigenvalues(&printed));
 }
 
-/// As printed, theta1' = sin(10 pi), the motors stand still and nothing of Fig. 4 is seen.
+/// Checks the excitation. With the printed theta1' = sin(10 pi), the motors would be at rest, unlike in Fig.
+/// 4.
 #[test]
 fn erratum_excitation_of_sec_4_has_a_time_in_it() {
     let peak_roll = |rate: &dyn Fn(f64) -> f64| {

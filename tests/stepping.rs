@@ -1,4 +1,4 @@
-//! The exact step against independent derivations: eq. (11) instead of the decoupled equations,
+//! Comparison of the exact step with independent derivations: eq. (11) instead of the decoupled equations,
 //! nalgebra's matrix exponential instead of the propagator, and the conservation of energy.
 
 use nalgebra::SMatrix;
@@ -12,7 +12,7 @@ use prw_testbed::{Parameters, Testbed};
 
 #[allow(non_snake_case, reason = "the paper's symbols")]
 fn parameters() -> impl Strategy<Value = Parameters> {
-    // A factor of up to 5 around Table 1 for each; more of them than there are parameters.
+    // A factor of up to 5 around Table 1 for each parameter; the vector has more entries than needed.
     (prop::collection::vec(-1.6..1.6f64, 32), 1..9i32, 1..15i32).prop_map(|(exponents, M, N)| {
         let mut exponents = exponents.into_iter();
         let near = Parameters::BUILT_IN.map_reals(|value| value * exponents.next().unwrap().exp());
@@ -20,7 +20,7 @@ fn parameters() -> impl Strategy<Value = Parameters> {
     })
 }
 
-/// Sets both motors' samples, with their rates as derivatives.
+/// Sets the samples of both motors, with their rates as derivatives.
 fn sample(testbed: &mut Testbed, theta: [f64; 2], rates: [f64; 2]) {
     for motor in 0..2 {
         testbed.motors.set_theta(motor, theta[motor]);
@@ -28,7 +28,7 @@ fn sample(testbed: &mut Testbed, theta: [f64; 2], rates: [f64; 2]) {
     }
 }
 
-/// `[x, theta, omega]` after time h with constant omega, by the exponential of one large matrix.
+/// Returns `[x, theta, omega]` after time h with constant omega, by the exponential of one large matrix.
 fn reference(p: &Parameters, x: [f64; 6], theta: [f64; 2], omega: [f64; 2], h: f64) -> [f64; 6] {
     let system = state_space(p);
     let mut generator = SMatrix::<f64, 10, 10>::zeros();
@@ -47,7 +47,8 @@ proptest! {
         let system = state_space(&p);
         let decoupled = *Testbed::new(p).unwrap().system();
         let (pitch, roll) = (decoupled.pitch, decoupled.roll);
-        // Side i, side j of the full matrix: mean + half difference on the diagonal, minus beside it.
+        // In the full matrix, the diagonal entry of a side is mean + half difference, the off-diagonal entry
+        // mean - half difference.
         for row in 0..3 {
             for column in 0..3 {
                 let expect = |sign: f64| 0.5 * (pitch.a[(row, column)] + sign * roll.a[(row, column)]);
@@ -99,7 +100,8 @@ proptest! {
         }
     }
 
-    /// A step that is made at once is the same step, bit for bit, also with rates that are given or come from omega.
+    /// Checks that fast steps and general steps are bit-identical, also with rates that are given or come
+    /// from omega.
     #[test]
     fn steps_at_once_are_steps(
         p in parameters(),
@@ -126,7 +128,7 @@ proptest! {
             }
             let h = if size == 0 { 2e-3 } else { 1e-3 };
             if size == 1 {
-                // A copy has no matrices yet.
+                // A copy has no matrices.
                 testbed = testbed.clone();
             }
             if testbed.step_at_once(h) {
@@ -141,7 +143,7 @@ proptest! {
         prop_assume!(at_once > 0);
     }
 
-    /// Both subsystems side by side are each by itself.
+    /// Checks that the pairs of propagators equal the separate propagators.
     #[test]
     fn pairs_of_propagators_are_propagators(p in parameters(), exponent in -6.0..-3.0f64) {
         let h = 10f64.powf(exponent);
@@ -191,7 +193,7 @@ fn a_testbed_at_rest_stays_at_rest() {
     assert_eq!(testbed.state, start);
 }
 
-/// What is left of earlier steps is used for its own parameters and its own step size only.
+/// Checks that stored step matrices are used only for their parameters and their step size.
 #[test]
 fn the_past_does_not_matter() {
     let p = Parameters::BUILT_IN;
@@ -204,7 +206,7 @@ fn the_past_does_not_matter() {
         testbed.state
     };
     let fresh = |p: Parameters, h| step(&mut Testbed::new(p).unwrap(), h);
-    // More sizes than are remembered, some of them nearly the same.
+    // The list has more sizes than the cache, some of them nearly equal.
     let sizes = || (0..12).flat_map(|i| [1e-3 + 1e-10 * f64::from(i), 1e-3, 1e-3 * f64::from(i % 3 + 1)]);
 
     let mut testbed = Testbed::new(p).unwrap();
@@ -223,8 +225,8 @@ fn the_past_does_not_matter() {
     }
 }
 
-/// Without damping of the load nothing holds a testbed back that turns as a whole: it does so to the last digits,
-/// however stiff it is, however little damped and however long the step.
+/// Checks that a testbed without load damping keeps turning as a whole, accurate to the last digits. This
+/// holds for any stiffness, any small damping and any step size.
 #[test]
 fn a_testbed_that_turns_goes_on_turning() {
     let mut worst = 0.0_f64;
@@ -254,7 +256,8 @@ fn a_testbed_that_turns_goes_on_turning() {
     assert!(worst < 3e-15, "{worst:e}");
 }
 
-/// With next to no springs a velocity fades like the exponential function, to the last digits of the little that is left.
+/// Checks that with almost no stiffness a velocity decays exponentially, and that a small remainder has all
+/// digits.
 #[test]
 fn what_is_left_of_a_velocity_has_all_digits() {
     let built_in = Parameters::BUILT_IN;
@@ -272,7 +275,7 @@ fn what_is_left_of_a_velocity_has_all_digits() {
 
 #[test]
 fn angle_jumps_pass_through_the_dampers() {
-    // omega = 0 makes a zero-order hold; the jump's impulse is B2 d.
+    // omega = 0 makes a zero-order hold; the impulse of the jump is B2 d.
     let mut testbed = Testbed::new(Parameters::BUILT_IN).unwrap();
     testbed.motors.use_omega = true;
     assert!(testbed.step(1e-3));
@@ -311,7 +314,8 @@ fn the_motors_work_is_stored_or_dissipated() {
             theta5: omega5,
             theta6: omega6,
         };
-        // Eq. (9) as printed; the motors feel the sensor torques, so they deliver -tau omega.
+        // Eq. (9) as printed. The sensor torques act on the motors, so the motors supply the power -tau
+        // omega.
         let tau1 = p.k1 * (theta3 - theta[0]) + p.c1 * (rates.theta3 - omega[0]);
         let tau2 = p.k1 * (theta4 - theta[1]) + p.c1 * (rates.theta4 - omega[1]);
         let energy = kinetic_energy(&p, &rates) + potential_energy(&p, &angles);

@@ -1,4 +1,4 @@
-//! How the motors move between communication points in Co-Simulation, as far as an importer can tell.
+//! Motion of the motors between communication points in Co-Simulation, observed by an importer.
 
 use crate::exact::{STATES, advanced, distance, jumped, parameters, set_parameters, start_at};
 use crate::{in_mode, new, vr};
@@ -20,8 +20,8 @@ fn slave(p: &Parameters, use_omega: bool) -> Fmu {
     fmu
 }
 
-/// One step with known angles and rates, compared with the exact solution after the jump from where
-/// the motors were expected.
+/// A reference for steps with known angles and rates: the exact solution after the jump from the expected
+/// angles.
 struct Follower<'a> {
     p: &'a Parameters,
     x: [f64; 6],
@@ -51,7 +51,8 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// The slope that fmi2SetRealInputDerivatives sets wins over omega and samples, for the next step only.
+/// Checks that the slope of fmi2SetRealInputDerivatives takes precedence over omega and samples, only for the
+/// next step.
 #[test]
 fn set_derivatives_come_first() {
     for use_omega in [false, true] {
@@ -68,15 +69,15 @@ fn set_derivatives_come_first() {
             assert_eq!(fmu.rates(THETA), rates);
             follower.step(&fmu, theta, rates, random.between(0.001, 0.05));
         }
-        // Not set again: the source that the parameter names is back.
+        // Without a new slope, the source that the parameter selects applies again.
         fmu.set(&THETA, &[0.1, 0.2]);
         fmu.set(&OMEGA, &[3.0, 4.0]);
         assert_eq!(fmu.rates(THETA) == [3.0, 4.0], use_omega);
     }
 }
 
-/// What is set in one go has no order: whatever comes first, the same rates and torques are read, before
-/// theta is set too.
+/// Checks that the order of set calls has no effect: the rates and torques are equal, before theta is set
+/// too.
 #[test]
 fn the_order_of_setting_does_not_matter() {
     let p = parameters(7);
@@ -102,7 +103,7 @@ fn the_order_of_setting_does_not_matter() {
     assert_ne!(one.1, other.1);
 }
 
-/// With use_omega the slope is omega; omega = 0 is an exact zero-order hold, jumps included.
+/// Checks that the slope is omega with use_omega; omega = 0 is an exact zero-order hold, including jumps.
 #[test]
 fn omega_is_the_slope() {
     let p = parameters(3);
@@ -117,20 +118,21 @@ fn omega_is_the_slope() {
     }
 }
 
-/// The slope of the parabola through the last three samples at the newest, by Lagrange's formula.
+/// Returns the slope of the parabola through the last three samples at the newest one, by Lagrange's formula.
 fn parabola_slope(t: [f64; 3], y: [f64; 3]) -> f64 {
     y[0] * (t[2] - t[1]) / ((t[0] - t[1]) * (t[0] - t[2]))
         + y[1] * (t[2] - t[0]) / ((t[1] - t[0]) * (t[1] - t[2]))
         + y[2] * (2.0 * t[2] - t[0] - t[1]) / ((t[2] - t[0]) * (t[2] - t[1]))
 }
 
-/// Without omega and derivatives: 0 on the first sample, a first-order difference on the second, a
-/// second-order one from the third on, steps uneven. And the step follows that slope.
+/// Checks slopes without omega and derivatives, with uneven steps: 0 on the first sample, a first-order
+/// difference on the second. From the third sample on, the difference is of second order. The step follows
+/// this slope.
 #[test]
 fn samples_are_differentiated() {
     let p = parameters(5);
     let fmu = slave(&p, false);
-    fmu.set(&OMEGA, &[77.0, 88.0]); // of no use here
+    fmu.set(&OMEGA, &[77.0, 88.0]); // no effect here
     let mut follower = Follower::new(&p);
     let mut random = Random(6);
     let (mut times, mut samples) = (vec![0.0_f64], Vec::<[f64; 2]>::new());
@@ -153,7 +155,7 @@ fn samples_are_differentiated() {
     }
 }
 
-/// A parabola is differentiated exactly, and so are the torques on it.
+/// Checks that slopes and torques are exact if the samples lie on a parabola.
 #[test]
 fn parabolas_have_exact_slopes() {
     let p = Parameters::BUILT_IN;
@@ -182,7 +184,7 @@ fn parabolas_have_exact_slopes() {
     }
 }
 
-/// A master that sets an input once and never again: the motor stands still from the third step on.
+/// Checks that the motors are at rest from the third step on if an importer sets an input only once.
 #[test]
 fn inputs_that_are_not_set_stay() {
     let fmu = slave(&Parameters::BUILT_IN, false);
@@ -193,7 +195,7 @@ fn inputs_that_are_not_set_stay() {
     assert!(distance(&fmu.get([vr(Name::theta3), vr(Name::pitch)]), &[0.3, 0.3]) < 1e-9);
 }
 
-/// Higher orders are accepted, alone and together with order 1, and change nothing.
+/// Checks that higher orders are accepted, with and without order 1, and have no effect.
 #[test]
 fn higher_orders_are_harmless() {
     let [plain, rich] = [(); 2].map(|()| slave(&Parameters::BUILT_IN, false));
@@ -224,7 +226,7 @@ fn higher_orders_are_harmless() {
     }
 }
 
-/// Derivatives given while initializing are those of the first step.
+/// Checks that derivatives set in Initialization Mode apply to the first step.
 #[test]
 fn derivatives_of_the_initialization_are_used() {
     let [with, without] = [true, false].map(|given| {
@@ -239,8 +241,7 @@ fn derivatives_of_the_initialization_are_used() {
     assert!(with[0] > 0.0 && without[0] == 0.0);
 }
 
-/// An input that is held between points at rest keeps everything at rest, to the last bit, whatever the step sizes: nothing
-/// drifts while a master waits.
+/// Checks that the testbed stays exactly at rest with constant inputs, for any step sizes.
 #[test]
 fn waiting_at_rest() {
     let fmu = in_mode(CoSimulation, StepComplete);

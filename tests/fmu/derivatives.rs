@@ -1,4 +1,4 @@
-//! Derivatives that the FMU offers: with respect to variables (section 2.1.9) and to time (4.2.1).
+//! Derivatives with respect to variables (section 2.1.9) and to time (4.2.1).
 
 use crate::exact::{
     INPUTS, STARTS, STATES, UNKNOWNS, jacobian, parameters, real_parameters, set_parameters, start_at,
@@ -16,17 +16,17 @@ use prw_testbed::TestbedFmu;
 use prw_testbed::variables::Name;
 use std::sync::LazyLock;
 
-/// What the description lists for FMI 2.0.
+/// Model structure that the description contains for FMI 2.0.
 static STRUCTURE: LazyLock<ModelStructure> = LazyLock::new(|| {
     let (fmi2, fmi3) =
         (fmu_export::fmi2::functions::<TestbedFmu>(), fmu_export::fmi3::functions::<TestbedFmu>());
-    // SAFETY: the functions of the same model.
+    // SAFETY: the functions belong to the same model.
     let model = unsafe { LoadedModel::new(&fmu_export::describe::<TestbedFmu>(), fmi2, fmi3) };
     ModelStructure::of(&model.unwrap(), false).unwrap()
 });
 
-/// Central differences of the values that getters return, each with a bound of its rounding error. The values are linear
-/// in every known except the parameters of the equations.
+/// Returns central differences of the values that getters return, each with a bound of its rounding error.
+/// The values are linear in every known except the parameters of the equations.
 fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f64)> {
     let [value] = fmu.get([known]);
     let is_linear = [&INPUTS[..], &STATES, &STARTS].concat().contains(&known);
@@ -49,7 +49,8 @@ fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f6
     ends.map(|(a, b)| ((a - b) / (2.0 * width), 1e-10 * (a.abs() + b.abs()) / width)).collect()
 }
 
-/// Every derivative is that of the values here; what is not declared is 0, but for states that follow their start.
+/// Checks that every derivative agrees with differences. Undeclared ones must be 0, except for states that
+/// depend on their start values.
 fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
     let structure = &*STRUCTURE;
     let (unknowns, listed) = match mode {
@@ -76,7 +77,8 @@ fn fit_differences<F: Either>(fmu: &F, mode: Mode, started: bool, label: &str) {
     }
 }
 
-/// Before the first step and after uneven ones: with no angle set, with one and with all, in another instance, at the end.
+/// Checks derivatives before the first step and after uneven steps: with no angle set, with one and with all,
+/// in another instance, at the end.
 fn co_simulation<F: Either>(use_omega: bool, at_rest: bool, with_rates: bool) {
     let label = format!("use_omega {use_omega}, start_at_rest {at_rest}, derivatives {with_rates}");
     let p = parameters(7);
@@ -121,7 +123,7 @@ fn co_simulation<F: Either>(use_omega: bool, at_rest: bool, with_rates: bool) {
     assert_eq!(all(&fmu), before, "{label}, terminated");
 }
 
-/// While the states follow their start, and after that.
+/// Checks derivatives while the states depend on their start values, and later.
 fn model_exchange<F: Either>(use_omega: bool, at_rest: bool) {
     let label = format!("use_omega {use_omega}, start_at_rest {at_rest}");
     let mut random = Random(9);
@@ -144,7 +146,7 @@ fn model_exchange<F: Either>(use_omega: bool, at_rest: bool) {
     fit_differences(&fmu, Event, true, &label);
 }
 
-/// In every mode that has directional derivatives; in FMI 3.0 the adjoint ones are the same numbers.
+/// Checks every mode that has directional derivatives. In FMI 3.0 the adjoint derivatives are equal.
 #[test]
 fn every_pair_fits_differences() {
     for [use_omega, at_rest] in [[false, false], [false, true], [true, false], [true, true]] {
@@ -160,7 +162,7 @@ fn every_pair_fits_differences() {
 const THETA: [u32; 2] = [vr(Name::theta1), vr(Name::theta2)];
 const OMEGA: [u32; 2] = [vr(Name::omega1), vr(Name::omega2)];
 
-/// Where the motors' rates come from.
+/// Source of the motor rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Rates {
     Samples,
@@ -168,8 +170,8 @@ enum Rates {
     Derivatives,
 }
 
-/// Right after the initialization and after each step; the samples lie where the motors are expected,
-/// so that no jump is in between.
+/// Checks output derivatives right after the initialization and after each step. The samples are at the
+/// expected angles, so there are no jumps.
 #[test]
 fn output_derivatives_are_exact() {
     for rates in [Rates::Samples, Rates::Omega, Rates::Derivatives] {
@@ -189,7 +191,7 @@ fn output_derivatives_are_exact() {
                 fmu.set_rates(THETA, given);
             }
             if rates == Rates::Samples && step == 2 {
-                // A corner, for the samples to lie on a curve from here on.
+                // A change of the slope, so that later samples lie on a curve.
                 theta[0] += 0.01;
                 fmu.set(&THETA, &theta);
             } else {
@@ -213,7 +215,8 @@ fn output_derivatives_are_exact() {
     }
 }
 
-/// With samples, omega' is the bend of the parabola through the last three.
+/// Checks that the derivative of omega from samples is the second derivative of the parabola through the last
+/// three.
 #[test]
 fn acceleration_of_samples() {
     let fmu = in_mode(CoSimulation, StepComplete);

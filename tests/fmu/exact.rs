@@ -1,5 +1,5 @@
-//! The model without the FMU: eq. (11) from [`prw_testbed::state_space`], values by matrix products,
-//! motion by the exponential of one large matrix.
+//! Reference without the FMU: eq. (11) from [`prw_testbed::state_space`], values by matrix products, motion
+//! by the exponential of one large matrix.
 
 #![allow(non_snake_case, reason = "the paper's symbols")]
 
@@ -21,7 +21,7 @@ pub const STATES: [u32; 6] = [
     vr(Name::omega5),
     vr(Name::omega6),
 ];
-/// The parameters that say where the states start, in the same order.
+/// The parameters with the start values of the states, in the order of [`STATES`].
 pub const STARTS: [u32; 6] = [
     vr(Name::theta3_start),
     vr(Name::theta4_start),
@@ -48,8 +48,8 @@ pub const UNKNOWNS: [u32; 14] = [
     vr(Name::theta4),
 ];
 
-/// The partial derivatives of [`UNKNOWNS`] with respect to [`STATES`], then [`INPUTS`]: A and B, the torque
-/// rows of C and D, and eq. (1).
+/// Returns the partial derivatives of [`UNKNOWNS`] with respect to [`STATES`] and [`INPUTS`]: A and B, the
+/// torque rows of C and D, and eq. (1).
 pub fn jacobian(p: &Parameters) -> SMatrix<f64, 14, 10> {
     let system = state_space(p);
     let mut jacobian = SMatrix::<f64, 14, 10>::zeros();
@@ -65,7 +65,7 @@ pub fn jacobian(p: &Parameters) -> SMatrix<f64, 14, 10> {
     jacobian
 }
 
-/// The state and the motor angles after time h, while the motors turn at constant rates.
+/// Returns the state and the motor angles after time h, while the motors turn at constant rates.
 pub fn advanced(
     p: &Parameters,
     x: [f64; 6],
@@ -83,26 +83,26 @@ pub fn advanced(
     (std::array::from_fn(|i| end[i]), [end[6], end[7]])
 }
 
-/// The state after the jump that a step of the motor angles by `d` causes: x jumps by B2 d.
+/// Returns the state after a jump of the motor angles by `d`: x jumps by B2 d.
 pub fn jumped(p: &Parameters, x: [f64; 6], d: [f64; 2]) -> [f64; 6] {
     let b = state_space(p).B;
     std::array::from_fn(|i| x[i] + b[(i, 2)] * d[0] + b[(i, 3)] * d[1])
 }
 
-/// The largest difference.
+/// Returns the largest difference.
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Lets the testbed start in this state instead of at rest.
+/// Makes the testbed start in this state instead of at rest.
 #[track_caller]
 pub fn start_at(fmu: &dyn Either, x: [f64; 6]) {
     fmu.ok(fmu.set_boolean(vr(Name::start_at_rest), 0));
     fmu.set(&STARTS, &x);
 }
 
-/// Sets all parameters that eq. (11) has, the Reals at once, because they are checked together.
+/// Sets all parameters of eq. (11), the Reals in one call, because they are checked together.
 pub fn set_parameters(fmu: &dyn Either, p: &Parameters) {
     let (mut reals, mut values) = (Vec::new(), Vec::new());
     for (name, value) in p.start_values() {
@@ -117,14 +117,14 @@ pub fn set_parameters(fmu: &dyn Either, p: &Parameters) {
     fmu.set(&reals, &values);
 }
 
-/// The value references of the Real parameters.
+/// Returns the value references of the Real parameters.
 pub fn real_parameters() -> impl Iterator<Item = u32> {
     let is_one =
         |v: &Variable<TestbedFmu>| v.causality() == Causality::Parameter && v.base() == BaseType::Real;
     (0..).zip(TABLE).filter(move |(_, variable)| is_one(variable)).map(|(vr, _)| vr)
 }
 
-/// A testbed unlike that of Table 1, another for each seed.
+/// Returns parameters that differ from Table 1, different for each seed.
 pub fn parameters(seed: u64) -> Parameters {
     let mut random = Random(seed);
     let [M, N] = [8.0, 14.0].map(|end| random.between(1.0, end) as i32);

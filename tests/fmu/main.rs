@@ -1,5 +1,5 @@
-//! The FMU of the testbed as an importer sees it: its physics, its parameters, its saved states. (What every FMU of
-//! fmu-export does at the boundary is tested there, on toy models.)
+//! Tests of the testbed FMU: physics, parameters, saved states. (fmu-export tests the C functions with test
+//! models.)
 
 #![allow(unsafe_code)]
 
@@ -21,24 +21,24 @@ use prw_testbed::variables::Name;
 /// The table of variables.
 const TABLE: &[Variable<TestbedFmu>] = TestbedFmu::TABLE;
 
-/// The value reference of a variable.
+/// Returns the value reference of a variable.
 const fn vr(name: Name) -> u32 {
     name as u32
 }
 
-/// A new instance.
+/// Makes an instance.
 fn new(interface: Interface) -> Importer {
     Importer::of::<TestbedFmu>(interface)
 }
 
 const INTERFACES: [Interface; 2] = [Interface::CoSimulation, Interface::ModelExchange];
 
-/// A new instance in this mode.
+/// Makes an instance in this mode.
 fn in_mode(interface: Interface, mode: Mode) -> Importer {
     Importer::in_mode::<TestbedFmu>(interface, mode)
 }
 
-/// What every FMU does.
+/// Checks that hold for every FMU.
 mod every {
     fmu_test_kit::every_check!(prw_testbed::TestbedFmu);
 }

@@ -10,7 +10,7 @@ use nalgebra::SVector;
 use prw_testbed::Parameters;
 use prw_testbed::variables::Name;
 
-/// Derivatives and outputs at random points with random parameters, whatever use_omega says.
+/// Checks derivatives and outputs at random points with random parameters; use_omega has no effect.
 #[test]
 fn equations() {
     let mut random = Random(3);
@@ -49,7 +49,7 @@ fn start_values_are_the_first_states() {
     assert_eq!(fmu.states::<6>(), start);
 }
 
-/// A state can be set as variable or among all, with the same effect.
+/// Checks that a state set as a variable and a state set in the array of states have equal effects.
 #[test]
 fn both_ways_to_set_a_state() {
     let fmu = in_mode(ModelExchange, ContinuousTime);
@@ -60,14 +60,14 @@ fn both_ways_to_set_a_state() {
     assert_eq!((fmu.states::<6>(), fmu.derivatives::<6>()), by_array);
 }
 
-/// Motors that start smoothly from rest: angle and rate.
+/// Returns angles and rates of motors that start smoothly from rest.
 fn motors(t: f64) -> ([f64; 2], [f64; 2]) {
     ([(2.0 * t).cos() - 1.0, 0.5 * t * t], [-2.0 * (2.0 * t).sin(), t])
 }
 
 const END: f64 = 0.5;
 
-/// Model Exchange with the classical Runge-Kutta method.
+/// Integrates in Model Exchange with the classical Runge-Kutta method.
 fn integrated(p: &Parameters, steps: i32) -> [f64; 14] {
     let fmu = new(ModelExchange);
     set_parameters(&fmu, p);
@@ -95,7 +95,7 @@ fn integrated(p: &Parameters, steps: i32) -> [f64; 14] {
     fmu.get(UNKNOWNS)
 }
 
-/// Co-Simulation of the same motion, from samples and with the rates given.
+/// Simulates the motion in Co-Simulation, from samples or with given rates.
 fn simulated(p: &Parameters, steps: i32, use_omega: bool) -> [f64; 14] {
     let fmu = new(CoSimulation);
     set_parameters(&fmu, p);
@@ -112,8 +112,8 @@ fn simulated(p: &Parameters, steps: i32, use_omega: bool) -> [f64; 14] {
     fmu.get(UNKNOWNS)
 }
 
-/// The same motion through both interface types. States wait for the jump of the last sample in
-/// Co-Simulation, which is of second order in h like the rest.
+/// Checks that both interface types give equal motions. In Co-Simulation the states follow the last sample
+/// only in the next step; this error is of second order in h, like the others.
 #[test]
 fn same_motion_as_co_simulation() {
     for p in [Parameters::BUILT_IN, parameters(4)] {

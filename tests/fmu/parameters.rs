@@ -1,4 +1,4 @@
-//! Parameters that make no testbed are refused: one message that says what is wrong, and nothing changed.
+//! Invalid parameters are rejected: one message with the reason, and no change.
 
 use crate::{INTERFACES, in_mode};
 use crate::{TABLE, vr};
@@ -11,7 +11,7 @@ use prw_testbed::variables::Name;
 
 const NAN: f64 = f64::NAN;
 
-/// What is tried, the call, words of the message.
+/// Label, call, and parts of the message.
 type Case = (&'static str, fn(&Fmu) -> Status, &'static [&'static str]);
 
 #[track_caller]
@@ -24,7 +24,7 @@ fn all_refused(fmu: &Fmu, cases: &[Case]) {
     }
 }
 
-/// Parameters out of their range, with what the message must tell.
+/// Parameters out of their range, with parts of the message.
 const PARAMETERS: &[Case] = &[
     ("J2 = 0", |fmu| fmu.try_set(&[vr(Name::J2)], &[0.0]), &["J2", "1e-300", "0"]),
     ("J3 < 0", |fmu| fmu.try_set(&[vr(Name::J3)], &[-0.1]), &["J3", "-0.1"]),
@@ -63,7 +63,8 @@ fn parameters_out_of_range() {
     all_refused(&in_mode(CoSimulation, StepComplete), PARAMETERS);
 }
 
-/// What a slider of an importer reaches: the least value that is declared is accepted and runs, what is below is refused.
+/// Checks the declared limits: the smallest declared value is accepted and runs; values below it are
+/// rejected.
 #[test]
 fn declared_limits_are_those() {
     let mut found = 0;
@@ -93,7 +94,7 @@ fn declared_limits_are_those() {
     assert_eq!(found, 10);
 }
 
-/// One of the dampings may be 0, in either order of setting them.
+/// Checks that one of the dampings may be 0, in either order of setting them.
 #[test]
 fn one_damping_may_be_zero() {
     let fmu = in_mode(CoSimulation, Instantiated);
@@ -104,8 +105,8 @@ fn one_damping_may_be_zero() {
     }
 }
 
-/// Importers that ignore the status (fmi-sim, OMSimulator) must not run with Table 1 instead: the initialization is refused in
-/// the words of the first refusal, until the parameter is set to something possible.
+/// Importers that ignore the status (fmi-sim, OMSimulator) must not run with Table 1 instead. So the
+/// initialization fails with the first error message until the parameter has a valid value.
 #[test]
 fn refused_parameters_stop_the_initialization() {
     let words = |message: String| message.split_once(": ").unwrap().1.to_owned();

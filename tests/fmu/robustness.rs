@@ -1,5 +1,5 @@
-//! Any calls in any order; the library loaded and unloaded beside another FMU. (The rest of docs/robustness.md is tested
-//! in crates/fmu-export, on toy models.)
+//! Random sequences of calls; loading and unloading of the library together with another FMU.
+//! (crates/fmu-export tests the rest of docs/robustness.md, with test models.)
 
 use fmu_test_kit::careless::{run, run_seeds};
 use fmu_test_kit::{Importer, fmi3};

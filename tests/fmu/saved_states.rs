@@ -1,4 +1,4 @@
-//! Saved states (section 2.1.8): what they bring back, and what is refused.
+//! Saved states (section 2.1.8): their content, and rejected states.
 
 use crate::{TABLE, in_mode, vr};
 use fmu_export::BaseType;
@@ -9,7 +9,7 @@ use fmu_test_kit::serialized::{VALUES, with};
 use prw_testbed::variables::Name;
 use std::ops::Range;
 
-/// Where the value of a variable is; after the last one what the model remembers besides.
+/// Returns the range of a variable's value; the memory of the model follows the last variable.
 fn place_of(vr: u32) -> Range<usize> {
     let stored = TABLE[..vr as usize].iter().filter(|variable| variable.has_start() || variable.is_state());
     let length = |base| if base == BaseType::Boolean { 1 } else { 8 };
@@ -17,7 +17,7 @@ fn place_of(vr: u32) -> Range<usize> {
     begin..begin + 8
 }
 
-/// A right checksum around parameters that make no testbed.
+/// Checks invalid parameters with a correct checksum.
 #[test]
 fn impossible_parameters() {
     let fmu = in_mode(CoSimulation, StepComplete);
@@ -28,7 +28,7 @@ fn impossible_parameters() {
     assert!(message.contains("J2"), "{message}");
 }
 
-/// The number of samples comes first after the variables: what it cannot be is refused.
+/// Checks that impossible numbers of samples are rejected; the number is the first value after the variables.
 #[test]
 fn impossible_number_of_samples() {
     let fmu = in_mode(CoSimulation, StepComplete);

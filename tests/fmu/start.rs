@@ -1,5 +1,5 @@
-//! How the testbed starts: at rest with the motors, in whatever order an importer says where they are, or in the state
-//! that is given.
+//! Start of the testbed: at rest at the motor angles, for any order of the importer's calls, or in a given
+//! state.
 
 use crate::exact::{INPUTS, STARTS, STATES, distance, start_at};
 use crate::{INTERFACES, in_mode};
@@ -17,14 +17,14 @@ const ANGLES: [f64; 2] = [0.7, -0.4];
 const REST: [f64; 6] = [0.7, -0.4, 0.7, -0.4, 0.0, 0.0];
 const GIVEN: [f64; 6] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
 
-/// A stage of an importer's way to the first step.
+/// A stage of the calls before the first step.
 type Stage = usize;
 const BEFORE_SETUP: Stage = 0;
 const INSTANTIATED: Stage = 1;
 const INITIALIZING: Stage = 2;
 const INITIALIZED: Stage = 3;
 
-/// The importer's calls up to the first step, with `act` at each stage.
+/// Makes the importer's calls up to the first step, and calls `act` at each stage.
 fn initialize(fmu: &Fmu, act: impl Fn(Stage)) {
     act(BEFORE_SETUP);
     fmu.ok(fmu.fmi2SetupExperiment(0, 0.0, 0.0, 0, 1.0));
@@ -49,7 +49,7 @@ fn rests(fmu: &Fmu) {
     assert_eq!(fmu.get([vr(Name::tau1), vr(Name::tau2), vr(Name::der_theta3)]), [0.0; 3]);
 }
 
-/// In Co-Simulation it stays where it is; to the last bit, because nothing is twisted.
+/// Checks that the testbed in Co-Simulation stays exactly at rest, because nothing is twisted.
 #[test]
 fn rest_in_co_simulation() {
     for stages in [vec![BEFORE_SETUP], vec![INSTANTIATED], vec![INITIALIZING], vec![INITIALIZED]] {
@@ -71,7 +71,7 @@ fn rest_in_co_simulation() {
     }
 }
 
-/// The angles that count are the last ones before the first step.
+/// Checks that the last angles before the first step determine the start.
 #[test]
 fn the_last_angles_before_the_first_step_count() {
     let fmu = new(CoSimulation);
@@ -84,12 +84,12 @@ fn the_last_angles_before_the_first_step_count() {
     fmu.set(&THETA, &ANGLES);
     fmu.step(0.0, 0.01);
     rests(&fmu);
-    // From here on the motors have to move it.
+    // From here on the angles of the motors act only through motion.
     fmu.set(&THETA, &[0.0; 2]);
     assert_eq!(fmu.get(STATES), REST);
 }
 
-/// A first step that is refused is none.
+/// Checks that a rejected first step does not start the simulation.
 #[test]
 fn a_refused_step_starts_nothing() {
     let fmu = in_mode(CoSimulation, StepComplete);
@@ -116,7 +116,7 @@ fn rest_in_model_exchange() {
         let mut rates = [f64::NAN; 6];
         fmu.ok(fmu.fmi2GetDerivatives(rates.as_mut_ptr(), 6));
         assert_eq!(rates, [0.0; 6]);
-        // The importer integrates from here on, whether it has set states or not.
+        // From here on the importer integrates, whether or not it has set states.
         fmu.set(&THETA, &[0.0; 2]);
         assert_eq!(fmu.get(STATES), REST);
         fmu.ok(fmu.fmi2EnterEventMode());
@@ -125,7 +125,7 @@ fn rest_in_model_exchange() {
     }
 }
 
-/// OpenModelica sets parameters late, and states that it has just read while still in event mode.
+/// OpenModelica sets parameters late, and in Event Mode sets states that it has just read.
 #[test]
 fn late_parameters_and_states_in_event_mode() {
     for given in [false, true] {
@@ -150,7 +150,7 @@ fn late_parameters_and_states_in_event_mode() {
     }
 }
 
-/// In the state that is given, set at any stage, until the first step only.
+/// Checks a start in a given state, set at any stage, until the first step.
 #[test]
 fn a_given_start() {
     for interface in INTERFACES {
@@ -172,7 +172,7 @@ fn a_given_start() {
     assert_eq!(fmu.get(STATES), [0.0; 6], "after the first step");
 }
 
-/// Before the first step a saved state still follows the motors; a reset brings that back.
+/// Checks that a state saved before the first step still follows the motors, and that a reset restores this.
 #[test]
 fn saved_and_reset() {
     for interface in INTERFACES {
@@ -227,14 +227,14 @@ fn fmi3() {
         fmu.set(&THETA, &[0.0; 2]);
         assert_eq!(get3(&fmu), REST, "{interface}, after the start");
     }
-    // In event mode FMI 3.0 lets an importer set one state by itself: the others are where they are.
+    // In Event Mode, FMI 3.0 allows setting one state; the other states keep their values.
     let fmu = fmi3::Importer::of::<TestbedFmu>(ModelExchange);
     fmu.set(&THETA, &ANGLES);
     initialize3(&fmu, |_| {});
     fmu.set(&[vr(Name::theta5)], &[9.0]);
     fmu.set(&THETA, &[0.0; 2]);
     assert_eq!(get3(&fmu), [0.7, -0.4, 9.0, -0.4, 0.0, 0.0]);
-    // And what is given is given, late, too.
+    // A given start state applies even if it is set late.
     let fmu = fmi3::Importer::of::<TestbedFmu>(ModelExchange);
     initialize3(&fmu, |_| {});
     fmu.ok(fmu.fmi3SetBoolean(&reference(vr(Name::start_at_rest)), 1, &0, 1));
@@ -242,7 +242,7 @@ fn fmi3() {
     assert_eq!(get3(&fmu), GIVEN);
 }
 
-/// Who wants to set a state itself is told what to set instead.
+/// Checks that the error for setting a state names the variables to set instead.
 #[test]
 fn states_are_not_set() {
     let told = |message: &str, name: &str| {

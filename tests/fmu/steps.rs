@@ -1,4 +1,4 @@
-//! Steps at the edge of the range of numbers.
+//! Steps near the limits of the number range.
 
 use crate::exact::start_at;
 use crate::in_mode;
@@ -8,7 +8,7 @@ use fmu_export::Mode::*;
 use fmu_test_kit::Either;
 use prw_testbed::variables::Name;
 
-/// A step to infinity is refused, and everything stays usable.
+/// Checks that a step to infinity is rejected and the instance stays usable.
 #[test]
 fn steps_out_of_the_range_of_numbers() {
     let fmu = in_mode(CoSimulation, StepComplete);
@@ -22,8 +22,8 @@ fn steps_out_of_the_range_of_numbers() {
     fmu.step(0.0, 10.0);
 }
 
-/// The parabola through the samples may have an end in range and a rate there that is not: the next state
-/// could not be saved.
+/// Checks that a step is rejected if the parabola's end is in range but its rate there is not, because the
+/// next state could not be saved.
 #[test]
 fn motors_out_of_the_range_of_numbers() {
     let fmu = in_mode(CoSimulation, StepComplete);

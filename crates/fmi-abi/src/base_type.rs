@@ -1,43 +1,43 @@
-//! The kinds of values.
+//! Base types of values.
 
 use std::fmt;
 
-/// The kinds of values that variables have. FMI 2.0 has Real, Integer, Boolean, String and Enumeration only; FMI 3.0
-/// calls a Real Float64 and an Integer Int32, and has the others as well.
+/// Base types of variables. FMI 2.0 has only Real, Integer, Boolean, String and Enumeration. FMI 3.0 has all
+/// of them; it calls Real Float64 and Integer Int32.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BaseType {
     /// A floating-point number, `f64` in Rust.
     Real,
     /// A floating-point number, `f32` in Rust.
     Float32,
-    /// A whole number, `i32` in Rust.
+    /// An integer, `i32` in Rust.
     Integer,
-    /// A whole number, `i8` in Rust.
+    /// An integer, `i8` in Rust.
     Int8,
-    /// A whole number, `u8` in Rust.
+    /// An integer, `u8` in Rust.
     UInt8,
-    /// A whole number, `i16` in Rust.
+    /// An integer, `i16` in Rust.
     Int16,
-    /// A whole number, `u16` in Rust.
+    /// An integer, `u16` in Rust.
     UInt16,
-    /// A whole number, `u32` in Rust.
+    /// An integer, `u32` in Rust.
     UInt32,
-    /// A whole number, `i64` in Rust.
+    /// An integer, `i64` in Rust.
     Int64,
-    /// A whole number, `u64` in Rust.
+    /// An integer, `u64` in Rust.
     UInt64,
-    /// A truth value, `bool` in Rust.
+    /// A Boolean, `bool` in Rust.
     Boolean,
-    /// A text, `String` in Rust.
+    /// A string, `String` in Rust.
     String,
     /// Bytes, `Vec<u8>` in Rust.
     Binary,
-    /// One of a list of names, an enum in Rust.
+    /// An item of an enumeration, an enum in Rust.
     Enumeration,
 }
 
 impl BaseType {
-    /// All of them.
+    /// All base types.
     pub const ALL: [Self; 14] = [
         Self::Real,
         Self::Float32,
@@ -55,17 +55,17 @@ impl BaseType {
         Self::Enumeration,
     ];
 
-    /// Whether FMI 2.0 has it.
+    /// Returns whether FMI 2.0 has this type.
     pub const fn is_in_fmi2(self) -> bool {
         matches!(self, Self::Real | Self::Integer | Self::Boolean | Self::String | Self::Enumeration)
     }
 
-    /// Whether it is a floating-point number.
+    /// Returns whether values are floating-point numbers.
     pub const fn is_float(self) -> bool {
         matches!(self, Self::Real | Self::Float32)
     }
 
-    /// The smallest and the largest value of a whole number; `None` for the rest.
+    /// Returns the smallest and the largest value of an integer type; `None` for other types.
     pub const fn range(self) -> Option<(i128, i128)> {
         Some(match self {
             Self::Int8 => (i8::MIN as i128, i8::MAX as i128),

@@ -1,4 +1,4 @@
-//! The types of C: libc's, or where there is no C library, Rust's own.
+//! C types from libc, or from Rust's standard library on targets without a C library.
 
 #[cfg(not(target_family = "wasm"))]
 pub use libc::{c_char, c_int, c_uint, c_void};

@@ -1,21 +1,23 @@
-//! The functions of both standards, called by their names with arguments as words: the one place that knows their types.
+//! Calls of the functions of both FMI versions by name, with arguments as 64-bit words. Only this module
+//! knows their argument types at run time.
 
 use crate::c_types::{c_int, c_void};
 use crate::{Rule, Standard};
 
-/// The name and the type of an argument.
+/// Name and type of an argument.
 #[derive(Debug)]
 pub struct Argument {
-    /// Its name.
+    /// Name of the argument.
     pub name: &'static str,
-    /// Its type, as `fmi-abi` writes it.
+    /// Type of the argument, as written in `fmi-abi`.
     pub of: &'static str,
 }
 
 impl Argument {
-    /// What it points to, without the name of the standard, and whether that is only read; `None` if it is no pointer.
+    /// Returns the pointee's type without the prefix `fmi2` or `fmi3`, and whether it is only read; `None` if
+    /// it is no pointer.
     pub fn pointee(&self) -> Option<(&'static str, bool)> {
-        // Macros may have put a space behind the star.
+        // Macro expansion may add a space after the asterisk.
         let (mutability, of) = self.of.strip_prefix('*')?.trim_start().split_once(' ')?;
         Some((
             of.strip_prefix("fmi2").or_else(|| of.strip_prefix("fmi3")).unwrap_or(of),
@@ -24,16 +26,16 @@ impl Argument {
     }
 }
 
-/// A function that works on an instance.
+/// Signature of a function with an instance argument.
 #[derive(Debug)]
 pub struct Signature {
-    /// Where it may be called.
+    /// States in which the function may be called.
     pub rule: &'static Rule,
-    /// What it is given after the instance.
+    /// Arguments after the instance.
     pub arguments: &'static [Argument],
 }
 
-/// An argument from a word.
+/// Conversion of a 64-bit word to an argument.
 trait FromWord {
     fn from_word(word: u64) -> Self;
 }
@@ -74,7 +76,7 @@ macro_rules! calls {
             $($function:ident $cs:literal $me:literal $tolerated:literal ($($argument:ident: $type:ty),*);)+
         }
     ) => {
-        /// Those of the standard, in its order.
+        /// Signatures of the FMI version, in the order of the standard.
         pub const SIGNATURES: &[Signature] = &[
             $(Signature {
                 rule: Function::$function.rule(),
@@ -82,21 +84,22 @@ macro_rules! calls {
             }),+
         ];
 
-        /// The names of those that need no instance.
+        /// Names of the functions without an instance argument.
         pub const FREE: &[&str] = &[$(stringify!($free)),+];
 
         /// Calls the function of this name at this address.
         ///
         /// # Safety
-        /// The address is that of a function of this name as the standard declares it, and the words are what it takes.
+        /// The address is the address of a function of this name with the type of the FMI standard, and the
+        /// words are valid arguments for it.
         pub unsafe fn call(address: *const c_void, name: &str, instance: *mut c_void, words: &[u64]) -> c_int {
             let mut words = words.iter().copied();
             match name {
                 $(stringify!($function) => {
                     let function: unsafe extern "C" fn($handle $(, $type)*) -> c_int =
-                        // SAFETY: the caller's promise.
+                        // SAFETY: the caller guarantees the type of the function.
                         unsafe { std::mem::transmute(address) };
-                    // SAFETY: the caller's promise.
+                    // SAFETY: the caller guarantees that the arguments are valid.
                     unsafe { function(instance $(, <$type as FromWord>::from_word({
                         let _ = stringify!($argument);
                         words.next().unwrap_or_default()
@@ -108,21 +111,21 @@ macro_rules! calls {
     };
 }
 
-/// FMI 2.0.
+/// Calls of FMI 2.0.
 pub mod fmi2 {
     use super::{Argument, FromWord, Signature, c_int, c_void};
     use crate::fmi2::{Function, types::*};
     crate::fmi2::functions!(calls);
 }
 
-/// FMI 3.0.
+/// Calls of FMI 3.0.
 pub mod fmi3 {
     use super::{Argument, FromWord, Signature, c_int, c_void};
     use crate::fmi3::{Function, types::*};
     crate::fmi3::functions!(calls);
 }
 
-/// The functions of a standard that work on an instance.
+/// Returns the signatures of an FMI version.
 pub const fn signatures(standard: Standard) -> &'static [Signature] {
     match standard {
         Standard::Fmi2 => fmi2::SIGNATURES,
@@ -130,18 +133,18 @@ pub const fn signatures(standard: Standard) -> &'static [Signature] {
     }
 }
 
-/// One of them.
+/// Returns the signature of this function.
 pub fn signature(name: &str) -> Option<&'static Signature> {
     let standard = if name.starts_with("fmi3") { Standard::Fmi3 } else { Standard::Fmi2 };
     signatures(standard).iter().find(|of| of.rule.name == name)
 }
 
-/// Calls it.
+/// Calls a function of either FMI version.
 ///
 /// # Safety
-/// As of [`fmi2::call`].
+/// The requirement of [`fmi2::call`].
 pub unsafe fn call(address: *const c_void, name: &str, instance: *mut c_void, words: &[u64]) -> c_int {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees the requirement.
     unsafe {
         if name.starts_with("fmi3") {
             fmi3::call(address, name, instance, words)

@@ -1,4 +1,4 @@
-//! Properties of a variable besides its type (section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0).
+//! Attributes of a variable other than its type (section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0).
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ macro_rules! attribute {
         pub enum $name { $($(#[$item_text])* $item,)+ }
 
         impl $name {
-            /// The item that has this name in model descriptions.
+            /// Returns the item with this name in model descriptions.
             pub fn of_name(name: &str) -> Option<Self> {
                 match name {
                     $($word => Some(Self::$item),)+
@@ -19,7 +19,7 @@ macro_rules! attribute {
             }
         }
 
-        /// As written in model descriptions.
+        /// Writes the name in model descriptions.
         impl fmt::Display for $name {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str(match self { $(Self::$item => $word,)+ })
@@ -29,17 +29,17 @@ macro_rules! attribute {
 }
 
 attribute! {
-    /// Who sets a variable and who reads it (section 2.2.7).
+    /// Purpose of a variable: who sets it and who reads it (section 2.2.7).
     Causality {
         /// Set by the user before the simulation.
         Parameter = "parameter",
-        /// Follows from parameters.
+        /// Calculated from parameters.
         CalculatedParameter = "calculatedParameter",
         /// Set by the importer at every communication point.
         Input = "input",
         /// Read by the importer.
         Output = "output",
-        /// Of interest inside the model only.
+        /// Used only inside the model.
         Local = "local",
         /// The time.
         Independent = "independent",
@@ -47,29 +47,29 @@ attribute! {
 }
 
 attribute! {
-    /// When a variable changes (section 2.2.7).
+    /// Times at which a variable may change (section 2.2.7).
     Variability {
-        /// Never.
+        /// The variable never changes.
         Constant = "constant",
-        /// Not after initialization.
+        /// The variable does not change after initialization.
         Fixed = "fixed",
-        /// When the user changes a parameter.
+        /// The variable changes when the user changes a parameter.
         Tunable = "tunable",
-        /// At events or communication points.
+        /// The variable changes at events or communication points.
         Discrete = "discrete",
-        /// At any time.
+        /// The variable may change at any time.
         Continuous = "continuous",
     }
 }
 
 attribute! {
-    /// How a variable gets its first value (section 2.2.7).
+    /// Source of the first value of a variable (section 2.2.7).
     Initial {
-        /// From its start value.
+        /// The first value is the start value.
         Exact = "exact",
-        /// By calculation that begins with its start value.
+        /// The first value is calculated by iteration from the start value.
         Approx = "approx",
-        /// By calculation.
+        /// The first value is calculated.
         Calculated = "calculated",
     }
 }

@@ -24,7 +24,7 @@ pub use standard::{Interface, Standard};
 pub use status::Status;
 pub use value::Value;
 
-/// What the list of a standard's functions says, as items of its module.
+/// Defines the items of an FMI version's module from its list of functions.
 macro_rules! table {
     (
         $standard:ident $handle:ident
@@ -51,7 +51,7 @@ macro_rules! table {
             $($crate::Rule::new($crate::Standard::$standard, stringify!($function), $cs, $me, $tolerated)),+
         ];
 
-        /// Pointers to all functions of the standard: what an importer has of a library.
+        /// Pointers to all functions of the FMI version, as an importer loads them from a library.
         #[allow(missing_docs, non_snake_case, reason = "each has the name of its function")]
         #[derive(Clone, Copy, Debug)]
         pub struct Functions {

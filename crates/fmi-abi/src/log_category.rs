@@ -3,18 +3,18 @@
 use crate::status::Status;
 use std::ffi::CStr;
 
-/// What a message is about; becomes `LogCategories` (section 2.2.4).
+/// Log category; the model description lists them as `LogCategories` (section 2.2.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Category {
-    /// The course of the simulation.
+    /// Progress of the simulation.
     Events,
-    /// Something is odd.
+    /// A warning.
     Warning,
-    /// A question that has no answer, or a step that ended early.
+    /// A status query without a result, or a step that ended early.
     Discard,
-    /// A call was refused.
+    /// A rejected call.
     Error,
-    /// The instance is broken.
+    /// A failure after which the instance cannot be used.
     Fatal,
     /// Every category.
     All,
@@ -25,7 +25,7 @@ impl Category {
     pub const ALL: [Self; 6] =
         [Self::Events, Self::Warning, Self::Discard, Self::Error, Self::Fatal, Self::All];
 
-    /// The name, as section 2.2.4 proposes it.
+    /// Returns the name that section 2.2.4 proposes.
     pub const fn name(self) -> &'static CStr {
         match self {
             Self::Events => c"logEvents",
@@ -37,7 +37,7 @@ impl Category {
         }
     }
 
-    /// One sentence for the model description.
+    /// Returns a sentence for the model description.
     pub const fn description(self) -> &'static str {
         match self {
             Self::Events => "The course of the simulation: instantiation, initialization, reset, termination",
@@ -49,7 +49,7 @@ impl Category {
         }
     }
 
-    /// The category that goes with a status.
+    /// Returns the category of messages with this status.
     pub const fn of(status: Status) -> Self {
         match status {
             Status::Ok => Self::Events,

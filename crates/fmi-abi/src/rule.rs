@@ -1,22 +1,22 @@
-//! A row of a standard's table of allowed calls.
+//! A row of the table of allowed calls of an FMI version.
 
 use crate::mode::Situations;
 use crate::standard::Standard;
 
-/// Where one function may be called.
+/// Situations in which a function may be called.
 #[derive(Clone, Copy, Debug)]
 pub struct Rule {
-    /// The function's name.
+    /// Name of the function.
     pub name: &'static str,
-    /// Where the standard allows the call.
+    /// Situations in which the FMI standard allows the call.
     pub standard: Situations,
-    /// Where the call is tolerated beyond the standard.
+    /// Further situations in which this project tolerates the call.
     pub tolerated: Situations,
 }
 
 impl Rule {
-    /// A row: the letters of [`Situations::new`] for either interface type; what is tolerated holds for those that have the
-    /// function.
+    /// Creates a row from the letters of [`Situations::new`] for each interface type. Tolerated modes apply
+    /// only to interface types that have the function.
     pub const fn new(
         of: Standard,
         name: &'static str,
@@ -29,7 +29,7 @@ impl Rule {
         Self { name, standard, tolerated }
     }
 
-    /// Where the call is accepted.
+    /// Returns all situations in which the call is accepted.
     pub const fn accepted(&self) -> Situations {
         self.standard.union(self.tolerated)
     }

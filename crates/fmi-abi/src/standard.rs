@@ -1,8 +1,8 @@
-//! The standards, and the types of interface that both have.
+//! FMI versions and interface types.
 
 use std::fmt;
 
-/// The standard that an importer speaks with an instance.
+/// FMI version of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standard {
     /// FMI 2.0.
@@ -12,8 +12,8 @@ pub enum Standard {
 }
 
 impl Standard {
-    /// The value reference that fmu-export gives the variable at this place of a model's list: in FMI 2.0 the place itself,
-    /// in FMI 3.0 counted from 1.
+    /// Returns the value reference that fmu-export assigns to the variable at this index of a model's list.
+    /// It is the index in FMI 2.0, and the index plus 1 in FMI 3.0.
     pub const fn reference(self, place: u32) -> u32 {
         place.wrapping_add(self as u32)
     }
@@ -28,12 +28,12 @@ impl fmt::Display for Standard {
     }
 }
 
-/// The type of interface that an instance was made for.
+/// Interface type of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
-    /// The importer integrates.
+    /// Model Exchange: the importer integrates.
     ModelExchange = 0,
-    /// The FMU steps itself.
+    /// Co-Simulation: the FMU performs its own steps.
     CoSimulation = 1,
 }
 

@@ -1,28 +1,29 @@
-//! The answer to a call.
+//! Status of a call.
 
 use crate::c_types::c_int;
 
-/// What a call answers (section 2.1.3).
+/// Status that a call returns (section 2.1.3).
 ///
-/// `Pending` is missing on purpose: no function here works asynchronously.
+/// `Pending` is omitted: no function here is asynchronous.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub enum Status {
-    /// All well.
+    /// The call succeeded.
     Ok = 0,
-    /// Something is odd, but the computation can continue. Some importers stop on it: it is said in the log only.
+    /// A warning; the computation can continue. fmu-export reports warnings only in the log, because some
+    /// importers stop on this status.
     Warning = 1,
-    /// The information or the step cannot be had.
+    /// The information is not available, or the step cannot be carried out.
     Discard = 2,
-    /// The call was refused.
+    /// The call was rejected.
     Error = 3,
-    /// The instance is broken for good.
+    /// The instance cannot be used any more.
     Fatal = 4,
 }
 
 impl Status {
-    /// The answer of a library that may be anybody's: what is no status is an error, and so is `Pending`, where nothing waits
-    /// for steps.
+    /// Converts the status of a third-party library. An unknown value is an error, and so is `Pending`,
+    /// because no caller here waits for asynchronous steps.
     #[inline]
     pub const fn from_c(code: c_int) -> Self {
         match code {

@@ -6,25 +6,26 @@ use std::fmt;
 /// A value of a variable.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Of a Real or a Float32.
+    /// Value of a Real or a Float32.
     Real(f64),
-    /// Of an integer of any kind or an Enumeration.
+    /// Value of any integer type or an Enumeration.
     Integer(i128),
-    /// Of a Boolean.
+    /// Value of a Boolean.
     Boolean(bool),
-    /// Of a String.
+    /// Value of a String.
     String(String),
-    /// Of a Binary.
+    /// Value of a Binary.
     Binary(Vec<u8>),
 }
 
 impl Value {
-    /// The number of a Real; NaN for other values.
+    /// Returns the number of a Real; NaN for other values.
     pub fn real(&self) -> f64 {
         if let Self::Real(value) = self { *value } else { f64::NAN }
     }
 
-    /// The value that is written as this text, as [`Display`](fmt::Display) writes it; `None` if the kind of value has none.
+    /// Parses a value in the format of [`Display`](fmt::Display); `None` if the string is no value of this
+    /// base type.
     pub fn read(base: BaseType, text: &str) -> Option<Self> {
         match base {
             BaseType::Real => text.parse().ok().map(Self::Real),
@@ -41,7 +42,7 @@ impl Value {
     }
 }
 
-/// Two hexadecimal digits for each byte.
+/// Parses two hexadecimal digits for each byte.
 fn bytes(text: &str) -> Option<Vec<u8>> {
     let digit = |byte: &u8| char::from(*byte).to_digit(16);
     let digits: Vec<u32> = text.as_bytes().iter().map(digit).collect::<Option<_>>()?;
@@ -74,11 +75,11 @@ impl From<&str> for Value {
     }
 }
 
-/// As written in model descriptions.
+/// Writes the value as in model descriptions.
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            // Where hundreds of zeros may have to be written.
+            // Uses exponents for numbers that would need many zeros.
             Self::Real(value) if *value != 0.0 && value.abs() < 1e-15 || value.abs() > 1e17 => {
                 write!(f, "{value:e}")
             }

@@ -1,7 +1,7 @@
-//! The description that a library gives of its model, as JSON, for the program that makes FMUs of it (`fmu-package`).
+//! The description of the model in a library, as JSON, for the program that makes FMUs (`fmu-package`).
 //!
-//! Floating-point numbers and integers of types are strings, which hold them to the last digit. The functions are not inlined
-//! and take trait objects: the description runs once, and its size counts in every library.
+//! Floating-point numbers and integers of types are strings, which keep all digits. The functions are not
+//! inlined and take trait objects: the description runs once, and its size counts in every library.
 
 use crate::boundary::{forget_panic, panic_message};
 use crate::capabilities::Events;
@@ -16,28 +16,29 @@ use fmi_abi::c_types::c_void;
 use std::fmt::{Debug, Display, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// The version of the description's form.
+/// Version of the format of the description.
 const VERSION: u32 = 1;
 
-/// The function that receives the description: a string in UTF-8, and its length in bytes.
+/// Function that receives the description: a UTF-8 string and its length in bytes.
 #[doc(hidden)]
 pub type Receive = unsafe extern "C" fn(context: *mut c_void, text: *const u8, length: usize);
 
-/// Passes the description of a model to `receive`; an empty one if the model panics.
+/// Passes the description of a model to `receive`, or an empty description if the model panics.
 ///
 /// # Safety
-/// `receive` may be called with this context.
+/// The caller guarantees that `receive` may be called with this context.
 #[doc(hidden)]
 pub unsafe fn pass_description<M: Exported>(receive: Receive, context: *mut c_void) {
     let text = catch_unwind(describe::<M>).unwrap_or_else(|panic| {
         forget_panic(Err(panic));
         String::new()
     });
-    // SAFETY: the caller's promise, and a string with its length.
+    // SAFETY: the caller guarantees that `receive` accepts `context`; pointer and length come from one
+    // string.
     unsafe { receive(context, text.as_ptr(), text.len()) }
 }
 
-/// The description of a model in this program.
+/// Returns the description of a model in this program.
 pub fn describe<M: Exported>() -> String {
     let mut json = Json::default();
     json.open("", '{');
@@ -176,8 +177,8 @@ fn unit(json: &mut Json, of: &Unit) {
     json.close('}');
 }
 
-/// The start values of a new model, `null` for a variable without; or the reason why there are none. Of a model for Model
-/// Exchange also the first event indicator that it does not fill in.
+/// Writes the start values of a new model, `null` for a variable without start value, or the reason why the
+/// model has none. For Model Exchange, also writes the first event indicator that the model does not write.
 fn starts<M: Exported>(json: &mut Json, interface: Interface) {
     json.open("", '{');
     let made = catch_unwind(|| M::new(&Setup::new(interface)));
@@ -212,7 +213,7 @@ fn starts<M: Exported>(json: &mut Json, interface: Interface) {
     json.close('}');
 }
 
-/// The first event indicator that keeps the value that was there before.
+/// Returns the first event indicator whose previous value the model does not overwrite.
 fn forgotten_indicator<M: Exported>(mut model: M) -> Option<usize> {
     let count = M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators);
     model.calculate(0.0);
@@ -224,7 +225,7 @@ fn forgotten_indicator<M: Exported>(mut model: M) -> Option<usize> {
     fill(1.0).iter().zip(fill(2.0)).position(|(one, two)| (*one, two) == (1.0, 2.0))
 }
 
-/// JSON that is being written; members of an array have the name "".
+/// Writer of JSON; members of an array have the name "".
 #[derive(Default)]
 struct Json(String);
 
@@ -269,13 +270,13 @@ impl Json {
         self.quoted(text);
     }
 
-    /// A number with all its digits, or the name of something, as a string.
+    /// Writes a number with all its digits, or a name, as a string.
     #[inline(never)]
     fn number(&mut self, name: &str, value: &dyn Debug) {
         self.text(name, &format!("{value:?}"));
     }
 
-    /// A number, true, false or null.
+    /// Writes a number, true, false or null.
     #[inline(never)]
     fn word(&mut self, name: &str, word: &dyn Display) {
         self.begin(name);

@@ -1,20 +1,20 @@
-//! From a model with capabilities to an FMU: [`export_fmu!`](crate::export_fmu).
+//! Conversion of a model with capabilities to an FMU: [`export_fmu!`](crate::export_fmu).
 
 use crate::capabilities::{Event, Events, Step, StepCompleted, Stepped};
 use crate::model::{Error, Model};
 
-/// A model with what it offers. Implemented by [`offer!`](crate::offer), which takes everything from the
-/// capabilities that it is given; what the model lacks is never called.
+/// A model and its capabilities. [`offer!`](crate::offer) implements it from the capability traits. This
+/// crate does not call functions of missing capabilities.
 pub trait Exported: Model {
-    /// What it offers as Co-Simulation slave; `None` if it is none.
+    /// Capabilities in Co-Simulation; `None` if the model does not support it.
     const CO_SIMULATION: Option<CoSimulationOffer> = None;
-    /// What it offers as Model Exchange model; `None` if it is none.
+    /// Capabilities in Model Exchange; `None` if the model does not support it.
     const MODEL_EXCHANGE: Option<ModelExchangeOffer> = None;
-    /// Whether it knows partial derivatives.
+    /// Whether the model provides partial derivatives.
     const PARTIALS: bool = false;
-    /// Whether it uses input derivatives.
+    /// Whether the model uses input derivatives.
     const INPUT_DERIVATIVES: bool = false;
-    /// The highest order of output derivatives.
+    /// Highest order of output derivatives; 0 for none.
     const OUTPUT_DERIVATIVES: u32 = 0;
 
     #[doc(hidden)]
@@ -56,19 +56,19 @@ pub trait Exported: Model {
     }
 }
 
-/// What the model description says of a Co-Simulation slave.
+/// Capabilities in Co-Simulation, as in the model description.
 #[derive(Clone, Copy, Debug)]
 pub struct CoSimulationOffer {
-    /// Steps may have any size.
+    /// Whether the step size may vary.
     pub variable_step_size: bool,
     /// Whether steps stop at events.
     pub events: Events,
-    /// Steps may end early, at events or elsewhere.
+    /// Whether steps may end early, at events or at other times.
     pub ends_early: bool,
 }
 
 impl CoSimulationOffer {
-    /// Fails if a step ended as the model has not announced it: the importer may count on that.
+    /// Panics if a step ended in a way that the model does not declare, because importers rely on the declaration.
     #[doc(hidden)]
     #[inline]
     pub fn check(&self, stepped: &Result<Stepped, Error>) {
@@ -88,26 +88,26 @@ impl CoSimulationOffer {
         }
     }
 
-    /// Whether an importer of FMI 3.0 can handle events.
+    /// Returns whether an importer of FMI 3.0 can handle events.
     pub const fn has_event_mode(&self) -> bool {
         !matches!(self.events, Events::None)
     }
 }
 
-/// What the model description says of a Model Exchange model.
+/// Capabilities in Model Exchange, as in the model description.
 #[derive(Clone, Copy, Debug)]
 pub struct ModelExchangeOffer {
     /// The number of event indicators.
     pub indicators: usize,
-    /// Whether the importer tells when a step of the integrator is complete.
+    /// Whether the importer must report each completed step of the integrator.
     pub step_completed: bool,
 }
 
-/// Exports a [`Model`] with its capabilities as an FMU: the functions of FMI 2.0 and of FMI 3.0 as symbols of the
-/// library.
+/// Exports a [`Model`] with its capabilities as an FMU. The library then contains the functions of FMI 2.0
+/// and of FMI 3.0.
 ///
-/// Goes once into `src/lib.rs` of an FMU's crate, which must be a `cdylib`. The symbols live in the crate that calls
-/// the macro, so several FMU crates can share a workspace.
+/// Call it once in `src/lib.rs` of an FMU's crate, which must be a `cdylib`. The symbols belong to the crate
+/// that calls the macro, so several FMU crates can share a workspace.
 ///
 /// ```text
 /// export_fmu!(Lag: CoSimulation + ModelExchange);
@@ -124,14 +124,14 @@ macro_rules! export_fmu {
     };
 }
 
-/// What [`export_fmu!`](crate::export_fmu) does besides the symbols: it says what the model offers. For tests, and
-/// for libraries with several models.
+/// Declares the capabilities of a model without exporting C symbols; [`export_fmu!`](crate::export_fmu)
+/// includes it. Use it for tests, and for libraries with several models.
 ///
-/// A capability that is named must be implemented, and one that is implemented must be named: the compiler sees to
-/// both.
+/// The compiler checks that the named and the implemented capabilities agree.
 #[macro_export]
 macro_rules! offer {
-    // An associated constant of the type itself, if the bound holds, comes before that of the trait.
+    // An associated constant of the type, if its bound holds, takes precedence over the constant of the
+    // trait.
     (@must_agree $model:ty, $capability:ident, $($offered:tt)+) => {
         const _: () = {
             struct Is<T>(::core::marker::PhantomData<T>);

@@ -1,37 +1,38 @@
-//! What a model says about itself: the facts behind the model description.
+//! General data of a model for the model description.
 
-/// The facts about an FMU (section 2.2.1). [`info!`](crate::info) fills in what Cargo knows.
+/// General data of an FMU (section 2.2.1). [`info!`](crate::info) takes some of it from Cargo.
 #[derive(Clone, Debug)]
 pub struct Info {
-    /// `modelName`, the name a user reads.
+    /// `modelName`, the name that users see.
     pub name: &'static str,
     /// `modelIdentifier`, the name of the library file.
     pub identifier: &'static str,
-    /// Fingerprint that ties the description to the library; importers must pass it when they make an instance.
+    /// Fingerprint that ties the description to the library. An importer passes it when it makes an instance.
     pub guid: &'static str,
-    /// One sentence.
+    /// Description in one sentence.
     pub description: &'static str,
-    /// Who made the model.
+    /// Author of the model.
     pub author: &'static str,
-    /// The model's version.
+    /// Version of the model.
     pub version: &'static str,
-    /// The licence of the FMU.
+    /// Licence of the FMU.
     pub license: &'static str,
-    /// Who holds the copyright.
+    /// Copyright notice.
     pub copyright: &'static str,
-    /// The experiment an importer proposes to its user.
+    /// Default experiment, which an importer proposes to its user.
     pub default_experiment: DefaultExperiment,
-    /// Whether outputs and derivatives follow from inputs, states and parameters by the same smooth equations
-    /// everywhere and at all times: no branches, limits, dead zones or switches but Integer, Boolean and
-    /// Enumeration parameters, and nothing that acts from a certain step on.
+    /// Whether outputs and derivatives follow from inputs, states and parameters by smooth equations that are
+    /// the same everywhere and at all times. Smooth equations have no branches, limits, dead zones or effects
+    /// that begin at a certain step. Only Integer, Boolean and Enumeration parameters may switch.
     ///
-    /// What does not react near the start values then does not react anywhere, and fmu-package finds the
-    /// dependencies, and their kinds, by trying. Otherwise it lists for every unknown all that its
-    /// [`depends_on`](crate::Variable::depends_on) names, and without that all there is.
+    /// If true, a variable that does not react near the start values never reacts, so fmu-package determines
+    /// the dependencies and their kinds by tests. Otherwise fmu-package lists the variables that
+    /// [`depends_on`](crate::Variable::depends_on) names for each unknown, and all knowns without
+    /// `depends_on`.
     pub smooth: bool,
 }
 
-/// The experiment an importer proposes to its user (section 2.2.5).
+/// Default experiment, which an importer proposes to its user (section 2.2.5).
 ///
 /// ```
 /// use fmu_export::DefaultExperiment;
@@ -51,7 +52,7 @@ pub struct DefaultExperiment {
 }
 
 impl DefaultExperiment {
-    /// A second in steps of a millisecond.
+    /// One second in steps of one millisecond.
     pub const DEFAULT: Self = Self { start_time: 0.0, stop_time: 1.0, step_size: 1e-3, tolerance: 1e-6 };
 }
 
@@ -62,7 +63,7 @@ impl Default for DefaultExperiment {
 }
 
 impl Info {
-    /// A model to be filled in.
+    /// Creates the data of a model; the remaining fields are empty.
     pub const fn new(name: &'static str, identifier: &'static str, guid: &'static str) -> Self {
         Self {
             name,
@@ -79,8 +80,9 @@ impl Info {
     }
 }
 
-/// The [`Info`] of a model of this name and identifier, with author, version and licence as in `Cargo.toml` and the
-/// guid that fmu-package passes to the compiler in the environment variable `FMU_GUID`: a hash of the model's sources.
+/// Creates the [`Info`] of a model with this name and identifier. Author, version and licence come from
+/// `Cargo.toml`. The guid comes from the environment variable `FMU_GUID`, in which fmu-package passes a hash
+/// of the model's sources to the compiler.
 ///
 /// Without that variable the guid is all zeros; fmu-package does not pack such a library.
 ///

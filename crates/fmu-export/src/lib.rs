@@ -1,12 +1,13 @@
 #![doc = include_str!("../README.md")]
 //!
-//! ## Inside
+//! ## Structure of the crate
 //!
-//! What an author writes: [`Model`] with a table of [`variables!`], the capabilities, [`export_fmu!`]. Below it, from
-//! the inside out: `instance` has what each call checks and does, free of pointers and of versions of FMI; `boundary`
-//! what C functions have in common; [`fmi2`] and [`fmi3`] the C functions of the standards, whose types and tables of
-//! allowed calls are in [`fmi_abi`]. All `unsafe` is in these three. [`describe`](describe()) is the library's description of its
-//! model, which the program reads that makes the FMU.
+//! An author writes a [`Model`] with a table of [`variables!`], implements capabilities and calls
+//! [`export_fmu!`]. `instance` contains the checks and effects of each call, without pointers and independent
+//! of the FMI version. `boundary` contains the code that the C functions share. [`fmi2`] and [`fmi3`] contain
+//! the C functions; [`fmi_abi`] contains their types and the tables of allowed calls. All `unsafe` code is in
+//! `boundary`, [`fmi2`] and [`fmi3`]. [`describe`](describe()) returns the library's description of its model
+//! for the program that makes the FMU.
 
 mod boundary;
 mod capabilities;

@@ -1,8 +1,8 @@
-//! Log messages, delivered so that every importer shows them as they are.
+//! Log messages that every importer shows unchanged.
 //!
-//! The callback is variadic and its message a `printf` format, but some importers never expand it and others look
-//! for `#r1#` in it. So the text is complete before it is handed over, free of `%` and of `#`, and there are no
-//! further arguments.
+//! The callback is variadic and its message is a `printf` format. Some importers never expand the format, and
+//! others look for `#r1#` in it. So each message is complete, contains neither `%` nor `#`, and is passed
+//! without further arguments.
 
 use crate::model::Model;
 use fmi_abi::{Category, Standard, Status};
@@ -15,7 +15,7 @@ const fn bit(category: Category) -> u8 {
     }
 }
 
-/// A message on its way to the importer.
+/// A message for the importer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
     pub status: Status,
@@ -27,7 +27,8 @@ impl Message {
         Category::of(self.status).name()
     }
 
-    /// The text on one line, without what `printf`, FMI (section 2.1.5) or C strings give a meaning to.
+    /// Returns the message on one line, without characters that `printf`, FMI (section 2.1.5) or C strings
+    /// interpret.
     pub fn printable(&self) -> CString {
         let special = |c: char| matches!(c, '%' | '#') || c.is_control();
         let safe: String = self.text.chars().map(|c| if special(c) { '_' } else { c }).collect();
@@ -35,8 +36,9 @@ impl Message {
     }
 }
 
-/// A model's messages to the user. A field of the model; [`Model::log`](crate::Model::log) hands it out, and what is
-/// in it is delivered at the end of the call, `%`, `#` and control characters as `_`: importers give them a meaning.
+/// Messages of a model to the user. The log is a field of the model, which [`Model::log`](crate::Model::log)
+/// returns. This crate delivers the messages at the end of the call. It replaces `%`, `#` and control
+/// characters by `_`, because importers interpret them.
 ///
 /// ```
 /// # let mut log = fmu_export::Log::default();
@@ -46,23 +48,23 @@ impl Message {
 pub struct Log(Vec<Message>);
 
 impl Log {
-    /// Says what happens, to who follows the course of the simulation (`logEvents`).
+    /// Logs an event of the simulation (`logEvents`).
     pub fn event(&mut self, text: impl Into<String>) {
         self.0.push(Message { status: Status::Ok, text: text.into() });
     }
 
-    /// Says that something is odd, while the simulation goes on (`logStatusWarning`).
+    /// Logs a warning; the simulation continues (`logStatusWarning`).
     pub fn warning(&mut self, text: impl Into<String>) {
         self.0.push(Message { status: Status::Warning, text: text.into() });
     }
 
-    /// Whether nothing is waiting.
+    /// Returns whether no message is waiting.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 }
 
-/// A copy of a model has nothing to say yet.
+/// A copy of a log is empty, so that no message is delivered twice.
 impl Clone for Log {
     fn clone(&self) -> Self {
         Self::default()
@@ -71,20 +73,21 @@ impl Clone for Log {
     fn clone_from(&mut self, _: &Self) {}
 }
 
-/// Decides which messages are shown, and keeps them until the call has ended.
+/// Filters messages by category and keeps them until the call ends.
 #[derive(Debug)]
 pub(crate) struct Logger {
     enabled: u8,
-    /// What is shown where nothing else is said.
+    /// Categories that are enabled by default.
     always: u8,
-    /// What nobody can switch off: errors in FMI 3.0 (section 2.3.1), nothing in FMI 2.0.
+    /// Categories that cannot be disabled: errors in FMI 3.0 (section 2.3.1), none in FMI 2.0.
     fixed: u8,
     waiting: Vec<Message>,
 }
 
 impl Logger {
-    /// Errors are always shown, the rest on demand (section 2.1.3 of FMI 2.0, 2.3.1 of FMI 3.0). Warnings are in FMI
-    /// 2.0 only; a discard there has other ways to tell its reason, in FMI 3.0 it is like an error for most importers.
+    /// Enables errors; the other categories on demand (section 2.1.3 of FMI 2.0, 2.3.1 of FMI 3.0). FMI 2.0
+    /// also enables warnings. FMI 3.0 also enables discards, because most importers treat a discard like an
+    /// error.
     pub fn new(standard: Standard, logging_on: bool) -> Self {
         let errors = bit(Category::Error) | bit(Category::Fatal);
         let (always, fixed) = match standard {
@@ -96,12 +99,12 @@ impl Logger {
         logger
     }
 
-    /// Without a list: everything, or what is always shown.
+    /// Enables all categories, or restores the default (a call without a list).
     pub fn set_all(&mut self, on: bool) {
         self.enabled = if on { bit(Category::All) } else { self.always };
     }
 
-    /// With a list: switches just these.
+    /// Enables or disables these categories (a call with a list).
     pub fn set(&mut self, categories: u8, on: bool) {
         if on {
             self.enabled |= categories;
@@ -110,7 +113,7 @@ impl Logger {
         }
     }
 
-    /// The bit of the category of this name.
+    /// Returns the bit of the category with this name.
     pub fn find(name: &[u8]) -> Option<u8> {
         let mut known = Category::ALL.iter();
         known.find(|category| category.name().to_bytes() == name).map(|category| bit(*category))
@@ -128,7 +131,7 @@ impl Logger {
         }
     }
 
-    /// Takes over what a model has to say. Returns whether it said anything.
+    /// Takes the messages of a model. Returns whether there were any.
     #[inline]
     pub fn listen(&mut self, model: &mut impl Model) -> bool {
         let Some(log) = model.log().filter(|log| !log.is_empty()) else { return false };

@@ -1,4 +1,5 @@
-//! What every model is: [`Model`]. What else it can do, it says by a [capability](crate::capabilities).
+//! The trait that every model implements, [`Model`]. Further abilities are
+//! [capabilities](crate::capabilities).
 
 use crate::info::Info;
 use crate::log::Log;
@@ -9,114 +10,117 @@ use std::path::PathBuf;
 
 /// A model that can be exported as an FMU.
 ///
-/// A model is a struct with the values of its inputs, parameters and states, a [table](crate::variables) that says
-/// which variable lives where, and equations. This crate does the rest: the C interface, the order of calls, the
-/// checks, the log, the saved states. A model needs no `unsafe` and no value references.
+/// A model is a struct with the values of its inputs, parameters and states, a [table](crate::variables) that
+/// maps variables to fields, and equations. This crate provides the C interface, the order of calls, the
+/// checks, the log and the saved states. A model needs no `unsafe` and no value references.
 ///
-/// What the model can do besides having values, it says by implementing a capability and naming it in
-/// [`export_fmu!`](crate::export_fmu): [`CoSimulation`](crate::CoSimulation), [`ModelExchange`](crate::ModelExchange),
+/// A model implements capabilities and names them in [`export_fmu!`](crate::export_fmu):
+/// [`CoSimulation`](crate::CoSimulation), [`ModelExchange`](crate::ModelExchange),
 /// [`Partials`](crate::Partials), [`InputDerivatives`](crate::InputDerivatives),
 /// [`OutputDerivatives`](crate::OutputDerivatives).
 ///
-/// A saved state is a clone of the model; instances and saved states go from thread to thread.
+/// A saved state is a clone of the model. Instances and saved states can move between threads.
 ///
-/// # What happens when
+/// # Calls of the importer and calls of the model
 ///
-/// | call of the importer | what the model sees |
+/// | call of the importer | effect on the model |
 /// |---|---|
 /// | instantiate, reset | [`new`](Self::new) |
-/// | set inputs, states, start values of outputs | the value in its place, and the `then` of the table; [`calculate_start`](Self::calculate_start) after each, until the model has stepped |
-/// | set parameters | the same on a copy, then [`update`](Self::update) once; the copy takes the model's place if that succeeds |
-/// | enter initialization | [`initialize`](Self::initialize) on a copy likewise; refused while a start value that was refused has not been set to another |
-/// | read | [`calculate`](Self::calculate), if anything was set or stepped since the last time; then the `by` of the table |
+/// | set inputs, states, start values of outputs | sets the field and runs the `then` of the table; then [`calculate_start`](Self::calculate_start), until the first step |
+/// | set parameters | as above on a copy, then [`update`](Self::update) once; the copy replaces the model if `update` succeeds |
+/// | enter initialization | [`initialize`](Self::initialize) on a copy, which replaces the model if it succeeds; an error while the last value set for some start value was rejected |
+/// | get | [`calculate`](Self::calculate), if a value was set or a step was done since the last time; then the `by` of the table |
 /// | step | [`CoSimulation::step_at_once`](crate::CoSimulation::step_at_once); [`step`](crate::CoSimulation::step) if that returns false |
 /// | event | [`ModelExchange::event`](crate::ModelExchange::event) |
 /// | enter Continuous-Time Mode | [`ModelExchange::continuous_time_entered`](crate::ModelExchange::continuous_time_entered) |
 /// | save, restore | `clone_from` |
-/// | de-serialize | on a copy, the values of the places and memory of the table; then [`restored`](Self::restored) and [`update`](Self::update) |
+/// | de-serialize | on a copy, sets the fields and the memory of the table; then [`restored`](Self::restored) and [`update`](Self::update) |
 pub trait Model: Variables + Clone + Send + Sync {
-    /// The facts about the model.
+    /// General data of the model.
     const INFO: Info;
 
-    /// The model with its start values: those of the description are read from what this makes.
+    /// Creates the model with its start values. The start values of the description are read from this model.
     ///
     /// # Errors
-    /// When it cannot be made; the importer gets no instance, and the message.
+    /// Fails if the model cannot be made. The importer then gets no instance, and the message.
     fn new(setup: &Setup) -> Result<Self, Error>;
 
-    /// Called after parameters have changed, once for all that one call of the importer changes, or because a state
-    /// was read from bytes: checks what concerns several values and prepares what depends on them. Ranges of single
-    /// parameters have been checked.
+    /// Checks conditions between several values and updates fields that depend on parameters. This crate
+    /// calls it once after each call of the importer that changes parameters, and after a de-serialization.
+    /// The ranges of single parameters have been checked before.
     ///
-    /// Many importers, FMPy among them, set one parameter a call: a pair of values that fits must be reached over pairs
-    /// that fit as well.
+    /// Many importers, for example FMPy, set one parameter per call. So there must be a path from one valid
+    /// pair of values to another over valid pairs.
     ///
-    /// Not called after inputs, states or start values of outputs have been set.
+    /// This crate does not call it after inputs, states or start values of outputs have been set.
     ///
     /// # Errors
-    /// When the values do not fit together. The change is then undone and the importer told.
+    /// Fails if the values are inconsistent. The change is then undone, and the importer gets the message.
     fn update(&mut self) -> Result<(), Error> {
         Ok(())
     }
 
-    /// Called after a state was read from bytes, before [`update`](Self::update): checks what the table's `memory` has
-    /// brought, which knows no ranges, and prepares what depends on it.
+    /// Checks the `memory` of the table after a de-serialization, and updates fields that depend on it. Only
+    /// the model knows the valid range of the memory. This crate then calls [`update`](Self::update).
     ///
     /// # Errors
-    /// When the model is never like that. The bytes are then refused.
+    /// Fails if the state is impossible for the model. The bytes are then rejected.
     fn restored(&mut self) -> Result<(), Error> {
         Ok(())
     }
 
-    /// Called after each value that is set, until the model has stepped or Continuous-Time Mode was entered: calculates the
-    /// states whose start is [`calculated`](crate::Variable::calculated). It is called as well if the importer has set
-    /// states, and until the next step after a state was read from bytes: the model remembers whether they still follow.
+    /// Calculates the states whose start is [`calculated`](crate::Variable::calculated). This crate calls it
+    /// after each value that is set, until the first step or Continuous-Time Mode. It is also called after
+    /// the importer has set states, and between a de-serialization and the next step. So the model must
+    /// remember whether the states are still calculated.
     #[inline]
     fn calculate_start(&mut self) {}
 
-    /// Called when the initialization begins, with all that was set before. More may be set until it ends.
+    /// Prepares the model for the start of the simulation, after the importer has entered Initialization
+    /// Mode. The importer may set further values before it leaves this mode.
     ///
     /// # Errors
-    /// When the model cannot start there. It is then as it was before.
+    /// Fails if the model cannot start with these values. The model is then unchanged.
     fn initialize(&mut self, _experiment: &Experiment) -> Result<(), Error> {
         Ok(())
     }
 
-    /// Calculates what several variables share, once after each change of values, state or time (s), before any of
-    /// them is read.
+    /// Calculates values that several variables share. This crate calls it once after each change of values,
+    /// state or time (s), before any of them is read.
     #[inline]
     fn calculate(&mut self, _time: f64) {}
 
-    /// The model's messages to the user, if it has any: a [`Log`] among its fields. What is in a log that this does
-    /// not hand out is never delivered.
+    /// Returns the log of the model, if it has one: a [`Log`] among its fields. Messages in any other log are
+    /// never delivered.
     #[inline]
     fn log(&mut self) -> Option<&mut Log> {
         None
     }
 }
 
-/// What a model is made for.
+/// Data with which a model is made.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// Who integrates.
+    /// Interface type: Co-Simulation or Model Exchange.
     pub interface: Interface,
-    /// The name of the instance.
+    /// Name of the instance.
     pub instance_name: String,
-    /// Where the FMU was unpacked, as the importer says it; see [`resources`](Self::resources).
+    /// Location of the resources, as the importer passes it; see [`resources`](Self::resources).
     pub resource_location: Option<String>,
 }
 
 impl Setup {
-    /// For a model outside of any importer, in tests.
+    /// Creates the setup for a model without an importer, for tests.
     pub fn new(interface: Interface) -> Self {
         Self { interface, instance_name: String::new(), resource_location: None }
     }
 
-    /// The folder `resources` of the unpacked FMU. `None` if the importer names none, or no file of this machine.
+    /// Returns the directory `resources` of the unpacked FMU. Returns `None` if the importer passes none, or
+    /// a location that is not a local file.
     ///
-    /// FMI 3.0 has a path here, FMI 2.0 a URI, which importers write as `file:/`, `file:///` or `file:////`, with
-    /// `localhost` or without, with `%20` for spaces or not, or as a path. Another host's folder is one on Windows
-    /// only.
+    /// FMI 3.0 passes a path. FMI 2.0 passes a URI, which importers write as `file:/`, `file:///` or
+    /// `file:////`, with or without `localhost`, with or without `%20` for spaces, or as a path. A directory
+    /// on another host is accepted only on Windows.
     pub fn resources(&self) -> Option<PathBuf> {
         resources(self.resource_location.as_deref()?, cfg!(windows))
     }
@@ -126,8 +130,8 @@ fn resources(location: &str, windows: bool) -> Option<PathBuf> {
     if location.trim().is_empty() {
         return None;
     }
-    // A path, which may have a colon anywhere: no scheme has a separator in it (section 3.1 of RFC 3986), or is as
-    // short as a drive.
+    // Otherwise it is a path, which may contain a colon anywhere. A scheme contains no separator (section 3.1
+    // of RFC 3986) and is longer than a drive letter.
     let is_scheme = |scheme: &str| scheme.len() > 1 && !scheme.contains(['/', '\\']);
     let Some((scheme, rest)) = location.split_once(':').filter(|(scheme, _)| is_scheme(scheme)) else {
         return Some(location.into());
@@ -138,7 +142,7 @@ fn resources(location: &str, windows: bool) -> Option<PathBuf> {
     let is_drive = |path: &str| matches!(path.as_bytes(), [letter, b':', ..] if letter.is_ascii_alphabetic());
     let rest = percent_decoded(rest);
     let (host, path) = match rest.strip_prefix("//") {
-        // file://C:/folder, which some write
+        // Some importers write file://C:/folder.
         Some(path) if is_drive(path) => ("", path),
         Some(rest) => rest.split_at(rest.find('/').unwrap_or(rest.len())),
         None => ("", rest.as_str()),
@@ -174,23 +178,23 @@ fn percent_decoded(text: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// What the importer says about the experiment (section 2.1.6).
+/// Data of the experiment from the importer (section 2.1.6).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Experiment {
     /// Start time, s.
     pub start_time: f64,
-    /// Stop time, s, if the importer knows it; no step goes beyond it.
+    /// Stop time, s, if the importer sets it; no step goes beyond it.
     pub stop_time: Option<f64>,
-    /// Relative tolerance, if the importer has one.
+    /// Relative tolerance, if the importer sets it.
     pub tolerance: Option<f64>,
 }
 
-/// Why a model cannot do what it was asked for, in a sentence that says what to do.
+/// Reason why a model cannot do a requested operation. The sentence names a remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error(String);
 
 impl Error {
-    /// An error with this message.
+    /// Creates an error with this message.
     pub fn new(message: impl Into<String>) -> Self {
         Self(message.into())
     }

@@ -1,34 +1,34 @@
-//! What a serialized state holds: [`Saved`] for every Rust type that a model may remember something in.
+//! Content of a serialized state: [`Saved`] for all Rust types in which a model may remember values.
 
 use std::collections::{BTreeMap, VecDeque};
 
-/// Sees every value of a model's state in turn; counts it, writes it or replaces it.
+/// Visitor of all values of a model's state; counts, writes or replaces them.
 pub trait StateVisitor {
-    /// A floating-point value, of any kind.
+    /// Visits a floating-point value of any type.
     fn real(&mut self, value: &mut f64);
-    /// A whole number.
+    /// Visits an integer.
     fn integer(&mut self, value: &mut i64);
-    /// A truth value.
+    /// Visits a Boolean.
     fn boolean(&mut self, value: &mut bool);
-    /// A text.
+    /// Visits a string.
     fn text(&mut self, value: &mut String);
-    /// How many elements follow, each of one byte at least. Reading more than there can be makes the state invalid, and
-    /// there are none.
+    /// Visits the number of elements that follow; each element has at least one byte. A length beyond the
+    /// remaining bytes makes the state invalid and becomes 0.
     fn length(&mut self, value: &mut usize);
-    /// What was read cannot be: the state is refused.
+    /// Marks the state as invalid; it is then rejected.
     fn invalid(&mut self);
-    /// Whether there may be more: not after what was read has been found invalid.
+    /// Returns whether more elements may follow: false once the state is invalid.
     fn goes_on(&self) -> bool {
         true
     }
 }
 
-/// A value that can be written into a serialized state and read back.
+/// A value that can be written to a serialized state and read back.
 ///
-/// Implemented for numbers, truth values, texts, and for options, boxes, tuples, arrays, vectors, queues and ordered maps of such;
-/// [`saved!`](crate::saved) implements it for a struct.
+/// Implemented for numbers, Booleans and strings, and for options, boxes, tuples, arrays, vectors, queues and
+/// ordered maps of them. [`saved!`](crate::saved) implements it for a struct.
 pub trait Saved {
-    /// Shows every value to the visitor, always in the same order: the same list serves to write and to read.
+    /// Passes every value to the visitor, always in the same order, for writing and for reading.
     fn visit(&mut self, visitor: &mut dyn StateVisitor);
 }
 
@@ -67,7 +67,7 @@ macro_rules! whole_numbers {
 
 whole_numbers!(i8 i16 i32 i64 isize u8 u16 u32);
 
-/// The same bits as an `i64`.
+/// Stored as the `i64` with the same bits.
 impl Saved for u64 {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut number = self.cast_signed();
@@ -76,7 +76,7 @@ impl Saved for u64 {
     }
 }
 
-/// What fits another machine only is refused there.
+/// A value beyond the range of this machine makes the state invalid.
 impl Saved for usize {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut number = *self as u64;
@@ -92,7 +92,7 @@ impl Saved for f32 {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut number = f64::from(*self);
         visitor.real(&mut number);
-        // What is no `f32` has not been written by one.
+        // A number that is not representable as `f32` was not written from one.
         match number as f32 {
             read if f64::from(read) == number || number.is_nan() => *self = read,
             _ => visitor.invalid(),
@@ -128,7 +128,7 @@ impl<T: Saved + Default> Saved for Option<T> {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut present = self.is_some();
         visitor.boolean(&mut present);
-        // A value that is missing takes its place all the same: the length of a state does not vary.
+        // A missing value is written as a default value, so that the length of a state is constant.
         let mut value = self.take().unwrap_or_default();
         value.visit(visitor);
         *self = present.then_some(value);
@@ -141,7 +141,7 @@ impl<T: Saved + Default> Saved for Vec<T> {
         visitor.length(&mut length);
         self.truncate(length);
         self.iter_mut().for_each(|value| value.visit(visitor));
-        // Hostile bytes may claim any length: an element is made when those before it were there.
+        // Malformed bytes may claim any length, so an element is made only after the previous ones were read.
         while self.len() < length && visitor.goes_on() {
             let mut value = T::default();
             value.visit(visitor);
@@ -162,7 +162,7 @@ impl<K: Saved + Default + Ord, V: Saved + Default> Saved for BTreeMap<K, V> {
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut entries: Vec<(K, V)> = std::mem::take(self).into_iter().collect();
         entries.visit(visitor);
-        // No map was written in another order.
+        // Maps are written in ascending order of keys.
         if !entries.is_sorted_by(|(one, _), (next, _)| one < next) {
             visitor.invalid();
         }
@@ -170,8 +170,8 @@ impl<K: Saved + Default + Ord, V: Saved + Default> Saved for BTreeMap<K, V> {
     }
 }
 
-/// Defines a struct all of whose fields belong to a serialized state; or says that of one that is defined elsewhere,
-/// where the compiler sees to it that no field is missing.
+/// Defines a struct whose fields all belong to a serialized state. With `for`, implements
+/// [`Saved`](crate::Saved) for an existing struct; the compiler checks that no field is missing.
 ///
 /// ```
 /// fmu_export::saved! {

@@ -1,9 +1,10 @@
-//! Where a variable may be set: what the standard says, and apart from it what is tolerated because importers do it.
+//! Modes in which a variable may be set: those that the standard allows, and those tolerated for existing
+//! importers.
 
 use fmi_abi::{Causality, Initial, Variability};
 use fmi_abi::{Situations, Standard};
 
-/// Where an importer may set a variable, in both standards, with what is tolerated.
+/// Returns the modes in which an importer may set a variable, in both FMI versions, including tolerated ones.
 pub(crate) const fn settable(
     causality: Causality,
     variability: Variability,
@@ -19,9 +20,9 @@ pub(crate) const fn settable(
     of_both.union(in_event_mode(causality, variability, state, reinit))
 }
 
-/// Footnotes 1, 3, 4, 5 and 6 of the tables in sections 3.2.3 and 4.2.4 of FMI 2.0; the states of FMI 3.0 (sections
-/// 2.3.2, 2.3.3, 2.3.5, 3.2.1 and 4.2.1) say the same. Inputs before the initialization are of FMI 3.0, see
-/// [`tolerated`].
+/// Returns the modes of the tables in sections 3.2.3 and 4.2.4 of FMI 2.0, footnotes 1, 3, 4, 5 and 6.
+/// Sections 2.3.2, 2.3.3, 2.3.5, 3.2.1 and 4.2.1 of FMI 3.0 give equal rules. FMI 3.0 also allows inputs
+/// before the initialization; see [`tolerated`].
 const fn in_both(
     standard: Standard,
     causality: Causality,
@@ -51,7 +52,8 @@ const fn in_both(
     set
 }
 
-/// What only FMI 3.0 has (section 2.3.5): the Event Mode of Co-Simulation, and states that events leave alone.
+/// Returns the modes that exist only in FMI 3.0 (section 2.3.5): Event Mode of Co-Simulation, and Event Mode
+/// for states without `reinit`.
 const fn in_event_mode(
     causality: Causality,
     variability: Variability,
@@ -66,8 +68,9 @@ const fn in_event_mode(
     }
 }
 
-/// Inputs before the initialization (OpenModelica, libcosim; FMI 3.0 allows it, section 2.3.2), parameters after it
-/// (OpenModelica, and users who tune), Real ones also between two evaluations (CasADi).
+/// Returns the tolerated modes. Inputs before the initialization: OpenModelica and libcosim; FMI 3.0 allows
+/// it (section 2.3.2). Parameters after the initialization: OpenModelica, and users who tune. Real parameters
+/// between two evaluations: CasADi.
 const fn tolerated(standard: Standard, causality: Causality, real: bool) -> Situations {
     match causality {
         Causality::Input => Situations::new(standard, "I", "I"),
@@ -76,10 +79,10 @@ const fn tolerated(standard: Standard, causality: Causality, real: bool) -> Situ
     }
 }
 
-/// Where start values are set.
+/// Modes in which start values are set.
 pub(crate) const STARTING: Situations =
     Situations::new(Standard::Fmi2, "IN", "IN").union(Situations::new(Standard::Fmi3, "IN", "IN"));
 
-/// The modes that instances can be in, short of fatal.
+/// All modes of instances except fatal.
 pub(crate) const POSSIBLE: Situations = Situations::new(Standard::Fmi2, "INCFTE", "INMKTE")
     .union(Situations::new(Standard::Fmi3, "INCMT", "INMKT"));

@@ -1,6 +1,7 @@
-//! The C functions of both standards: what every call has in common around their bodies, and the symbols of a library.
+//! The C functions of both FMI versions: the code that all calls share, and the symbols of a library.
 
-/// The C functions of a standard, generic over the model and under their C names, and pointers to all of them.
+/// Defines the C functions of an FMI version, generic over the model and under their C names, and a table of
+/// pointers to them.
 macro_rules! c_functions {
     (
         $standard:ident $handle:ident
@@ -16,13 +17,14 @@ macro_rules! c_functions {
                 c: $handle
                 $(, $argument: $type)*
             ) -> fmi_abi::c_types::c_int {
-                // SAFETY: the importer keeps the contract of this module, for the instance and all arguments.
+                // SAFETY: the importer guarantees the contract of this module for the instance and all
+                // arguments.
                 let status = unsafe { $crate::boundary::short::call!($function(c $(, $argument: $type)*)) };
                 status as _
             }
         )+
 
-        /// The functions of a model in this program, as an importer has those of a library.
+        /// Returns the functions of a model in this program, as an importer loads them from a library.
         pub fn functions<M: $crate::Exported>() -> Functions {
             Functions { $($free: $free::<M>,)+ $($function: $function::<M>,)+ }
         }
@@ -30,13 +32,14 @@ macro_rules! c_functions {
 }
 pub(crate) use c_functions;
 
-/// The symbols of the library for a model: the functions of both standards, and one that describes the model to the program
-/// that makes its FMU.
+/// Defines the symbols of the library for a model: the functions of both FMI versions, and the function that
+/// describes the model to fmu-package.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! symbols {
     ($model:ty) => {
-        // All that the modules below know of the author's crate, where anything may be called like FMI's types.
+        // The modules below use only this item of the author's crate, because other items there may have
+        // names of FMI types.
         #[doc(hidden)]
         #[allow(non_camel_case_types)]
         type __fmu_model = $model;
@@ -65,12 +68,12 @@ macro_rules! symbols {
                 function: fmi2String,
                 reason: fmi2String,
             ) -> fmi2Status {
-                // SAFETY: the C around the module keeps the contract of this function.
+                // SAFETY: the C code around the module guarantees the contract of this function.
                 unsafe { $crate::fmi2::broken::<__fmu_model>(c, function, reason) as _ }
             }
         }
 
-        /// The C functions of FMI 3.0. C sources are made of FMI 2.0 alone.
+        /// The C functions of FMI 3.0. C sources contain only FMI 2.0.
         #[doc(hidden)]
         #[cfg(not(target_family = "wasm"))]
         #[allow(unsafe_code, non_snake_case, missing_docs, clippy::missing_safety_doc)]
@@ -86,7 +89,7 @@ macro_rules! symbols {
                 receive: $crate::Receive,
                 context: *mut ::core::ffi::c_void,
             ) {
-                // SAFETY: the caller keeps the contract of this function.
+                // SAFETY: the caller guarantees the contract of this function.
                 unsafe { $crate::pass_description::<__fmu_model>(receive, context) }
             }
         }
@@ -102,14 +105,14 @@ macro_rules! symbols {
         $(
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn $free($($free_argument: $free_type),*) -> $result {
-                // SAFETY: the importer keeps the contract of the standard's module in fmu_export.
+                // SAFETY: the importer guarantees the contract of the FMI version's module in fmu_export.
                 unsafe { $crate::$module::$free::<$model>($($free_argument),*) }
             }
         )+
         $(
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn $function(c: $handle $(, $argument: $type)*) -> ::core::ffi::c_int {
-                // SAFETY: see above.
+                // SAFETY: the importer guarantees the contract, as above.
                 unsafe { $crate::$module::$function::<$model>(c $(, $argument)*) }
             }
         )+

@@ -1,43 +1,44 @@
-//! The table of variables: [`variables!`](crate::variables) and what it makes.
+//! The table of variables: [`variables!`](crate::variables) and the code that it generates.
 
 use crate::saved::StateVisitor;
 use crate::variable::{Index, Variable, refuse};
 use std::fmt::Debug;
 
-/// The variables of a model. Implemented by [`variables!`](crate::variables).
+/// The variables of a model. [`variables!`](crate::variables) implements it.
 ///
 /// # Safety
-/// Each offset that a function returns is that of a valid value of its type in this model, as it is now, or what the
-/// function was given for a line without one.
+/// Each offset that a function returns is the offset of a valid value of its type in this model in its
+/// current state. For a line without an offset, the function returns the argument for that case.
 pub unsafe trait Variables: Sized + 'static {
-    /// The names of the lines.
+    /// Names of the lines of the table.
     type Name: Copy + PartialEq + Debug + 'static;
 
     /// The variables, one for each line.
     #[doc(hidden)]
     const LINES: &'static [Variable<Self>];
 
-    /// The variables, of an array each element; a variable's place in this list is its value reference in FMI 2.0.
+    /// The variables, with one entry for each element of an array. The index in this list is the value
+    /// reference in FMI 2.0.
     const TABLE: &'static [Variable<Self>];
 
-    /// Their names, in the same order; the elements of an array have the same.
+    /// Names of the variables, in the order of `TABLE`; all elements of an array have the same name.
     const NAMES: &'static [Self::Name];
 
-    /// Places of the states and of their derivatives in the table, by the place of the state.
+    /// Indices of the states and of their derivatives in the table, sorted by the index of the state.
     #[doc(hidden)]
     const STATES: &'static [StateOfTable];
 
-    /// Whether there is an array among the variables.
+    /// Whether any variable is an array.
     #[doc(hidden)]
     const ARRAYS: bool = has_arrays(Self::LINES);
 
-    /// The place in the table of a variable, of an array that of its first element.
+    /// Returns the index of a variable in the table; for an array, the index of its first element.
     fn place(name: Self::Name) -> usize {
         let place = Self::NAMES.iter().position(|known| *known == name);
         place.expect("the table has a variable for each name")
     }
 
-    /// The name of the variable at a place of the table, and which element of it that is.
+    /// Returns the name of the variable at an index of the table, and the number of the element.
     #[doc(hidden)]
     #[inline]
     fn element(place: u32) -> (Self::Name, usize) {
@@ -45,20 +46,22 @@ pub unsafe trait Variables: Sized + 'static {
         (Self::NAMES[place as usize], number)
     }
 
-    /// The offset of the `f64` that is the value of a line, if it is simply read.
+    /// Returns the offset of the `f64` that holds the value of a line, or `without` if reading needs a
+    /// calculation.
     #[doc(hidden)]
     fn offset_to_read(&self, line: Index, without: usize) -> usize;
 
-    /// The offset of the `f64` that a line is set in and, in the upper half, that of the `bool` that becomes true then, or
-    /// `no_mark`; if it is not simply set, `without`.
+    /// Returns the offset of the `f64` that setting a line writes to. The upper half holds the offset of the
+    /// `bool` that becomes true then, or `no_mark`. Returns `without` if setting a line needs a function
+    /// call.
     #[doc(hidden)]
     fn offsets_to_set(&mut self, line: Index, no_mark: usize, without: u64) -> u64;
 
-    /// Shows what the model remembers besides its variables.
+    /// Visits the memory of the model: the values that are not variables.
     #[doc(hidden)]
     fn visit_memory(&mut self, visitor: &mut dyn StateVisitor);
 
-    /// Shows all that a serialized state holds of the model.
+    /// Visits all values of a serialized state.
     #[doc(hidden)]
     fn visit_state(&mut self, visitor: &mut dyn StateVisitor) {
         for variable in Self::TABLE {
@@ -91,7 +94,7 @@ const fn is_array<M>(variable: &Variable<M>) -> bool {
     !variable.dimensions().is_empty()
 }
 
-/// The number of variables before a line.
+/// Returns the number of variables before a line.
 const fn place_of<M>(lines: &[Variable<M>], line: usize) -> usize {
     let (mut place, mut before) = (0, 0);
     while before < line {
@@ -101,13 +104,13 @@ const fn place_of<M>(lines: &[Variable<M>], line: usize) -> usize {
     place
 }
 
-/// The number of variables that lines have, each element of an array being one.
+/// Returns the number of variables of the lines; each element of an array counts.
 #[doc(hidden)]
 pub const fn count_elements<M>(lines: &[Variable<M>]) -> usize {
     place_of(lines, lines.len())
 }
 
-/// The number of bytes of the names of all elements of arrays.
+/// Returns the total length in bytes of the names of all array elements.
 #[doc(hidden)]
 pub const fn count_letters<M>(lines: &[Variable<M>]) -> usize {
     let (mut count, mut line) = (0, 0);
@@ -122,7 +125,7 @@ pub const fn count_letters<M>(lines: &[Variable<M>]) -> usize {
     count
 }
 
-/// The names of all elements of arrays, which have this many bytes.
+/// Returns the names of all array elements, concatenated.
 #[doc(hidden)]
 pub const fn write_names<M, const LETTERS: usize>(lines: &[Variable<M>]) -> [u8; LETTERS] {
     let mut letters = [0; LETTERS];
@@ -144,8 +147,8 @@ pub const fn write_names<M, const LETTERS: usize>(lines: &[Variable<M>]) -> [u8;
     letters
 }
 
-/// The name of an array with the indices of an element, which count from 1 (section 2.2.9 of FMI 2.0): they belong to the
-/// variable, as in `der(T[3])`.
+/// The name of an array element: the name of the array with indices that count from 1 (section 2.2.9 of FMI
+/// 2.0). Indices follow the variable, as in `der(T[3])`.
 struct NameOfElement {
     letters: [u8; 300],
     length: usize,
@@ -192,7 +195,7 @@ impl NameOfElement {
     }
 }
 
-/// The table of variables, with their names from the letters of [`write_names`].
+/// Returns the table of variables; the names of array elements are slices of the result of [`write_names`].
 #[doc(hidden)]
 pub const fn spread<M, const COUNT: usize>(
     lines: &[Variable<M>],
@@ -230,7 +233,7 @@ pub const fn spread<M, const COUNT: usize>(
     table
 }
 
-/// The names of the lines, each as often as it has elements.
+/// Returns the names of the lines, each repeated once per element.
 #[doc(hidden)]
 pub const fn spread_names<M, N: Copy, const COUNT: usize>(lines: &[Variable<M>], names: &[N]) -> [N; COUNT] {
     let mut spread = [names[0]; COUNT];
@@ -247,7 +250,7 @@ pub const fn spread_names<M, N: Copy, const COUNT: usize>(lines: &[Variable<M>],
     spread
 }
 
-/// The number of states in a table.
+/// Returns the number of states in a table.
 #[doc(hidden)]
 pub const fn count_states<M>(table: &[Variable<M>]) -> usize {
     let (mut count, mut place) = (0, 0);
@@ -258,13 +261,13 @@ pub const fn count_states<M>(table: &[Variable<M>]) -> usize {
     count
 }
 
-/// The states in a table, of which there are `N`.
+/// Returns the `N` states in a table.
 #[doc(hidden)]
 pub const fn find_states<M, const N: usize>(table: &[Variable<M>]) -> [StateOfTable; N] {
     let mut states = [StateOfTable { state: 0, derivative: 0 }; N];
     let (mut found, mut place) = (0, 0);
     while place < table.len() {
-        // A line without is refused.
+        // `check_line` rejects a state without derivative.
         if table[place].is_state()
             && let Some(derivative) = derivative(table, place as u32)
         {
@@ -287,7 +290,7 @@ const fn derivative<M>(table: &[Variable<M>], state: u32) -> Option<u32> {
     None
 }
 
-/// Refuses a line that cannot be, at the place in the author's file where this is called.
+/// Rejects an invalid line. The error points at the line in the author's file.
 #[doc(hidden)]
 #[track_caller]
 pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
@@ -295,7 +298,7 @@ pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
     if let Some(fault) = of.fault() {
         refuse(of.name(), fault);
     }
-    // Section 2.2.7. The compiler sees to the names of the items, not to those that are texts.
+    // Section 2.2.7. The compiler checks only names that are identifiers, not names that are strings.
     let mut other = 0;
     while other < lines.len() {
         if other < line as usize && has_name(of, &lines[other]) || is_element(of, &lines[other]) {
@@ -320,7 +323,7 @@ const fn has_name<M>(one: &Variable<M>, other: &Variable<M>) -> bool {
     is_equal(one.name().as_bytes(), other.name().as_bytes())
 }
 
-/// Whether a variable is called like an element of an array.
+/// Returns whether a variable has the name of an element of the array.
 const fn is_element<M>(one: &Variable<M>, array: &Variable<M>) -> bool {
     let name = one.name().as_bytes();
     let (mut place, mut has_index) = (0, false);
@@ -347,7 +350,8 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
     place == one.len() && place == other.len()
 }
 
-/// Writes a model's table of variables: what each variable is, and where its value lives or how it is calculated.
+/// Defines a model's table of variables: the kind of each variable, and the field or calculation of its
+/// value.
 ///
 /// ```text
 /// variables! { for Model, names Name, memory in PLACE, ...;  // both if you like, and there is any
@@ -362,26 +366,30 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// ```
 ///
 /// A kind is a function of [`Variable`]: `input`, `output`, `local`, `parameter`, `calculated_parameter`,
-/// `independent`; a refinement is one of its methods, where other variables are named by their names here. A place
-/// is a path of fields, such as `motors[0].theta`. Start values are those of the model that
-/// [`Model::new`](crate::Model::new) makes.
+/// `independent`. A refinement is one of its methods; its arguments name other variables by their names in
+/// the table. A PLACE is a path of fields, such as `motors[0].theta`. Start values are those of the model
+/// that [`Model::new`](crate::Model::new) makes.
 ///
-/// The fastest place of a Real is an `f64` in a path of fields and elements of arrays, without a block after `then`: it is
-/// read and set without a call. A path through a `Box`, a `Vec` or an `Index` takes a call.
+/// Both `names` and `memory` are optional. Access to a Real needs no function call if its place is an `f64`
+/// in a path of fields and array elements, without a block after `then`. A path through a `Box`, a `Vec` or
+/// an `Index` needs a call.
 ///
-/// A value that is an array, in a place or calculated, makes the line an array: `[f64; 8]`, or `[[f64; 2]; 3]` as a matrix,
-/// row by row. FMI 3.0 has one variable for it, FMI 2.0 a scalar for each element, `T[1]` to `T[8]`; a start value, a range and
-/// a refusal are those of an element. `then` follows the setting of each element; `by` gives the whole array, which is calculated
-/// once for elements that are read together. The derivative of an array is an array of the same length, and whoever depends on
-/// an array depends on all of its elements. With arrays, the names of all variables must be those of the structured naming convention
-/// (section 2.2.9 of FMI 2.0): as in Modelica, for example `motor.current`, `axes[1].angle`, `'any text'`.
+/// If the value is an array, in a place or calculated, the line is an array: `[f64; 8]`, or `[[f64; 2]; 3]`
+/// as a matrix, row by row. FMI 3.0 has one variable for an array. FMI 2.0 has a scalar for each element,
+/// `T[1]` to `T[8]`. Start values, ranges and errors refer to elements. `then` follows the setting of each
+/// element. `by` returns the whole array, which is calculated once for elements that are read together. The
+/// derivative of an array is an array of the same length. A variable that depends on an array depends on all
+/// its elements. With arrays, all names must follow the structured naming convention (section 2.2.9 of FMI
+/// 2.0), for example `motor.current`, `axes[1].angle`, `'any text'`.
 ///
-/// What lives in a place and all that is in the `memory` belongs to a serialized state; see [`Saved`](crate::Saved). What
-/// `initialize`, a step or an event changes must be there; `build_fmu` of fmu-package refuses models where something is missing.
+/// A serialized state contains all places and the `memory`; see [`Saved`](crate::Saved). It must contain all
+/// values that `initialize`, a step or an event changes. `build_fmu` of fmu-package rejects models in which a
+/// value is missing.
 ///
-/// The macro implements [`Variables`] for the model and defines an enum with the names of the lines, for
-/// [`Partials`](crate::Partials) and its like: `Name`, or what stands behind `names`, as where a module has two models or a `Name`
-/// of its own. [`Variables::place`] tells where in the table a name is.
+/// The macro implements [`Variables`] for the model. It also defines an enum with the names of the lines, for
+/// [`Partials`](crate::Partials) and other capabilities. The enum is called `Name`, or as given after
+/// `names`, for example if a module has two models. [`Variables::place`] returns the index of a name in the
+/// table.
 ///
 /// ```
 /// use fmu_export::{NUMBER, variables};
@@ -429,7 +437,8 @@ macro_rules! variables {
         const _: () = {
             #[allow(non_upper_case_globals, non_camel_case_types, unused)]
             mod index {
-                // Not `Name`: a module cannot see the items of a function, where the macro may stand.
+                // Not called `Name`: a module cannot use items of a function, and the macro may be called in
+                // a function.
                 #[repr(u32)]
                 enum Place { $( $name ),+ }
 
@@ -437,8 +446,8 @@ macro_rules! variables {
             }
 
             $(
-                // A function called like the kind, so that the compiler points at the author's line: tokens keep their place in
-                // the author's file where a macro uses them first.
+                // A function with the name of the kind makes the compiler point at the author's line. Tokens
+                // keep their position in the author's file at their first use in a macro.
                 #[allow(long_running_const_eval, clippy::needless_borrows_for_generic_args)]
                 const _: () = {
                     #[track_caller]
@@ -449,7 +458,7 @@ macro_rules! variables {
                 };
             )+
 
-            // SAFETY: the offsets are those of references to the model's places, made just then.
+            // SAFETY: the offsets are computed from references to the model's fields at the time of the call.
             unsafe impl $crate::Variables for $model {
                 type Name = $crate::variables!(@name $($names)?);
 
@@ -633,8 +642,8 @@ macro_rules! variables {
     };
     (@names [] $($variants:tt)+) => { $crate::variables! { @names [Name] $($variants)+ } };
     (@names [$names:ident] $($variants:tt)+) => {
-        /// The names of the variables: what stands at the begin of each line of `variables!`, which defines them. `names` says
-        /// there what this is called.
+        /// Names of the variables: the identifiers at the start of the lines of `variables!`, which defines
+        /// this enum. `names` in `variables!` sets the name of the enum.
         #[allow(non_camel_case_types)]
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u32)]

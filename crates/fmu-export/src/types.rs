@@ -1,9 +1,9 @@
-//! Types of variables: what kind of value, in which unit, in which range.
+//! Types of variables: base type, unit and range.
 
 use crate::units::{self, Unit};
 use fmi_abi::BaseType;
 
-/// The whole number, if this kind has it; an error when compiling otherwise.
+/// Returns the integer if the base type can represent it; otherwise compilation fails.
 const fn has(base: BaseType, number: i128) -> i128 {
     match base.range() {
         Some((min, max)) if min <= number && number <= max => number,
@@ -11,14 +11,14 @@ const fn has(base: BaseType, number: i128) -> i128 {
     }
 }
 
-/// One value of an enumeration.
+/// One item of an enumeration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Item {
-    /// Its name.
+    /// Name of the item.
     pub name: &'static str,
-    /// The number that stands for it at the interface.
+    /// Number of the item at the FMI interface.
     pub value: i32,
-    /// One sentence for the user.
+    /// Description in one sentence.
     pub description: &'static str,
 }
 
@@ -32,103 +32,103 @@ pub struct Item {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Type {
-    /// Name, unlike any variable's; empty for a type that needs no definition.
+    /// Name, different from the names of all variables; empty for a type without definition.
     pub name: &'static str,
-    /// What it says of its values.
+    /// Attributes other than the name.
     pub attributes: Attributes,
-    /// What kind of value.
+    /// FMI base type.
     pub base: BaseType,
 }
 
-/// What a type says besides its name.
+/// Attributes of a type other than its name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Attributes {
-    /// Of a floating-point number.
+    /// Attributes of a floating-point type.
     Real {
-        /// As in ISO 80000, for example `Angle`.
+        /// Quantity as in ISO 80000, for example `Angle`.
         quantity: &'static str,
         /// Unit of the values at the interface.
         unit: &'static Unit,
-        /// Smallest value; enforced for parameters, a hint for the rest.
+        /// Smallest value; enforced for parameters, a hint for all other variables.
         min: Option<f64>,
-        /// Largest value; enforced for parameters, a hint for the rest.
+        /// Largest value; enforced for parameters, a hint for all other variables.
         max: Option<f64>,
-        /// The order of magnitude of the values, for the scaling of solvers.
+        /// Order of magnitude of the values, for the scaling of solvers.
         nominal: Option<f64>,
     },
-    /// Of a whole number, with its range, enforced for parameters.
+    /// Range of an integer type, enforced for parameters.
     Integer {
-        /// Smallest value; that of the kind of number if nothing else is said.
+        /// Smallest value; by default the smallest of the base type.
         min: i128,
-        /// Largest value; that of the kind of number if nothing else is said.
+        /// Largest value; by default the largest of the base type.
         max: i128,
     },
-    /// Of a truth value.
+    /// Attributes of a Boolean type; there are none.
     Boolean,
-    /// Of a text.
+    /// Attributes of a string type; there are none.
     String,
-    /// Of bytes.
+    /// Attributes of a binary type.
     Binary {
-        /// What they are, for example `image/png`.
+        /// Kind of data, for example `image/png`.
         mime_type: &'static str,
-        /// The largest number of them, enforced for all that importers set.
+        /// Largest number of bytes, enforced for all values that importers set.
         max_size: usize,
     },
-    /// Of one of these.
+    /// Items of an enumeration type.
     Enumeration(&'static [Item]),
 }
 
-/// A number without unit.
+/// A dimensionless number.
 pub const NUMBER: Type = Type::real("Number", &units::ONE);
 /// A time in s.
 pub const TIME: Type = Type::real("Time", &units::S);
-/// A whole number of any size.
+/// An integer without further limits.
 pub const INTEGER: Type = Type::integer("");
-/// A truth value.
+/// A Boolean.
 pub const BOOLEAN: Type = Type { name: "", attributes: Attributes::Boolean, base: BaseType::Boolean };
-/// A text.
+/// A string.
 pub const STRING: Type = Type { name: "", attributes: Attributes::String, base: BaseType::String };
 /// Bytes of any meaning.
 pub const BINARY: Type = Type::binary("", "application/octet-stream");
 
 impl Type {
-    /// A physical quantity of this name in this unit, without range and nominal value; [`quantity`](Self::quantity) gives it another
-    /// name than the type.
+    /// Creates the type of a physical quantity of this name in this unit, without range and nominal value.
+    /// [`quantity`](Self::quantity) sets a quantity that differs from the name of the type.
     pub const fn real(name: &'static str, unit: &'static Unit) -> Self {
         let attributes = Attributes::Real { quantity: name, unit, min: None, max: None, nominal: None };
         Self { name, attributes, base: BaseType::Real }
     }
 
-    /// The same in single precision.
+    /// Creates the type of a physical quantity in single precision; see [`real`](Self::real).
     pub const fn float32(name: &'static str, unit: &'static Unit) -> Self {
         Self { base: BaseType::Float32, ..Self::real(name, unit) }
     }
 
-    /// A whole number.
+    /// Creates an integer type.
     pub const fn integer(name: &'static str) -> Self {
         Self::whole(name, BaseType::Integer)
     }
 
-    /// A whole number of a kind, such as [`BaseType::UInt16`].
+    /// Creates an integer type of a certain base type, such as [`BaseType::UInt16`].
     #[track_caller]
     pub const fn whole(name: &'static str, base: BaseType) -> Self {
         let Some((min, max)) = base.range() else { panic!("this kind of value is no whole number") };
         Self { name, attributes: Attributes::Integer { min, max }, base }
     }
 
-    /// Bytes of a MIME type, at most a mebibyte of them.
+    /// Creates a binary type with a MIME type and at most 1 MiB.
     pub const fn binary(name: &'static str, mime_type: &'static str) -> Self {
         let attributes = Attributes::Binary { mime_type, max_size: 1 << 20 };
         Self { name, attributes, base: BaseType::Binary }
     }
 
-    /// One of a list of names. [`enumeration!`](crate::enumeration) makes the list.
+    /// Creates an enumeration type. [`enumeration!`](crate::enumeration) generates the list of items.
     pub const fn enumeration(name: &'static str, items: &'static [Item]) -> Self {
         Self { name, attributes: Attributes::Enumeration(items), base: BaseType::Enumeration }
     }
 
-    /// With the quantity that it is of, for a Real, where that is not its name: `Velocity` for a type `Speed`.
+    /// Sets the quantity of a Real type if it differs from the name: `Velocity` for a type `Speed`.
     #[must_use]
     #[track_caller]
     pub const fn quantity(mut self, name: &'static str) -> Self {
@@ -137,7 +137,7 @@ impl Type {
         self
     }
 
-    /// With a smallest value, for a Real.
+    /// Sets the smallest value of a Real type.
     #[must_use]
     #[track_caller]
     pub const fn min(mut self, smallest: f64) -> Self {
@@ -148,7 +148,7 @@ impl Type {
         self
     }
 
-    /// With a largest value, for a Real.
+    /// Sets the largest value of a Real type.
     #[must_use]
     #[track_caller]
     pub const fn max(mut self, largest: f64) -> Self {
@@ -159,7 +159,7 @@ impl Type {
         self
     }
 
-    /// With an order of magnitude, for a Real.
+    /// Sets the nominal value of a Real type.
     #[must_use]
     #[track_caller]
     pub const fn nominal(mut self, magnitude: f64) -> Self {
@@ -168,7 +168,7 @@ impl Type {
         self
     }
 
-    /// With a smallest value, for a whole number.
+    /// Sets the smallest value of an integer type.
     #[must_use]
     #[track_caller]
     pub const fn min_integer(mut self, smallest: i128) -> Self {
@@ -180,7 +180,7 @@ impl Type {
         self
     }
 
-    /// With a largest value, for a whole number.
+    /// Sets the largest value of an integer type.
     #[must_use]
     #[track_caller]
     pub const fn max_integer(mut self, largest: i128) -> Self {
@@ -192,7 +192,7 @@ impl Type {
         self
     }
 
-    /// With a largest number of bytes, at most a mebibyte.
+    /// Sets the largest number of bytes, at most 1 MiB.
     #[must_use]
     #[track_caller]
     pub const fn max_size(mut self, largest: usize) -> Self {
@@ -204,12 +204,12 @@ impl Type {
         self
     }
 
-    /// The kind of value.
+    /// Returns the base type.
     pub const fn base(&self) -> BaseType {
         self.base
     }
 
-    /// The nominal value of a Real, 1 if nothing else is said.
+    /// Returns the nominal value of a Real type; 1 by default.
     pub const fn nominal_or_one(&self) -> f64 {
         match self.attributes {
             Attributes::Real { nominal: Some(nominal), .. } => nominal,

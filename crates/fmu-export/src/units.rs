@@ -1,5 +1,5 @@
-//! Units (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0); those of mechanics ready to use in a [`Type`](crate::Type).
-//! People see angles in degrees.
+//! Units (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0), and constants for mechanics, ready to use in a
+//! [`Type`](crate::Type). The display unit of angles is the degree.
 
 use std::f64::consts::PI;
 
@@ -16,9 +16,9 @@ use std::f64::consts::PI;
 pub struct Unit {
     /// Name, for example `N.m/rad`.
     pub name: &'static str,
-    /// What it is in base units.
+    /// Definition in base units.
     pub base: BaseUnit,
-    /// The unit that people prefer.
+    /// Unit in which tools show the values.
     pub display: Option<DisplayUnit>,
 }
 
@@ -42,20 +42,20 @@ pub struct BaseUnit {
     pub cd: i32,
     /// Exponent of the radian.
     pub rad: i32,
-    /// Multiplies a value in the unit.
+    /// Factor by which a value in the unit is multiplied.
     pub factor: f64,
-    /// Is added then.
+    /// Offset that is added after the multiplication.
     pub offset: f64,
 }
 
-/// A unit to show values in: the value shown is `factor * value + offset`.
+/// A display unit: the displayed value is `factor * value + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DisplayUnit {
     /// Name, for example `deg`.
     pub name: &'static str,
-    /// Multiplies the value.
+    /// Factor by which the value is multiplied.
     pub factor: f64,
-    /// Is added then.
+    /// Offset that is added after the multiplication.
     pub offset: f64,
 }
 
@@ -75,7 +75,7 @@ macro_rules! exponents {
 }
 
 impl Unit {
-    /// A unit of this name, so far the number 1.
+    /// Creates a dimensionless unit of this name.
     pub const fn new(name: &'static str) -> Self {
         let base =
             BaseUnit { kg: 0, m: 0, s: 0, A: 0, K: 0, mol: 0, cd: 0, rad: 0, factor: 1.0, offset: 0.0 };
@@ -84,21 +84,21 @@ impl Unit {
 
     exponents!(kg m s A K mol cd rad);
 
-    /// With a factor to the base units.
+    /// Sets the factor to the base units.
     #[must_use]
     pub const fn factor(mut self, factor: f64) -> Self {
         self.base.factor = factor;
         self
     }
 
-    /// With an offset, in base units.
+    /// Sets the offset, in base units.
     #[must_use]
     pub const fn offset(mut self, offset: f64) -> Self {
         self.base.offset = offset;
         self
     }
 
-    /// With a unit that people prefer: what they see is `factor * value + offset`.
+    /// Sets the display unit; the displayed value is `factor * value + offset`.
     #[must_use]
     pub const fn display(mut self, name: &'static str, factor: f64, offset: f64) -> Self {
         self.display = Some(DisplayUnit { name, factor, offset });
@@ -109,7 +109,7 @@ impl Unit {
 const DEG_PER_RAD: f64 = 180.0 / PI;
 const RAD_PER_DEG: f64 = PI / 180.0;
 
-/// A number.
+/// Dimensionless.
 pub const ONE: Unit = Unit::new("1");
 /// Second.
 pub const S: Unit = Unit::new("s").s(1);
@@ -136,11 +136,11 @@ pub const N_M_S_PER_RAD: Unit =
 mod tests {
     use super::*;
 
-    /// What a unit is in base units follows from what its name says.
+    /// Checks that the base units of each unit agree with its name.
     #[test]
     fn names_and_exponents_agree() {
         let exponents = |unit: &Unit| [unit.base.kg, unit.base.m, unit.base.s, unit.base.rad];
-        // N.m is counted as kg m2 s-2.
+        // Exponents of kg, m, s and rad: N.m is kg m2 s-2.
         let named = |unit: &Unit| {
             let (above, below) = unit.name.split_once('/').unwrap_or((unit.name, ""));
             let mut sum = [0; 4];
@@ -169,7 +169,7 @@ mod tests {
         }
     }
 
-    /// A right angle, and a stiffness of 1 N m per degree.
+    /// Checks a right angle, and a stiffness of 1 N m per degree.
     #[test]
     fn people_see_degrees() {
         let shown =

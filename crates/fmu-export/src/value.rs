@@ -1,35 +1,36 @@
-//! Values of variables, and the Rust types that they live in.
+//! Values of variables, and the Rust types that hold them.
 
 use crate::saved::{Saved, StateVisitor};
 use crate::types::Item;
 use fmi_abi::{BaseType, Value};
 
-/// A Rust type that a variable's value may live in: `f64`, `i32`, `bool`, `String`, or an enum made by
-/// [`enumeration!`](crate::enumeration); and `f32`, whole numbers from `i8` to `u64`, and `Vec<u8>`, which FMI 2.0
-/// has no variables for.
+/// A Rust type that can hold a variable's value: `f64`, `i32`, `bool`, `String`, or an enum made by
+/// [`enumeration!`](crate::enumeration). The types `f32`, `i8` to `u64` other than `i32`, and `Vec<u8>` are
+/// possible only for FMI 3.0.
 pub trait Scalar: Saved {
-    /// The kind of value it is for an importer.
+    /// FMI base type.
     const BASE: BaseType;
 
-    /// The value.
+    /// Returns the value.
     fn value(&self) -> Value;
 
-    /// Takes a value of the right kind. What cannot be is left out: the importer has been refused before.
+    /// Sets a value of the right type. Ignores impossible values; this crate has rejected them before.
     fn assign(&mut self, value: &Value);
 
-    /// The [`value`](Self::value) of a Real, for types that have it without a detour; of others it is no number.
+    /// Returns the [`value`](Self::value) of a Real; NaN for all other types. Numeric types override it to
+    /// avoid the conversion.
     #[inline]
     fn real(&self) -> f64 {
         self.value().real()
     }
 
-    /// [Takes](Self::assign) the value of a Real, for types that can without a detour.
+    /// [Sets](Self::assign) the value of a Real. Numeric types override it to avoid the conversion.
     #[inline]
     fn set_real(&mut self, value: f64) {
         self.assign(&Value::Real(value));
     }
 
-    /// The number itself, of a type that is one.
+    /// Returns a reference to the number if the type is `f64`.
     #[doc(hidden)]
     #[inline]
     fn as_real(&self) -> Option<&f64> {
@@ -37,7 +38,8 @@ pub trait Scalar: Saved {
     }
 }
 
-/// Where a variable's value may live: a [`Scalar`], or an array of such, as `[f64; 8]` or `[[f64; 2]; 3]`.
+/// A Rust type for the field of a variable: a [`Scalar`], or an array of scalars such as `[f64; 8]` or
+/// `[[f64; 2]; 3]`.
 #[diagnostic::on_unimplemented(
     message = "no variable can have a value of the type `{Self}`",
     label = "the type is `{Self}`",
@@ -45,19 +47,19 @@ pub trait Scalar: Saved {
             arrays of them, such as [f64; 8]"
 )]
 pub trait Place: Saved {
-    /// What an element is.
+    /// Type of an element.
     type Element: Scalar;
 
-    /// How many elements there are, in each direction.
+    /// Number of elements in each dimension.
     const DIMENSIONS: Dimensions;
 
-    /// An element, counted from 0, row by row; the scalar itself.
+    /// Returns an element, counted from 0, row by row; element 0 of a scalar is the scalar.
     fn element(&self, number: usize) -> &Self::Element;
 
-    /// The same, to be changed.
+    /// Returns an element as mutable reference; see [`element`](Self::element).
     fn element_mut(&mut self, number: usize) -> &mut Self::Element;
 
-    /// The number itself, of a scalar that is one.
+    /// Returns a reference to the number if the type is `f64`.
     #[doc(hidden)]
     #[inline]
     fn as_real(&self) -> Option<&f64> {
@@ -97,12 +99,12 @@ impl<T: Place, const N: usize> Place for [T; N] {
     }
 }
 
-/// The sizes of an array, that of the rows last; none of a scalar.
+/// The sizes of an array, the length of a row last; empty for a scalar.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dimensions {
     sizes: [usize; 3],
-    /// How many there are. Of what has more, none is known.
+    /// Number of dimensions, at most 3.
     count: usize,
 }
 
@@ -119,7 +121,7 @@ impl Dimensions {
         self.sizes.split_at(self.count).0
     }
 
-    /// The number of elements.
+    /// Returns the number of elements.
     pub(crate) const fn length(&self) -> usize {
         let (mut length, mut place) = (1, 0);
         while place < self.count {
@@ -238,19 +240,19 @@ whole_number! {
     u64: UInt64;
 }
 
-/// An enum that is an enumeration for importers. Made by [`enumeration!`](crate::enumeration).
+/// An enum that is an FMI enumeration. [`enumeration!`](crate::enumeration) implements it.
 pub trait Enumeration: Copy + 'static {
-    /// The values, in the order of declaration.
+    /// Items, in the order of declaration.
     const ITEMS: &'static [Item];
 
-    /// The value that this number stands for.
+    /// Returns the value with this number.
     fn from_number(number: i32) -> Option<Self>;
 
-    /// The number that stands for the value.
+    /// Returns the number of the value.
     fn number(self) -> i32;
 }
 
-/// What [`enumeration!`](crate::enumeration) needs of [`Saved`].
+/// Implements [`Saved::visit`] for [`enumeration!`](crate::enumeration).
 #[doc(hidden)]
 pub fn visit_enumeration<T: Enumeration>(value: &mut T, visitor: &mut dyn StateVisitor) {
     let mut number = i64::from(value.number());
@@ -261,7 +263,7 @@ pub fn visit_enumeration<T: Enumeration>(value: &mut T, visitor: &mut dyn StateV
     }
 }
 
-/// Defines an enum that importers see as an enumeration: names, numbers and descriptions, written once.
+/// Defines an enum that is an FMI enumeration, with names, numbers and descriptions.
 ///
 /// ```
 /// fmu_export::enumeration! {
@@ -351,7 +353,7 @@ mod tests {
             let mut place = start.clone();
             place.assign(&value);
             assert_eq!(place, other);
-            // A value of another kind is left out.
+            // A value of another type is ignored.
             let wrong = if base == BaseType::Boolean { Value::Real(1.0) } else { Value::Boolean(true) };
             place.assign(&wrong);
             assert_eq!(place, other);
@@ -362,7 +364,7 @@ mod tests {
         check(String::new(), "a".to_owned(), Value::String("a".to_owned()), BaseType::String);
     }
 
-    /// The short way of Reals is the long one.
+    /// Checks that the direct access to Reals agrees with the general access.
     #[test]
     fn reals_without_a_detour() {
         let mut place = 1.0;
@@ -374,7 +376,7 @@ mod tests {
         assert_eq!(whole, 7);
     }
 
-    /// As XML has them, and Reals to the last digit.
+    /// Checks that strings of values are valid in XML and keep all digits of Reals.
     #[test]
     fn texts_of_values() {
         for (value, text) in [

@@ -1,4 +1,4 @@
-//! Variables: what each is, and how the model's value is reached.
+//! Variables: their attributes, and the access to their values in the model.
 
 use crate::saved::StateVisitor;
 use crate::settable::settable;
@@ -11,21 +11,23 @@ use fmi_abi::Value;
 use fmi_abi::{Causality, Initial, Variability};
 use std::mem::MaybeUninit;
 
-/// A variable's line in the table. Authors write its name; see [`variables!`](crate::variables).
+/// Line of a variable in the table. Authors write the name of the variable; see
+/// [`variables!`](crate::variables).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Index(#[doc(hidden)] pub u32);
 
 impl Index {
-    /// The time, also where it is no variable of the table; for [`depends_on`](Variable::depends_on).
+    /// The time, even if it is no variable of the table; for [`depends_on`](Variable::depends_on).
     pub const TIME: Self = Self(u32::MAX);
 }
 
-/// A variable of model `M`: an entry of the table that [`variables!`](crate::variables) makes, of an array an element.
+/// A variable of model `M`: an entry of the table that [`variables!`](crate::variables) defines. An array has
+/// one entry per element.
 pub struct Variable<M> {
     name: &'static str,
-    /// That of the array, if it is an element of one.
+    /// Name of the array for an element of an array; otherwise equal to `name`.
     name_of_line: &'static str,
-    /// Its line, and which element of an array it is.
+    /// Line of the variable. `element` is the number of the element in an array.
     line: u32,
     element: u32,
     dimensions: Dimensions,
@@ -34,27 +36,27 @@ pub struct Variable<M> {
     variability: Variability,
     initial: Option<Initial>,
     of: &'static Type,
-    /// Follows from the type; here for speed.
+    /// Base type of `of`; a copy for speed.
     base: BaseType,
-    /// A line; a place once the lines are spread into a table.
+    /// Line of the state; in the table, the index of the state.
     derivative_of: Option<Index>,
     depends_on: Option<&'static [Index]>,
     state: bool,
     reinit: bool,
-    /// Where the importer may set this variable; follows from the rest.
+    /// Modes in which the importer may set this variable; derived from the other fields.
     pub(crate) settable: Situations,
-    /// The same for a Real that takes its value without further ado, else nowhere.
+    /// Modes in which setting a Real stores the value without further checks; none for other variables.
     pub(crate) takes_reals: Situations,
-    /// Of these, where nothing but its place and its mark is to be set once the model has started.
+    /// Modes in which setting only writes the field and the `bool` after `then`, once the model has started.
     pub(crate) takes_at_once: Situations,
-    /// Whether nothing follows when it is set.
+    /// Whether setting it has no side effect except the `bool` after `then`.
     plain: bool,
     read: Option<Read<M>>,
     store: Option<Store<M>>,
-    /// The same for elements of arrays only.
+    /// Access to elements of arrays; `None` for scalars.
     read_at: Option<ReadAt<M>>,
     store_at: Option<StoreAt<M>>,
-    /// What is known to be wrong before the line is finished.
+    /// A fault that is known before the line is complete.
     refused: Option<&'static str>,
 }
 
@@ -87,24 +89,26 @@ macro_rules! functions {
 }
 
 functions! {
-    /// How a value is read.
+    /// Functions that read a value.
     Read { shape: Shape, real: fn(&M) -> f64, value: fn(&M) -> Value }
 
-    /// How a value that lives in the model is set, and visited to be saved: of an array as a whole.
+    /// Functions that set a value in the model, and visit it for a serialized state. An array is visited as a
+    /// whole.
     Store {
         real: fn(&mut M, f64),
         value: fn(&mut M, &Value),
         visit: fn(&mut M, &mut dyn StateVisitor)
     }
 
-    /// How elements of an array are read: as many as there is room for, from one on, with 0 if all are finite; or one.
+    /// Functions that read elements of an array. `reals` fills the slice, starting at an element; it returns
+    /// 0 if all values are finite. `value` reads one element.
     ReadAt { reals: fn(&M, usize, &mut [MaybeUninit<f64>]) -> f64, value: fn(&M, usize) -> Value }
 
-    /// How an element of an array that lives in the model is set.
+    /// Functions that set an element of an array in the model.
     StoreAt { real: fn(&mut M, usize, f64), value: fn(&mut M, usize, &Value) }
 }
 
-/// What kind of value it is, and how many.
+/// Base type and dimensions of a value.
 #[doc(hidden)]
 #[derive(Clone, Copy)]
 pub struct Shape {
@@ -142,7 +146,7 @@ impl<M> Variable<M> {
         }
     }
 
-    /// Continuous for a Real, discrete for the rest.
+    /// Creates a variable that is continuous if it is a Real, otherwise discrete.
     const fn moving(causality: Causality, of: &'static Type) -> Self {
         let variability = match of.base() {
             base if base.is_float() => Variability::Continuous,
@@ -151,40 +155,40 @@ impl<M> Variable<M> {
         Self::new(causality, variability, of)
     }
 
-    /// An input: continuous if it is a Real, else discrete.
+    /// Creates an input; continuous if it is a Real, otherwise discrete.
     pub const fn input(of: &'static Type) -> Self {
         Self::moving(Causality::Input, of)
     }
 
-    /// An output that the model calculates: continuous if it is a Real, else discrete.
+    /// Creates an output that the model calculates; continuous if it is a Real, otherwise discrete.
     pub const fn output(of: &'static Type) -> Self {
         let mut variable = Self::moving(Causality::Output, of);
         variable.initial = Some(Initial::Calculated);
         variable
     }
 
-    /// A variable of the model's inside, calculated: continuous if it is a Real, else discrete.
+    /// Creates a local variable that the model calculates; continuous if it is a Real, otherwise discrete.
     pub const fn local(of: &'static Type) -> Self {
         let mut variable = Self::moving(Causality::Local, of);
         variable.initial = Some(Initial::Calculated);
         variable
     }
 
-    /// A fixed parameter.
+    /// Creates a fixed parameter.
     pub const fn parameter(of: &'static Type) -> Self {
         let mut variable = Self::new(Causality::Parameter, Variability::Fixed, of);
         variable.initial = Some(Initial::Exact);
         variable
     }
 
-    /// A value that follows from fixed parameters.
+    /// Creates a calculated parameter, which depends on fixed parameters.
     pub const fn calculated_parameter(of: &'static Type) -> Self {
         let mut variable = Self::new(Causality::CalculatedParameter, Variability::Fixed, of);
         variable.initial = Some(Initial::Calculated);
         variable
     }
 
-    /// So that the compiler says why there is none.
+    /// Exists only so that the compiler's message explains why there are no clocks.
     #[doc(hidden)]
     pub const fn clock(of: &'static Type) -> Self {
         let mut variable = Self::local(of);
@@ -195,7 +199,7 @@ impl<M> Variable<M> {
         variable
     }
 
-    /// The same.
+    /// Exists only so that the compiler's message explains why there are no structural parameters.
     #[doc(hidden)]
     pub const fn structural_parameter(of: &'static Type) -> Self {
         let mut variable = Self::parameter(of);
@@ -205,12 +209,13 @@ impl<M> Variable<M> {
         variable
     }
 
-    /// The time. It has neither `in` nor `by`: its value is the instance's time.
+    /// Creates the independent variable, the time. It has neither `in` nor `by`: its value is the instance's
+    /// time.
     pub const fn independent(of: &'static Type) -> Self {
         Self::new(Causality::Independent, Variability::Continuous, of)
     }
 
-    /// The variable, an output or local, as one that never changes.
+    /// Makes an output or local variable constant.
     #[must_use]
     pub const fn constant(mut self) -> Self {
         self.variability = Variability::Constant;
@@ -218,91 +223,92 @@ impl<M> Variable<M> {
         self
     }
 
-    /// The variable, a local, as one that does not change after the initialization.
+    /// Makes a local variable fixed: it does not change after the initialization.
     #[must_use]
     pub const fn fixed(mut self) -> Self {
         self.variability = Variability::Fixed;
         self
     }
 
-    /// The variable, a parameter or what follows from parameters, as one that changes with them while it runs.
+    /// Makes a parameter tunable, or a variable that depends on tunable parameters.
     #[must_use]
     pub const fn tunable(mut self) -> Self {
         self.variability = Variability::Tunable;
         self
     }
 
-    /// The variable, a Real, as one that changes at events or communication points only.
+    /// Makes a Real discrete: it changes only at events or communication points.
     #[must_use]
     pub const fn discrete(mut self) -> Self {
         self.variability = Variability::Discrete;
         self
     }
 
-    /// The variable, an output or local, as continuous-time state with an exact start value, or with one that is
-    /// [`calculated`](Self::calculated).
+    /// Makes an output or local variable a continuous-time state with an exact start value.
+    /// [`calculated`](Self::calculated) replaces the exact start value.
     ///
-    /// It lives in the model (`in`): its value is what was set, or what the last step made of it.
+    /// A state has a field in the model (`in`), which holds the value that was set or that the last step
+    /// calculated.
     #[must_use]
     pub const fn state(mut self) -> Self {
         self.state = true;
         self.exact()
     }
 
-    /// The variable, a state, as one that events may change
-    /// ([`Event::states_changed`](crate::Event::states_changed)).
+    /// Marks a state that events may change ([`Event::states_changed`](crate::Event::states_changed)).
     #[must_use]
     pub const fn reinit(mut self) -> Self {
         self.reinit = true;
         self
     }
 
-    /// The variable, an output or local, with an exact start value that the importer may set.
+    /// Gives an output or local variable an exact start value, which the importer may set.
     #[must_use]
     pub const fn exact(mut self) -> Self {
         self.initial = Some(Initial::Exact);
         self
     }
 
-    /// The variable, a state, with a start that the model calculates: until the model steps, or the importer sets states
-    /// or enters Continuous-Time Mode, [`calculate_start`](crate::Model::calculate_start) brings it up to date whenever
-    /// something is set. Importers that want to set it are told by [`depends_on`](Self::depends_on) what to set instead.
+    /// Marks a state whose start value the model calculates. After each value that is set,
+    /// [`calculate_start`](crate::Model::calculate_start) updates it, until the first step, until the
+    /// importer sets states, or until Continuous-Time Mode. Its [`depends_on`](Self::depends_on) lists the
+    /// variables that an importer can set instead.
     #[must_use]
     pub const fn calculated(mut self) -> Self {
         self.initial = Some(Initial::Calculated);
         self
     }
 
-    /// The variable, an output or local, with a start value that its calculation begins with.
+    /// Gives an output or local variable an approximate start value, from which its calculation begins.
     #[must_use]
     pub const fn approx(mut self) -> Self {
         self.initial = Some(Initial::Approx);
         self
     }
 
-    /// The variable, an output or local, as time derivative of another, given by its name. (No input: importers take
-    /// what is said to be a derivative for that of a state.)
+    /// Makes an output or local variable the time derivative of another variable. An input cannot be one:
+    /// importers assume that a derivative belongs to a state.
     #[must_use]
     pub const fn derivative_of(mut self, of: Index) -> Self {
         self.derivative_of = Some(of);
         self
     }
 
-    /// The variable, an output or local, as one that depends on no inputs, states, parameters and other start
-    /// values but these, given by their names: `depends_on(u, x)` in the table, or `depends_on(&[u, x])`; on nothing
+    /// Lists the only inputs, states, parameters and start values on which an output or local variable
+    /// depends. In the table, write `depends_on(u, x)` or `depends_on(&[u, x])`; for no dependencies,
     /// `depends_on(&[])`.
     ///
-    /// It is about direct dependence (section 2.2.8): at a communication point or instant, and while
-    /// initializing. An output that an input reaches through a step or a state only does not depend on that
-    /// input. The time, which FMI 3.0 counts among the knowns, is [`Index::TIME`]. Where nothing is said, it depends on
-    /// all of them, see [`Info::smooth`](crate::Info::smooth).
+    /// The list contains direct dependencies (section 2.2.8), at a communication point or instant and in
+    /// Initialization Mode. An output that reacts to an input only through a step or a state does not depend
+    /// on that input. The time, a known in FMI 3.0, is [`Index::TIME`]. Without a list, the variable depends
+    /// on all knowns; see [`Info::smooth`](crate::Info::smooth).
     #[must_use]
     pub const fn depends_on(mut self, knowns: &'static [Index]) -> Self {
         self.depends_on = Some(knowns);
         self
     }
 
-    /// Called by the macro: the value lives in the model.
+    /// Called by the macro; sets the functions for a value in a field of the model.
     #[doc(hidden)]
     pub const fn stored(
         mut self,
@@ -320,7 +326,7 @@ impl<M> Variable<M> {
         self.read_by(read, read_at)
     }
 
-    /// Called by the macro: the value is calculated from the model.
+    /// Called by the macro; sets the functions for a value that is calculated.
     #[doc(hidden)]
     pub const fn read_by(mut self, read: Read<M>, read_at: ReadAt<M>) -> Self {
         if let Some(Read { shape: Shape { dimensions, .. }, .. }) = &self.read
@@ -336,7 +342,7 @@ impl<M> Variable<M> {
         self
     }
 
-    /// Called by the macro at last: name and description.
+    /// Called by the macro last; sets name and description.
     #[doc(hidden)]
     pub const fn finished(mut self, name: &'static str, description: &'static str) -> Self {
         self.name = name;
@@ -346,7 +352,7 @@ impl<M> Variable<M> {
         self.settable =
             settable(self.causality, self.variability, self.initial, self.state, self.reinit, real);
         if real && !matches!(self.causality, Causality::Parameter) {
-            // A start value that is refused is remembered, which takes further ado.
+            // A rejected start value must be recorded, so setting start values needs further checks.
             self.takes_reals = self.settable.without(crate::settable::STARTING);
             if self.plain {
                 self.takes_at_once = self.takes_reals;
@@ -355,7 +361,7 @@ impl<M> Variable<M> {
         self
     }
 
-    /// An element of the array that this line is, or the line's only variable.
+    /// Returns an element of the array of this line, or the only variable of the line.
     pub(crate) const fn spread(mut self, line: usize, element: usize, name: &'static str) -> Self {
         self.line = line as u32;
         self.element = element as u32;
@@ -363,13 +369,13 @@ impl<M> Variable<M> {
         self
     }
 
-    /// With the place of what it is the derivative of.
+    /// Sets the index of the variable of which this one is the derivative.
     pub(crate) const fn differentiating(mut self, place: usize) -> Self {
         self.derivative_of = Some(Index(place as u32));
         self
     }
 
-    /// What is wrong with the variable on its own.
+    /// Returns the fault of a variable that is invalid by itself.
     pub(crate) const fn fault(&self) -> Option<&'static str> {
         use Causality::*;
         use Variability::*;
@@ -450,27 +456,28 @@ impl<M> Variable<M> {
         None
     }
 
-    /// The name: of an element of an array with its indices, which count from 1, as `T[3]`, `T[1,2]`, `der(T[3])`.
+    /// Returns the name. An element of an array has indices that count from 1, as in `T[3]`, `T[1,2]`,
+    /// `der(T[3])`.
     pub const fn name(&self) -> &'static str {
         self.name
     }
 
-    /// The name without indices: for an element of an array that of the array.
+    /// Returns the name without indices: for an element of an array, the name of the array.
     pub const fn name_of_array(&self) -> &'static str {
         self.name_of_line
     }
 
-    /// The sizes of the array that it is an element of; none if it is a scalar.
+    /// Returns the sizes of the array to which the element belongs; empty for a scalar.
     pub const fn dimensions(&self) -> &[usize] {
         self.dimensions.sizes()
     }
 
-    /// The number of elements of the array that it is an element of; 1 for a scalar.
+    /// Returns the number of elements of the array; 1 for a scalar.
     pub const fn length(&self) -> usize {
         self.dimensions.length()
     }
 
-    /// Which element of an array it is, counted from 0, row by row; 0 for a scalar.
+    /// Returns the number of the element in its array, counted from 0, row by row; 0 for a scalar.
     pub const fn element(&self) -> usize {
         self.element as usize
     }
@@ -479,38 +486,38 @@ impl<M> Variable<M> {
         self.dimensions.is(&of.dimensions)
     }
 
-    /// One sentence for the user.
+    /// Returns the description, one sentence.
     pub const fn description(&self) -> &'static str {
         self.description
     }
 
-    /// Who sets it and who reads it.
+    /// Returns the causality.
     pub const fn causality(&self) -> Causality {
         self.causality
     }
 
-    /// When it changes.
+    /// Returns the variability.
     pub const fn variability(&self) -> Variability {
         self.variability
     }
 
-    /// How it gets its first value; `None` for inputs and the time.
+    /// Returns the attribute `initial`; `None` for inputs and the time.
     pub const fn initial(&self) -> Option<Initial> {
         self.initial
     }
 
-    /// Unit, range and so on.
+    /// Returns the type: unit, range and so on.
     pub const fn variable_type(&self) -> &'static Type {
         self.of
     }
 
-    /// The kind of value.
+    /// Returns the base type.
     #[inline]
     pub const fn base(&self) -> BaseType {
         self.base
     }
 
-    /// The place in the table of the variable that this one is the time derivative of.
+    /// Returns the index of the variable of which this one is the time derivative.
     pub const fn differentiates(&self) -> Option<u32> {
         match self.derivative_of {
             Some(Index(of)) => Some(of),
@@ -518,8 +525,8 @@ impl<M> Variable<M> {
         }
     }
 
-    /// What [`depends_on`](Self::depends_on) has said, as places in the table, but for [`Index::TIME`]: of an array all
-    /// elements.
+    /// Returns the variables in [`depends_on`](Self::depends_on) as indices in the table, without
+    /// [`Index::TIME`]; of an array all elements.
     pub fn dependencies(&self) -> Option<impl Iterator<Item = u32> + use<M>>
     where
         M: Variables,
@@ -531,22 +538,24 @@ impl<M> Variable<M> {
         self.depends_on.map(|knowns| knowns.iter().flat_map(places))
     }
 
-    /// Whether [`depends_on`](Self::depends_on) names [`Index::TIME`], if anything is said there.
+    /// Returns whether [`depends_on`](Self::depends_on) contains [`Index::TIME`]; `None` without
+    /// `depends_on`.
     pub fn depends_on_time(&self) -> Option<bool> {
         self.depends_on.map(|knowns| knowns.contains(&Index::TIME))
     }
 
-    /// Whether this is a continuous-time state.
+    /// Returns whether this is a continuous-time state.
     pub const fn is_state(&self) -> bool {
         self.state
     }
 
-    /// Whether this is a state that events may change.
+    /// Returns whether this is a state that events may change.
     pub const fn is_reinit(&self) -> bool {
         self.reinit
     }
 
-    /// Whether it begins with a value that is given: inputs, and what is exact or approx (section 2.2.7).
+    /// Returns whether the variable has a start value: inputs, and variables with `initial` exact or approx
+    /// (section 2.2.7).
     pub const fn has_start(&self) -> bool {
         matches!(
             (self.causality, self.initial),
@@ -554,7 +563,7 @@ impl<M> Variable<M> {
         )
     }
 
-    /// Its value, where it does not depend on the instance: `None` for the time.
+    /// Returns the value in the model; `None` for the time.
     pub fn value(&self, model: &M) -> Option<Value> {
         match &self.read_at {
             Some(read) => Some((read.value)(model, self.element())),
@@ -562,7 +571,7 @@ impl<M> Variable<M> {
         }
     }
 
-    /// Sets its value in the model, without any check. What is calculated stays as it is.
+    /// Sets the value in the model without checks. Does nothing for a calculated value.
     pub fn set(&self, model: &mut M, value: &Value) {
         match (&self.store_at, &self.store) {
             (Some(store), _) => (store.value)(model, self.element(), value),
@@ -571,7 +580,8 @@ impl<M> Variable<M> {
         }
     }
 
-    /// Shows the value to a visitor, if it lives in the model: of an array all of it at the first element.
+    /// Passes the value to a visitor if it is a field of the model. The first element of an array passes the
+    /// whole array.
     pub(crate) fn visit(&self, model: &mut M, visitor: &mut dyn StateVisitor) {
         if let Some(store) = self.store
             && self.element == 0
@@ -582,7 +592,7 @@ impl<M> Variable<M> {
 }
 
 impl<M: Variables> Variable<M> {
-    /// The value of a Real; `None` for the time.
+    /// Returns the value of a Real; `None` for the time.
     #[inline]
     pub(crate) fn real(&self, model: &M) -> Option<f64> {
         if M::ARRAYS && self.read_at.is_some() {
@@ -591,8 +601,8 @@ impl<M: Variables> Variable<M> {
         self.read.as_ref().map(|read| (read.real)(model))
     }
 
-    /// The values of Reals of one array from this element on, for which there is room, or of the scalar; 0 if they are
-    /// finite.
+    /// Reads the scalar, or elements of the array from this element on, as many as `values` holds. Returns 0
+    /// if all values are finite.
     pub(crate) fn reals(&self, model: &M, time: f64, values: &mut [MaybeUninit<f64>]) -> f64 {
         if let Some(read) = &self.read_at {
             return (read.reals)(model, self.element(), values);
@@ -613,26 +623,26 @@ impl<M: Variables> Variable<M> {
     }
 }
 
-/// The kind of value in a place of the model.
+/// Returns the shape of a field of the model.
 #[doc(hidden)]
 pub const fn shape_of_place<M, T: Place>(_: fn(&M) -> &T) -> Shape {
     Shape { base: T::Element::BASE, dimensions: T::DIMENSIONS }
 }
 
-/// The kind of value that a calculation gives.
+/// Returns the shape of a calculated value.
 #[doc(hidden)]
 pub const fn shape_of_calculation<M, T: Place>(_: fn(&M) -> T) -> Shape {
     Shape { base: T::Element::BASE, dimensions: T::DIMENSIONS }
 }
 
-/// The Real that is an element of an array, or the scalar.
+/// Reads a Real: an element of an array, or the scalar.
 #[doc(hidden)]
 #[inline(always)]
 pub fn read_real(place: &impl Place, number: usize) -> f64 {
     place.element(number).real()
 }
 
-/// The same of any type.
+/// Reads a value of any type: an element of an array, or the scalar.
 #[doc(hidden)]
 #[inline(always)]
 pub fn read_value(place: &impl Place, number: usize) -> Value {
@@ -653,7 +663,7 @@ pub fn set_value(place: &mut impl Place, number: usize, value: &Value) {
     place.element_mut(number).assign(value);
 }
 
-/// The Reals of an array, from an element on; 0 if they are finite.
+/// Reads Reals of an array from an element on. Returns 0 if all values are finite.
 #[doc(hidden)]
 pub fn read_reals(array: &impl Place, first: usize, values: &mut [MaybeUninit<f64>]) -> f64 {
     values
@@ -663,20 +673,20 @@ pub fn read_reals(array: &impl Place, first: usize, values: &mut [MaybeUninit<f6
         .sum()
 }
 
-/// Calls a closure whose argument's type it need not say.
+/// Calls a closure, so that the compiler infers the type of its argument.
 #[doc(hidden)]
 #[inline(always)]
 pub fn read<M, T>(model: &M, calculate: impl Fn(&M) -> T) -> T {
     calculate(model)
 }
 
-/// Ends the compilation with a message: a variable's name and what is wrong with it.
+/// Ends the compilation with a message that contains a variable's name and its fault.
 #[track_caller]
 pub(crate) const fn refuse(name: &str, fault: &str) -> ! {
     panic!("{}", Message::new(name, fault).text())
 }
 
-/// What to say of a value whose Rust type is not that of the variable's type.
+/// Returns the message for a value whose Rust type does not match the type of the variable.
 const fn wrong_type(base: BaseType) -> &'static str {
     match base {
         BaseType::Real => "it is a Real, so its value must be an f64",
@@ -696,7 +706,7 @@ const fn wrong_type(base: BaseType) -> &'static str {
     }
 }
 
-/// The text of such a message.
+/// Message of [`refuse`], built at compile time.
 struct Message {
     bytes: [u8; 400],
     length: usize,

@@ -1,20 +1,21 @@
-//! Arrays of FMI 3.0, whose elements are variables here: the FMU knows the array only, by one value reference, and takes
-//! and gives all its values at once (section 2.2.7.2).
+//! Arrays of FMI 3.0. Each element is a variable here, but the FMU knows only the array, by one value
+//! reference. A call of the FMU gets or sets all values of an array (section 2.2.7.2).
 
 use fmi_abi::BaseType;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// So many elements at the most are offered as variables.
+/// Limit of the total number of array elements.
 const MOST: usize = 1 << 20;
 
-/// The arrays of an FMU. Their elements have numbers of their own for value references, behind those of all variables.
+/// The arrays of an FMU. Their elements have numbers that serve as value references; they are larger than all
+/// value references of the FMU.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Arrays {
     all: Vec<Array>,
-    /// By their value references, their places here.
+    /// Index in `all` by value reference.
     by_reference: HashMap<u32, usize>,
-    /// The number of the first element, and for each the array's place and which of its elements it is.
+    /// Number of the first element. `elements` contains, for each element, the index of its array and its number in it.
     first: u32,
     elements: Vec<(usize, usize)>,
 }
@@ -29,7 +30,8 @@ pub(crate) struct Array {
 }
 
 impl Array {
-    /// With its sizes and start values: one for each element, or for all (section 2.4.7.5.1).
+    /// Creates an array with its sizes and start values: one for each element, or one for all (section
+    /// 2.4.7.5.1).
     pub fn new(reference: u32, base: BaseType, sizes: Vec<usize>, start: &[&str]) -> Self {
         let start = start.iter().map(|start| (*start).to_owned()).collect();
         Self { reference, base, sizes, start }
@@ -40,7 +42,7 @@ impl Array {
         length.filter(|length| *length <= MOST)
     }
 
-    /// Of an element.
+    /// Returns the start value of an element.
     pub fn start(&self, number: usize) -> Option<&str> {
         match &self.start[..] {
             [one] => Some(one),
@@ -48,7 +50,8 @@ impl Array {
         }
     }
 
-    /// Of an element, as FMI 2.0 calls it (section 2.2.9 there): indices count from 1 and belong to the variable.
+    /// Returns the name of an element as in FMI 2.0 (section 2.2.9 there): indices count from 1 and follow
+    /// the variable.
     pub fn name(&self, array: &str, number: usize) -> String {
         let mut rest = number;
         let mut indices: Vec<_> = self
@@ -68,20 +71,20 @@ impl Array {
     }
 }
 
-/// What a call has to pass for variables of which some are elements: whole arrays.
+/// Whole arrays, for a call with variables of which some are array elements.
 #[derive(Debug, Default)]
 pub(crate) struct Whole {
-    /// Value references as the FMU has them.
+    /// Value references of the FMU.
     pub references: Vec<u32>,
-    /// The number of their values, and where among them that of each variable is.
+    /// Number of their values. `places` contains the index of each variable's value among them.
     pub count: usize,
     pub places: Vec<usize>,
-    /// Where the values of each array begin.
+    /// Index of each array and of its first value.
     pub arrays: Vec<(usize, usize)>,
 }
 
 impl Whole {
-    /// Whether the variables are all elements of their arrays.
+    /// Returns whether the variables include all elements of their arrays.
     pub fn is_complete(&self) -> bool {
         let mut named = vec![false; self.count];
         self.places.iter().for_each(|place| named[*place] = true);
@@ -90,7 +93,7 @@ impl Whole {
 }
 
 impl Arrays {
-    /// None yet, of an FMU with no value reference beyond this.
+    /// Creates an empty list for an FMU whose largest value reference is `largest`.
     pub fn after(largest: u32) -> Self {
         Self { first: largest.saturating_add(1), ..Self::default() }
     }
@@ -99,7 +102,7 @@ impl Arrays {
         &self.all
     }
 
-    /// One more, and the numbers of its elements; `None` if it has too many.
+    /// Adds an array and returns the numbers of its elements; `None` if there are too many.
     pub fn push(&mut self, array: Array) -> Option<Range<u32>> {
         let length = array.length()?;
         let begin = u32::try_from(self.elements.len()).ok()?.checked_add(self.first)?;
@@ -114,12 +117,12 @@ impl Arrays {
         Some(begin..end)
     }
 
-    /// The number of values that a variable of the FMU has.
+    /// Returns the number of values of a variable of the FMU.
     pub fn length(&self, reference: u32) -> usize {
         self.by_reference.get(&reference).and_then(|place| self.all[*place].length()).unwrap_or(1)
     }
 
-    /// The numbers of the elements of an array of the FMU; of a scalar its own value reference.
+    /// Returns the numbers of the elements of an array of the FMU; for a scalar, its value reference.
     pub fn elements(&self, reference: u32) -> Range<u32> {
         let Some(place) = self.by_reference.get(&reference) else {
             return reference..reference.saturating_add(1);
@@ -128,19 +131,19 @@ impl Arrays {
         begin..begin + self.length(reference) as u32
     }
 
-    /// The array that a number is an element of, by its place, and which.
+    /// Returns the index of the array to which an element belongs, and its number in the array.
     #[inline]
     pub fn find(&self, reference: u32) -> Option<(usize, usize)> {
         self.elements.get(reference.checked_sub(self.first)? as usize).copied()
     }
 
-    /// Whether an element is among these.
+    /// Returns whether any of these is an array element.
     #[inline]
     pub fn among(&self, references: &[u32]) -> bool {
         !self.elements.is_empty() && references.iter().any(|reference| *reference >= self.first)
     }
 
-    /// The whole arrays of the elements among these variables.
+    /// Returns the whole arrays of the elements among these variables.
     pub fn whole(&self, references: &[u32]) -> Whole {
         let mut whole = Whole::default();
         let mut begins = HashMap::new();

@@ -1,4 +1,4 @@
-//! What the model description says, as far as running or wiring the FMU needs it.
+//! Reads the parts of the model description that running or connecting an FMU needs.
 
 use crate::arrays::{Array, Arrays};
 use fmi_abi::{BaseType, Interface, Standard};
@@ -6,87 +6,90 @@ use roxmltree::{Document, Node};
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-/// A variable of an FMU. Each element of an array of FMI 3.0 is one, called as FMI 2.0 calls it: `T[3]`, `T[1,2]`, `der(T[3])`.
+/// A variable of an FMU. Each element of an array of FMI 3.0 is a variable, with a name as in FMI 2.0:
+/// `T[3]`, `T[1,2]`, `der(T[3])`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its value reference; of an element of an array a number of its own, which no variable has.
+    /// Value reference; for an array element, a number that is no value reference of the FMU.
     pub reference: u32,
-    /// Its type; an Int32 of FMI 3.0 is an Integer, a Float64 a Real.
+    /// Base type; Int32 of FMI 3.0 is Integer, Float64 is Real.
     pub base: BaseType,
-    /// `input`, `output`, `parameter` and so on; `local` if nothing is said.
+    /// `input`, `output`, `parameter` and so on; `local` by default.
     pub causality: String,
-    /// `fixed`, `tunable`, `discrete` or `continuous`, if it is said.
+    /// `fixed`, `tunable`, `discrete` or `continuous`, if given.
     pub variability: Option<String>,
-    /// Its start value as it is written, if it has one.
+    /// Start value as written in the file, if given.
     pub start: Option<String>,
-    /// Its unit, or that of its declared type, if there is one.
+    /// Unit of the variable or of its declared type, if given.
     pub unit: Option<String>,
-    /// Its smallest value, or that of its declared type, if there is one.
+    /// Smallest value of the variable or of its declared type, if given.
     pub min: Option<f64>,
-    /// Its largest value, or that of its declared type, if there is one.
+    /// Largest value of the variable or of its declared type, if given.
     pub max: Option<f64>,
-    /// The name of its declared type, if it has one.
+    /// Name of the declared type, if given.
     pub declared_type: Option<String>,
-    /// The unit that its values are displayed in, or that of its declared type, if there is one.
+    /// Display unit of the variable or of its declared type, if given.
     pub display_unit: Option<String>,
-    /// The name of the continuous state whose derivative with respect to time it is, if it is one.
+    /// Name of the continuous state of which this variable is the time derivative, if it is one.
     pub derivative_of: Option<String>,
-    /// Of an output: the value references of what it depends on without a step; `None` if nothing is said, for then it may be
-    /// all inputs (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
+    /// For an output: value references of the variables on which it depends without a step. `None` if not
+    /// given; then it may depend on all inputs (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
     pub depends_on: Option<Vec<u32>>,
-    /// What it means.
+    /// Description.
     pub description: String,
 }
 
-/// What an FMU offers to those who use it by one type of interface.
+/// Capabilities of an FMU for one interface type.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Offer {
-    /// What the library is called.
+    /// `modelIdentifier`, the name of the library.
     pub identifier: String,
-    /// One instance in a process is all there may be.
+    /// Whether a process may have only one instance.
     pub once_per_process: bool,
-    /// Its library starts another program, which must be installed.
+    /// Whether the library starts another program, which must be installed.
     pub needs_execution_tool: bool,
-    /// It takes input derivatives (FMI 2.0, `canInterpolateInputs`).
+    /// Whether it accepts input derivatives (FMI 2.0, `canInterpolateInputs`).
     pub input_derivatives: bool,
-    /// It calculates directional derivatives (`providesDirectionalDerivative`, in FMI 3.0 with an s at the end).
+    /// Whether it provides directional derivatives (`providesDirectionalDerivative`, in FMI 3.0 with a final
+    /// s).
     pub directional_derivatives: bool,
-    /// Its state can be saved and restored (`canGetAndSetFMUstate`, in FMI 3.0 with a capital S).
+    /// Whether its state can be saved and restored (`canGetAndSetFMUstate`, in FMI 3.0
+    /// `canGetAndSetFMUState`).
     pub saves_states: bool,
-    /// Saved states can be serialized (`canSerializeFMUstate`).
+    /// Whether saved states can be serialized (`canSerializeFMUstate`).
     pub serializes_states: bool,
 }
 
-/// The model description of an FMU, as far as running or wiring it needs it.
+/// Parts of the model description of an FMU that running or connecting it needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Description {
-    /// The edition of the standard.
+    /// FMI version.
     pub standard: Standard,
-    /// The name of the model.
+    /// Name of the model.
     pub model_name: String,
     /// `guid` of FMI 2.0, `instantiationToken` of FMI 3.0.
     pub token: String,
-    /// What it offers in Co-Simulation, if it has that.
+    /// Capabilities in Co-Simulation, if the FMU supports it.
     pub co_simulation: Option<Offer>,
-    /// What it offers in Model Exchange, if it has that.
+    /// Capabilities in Model Exchange, if the FMU supports it.
     pub model_exchange: Option<Offer>,
-    /// The experiment that it proposes: start, stop and step size of the communication, s, as far as it says them.
+    /// Start time, stop time and step size of the default experiment, s, if given.
     pub default_experiment: [Option<f64>; 3],
-    /// The number of continuous states.
+    /// Number of continuous states.
     pub states: usize,
-    /// The number of event indicators.
+    /// Number of event indicators.
     pub event_indicators: usize,
-    /// In the order of the model description.
+    /// Variables, in the order of the model description.
     pub variables: Vec<Variable>,
-    /// The units by their names, each with the exponents of SI's base units, factor and offset as they are written.
+    /// Units by name, each with the exponents of SI base units, factor and offset as written in the file.
     pub units: BTreeMap<String, Vec<(String, String)>>,
-    /// By units, what else values in them may be given in: its name, factor and offset.
+    /// Display units by unit, each with name, factor and offset.
     pub display_units: BTreeMap<String, Vec<(String, f64, f64)>>,
-    /// The enumerations by their names, each with the names and numbers of its items.
+    /// Enumerations by name, each with the names and numbers of its items.
     pub enumerations: BTreeMap<String, Vec<(String, String)>>,
-    /// What the elements of arrays are.
+    /// Arrays to which variables belong.
     pub(crate) arrays: Arc<Arrays>,
     places: HashMap<String, usize>,
 }
@@ -95,7 +98,7 @@ impl Description {
     /// Reads a `modelDescription.xml`.
     ///
     /// # Errors
-    /// A sentence on what is wrong or missing.
+    /// The message names the fault.
     pub fn parse(text: &str) -> Result<Self, String> {
         let document =
             Document::parse(text).map_err(|error| format!("modelDescription.xml is no XML: {error}"))?;
@@ -135,7 +138,7 @@ impl Description {
         })
     }
 
-    /// What it offers for this type of interface, if it has that.
+    /// Returns the capabilities for this interface type, if the FMU supports it.
     pub fn offer(&self, interface: Interface) -> Option<&Offer> {
         match interface {
             Interface::CoSimulation => self.co_simulation.as_ref(),
@@ -143,26 +146,28 @@ impl Description {
         }
     }
 
-    /// The variable of this name.
+    /// Returns the variable of this name.
     pub fn variable(&self, name: &str) -> Option<&Variable> {
         self.places.get(name).map(|place| &self.variables[*place])
     }
 
-    /// Whether directional derivatives with respect to this variable may exist: it is an input, a parameter or a continuous state.
+    /// Returns whether directional derivatives with respect to this variable may exist: for inputs,
+    /// parameters and continuous states.
     pub(crate) fn is_known(&self, name: &str) -> bool {
         self.variable(name).is_some_and(Variable::is_settable)
             || self.variables.iter().any(|of| of.derivative_of.as_deref() == Some(name))
     }
 
-    /// The names and numbers of the items of a variable's enumeration, if it is of one.
+    /// Returns names and numbers of the items of a variable's enumeration, if it has one.
     pub fn items(&self, of: &Variable) -> Option<&[(String, String)]> {
         self.enumerations.get(of.declared_type.as_ref()?).map(Vec::as_slice)
     }
 
-    /// Whether an output may feed an input of another FMU or the same: both of the same type, unit and items.
+    /// Checks that an output may be connected to an input of this or another FMU: types, units and items must
+    /// be equal.
     ///
     /// # Errors
-    /// What differs, in a few words.
+    /// The message names the difference.
     pub fn connects(&self, output: &Variable, to: &Self, input: &Variable) -> Result<(), String> {
         let [one, other] = [output, input].map(Variable::kind);
         if one != other {
@@ -181,12 +186,12 @@ impl Description {
 }
 
 impl Variable {
-    /// Whether a caller may set it after the initialization, as far as its causality tells.
+    /// Returns whether a caller may set the variable after the initialization, according to its causality.
     pub(crate) fn is_settable(&self) -> bool {
         matches!(self.causality.as_str(), "input" | "parameter" | "structuralParameter")
     }
 
-    /// What its values are, in a sentence.
+    /// Returns the kind of its values, for use in a message.
     pub(crate) fn what(&self) -> &'static str {
         match self.kind() {
             "Boolean" => "a Boolean",
@@ -197,7 +202,8 @@ impl Variable {
         }
     }
 
-    /// Its type as those have it who tell numbers of FMI 3.0 apart as little as FMI 2.0.
+    /// Returns the type as in FMI 2.0, which has one type for all floating-point numbers and one for all
+    /// integers.
     pub fn kind(&self) -> &'static str {
         match self.base {
             BaseType::Real | BaseType::Float32 => "Real",
@@ -235,14 +241,15 @@ fn default_experiment(root: Node) -> [Option<f64>; 3] {
     [of("startTime"), of("stopTime"), of("stepSize")]
 }
 
-/// A derivative for each (section 2.2.8 of FMI 2.0, 2.4.8 of FMI 3.0).
+/// Returns the number of continuous states: each has one derivative (section 2.2.8 of FMI 2.0, 2.4.8 of FMI
+/// 3.0).
 fn states(root: Node, arrays: &Arrays) -> usize {
     let structure = child(root, "ModelStructure");
     let of_fmi2 = structure.map_or(0, |structure| elements(structure, "Derivatives").count());
     of_fmi2 + count(root, "ContinuousStateDerivative", arrays)
 }
 
-/// A number in FMI 2.0, in FMI 3.0 they are variables.
+/// Returns the number of event indicators: an attribute in FMI 2.0, variables in FMI 3.0.
 fn event_indicators(root: Node, arrays: &Arrays) -> Result<usize, String> {
     let of_fmi2 = match root.attribute("numberOfEventIndicators") {
         Some(text) => text.parse().map_err(|_| {
@@ -253,7 +260,7 @@ fn event_indicators(root: Node, arrays: &Arrays) -> Result<usize, String> {
     Ok(of_fmi2 + count(root, "EventIndicator", arrays))
 }
 
-/// How many there are of these in the structure of FMI 3.0, where an array counts as many times as it has elements.
+/// Counts elements of this name in the structure of FMI 3.0; an array counts once per element.
 fn count(root: Node, name: &str, arrays: &Arrays) -> usize {
     let listed = elements(root, "ModelStructure").filter(|node| node.has_tag_name(name));
     listed.map(|node| number(node, "valueReference").map_or(1, |reference| arrays.length(reference))).sum()
@@ -267,13 +274,14 @@ fn attributes(node: Node) -> Vec<(String, String)> {
     node.attributes().map(|of| (of.name().to_owned(), of.value().to_owned())).collect()
 }
 
-/// Section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0.
+/// Reads a unit (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0).
 fn unit(node: Node) -> (String, Vec<(String, String)>) {
     let base = child(node, "BaseUnit").map(attributes).unwrap_or_default();
     (node.attribute("name").unwrap_or_default().to_owned(), base)
 }
 
-/// Value in the display unit = factor * value in the unit + offset; in FMI 3.0 it may be inverse.
+/// Reads display units: value in the display unit = factor * value in the unit + offset. Skips inverse units
+/// of FMI 3.0.
 fn display_units(node: Node) -> (String, Vec<(String, f64, f64)>) {
     let number =
         |of: Node, name, default| of.attribute(name).and_then(|text| text.parse().ok()).unwrap_or(default);
@@ -286,7 +294,7 @@ fn display_units(node: Node) -> (String, Vec<(String, f64, f64)>) {
     (node.attribute("name").unwrap_or_default().to_owned(), others.collect())
 }
 
-/// Which outputs depend on what: by places in FMI 2.0, counted from 1, by value references in FMI 3.0.
+/// Reads the dependencies of outputs: indices in FMI 2.0, counted from 1; value references in FMI 3.0.
 fn depend(root: Node, standard: Standard, variables: &mut [Variable], arrays: &Arrays) {
     let list = |node: Node, name: &str| -> Option<Vec<u32>> {
         let list = node.attribute(name)?.split_whitespace();
@@ -315,7 +323,7 @@ fn depend(root: Node, standard: Standard, variables: &mut [Variable], arrays: &A
                 let Some(reference) = number(node, "valueReference") else { continue };
                 let own = arrays.elements(reference);
                 let known = list(node, "dependencies").filter(|known| {
-                    // Of large arrays, which may depend on all inputs for all that is known here.
+                    // Skips very large arrays; these then depend on all inputs.
                     own.len() * known.iter().map(|known| arrays.length(*known)).sum::<usize>() < 1 << 22
                 });
                 let known: Option<Vec<u32>> =
@@ -327,7 +335,7 @@ fn depend(root: Node, standard: Standard, variables: &mut [Variable], arrays: &A
     }
 }
 
-/// The states of derivatives: by places in FMI 2.0, counted from 1, by value references in FMI 3.0.
+/// Sets `derivative_of`: from indices in FMI 2.0, counted from 1; from value references in FMI 3.0.
 fn differentiate(root: Node, standard: Standard, variables: &mut [Variable], arrays: &Arrays) {
     let names: HashMap<u32, String> = match standard {
         Standard::Fmi2 => (1..).zip(variables.iter().map(|of| of.name.clone())).collect(),
@@ -355,7 +363,8 @@ fn differentiate(root: Node, standard: Standard, variables: &mut [Variable], arr
     }
 }
 
-/// A type's element in FMI 2.0 holds one for its kind (section 2.2.3); in FMI 3.0 it is that itself (2.4.4).
+/// Reads an enumeration. In FMI 2.0 the type element contains an element for the base type (section 2.2.3);
+/// in FMI 3.0 they are one element (2.4.4).
 fn enumeration(node: Node) -> Option<(String, Vec<(String, String)>)> {
     let items = node.descendants().filter(|item| item.has_tag_name("Item"));
     let item = |item: Node| Some((item.attribute("name")?.to_owned(), item.attribute("value")?.to_owned()));
@@ -367,7 +376,8 @@ fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
     node.children().find(|child| child.has_tag_name(name))
 }
 
-/// The declared types by name, each as the elements that have attributes: in FMI 2.0 one for the kind is in the type's.
+/// Declared types by name, each with the elements that may have attributes: in FMI 2.0, the type element and
+/// its child.
 type Types<'a> = HashMap<&'a str, Vec<Node<'a, 'a>>>;
 
 fn types<'a>(root: Node<'a, 'a>) -> Types<'a> {
@@ -375,7 +385,8 @@ fn types<'a>(root: Node<'a, 'a>) -> Types<'a> {
     types.filter_map(|of| Some((of.attribute("name")?, of.children().chain([of]).collect()))).collect()
 }
 
-/// Each is a `ScalarVariable` with an element for its type (section 2.2.7 of FMI 2.0).
+/// Reads the variables of FMI 2.0: each is a `ScalarVariable` with an element for its type (section 2.2.7
+/// there).
 fn variables_of_fmi2(root: Node) -> Result<Vec<Variable>, String> {
     let mut found = Vec::new();
     let types = types(root);
@@ -388,8 +399,8 @@ fn variables_of_fmi2(root: Node) -> Result<Vec<Variable>, String> {
     Ok(found)
 }
 
-/// The element's name is the type (section 2.4.7 of FMI 3.0). An array is replaced by its elements. Clocks are passed over, and
-/// arrays whose size is not known or beyond all use: nothing here sets or reads them.
+/// Reads the variables of FMI 3.0: the element name is the type (section 2.4.7 there). Replaces an array by
+/// its elements. Skips clocks, and arrays whose size is unknown or too large.
 fn variables_of_fmi3(root: Node) -> Result<(Vec<Variable>, Arrays), String> {
     let mut found = Vec::new();
     let types = types(root);
@@ -423,7 +434,8 @@ fn variables_of_fmi3(root: Node) -> Result<(Vec<Variable>, Arrays), String> {
     Ok((found, arrays))
 }
 
-/// Of an array in one direction: a number, or the start value of a structural parameter (section 2.4.7.5.1 of FMI 3.0).
+/// Returns the size of an array dimension: a number, or the start value of a structural parameter (section
+/// 2.4.7.5.1 of FMI 3.0).
 fn size(root: Node, dimension: Node) -> Option<usize> {
     if let Some(size) = dimension.attribute("start") {
         return size.trim().parse().ok();
@@ -446,7 +458,7 @@ fn variable(node: Node, of_type: Node, base: BaseType, types: &Types) -> Result<
     let reference = node.attribute("valueReference").and_then(|text| text.parse().ok());
     let text = |name: &str| node.attribute(name).map(str::to_owned);
     let start = match base {
-        // Section 2.4.7.5 of FMI 3.0: texts have theirs in an element.
+        // Section 2.4.7.5 of FMI 3.0: start values of strings are child elements.
         BaseType::String if of_type.attribute("start").is_none() => {
             child(of_type, "Start").and_then(|start| start.attribute("value"))
         }

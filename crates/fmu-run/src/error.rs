@@ -1,22 +1,22 @@
-//! What can be wrong with an FMU or with what it is asked for.
+//! Errors of an FMU or of a request.
 
 use std::fmt;
 
-/// Why nothing can be run. What a single run is refused for is told [with that run](crate::Runs::errors).
+/// Error that prevents all runs. The error of a single run is [part of the results](crate::Runs::errors).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// The file is no FMU, or none that can be run here.
+    /// The file is no FMU, or cannot be run on this machine.
     Fmu(String),
-    /// What is asked for does not fit the FMU, or itself.
+    /// The request does not fit the FMU, or is inconsistent.
     Request(String),
-    /// The results or the instances need more memory than there is.
+    /// There is not enough memory for the results or the instances.
     Memory(String),
-    /// The caller has [cancelled](crate::Watch::cancel).
+    /// The caller has [cancelled](crate::Watch::cancel) the runs.
     Cancelled,
 }
 
 impl Error {
-    /// The results of a batch fit into no memory.
+    /// Returns the error for a batch whose results do not fit in memory.
     pub fn too_much() -> Self {
         Self::Memory(
             "the trajectories need more memory than there is; take measures, keep fewer times (every), or split the runs"

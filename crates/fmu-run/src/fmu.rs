@@ -1,4 +1,4 @@
-//! An FMU that has been unpacked and loaded.
+//! An unpacked and loaded FMU.
 
 use crate::description::{Description, Offer};
 use crate::error::Error;
@@ -15,42 +15,45 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
 
-/// An FMU, unpacked and loaded once, for any number of runs and instances, which keep it loaded: a [`System`] of one.
+/// An FMU, unpacked and loaded once for any number of runs and instances, which keep it loaded. It is a
+/// [`System`] with one component.
 #[derive(Clone, Debug)]
 pub struct Fmu(System);
 
 impl Fmu {
-    /// Unpacks an FMU and loads its library: `unsafe`, for it runs code that comes with the FMU.
+    /// Unpacks an FMU and loads its library. It is `unsafe` because it runs code of the FMU.
     ///
     /// ```compile_fail,E0133
     /// let fmu = fmu_run::Fmu::open("model.fmu".as_ref());
     /// ```
     ///
     /// # Safety
-    /// The library's functions have the types of the standard, and what it does when it is loaded and called is sound.
+    /// The functions of the library have the types of the FMI standard, and the library is sound when it is
+    /// loaded and called.
     ///
     /// # Errors
-    /// [`Error::Fmu`], when the file is no FMU, has no library for this platform, or needs another
+    /// Returns [`Error::Fmu`] if the file is no FMU, has no library for this platform, or needs another
     /// program.
     pub unsafe fn open(path: &Path) -> Result<Self, Error> {
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees that the library is sound.
         unsafe { Loaded::open(path, false) }.map(|loaded| Self(System::of_one(loaded)))
     }
 
-    /// The same, also if the FMU's library starts another program (`needsExecutionTool`), which must be installed. What
-    /// an FMU says when it does not find its program, it says when it is run.
+    /// Opens an FMU as [`open`](Self::open) does, and permits libraries that start another program
+    /// (`needsExecutionTool`), which must be installed. If the program is missing, the FMU reports it when it
+    /// runs.
     ///
     /// # Safety
-    /// As of [`open`](Self::open), and the program may be started.
+    /// The requirement of [`open`](Self::open), and the program may be started.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
+    /// Same errors as [`open`](Self::open).
     pub unsafe fn open_with_execution_tool(path: &Path) -> Result<Self, Error> {
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees that the library is sound and that the program may be started.
         unsafe { Loaded::open(path, true) }.map(|loaded| Self(System::of_one(loaded)))
     }
 
-    /// What the model description says.
+    /// Returns the model description.
     pub fn description(&self) -> &Description {
         &self.loaded().description
     }
@@ -60,7 +63,7 @@ impl Fmu {
     }
 }
 
-/// What a [`System`] can do, its one FMU can do alone: variables, runs, instances.
+/// An FMU has the functions of its [`System`]: variables, runs, instances.
 impl Deref for Fmu {
     type Target = System;
 
@@ -69,18 +72,21 @@ impl Deref for Fmu {
     }
 }
 
-/// What an FMU is when it is unpacked and loaded.
+/// An unpacked and loaded FMU.
 #[derive(Debug)]
 pub(crate) struct Loaded {
     pub description: Description,
     co_simulation: Option<Arc<Library>>,
-    /// Or why it cannot be loaded, where it has Co-Simulation, too.
+    /// Library for Model Exchange, or the reason why it cannot be loaded although the library for
+    /// Co-Simulation can.
     model_exchange: Result<Option<Arc<Library>>, String>,
 }
 
 impl Loaded {
+    /// Opens an FMU.
+    ///
     /// # Safety
-    /// As of [`Fmu::open`], and the program may be started if there is to be an execution tool.
+    /// The requirement of [`Fmu::open`]; if `execution_tool` is true, the program may be started.
     pub unsafe fn open(path: &Path, execution_tool: bool) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let folder = unpacked(path).map_err(fail)?;
@@ -89,7 +95,7 @@ impl Loaded {
             .map_err(|_| fail("there is no readable modelDescription.xml in it; it is no FMU".to_owned()))?;
         let description = Description::parse(&text).map_err(fail)?;
         let folder = Arc::new(folder);
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees that the library is sound.
         let load = |offer: &Offer| unsafe { load(&folder, description.standard, offer, execution_tool) };
         let co_simulation = description.co_simulation.as_ref().map(load).transpose().map_err(fail)?;
         let same = |offer: &&Offer| {
@@ -106,12 +112,12 @@ impl Loaded {
         Ok(Self { description, co_simulation, model_exchange })
     }
 
-    /// There may be one instance only.
+    /// Returns whether a process may have only one instance.
     pub fn once_per_process(&self, interface: Interface) -> bool {
         self.description.offer(interface).is_some_and(|offer| offer.once_per_process)
     }
 
-    /// The library for this type of interface.
+    /// Returns the library for this interface type.
     pub fn library(&self, interface: Interface) -> Result<&Arc<Library>, Error> {
         let name = &self.description.model_name;
         match interface {
@@ -128,10 +134,10 @@ impl Loaded {
     }
 }
 
-/// The library for a type of interface.
+/// Loads the library for an interface type.
 ///
 /// # Safety
-/// As of [`Fmu::open`].
+/// The requirement of [`Fmu::open`].
 unsafe fn load(
     folder: &Arc<TempDir>,
     standard: Standard,
@@ -145,10 +151,10 @@ unsafe fn load(
     }
     let file = library_of(folder.path(), standard, offer)?;
     let resources = location(&folder.path().join("resources"), standard);
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees that the library is sound.
     let loaded = unsafe { Library::load(&file, standard, resources, Arc::clone(folder)) };
     loaded.map(Arc::new).map_err(|error| {
-        // The loader's error says which call failed, its source why.
+        // The loader's error names the failed call; its source gives the reason.
         let why = machine::mismatch(&file).unwrap_or_else(|| match error.source() {
             Some(source) => format!("{error}: {source}"),
             None => error.to_string(),
@@ -165,13 +171,13 @@ pub(crate) fn unpacked(path: &Path) -> Result<TempDir, String> {
         .prefix("fmu-run-")
         .tempdir()
         .map_err(|error| format!("there is no room to unpack it ({error})"))?;
-    // Entries that would leave the folder are refused.
+    // `extract` rejects entries that would leave the directory.
     archive.extract(folder.path()).map_err(|error| format!("cannot be unpacked ({error})"))?;
     Ok(folder)
 }
 
-/// The folders of `binaries/` where a library for this machine may lie. Those of FMI 2.0 know no processors; many FMUs
-/// for ARM have theirs there all the same.
+/// Returns the directories of `binaries/` that may contain a library for this machine. The names of FMI 2.0
+/// do not contain the processor; many FMUs for ARM use them nevertheless.
 fn folders(standard: Standard) -> Vec<String> {
     let system = if OS == "macos" { "darwin" } else { OS };
     let tuple = format!("{ARCH}-{system}");
@@ -205,7 +211,8 @@ fn library_of(folder: &Path, standard: Standard, offer: &Offer) -> Result<PathBu
     Err(format!("has no library for this platform (binaries/{}/{name}); it has: {others}", folders[0]))
 }
 
-/// The folder as importers write it: a URI in FMI 2.0 (section 2.1.5), a path with an end in FMI 3.0 (section 2.3.1).
+/// Returns the location of the directory as importers write it: a URI in FMI 2.0 (section 2.1.5), a path with
+/// a final separator in FMI 3.0 (section 2.3.1).
 fn location(resources: &Path, standard: Standard) -> CString {
     let text = match standard {
         Standard::Fmi2 => uri(resources.as_os_str()),

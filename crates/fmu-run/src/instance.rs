@@ -1,5 +1,5 @@
-//! An instance of an FMU, whichever the standard: safe to call, because lengths are checked, the library stays, and nothing
-//! is called any more after fmi2Fatal.
+//! An instance of an FMU of any version. Safe functions wrap the C calls: they check lengths, keep the
+//! library loaded, and call nothing after fmi2Fatal.
 
 use crate::arrays::{Arrays, Whole};
 use crate::fmu::Loaded;
@@ -16,32 +16,32 @@ use std::ptr::{null, null_mut};
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// An instance; freed when dropped. It keeps its library loaded.
+/// An instance, freed when dropped. It keeps its library loaded.
 #[derive(Debug)]
 pub struct Instance {
-    /// NULL after fmi2Fatal: then not even its memory may be given back (section 2.1.3 of FMI 2.0).
+    /// NULL after fmi2Fatal, when even freeing is forbidden (section 2.1.3 of FMI 2.0).
     handle: *mut c_void,
     log: Arc<Log>,
-    /// The structure must live as long as the instance (section 2.1.5 of FMI 2.0).
+    /// Callbacks, which must live as long as the instance (section 2.1.5 of FMI 2.0).
     _callbacks: Rc<fmi2CallbackFunctions>,
     library: Arc<Library>,
-    /// The states that it has saved; NULL where there is room for another.
+    /// States that the instance has saved; NULL marks a free entry.
     saved: Vec<*mut c_void>,
-    /// Of its component; empty where there is only one.
+    /// Name of the component; empty if there is only one.
     name: String,
     arrays: Arc<Arrays>,
-    /// What arrays have been set to before the initialization, when they cannot be read yet; `None` after it has begun.
+    /// Values of arrays set before the initialization, when they cannot be read; `None` after its start.
     early: Option<Early>,
 }
 
-/// The values of arrays by their places, once they have been set.
+/// Values of arrays that have been set, by array index.
 #[derive(Debug, Default)]
 struct Early {
     numbers: HashMap<usize, Vec<f64>>,
     texts: HashMap<usize, Vec<CString>>,
 }
 
-/// The place of a state that an instance has saved.
+/// Index of a state that an instance has saved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Saved(usize);
 
@@ -51,36 +51,36 @@ impl Saved {
     }
 }
 
-/// What an event did (section 3.2.2 of FMI 2.0, 2.3.5 of FMI 3.0).
+/// Result of an event (section 3.2.2 of FMI 2.0, 2.3.5 of FMI 3.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Event {
-    /// The FMU wants to end the simulation.
+    /// Whether the FMU requests the end of the simulation.
     pub terminate: bool,
-    /// The nominal values of the states have changed.
+    /// Whether the nominal values of the states have changed.
     pub nominals_changed: bool,
-    /// The states have changed.
+    /// Whether the states have changed.
     pub states_changed: bool,
-    /// When the next event is due, s.
+    /// Time of the next event, s.
     pub next: Option<f64>,
 }
 
-/// What an instance for Model Exchange can be asked for, one value for each state or event indicator.
+/// Quantities in Model Exchange with one value for each state or event indicator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Continuous {
-    /// The states.
+    /// Continuous states.
     States,
-    /// Their derivatives.
+    /// Derivatives of the states.
     Derivatives,
-    /// The event indicators.
+    /// Event indicators.
     EventIndicators,
-    /// The nominal values of the states.
+    /// Nominal values of the states.
     Nominals,
 }
 
-/// Rounds of an event that are waited for.
+/// Limit of iterations of an event.
 const MOST_ROUNDS: usize = 10_000;
 
-// SAFETY: an instance may be used from any one thread at a time (masters have thread pools).
+// SAFETY: the FMI standards permit use of an instance from any thread, one thread at a time.
 unsafe impl Send for Instance {}
 
 impl Drop for Instance {
@@ -91,7 +91,7 @@ impl Drop for Instance {
         for place in 0..self.saved.len() {
             _ = self.forget(Saved(place));
         }
-        // SAFETY: made by the library and freed only here.
+        // SAFETY: the library made the instance, which is freed only here.
         unsafe {
             match &self.library.functions {
                 Functions::Fmi2(functions) => (functions.fmi2FreeInstance)(self.handle),
@@ -101,14 +101,15 @@ impl Drop for Instance {
     }
 }
 
-/// A call: the function of either standard with its arguments, or that which only FMI 2.0 has.
+/// Calls a function of FMI 2.0 or its counterpart in FMI 3.0; without a counterpart, FMI 3.0 gets an error.
 macro_rules! call {
     ($self:ident, $fmi2:ident ( $($of_fmi2:expr),* ) $(, $fmi3:ident ( $($of_fmi3:expr),* ))?) => {{
         let handle = $self.handle;
         if handle.is_null() {
             return Err($self.refusal(stringify!($fmi2), Status::Fatal, Vec::new()));
         }
-        // SAFETY: the instance is alive; arrays are slices of the lengths that are passed, single values live.
+        // SAFETY: the instance is alive; array arguments are slices with the passed lengths, and single
+        // values are live references.
         let (function, code) = unsafe {
             match &$self.library.functions {
                 Functions::Fmi2(of) => (stringify!($fmi2), (of.$fmi2)(handle $(, $of_fmi2)*)),
@@ -121,7 +122,7 @@ macro_rules! call {
     }};
 }
 
-/// The numbers with their functions: those of FMI 3.0, and what FMI 2.0 has for them.
+/// Lists the numeric types with their setters and getters in FMI 2.0 and FMI 3.0.
 macro_rules! numbers {
     ($with:ident: $($before:tt)*) => { $with! { $($before)*;
         Real fmi2SetReal fmi2GetReal f64 fmi3SetFloat64 fmi3GetFloat64 f64
@@ -173,7 +174,7 @@ macro_rules! get {
     };
 }
 
-/// All values of an array, which only FMI 3.0 has.
+/// Sets all values of an array, which exists only in FMI 3.0.
 macro_rules! set_all {
     ($self:ident $base:ident $vr:ident $values:ident;
      $($name:ident $set2:ident $get2:ident $type2:ident $set3:ident $get3:ident $type3:ident)+) => {
@@ -216,8 +217,8 @@ macro_rules! get_all {
 }
 
 impl Instance {
-    /// A new instance of an FMU that has this type of interface; or why there is none, and whether the FMU said so. Its name
-    /// is that of its component.
+    /// Creates an instance for an interface type. The error contains the reason, and whether the FMU gave it.
+    /// The instance has the name of its component.
     pub(crate) fn new(
         fmu: &Loaded,
         component: &str,
@@ -240,7 +241,7 @@ impl Instance {
             step_finished: None,
             component_environment: environment,
         });
-        // SAFETY: all strings live, the callbacks and the log as long as the instance.
+        // SAFETY: all strings are live; callbacks and log live as long as the instance.
         let handle = unsafe {
             match &library.functions {
                 Functions::Fmi2(functions) => (functions.fmi2Instantiate)(
@@ -295,7 +296,7 @@ impl Instance {
         Refusal::new(&self.name, function, status, log)
     }
 
-    /// What became of a call.
+    /// Converts the status of a call.
     #[inline]
     fn check(&mut self, function: &'static str, code: c_int) -> Result<(), Refusal> {
         if code == Status::Ok as c_int { Ok(()) } else { self.not_ok(function, Status::from_c(code)) }
@@ -303,7 +304,7 @@ impl Instance {
 
     #[cold]
     fn not_ok(&mut self, function: &'static str, status: Status) -> Result<(), Refusal> {
-        // What came with a warning must not be taken for the reason of something later.
+        // Messages of a warning are removed, so that they are not taken for the reason of a later error.
         let log = self.log.take();
         if status == Status::Warning {
             return Ok(());
@@ -318,7 +319,7 @@ impl Instance {
         matches!(self.library.functions, Functions::Fmi2(_))
     }
 
-    /// Whether it can still be used.
+    /// Returns whether the instance can still be used.
     pub(crate) fn is_alive(&self) -> bool {
         !self.handle.is_null()
     }
@@ -327,15 +328,15 @@ impl Instance {
         self.log.take();
     }
 
-    /// The messages since the last time, of an instance whose logging is on.
+    /// Returns the messages since the last call, if logging is on.
     pub(crate) fn take_messages(&self) -> Vec<Message> {
         self.log.take_all()
     }
 
-    /// Before the start values are set, in FMI 2.0.
+    /// Sets up the experiment in FMI 2.0, before the start values are set.
     pub(crate) fn set_up(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
         match &self.library.functions {
-            // It says this when it begins to initialize.
+            // FMI 3.0 passes the times when it enters Initialization Mode.
             Functions::Fmi3(_) => Ok(()),
             Functions::Fmi2(_) => {
                 let stop = stop_time.unwrap_or(start_time);
@@ -386,7 +387,7 @@ impl Instance {
         call!(self, fmi2GetReal(vr, n, values), fmi3GetFloat64(vr, n, values, n))
     }
 
-    /// The Reals of whole arrays, and others.
+    /// Gets Reals of whole arrays and scalars.
     fn get_whole(&mut self, whole: &Whole) -> Result<Vec<f64>, Refusal> {
         let mut all = vec![0.0; whole.count];
         let (vr, n, values) = (whole.references.as_ptr(), whole.references.len(), all.as_mut_ptr());
@@ -395,7 +396,7 @@ impl Instance {
         Ok(all)
     }
 
-    /// Reals of which some are elements of arrays: what is not among them stays as it is.
+    /// Sets Reals of which some are array elements; the other elements of the arrays keep their values.
     #[cold]
     fn set_elements(&mut self, vr: &[u32], values: &[f64]) -> Result<(), Refusal> {
         let whole = self.arrays.whole(vr);
@@ -423,7 +424,8 @@ impl Instance {
         Ok(())
     }
 
-    /// What an array has before the initialization: what it was set to, or its start values.
+    /// Returns the values of an array before the initialization: the values that were set, or the start
+    /// values.
     fn early_numbers(&self, array: usize) -> Vec<f64> {
         if let Some(known) = self.early.as_ref().and_then(|early| early.numbers.get(&array)) {
             return known.clone();
@@ -436,7 +438,7 @@ impl Instance {
         (0..self.arrays.length(of.reference)).map(number).collect()
     }
 
-    /// All numbers of an array now.
+    /// Returns all numbers of an array.
     fn array_numbers(&mut self, array: usize) -> Result<Vec<f64>, Refusal> {
         let arrays = Arc::clone(&self.arrays);
         let of = &arrays.all()[array];
@@ -444,7 +446,7 @@ impl Instance {
         numbers!(get_all: self base vr length)
     }
 
-    /// One number of an array, whose others stay as they are.
+    /// Sets one number of an array; the others keep their values.
     fn set_element(&mut self, (array, number): (usize, usize), value: f64) -> Result<(), Refusal> {
         let arrays = Arc::clone(&self.arrays);
         let (base, vr) = (arrays.all()[array].base, arrays.all()[array].reference);
@@ -459,7 +461,7 @@ impl Instance {
         Ok(())
     }
 
-    /// A number of any type, or 0 and 1 for a Boolean.
+    /// Sets a number of any type; 0 or 1 for a Boolean.
     pub(crate) fn set_number(&mut self, base: BaseType, vr: u32, value: f64) -> Result<(), Refusal> {
         if let Some(element) = self.arrays.find(vr) {
             return self.set_element(element, value);
@@ -474,19 +476,19 @@ impl Instance {
         numbers!(get: self base vr)
     }
 
-    /// All texts of an array, in FMI 3.0.
+    /// Returns all strings of an array, in FMI 3.0.
     fn array_texts(&mut self, array: usize) -> Result<Vec<CString>, Refusal> {
         let vr = self.arrays.all()[array].reference;
         let mut texts = vec![null(); self.arrays.length(vr)];
         let (values, n) = (texts.as_mut_ptr(), texts.len());
         call!(self, fmi2GetString(&vr, 1, values), fmi3GetString(&vr, 1, values, n))?;
-        // SAFETY: texts of the FMU's, which stay until the next call of it.
+        // SAFETY: the strings belong to the FMU and are valid until the next call.
         let owned =
             |text: &fmi3String| unsafe { (!text.is_null()).then(|| CStr::from_ptr(*text).to_owned()) };
         Ok(texts.iter().map(owned).map(Option::unwrap_or_default).collect())
     }
 
-    /// One text of an array, whose others stay as they are.
+    /// Sets one string of an array; the others keep their values.
     fn set_text_element(&mut self, (array, number): (usize, usize), value: &CStr) -> Result<(), Refusal> {
         let (arrays, vr) = (Arc::clone(&self.arrays), self.arrays.all()[array].reference);
         let start =
@@ -523,11 +525,11 @@ impl Instance {
         if text.is_null() {
             return Ok(String::new());
         }
-        // SAFETY: a text of the FMU's, which stays until the next call of it.
+        // SAFETY: the string belongs to the FMU and is valid until the next call.
         Ok(unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned())
     }
 
-    /// Time derivatives of order 1, which FMI 3.0 has no function for.
+    /// Sets time derivatives of inputs, of order 1. FMI 3.0 has no function for this.
     #[inline]
     pub(crate) fn set_input_derivatives(
         &mut self,
@@ -540,7 +542,7 @@ impl Instance {
         call!(self, fmi2SetRealInputDerivatives(vr, n, orders, values))
     }
 
-    /// Time derivatives of outputs, of order 1.
+    /// Gets time derivatives of outputs, of order 1.
     pub(crate) fn get_output_derivatives(
         &mut self,
         vr: &[u32],
@@ -570,7 +572,7 @@ impl Instance {
         )
     }
 
-    /// Refused also where the FMU ends the simulation.
+    /// Performs a step. Returns an error also if the FMU ends the simulation.
     #[inline]
     pub(crate) fn step(&mut self, time: f64, size: f64) -> Result<(), Refusal> {
         let (mut event, mut terminate, mut early, mut reached) = (fmi3False, fmi3False, fmi3False, time);
@@ -586,7 +588,7 @@ impl Instance {
         }
     }
 
-    /// A step that was discarded may be the end that the FMU wants (section 4.2.3 of FMI 2.0).
+    /// Detects whether a discarded step is a request to end the simulation (section 4.2.3 of FMI 2.0).
     #[cold]
     fn ended(&self, refusal: Refusal, time: f64) -> Refusal {
         let (mut wanted, mut reached) = (fmi2False, time);
@@ -596,7 +598,7 @@ impl Instance {
         if refusal.status() != Status::Discard {
             return refusal;
         }
-        // SAFETY: the instance is alive after fmi2Discard, the places live.
+        // SAFETY: the instance is alive after fmi2Discard; the pointers are live references.
         let [asked, told] = unsafe {
             [
                 (functions.fmi2GetBooleanStatus)(self.handle, kinds[0], &mut wanted),
@@ -610,7 +612,8 @@ impl Instance {
         refusal.at_end(if told { reached } else { time })
     }
 
-    /// The end that the FMU wants, or an early return, which it has not been allowed (section 4.2.1 of FMI 3.0).
+    /// Returns the error for a requested end of the simulation, or for an early return, which was not allowed
+    /// (section 4.2.1 of FMI 3.0).
     #[cold]
     fn stopped(&self, wanted: bool, reached: f64) -> Refusal {
         let (function, status) = ("fmi3DoStep", Status::Discard);
@@ -623,7 +626,7 @@ impl Instance {
         if wanted { refusal.at_end(reached) } else { refusal }
     }
 
-    /// Saves the state, in a place of its own.
+    /// Saves the state under a free index.
     pub(crate) fn save(&mut self) -> Result<Saved, Refusal> {
         let mut state = null_mut();
         call!(self, fmi2GetFMUstate(&mut state), fmi3GetFMUState(&mut state))?;
@@ -638,7 +641,7 @@ impl Instance {
         Saved(place)
     }
 
-    /// What is saved in a place.
+    /// Returns the saved state of an index.
     fn state(&self, saved: Saved, function: &'static str) -> Result<*mut c_void, Refusal> {
         let state = self.saved.get(saved.0).copied().filter(|state| !state.is_null());
         state.ok_or_else(|| self.refusal(function, Status::Error, Vec::new()))
@@ -678,7 +681,7 @@ impl Instance {
         Ok(self.keep(state))
     }
 
-    /// The derivatives of unknowns in the direction of a seed (section 2.1.9 of FMI 2.0, 2.2.11 of FMI 3.0).
+    /// Computes directional derivatives of unknowns for a seed (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0).
     pub(crate) fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -693,7 +696,7 @@ impl Instance {
         self.directional_derivative_of_variables(unknowns, knowns, seed, result)
     }
 
-    /// The call, with a value for each scalar and for each element of an array.
+    /// Calls the function with a value for each scalar and each array element.
     fn directional_derivative_of_variables(
         &mut self,
         unknowns: &[u32],
@@ -712,7 +715,8 @@ impl Instance {
         )
     }
 
-    /// The same where some are elements of arrays: the others of these do not change.
+    /// Computes directional derivatives if some variables are array elements: the seed of all other elements
+    /// is 0.
     #[cold]
     fn directional_derivative_of_elements(
         &mut self,
@@ -738,7 +742,7 @@ impl Instance {
         call!(self, fmi2EnterContinuousTimeMode(), fmi3EnterContinuousTimeMode())
     }
 
-    /// All rounds of an event, in Event Mode.
+    /// Performs all iterations of an event, in Event Mode.
     pub(crate) fn event(&mut self) -> Result<Event, Refusal> {
         let mut all = Event::default();
         for _ in 0..MOST_ROUNDS {
@@ -779,7 +783,8 @@ impl Instance {
         Err(self.refusal("event", Status::Error, vec![message]))
     }
 
-    /// Whether the FMU wants an event, and the end, after a step of the integrator.
+    /// Returns whether the FMU requests an event and the end of the simulation after a step of the
+    /// integrator.
     pub(crate) fn completed_integrator_step(&mut self) -> Result<[bool; 2], Refusal> {
         let [mut event2, mut end2] = [fmi2False; 2];
         let [mut event3, mut end3] = [fmi3False; 2];

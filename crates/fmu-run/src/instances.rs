@@ -1,4 +1,4 @@
-//! Instances of an FMU in the hand: set, stepped, read, put back, side by side.
+//! Instances of an FMU, controlled call by call: set, step, get, save and restore, all instances in parallel.
 
 use crate::description::Description;
 use crate::error::{Error, request};
@@ -10,25 +10,25 @@ use crate::start::{Start, StartValues};
 use crate::system::System;
 use fmi_abi::{BaseType, Interface};
 
-/// How instances are made.
+/// Settings for new instances.
 #[derive(Clone, Debug)]
 pub struct Setup<'a> {
-    /// Who integrates.
+    /// Interface type: Co-Simulation or Model Exchange.
     pub interface: Interface,
-    /// How many.
+    /// Number of instances.
     pub count: usize,
-    /// Start values.
+    /// Start values by variable.
     pub start: Vec<(&'a str, Start<'a>)>,
-    /// When they begin, s.
+    /// Start time, s.
     pub start_time: f64,
-    /// When they will end, s, if that is known; the FMU may refuse to go further.
+    /// Stop time, s, if known; the FMU may reject steps beyond it.
     pub stop_time: Option<f64>,
-    /// How many threads; `None` takes as many as the machine has processors.
+    /// Number of threads; `None` uses one thread for each processor.
     pub threads: Option<usize>,
 }
 
 impl Default for Setup<'_> {
-    /// One instance for Co-Simulation, from 0 s.
+    /// Returns settings for one instance for Co-Simulation that starts at 0 s.
     fn default() -> Self {
         Self {
             interface: Interface::CoSimulation,
@@ -41,11 +41,12 @@ impl Default for Setup<'_> {
     }
 }
 
-/// Instances of one FMU, each with its time. Every method does the same with all of them, in their threads; rows of values are
-/// one after the other: instances times variables, the last fastest.
+/// Instances of one FMU, each with its own time. Every method acts on all of them, in several threads. Values
+/// are stored in rows, one for each instance: instances times variables, the last index varies fastest.
 ///
-/// An instance that is refused something drops out: [`errors`](Self::errors) tells why, what is read of it is not a number,
-/// the others go on. [`reset`](Self::reset) and [`restore`](Self::restore) bring it back.
+/// If a call returns an error for an instance, the instance fails, and the others continue.
+/// [`errors`](Self::errors) contains the reason; values read from a failed instance are NaN.
+/// [`reset`](Self::reset) and [`restore`](Self::restore) make it usable again.
 #[derive(Debug)]
 pub struct Instances {
     system: System,
@@ -64,22 +65,23 @@ struct Begin {
 
 #[derive(Debug)]
 struct One {
-    /// None after it was lost for good.
+    /// The instance; `None` if it could not be made again.
     instance: Option<Running>,
-    /// Why it dropped out.
+    /// Reason why the instance failed, if it did.
     error: Option<String>,
     own: Own,
 }
 
-/// What is known of an instance.
+/// Time and last event of an instance.
 #[derive(Debug, Default)]
 struct Own {
     time: f64,
     event: Event,
 }
 
-/// States that [`Instances`] have saved, one for each that had not dropped out. They are places among
-/// their own, not pointers: what is freed is given away, and those of others lead to none or to another state of one's own.
+/// States that [`Instances`] have saved, one for each that had not failed. They are indices, not pointers, so
+/// the states of other instances are harmless: they lead to no state or to another own state. Freeing
+/// consumes the value, so freed states cannot be used.
 ///
 /// ```compile_fail,E0382
 /// fn restore_what_is_freed(instances: &mut fmu_run::Instances) {
@@ -91,16 +93,16 @@ struct Own {
 #[derive(Debug, PartialEq)]
 pub struct States(Vec<Option<(Saved, f64)>>);
 
-/// Which of the instances a call is for: all, or those that are true.
+/// Selection of the instances for a call: all, or those with true.
 pub type Mask<'a> = Option<&'a [bool]>;
 
 impl System {
-    /// Makes instances, sets their start values and initializes them. Those for Model Exchange have been through the events at
-    /// the begin and are in Continuous-Time Mode.
+    /// Makes instances, sets their start values and initializes them. Instances for Model Exchange have
+    /// handled the events at the start and are in Continuous-Time Mode.
     ///
     /// # Errors
-    /// [`Error::Request`] when what is asked for does not fit the FMU, [`Error::Fmu`] when it does not have this type of
-    /// interface, or makes no instances.
+    /// Returns [`Error::Request`] if the settings do not fit the FMU. Returns [`Error::Fmu`] if the FMU does
+    /// not support the interface type or makes no instances.
     pub fn instances(&self, setup: &Setup) -> Result<Instances, Error> {
         self.check_interface(setup.interface)?;
         if setup.count == 0 {
@@ -134,51 +136,52 @@ impl System {
 }
 
 impl Instances {
-    /// How many there are.
+    /// Returns the number of instances.
     pub fn len(&self) -> usize {
         self.all.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no instances.
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
 
-    /// Who integrates.
+    /// Returns the interface type.
     pub fn interface(&self) -> Interface {
         self.interface
     }
 
-    /// What they are instances of.
+    /// Returns the system to which the instances belong.
     pub fn system(&self) -> &System {
         &self.system
     }
 
-    /// The time of each, s.
+    /// Returns the time of each instance, s.
     pub fn times(&self) -> impl Iterator<Item = f64> {
         self.all.iter().map(|one| one.own.time)
     }
 
-    /// Those that have dropped out, and why.
+    /// Returns the indices of the failed instances, each with the reason.
     pub fn errors(&self) -> impl Iterator<Item = (usize, &str)> {
         self.all.iter().enumerate().filter_map(|(place, one)| Some((place, one.error.as_deref()?)))
     }
 
-    /// Why there is none left, if all have dropped out.
+    /// Returns the error of the first instance if all instances have failed.
     pub fn none_left(&self) -> Option<&str> {
         let all = self.all.iter().all(|one| one.error.is_some());
         self.all.first().filter(|_| all).and_then(|one| one.error.as_deref())
     }
 
-    /// What the last event of each did.
+    /// Returns the result of the last event of each instance.
     pub fn events(&self) -> impl Iterator<Item = Event> {
         self.all.iter().map(|one| one.own.event)
     }
 
-    /// New start values, for the next [`reset`](Self::reset), in place of those of the same variables.
+    /// Replaces start values for the next [`reset`](Self::reset); start values of other variables stay.
     ///
     /// # Errors
-    /// [`Error::Request`] when a variable is not there, or the values do not fit it or the number of instances.
+    /// Returns [`Error::Request`] if a variable is unknown, or if the values do not fit it or the number of
+    /// instances.
     pub fn start_from(&mut self, start: &[(&str, Start)]) -> Result<(), Error> {
         for (name, values) in start {
             if let Some(count) = values.count()
@@ -192,7 +195,7 @@ impl Instances {
         Ok(())
     }
 
-    /// Back to the start values, initialized.
+    /// Resets the instances to their start values and initializes them.
     pub fn reset(&mut self, mask: Mask) {
         let (system, interface, begin) = (&self.system, self.interface, &self.begin);
         let reset = |place: usize, one: &mut One| {
@@ -215,11 +218,11 @@ impl Instances {
     /// Sets variables, from a row for each instance or from one row for all.
     ///
     /// # Errors
-    /// [`Error::Request`] when a variable is read-only, an integer or a Boolean cannot have its value, or an output feeds one of
-    /// them.
+    /// Returns [`Error::Request`] if a variable is read-only, an integer or a Boolean cannot have its value,
+    /// or an output feeds a variable.
     ///
     /// # Panics
-    /// When there are other than so many values.
+    /// Panics if the number of values is wrong.
     pub fn set(&mut self, variables: &Selection, values: &[f64], mask: Mask) -> Result<(), Error> {
         variables.check(values)?;
         let rows = rows(variables.len(), values.len(), self.len());
@@ -230,15 +233,15 @@ impl Instances {
     /// Reads variables into a row for each instance.
     ///
     /// # Panics
-    /// When there is room for another number of values.
+    /// Panics if the length of `values` is wrong.
     pub fn get(&mut self, variables: &Selection, values: &mut [f64]) {
         self.fill(variables.len(), values, |instance, row| instance.get(variables, row));
     }
 
-    /// Steps of Co-Simulation of this size, s.
+    /// Performs Co-Simulation steps of this size, s.
     ///
     /// # Errors
-    /// [`Error::Request`] when the size is not above 0 and finite.
+    /// Returns [`Error::Request`] if the size is not above 0 and finite.
     pub fn step(&mut self, size: f64, mask: Mask) -> Result<(), Error> {
         check_size(size)?;
         self.alive(mask, |_, own, instance| {
@@ -249,10 +252,10 @@ impl Instances {
         Ok(())
     }
 
-    /// Steps of Co-Simulation to this time, s.
+    /// Performs Co-Simulation steps to this time, s.
     ///
     /// # Errors
-    /// [`Error::Request`] when the time is not finite, or not after the time of an instance.
+    /// Returns [`Error::Request`] if the time is not finite, or not after the time of an instance.
     pub fn step_to(&mut self, time: f64, mask: Mask) -> Result<(), Error> {
         let steps = |place: usize, one: &One| one.error.is_none() && mask.is_none_or(|mask| mask[place]);
         let mut ahead = self.all.iter().enumerate().filter(|(place, one)| steps(*place, one));
@@ -270,14 +273,14 @@ impl Instances {
         Ok(())
     }
 
-    /// Sets variables, steps and reads others: [`set`](Self::set), [`step`](Self::step) and [`get`](Self::get) in one go of the
-    /// threads.
+    /// Sets variables, performs a step and reads other variables. Equals [`set`](Self::set),
+    /// [`step`](Self::step) and [`get`](Self::get), but starts the threads only once.
     ///
     /// # Errors
-    /// As [`set`](Self::set) and [`step`](Self::step).
+    /// Same errors as [`set`](Self::set) and [`step`](Self::step).
     ///
     /// # Panics
-    /// As they do.
+    /// Panics if the number of values is wrong.
     pub fn advance(
         &mut self,
         (set, values): (&Selection, &[f64]),
@@ -296,10 +299,10 @@ impl Instances {
         Ok(())
     }
 
-    /// Saves the state of each.
+    /// Saves the state of each instance.
     ///
     /// # Errors
-    /// [`Error::Request`] when the FMU does not offer it.
+    /// Returns [`Error::Request`] if the FMU does not support it.
     pub fn save(&mut self) -> Result<States, Error> {
         let why = "cannot save its state (canGetAndSetFMUstate is not true)";
         self.system.check_offer(self.interface, |offer| offer.saves_states, why)?;
@@ -313,10 +316,10 @@ impl Instances {
         Ok(States(states))
     }
 
-    /// Back to states that they have saved.
+    /// Restores states that these instances have saved.
     ///
     /// # Panics
-    /// When the states are of another number of instances.
+    /// Panics if the number of states differs from the number of instances.
     pub fn restore(&mut self, states: &States, mask: Mask) {
         assert_eq!(states.0.len(), self.len(), "states of other instances");
         let back = |place: usize, one: &mut One| {
@@ -329,7 +332,7 @@ impl Instances {
         each(self.pool.as_ref(), &mut self.all, mask, back);
     }
 
-    /// Frees states.
+    /// Frees saved states.
     pub fn forget(&mut self, states: States) {
         for (one, saved) in self.all.iter_mut().zip(states.0) {
             if let (Some((saved, _)), Some(instance)) = (saved, &mut one.instance) {
@@ -338,10 +341,11 @@ impl Instances {
         }
     }
 
-    /// Saved states as bytes, which another process can read; `None` if an instance had none, or its FMU refuses.
+    /// Serializes saved states to bytes, which another process can read. An entry is `None` if the instance
+    /// had no state, or its FMU returned an error.
     ///
     /// # Errors
-    /// [`Error::Request`] when the FMU does not offer it.
+    /// Returns [`Error::Request`] if the FMU does not support it.
     pub fn serialize(&mut self, states: &States) -> Result<Vec<Option<Vec<u8>>>, Error> {
         let why = "cannot serialize its state (canSerializeFMUstate is not true)";
         self.system.check_offer(self.interface, |offer| offer.serializes_states, why)?;
@@ -358,10 +362,11 @@ impl Instances {
         Ok(bytes.collect())
     }
 
-    /// States that were [serialized](Self::serialize), one for each instance, or none.
+    /// De-serializes states from [`serialize`](Self::serialize), one or `None` for each instance.
     ///
     /// # Errors
-    /// [`Error::Request`] when there are other than so many, [`Error::Fmu`] when an instance refuses one.
+    /// Returns [`Error::Request`] if the number of states is wrong, and [`Error::Fmu`] if an instance rejects
+    /// a state.
     pub fn deserialize(&mut self, bytes: &[Option<impl AsRef<[u8]>>]) -> Result<States, Error> {
         if bytes.len() != self.len() {
             return request(format!("there are {} states for {} instances", bytes.len(), self.len()));
@@ -385,13 +390,14 @@ impl Instances {
         Ok(States(states))
     }
 
-    /// The derivatives of unknowns in the direction of a seed: a row of the knowns for each instance, or one for all.
+    /// Computes the directional derivatives of unknowns, with a seed for each instance or one for all.
     ///
     /// # Errors
-    /// [`Error::Request`] unless all variables are Real, and each known is an input, a parameter or a continuous state.
+    /// Returns [`Error::Request`] unless all variables are Real, and each known is an input, a parameter or a
+    /// continuous state.
     ///
     /// # Panics
-    /// As [`set`](Self::set) and [`get`](Self::get).
+    /// Panics if the number of values is wrong.
     pub fn directional_derivative(
         &mut self,
         unknowns: &Selection,
@@ -415,13 +421,14 @@ impl Instances {
         Ok(())
     }
 
-    /// In Co-Simulation: time derivatives of inputs, of order 1, which only FMI 2.0 has.
+    /// Sets time derivatives of inputs, of order 1, in Co-Simulation. Only FMI 2.0 supports them.
     ///
     /// # Errors
-    /// [`Error::Request`] unless all variables are Real inputs of an FMU that takes input derivatives.
+    /// Returns [`Error::Request`] unless all variables are Real inputs of an FMU that accepts input
+    /// derivatives.
     ///
     /// # Panics
-    /// As [`set`](Self::set).
+    /// Panics if the number of values is wrong.
     pub fn set_input_derivatives(
         &mut self,
         inputs: &Selection,
@@ -437,13 +444,13 @@ impl Instances {
         Ok(())
     }
 
-    /// In Co-Simulation: time derivatives of outputs, of order 1, into a row for each instance.
+    /// Reads time derivatives of outputs, of order 1, into a row for each instance, in Co-Simulation.
     ///
     /// # Errors
-    /// [`Error::Request`] unless all variables are Real.
+    /// Returns [`Error::Request`] unless all variables are Real.
     ///
     /// # Panics
-    /// As [`get`](Self::get).
+    /// Panics if the length of `values` is wrong.
     pub fn get_output_derivatives(&mut self, outputs: &Selection, values: &mut [f64]) -> Result<(), Error> {
         let (references, orders) = (self.real(outputs)?, vec![1; outputs.len()]);
         self.fill(outputs.len(), values, |instance, row| {
@@ -452,13 +459,13 @@ impl Instances {
         Ok(())
     }
 
-    /// In Model Exchange: the time, s, one for each or for all.
+    /// Sets the time, s, of each instance or one time of all, in Model Exchange.
     ///
     /// # Errors
-    /// [`Error::Request`] when a time is not finite.
+    /// Returns [`Error::Request`] if a time is not finite.
     ///
     /// # Panics
-    /// When there are other than so many values.
+    /// Panics if the number of times is wrong.
     pub fn set_time(&mut self, times: &[f64], mask: Mask) -> Result<(), Error> {
         if let Some(time) = times.iter().find(|time| !time.is_finite()) {
             return request(format!("time is {time}; it must be finite"));
@@ -471,25 +478,26 @@ impl Instances {
         Ok(())
     }
 
-    /// In Model Exchange: the continuous states, a row for each or for all.
+    /// Sets the continuous states from a row for each instance or one row for all, in Model Exchange.
     ///
     /// # Panics
-    /// When there are other than so many values.
+    /// Panics if the number of values is wrong.
     pub fn set_continuous_states(&mut self, values: &[f64], mask: Mask) {
         let rows =
             rows(self.description().map_or(0, |description| description.states), values.len(), self.len());
         self.alive(mask, |place, _, instance| instance.sole().set_continuous_states(rows.of(values, place)));
     }
 
-    /// In Model Exchange: states, their derivatives or nominal values, or event indicators, a row for each.
+    /// Reads states, derivatives, nominal values or event indicators into a row for each instance, in Model
+    /// Exchange.
     ///
     /// # Panics
-    /// When there is room for another number of values.
+    /// Panics if the length of `values` is wrong.
     pub fn get_continuous(&mut self, what: Continuous, values: &mut [f64]) {
         self.fill(self.continuous(what), values, |instance, row| instance.sole().get_continuous(what, row));
     }
 
-    /// How many there are of these.
+    /// Returns the number of values of this quantity.
     pub fn continuous(&self, what: Continuous) -> usize {
         self.description().map_or(0, |description| match what {
             Continuous::EventIndicators => description.event_indicators,
@@ -497,14 +505,15 @@ impl Instances {
         })
     }
 
-    /// In Model Exchange: an event, with all its rounds, and back to Continuous-Time Mode. [`events`](Self::events) tells what
-    /// it did. In Event Mode, before its rounds, variables are set from a row for each or for all.
+    /// Handles an event with all its iterations and returns to Continuous-Time Mode, in Model Exchange.
+    /// [`events`](Self::events) returns the results. In Event Mode, before the iterations, sets variables
+    /// from a row for each instance or one row for all.
     ///
     /// # Errors
-    /// As [`set`](Self::set).
+    /// Same errors as [`set`](Self::set).
     ///
     /// # Panics
-    /// As [`set`](Self::set).
+    /// Panics if the number of values is wrong.
     pub fn handle_events(&mut self, (set, values): (&Selection, &[f64]), mask: Mask) -> Result<(), Error> {
         set.check(values)?;
         let rows = rows(set.len(), values.len(), self.len());
@@ -517,11 +526,11 @@ impl Instances {
         Ok(())
     }
 
-    /// In Model Exchange: a step of the integrator is complete. Whether each wants an event and the end, one after the other,
-    /// into `wanted`.
+    /// Reports a completed step of the integrator, in Model Exchange. Writes two values for each instance to
+    /// `wanted`: whether it requests an event, and the end of the simulation.
     ///
     /// # Panics
-    /// When there is no room for two values of each.
+    /// Panics if `wanted` does not have two values for each instance.
     pub fn completed_integrator_step(&mut self, wanted: &mut [f64]) {
         self.fill(2, wanted, |instance, row| {
             row.copy_from_slice(
@@ -531,22 +540,22 @@ impl Instances {
         });
     }
 
-    /// Of the one FMU.
+    /// Returns the model description of a single FMU.
     fn description(&self) -> Option<&Description> {
         self.system.sole().map(|fmu| &fmu.description)
     }
 
-    /// The value references of Real variables of the one FMU.
+    /// Returns the value references of Real variables of a single FMU.
     fn real<'s>(&self, variables: &'s Selection) -> Result<&'s [u32], Error> {
         let why = "only Real variables have derivatives, of one FMU and not of a system";
         let references = self.system.sole().and_then(|_| variables.references());
         references.ok_or_else(|| Error::Request(why.to_owned()))
     }
 
-    /// The text of a variable in each; none of those that have dropped out.
+    /// Returns the value of a string variable in each instance; `None` for a failed instance.
     ///
     /// # Errors
-    /// [`Error::Request`] when the variable is not there or no text.
+    /// Returns [`Error::Request`] if the variable is unknown or no string.
     pub fn texts(&mut self, name: &str) -> Result<Vec<Option<String>>, Error> {
         let found = self.system.find_first(name)?;
         if found.of.base != BaseType::String {
@@ -560,7 +569,7 @@ impl Instances {
         Ok(texts)
     }
 
-    /// With those that have not dropped out; a refusal is why one does.
+    /// Calls `body` for each instance that has not failed. An error makes the instance fail.
     fn alive(
         &mut self,
         mask: Mask,
@@ -580,7 +589,7 @@ impl Instances {
         self.fill_by_place(length, values, |_, _, instance, row| body(instance, row));
     }
 
-    /// A row of values of each; not a number of those that have dropped out.
+    /// Fills a row of values for each instance, with NaN for a failed instance.
     fn fill_by_place(
         &mut self,
         length: usize,
@@ -598,7 +607,7 @@ impl Instances {
 }
 
 impl One {
-    /// Whether it has not dropped out, and does not by this.
+    /// Calls `body` if the instance has not failed. Returns whether the instance is still usable.
     #[inline]
     fn with(&mut self, body: impl FnOnce(&mut Own, &mut Running) -> Result<(), Refusal>) -> bool {
         let Self { instance: Some(instance), error: error @ None, own } = self else { return false };
@@ -610,16 +619,16 @@ impl One {
     }
 }
 
-/// Room for so many instances of a system with so many components, if there is memory for them and for what they point to.
+/// Allocates entries for the instances of a system, if there is enough memory for them and for their data.
 fn empty(count: usize, parts: usize) -> Result<Vec<One>, Error> {
-    /// At least what a component of an instance takes besides: the allocations of its FMU and of its log.
+    /// Minimum of further memory per component: allocations of its FMU and of its log.
     const COMPONENT: usize = 256;
     let too_many = || Error::Memory(format!("{count} instances need more memory than there is"));
     let mut all = Vec::new();
     all.try_reserve_exact(count).map_err(|_| too_many())?;
     let each = size_of::<Running>() + parts * (size_of::<Instance>() + COMPONENT);
     let needed = count.checked_mul(each).ok_or_else(too_many)?;
-    // Freed at once; what it shows is that the system would give so much.
+    // Freed immediately; it only tests whether so much memory is available.
     Vec::<u8>::new().try_reserve_exact(needed).map_err(|_| too_many())?;
     all.resize_with(count, || One { instance: None, error: None, own: Own::default() });
     Ok(all)
@@ -632,7 +641,7 @@ fn check_size(size: f64) -> Result<(), Error> {
     request(format!("the size of a step is {size} s; it must be above 0 and finite"))
 }
 
-/// From the start values to the first step.
+/// Initializes an instance: from the start values to the first step.
 fn initialize(
     instance: &mut Running,
     begin: &Begin,
@@ -649,7 +658,7 @@ fn initialize(
     Ok(event)
 }
 
-/// Each of those that the mask has.
+/// Calls `body` for each instance in the mask.
 fn each(
     pool: Option<&rayon::ThreadPool>,
     all: &mut [One],
@@ -666,7 +675,8 @@ fn each(
     });
 }
 
-/// Each with its row of so many values, in as many parts as there are threads: one here, one in each thread of the pool.
+/// Calls `body` for each instance and its row of `length` values. This thread and each thread of the pool get
+/// a part of the instances.
 fn in_parts(
     pool: Option<&rayon::ThreadPool>,
     all: &mut [One],
@@ -682,7 +692,7 @@ fn in_parts(
     };
     let Some(pool) = pool else { return work(0, all, values) };
     let part = all.len().div_ceil(pool.current_num_threads() + 1);
-    // What waits in another thread needs time to wake; this one is awake.
+    // This thread works too, because a waiting thread takes time to wake up.
     pool.in_place_scope(|scope| {
         let (own, others) = all.split_at_mut(part);
         let (own_values, other_values) = values.split_at_mut(part * length);
@@ -697,7 +707,7 @@ fn in_parts(
     });
 }
 
-/// A row for each instance, or one for all.
+/// Access to a row for each instance, or to one row for all.
 #[derive(Clone, Copy)]
 struct Rows {
     length: usize,

@@ -1,11 +1,11 @@
 #![doc = include_str!("../README.md")]
 //!
-//! ## Inside
+//! ## Structure of the crate
 //!
-//! [`Fmu`] is an FMU, of FMI 2.0 or 3.0, unpacked and loaded. It runs as often as a [`Batch`] says, on all processors; or
-//! its [`Instances`] are in your hands. Below them: `description` reads `modelDescription.xml`, `library` loads the
-//! functions, `instance` calls them, `log` hears what they say. `unsafe` is in these last three alone, and for the caller
-//! where an FMU is [opened](Fmu::open).
+//! [`Fmu`] is an unpacked and loaded FMU of FMI 2.0 or 3.0. A [`Batch`] runs it many times on all processors;
+//! [`Instances`] are stateful and controlled by the caller. `description` reads `modelDescription.xml`,
+//! `library` loads the functions, `instance` calls them, and `log` collects their messages. Only the last
+//! three contain `unsafe` code. A caller needs `unsafe` only to [open](Fmu::open) an FMU.
 
 mod arrays;
 mod batch;

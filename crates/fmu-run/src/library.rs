@@ -1,4 +1,4 @@
-//! The shared library of an FMU, loaded for as long as anything needs it.
+//! The shared library of an FMU, loaded as long as an object uses it.
 
 use fmi_abi::c_types::c_void;
 use fmi_abi::{Standard, fmi2, fmi3};
@@ -11,14 +11,14 @@ use tempfile::TempDir;
 #[derive(Debug)]
 pub(crate) struct Library {
     pub functions: Functions,
-    /// Where its resources are, as importers write it.
+    /// Location of its resources, as importers write it.
     pub resources: CString,
     _loaded: libloading::Library,
     // Removed after the library is unloaded.
     _folder: Arc<TempDir>,
 }
 
-/// Its functions, of the one standard or the other.
+/// Functions of the library, for one FMI version.
 #[derive(Debug)]
 pub(crate) enum Functions {
     Fmi2(Box<fmi2::Functions>),
@@ -26,26 +26,26 @@ pub(crate) enum Functions {
 }
 
 impl Library {
-    /// Loads a library. An FMU need not have the functions of an interface type that it does not offer: calls of these
-    /// are errors.
+    /// Loads a library. Functions of an unsupported interface type may be missing; calls of missing functions
+    /// return errors.
     ///
     /// # Safety
-    /// The file is the library of an FMU for this standard: its functions have the types of the standard, and what it does
-    /// when it is loaded and called is sound.
+    /// The file is the library of an FMU of this FMI version. Its functions have the types of the FMI
+    /// standard, and the library is sound when it is loaded and called.
     ///
     /// # Errors
-    /// When it cannot be loaded, or lacks the function that frees instances.
+    /// Fails if the library cannot be loaded, or lacks the function that frees instances.
     pub unsafe fn load(
         path: &Path,
         standard: Standard,
         resources: CString,
         folder: Arc<TempDir>,
     ) -> Result<Self, libloading::Error> {
-        // SAFETY: the caller's promise, here and below.
+        // SAFETY: the caller guarantees that loading is sound.
         let loaded = unsafe { libloading::Library::new(path) }?;
         // SAFETY: the symbol is only looked up.
         let symbol = |name: &str| unsafe { loaded.get::<*const c_void>(name) }.map(|found| *found);
-        // SAFETY: see above.
+        // SAFETY: the caller guarantees that the functions have the types of the FMI standard.
         let functions = unsafe {
             match standard {
                 Standard::Fmi2 => {

@@ -1,4 +1,4 @@
-//! What an FMU logs: the callbacks that it is given.
+//! Log callbacks for FMUs.
 
 use crate::refusal::Message;
 use fmi_abi::Status;
@@ -8,7 +8,7 @@ use fmi_abi::fmi3::types::*;
 use std::ffi::CStr;
 use std::sync::{Mutex, PoisonError};
 
-/// What the FMU logs; its address is the instance's environment.
+/// Messages of the FMU; the address of the log is the instance environment.
 #[derive(Debug, Default)]
 pub(crate) struct Log {
     /// The messages since the last call that failed.
@@ -33,8 +33,10 @@ impl Log {
         all.map(|mut all| std::mem::take(&mut *all)).unwrap_or_default()
     }
 
+    /// Stores a message.
+    ///
     /// # Safety
-    /// The environment is NULL or a `Log` that lives, the texts are NULL or strings.
+    /// The environment is NULL or a live `Log`; the strings are NULL or valid.
     unsafe fn remember(
         environment: *mut c_void,
         status: c_int,
@@ -43,11 +45,11 @@ impl Log {
     ) {
         let text_of = |pointer: *const c_char| match pointer.is_null() {
             true => String::new(),
-            // SAFETY: the caller's promise.
+            // SAFETY: the caller guarantees a string if the pointer is not NULL.
             false => unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned(),
         };
         let [category, text] = [category, text].map(text_of);
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees NULL or a live `Log`.
         if let Some(log) = unsafe { environment.cast::<Self>().as_ref() } {
             let message = Message { status: Status::from_c(status), category, text };
             if let Some(all) = &log.all {
@@ -60,12 +62,13 @@ impl Log {
 
 pub(crate) fn logger_of_fmi2() -> fmi2CallbackLogger {
     let plain: unsafe extern "C" fn(_, _, _, _, _) = log_of_fmi2;
-    // SAFETY: see `log_of_fmi2`.
+    // SAFETY: the documentation of `log_of_fmi2` explains why both types have compatible calls.
     unsafe { std::mem::transmute::<_, fmi2CallbackLogger>(plain) }
 }
 
-/// The logger of FMI 2.0 without its `...`, which stable Rust cannot define. The FMU may pass variadic arguments, which
-/// are not looked at; named ones travel the same way in variadic and plain calls on every platform of this project.
+/// The logger of FMI 2.0 without its `...`, which stable Rust cannot define. The function ignores variadic
+/// arguments. On every platform of this project, variadic and plain calls pass named arguments in the same
+/// way.
 unsafe extern "C" fn log_of_fmi2(
     environment: fmi2ComponentEnvironment,
     _instance_name: fmi2String,
@@ -73,8 +76,8 @@ unsafe extern "C" fn log_of_fmi2(
     category: fmi2String,
     message: fmi2String,
 ) {
-    // SAFETY: section 2.1.5: NULL or zero-terminated strings, and the log that was handed over, which lives as long as the
-    // instance.
+    // SAFETY: section 2.1.5 requires NULL or NUL-terminated strings. The environment is the log that was
+    // passed to the FMU; it lives as long as the instance.
     unsafe { Log::remember(environment, status, category, message) }
 }
 
@@ -84,6 +87,6 @@ pub(crate) unsafe extern "C" fn log_of_fmi3(
     category: fmi3String,
     message: fmi3String,
 ) {
-    // SAFETY: section 2.3.1 says the same.
+    // SAFETY: section 2.3.1 requires the same of FMI 3.0.
     unsafe { Log::remember(environment, status, category, message) }
 }

@@ -1,26 +1,26 @@
-//! Why an instance refuses something, in the words of its FMU.
+//! Errors of an instance, with the messages of its FMU.
 
 use fmi_abi::Status;
 
-/// What an FMU has logged.
+/// A log message of an FMU.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
-    /// The status that goes with it.
+    /// Status of the message.
     pub status: Status,
-    /// One of the log categories.
+    /// Log category.
     pub category: String,
-    /// The text.
+    /// Text of the message.
     pub text: String,
 }
 
-/// What an instance answered instead of OK or Warning: the function, and what it logged. In a box, as it is seldom made and
-/// each call may answer with it.
+/// A status other than OK or Warning, with the function that returned it and the messages of the FMU. The
+/// error is boxed because it is rare and each call may return it.
 #[derive(Debug)]
 pub struct Refusal(Box<Refused>);
 
 #[derive(Debug)]
 struct Refused {
-    /// The component; empty where there is only one.
+    /// Name of the component; empty if there is only one.
     component: String,
     function: &'static str,
     status: Status,
@@ -34,7 +34,7 @@ impl Refusal {
         Self(Box::new(Refused { component: component.to_owned(), function, status, log, ended: None }))
     }
 
-    /// What no FMU has refused.
+    /// Creates an error that does not come from an FMU.
     #[cold]
     pub(crate) fn of_ours(what: &'static str, why: &str) -> Self {
         let message = Message { status: Status::Error, category: String::new(), text: why.to_owned() };
@@ -45,18 +45,18 @@ impl Refusal {
         self.0.status
     }
 
-    /// The FMU wants to end the simulation, at this time.
+    /// Records that the FMU requests the end of the simulation, at this time.
     pub(crate) fn at_end(mut self, time: f64) -> Self {
         self.0.ended = Some(time);
         self
     }
 
-    /// When the FMU has ended the simulation, if that is what it wants.
+    /// Returns the time at which the FMU ended the simulation, if it did.
     pub(crate) fn ended(&self) -> Option<f64> {
         self.0.ended
     }
 
-    /// Whether it comes without a reason.
+    /// Returns whether the FMU gave no reason.
     pub(crate) fn is_silent(&self) -> bool {
         self.0.log.is_empty() && self.0.ended.is_none()
     }
@@ -74,7 +74,7 @@ impl std::fmt::Display for Refusal {
             return message.map_or(Ok(()), |message| write!(f, ": {}", message.text.trim()));
         }
         match message {
-            // Some FMUs name the function, some do not.
+            // Some FMUs include the function in the message.
             Some(message) if message.text.contains(function) => f.write_str(message.text.trim()),
             Some(message) => write!(f, "{}: {}", function, message.text.trim()),
             None => write!(f, "{} was answered with {:?}, without a message", function, status),
@@ -84,7 +84,8 @@ impl std::fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-/// What of a log tells why something was refused.
+/// Returns the message that explains an error: the last one with status Discard or worse, otherwise the last
+/// one.
 pub(crate) fn reason(log: &[Message]) -> Option<&Message> {
     let grave = log.iter().rev().find(|message| message.status as i32 >= Status::Discard as i32);
     grave.or(log.last())

@@ -1,4 +1,4 @@
-//! The instances of a system's components, which run as one.
+//! Instances of the components of a system, which run together.
 
 use crate::instance::{Instance, Saved};
 use crate::refusal::{Message, Refusal};
@@ -7,24 +7,24 @@ use crate::start::StartValues;
 use crate::system::{Exchange, Order, System};
 use fmi_abi::{BaseType, Interface};
 
-/// An instance of each component; what is said here of one holds for all. An FMU alone is a system of one component, without
-/// connections.
+/// One instance of each component; each function acts on all of them. A single FMU is a system with one
+/// component and no connections.
 #[derive(Debug)]
 pub(crate) struct Running {
     parts: Vec<Instance>,
     system: System,
-    /// Inputs are to be fed before anything is read or stepped ([`Order::Dependencies`]).
+    /// Whether inputs must be updated before the next get or step ([`Order::Dependencies`]).
     is_due: bool,
-    /// What outputs were after the last step ([`Order::Jacobi`]), and in the places of saved states.
+    /// Outputs after the last step ([`Order::Jacobi`]). `saved` contains them for each saved state.
     passed: Vec<f64>,
     saved: Vec<Vec<f64>>,
-    /// Room for what goes to and fro.
+    /// Buffers, reused by all calls.
     row: Vec<f64>,
     buffer: Vec<f64>,
 }
 
 impl Running {
-    /// Used instances as new, or others in their place; or why there is none, and whether the FMU said so.
+    /// Resets used instances or creates new ones. The error contains the reason, and whether the FMU gave it.
     pub fn renewed(
         used: Option<Self>,
         system: &System,
@@ -35,7 +35,8 @@ impl Running {
             used.parts.iter_mut().try_for_each(Instance::reset).ok()?;
             Some(used)
         });
-        // Some FMUs cannot be reset. The old instances are gone by now: there may be one at a time only.
+        // Some FMUs cannot be reset. The old instances are freed before new ones are made, because some FMUs
+        // permit only one.
         if let Some(used) = used {
             return Ok(used);
         }
@@ -46,7 +47,7 @@ impl Running {
         Ok(Self { parts, system, is_due: false, passed, saved: Vec::new(), row, buffer })
     }
 
-    /// Start values, and into the initialization: so both editions of the standard allow it.
+    /// Sets start values and enters Initialization Mode, in an order that both FMI versions allow.
     pub fn begin(
         &mut self,
         start_time: f64,
@@ -82,8 +83,9 @@ impl Running {
         self.stepped()
     }
 
-    /// Before the first step outputs may depend on inputs otherwise than later. They are passed on until they no longer
-    /// change; in Jacobi's order as often as there are components, as libcosim does.
+    /// Passes outputs to inputs in Initialization Mode, where the dependencies may differ from the later ones.
+    /// Repeats until no value changes; with [`Order::Jacobi`], at most once for each component, as libcosim
+    /// does.
     fn agree(&mut self) -> Result<(), Refusal> {
         let Exchange { order, stages } = self.system.exchange();
         let order = *order;
@@ -110,7 +112,7 @@ impl Running {
         }
     }
 
-    /// Feeds the inputs, if they are to be fed.
+    /// Updates the inputs, if necessary.
     #[inline]
     fn pass_on(&mut self) -> Result<(), Refusal> {
         if self.is_due { self.pass_all_on(|_| ()) } else { Ok(()) }
@@ -128,7 +130,7 @@ impl Running {
         Ok(())
     }
 
-    /// After a step or the initialization.
+    /// Updates the records after a step or the initialization.
     #[inline]
     fn stepped(&mut self) -> Result<(), Refusal> {
         let Self { parts, system, passed, buffer, .. } = self;
@@ -144,7 +146,8 @@ impl Running {
         Ok(())
     }
 
-    /// Refused also where an FMU ends the simulation; then the others have done the step.
+    /// Performs a step. Returns an error also if an FMU ends the simulation; the other FMUs have then done
+    /// the step.
     #[inline]
     pub fn step(&mut self, time: f64, size: f64) -> Result<(), Refusal> {
         if let [instance] = &mut *self.parts
@@ -165,7 +168,7 @@ impl Running {
             }
             stepped => stepped,
         })?;
-        // What has ended takes no more inputs.
+        // An FMU that has ended accepts no more inputs.
         ended.map_or_else(|| self.stepped(), Err)
     }
 
@@ -188,7 +191,7 @@ impl Running {
         self.parts[place.part].get_text(place.reference)
     }
 
-    /// The instance of an FMU that runs alone.
+    /// Returns the instance of a single FMU.
     #[inline]
     pub fn sole(&mut self) -> &mut Instance {
         &mut self.parts[0]
@@ -211,7 +214,7 @@ impl Running {
         self.each(|_, instance| instance.terminate())
     }
 
-    /// Saves the state, in a place of its own, which is the same in all instances.
+    /// Saves the states of all instances under one index.
     pub fn save(&mut self) -> Result<Saved, Refusal> {
         self.keep(|_, instance| instance.save())
     }
@@ -229,7 +232,8 @@ impl Running {
         self.each(|_, instance| instance.forget(saved))
     }
 
-    /// The bytes of an FMU alone as they are; else those of all components, each after its length, and what was passed on.
+    /// Serializes a saved state. For a single FMU, returns its bytes. For a system, returns the bytes of all
+    /// components, each after its length, and the outputs of the last step.
     pub fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Refusal> {
         if self.system.sole().is_some() {
             return self.sole().serialize(saved);
@@ -270,7 +274,7 @@ impl Running {
         saved
     }
 
-    /// Keeps a state of each instance, or of none, with what is passed on.
+    /// Stores a state of each instance, with the outputs of the last step. On an error, stores none.
     fn keep(
         &mut self,
         mut state: impl FnMut(usize, &mut Instance) -> Result<Saved, Refusal>,

@@ -1,4 +1,4 @@
-//! Variables that are set or read together.
+//! Groups of variables that are set or read together.
 
 use crate::error::{Error, request};
 use crate::instance::Instance;
@@ -6,29 +6,30 @@ use crate::refusal::Refusal;
 use crate::system::{Found, System};
 use fmi_abi::BaseType;
 
-/// Variables that are numbers, found once by their names. A row of values has one for each, in this order; 0 and 1 stand for
-/// Booleans.
+/// Numeric variables, looked up once by name. A row of values has one value for each, in this order; 0 and 1
+/// represent Booleans.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
     names: Vec<String>,
     groups: Vec<Group>,
-    /// All are Real variables of one component, so that a row goes over as it is.
+    /// Whether all are Real variables of one component, so that a row is passed to the FMU unchanged.
     is_direct: bool,
-    /// Why a caller cannot set them, if one is read-only or fed by an output.
+    /// Reason why a caller cannot set them, if one is read-only or fed by an output.
     read_only: Option<String>,
 }
 
-/// Those of one component.
+/// Variables of one component.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Group {
     part: usize,
-    /// The value references of those that are Real, set and read by one call, and their places in a row.
+    /// Value references of the Real variables, which one call sets or reads. `places` are their indices in a
+    /// row.
     reals: Vec<u32>,
     places: Vec<usize>,
     others: Vec<(BaseType, u32, usize)>,
 }
 
-/// Where a value goes: component, type and value reference.
+/// Target of a value: component, type and value reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
     pub part: usize,
@@ -43,22 +44,22 @@ impl Place {
 }
 
 impl Selection {
-    /// The number of variables.
+    /// Returns the number of variables.
     pub fn len(&self) -> usize {
         self.names.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no variables.
     pub fn is_empty(&self) -> bool {
         self.names.is_empty()
     }
 
-    /// Their names.
+    /// Returns the names of the variables.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// One more: all that its name stands for.
+    /// Adds a name and all variables that it denotes.
     pub(crate) fn push(&mut self, name: &str, found: &[Found]) {
         let row = self.names.len();
         self.names.push(name.to_owned());
@@ -82,7 +83,7 @@ impl Selection {
         self.is_direct = self.groups.len() == 1 && self.groups[0].places.len() == self.names.len();
     }
 
-    /// The value references, if all are Real variables of one component.
+    /// Returns the value references, if all are Real variables of one component.
     pub(crate) fn references(&self) -> Option<&[u32]> {
         match self.groups.first() {
             None => Some(&[]),
@@ -90,7 +91,7 @@ impl Selection {
         }
     }
 
-    /// Fails unless a caller may set them to the values of these rows.
+    /// Fails if a caller may not set the variables to the values of these rows.
     #[inline]
     pub(crate) fn check(&self, values: &[f64]) -> Result<(), Error> {
         if self.is_direct && self.read_only.is_none() { Ok(()) } else { self.check_each(values) }
@@ -108,7 +109,7 @@ impl Selection {
         Ok(())
     }
 
-    /// The values into a row, over a buffer.
+    /// Reads the values into a row, using a buffer.
     #[inline]
     pub(crate) fn get(
         &self,
@@ -136,7 +137,7 @@ impl Selection {
         Ok(())
     }
 
-    /// Sets the values of a row, over a buffer.
+    /// Sets the values of a row, using a buffer.
     #[inline]
     pub(crate) fn set(
         &self,
@@ -167,7 +168,7 @@ impl System {
     /// Finds variables by their names.
     ///
     /// # Errors
-    /// [`Error::Request`], when there is none of a name, or it is no number.
+    /// Returns [`Error::Request`] if a name is unknown, or a variable is not numeric.
     pub fn select(&self, names: &[impl AsRef<str>]) -> Result<Selection, Error> {
         let mut selection = Selection::default();
         for name in names.iter().map(AsRef::as_ref) {
@@ -177,7 +178,7 @@ impl System {
     }
 }
 
-/// Whole numbers and Booleans take no other values. What a Real takes is the FMU's to say.
+/// Checks that integers and Booleans can have these values. The FMU checks the values of Reals.
 pub(crate) fn fits(name: &str, base: BaseType, values: &[f64]) -> Result<(), Error> {
     let (low, high) = match base {
         BaseType::Boolean => (0.0, 1.0),

@@ -7,21 +7,22 @@ use fmi_abi::BaseType;
 use std::borrow::Cow;
 use std::ffi::{CStr, CString};
 
-/// A start value of a variable. Texts are for texts and name the items of enumerations; `true` and `false` are for Booleans.
+/// Start value of a variable. A string is a value of a string variable, an item of an enumeration, or `true`
+/// or `false` for a Boolean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start<'a> {
-    /// The same number in all runs or instances; 0 and 1 for Booleans.
+    /// One number for all runs or instances; 0 or 1 for a Boolean.
     Same(f64),
-    /// A number for each.
+    /// A number for each run or instance.
     Each(&'a [f64]),
-    /// The same text in all.
+    /// One string for all runs or instances.
     Text(&'a str),
-    /// A text for each.
+    /// A string for each run or instance.
     EachText(&'a [String]),
 }
 
 impl Start<'_> {
-    /// How many runs or instances it is for, if it is not for any number.
+    /// Returns the number of runs or instances, if the value is given for each.
     pub(crate) fn count(&self) -> Option<usize> {
         match self {
             Self::Same(_) | Self::Text(_) => None,
@@ -31,7 +32,7 @@ impl Start<'_> {
     }
 }
 
-/// Start values after all checks: of each variable one for all runs or instances, or one for each.
+/// Checked start values. Each variable has one value for all runs or instances, or one for each.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct StartValues<'a> {
     numbers: Vec<(Place, Cow<'a, [f64]>)>,
@@ -39,7 +40,7 @@ pub(crate) struct StartValues<'a> {
 }
 
 impl<'a> StartValues<'a> {
-    /// Those that a system came with, and in their place those that are given.
+    /// Returns the start values of the system, replaced by the given values.
     pub fn of(system: &System, given: &[(&str, Start<'a>)]) -> Result<Self, Error> {
         let mut all = Self::default();
         for (name, value) in system.start() {
@@ -53,7 +54,7 @@ impl<'a> StartValues<'a> {
         Ok(all)
     }
 
-    /// Those that are given, each variable once.
+    /// Returns the given start values; each variable may occur only once.
     pub fn given(system: &System, given: &[(&str, Start<'a>)]) -> Result<Self, Error> {
         let mut all = Self::default();
         for (place, (name, start)) in given.iter().enumerate() {
@@ -65,7 +66,7 @@ impl<'a> StartValues<'a> {
         Ok(all)
     }
 
-    /// Others, in the place of those of the same variables.
+    /// Adds start values and removes earlier values of the same variables.
     pub fn put(&mut self, new: Self) {
         let is_new = |place: &Place| {
             new.numbers.iter().any(|(of, _)| of == place) || new.texts.iter().any(|(of, _)| of == place)
@@ -76,17 +77,17 @@ impl<'a> StartValues<'a> {
         self.texts.extend(new.texts);
     }
 
-    /// The numbers of a run or an instance.
+    /// Returns the numbers of a run or an instance.
     pub fn numbers(&self, of: usize) -> impl Iterator<Item = (Place, f64)> {
         self.numbers.iter().filter_map(move |(place, values)| Some((*place, *one(values, of)?)))
     }
 
-    /// The texts of a run or an instance.
+    /// Returns the strings of a run or an instance.
     pub fn texts(&self, of: usize) -> impl Iterator<Item = (Place, &CStr)> {
         self.texts.iter().filter_map(move |(place, texts)| Some((*place, one(texts, of)?.as_c_str())))
     }
 
-    /// With memory of its own.
+    /// Copies borrowed values.
     pub fn into_owned(self) -> StartValues<'static> {
         let own = |(place, numbers): (_, Cow<[f64]>)| (place, Cow::Owned(numbers.into_owned()));
         StartValues { numbers: self.numbers.into_iter().map(own).collect(), texts: self.texts }
@@ -133,7 +134,7 @@ fn checked<'a>(found: Found, name: &str, numbers: Cow<'a, [f64]>) -> Result<Cow<
     Ok(numbers)
 }
 
-/// What a text stands for, if it is no text.
+/// Returns the number for a string, for a variable that is no string.
 fn number_of(found: Found, name: &str, text: &str) -> Result<f64, Error> {
     if found.of.base == BaseType::Boolean
         && let Ok(truth) = text.parse::<bool>()

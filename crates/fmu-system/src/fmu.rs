@@ -1,4 +1,4 @@
-//! What a system needs to know of an FMU.
+//! Data of an FMU that a system needs.
 
 use anyhow::{Result, anyhow, bail, ensure};
 use fmu_package::files::unzip;
@@ -10,17 +10,17 @@ pub struct Fmu {
     pub description: Description,
 }
 
-/// The names and numbers of an enumeration's items.
+/// Names and numbers of the items of an enumeration.
 pub type Items = [(String, String)];
 
 impl Fmu {
-    /// From the content of its file.
+    /// Reads an FMU from the content of its file.
     pub fn read(bytes: Vec<u8>) -> Result<Self> {
         let text = String::from_utf8(unzip(&bytes, "modelDescription.xml")?)?;
         Ok(Self { bytes, description: Description::parse(&text).map_err(|why| anyhow!(why))? })
     }
 
-    /// A variable of it.
+    /// Returns a variable of the FMU.
     pub fn variable(&self, name: &str) -> Option<Own<'_>> {
         Some(Own { fmu: self, variable: self.description.variable(name)? })
     }
@@ -34,30 +34,30 @@ pub struct Own<'a> {
 }
 
 impl<'a> Own<'a> {
-    /// Its type as SSP 1.0 and OSP have them.
+    /// Returns the type name that SSP 1.0 and OSP use.
     pub fn kind(self) -> &'static str {
         self.variable.kind()
     }
 
-    /// Fails unless it may feed this input.
+    /// Fails if the variable must not be connected to this input.
     pub fn check_feeds(self, input: Self) -> Result<(), String> {
         self.fmu.description.connects(self.variable, &input.fmu.description, input.variable)
     }
 
-    /// Name and items of its enumeration, if it is of one.
+    /// Returns name and items of its enumeration, if it has one.
     pub fn items(self) -> Option<(&'a str, &'a Items)> {
         let name = self.variable.declared_type.as_deref()?;
         let (name, items) = self.fmu.description.enumerations.get_key_value(name)?;
         Some((name, items))
     }
 
-    /// The number of an item.
+    /// Returns the number of an item.
     pub fn number_of(self, item: &str) -> Option<&'a str> {
         let (_, items) = self.items()?;
         items.iter().find(|(name, _)| name == item).map(|(_, number)| number.as_str())
     }
 
-    /// Fails unless a system may start this variable otherwise.
+    /// Fails if a system cannot set the start value of this variable.
     pub fn check_settable(self, name: &str) -> Result<()> {
         let Variable { start, variability, causality, .. } = self.variable;
         let is_constant = variability.as_deref() == Some("constant");
@@ -65,8 +65,8 @@ impl<'a> Own<'a> {
         Ok(())
     }
 
-    /// Fails unless this text is a value of the variable: a number in its range, `true` or `false`, any text, the name of an
-    /// item.
+    /// Fails if the string is no valid value: a number in the range, `true` or `false`, a string, or an item
+    /// of the enumeration.
     pub fn check_start(self, name: &str, text: &str) -> Result<()> {
         let number: Option<f64> = match self.kind() {
             "Real" => text.parse().ok(),

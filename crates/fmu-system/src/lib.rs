@@ -1,8 +1,8 @@
 #![doc = include_str!("../README.md")]
 //!
-//! ## Inside
+//! ## Structure of the crate
 //!
-//! `fmu` has what an FMU says of itself, `system` checks the wiring against it; `ssp` and `osp` write.
+//! `fmu` reads the FMUs, `system` checks the connections, `ssp` and `osp` write the files.
 
 mod fmu;
 mod osp;

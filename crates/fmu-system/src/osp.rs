@@ -1,4 +1,4 @@
-//! For libcosim: a folder with `OspSystemStructure.xml` and the FMUs.
+//! Output for libcosim: a directory with `OspSystemStructure.xml` and the FMUs.
 
 use crate::system::{CheckedSystem, file_name, split};
 use anyhow::Result;
@@ -8,10 +8,10 @@ use std::io::Write;
 use std::path::Path;
 
 impl CheckedSystem<'_> {
-    /// Writes the folder that libcosim takes: `OspSystemStructure.xml` and the FMUs.
+    /// Writes the directory for libcosim: `OspSystemStructure.xml` and the FMUs.
     ///
     /// # Errors
-    /// When a file cannot be written.
+    /// Fails if a file cannot be written.
     pub fn write_osp(&self, folder: &Path) -> Result<()> {
         for (name, bytes) in self.files()? {
             write_atomically(&folder.join(name), |file| Ok(file.write_all(bytes)?))?;
@@ -60,7 +60,7 @@ impl CheckedSystem<'_> {
         ]))
     }
 
-    /// Items of enumerations are numbers here.
+    /// Returns the initial value; items of enumerations are written as numbers.
     fn initial_value(&self, name: &str, start: &str) -> Result<Element> {
         let variable = self.variable(name)?;
         Ok(match variable.number_of(start) {

@@ -1,4 +1,4 @@
-//! As SSP: System Structure and Parameterization 1.0.
+//! Output as SSP: System Structure and Parameterization 1.0.
 
 use crate::fmu::{Items, Own};
 use crate::system::{CheckedSystem, System, file_name, split};
@@ -12,13 +12,14 @@ use std::path::Path;
 const COMMON: &str = "http://ssp-standard.org/SSP1/SystemStructureCommon";
 
 impl CheckedSystem<'_> {
-    /// Writes the SSP and tells its size in bytes.
+    /// Writes the SSP file and returns its size in bytes.
     ///
-    /// The FMUs are in `resources`, with a file of start values beside each that needs one; the start values
-    /// of the system's inputs are in `resources/experiment.ssv`. All sets of start values are named `default`.
+    /// The directory `resources` contains the FMUs, and a file of start values for each component that has
+    /// some. The file `resources/experiment.ssv` contains the start values of the system's inputs. All sets
+    /// of start values are named `default`.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// Fails if the file cannot be written.
     pub fn write_ssp(&self, destination: &Path) -> Result<u64> {
         let mut entries = vec![("SystemStructure.ssd".to_owned(), self.ssd()?.document()?.into_bytes())];
         for (name, bytes) in self.files()? {
@@ -40,7 +41,7 @@ impl CheckedSystem<'_> {
         let mut elements = Vec::new();
         for (component, path) in components {
             let own = |end: &str| split(end).0 == *component;
-            // Only what is connected: masters trip over the rest.
+            // Writes only connectors with a connection, because importers fail on others.
             let mut connectors = Vec::new();
             let to = inputs.iter().map(|(_, to, _)| *to).chain(connections.iter().map(|(_, to)| *to));
             for to in to.filter(|to| own(to)) {
@@ -92,8 +93,8 @@ impl CheckedSystem<'_> {
             .containing([experiment]))
     }
 
-    /// The kind of master, without which OMSimulator does not take the file; others skip it. The tolerances are
-    /// OMSimulator's own: it wants them with every master, also with one of fixed steps.
+    /// Returns the annotation for the kind of importer, which OMSimulator requires and other importers
+    /// ignore. The tolerances are OMSimulator's defaults, which it requires even for fixed steps.
     fn omsimulator(&self) -> Element {
         let master = Element::new("oms:FixedStepMaster")
             .with("description", "oms-ma")
@@ -111,7 +112,7 @@ impl CheckedSystem<'_> {
         Element::new("ssd:Annotations").containing([annotation])
     }
 
-    /// The variables that have connectors.
+    /// Returns the variables that have connectors.
     fn connected(&self) -> Result<Vec<Own<'_>>> {
         let System { inputs, outputs, connections, .. } = self.system;
         let ends = connections.iter().map(|(_, to)| *to).chain(inputs.iter().map(|(_, to, _)| *to));
@@ -119,7 +120,7 @@ impl CheckedSystem<'_> {
         ends.map(|end| self.variable(end)).collect()
     }
 
-    /// The units of variables, and no others.
+    /// Returns only the units that the variables use.
     fn units_of(&self, variables: &[Own]) -> Vec<Element> {
         let used: HashSet<_> = variables.iter().map(|of| of.variable.unit.as_deref()).collect();
         let units = self.units.keys().filter(|name| used.contains(&Some(name.as_str())));
@@ -132,7 +133,7 @@ impl CheckedSystem<'_> {
         Some(Element::new("ssc:Unit").with("name", name).containing([base]))
     }
 
-    /// A connector with the type and unit of a variable.
+    /// Returns a connector with the type and unit of a variable.
     fn connector(&self, name: &str, of: &str, kind: &str) -> Result<Element> {
         let of = self.variable(of)?;
         let base_type = Element::new(format!("ssc:{}", of.kind()))
@@ -141,7 +142,7 @@ impl CheckedSystem<'_> {
         Ok(Element::new("ssd:Connector").with("name", name).with("kind", kind).containing([base_type]))
     }
 
-    /// The file with the start values of a component: each with its name, the variable it is for, and its value.
+    /// Returns the file with start values of a component; each has a name, a variable and a value.
     fn ssv<'b>(
         &self,
         component: &str,
@@ -173,7 +174,7 @@ impl CheckedSystem<'_> {
     }
 }
 
-/// The enumerations of variables, if there are any.
+/// Returns the enumerations of variables, if there are any.
 fn enumerations(variables: &[Own]) -> Result<Option<Element>> {
     let mut known: BTreeMap<&str, &Items> = BTreeMap::new();
     for (name, items) in variables.iter().filter_map(|of| of.items()) {
@@ -189,7 +190,7 @@ fn enumerations(variables: &[Own]) -> Result<Option<Element>> {
     Ok(list("ssd:Enumerations", known.into_iter().map(element).collect()))
 }
 
-/// A list that must not be empty; none if it would be.
+/// Returns a list element; `None` if it would be empty.
 fn list(name: &str, children: Vec<Element>) -> Option<Element> {
     (!children.is_empty()).then(|| Element::new(name).containing(children))
 }

@@ -1,4 +1,4 @@
-//! A system, and whether it fits together.
+//! A system, and the checks of its consistency.
 
 use crate::fmu::{Fmu, Own};
 use anyhow::{Context, Result, anyhow, bail, ensure};
@@ -6,47 +6,46 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// FMUs that are wired to each other. Variables of FMUs are written `component.variable`.
+/// Connected FMUs. Variables of FMUs are written `component.variable`.
 ///
-/// Start values are written as texts: numbers, `true` or `false`, the name of an enumeration's item, or what a String
-/// is to be.
+/// Start values are strings: numbers, `true` or `false`, an item of an enumeration, or the value of a String.
 #[derive(Clone, Debug)]
 pub struct System<'a> {
-    /// The name, for people.
+    /// Name for users.
     pub name: &'a str,
-    /// One sentence.
+    /// Description in one sentence.
     pub description: &'a str,
-    /// The FMUs: the name of the component, the file.
+    /// Components: name and file of the FMU.
     pub components: Vec<(&'a str, PathBuf)>,
-    /// Inputs of the system: name, the input it feeds, start value in that input's unit.
+    /// Inputs of the system: name, connected input of a component, start value in that input's unit.
     pub inputs: Vec<(&'a str, &'a str, String)>,
-    /// Outputs of the system: name, the output it shows.
+    /// Outputs of the system: name, connected output of a component.
     pub outputs: Vec<(&'a str, &'a str)>,
-    /// Output to input.
+    /// Connections from outputs to inputs.
     pub connections: Vec<(&'a str, &'a str)>,
-    /// Start values that differ from those of the FMUs.
+    /// Start values that replace the start values of the FMUs.
     pub start: Vec<(&'a str, String)>,
-    /// The proposed end of the experiment, s; it starts at 0.
+    /// Stop time of the default experiment, s; the start time is 0.
     pub stop_time: f64,
-    /// The proposed communication step size, s.
+    /// Communication step size of the default experiment, s.
     pub step_size: f64,
 }
 
-/// A system whose FMUs have been read and whose wiring has been checked.
+/// A system whose FMUs have been read and whose connections have been checked.
 pub struct CheckedSystem<'a> {
     pub(crate) system: &'a System<'a>,
     fmus: Vec<Fmu>,
-    /// By their names, each with the exponents of SI's base units, factor and offset.
+    /// Units by name, each with the exponents of SI base units, factor and offset.
     pub(crate) units: BTreeMap<String, Vec<(String, String)>>,
 }
 
 impl<'a> System<'a> {
-    /// Reads the FMUs and checks the wiring against what they say of themselves.
+    /// Reads the FMUs and checks the connections against their model descriptions.
     ///
     /// # Errors
-    /// When an FMU cannot be read, two components share a name or two different FMUs a file name, a variable is
-    /// not there or has the wrong causality, two ends of a connection differ in type or unit, an input is fed
-    /// twice, or a start value or time is impossible.
+    /// Fails if an FMU cannot be read, if two components share a name, or if two different FMUs share a file
+    /// name. Fails if a variable is unknown or has the wrong causality, or if the ends of a connection differ
+    /// in type or unit. Fails if an input is fed twice, or if a start value or time is invalid.
     pub fn check(&'a self) -> Result<CheckedSystem<'a>> {
         let mut checked = CheckedSystem { system: self, fmus: Vec::new(), units: BTreeMap::new() };
         for (what, value) in [("stop time", self.stop_time), ("step size", self.step_size)] {
@@ -102,7 +101,7 @@ impl CheckedSystem<'_> {
         Ok(())
     }
 
-    /// Several components may be instances of one FMU; it is packed once.
+    /// Checks that different FMUs have different file names. Components with equal FMUs share one file.
     fn check_files(&self) -> Result<()> {
         let mut files = BTreeMap::new();
         for ((_, path), fmu) in self.system.components.iter().zip(&self.fmus) {
@@ -117,7 +116,7 @@ impl CheckedSystem<'_> {
         Ok(())
     }
 
-    /// The FMUs, each once: file name and content.
+    /// Returns file name and content of each FMU, without duplicates.
     pub(crate) fn files(&self) -> Result<BTreeMap<&str, &[u8]>> {
         let fmus = self.system.components.iter().zip(&self.fmus);
         fmus.map(|((_, path), fmu)| Ok((file_name(path)?, fmu.bytes.as_slice()))).collect()
@@ -137,14 +136,14 @@ impl CheckedSystem<'_> {
         variable.with_context(|| format!("no FMU has a variable {name}"))
     }
 
-    /// The start values of a component's own variables: full name and value.
+    /// Returns the start values of a component's variables: full name and value.
     pub(crate) fn own_start(&self, component: &str) -> Vec<(&str, &str)> {
         let start = self.system.start.iter().filter(|(name, _)| split(name).0 == component);
         start.map(|(name, start)| (*name, start.as_str())).collect()
     }
 }
 
-/// Component and variable.
+/// Splits a name into component and variable.
 pub(crate) fn split(end: &str) -> (&str, &str) {
     end.split_once('.').unwrap_or(("", end))
 }

@@ -1,17 +1,17 @@
-//! C programs that load FMUs, compiled and run for tests, with the standard's own headers.
+//! C programs that load FMUs, compiled and run for tests, with the headers of the FMI standards.
 //!
-//! All functions panic where something is missing, with a message that says what to do.
+//! All functions panic if a tool or file is missing; the message names the remedy.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The folder with the standards' `fmi2Functions.h` and `fmi3Functions.h`: `FMI2_HEADERS`, or that of the pip package fmpy in the `.venv` of
-/// this folder or one above it.
+/// Returns the directory with `fmi2Functions.h` and `fmi3Functions.h`. It is `FMI2_HEADERS`, or the directory
+/// in the pip package fmpy in the `.venv` of this directory or one above it.
 ///
 /// # Panics
-/// When there is none.
+/// Panics if there is no such directory.
 pub fn headers(folder: &Path) -> PathBuf {
     let named = std::env::var_os("FMI2_HEADERS").map(PathBuf::from);
     let in_venvs = folder.ancestors().flat_map(|folder| {
@@ -23,10 +23,11 @@ pub fn headers(folder: &Path) -> PathBuf {
     )
 }
 
-/// The shared library of this name: Cargo puts it beside the test, one folder up, or among the examples there.
+/// Returns the shared library of this name. Cargo writes it to the directory of the test, to the parent
+/// directory, or to the examples there.
 ///
 /// # Panics
-/// When it has not been built.
+/// Panics if the library has not been built.
 pub fn library(name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("a test");
     let file = format!("{DLL_PREFIX}{name}{DLL_SUFFIX}");
@@ -40,10 +41,10 @@ pub fn library(name: &str) -> PathBuf {
     })
 }
 
-/// What a program prints.
+/// Returns the output of a program.
 ///
 /// # Panics
-/// When it cannot be run, with the sentence that says what is missing, or fails.
+/// Panics with the message `missing` if the program cannot be run. Panics if the program fails.
 pub fn output(command: &mut Command, missing: &str) -> String {
     let output = command.output().unwrap_or_else(|error| panic!("{missing}: {command:?}: {error}"));
     let stderr = String::from_utf8_lossy(&output.stderr);
@@ -51,10 +52,10 @@ pub fn output(command: &mut Command, missing: &str) -> String {
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
-/// Compiles a C program into a folder, with the headers found from the folder of its source.
+/// Compiles a C program to a directory, with the headers found from the directory of its source.
 ///
 /// # Panics
-/// When it does not compile without warnings.
+/// Panics if the compiler reports an error or a warning.
 pub fn compile(source: &Path, folder: &Path) -> PathBuf {
     let program = folder.join(source.file_stem().expect("a file"));
     output(c_compiler(&headers(source)).arg("-o").args([&program, source]).arg("-ldl"), NO_COMPILER);
@@ -64,10 +65,10 @@ pub fn compile(source: &Path, folder: &Path) -> PathBuf {
 /// Checks that a C file compiles without warnings.
 ///
 /// # Errors
-/// What the compiler says.
+/// Returns the messages of the compiler.
 ///
 /// # Panics
-/// When there is no compiler.
+/// Panics if there is no compiler.
 pub fn check_syntax(source: &Path, headers: &Path) -> Result<(), String> {
     let output = c_compiler(headers).arg("-fsyntax-only").arg(source).output().expect(NO_COMPILER);
     if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).into_owned()) }
@@ -81,10 +82,10 @@ fn c_compiler(headers: &Path) -> Command {
     compiler
 }
 
-/// Runs a program, under what `C_RUNNER` says (`make sanitize`: valgrind).
+/// Returns the command for a program, run by the command in `C_RUNNER` if set (`make sanitize`: valgrind).
 ///
 /// # Panics
-/// Never.
+/// Never panics.
 pub fn command(program: &Path) -> Command {
     let runner = std::env::var("C_RUNNER").unwrap_or_default();
     let mut words = runner.split_whitespace().map(OsStr::new).chain([program.as_os_str()]);
@@ -93,14 +94,14 @@ pub fn command(program: &Path) -> Command {
     command
 }
 
-/// Lets `reload.c` load, use and unload libraries again and again.
+/// Runs `reload.c`, which loads, uses and unloads libraries repeatedly.
 ///
-/// The memory must grow by less than 100 bytes a round over the last nine tenths of the rounds. Counting pages has a noise
-/// of some 100 KiB, however many rounds there are. An instance forgotten in each would be 50 times as much; `make
-/// sanitize` has valgrind look for every byte.
+/// The memory must grow by less than 100 bytes per round over the last nine tenths of the rounds. The count
+/// of pages varies by some 100 KiB, independent of the number of rounds. An instance leaked in each round
+/// would add 50 times as much. With `make sanitize`, valgrind detects every leaked byte.
 ///
 /// # Panics
-/// When it grows by more.
+/// Panics if the memory grows by more.
 pub fn reload(program: &Path, names: &[&str]) {
     const ROUNDS: i64 = 3000;
     let mut command = command(program);

@@ -1,4 +1,4 @@
-//! What importers of either standard do with an instance, and what tests ask of it.
+//! Operations on an instance of either FMI version, and assertions for tests.
 
 use crate::{Arguments, Message};
 use fmu_export::Mode::{self, *};
@@ -6,7 +6,7 @@ use fmu_export::{Exported, Interface, Status};
 use std::ffi::{c_char, c_void};
 use std::ptr::null_mut;
 
-/// What an event has done: `fmi2EventInfo`, or what `fmi3UpdateDiscreteStates` says.
+/// Result of an event: `fmi2EventInfo`, or the results of `fmi3UpdateDiscreteStates`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(missing_docs, reason = "as in the standards: section 3.2.2 of FMI 2.0, 2.3.5 of FMI 3.0")]
 pub struct Updated {
@@ -17,13 +17,13 @@ pub struct Updated {
     pub next: Option<f64>,
 }
 
-/// The functions that differ in their names alone.
+/// Declares the functions that differ only in their names.
 macro_rules! same {
     ($($name:ident $fmi2:ident $fmi3:ident ($($argument:ident: $type:ty),*);)+) => {
         $(#[allow(missing_docs, reason = "named like the functions")] fn $name(&self $(, $argument: $type)*) -> Status;)+
     };
 }
-/// Hands the list of them on to another macro.
+/// Passes the list of these functions to another macro.
 macro_rules! same_functions {
     ($with:ident) => {
         $with! {
@@ -45,56 +45,57 @@ macro_rules! same_functions {
 }
 pub(crate) use same_functions;
 
-/// An instance as an importer of FMI 2.0 or FMI 3.0 holds it. Variables are named by their places in the table.
+/// An instance of FMI 2.0 or FMI 3.0, as an importer uses it. Variables are given by their indices in the
+/// table.
 #[allow(clippy::missing_panics_doc, reason = "that is what the asserting ones are for")]
 pub trait Either: Send {
     same_functions!(same);
 
-    /// Instantiates, with what a model in this program exports.
+    /// Makes an instance of a model in this program.
     ///
     /// # Errors
-    /// What was logged, if there is no instance.
+    /// Returns the log messages if there is no instance.
     fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>>
     where
         Self: Sized;
 
-    /// No instance.
+    /// Returns a handle without an instance (NULL).
     fn nothing<M: Exported>() -> Self
     where
         Self: Sized;
 
-    /// The names of the functions that work on an instance.
+    /// Returns the names of the functions on an instance.
     fn functions() -> &'static [&'static str]
     where
         Self: Sized;
 
-    /// The modes of an interface type but fatal, which needs a model that panics.
+    /// Returns the modes of an interface type, except fatal, which needs a model that panics.
     fn modes_of(interface: Interface) -> &'static [Mode]
     where
         Self: Sized;
 
-    /// Calls the function of this name with arguments as words; those that are not there are 0 or NULL.
+    /// Calls the function of this name with arguments as words; missing ones are 0 or NULL.
     ///
     /// # Safety
-    /// The words are what the function takes, as in C.
+    /// The words are valid arguments of the function, as in C.
     ///
     /// # Panics
-    /// When there is none.
+    /// Panics if there is no such function.
     unsafe fn call(&self, name: &str, words: &[u64]) -> Status;
 
-    /// Calls the function of this name, with zeros and NULL for arguments.
+    /// Calls the function of this name with all arguments 0 or NULL.
     ///
     /// # Panics
-    /// When there is none.
+    /// Panics if there is no such function.
     fn call_with_zeros(&self, name: &str) -> Status {
-        // SAFETY: nothing to follow.
+        // SAFETY: NULL pointers are never dereferenced.
         unsafe { self.call(name, &[]) }
     }
 
-    /// The messages since the last call of this.
+    /// Returns the messages since the last call of this function.
     fn take_log(&self) -> Vec<Message>;
 
-    /// Initialization mode.
+    /// Enters Initialization Mode.
     fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status;
 
     /// Reads Reals.
@@ -112,10 +113,10 @@ pub trait Either: Send {
     /// Sets a String.
     fn set_text(&self, place: u32, value: *const c_char) -> Status;
 
-    /// A step.
+    /// Performs a step.
     fn try_step(&self, point: f64, step_size: f64) -> Status;
 
-    /// A step to its end, which is the time of the FMU then, to the last bit; allocates nothing.
+    /// Performs a step to its end, which must equal the time of the FMU exactly. Allocates nothing.
     fn step(&self, point: f64, step_size: f64);
 
     /// Sets the time derivatives of up to 8 inputs; FMI 3.0 has no function for it.
@@ -127,19 +128,20 @@ pub trait Either: Send {
     /// Reads a partial derivative.
     fn partial(&self, unknown: u32, known: u32) -> f64;
 
-    /// One round of the event iteration.
+    /// Performs one iteration of the event handling.
     fn update(&self) -> Updated;
 
-    /// The end of a step of an integrator: whether there is an event, and whether the simulation ends.
+    /// Reports a completed step of an integrator. Returns whether there is an event, and whether the
+    /// simulation ends.
     fn completed_step(&self) -> [bool; 2];
 
-    /// Writes a saved state.
+    /// Serializes a saved state.
     fn serialize_into(&self, state: *mut c_void, bytes: *mut u8, size: usize) -> Status;
 
-    /// Reads one.
+    /// De-serializes a state.
     fn deserialize(&self, bytes: *const u8, size: usize, state: *mut *mut c_void) -> Status;
 
-    /// A new instance, initialized at this time.
+    /// Makes an instance and initializes it at this time.
     fn initialized_at<M: Exported>(start_time: f64) -> Self
     where
         Self: Sized,
@@ -149,8 +151,8 @@ pub trait Either: Send {
         fmu
     }
 
-    /// A new instance, with event mode if it can, in this mode. Nothing that an importer does leads to "error", for refusals
-    /// leave the mode as it is; a saved state does.
+    /// Makes an instance in this mode, with Event Mode if it is supported. An error leaves the mode
+    /// unchanged, so only a de-serialized state leads to the mode "error".
     fn in_mode<M: Exported>(interface: Interface, mode: Mode) -> Self
     where
         Self: Sized,
@@ -174,10 +176,10 @@ pub trait Either: Send {
         fmu
     }
 
-    /// To the first step, where an importer handles the events.
+    /// Continues to the first step if the importer handles events.
     fn leave_event_mode(&self) {}
 
-    /// Calls each function, with zeros and NULL for arguments.
+    /// Calls each function with all arguments 0 or NULL.
     fn call_all(&self) -> Vec<(&'static str, Status)>
     where
         Self: Sized,
@@ -185,14 +187,14 @@ pub trait Either: Send {
         Self::functions().iter().map(|name| (*name, self.call_with_zeros(name))).collect()
     }
 
-    /// Asserts OK.
+    /// Asserts that the status is OK.
     #[track_caller]
     fn ok(&self, status: Status) {
         assert_eq!(status, Status::Ok, "log: {:#?}", self.take_log());
     }
 
-    /// The promises about a refused call: an error, one clean message that names the function, and an instance that is as it
-    /// was. Returns the message.
+    /// Asserts the guarantees for a rejected call: an error, one clean message that names the function, and
+    /// an unchanged instance. Returns the message.
     #[track_caller]
     fn refused(&self, label: &str, call: impl FnOnce(&Self) -> Status) -> String
     where
@@ -214,7 +216,7 @@ pub trait Either: Send {
         message.text.clone()
     }
 
-    /// Refused, in these words.
+    /// Asserts that a call is rejected with a message that contains these words.
     #[track_caller]
     fn refused_with(&self, words: &[&str], call: impl FnOnce(&Self) -> Status)
     where
@@ -224,7 +226,7 @@ pub trait Either: Send {
         words.iter().for_each(|word| assert!(message.contains(word), "'{word}' is not in: {message}"));
     }
 
-    /// The state as bytes; `None` if the FMU does not serialize.
+    /// Returns the serialized state; `None` if the FMU does not serialize.
     fn serialized(&self) -> Option<Vec<u8>> {
         let mut state = null_mut();
         if self.get_state(&mut state) != Status::Ok {
@@ -240,13 +242,14 @@ pub trait Either: Send {
         (status == Status::Ok).then_some(bytes)
     }
 
-    /// The state as bytes.
+    /// Returns the serialized state.
     #[track_caller]
     fn bytes(&self) -> Vec<u8> {
         self.serialized().expect("the FMU serializes its state")
     }
 
-    /// De-serializing these bytes is refused, and the handle stays as it is; returns the message.
+    /// Asserts that de-serializing these bytes is rejected and the handle stays unchanged; returns the
+    /// message.
     #[track_caller]
     fn refused_bytes(&self, bytes: &[u8]) -> String
     where
@@ -260,7 +263,7 @@ pub trait Either: Send {
         message
     }
 
-    /// Continues from a serialized state.
+    /// Restores a serialized state.
     #[track_caller]
     fn restore(&self, bytes: &[u8]) {
         let mut state = null_mut();
@@ -269,7 +272,7 @@ pub trait Either: Send {
         self.forget(state);
     }
 
-    /// A new saved state.
+    /// Saves the state and returns it.
     #[track_caller]
     fn save(&self) -> *mut c_void {
         let mut state = null_mut();
@@ -284,20 +287,21 @@ pub trait Either: Send {
         assert!(state.is_null(), "the handle is cleared");
     }
 
-    /// From instantiated to initialization mode.
+    /// Enters Initialization Mode; asserts success.
     #[track_caller]
     fn enter_initialization(&self, start_time: f64, stop_time: Option<f64>) {
         self.ok(self.enter_initialization_mode(start_time, stop_time));
     }
 
-    /// From instantiated to the first communication point or to event mode.
+    /// Initializes an instance: from instantiated to the first communication point or to Event Mode.
     #[track_caller]
     fn initialize(&self, start_time: f64) {
         self.enter_initialization(start_time, None);
         self.ok(self.exit_initialization_mode());
     }
 
-    /// From event mode on, with the event iteration; what the rounds have said, together.
+    /// Performs the event iteration in Event Mode and enters Continuous-Time Mode. Returns the combined
+    /// results of the iterations.
     #[track_caller]
     fn enter_continuous_time(&self) -> Updated {
         let mut all = Updated::default();
@@ -317,7 +321,7 @@ pub trait Either: Send {
         }
     }
 
-    /// Values of Reals.
+    /// Returns values of Reals as a vector.
     #[track_caller]
     fn read(&self, places: &[u32]) -> Vec<f64> {
         let mut values = vec![f64::NAN; places.len()];
@@ -325,7 +329,7 @@ pub trait Either: Send {
         values
     }
 
-    /// Values of Reals.
+    /// Returns values of Reals as an array.
     #[track_caller]
     fn get<const COUNT: usize>(&self, places: [u32; COUNT]) -> [f64; COUNT]
     where
@@ -343,7 +347,7 @@ pub trait Either: Send {
         self.ok(self.try_set(places, values));
     }
 
-    /// All continuous states.
+    /// Returns all continuous states.
     #[track_caller]
     fn states<const COUNT: usize>(&self) -> [f64; COUNT]
     where
@@ -354,7 +358,7 @@ pub trait Either: Send {
         x
     }
 
-    /// The derivatives of all continuous states.
+    /// Returns the derivatives of all continuous states.
     #[track_caller]
     fn derivatives<const COUNT: usize>(&self) -> [f64; COUNT]
     where

@@ -1,4 +1,4 @@
-//! FMI 2.0: an instance as an importer holds it.
+//! FMI 2.0: an instance as an importer uses it.
 
 use crate::importer::{Log, importer, remember};
 use crate::{Arguments, Borrowed, Either, Message, Updated, either, library::functions_of};
@@ -12,9 +12,9 @@ use std::ptr::{null, null_mut};
 
 fmi_abi::fmi2_functions!(importer, fmi2FreeInstance;);
 
-/// The logger without its `...`, which stable Rust cannot define. The FMU may pass variadic arguments, which are not
-/// looked at; named ones travel the same way in variadic and plain calls on every platform of this project. Miri checks
-/// that, so it gets one as it should be.
+/// The logger without its `...`, which stable Rust cannot define. The function ignores variadic arguments. On
+/// every platform of this project, variadic and plain calls pass named arguments in the same way. Miri checks
+/// the calling convention, so it gets a variadic function.
 unsafe extern "C" fn log_message(
     environment: fmi2ComponentEnvironment,
     instance_name: fmi2String,
@@ -23,12 +23,12 @@ unsafe extern "C" fn log_message(
     message: fmi2String,
     #[cfg(miri)] _: ...
 ) {
-    // SAFETY: section 2.1.5: NULL or zero-terminated strings, and NULL or the log.
+    // SAFETY: section 2.1.5 requires NULL or NUL-terminated strings, and NULL or the log.
     unsafe { remember(environment, instance_name, status, category, message) }
 }
 
-/// `fmi2Instantiate`. The callbacks structure and the instance name are overwritten afterwards: the FMU must have copied
-/// them.
+/// Calls `fmi2Instantiate`. Afterwards overwrites the callbacks structure and the instance name, because the
+/// FMU must have copied them.
 fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi2Component {
     let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
     let mut name = arguments.instance_name.map(|name| name.to_bytes_with_nul().to_vec());
@@ -37,7 +37,7 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi2Componen
     #[cfg(miri)]
     let logger: fmi2CallbackLogger = log_message;
     let mut callbacks = fmi2CallbackFunctions {
-        // SAFETY: see `log_message`.
+        // SAFETY: the documentation of `log_message` explains why both types have compatible calls.
         logger: arguments.logger.then(|| unsafe { std::mem::transmute::<_, fmi2CallbackLogger>(logger) }),
         allocate_memory: None,
         free_memory: None,
@@ -47,7 +47,7 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi2Componen
             false => null_mut(),
         },
     };
-    // SAFETY: NULL or living values, all of them.
+    // SAFETY: each pointer is NULL or points to a live value.
     let component = unsafe {
         (functions.fmi2Instantiate)(
             name.as_ref().map_or(null(), |name| name.as_ptr().cast()),
@@ -68,17 +68,17 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi2Componen
     component
 }
 
-/// What FMI 2.0 alone has.
+/// Functions that exist only in FMI 2.0.
 #[allow(clippy::missing_panics_doc, reason = "that is what they are for")]
 impl Importer {
-    /// What needs no instance: version and platform (section 2.1.4).
+    /// Returns version and platform, which need no instance (section 2.1.4).
     pub fn version_and_platform(&self) -> [&CStr; 2] {
         let Functions { fmi2GetVersion, fmi2GetTypesPlatform, .. } = self.functions;
-        // SAFETY: both give strings that the library keeps.
+        // SAFETY: both functions return strings that the library keeps.
         [fmi2GetVersion, fmi2GetTypesPlatform].map(|text| unsafe { CStr::from_ptr(text()) })
     }
 
-    /// Output derivatives of order 1.
+    /// Returns output derivatives of order 1.
     #[track_caller]
     pub fn rates<const COUNT: usize>(&self, vr: [u32; COUNT]) -> [f64; COUNT] {
         let mut values = [f64::NAN; COUNT];
@@ -87,13 +87,13 @@ impl Importer {
         values
     }
 
-    /// Input derivatives of order 1.
+    /// Sets input derivatives of order 1.
     #[track_caller]
     pub fn set_rates<const COUNT: usize>(&self, vr: [u32; COUNT], values: [f64; COUNT]) {
         self.give_rates(&vr, &values);
     }
 
-    /// Directional derivatives.
+    /// Returns directional derivatives.
     #[track_caller]
     pub fn directional(&self, unknown: &[u32], known: &[u32], seed: &[f64]) -> Vec<f64> {
         let mut result = vec![f64::NAN; unknown.len()];
@@ -111,7 +111,7 @@ impl Importer {
         result
     }
 
-    /// `fmi2SetDebugLogging` with these categories.
+    /// Calls `fmi2SetDebugLogging` with these categories.
     pub fn set_debug_logging(&self, on: bool, categories: &[&CStr]) -> Status {
         let pointers: Vec<_> = categories.iter().map(|category| category.as_ptr()).collect();
         self.fmi2SetDebugLogging(on.into(), pointers.len(), pointers.as_ptr())
@@ -151,7 +151,7 @@ impl Either for Importer {
     }
 
     unsafe fn call(&self, name: &str, words: &[u64]) -> Status {
-        // SAFETY: the function of this name, and the caller's promise.
+        // SAFETY: the address belongs to the function of this name; the caller guarantees the arguments.
         Status::from_c(unsafe { calls::call(self.address_of(name), name, self.instance.cast(), words) })
     }
 

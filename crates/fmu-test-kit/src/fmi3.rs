@@ -1,4 +1,4 @@
-//! FMI 3.0: an instance as an importer holds it.
+//! FMI 3.0: an instance as an importer uses it.
 
 use crate::importer::{Log, importer, remember};
 use crate::{Arguments, Borrowed, Either, Message, Updated, either};
@@ -19,16 +19,16 @@ unsafe extern "C" fn log_message(
     category: fmi3String,
     message: fmi3String,
 ) {
-    // SAFETY: section 2.3.1: strings, and NULL or the log. No instance name comes with them.
+    // SAFETY: section 2.3.1 requires strings, and NULL or the log. FMI 3.0 passes no instance name.
     unsafe { remember(environment, null(), status, category, message) }
 }
 
-/// `fmi3InstantiateModelExchange` or `fmi3InstantiateCoSimulation`.
+/// Calls `fmi3InstantiateModelExchange` or `fmi3InstantiateCoSimulation`.
 fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance {
     let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
     let name = pointer(arguments.instance_name);
     let token = pointer(arguments.guid.as_deref());
-    // A path, not a URI.
+    // FMI 3.0 needs a path, not a URI.
     let path = arguments.resource_location.map(|location| {
         let bytes = location.to_bytes_with_nul();
         CStr::from_bytes_with_nul(bytes.strip_prefix(b"file://").unwrap_or(bytes)).expect("its end is left")
@@ -41,7 +41,7 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance
     let callback = arguments.logger.then_some(log_message as fmi3LogMessageCallback);
     let (visible, logging_on) = (arguments.visible.into(), arguments.logging_on);
     let required = arguments.required_intermediate_variables;
-    // SAFETY: NULL or living values, all of them.
+    // SAFETY: each pointer is NULL or points to a live value.
     unsafe {
         match arguments.fmu_type {
             0 => (functions.fmi3InstantiateModelExchange)(
@@ -71,7 +71,7 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance
     }
 }
 
-/// What `fmi3DoStep` says.
+/// Results of `fmi3DoStep`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs, reason = "as in the standard, section 4.2.1")]
 pub struct Stepped {
@@ -81,12 +81,12 @@ pub struct Stepped {
     pub last_successful_time: f64,
 }
 
-/// What FMI 3.0 alone has.
+/// Functions that exist only in FMI 3.0.
 impl Importer {
-    /// A step, or not.
+    /// Performs a step.
     ///
     /// # Errors
-    /// What is answered instead of OK.
+    /// Returns the status if it is not OK.
     pub fn do_step(&self, point: f64, step_size: f64) -> Result<Stepped, Status> {
         let (mut event, mut terminate, mut early, mut time) = (2, 2, 2, f64::NAN);
         let status =
@@ -105,8 +105,8 @@ fn truth(flag: fmi3Boolean) -> bool {
     flag == 1
 }
 
-/// The value references of variables at these places, up to 16; without an allocation, which tests of control loops
-/// would count.
+/// Returns the value references of variables with these indices, up to 16. Allocates nothing, because tests
+/// of control loops count allocations.
 fn references(places: &[u32]) -> [u32; 16] {
     let mut references = [0; 16];
     references[..places.len()].copy_from_slice(places);
@@ -142,7 +142,7 @@ impl Either for Importer {
     }
 
     unsafe fn call(&self, name: &str, words: &[u64]) -> Status {
-        // SAFETY: the function of this name, and the caller's promise.
+        // SAFETY: the address belongs to the function of this name; the caller guarantees the arguments.
         Status::from_c(unsafe { calls::call(self.address_of(name), name, self.instance.cast(), words) })
     }
 
@@ -200,7 +200,7 @@ impl Either for Importer {
         rate
     }
 
-    /// Backward and forward: of one with respect to one it is the same number.
+    /// Reads a directional and an adjoint derivative, which are equal for a single pair of variables.
     #[track_caller]
     fn partial(&self, unknown: u32, known: u32) -> f64 {
         let [unknown, known] = [unknown, known].map(reference);

@@ -1,4 +1,5 @@
-//! An instance as an importer holds it: the C functions of a standard as methods, from the standard's list.
+//! An instance as an importer uses it: the C functions of an FMI version as methods, from the list of
+//! functions.
 
 use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmu_export::{Category, Exported, Interface, Status};
@@ -6,24 +7,25 @@ use std::ffi::{CStr, CString};
 use std::ops::Deref;
 use std::sync::Mutex;
 
-/// What the logger was told.
+/// A log message that the importer received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
     /// The name of the instance; FMI 3.0 does not pass it.
     pub instance_name: String,
-    /// The status that goes with it.
+    /// Status of the message.
     pub status: Status,
-    /// One of the log categories.
+    /// Log category.
     pub category: String,
-    /// The text.
+    /// Text of the message.
     pub text: String,
 }
 
 impl Message {
-    /// Every importer shows it as it is: nothing in it that `printf` or section 2.1.5 give a meaning to.
+    /// Asserts that every importer shows the message unchanged: no characters that `printf` or section 2.1.5
+    /// interpret.
     ///
     /// # Panics
-    /// When it is not so.
+    /// Panics if the message contains such characters.
     #[track_caller]
     pub fn assert_clean(&self) {
         assert!(!self.text.contains(['%', '#', '\n']) && !self.text.is_empty(), "{self:?}");
@@ -42,8 +44,10 @@ impl Log {
     }
 }
 
+/// Stores a message.
+///
 /// # Safety
-/// The environment is NULL or a `Log` that lives, the texts are NULL or strings.
+/// The environment is NULL or a live `Log`; the strings are NULL or valid.
 pub(crate) unsafe fn remember(
     environment: *mut c_void,
     instance_name: *const c_char,
@@ -51,30 +55,31 @@ pub(crate) unsafe fn remember(
     category: *const c_char,
     message: *const c_char,
 ) {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees NULL or a string.
     let text = |pointer: *const c_char| match unsafe { pointer.as_ref() } {
-        // SAFETY: not NULL, and a string.
+        // SAFETY: the pointer is not NULL, so it is a string.
         Some(_) => unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned(),
         None => String::new(),
     };
     let status = Status::from_c(status);
     let [instance_name, category, text] = [instance_name, category, message].map(text);
-    // SAFETY: NULL or the `Log` that was handed over with the logger and lives as long as the instance.
+    // SAFETY: NULL, or the `Log` that was passed with the logger and lives as long as the instance.
     if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
         let mut messages = log.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         messages.push(Message { instance_name, status, category, text });
     }
 }
 
-/// The arguments of the functions that make instances. `callbacks: false` passes NULL instead of FMI 2.0's structure,
-/// `logger: false` no logger, `environment: false` no environment (messages are then read and forgotten).
+/// Arguments of the functions that make instances. `callbacks: false` passes NULL instead of FMI 2.0's
+/// structure, `logger: false` no logger, and `environment: false` no environment (messages are then ignored).
 #[derive(Clone, Debug)]
 #[allow(missing_docs, reason = "as in the standards: section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0")]
 pub struct Arguments<'a> {
     pub instance_name: Option<&'a CStr>,
-    /// In FMI 3.0, whose interface types have a function each, all but 0 is Co-Simulation.
+    /// Interface type. FMI 3.0 has a function for each type; here 0 is Model Exchange and any other value
+    /// Co-Simulation.
     pub fmu_type: i32,
-    /// Or instantiation token.
+    /// The guid, or the instantiation token.
     pub guid: Option<CString>,
     pub resource_location: Option<&'a CStr>,
     pub callbacks: bool,
@@ -82,14 +87,14 @@ pub struct Arguments<'a> {
     pub environment: bool,
     pub visible: bool,
     pub logging_on: u8,
-    /// From here on for FMI 3.0.
+    /// This and the following fields are only for FMI 3.0.
     pub event_mode_used: u8,
     pub early_return_allowed: u8,
     pub required_intermediate_variables: &'a [u32],
 }
 
 impl Arguments<'static> {
-    /// What a careful importer passes, which can do little.
+    /// Returns the arguments of an importer without optional capabilities.
     pub fn of<M: Exported>(interface: Interface) -> Self {
         Self {
             instance_name: Some(c"instance"),
@@ -107,17 +112,17 @@ impl Arguments<'static> {
         }
     }
 
-    /// The same with all that the importers of the model may use.
+    /// Returns the arguments of an importer with all capabilities that the model supports.
     pub fn with_events<M: Exported>(interface: Interface) -> Self {
         let event_mode_used = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode()).into();
         Self { event_mode_used, early_return_allowed: 1, ..Self::of::<M>(interface) }
     }
 }
 
-/// An instance of either standard that somebody else frees, see `Importer::borrowed`.
+/// An instance of either FMI version that other code frees, see `Importer::borrowed`.
 pub struct Borrowed<F> {
     pub(crate) importer: F,
-    /// Leaves NULL in its place, whose freeing does nothing.
+    /// Replaces the instance by NULL, which is safe to free.
     pub(crate) forget: fn(&mut F),
 }
 
@@ -135,7 +140,8 @@ impl<F> Drop for Borrowed<F> {
     }
 }
 
-/// The importer of a standard. The module has `make`, for instances, and `functions_of` a model.
+/// Defines the importer of an FMI version. The calling module provides `make` for instances and
+/// `functions_of` for models.
 macro_rules! importer {
     (
         $free_instance:ident;
@@ -150,89 +156,90 @@ macro_rules! importer {
         pub struct Importer {
             functions: Functions,
             instance: $handle,
-            // Shared: the FMU has a pointer to it.
+            // Shared, because the FMU has a pointer to it.
             log: std::sync::Arc<Log>,
         }
 
-        // SAFETY: an instance may be used from any one thread at a time (masters have thread pools).
+        // SAFETY: the FMI standards permit use of an instance from any thread, one thread at a time.
         unsafe impl Send for Importer {}
 
         impl Drop for Importer {
             fn drop(&mut self) {
-                // SAFETY: NULL, or made by the library and freed only here.
+                // SAFETY: the instance is NULL, or made by the library and freed only here.
                 unsafe { (self.functions.$free_instance)(self.instance) }
             }
         }
 
         impl Importer {
-            /// A new instance.
+            /// Makes an instance.
             ///
             /// # Errors
-            /// What was logged, if there is no instance.
+            /// Returns the log messages if there is no instance.
             pub fn instantiate(functions: Functions, arguments: &Arguments) -> Result<Self, Vec<Message>> {
                 let log = std::sync::Arc::<Log>::default();
                 let instance = make(&functions, arguments, &log);
                 if instance.is_null() { Err(log.take()) } else { Ok(Self { functions, instance, log }) }
             }
 
-            /// A fresh instance of a model in this program, or of the library that stands for it.
+            /// Makes an instance of a model in this program, or of the library that `FMU_LIBRARY` names.
             ///
             /// # Panics
-            /// When there is none.
+            /// Panics if there is no instance.
             pub fn of<M: Exported>(interface: Interface) -> Self {
                 Self::with::<M>(&Arguments::of::<M>(interface))
             }
 
-            /// One that is made like this.
+            /// Makes an instance with these arguments.
             ///
             /// # Panics
-            /// When there is none.
+            /// Panics if there is no instance.
             pub fn with<M: Exported>(arguments: &Arguments) -> Self {
                 Self::try_with::<M>(arguments).unwrap_or_else(|log| panic!("there is no instance: {log:?}"))
             }
 
-            /// One that is made like this, or not.
+            /// Makes an instance with these arguments, or returns an error.
             ///
             /// # Errors
-            /// What was logged, if there is no instance.
+            /// Returns the log messages if there is no instance.
             pub fn try_with<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
                 Self::instantiate(functions_of::<M>(), arguments)
             }
 
-            /// What an importer has that ignored a NULL.
+            /// Returns a NULL instance, as of an importer that ignored a failed instantiation.
             pub fn null<M: Exported>() -> Self {
                 Self { functions: functions_of::<M>(), instance: null_mut(), log: std::sync::Arc::default() }
             }
 
-            /// An instance that somebody else has, to call and not to free: as a log callback knows it.
+            /// Wraps an instance that other code owns, to call but not free it, for example in a log
+            /// callback.
             ///
             /// # Safety
-            /// The instance is NULL or from these functions, and alive for as long as this is used.
+            /// The instance is NULL or was made by these functions, and lives as long as the result is used.
             pub unsafe fn borrowed(functions: Functions, instance: $handle) -> Borrowed<Self> {
                 let importer = Self { functions, instance, log: std::sync::Arc::default() };
                 Borrowed { importer, forget: |importer| importer.instance = null_mut() }
             }
 
-            /// The functions of the library.
+            /// Returns the functions of the library.
             pub fn functions(&self) -> &Functions {
                 &self.functions
             }
 
-            /// The instance, for calls that this type does not have.
+            /// Returns the instance, for calls that this type does not have.
             pub fn instance(&self) -> $handle {
                 self.instance
             }
         }
 
-        /// The functions of the standard, under their names, with the arguments of C.
+        /// Functions of the FMI version, under their names, with the arguments of C.
         #[allow(non_snake_case, missing_docs, clippy::too_many_arguments)]
         impl Importer {
             $(
                 #[allow(clippy::not_unsafe_ptr_arg_deref, reason = "see the SAFETY comment")]
                 #[inline]
                 pub fn $function(&self $(, $argument: $type)*) -> Status {
-                    // SAFETY: the instance is NULL or alive. Pointers are passed on as they are: who uses this type
-                    // passes NULL or pointers to as many values as it says, as in C.
+                    // SAFETY: the instance is NULL or alive. Pointers are passed on unchanged: callers of
+                    // this type guarantee NULL or enough values, as in C.
                     Status::from_c(unsafe { (self.functions.$function)(self.instance $(, $argument)*) })
                 }
             )+
@@ -245,7 +252,7 @@ macro_rules! importer {
             }
         }
 
-        /// The names of the functions that work on an instance.
+        /// Names of the functions on an instance.
         pub const FUNCTIONS: &[&str] = &[$(stringify!($function)),+];
     };
 }

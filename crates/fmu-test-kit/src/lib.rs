@@ -1,9 +1,10 @@
-//! What tests, fuzzing and benchmarks of FMUs share; not published.
+//! Code that tests, fuzzing and benchmarks of FMUs share; not published.
 //!
-//! An importer that does nothing of its own: the functions of FMI 2.0 as methods of an instance that frees itself,
-//! [`Importer`]; in [`fmi3`] those of FMI 3.0. What both have, and what tests ask of an instance, is [`Either`];
-//! [`serialized`] has the bytes of saved states, [`c_programs`] what tests with C programs need. [`careless`] is an importer
-//! that makes any calls in any order, [`realtime`] checks that code may run in a control loop; [`checks`] holds for every FMU.
+//! [`Importer`] is a plain importer of FMI 2.0: the C functions as methods of an instance that frees itself.
+//! [`fmi3`] contains the importer of FMI 3.0. [`Either`] contains the operations that both share, and
+//! assertions. [`serialized`] describes the bytes of saved states; [`c_programs`] supports tests with C
+//! programs. [`careless`] is a fault-injecting importer that makes any calls in any order. [`realtime`]
+//! checks that code may run in a control loop. [`checks`] contains checks that hold for every FMU.
 
 // Under Miri, the logger is variadic as in C.
 #![cfg_attr(miri, feature(c_variadic))]

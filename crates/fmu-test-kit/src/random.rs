@@ -1,18 +1,18 @@
-//! A sequence of numbers, the same in every run.
+//! A sequence of pseudorandom numbers, equal in every run.
 
-/// From a seed on.
+/// Generator with its state, initially the seed.
 #[derive(Debug)]
 pub struct Random(pub u64);
 
 impl Random {
-    /// 64 bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
-        // Knuth's multiplier; the high bits are the good ones.
+        // Knuth's multiplier; the high bits have the better quality.
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         self.0 ^ (self.0 >> 33)
     }
 
-    /// A number of this range.
+    /// Returns a number in this range.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * ((self.bits() >> 11) as f64 / (1_u64 << 53) as f64)
     }

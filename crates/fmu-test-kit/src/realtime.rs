@@ -1,11 +1,13 @@
-//! Whether code may run in a control loop: it must not allocate, not enter the kernel, not lock.
+//! Checks that code may run in a control loop: it must not allocate, call the kernel, or lock.
 //!
-//! * Allocations are counted by an allocator that the test installs: `#[global_allocator] static COUNTING: Counting =
-//!   Counting;`, see [`allocations`].
-//! * System calls end a copy of the process in which the work is done, see [`without_kernel`].
-//! * Locks are words that the source must not have, see [`assert_nothing_to_lock`]: a lock that is free is an atomic
-//!   instruction, which no run shows, nor any sanitizer.
-//! * Built with `--cfg rtsan` and the RealtimeSanitizer, [`sanitizer`] marks where nothing may be called that can block.
+//! * An allocator that the test installs counts allocations:
+//!   `#[global_allocator] static COUNTING: Counting = Counting;`, see [`allocations`].
+//! * The work runs in a copy of the process that the kernel ends at the first system call, see
+//!   [`without_kernel`].
+//! * The source must not contain the names of locks, see [`assert_nothing_to_lock`]. A free lock is only an
+//!   atomic instruction, which no run and no sanitizer detects.
+//! * In a build with `--cfg rtsan` and the RealtimeSanitizer, [`sanitizer`] marks the code in which blocking
+//!   calls are forbidden.
 
 use crate::checks::{inputs, outputs, parameters, start_of};
 use crate::{Either, Importer, fmi3};
@@ -20,40 +22,40 @@ thread_local! {
     static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The system's allocator, counting for each thread what it is asked to do.
+/// The system's allocator with a count of its calls for each thread.
 #[derive(Debug)]
 pub struct Counting;
 
 fn count() {
-    // Without a destructor the counter is there for as long as its thread.
+    // The counter has no destructor, so it exists as long as its thread.
     ALLOCATIONS.with(|count| count.set(count.get() + 1));
 }
 
-// SAFETY: hands everything on to the system's allocator.
+// SAFETY: passes all calls to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
-        // SAFETY: the caller's promise is that of the same function.
+        // SAFETY: the caller guarantees the requirements of the same function.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         count();
-        // SAFETY: as above.
+        // SAFETY: the caller guarantees the requirements of the same function.
         unsafe { System.dealloc(pointer, layout) }
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         count();
-        // SAFETY: as above.
+        // SAFETY: the caller guarantees the requirements of the same function.
         unsafe { System.realloc(pointer, layout, size) }
     }
 }
 
-/// What the work does allocate and free on this thread.
+/// Returns the number of allocations and deallocations by `work` on this thread.
 ///
 /// # Panics
-/// When nothing is counted: [`Counting`] is not the allocator of the program.
+/// Panics if [`Counting`] is not the allocator of the program.
 pub fn allocations(work: impl FnOnce()) -> u64 {
     let before = ALLOCATIONS.with(Cell::get);
     drop(std::hint::black_box(Box::new(1)));
@@ -63,8 +65,8 @@ pub fn allocations(work: impl FnOnce()) -> u64 {
     ALLOCATIONS.with(Cell::get) - start
 }
 
-/// The tests of a model whose sources are in this package: what runs in a control loop neither allocates nor enters the kernel nor
-/// locks. `make sanitize` runs the same loop under the RealtimeSanitizer.
+/// Defines the tests of a model whose sources are in this package: a control loop neither allocates, nor
+/// calls the kernel, nor locks. `make sanitize` runs the same loop under the RealtimeSanitizer.
 #[macro_export]
 macro_rules! control_loop {
     ($model:ty) => {
@@ -76,7 +78,7 @@ macro_rules! control_loop {
             $crate::realtime::assert_no_allocation::<$model>();
         }
 
-        /// Code that only sees its instance needs neither locks nor anything else that instances would share.
+        /// Checks that the source shares no data between instances, so that it needs no locks.
         #[test]
         fn the_library_has_nothing_to_lock() {
             let sources = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
@@ -84,7 +86,8 @@ macro_rules! control_loop {
             assert!(files > 10, "{files} files");
         }
 
-        /// The kernel ends the process at the first system call, so the loop runs in a copy of it.
+        /// Runs the loop in a copy of the process, because the kernel ends the process at the first system
+        /// call.
         #[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
         #[test]
         fn the_loop_makes_no_system_call() {
@@ -93,14 +96,14 @@ macro_rules! control_loop {
     };
 }
 
-/// A controller's turn: what masters call between two samples.
+/// Calls of an importer in a control loop.
 struct Loop<F: Either> {
     fmu: F,
     state: *mut c_void,
     time: f64,
     inputs: Vec<u32>,
     outputs: Vec<u32>,
-    /// What is set or was read.
+    /// Values to set and values read.
     values: [Vec<f64>; 2],
     parameter: (u32, f64),
     truths: Vec<u32>,
@@ -122,7 +125,7 @@ impl<F: Either> Loop<F> {
         }
     }
 
-    /// One step of size `h`, with a fresh state saved into an old one.
+    /// Performs one step of size `h`, and saves the state over an earlier one.
     fn turn(&mut self, h: f64) {
         let Self { fmu, state, time, values: [set, read], inputs, outputs, .. } = self;
         set.iter_mut().zip(1_u8..).for_each(|(value, i)| *value = (*time * f64::from(i)).sin());
@@ -134,7 +137,7 @@ impl<F: Either> Loop<F> {
         *time += h;
     }
 
-    /// What a master does less often: another parameter, another mode of working, back to a saved state, derivatives.
+    /// Performs rarer calls: sets a parameter and Booleans, restores a state, and reads derivatives.
     fn change(&self, factor: f64) {
         let Self { fmu, parameter: (parameter, start), .. } = self;
         fmu.set(&[*parameter], &[start * factor]);
@@ -144,8 +147,8 @@ impl<F: Either> Loop<F> {
         fmu.partial(self.outputs[0], self.inputs[0]);
     }
 
-    /// A thousand turns with one step size, a thousand with a new one each, changes in between. The largest step sizes
-    /// need what stiff models have for them.
+    /// Performs a thousand steps of one size and a thousand steps of different sizes, with changes in
+    /// between. The largest step sizes cover special code for stiff models.
     fn run(&mut self) {
         let _context = sanitizer::enter();
         for i in 0..1000 {
@@ -164,19 +167,19 @@ impl<F: Either> Drop for Loop<F> {
     }
 }
 
-/// Runs the loop of a model in both standards.
+/// Runs the loop of a model in both FMI versions.
 ///
 /// # Panics
-/// When it allocates.
+/// Panics if the loop allocates.
 pub fn assert_no_allocation<M: Exported>() {
     let (mut old, mut new) = (Loop::<Importer>::new::<M>(), Loop::<fmi3::Importer>::new::<M>());
     assert_eq!([allocations(|| old.run()), allocations(|| new.run())], [0; 2]);
 }
 
-/// Runs the loop of a model in both standards.
+/// Runs the loop of a model in both FMI versions.
 ///
 /// # Panics
-/// When it makes a system call, or nobody would notice.
+/// Panics if the loop makes a system call, or if system calls are not detected.
 #[cfg(all(target_os = "linux", any(target_arch = "x86_64", target_arch = "aarch64")))]
 pub fn assert_no_system_call<M: Exported>() {
     assert_eq!(without_kernel(&mut || ()), Ended::Exited(0));
@@ -187,10 +190,10 @@ pub fn assert_no_system_call<M: Exported>() {
     assert_eq!(without_kernel(&mut || new.run()), Ended::Exited(0));
 }
 
-/// Looks for locks and for anything else that instances would share in all files of a folder; returns their number.
+/// Searches all files of a directory for locks and other shared data; returns the number of files.
 ///
 /// # Panics
-/// When there is any.
+/// Panics if it finds any.
 pub fn assert_nothing_to_lock(folder: &Path) -> usize {
     let shared = ["Mutex", "RwLock", "Condvar", "Once", "OnceLock", "LazyLock", "thread_local"];
     let mut folders = vec![folder.to_owned()];
@@ -204,7 +207,7 @@ pub fn assert_nothing_to_lock(folder: &Path) -> usize {
             }
             files += 1;
             let text = std::fs::read_to_string(&path).expect("a readable file");
-            // Each instance has a WebAssembly module for itself: nothing in it is shared.
+            // Each instance has a separate WebAssembly module, so nothing in it is shared.
             if text.contains("#![cfg(target_family = \"wasm\")]") {
                 continue;
             }
@@ -218,9 +221,9 @@ pub fn assert_nothing_to_lock(folder: &Path) -> usize {
     files
 }
 
-/// Tells the RealtimeSanitizer, if this was built with it (`--cfg rtsan`), that nothing may be called that can block.
+/// Marks code for the RealtimeSanitizer (`--cfg rtsan`), which then reports calls that may block.
 pub mod sanitizer {
-    /// Until this is dropped.
+    /// Section in which blocking calls are forbidden; ends when dropped.
     #[derive(Debug)]
     #[must_use]
     pub struct Context;
@@ -231,9 +234,9 @@ pub mod sanitizer {
         fn __rtsan_realtime_exit();
     }
 
-    /// From here on.
+    /// Begins a section in which blocking calls are forbidden.
     pub fn enter() -> Context {
-        // SAFETY: marks the thread, no more.
+        // SAFETY: only marks the thread.
         #[cfg(rtsan)]
         unsafe {
             __rtsan_realtime_enter()
@@ -243,7 +246,7 @@ pub mod sanitizer {
 
     impl Drop for Context {
         fn drop(&mut self) {
-            // SAFETY: as above.
+            // SAFETY: only marks the thread.
             #[cfg(rtsan)]
             unsafe {
                 __rtsan_realtime_exit()
@@ -259,22 +262,22 @@ pub use sandbox::{Ended, without_kernel};
 mod sandbox {
     use libc::{BPF_ABS, BPF_JEQ, BPF_JMP, BPF_K, BPF_LD, BPF_RET, BPF_W, sock_filter, sock_fprog};
 
-    /// How a process ended.
+    /// End of a process.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum Ended {
-        /// By itself, with this code.
+        /// The process exited with this code.
         Exited(i32),
-        /// By this signal; SIGSYS after a system call.
+        /// This signal ended the process; SIGSYS after a system call.
         Killed(i32),
     }
 
-    /// Does the work in a copy of this process that may make no system call but the last.
+    /// Runs the work in a copy of this process in which every system call except exit is fatal.
     ///
     /// # Panics
-    /// When there is no copy to be had.
+    /// Panics if the process cannot be copied.
     pub fn without_kernel(work: &mut dyn FnMut()) -> Ended {
-        // SAFETY: the child does the work and exits; if the work allocates or locks, as another thread might be doing
-        // at this moment, the test is lost anyway.
+        // SAFETY: the child runs the work and exits. If the work allocates or locks, the child may deadlock
+        // with a lock held by another thread, but then the test must fail anyway.
         let child = unsafe { libc::fork() };
         assert!(child >= 0, "fork: {}", std::io::Error::last_os_error());
         if child == 0 {
@@ -288,7 +291,7 @@ mod sandbox {
             unsafe { libc::_exit(code) }
         }
         let mut status = 0;
-        // SAFETY: the child of above and a place for its status.
+        // SAFETY: waits for the child; the pointer is a live reference.
         assert_eq!(unsafe { libc::waitpid(child, &raw mut status, 0) }, child);
         if libc::WIFEXITED(status) {
             Ended::Exited(libc::WEXITSTATUS(status))
@@ -300,13 +303,13 @@ mod sandbox {
     fn allow_exit_only() -> bool {
         let statement = |code: u32, k: u32, jt, jf| sock_filter { code: code as u16, jt, jf, k };
         let mut filter = [
-            statement(BPF_LD | BPF_W | BPF_ABS, 0, 0, 0), // the number of the system call
+            statement(BPF_LD | BPF_W | BPF_ABS, 0, 0, 0), // number of the system call
             statement(BPF_JMP | BPF_JEQ | BPF_K, libc::SYS_exit_group as u32, 0, 1),
             statement(BPF_RET | BPF_K, libc::SECCOMP_RET_ALLOW, 0, 0),
             statement(BPF_RET | BPF_K, libc::SECCOMP_RET_KILL_PROCESS, 0, 0),
         ];
         let program = sock_fprog { len: filter.len() as u16, filter: filter.as_mut_ptr() };
-        // SAFETY: both only restrict this process; the program is copied.
+        // SAFETY: both calls only restrict this process; the kernel copies the filter program.
         unsafe {
             libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0
                 && libc::prctl(libc::PR_SET_SECCOMP, libc::SECCOMP_MODE_FILTER, &raw const program) == 0

@@ -1,30 +1,32 @@
-//! The bytes of a saved state of fmu-export, written from a description of the layout and not with its code, so that
-//! tests find what the code gets wrong: 7 bytes of magic and one for the version, the hash of the guid, the interface
-//! type (and 2 more for FMI 3.0), then the mode, whether the simulation has ended, time, start time, stop time, tolerance, the values and the
-//! memory of the table; at the end FNV-1a of all that. Whole numbers have 64 bits, little-endian; what may be missing
-//! has a truth value of one byte before it.
+//! The bytes of a saved state of fmu-export. This code follows a description of the layout and shares no code
+//! with fmu-export, so that tests detect errors there.
+//!
+//! The layout is: 7 bytes of magic, one byte for the version, the hash of the guid, and the interface type
+//! (plus 2 for FMI 3.0). The mode, the end flag, time, start time, stop time and tolerance follow, then the
+//! values and the memory of the table. The last bytes are the FNV-1a checksum of all bytes before. Integers
+//! have 64 bits, little-endian. An optional value has a Boolean of one byte before it.
 
 use fmu_export::Mode;
 use std::ops::Range;
 
-/// The version of the layout.
+/// Index of the version of the layout.
 pub const VERSION: usize = 7;
-/// The hash of the guid.
+/// Range of the hash of the guid.
 pub const GUID_HASH: Range<usize> = 8..16;
-/// The interface type.
+/// Index of the interface type.
 pub const INTERFACE: usize = 16;
-/// The mode.
+/// Range of the mode.
 pub const MODE: Range<usize> = 17..25;
-/// Whether the model wants the simulation to end.
+/// Index of the Boolean that is true if the model has requested the end of the simulation.
 pub const ENDED: usize = 25;
-/// The time.
+/// Range of the time.
 pub const TIME: Range<usize> = 26..34;
-/// Where the values of the variables begin, in the order of the table.
+/// Index of the first value of the variables, which are in the order of the table.
 pub const VALUES: usize = 60;
-/// The length of the checksum at the end.
+/// Length of the checksum at the end.
 pub const CHECKSUM: usize = 8;
 
-/// The hash of the guid, and the checksum.
+/// Returns the FNV-1a hash, used for the guid and the checksum.
 pub fn fnv1a(bytes: &[u8]) -> [u8; 8] {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     for byte in bytes {
@@ -33,7 +35,7 @@ pub fn fnv1a(bytes: &[u8]) -> [u8; 8] {
     hash.to_le_bytes()
 }
 
-/// Makes the checksum fit the bytes before it.
+/// Updates the checksum.
 pub fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let end = bytes.len() - CHECKSUM;
     let checksum = fnv1a(&bytes[..end]);
@@ -41,21 +43,21 @@ pub fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// The state with other bytes somewhere, sealed.
+/// Replaces some bytes and updates the checksum.
 pub fn with(mut bytes: Vec<u8>, at: Range<usize>, patch: &[u8]) -> Vec<u8> {
     bytes[at].copy_from_slice(patch);
     sealed(bytes)
 }
 
-/// The state in another mode.
+/// Replaces the mode and updates the checksum.
 pub fn with_mode(bytes: Vec<u8>, mode: Mode) -> Vec<u8> {
     with(bytes, MODE, &i64::from(mode as u32).to_le_bytes())
 }
 
-/// The time of the state.
+/// Returns the time of the state.
 ///
 /// # Panics
-/// When the bytes are too few.
+/// Panics if there are too few bytes.
 pub fn time(bytes: &[u8]) -> f64 {
     f64::from_le_bytes(bytes[TIME].try_into().expect("8 bytes"))
 }

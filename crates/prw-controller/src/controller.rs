@@ -1,6 +1,7 @@
-//! The control law, and when it is carried out.
+//! The control law, and the schedule of its samples.
 //!
-//! At each sample the motors head for the inverse of eq. (1), taken of the reference plus a correction:
+//! At each sample, the goal of the motors is the inverse of eq. (1), applied to the reference plus a
+//! correction:
 //!
 //! ```text
 //! windup     = rigid - measured          rigid: eq. (1) of the motors' angles as they are
@@ -10,39 +11,40 @@
 //! goal       = inverse of eq. (1) of (reference + correction)
 //! ```
 //!
-//! This is PI control: where the motors are at their goal, rigid = reference + correction, so (with Kd = 0)
-//! windup - correction is the error e = reference - measured, correction = Kp e + I, and I' = Ki e. Written
-//! like this, only what the couplings take counts as error, not the way that is still to go. I waits while a
-//! motor is under way or backs off (anti-windup), so that the drag of a move leaves nothing to be undone.
+//! This is PI control. If the motors are at their goal, rigid = reference + correction. Then, with Kd = 0,
+//! windup - correction is the error e = reference - measured, correction = Kp e + I, and I' = Ki e. In this
+//! form, only the twist of the couplings counts as error, not the remaining distance to the goal. The
+//! integral pauses while a motor moves or backs off (anti-windup), so a move leaves no error to correct
+//! afterwards.
 //!
-//! D damps the vibration of the couplings, where the wrist follows its motors late. A stiff wrist follows at
-//! once, and without the filter the motors' own rate would come back at them with the gain Kd / sample_time,
-//! far above 1, and set up a limit cycle; with it the gain at high frequencies is 1/2.
+//! D damps the vibration of the couplings, because of which the wrist lags behind its motors. A stiff wrist
+//! follows at once. Without the filter, the motors' own rate would be fed back with the gain Kd /
+//! sample_time, far above 1, and cause a limit cycle. With the filter, the gain at high frequencies is 1/2.
 //!
-//! A motor backs off from torque: it may head no farther than where, with a wrist that is stuck, the
-//! couplings would reach the torque limit; beyond the limit that goal lies behind it. As the motor never
-//! goes faster than it can stop at its goal, it cannot run into the limit either.
+//! A motor backs off from torque. Its goal is limited to the angle at which, with a blocked wrist, the
+//! couplings would reach the torque limit. Beyond the torque limit, this goal lies behind the motor. The
+//! motor always moves so slowly that it can stop at its goal, so it does not exceed the limit by its motion.
 
 use crate::motor::{Limits, Motor};
 use crate::parameters::{InvalidParameter, Parameters};
 use crate::wrist::{Kinematics, Motors, PitchRoll};
 use std::array::from_fn;
 
-/// What the controller reads, or how fast that changes.
+/// Inputs of the controller, or their time derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inputs {
-    /// Where pitch and roll are to go, rad.
+    /// Reference pitch and roll, rad.
     pub reference: PitchRoll,
     /// Measured pitch and roll, rad.
     pub angle: PitchRoll,
     /// Measured rates of pitch and roll, rad/s.
     pub rate: PitchRoll,
-    /// Measured torques in the paper's sign (eq. 9), negative while the motor drives, N.m.
+    /// Measured torques with the sign of the paper (eq. 9), negative while the motor drives, N.m.
     pub torque: Motors,
 }
 
 impl Inputs {
-    /// After `time` s at a constant `slope`.
+    /// Returns the inputs after `time` s at a constant `slope`.
     fn after(&self, slope: &Self, time: f64) -> Self {
         let after = |values: [f64; 2], slopes: [f64; 2]| from_fn(|i| values[i] + slopes[i] * time);
         Self {
@@ -54,14 +56,15 @@ impl Inputs {
     }
 }
 
-/// When samples are due: at `epoch` and every `period` from there. No sum, so nothing adds up.
+/// Schedule of the samples: at `epoch` and every `period` from there. Times are products, not sums, so
+/// rounding errors do not accumulate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Schedule {
     /// Time of the sample with number 0, s.
     pub epoch: f64,
     /// Time between samples, s.
     pub period: f64,
-    /// Number of the next sample, a whole number.
+    /// Number of the next sample, an integer.
     pub next: f64,
 }
 
@@ -74,11 +77,11 @@ impl Schedule {
 /// The controller between two communication points.
 #[derive(Clone, Debug)]
 pub struct Controller {
-    /// Parameters; call [`parameters_changed`](Self::parameters_changed) after a change.
+    /// Parameters. Call [`parameters_changed`](Self::parameters_changed) after a change.
     pub parameters: Parameters,
-    /// The inputs at the current communication point.
+    /// Inputs at the current communication point.
     pub inputs: Inputs,
-    /// How fast they change, if the importer has said so since the last step; per s.
+    /// Slopes of the inputs, if the importer has set them since the last step; per s.
     pub slopes: Inputs,
     /// Motors 1 and 2 at the last sample.
     pub motors: [Motor; 2],
@@ -90,24 +93,24 @@ pub struct Controller {
     pub correction: PitchRoll,
     /// Whether both motors were on their goals at the last sample.
     pub on_goal: bool,
-    /// When samples are due.
+    /// Schedule of the samples.
     pub schedule: Schedule,
-    /// When the last sample was taken, s.
+    /// Time of the last sample, s.
     pub sampled_at: f64,
-    /// The time of the motors' [`motion`](Self::motion), s: in Co-Simulation the communication point.
+    /// Time of the motors' [`motion`](Self::motion), s: in Co-Simulation the communication point.
     pub now: f64,
 }
 
-/// Steps with more samples are refused: an hour at 1 kHz, which takes less than a second.
+/// Maximum number of samples in a step: an hour at 1 kHz, which takes less than a second.
 const MOST_SAMPLES: f64 = 3.6e6;
-/// Beyond it a double cannot count.
+/// Beyond this number a double cannot represent all integers.
 const LAST_SAMPLE: f64 = (1_u64 << 53) as f64;
 
 impl Controller {
-    /// A controller with its motors at rest at angle 0.
+    /// Creates a controller with its motors at rest at angle 0.
     ///
     /// # Errors
-    /// When the parameters make no controller.
+    /// Fails if the parameters are invalid.
     pub fn new(parameters: Parameters) -> Result<Self, InvalidParameter> {
         parameters.check()?;
         Ok(Self {
@@ -125,10 +128,10 @@ impl Controller {
         })
     }
 
-    /// Checks the parameters. A new sample time holds from the next sample on.
+    /// Checks the parameters. A new sample time applies from the next sample on.
     ///
     /// # Errors
-    /// When they make no controller; they stay as they are.
+    /// Fails if the parameters are invalid; the schedule then stays unchanged.
     pub fn parameters_changed(&mut self) -> Result<(), InvalidParameter> {
         self.parameters.check()?;
         if self.schedule.period != self.parameters.sample_time {
@@ -142,24 +145,24 @@ impl Controller {
         Ok(())
     }
 
-    /// The first sample is taken at `start_time`, s.
+    /// Schedules the first sample at `start_time`, s.
     pub fn start(&mut self, start_time: f64) {
         self.schedule = Schedule { epoch: start_time, period: self.parameters.sample_time, next: 0.0 };
         (self.sampled_at, self.now) = (start_time, start_time);
     }
 
-    /// The motion of the motors now. It follows from earlier samples alone: an input acts at the sample
-    /// that comes after it has been set.
+    /// Returns the current motion of the motors. It depends only on earlier samples: an input acts from the
+    /// next sample after it has been set.
     #[inline]
     pub fn motion(&self) -> [Motor; 2] {
         self.motors.map(|motor| motor.after((self.now - self.sampled_at).max(0.0)))
     }
 
-    /// Goes from `time` to `time + h` (s) and takes the samples that are due before its end.
+    /// Advances from `time` to `time + h` (s) and takes the samples that are due before the end.
     ///
-    /// A sample within rounding of the end belongs to the next step, which knows its inputs.
+    /// A sample within rounding error of the end belongs to the next step, which has its inputs.
     ///
-    /// Returns false, with nothing changed, if the step holds so many samples that a master would wait long for it.
+    /// Returns false and changes nothing if the step contains too many samples.
     #[must_use]
     pub fn step(&mut self, time: f64, h: f64) -> bool {
         let end = time + h;
@@ -176,20 +179,21 @@ impl Controller {
         true
     }
 
-    /// When the next sample is due, s, if that is before the end of a step from `time` to `time + h` (s) or at its end.
+    /// Returns the time of the next sample, s, if it is before or at the end of a step from `time` to
+    /// `time + h` (s).
     pub fn sample_within(&self, time: f64, h: f64) -> Option<f64> {
         let (next, end) = (self.next_sample(), time + h);
         (next <= end + self.rounding(end, h)).then_some(next.min(end))
     }
 
-    /// When the next sample is due, s.
+    /// Returns the time of the next sample, s.
     pub fn next_sample(&self) -> f64 {
         self.schedule.time_of(self.schedule.next)
     }
 
-    /// Takes the samples that are due at `time` (s), with the inputs as they are.
+    /// Takes the samples that are due at `time` (s), with the current inputs.
     ///
-    /// Returns false, with nothing changed, if a master would wait long for it.
+    /// Returns false and changes nothing if there are too many samples.
     #[must_use]
     pub fn take_samples(&mut self, time: f64) -> bool {
         let due = self.due_before(time + self.rounding(time, self.schedule.period));
@@ -203,12 +207,12 @@ impl Controller {
         true
     }
 
-    /// How far the times of masters may be off.
+    /// Returns the tolerance for times of importers.
     fn rounding(&self, time: f64, h: f64) -> f64 {
         (0.01 * h.min(self.schedule.period)).min(1e-9) + 8.0 * f64::EPSILON * time.abs()
     }
 
-    /// The number of the first sample that is not due before `time`.
+    /// Returns the number of the first sample that is not due before `time`.
     fn due_before(&self, time: f64) -> f64 {
         ((time - self.schedule.epoch) / self.schedule.period).ceil()
     }
@@ -226,7 +230,7 @@ impl Controller {
         self.sampled_at = now;
     }
 
-    /// The control law.
+    /// Evaluates the control law.
     fn control(&mut self, inputs: &Inputs) {
         let p = &self.parameters;
         let kinematics = Kinematics::new(p.M, p.N);
@@ -251,7 +255,7 @@ impl Controller {
         let limits = Limits { rate: p.max_rate, acceleration: p.max_acceleration };
         self.on_goal = true;
         for (motor, (goal, torque)) in self.motors.iter_mut().zip(goals.into_iter().zip(inputs.torque)) {
-            // How much farther the motor may wind up its couplings, forward and back.
+            // Limits the further twist of the couplings, forward and back.
             let farthest = motor.angle + (p.max_torque + torque) / p.stiffness;
             let nearest = motor.angle - (p.max_torque - torque) / p.stiffness;
             let allowed = goal.min(farthest).max(nearest);

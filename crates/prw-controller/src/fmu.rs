@@ -1,4 +1,4 @@
-//! The controller as an FMU: what it offers besides its variables.
+//! Capabilities of the controller FMU.
 
 use crate::controller::{Controller, Inputs, Schedule};
 use crate::motor::Motor;
@@ -52,7 +52,7 @@ impl Model for Controller {
 }
 
 impl CoSimulation for Controller {
-    /// A sample at the end of a step waits for the inputs of the next one.
+    /// A sample at the end of a step waits for the inputs of the next step.
     const EVENTS: Events = Events::StopIfHandled;
 
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
@@ -71,7 +71,8 @@ impl CoSimulation for Controller {
     }
 }
 
-/// No states: between its samples, which are time events, the motors' motion is known.
+/// The controller has no continuous states: between samples, which are time events, the motion of the motors
+/// is known.
 impl ModelExchange for Controller {
     fn event(&mut self, time: f64) -> Result<Event, Error> {
         if self.take_samples(time) {
@@ -85,7 +86,7 @@ impl ModelExchange for Controller {
 }
 
 impl InputDerivatives for Controller {
-    /// A slope has the same place in `slopes` as its input in `inputs`.
+    /// Sets a slope by the variable table: `slopes` has the layout of `inputs`.
     fn set_input_derivative(&mut self, of: Name, order: u32, value: f64) {
         if order == 1 {
             std::mem::swap(&mut self.inputs, &mut self.slopes);
@@ -118,8 +119,8 @@ impl OutputDerivatives for Controller {
 }
 
 impl Partials for Controller {
-    /// Inputs and parameters act from the sample after them on, so at a communication point nothing depends on them; the
-    /// motors' angles start where they are set.
+    /// Inputs and parameters act from the next sample on, so nothing depends on them at a communication
+    /// point. Motor angles depend only on their own start values.
     fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
         Some(f64::from(u8::from(unknown == known)))
     }

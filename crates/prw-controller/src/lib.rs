@@ -1,9 +1,9 @@
-//! A controller for the pitch-roll wrist testbed, and the FMU made of it.
+//! A controller for the pitch-roll wrist testbed, and the FMU made from it.
 //!
-//! [`Controller`] moves the testbed's two motors so that the wrist takes the pitch and the roll it is told:
-//! the inverse of eq. (1) as feed-forward, PI correction from measured pitch and roll, limits on the motors'
-//! rate, acceleration and torque. The table of [`variables`] and `fmu.rs` make the FMU
-//! of it; the rest knows no FMI.
+//! [`Controller`] moves the two motors of the testbed so that the wrist reaches a reference pitch and roll.
+//! The inverse of eq. (1) gives a feed-forward, and a PI control of measured pitch and roll corrects it.
+//! Rate, acceleration and torque of the motors are limited. The table of [`variables`] and `fmu.rs` make the
+//! FMU; the other modules do not depend on FMI.
 
 pub mod controller;
 mod fmu;

@@ -1,12 +1,12 @@
-//! A motor's motion from sample to sample: as fast as its limits allow, without overshoot.
+//! Motion of a motor from sample to sample: as fast as its limits permit, without overshoot.
 //!
-//! Over a sample period the acceleration is constant, so the angle is a parabola, the rate a straight line
-//! and exactly the angle's derivative. At each sample the motor takes the highest rate from which it can
-//! still stop at its goal by braking at full strength *in whole samples*. Continuous-time formulas for the
-//! braking distance overshoot by a fraction of a sample and then hunt around the goal for ever; this rule
-//! reaches it exactly and stays.
+//! During a sample period the acceleration is constant. So the angle is a parabola, and the rate is its exact
+//! derivative, a straight line. At each sample the motor chooses the highest rate from which it can still
+//! stop at its goal by full braking *in whole samples*. Continuous-time formulas for the braking distance
+//! overshoot by a fraction of a sample and then oscillate around the goal. This rule reaches the goal exactly
+//! and stays there.
 
-/// What a motor is able to do.
+/// Limits of a motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Highest rate, rad/s.
@@ -15,7 +15,7 @@ pub struct Limits {
     pub acceleration: f64,
 }
 
-/// Angle and rate at a sample, and the acceleration from there to the next one.
+/// Angle and rate at a sample, and the acceleration until the next sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motor {
     /// Angle, rad.
@@ -27,7 +27,7 @@ pub struct Motor {
 }
 
 impl Motor {
-    /// The motion `time` s after the sample.
+    /// Returns the motion `time` s after the sample.
     #[inline]
     pub fn after(&self, time: f64) -> Self {
         Self {
@@ -39,12 +39,12 @@ impl Motor {
 
     /// Chooses the acceleration for the next `period` s on the way to `goal` (rad; may be infinite).
     ///
-    /// Within the limits it gets there in the least number of samples; a goal that lies behind, or nearer
-    /// than the motor can stop, is passed and returned to. Tells whether the motor is on its goal: there, or
-    /// there and at rest two samples from now.
+    /// Within the limits the motor reaches the goal in the least number of samples. If the goal lies behind,
+    /// or is nearer than the stopping distance, the motor passes it and returns. Returns whether the motor is
+    /// at its goal, or will be at rest there in two samples.
     pub fn turn_towards(&mut self, goal: f64, limits: &Limits, period: f64) -> bool {
         let Limits { rate: max_rate, acceleration: max } = *limits;
-        // In units of what full acceleration makes of a rate and an angle within one period.
+        // Units: the changes of rate and angle by full acceleration during one period.
         let (rate_unit, angle_unit) = (max * period, max * period * period);
         let distance = (goal - self.angle - 0.5 * self.rate * period) / angle_unit;
         let rate = rate_unit * fastest_rate(distance.abs(), max_rate / rate_unit).copysign(distance);
@@ -55,13 +55,13 @@ impl Motor {
     }
 }
 
-/// The highest rate v, at most `limit`, such that the rest of this sample and braking from v take the
-/// distance q: v/2 + D(v) = q, in the units of [`Motor::turn_towards`].
+/// Returns the highest rate v, at most `limit`, for which the rest of this sample and braking from v cover
+/// the distance q: v/2 + D(v) = q, in the units of [`Motor::turn_towards`].
 ///
-/// Braking takes m = floor(v) whole samples and the rest v - m in one more: D(v) = (m + 1/2) v - m (m + 1)/2,
-/// and so q = (m + 1) v - m (m + 1)/2, which is m (m + 1)/2 at v = m.
+/// Braking takes m = floor(v) whole samples and one more for the rest v - m. So D(v) = (m + 1/2) v - m (m +
+/// 1)/2, and q = (m + 1) v - m (m + 1)/2, which is m (m + 1)/2 at v = m.
 fn fastest_rate(q: f64, limit: f64) -> f64 {
-    // v <= sqrt(2 q) always; beyond that the limit decides, also where q is infinite.
+    // v <= sqrt(2 q) always holds. For larger q, infinite q included, the limit applies.
     if q > 0.5 * (limit + 1.0) * (limit + 2.0) {
         return limit;
     }
@@ -75,7 +75,8 @@ mod tests {
 
     const PERIOD: f64 = 1e-3;
 
-    /// Goes to `goal` and tells the samples it took and the largest angle in the goal's direction.
+    /// Moves to `goal`; returns the number of samples, the largest angle in the direction of the goal, and
+    /// the motor.
     fn go(mut motor: Motor, goal: f64, limits: &Limits) -> (usize, f64, Motor) {
         let direction = (goal - motor.angle).signum();
         let mut farthest = motor.angle;
@@ -105,7 +106,7 @@ mod tests {
             for goal in [1.1220, -0.5, 1e-3, 3.3e-5, 1e-5, -1e-7, 0.022_2] {
                 let (samples, farthest, _) = go(Motor::default(), goal, &limits);
                 assert!((farthest - goal) * f64::signum(goal) <= 1e-12, "{goal}: {farthest}");
-                // Bang-bang in continuous time, rounded up to whole samples; at most two more.
+                // Bang-bang motion in continuous time, rounded up to whole samples; at most two more samples.
                 let distance = goal.abs();
                 let peak = (distance * acceleration).sqrt().min(rate);
                 let shortest = distance / peak + peak / acceleration;
@@ -134,7 +135,7 @@ mod tests {
         let limits = Limits { rate: 3.0, acceleration: 30.0 };
         let fast = Motor { angle: 0.0, rate: 3.0, acceleration: 0.0 };
         let (_, farthest, motor) = go(fast, 0.05, &limits);
-        // It cannot stop before 3^2 / 60 = 0.15.
+        // The motor cannot stop before 3^2 / 60 = 0.15.
         assert!((farthest - 0.15).abs() < 1e-9, "{farthest}");
         assert!((motor.angle - 0.05).abs() < 1e-12);
     }

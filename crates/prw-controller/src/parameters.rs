@@ -1,13 +1,13 @@
-//! The controller's parameters and their ranges.
+//! Parameters of the controller and their ranges.
 
 use std::fmt;
 
-/// Products and quotients of parameters within these bounds stay numbers.
+/// Smallest positive parameter. Within the bounds, products and quotients of parameters do not overflow.
 pub const SMALLEST: f64 = 1e-9;
-/// See [`SMALLEST`].
+/// Largest parameter; see [`SMALLEST`].
 pub const LARGEST: f64 = 1e9;
 
-/// Sample time, limits of the motors, gains, and what the controller assumes of the wrist.
+/// Sample time, limits of the motors, gains, and the assumed properties of the wrist.
 #[allow(non_snake_case, reason = "the names control engineers use, and the paper's symbols")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
@@ -17,15 +17,15 @@ pub struct Parameters {
     pub max_rate: f64,
     /// Highest acceleration of a motor, rad/s2.
     pub max_acceleration: f64,
-    /// Torque at which a motor backs off, N.m.
+    /// Torque beyond which a motor backs off, N.m.
     pub max_torque: f64,
-    /// Stiffness between motor and wrist that backing off assumes, N.m/rad.
+    /// Assumed stiffness between motor and wrist, for backing off, N.m/rad.
     pub stiffness: f64,
     /// Proportional gain.
     pub Kp: f64,
     /// Integral gain, 1/s.
     pub Ki: f64,
-    /// Gain of the measured rates, which damps the couplings' vibration, s.
+    /// Gain of the measured rates, which damps vibration of the couplings, s.
     pub Kd: f64,
     /// Largest correction of pitch and of roll, rad.
     pub max_correction: f64,
@@ -36,7 +36,7 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// For the testbed with Table 1.
+    /// Default parameters, for the testbed with Table 1.
     pub const DEFAULT: Self = Self {
         sample_time: 1e-3,
         max_rate: 3.0,
@@ -52,10 +52,10 @@ impl Parameters {
         N: 7,
     };
 
-    /// Checks the ranges in which the control law makes sense.
+    /// Checks that the parameters are in the ranges in which the control law is valid.
     ///
     /// # Errors
-    /// Names the parameter and what it must be.
+    /// The message names the parameter and its valid range.
     pub fn check(&self) -> Result<(), InvalidParameter> {
         for (name, value) in [
             ("sample_time", self.sample_time),
@@ -94,7 +94,7 @@ impl Parameters {
     }
 }
 
-/// Why a set of parameters makes no controller.
+/// Reason for which a set of parameters is invalid.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InvalidParameter(String);
 

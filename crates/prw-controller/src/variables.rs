@@ -1,4 +1,4 @@
-//! The variables of the FMU: every name, unit and range, and where its value lives.
+//! The variables of the FMU: name, unit, range, and field.
 
 use crate::controller::Controller;
 use crate::parameters::{LARGEST, SMALLEST};

@@ -1,29 +1,29 @@
-//! Eq. (1): how a rigid wrist would follow its motors, and which motor angles make a pitch and a roll.
+//! Eq. (1): the motion of a rigid wrist from its motors, and the motor angles for a given pitch and roll.
 
 /// Pitch and roll, or their rates; rad, rad/s.
 pub type PitchRoll = [f64; 2];
-/// The same of motors 1 and 2.
+/// Angles of motors 1 and 2, or their rates; rad, rad/s.
 pub type Motors = [f64; 2];
 
-/// The kinematics of the wrist, known by its numbers of cam lobes and rollers.
+/// Kinematics of the wrist, from its numbers of cam lobes and rollers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kinematics {
-    /// M / N: what a roll takes of motor 1, and motor 2 the other way.
+    /// M / N: angle of motor 1 per roll angle; motor 2 turns in the opposite direction.
     motor_per_roll: f64,
 }
 
 impl Kinematics {
-    /// Of a wrist with `lobes` (M) and `rollers` (N), both at least 1.
+    /// Creates the kinematics of a wrist with `lobes` (M) and `rollers` (N), both at least 1.
     pub fn new(lobes: i32, rollers: i32) -> Self {
         Self { motor_per_roll: f64::from(lobes) / f64::from(rollers) }
     }
 
-    /// Eq. (1) with theta5 = theta1 and theta6 = theta2.
+    /// Returns pitch and roll by eq. (1) with theta5 = theta1 and theta6 = theta2.
     pub fn wrist(&self, [one, two]: Motors) -> PitchRoll {
         [0.5 * one + 0.5 * two, (0.5 * one - 0.5 * two) / self.motor_per_roll]
     }
 
-    /// The inverse of eq. (1).
+    /// Returns the motor angles by the inverse of eq. (1).
     pub fn motors(&self, [pitch, roll]: PitchRoll) -> Motors {
         [pitch + roll * self.motor_per_roll, pitch - roll * self.motor_per_roll]
     }

@@ -1,4 +1,4 @@
-//! What `build_closed_loop` refuses.
+//! Options that `build_closed_loop` rejects.
 
 use std::process::Command;
 

@@ -1,4 +1,4 @@
-//! The control law, with wrists that are rigid, jammed, or not there at all.
+//! The control law, with a rigid wrist, a jammed wrist, or no wrist.
 
 use proptest::prelude::*;
 use prw_controller::controller::{Controller, Inputs};
@@ -16,7 +16,7 @@ fn radians(degrees: PitchRoll) -> PitchRoll {
     degrees.map(f64::to_radians)
 }
 
-/// Runs for `duration` s in steps of 1 ms; `measure` tells the inputs from the motors' motion.
+/// Runs for `duration` s in steps of 1 ms; `measure` computes the inputs from the motors' motion.
 fn run(c: &mut Controller, duration: f64, measure: impl Fn(f64, [Motor; 2]) -> Inputs) -> Vec<[Motor; 2]> {
     let start = c.now;
     let mut motions = Vec::new();
@@ -29,7 +29,7 @@ fn run(c: &mut Controller, duration: f64, measure: impl Fn(f64, [Motor; 2]) -> I
     motions
 }
 
-/// A wrist without couplings.
+/// Returns the inputs of a wrist without couplings.
 fn rigid(reference: PitchRoll) -> impl Fn(f64, [Motor; 2]) -> Inputs {
     let kinematics = Kinematics::new(4, 7);
     move |_, motors| Inputs {
@@ -52,7 +52,7 @@ fn a_rigid_wrist_gets_where_it_shall() {
     assert!(one.rate.abs() + two.rate.abs() < 1e-9);
 }
 
-/// A sensor with an offset of 2 degrees: feed-forward alone would be off by as much.
+/// Checks a sensor with an offset of 2 degrees, which feed-forward without integral would not remove.
 #[test]
 fn the_integral_removes_what_the_feed_forward_leaves() {
     let reference = radians([10.0, -20.0]);
@@ -71,7 +71,7 @@ fn the_integral_removes_what_the_feed_forward_leaves() {
     }
 }
 
-/// Sensors that stand still: the correction stops at its bound, and so do the motors.
+/// Checks constant measurements: the correction reaches its limit, and the motors stop.
 #[test]
 fn stuck_sensors_leave_everything_bounded() {
     let reference = radians([30.0, 60.0]);
@@ -85,8 +85,8 @@ fn stuck_sensors_leave_everything_bounded() {
     assert_eq!(c.correction.map(f64::abs), [bound; 2]);
 }
 
-/// A wrist that does not move at all: the couplings (32 N.m/rad, as the controller assumes) take all, and
-/// the torque never exceeds the limit. When it comes free there is nothing to be undone.
+/// Checks a blocked wrist. The couplings (32 N.m/rad, as the controller assumes) take the whole twist, and
+/// the torque never exceeds the limit. After the release there is no error to correct.
 #[test]
 fn motors_back_off_from_a_jammed_wrist() {
     let reference = radians([120.0, 0.0]);
@@ -103,7 +103,7 @@ fn motors_back_off_from_a_jammed_wrist() {
     }
     let [one, _] = motions.last().unwrap();
     assert!((p.stiffness * one.angle - p.max_torque).abs() < 1e-6, "{one:?}");
-    // Anti-windup: while backing off I has waited.
+    // Anti-windup: the integral has paused while the motors backed off.
     assert_eq!(c.integral, [0.0; 2]);
     let motions = run(&mut c, 2.0, rigid(reference));
     for motor in motions.iter().flatten() {
@@ -111,7 +111,7 @@ fn motors_back_off_from_a_jammed_wrist() {
     }
 }
 
-/// Torque above the limit, from whatever source, drives the motor back.
+/// Checks that torque above the limit, from any source, drives the motor back.
 #[test]
 fn torque_beyond_the_limit_turns_the_motor_round() {
     let mut c = controller(|_| ());
@@ -121,7 +121,8 @@ fn torque_beyond_the_limit_turns_the_motor_round() {
     }
 }
 
-/// Where communication points lie does not change the samples: not their times, not a bit of their result.
+/// Checks that the communication points change neither the times of the samples nor their results, which are
+/// bit-identical.
 #[test]
 fn samples_do_not_depend_on_the_communication_step() {
     let wrist =
@@ -131,7 +132,7 @@ fn samples_do_not_depend_on_the_communication_step() {
         let mut c = controller(|_| ());
         let mut time = 0.0_f64;
         for h in steps {
-            // As of the last sample instant, so that all runs sample the same.
+            // The inputs are those of the last sample, so that all runs sample equal values.
             c.inputs = wrist((time * 1e3 + 1e-6).floor() / 1e3);
             assert!(c.step(time, h));
             time += h;
@@ -145,7 +146,7 @@ fn samples_do_not_depend_on_the_communication_step() {
     }
 }
 
-/// With slopes, samples inside a long step see inputs that move on.
+/// Checks that samples within a long step use inputs that change with their slopes.
 #[test]
 fn input_slopes_reach_the_samples_inside_a_step() {
     let ramp = |time: f64| 0.5 * time;
@@ -169,7 +170,7 @@ fn a_new_sample_time_holds_from_the_next_sample_on() {
     c.parameters.sample_time = 0.01;
     c.parameters_changed().unwrap();
     assert!(c.step(0.0025, 0.0105));
-    // Samples at 0, 1, 2, then 3 and 13 ms; the last belongs to the next step.
+    // Samples at 0, 1, 2, then 3 and 13 ms; the last one belongs to the next step.
     assert_eq!((c.sampled_at, c.schedule.next), (0.003, 1.0));
     assert!(c.step(0.013, 1e-4));
     assert_eq!(c.schedule.next, 2.0);
@@ -199,7 +200,7 @@ fn parameters_that_make_no_controller_are_refused() {
     assert_eq!(c.schedule.next, 0.0);
 }
 
-/// Any number an importer can set, also the largest.
+/// Generates any number that an importer can set, including the largest.
 fn any_input() -> impl Strategy<Value = f64> {
     prop_oneof![8 => -3.0..3.0, 1 => -1e308..1e308, 1 => Just(f64::MAX), 1 => Just(-f64::MAX)]
 }
@@ -228,7 +229,7 @@ proptest! {
                     prop_assert!(new.angle.is_finite());
                     prop_assert!(new.rate.abs() <= rate * (1.0 + 1e-9), "{new:?}");
                     prop_assert!((new.rate - old.rate).abs() <= acceleration * step * (1.0 + 1e-9) + 1e-12);
-                    // The mean of the rates is exact for one parabola, and off by little for several.
+                    // The mean of the rates is exact for one parabola, and nearly exact for several.
                     let mean = 0.5 * (old.rate + new.rate) * step;
                     prop_assert!((new.angle - old.angle - mean).abs() <= acceleration * step * step + 1e-9);
                 }

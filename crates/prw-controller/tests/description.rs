@@ -6,7 +6,7 @@ use std::process::Command;
 
 const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modelDescription/modelDescription.xml");
 
-/// The documentation's tables come from it.
+/// Checks that the description is up to date, because the tables of the documentation come from it.
 #[test]
 fn the_committed_description_is_up_to_date() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("controller");

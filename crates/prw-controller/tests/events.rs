@@ -1,4 +1,5 @@
-//! The samples as events: whoever handles them, the motors take the same path, bit for bit.
+//! Samples as events: the motion of the motors is bit-identical, regardless of the code that handles the
+//! events.
 
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi3::types::{Status, fmi3Boolean, fmi3False, fmi3True};
@@ -27,12 +28,12 @@ const OUTPUTS: [u32; 6] = [
 ];
 const KD: u32 = Name::Kd as u32;
 const SAMPLE_TIME: u32 = Name::sample_time as u32;
-// Their sums are exact.
+// Sums of these times are exact.
 const START: f64 = 0.125;
 const PERIOD: f64 = 1.0 / 128.0;
 const SAMPLES: u32 = 200;
 
-/// What the controller reads, all of it moving.
+/// Returns all inputs of the controller, each a function of time.
 fn inputs(time: f64) -> [f64; 8] {
     let wave = |amplitude: f64, frequency: f64| amplitude * (frequency * time).sin();
     [
@@ -55,7 +56,8 @@ fn bits(outputs: [f64; 6]) -> [u64; 6] {
     outputs.map(f64::to_bits)
 }
 
-/// The outputs at each communication point, a sample apart; nobody but the controller knows of samples.
+/// Returns the outputs at communication points one sample apart; the controller handles the samples within
+/// its steps.
 fn steps_of_fmi2() -> Vec<[f64; 6]> {
     let fmu = fmu_test_kit::Importer::of::<Controller>(CoSimulation);
     fmu.set(&[KD, SAMPLE_TIME], &[0.01, PERIOD]);
@@ -91,7 +93,7 @@ fn without_event_mode() {
     }
 }
 
-/// Steps of one sample, which end at an event, and long ones, which end early.
+/// Checks steps of one sample, which end at an event, and long steps, which end early.
 #[test]
 fn in_event_mode() {
     for (early_return_allowed, samples_a_step) in [(fmi3False, 1), (fmi3True, 1), (fmi3True, 1000)] {
@@ -114,8 +116,8 @@ fn in_event_mode() {
     }
 }
 
-/// The importer handles the events at its communication points only: between them the inputs stand still, as for
-/// importers that know of no events.
+/// Checks an importer that handles events only at its communication points. Between them the inputs are
+/// constant, as for importers without Event Mode.
 #[test]
 fn in_event_mode_with_samples_within_a_step() {
     let (fmu, unaware) = (with(fmi3True, fmi3False), with(fmi3False, fmi3False));
@@ -132,7 +134,7 @@ fn in_event_mode_with_samples_within_a_step() {
     }
 }
 
-/// A step with more samples than a step may have is not begun, and a shorter one goes on from where it is.
+/// Checks that a step with too many samples changes nothing, and that a shorter step then succeeds.
 #[test]
 fn too_many_samples_within_a_step() {
     let fmu = with(fmi3True, fmi3False);
@@ -147,7 +149,7 @@ fn too_many_samples_within_a_step() {
     assert!(fmu.do_step(START, 70.0).unwrap().event_handling_needed);
 }
 
-/// Whoever does not handle the event that a step ended with has it handled by the next step.
+/// Checks that the next step handles an event at the end of a step if the importer does not.
 #[test]
 fn an_event_that_nobody_handles() {
     let (fmu, unaware) = (with(fmi3True, fmi3False), with(fmi3False, fmi3False));
@@ -174,7 +176,7 @@ fn in_model_exchange() {
             fmu.set(&INPUTS, &inputs(time));
             assert_eq!(fmu.update(), Updated { next: Some(next), ..Updated::default() });
             fmu.ok(fmu.enter_continuous_time_mode());
-            // A solver may look ahead and come back.
+            // A solver may evaluate later times first and return.
             for share in [0.5, 1.0, 0.25, 1.0] {
                 fmu.ok(fmu.set_time(time + share * PERIOD));
                 fmu.set(&INPUTS, &inputs(time + share * PERIOD));
@@ -189,7 +191,7 @@ fn in_model_exchange() {
     check::<fmu_test_kit::fmi3::Importer>();
 }
 
-/// An importer that forgets the time events for hours is told so.
+/// Checks that an importer that ignores time events for hours gets an error.
 #[test]
 fn too_many_samples_at_once() {
     let fmu = fmu_test_kit::Importer::of::<Controller>(ModelExchange);
@@ -198,8 +200,8 @@ fn too_many_samples_at_once() {
     fmu.refused_with(&["sample_time"], |fmu| fmu.fmi2NewDiscreteStates(&mut Default::default()));
 }
 
-/// Between samples the motors' motion is a function of the time, which FMI 3.0 counts among the knowns: its partial
-/// derivatives, both ways, against differences.
+/// Checks partial derivatives with respect to time, which FMI 3.0 counts among the knowns, against
+/// differences. Between samples, the motion of the motors is a function of time.
 #[test]
 fn partial_derivatives_by_the_time() {
     const WIDTH: f64 = 1.0 / 65_536.0;

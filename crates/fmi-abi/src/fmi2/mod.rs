@@ -1,22 +1,23 @@
-//! FMI 2.0: its C types, and its functions, listed once: arguments, and where each may be called.
+//! FMI 2.0: its C types, and one list of its functions with arguments and allowed states.
 
 pub mod types;
 
 use types::*;
 
-/// Passes the functions on to another macro, after whatever tokens are given behind its name: those that need no instance with
-/// arguments and result, those that work on one with `name CS ME tolerated (arguments);`.
+/// Passes the list of functions to another macro, after any tokens that follow its name. First come the
+/// functions without an instance argument, with arguments and result. Functions on an instance follow as
+/// `name CS ME tolerated (arguments);`.
 ///
-/// The letters are the columns of the standard's tables (sections 4.2.4 and 3.2.3): I instantiated,
-/// N initialization, C step complete, F step failed, M event, K continuous time, T terminated, E error. In fatal
-/// nothing is allowed. For `fmi2Set...` the table has the columns; which variable can be set in which of them is said
-/// by the exporter. `fmi2CancelStep` belongs to asynchronous steps, which do not exist here.
+/// The letters are the columns of the tables in sections 4.2.4 and 3.2.3: I instantiated, N initialization, C
+/// step complete, F step failed, M event, K continuous time, T terminated, E error. In fatal no call is
+/// allowed. For `fmi2Set...`, the list contains all columns in which some variable can be set; fmu-export
+/// checks each variable. `fmi2CancelStep` is for asynchronous steps, which do not exist here.
 ///
-/// Tolerated, for interface types that have the function:
-///   fmi2Terminate after an error (FMI Library calls it in a destructor);
-///   fmi2EnterInitializationMode without fmi2SetupExperiment before it: the start time is 0;
-///   fmi2SetTime while initializing and in event mode, fmi2SetContinuousStates in event mode (OpenModelica, on
-///   every run).
+/// Tolerated calls, for interface types that have the function:
+/// * fmi2Terminate after an error (FMI Library calls it in a destructor);
+/// * fmi2EnterInitializationMode without fmi2SetupExperiment before it: the start time is then 0;
+/// * fmi2SetTime in Initialization Mode and Event Mode, fmi2SetContinuousStates in Event Mode (OpenModelica,
+///   on every run).
 #[doc(hidden)]
 #[macro_export]
 #[rustfmt::skip]

@@ -1,61 +1,61 @@
 //! The C types of FMI 2.0, as in `fmi2TypesPlatform.h` and `fmi2FunctionTypes.h`, written by hand.
 //!
-//! Enumerations that a caller passes in arrive as plain integers ([`fmi2Type`], [`fmi2StatusKind`]),
-//! because a C caller can pass any value, and so does a [`Status`].
+//! Enumerations that a caller passes are plain integers ([`fmi2Type`], [`fmi2StatusKind`]), because a C
+//! caller can pass any value. A [`Status`] is a plain integer too.
 #![allow(non_camel_case_types)]
 
 use crate::c_types::{c_char, c_int, c_uint, c_void};
 pub use crate::status::Status;
 
-/// What a call answers: a [`Status`] as C has it, an int, because a foreign library may answer any.
+/// Status of a call: a [`Status`] as C int, because a third-party library may return any value.
 pub type fmi2Status = c_int;
-/// An instance, as the importer holds it.
+/// Handle of an instance.
 pub type fmi2Component = *mut c_void;
-/// The importer's own data, handed back to its callbacks.
+/// Data of the importer, passed to its callbacks.
 pub type fmi2ComponentEnvironment = *mut c_void;
-/// A saved state of an instance, as the importer holds it.
+/// Handle of a saved state.
 pub type fmi2FMUstate = *mut c_void;
-/// The handle of a variable.
+/// Value reference of a variable.
 pub type fmi2ValueReference = c_uint;
 /// A floating-point value.
 pub type fmi2Real = f64;
 /// A signed integer value.
 pub type fmi2Integer = c_int;
-/// A truth value: 0 or 1.
+/// A Boolean: 0 or 1.
 pub type fmi2Boolean = c_int;
 /// One character.
 pub type fmi2Char = c_char;
-/// A zero-terminated UTF-8 string.
+/// A NUL-terminated UTF-8 string.
 pub type fmi2String = *const fmi2Char;
 /// One byte of a serialized state.
 pub type fmi2Byte = c_char;
-/// [`fmi2True`] as C sees it.
+/// `fmi2True`, the value of true.
 #[allow(non_upper_case_globals)]
 pub const fmi2True: fmi2Boolean = 1;
-/// [`fmi2False`] as C sees it.
+/// `fmi2False`, the value of false.
 #[allow(non_upper_case_globals)]
 pub const fmi2False: fmi2Boolean = 0;
 
-/// `fmi2Type` as it arrives: 0 is Model Exchange, 1 is Co-Simulation.
+/// `fmi2Type` as a number: 0 is Model Exchange, 1 is Co-Simulation.
 pub type fmi2Type = c_int;
-/// `fmi2StatusKind` as it arrives: 0 to 3, see [`StatusKind`].
+/// `fmi2StatusKind` as a number: 0 to 3, see [`StatusKind`].
 pub type fmi2StatusKind = c_int;
 
-/// What the `fmi2Get...Status` functions can be asked for (section 4.2.3).
+/// Information that the `fmi2Get...Status` functions return (section 4.2.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StatusKind {
     /// The result of an asynchronous step.
     DoStepStatus,
-    /// A text about a pending step.
+    /// A message about a pending step.
     PendingStatus,
-    /// The end of the last step that succeeded.
+    /// The end of the last successful step.
     LastSuccessfulTime,
-    /// Whether the slave wants to end the simulation.
+    /// Whether the slave requests the end of the simulation.
     Terminated,
 }
 
 impl StatusKind {
-    /// The kind behind a C value, if there is one.
+    /// Returns the kind for a C value, if it is valid.
     pub const fn from_c(value: fmi2StatusKind) -> Option<Self> {
         match value {
             0 => Some(Self::DoStepStatus),
@@ -67,7 +67,7 @@ impl StatusKind {
     }
 }
 
-/// The importer's log function. It is variadic like `printf`; this crate never passes arguments.
+/// The importer's log function. It is variadic like `printf`; fmu-export never passes further arguments.
 pub type fmi2CallbackLogger = unsafe extern "C" fn(
     environment: fmi2ComponentEnvironment,
     instance_name: fmi2String,
@@ -76,12 +76,12 @@ pub type fmi2CallbackLogger = unsafe extern "C" fn(
     message: fmi2String,
     ...
 );
-/// The importer's `calloc`. Never called: instances live on Rust's heap
+/// The importer's `calloc`. Never called: instances are on Rust's heap
 /// (`canNotUseMemoryManagementFunctions`).
 pub type fmi2CallbackAllocateMemory = unsafe extern "C" fn(count: usize, size: usize) -> *mut c_void;
 /// The importer's `free`. Never called.
 pub type fmi2CallbackFreeMemory = unsafe extern "C" fn(memory: *mut c_void);
-/// Tells the importer that an asynchronous step has ended. Never called: no step is asynchronous.
+/// Callback for the end of an asynchronous step. Never called: no step is asynchronous.
 pub type fmi2StepFinished = unsafe extern "C" fn(environment: fmi2ComponentEnvironment, status: fmi2Status);
 
 /// The importer's callbacks; each may be NULL.
@@ -96,24 +96,24 @@ pub struct fmi2CallbackFunctions {
     pub free_memory: Option<fmi2CallbackFreeMemory>,
     /// Unused.
     pub step_finished: Option<fmi2StepFinished>,
-    /// Handed back to the logger.
+    /// Passed to the logger.
     pub component_environment: fmi2ComponentEnvironment,
 }
 
-/// What an event did (section 3.2.2).
+/// Result of an event (section 3.2.2).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct fmi2EventInfo {
-    /// The event iteration has to go on.
+    /// Whether another event iteration is needed.
     pub new_discrete_states_needed: fmi2Boolean,
-    /// The model wants to end the simulation.
+    /// Whether the model requests the end of the simulation.
     pub terminate_simulation: fmi2Boolean,
-    /// The nominal values of the states have changed.
+    /// Whether the nominal values of the states have changed.
     pub nominals_of_continuous_states_changed: fmi2Boolean,
-    /// The states have changed.
+    /// Whether the states have changed.
     pub values_of_continuous_states_changed: fmi2Boolean,
-    /// `next_event_time` holds a time event.
+    /// Whether `next_event_time` is valid.
     pub next_event_time_defined: fmi2Boolean,
-    /// The next time event.
+    /// Time of the next time event.
     pub next_event_time: fmi2Real,
 }

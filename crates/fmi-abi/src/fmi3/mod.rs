@@ -1,27 +1,29 @@
-//! FMI 3.0: its C types, and its functions, listed once: arguments, and where each may be called.
+//! FMI 3.0: its C types, and one list of its functions with arguments and allowed states.
 
 pub mod types;
 
 use types::*;
 
-/// Passes the functions on to another macro, after whatever tokens are given behind its name: those that need no instance with
-/// arguments and result, those that work on one with `name CS ME tolerated (arguments);`.
+/// Passes the list of functions to another macro, after any tokens that follow its name. First come the
+/// functions without an instance argument, with arguments and result. Functions on an instance follow as
+/// `name CS ME tolerated (arguments);`.
 ///
-/// The letters are the states of sections 2.3, 3.2 and 4.2: I instantiated, N Initialization Mode, C Step Mode, M Event
-/// Mode, K Continuous-Time Mode, T terminated. In fatal nothing is allowed. For `fmi3Set...` the table has the states;
-/// which variable can be set in which of them is said by the exporter.
+/// The letters are the states of sections 2.3, 3.2 and 4.2: I instantiated, N Initialization Mode, C Step
+/// Mode, M Event Mode, K Continuous-Time Mode, T terminated. In fatal no call is allowed. For `fmi3Set...`,
+/// the list contains all states in which some variable can be set; fmu-export checks each variable.
 ///
-/// An error changes nothing here, so that the importer may go on where the text has the instance go to terminated
-/// (section 2.3.1).
+/// In fmu-export an error changes nothing. So the importer may continue although section 2.3.1 moves the
+/// instance to terminated.
 ///
-/// In no state: fmi3ExitConfigurationMode and fmi3ActivateModelPartition, whose states cannot be entered. Refused where
-/// the text allows them, with the reason: clocks, fmi3EnterConfigurationMode (no structural parameters),
-/// fmi3EvaluateDiscreteStates.
+/// No state allows fmi3ExitConfigurationMode and fmi3ActivateModelPartition, because their states cannot be
+/// entered. Some functions are allowed but return an error with the reason: functions of clocks,
+/// fmi3EnterConfigurationMode (no structural parameters), fmi3EvaluateDiscreteStates.
 ///
-/// Tolerated, for interface types that have the function:
-///   fmi3SetTime while initializing and in event mode, fmi3SetContinuousStates in event mode, as in FMI 2.0;
-///   the two numbers and the nominal values in every state: they never change;
-///   fmi3EnterEventMode in Event Mode, as in FMI 2.0 (OpenModelica).
+/// Tolerated calls, for interface types that have the function:
+/// * fmi3SetTime in Initialization Mode and Event Mode, fmi3SetContinuousStates in Event Mode, as in FMI 2.0;
+/// * the two functions for the numbers of states and event indicators, and the function for nominal values,
+///   in every state: the numbers never change;
+/// * fmi3EnterEventMode in Event Mode, as in FMI 2.0 (OpenModelica).
 #[doc(hidden)]
 #[macro_export]
 #[rustfmt::skip]

@@ -4,58 +4,58 @@
 use crate::c_types::{c_char, c_int, c_void};
 pub use crate::status::Status;
 
-/// What a call answers: a [`Status`] as C has it, an int, because a foreign library may answer any.
+/// Status of a call: a [`Status`] as C int, because a third-party library may return any value.
 pub type fmi3Status = c_int;
-/// An instance, as the importer holds it.
+/// Handle of an instance.
 pub type fmi3Instance = *mut c_void;
-/// The importer's own data, handed back to its callbacks.
+/// Data of the importer, passed to its callbacks.
 pub type fmi3InstanceEnvironment = *mut c_void;
-/// A saved state of an instance, as the importer holds it.
+/// Handle of a saved state.
 pub type fmi3FMUState = *mut c_void;
-/// The handle of a variable.
+/// Value reference of a variable.
 pub type fmi3ValueReference = u32;
 /// A floating-point value of 32 bits.
 pub type fmi3Float32 = f32;
 /// A floating-point value of 64 bits.
 pub type fmi3Float64 = f64;
-/// A whole number.
+/// A signed integer of 8 bits.
 pub type fmi3Int8 = i8;
-/// A whole number.
+/// An unsigned integer of 8 bits.
 pub type fmi3UInt8 = u8;
-/// A whole number.
+/// A signed integer of 16 bits.
 pub type fmi3Int16 = i16;
-/// A whole number.
+/// An unsigned integer of 16 bits.
 pub type fmi3UInt16 = u16;
-/// A whole number.
+/// A signed integer of 32 bits.
 pub type fmi3Int32 = i32;
-/// A whole number.
+/// An unsigned integer of 32 bits.
 pub type fmi3UInt32 = u32;
-/// A whole number.
+/// A signed integer of 64 bits.
 pub type fmi3Int64 = i64;
-/// A whole number.
+/// An unsigned integer of 64 bits.
 pub type fmi3UInt64 = u64;
-/// A truth value: `bool` in C; a byte here, because a C caller can pass any.
+/// A Boolean: `bool` in C. The type is a byte, because a C caller can pass any value.
 pub type fmi3Boolean = u8;
 /// One character.
 pub type fmi3Char = c_char;
-/// A zero-terminated UTF-8 string.
+/// A NUL-terminated UTF-8 string.
 pub type fmi3String = *const fmi3Char;
 /// One byte.
 pub type fmi3Byte = u8;
-/// Bytes whose number is passed beside them.
+/// Bytes; their number is a separate argument.
 pub type fmi3Binary = *const fmi3Byte;
 /// Whether a clock ticks: `bool` in C.
 pub type fmi3Clock = u8;
-/// [`fmi3True`] as C sees it.
+/// `fmi3True`, the value of true.
 #[allow(non_upper_case_globals)]
 pub const fmi3True: fmi3Boolean = 1;
-/// [`fmi3False`] as C sees it.
+/// `fmi3False`, the value of false.
 #[allow(non_upper_case_globals)]
 pub const fmi3False: fmi3Boolean = 0;
 
 /// `fmi3DependencyKind`.
 pub type fmi3DependencyKind = c_int;
-/// `fmi3Dependent`: nothing is known of how it depends.
+/// `fmi3Dependent`: a dependency of unknown kind.
 #[allow(non_upper_case_globals)]
 pub const fmi3Dependent: fmi3DependencyKind = 5;
 /// `fmi3IntervalQualifier`.
@@ -70,7 +70,7 @@ pub type fmi3LogMessageCallback = unsafe extern "C" fn(
 );
 /// Never called: there are no clocks.
 pub type fmi3ClockUpdateCallback = unsafe extern "C" fn(environment: fmi3InstanceEnvironment);
-/// Never called: nothing is exchanged within a step.
+/// Never called: there is no intermediate update.
 pub type fmi3IntermediateUpdateCallback = unsafe extern "C" fn(
     environment: fmi3InstanceEnvironment,
     time: fmi3Float64,

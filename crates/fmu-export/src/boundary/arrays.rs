@@ -1,4 +1,4 @@
-//! The importer's arrays, places and strings.
+//! Arrays, pointers and strings of the importer.
 
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, Reference, elements_of, refuse};
@@ -6,24 +6,25 @@ use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 use std::mem::MaybeUninit;
 
-/// The importer's array of `length` values, to be read.
+/// Returns the importer's array of `length` values for reading.
 ///
 /// # Safety
-/// `pointer` is NULL or points to `length` values that stay as they are for `'a`.
+/// `pointer` is NULL or points to `length` values that do not change during `'a`.
 #[inline]
 pub(crate) unsafe fn array<'a, T>(pointer: *const T, length: usize, argument: &str) -> Outcome<&'a [T]> {
     if length == 0 {
         return Ok(&[]);
     }
     check(pointer, length, argument)?;
-    // SAFETY: not NULL, aligned, of a possible size; the length is the caller's promise.
+    // SAFETY: the pointer is not NULL and is aligned, and the size is possible; the caller guarantees the
+    // length.
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
 
-/// The importer's array of `length` values, to be written. What is in it before may be anything.
+/// Returns the importer's array of `length` values for writing. Its previous content may be uninitialized.
 ///
 /// # Safety
-/// `pointer` is NULL or points to `length` values that nobody else uses for `'a`.
+/// `pointer` is NULL or points to `length` values that no other code uses during `'a`.
 #[inline]
 pub(crate) unsafe fn output<'a, T>(
     pointer: *mut T,
@@ -34,12 +35,12 @@ pub(crate) unsafe fn output<'a, T>(
         return Ok(&mut []);
     }
     check(pointer, length, argument)?;
-    // SAFETY: not NULL, aligned, of a possible size; the length is the caller's promise, and `MaybeUninit` asks for
-    // no initialized values.
+    // SAFETY: the pointer is not NULL and is aligned, and the size is possible; the caller guarantees the
+    // length. `MaybeUninit` requires no initialized values.
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), length) })
 }
 
-/// As many values as variables have.
+/// Checks that the array length equals the number of values.
 #[inline]
 pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
     if count == needed {
@@ -48,11 +49,11 @@ pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
     refuse(format!("there are {needed} {what}, the array has {count} elements"))
 }
 
-/// Does something with variables that an importer of FMI 3.0 names, in a model with arrays: by the value reference of its
-/// first element it means the whole array, of which the values follow each other (section 2.2.7.2).
+/// Calls `body` with the elements of variables of FMI 3.0, in a model with arrays. The value reference of the
+/// first element denotes the whole array; its values are contiguous (section 2.2.7.2).
 ///
 /// # Safety
-/// The value references are NULL or an array of this length, which stays as it is.
+/// The value references are NULL or an array of this length, which does not change.
 pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
     vr: *const u32,
@@ -60,10 +61,10 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
     value_count: usize,
     body: impl FnOnce(&mut Instance<M>, &[u32]) -> Outcome,
 ) -> Outcome {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees the array and its length.
     let vr: &[R] = unsafe { array(R::cast(vr), count, R::REFERENCES) }?;
     same("values", instance.count_elements(vr)?, value_count)?;
-    // Out of the instance for as long as it is needed, which gets it back with its memory.
+    // Moved out so that `body` can borrow the instance; moved back to reuse the allocation.
     let mut elements = std::mem::take(&mut instance.elements);
     elements.clear();
     elements.extend(vr.iter().flat_map(|vr| elements_of::<M>(vr.place())));
@@ -72,30 +73,30 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
     outcome
 }
 
-/// The importer's place for one value.
+/// Returns the importer's memory for one value.
 ///
 /// # Safety
-/// `pointer` is NULL or points to a value that nobody else uses for `'a`.
+/// `pointer` is NULL or points to a value that no other code uses during `'a`.
 pub(crate) unsafe fn place<'a, T>(pointer: *mut T, argument: &str) -> Outcome<&'a mut MaybeUninit<T>> {
     if pointer.is_null() || !pointer.is_aligned() {
         return refuse(format!("the pointer {argument} is NULL or not aligned"));
     }
-    // SAFETY: not NULL and aligned; that it points to a value is the caller's promise.
+    // SAFETY: the pointer is not NULL and is aligned; the caller guarantees that it points to a value.
     Ok(unsafe { &mut *pointer.cast() })
 }
 
-/// The importer's string.
+/// Returns the importer's string.
 ///
 /// # Safety
-/// `pointer` is NULL or a string with a zero byte at its end that stays as it is for `'a`.
+/// `pointer` is NULL or a NUL-terminated string that does not change during `'a`.
 pub(crate) unsafe fn string<'a>(pointer: *const c_char) -> Option<&'a CStr> {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees a string if the pointer is not NULL.
     (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) })
 }
 
 #[inline]
 fn check<T>(pointer: *const T, length: usize, argument: &str) -> Outcome {
-    // In one test: not aligned, or so long that its bytes cannot be counted.
+    // One test covers both faults: not aligned, or a size in bytes that overflows `isize`.
     let odd = pointer.addr() & (align_of::<T>() - 1) | length >> (isize::BITS - 1 - size_of::<T>().ilog2());
     if pointer.is_null() || odd != 0 {
         return refuse_array(pointer, length, argument);

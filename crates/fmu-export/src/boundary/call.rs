@@ -1,4 +1,4 @@
-//! What every call on an instance has in common.
+//! The code that every call on an instance shares.
 
 use super::ImporterLog;
 use crate::export::Exported;
@@ -11,40 +11,41 @@ use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-// WebAssembly traps instead, which ends the call and not the process.
+// WebAssembly traps instead; a trap ends the call, not the process.
 #[cfg(all(panic = "abort", not(target_family = "wasm")))]
 compile_error!("an FMU must not end the importer's process: build with panic = \"unwind\"");
 
-/// What a component points to.
+/// Target of a component pointer.
 ///
-/// Processors fetch cache lines of 64 bytes in pairs: instances side by side on the heap share none, so that
-/// threads that step them do not take them from each other.
+/// Processors fetch cache lines of 64 bytes in pairs. The alignment keeps adjacent instances in separate
+/// pairs, so that threads that step them do not slow each other down.
 #[repr(align(128))]
 pub(crate) struct Component<M> {
-    /// Whether the importer's log callback is running: it must not call back. The instance's situation says so, too.
+    /// Whether the importer's log callback is running; it must not call back. The situation of the instance
+    /// forbids calls as well.
     pub delivering: Cell<bool>,
     pub instance: UnsafeCell<Instance<M>>,
     pub importer: ImporterLog,
 }
 
-/// Runs a function's body on the instance behind `c` if the table of allowed calls has it.
+/// Runs a function's body on the instance of `c` if the table of allowed calls permits the call.
 ///
 /// # Safety
-/// `c` as in the contract of the standard's module.
+/// `c` as in the contract of the FMI version's module.
 #[inline(always)]
 pub(crate) unsafe fn call<M: Exported>(
     c: *mut c_void,
     rule: &'static Rule,
     body: impl FnOnce(&mut Instance<M>) -> Outcome,
 ) -> Status {
-    // SAFETY: by contract NULL or a living component of this model. Shared, because the log callback of a call that
-    // is not over may come here, too.
+    // SAFETY: by contract, NULL or a live component of this model. The reference is shared because the log
+    // callback of a running call may come here as well.
     let Some(component) = (unsafe { c.cast::<Component<M>>().as_ref() }) else {
         return Status::Error;
     };
-    // SAFETY: by contract no other thread is here, and no call on this thread: none is running a body, because bodies
-    // call nothing of the importer's, and none is delivering. The reference ends with this function's use of it, before
-    // anything is delivered.
+    // SAFETY: by contract, no other thread is here. On this thread, no body is running, because bodies never
+    // call the importer, and no message is being delivered. The last use of the reference is before any
+    // delivery.
     let instance = unsafe { &mut *component.instance.get() };
     if !instance.situation().is_in(rule.accepted()) {
         return not_allowed(component, rule);
@@ -60,27 +61,28 @@ pub(crate) unsafe fn call<M: Exported>(
     }
 }
 
-/// Goes the short way of a call if the table of allowed calls has it. `None` if the long way must be gone.
+/// Runs the fast path of a call if the table of allowed calls permits the call. Returns `None` if the caller
+/// must use the general path.
 ///
 /// # Safety
-/// As above.
+/// `c` meets the requirement of [`call`].
 #[inline(always)]
 pub(crate) unsafe fn call_at_once<M: Exported>(
     c: *mut c_void,
     rule: &'static Rule,
     way: impl FnOnce(*mut Instance<M>) -> bool,
 ) -> Option<Status> {
-    // SAFETY: as above.
+    // SAFETY: as in `call`.
     let component = unsafe { c.cast::<Component<M>>().as_ref() }?;
     let instance = component.instance.get();
-    // SAFETY: as above.
+    // SAFETY: as in `call`.
     if !unsafe { &*instance }.situation().is_in(rule.accepted()) {
         return None;
     }
-    // The way takes a pointer. Behind a reference the compiler may read more than one value at once, and the processor
-    // has to wait if one of them was written right before.
+    // The fast path takes a pointer. With a reference, the compiler may read several values at once. The
+    // processor stalls if one of them was written just before.
     //
-    // SAFETY: as above.
+    // SAFETY: as in `call`.
     let walk = || way(instance).then(|| unsafe { &mut *instance }.listen());
     match catch_unwind(AssertUnwindSafe(walk)) {
         Ok(Some(false)) => Some(Status::Ok),
@@ -90,7 +92,8 @@ pub(crate) unsafe fn call_at_once<M: Exported>(
     }
 }
 
-/// A call that is not in the table of allowed calls, or comes out of the log callback: an error without a message.
+/// Rejects a call that the table of allowed calls forbids. A call from the log callback returns an error
+/// without a message.
 #[cold]
 #[inline(never)]
 fn not_allowed<M: Exported>(component: &Component<M>, rule: &'static Rule) -> Status {
@@ -98,7 +101,7 @@ fn not_allowed<M: Exported>(component: &Component<M>, rule: &'static Rule) -> St
         return Status::Error;
     }
     let refusal = catch_unwind(AssertUnwindSafe(|| {
-        // SAFETY: as in `call`, which has no use for its reference any more.
+        // SAFETY: as in `call`, which no longer uses its reference.
         refuse_call(unsafe { &*component.instance.get() }, rule.accepted())
     }));
     finish(component, rule.name, refusal)
@@ -112,10 +115,10 @@ fn refuse_call<M: Exported>(instance: &Instance<M>, accepted: Situations) -> Out
     Err(Box::new(Refusal { status, message }))
 }
 
-/// What became of a body: the refusal or the panic that it ended with.
+/// Result of a body: its outcome, or the payload of its panic.
 type Ended = Result<Outcome, Box<dyn Any + Send>>;
 
-/// The end of a call that is not simply OK: says what there is to say.
+/// Ends a call that is not simply OK: delivers the messages and returns the status.
 #[cold]
 #[inline(never)]
 pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: Ended) -> Status {
@@ -126,8 +129,8 @@ pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: E
     };
     let deliver = || {
         let messages = {
-            // SAFETY: as in `call`: nobody else has a reference to the instance, and this one ends before the first
-            // message is delivered.
+            // SAFETY: as in `call`, no other code has a reference to the instance. The last use of this
+            // reference is before the first delivery.
             let instance = unsafe { &mut *component.instance.get() };
             match &ended {
                 Ok(Ok(())) => {}
@@ -149,7 +152,7 @@ pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: E
         component.delivering.set(true);
         messages.iter().for_each(|message| component.importer.deliver(message));
         component.delivering.set(false);
-        // SAFETY: as above: what was called back is over.
+        // SAFETY: as above; the deliveries have ended.
         unsafe { &mut *component.instance.get() }.while_delivering(false);
     };
     forget_panic(catch_unwind(AssertUnwindSafe(deliver)));
@@ -159,7 +162,7 @@ pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: E
     status
 }
 
-/// Drops what a panic carries. If that panics as well, what the second one carries is left to itself.
+/// Drops the payload of a panic. If the drop panics as well, leaks the second payload.
 pub(crate) fn forget_panic(ended: Result<(), Box<dyn Any + Send>>) {
     if let Err(panic) = ended
         && let Err(second) = catch_unwind(AssertUnwindSafe(|| drop(panic)))

@@ -1,15 +1,15 @@
-//! Derivatives in arrays of the importer's.
+//! Derivatives in arrays of the importer.
 
 use super::{array, output, same};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome, Reference, elements_of};
 use std::mem::MaybeUninit;
 
-/// Partial derivatives (section 2.1.9 of FMI 2.0, 2.2.11 of FMI 3.0): unknowns, knowns, seed and result, each with its
-/// length and called by `names`.
+/// Computes partial derivatives (section 2.1.9 of FMI 2.0, 2.2.12 of FMI 3.0). The arguments are unknowns,
+/// knowns, seed and result, each with its length; `names` are their names in messages.
 ///
 /// # Safety
-/// Each is NULL or an array of its length; the result does not overlap the others.
+/// Each array is NULL or has its length; the result does not overlap the others.
 #[inline]
 pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOINT: bool>(
     instance: &mut Instance<M>,
@@ -20,7 +20,7 @@ pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOIN
     result: (*mut f64, usize),
 ) -> Outcome {
     let (seed_count, result_count) = (seed.1, result.1);
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees the arrays and their lengths.
     let (unknown, known, seed, result) = unsafe {
         (
             array(R::cast(unknown.0), unknown.1, names[0])?,
@@ -35,7 +35,7 @@ pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOIN
     same(seeded.0, seeded.1, seed_count)?;
     same(wanted.0, wanted.1, result_count)?;
     result.fill(MaybeUninit::new(0.0));
-    // SAFETY: all have been written.
+    // SAFETY: all values have been written.
     let sums = unsafe { &mut *(std::ptr::from_mut(result) as *mut [f64]) };
     if M::ARRAYS && R::ARRAYS {
         let [unknown, known] = [unknown, known].map(elements::<M, R>);
@@ -48,10 +48,10 @@ fn elements<M: Exported, R: Reference>(vr: &[R]) -> Vec<u32> {
     vr.iter().flat_map(|vr| elements_of::<M>(vr.place())).collect()
 }
 
-/// Time derivatives of outputs (section 4.2.2 of FMI 2.0, 4.2.4 of FMI 3.0).
+/// Computes time derivatives of outputs (section 4.2.2 of FMI 2.0, 4.2.4 of FMI 3.0).
 ///
 /// # Safety
-/// Each is NULL or an array of its length; the values do not overlap the others.
+/// Each array is NULL or has its length; the values do not overlap the others.
 pub(crate) unsafe fn output_derivatives<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
     vr: *const u32,
@@ -60,7 +60,7 @@ pub(crate) unsafe fn output_derivatives<M: Exported, R: Reference>(
     value: *mut f64,
     value_count: usize,
 ) -> Outcome {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees the arrays and their lengths.
     let (vr, order, value) = unsafe {
         (
             array(R::cast(vr), count, R::REFERENCES)?,
@@ -70,7 +70,7 @@ pub(crate) unsafe fn output_derivatives<M: Exported, R: Reference>(
     };
     same("values", instance.count_elements(vr)?, value_count)?;
     if M::ARRAYS && R::ARRAYS {
-        // The order is that of the whole array (section 4.2.4 of FMI 3.0).
+        // One order applies to the whole array (section 4.2.4 of FMI 3.0).
         let of_elements =
             |(vr, order): (&R, &i32)| elements_of::<M>(vr.place()).map(|_| *order).collect::<Vec<_>>();
         let order: Vec<i32> = vr.iter().zip(order).flat_map(of_elements).collect();

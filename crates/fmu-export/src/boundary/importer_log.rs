@@ -6,7 +6,7 @@ use crate::log::Message;
 use fmi_abi::c_types::c_void;
 use std::ffi::CString;
 
-/// The callback, as its standard has it.
+/// The callback in the form of its FMI version.
 #[derive(Clone, Copy)]
 #[cfg_attr(target_family = "wasm", allow(dead_code, reason = "the C around the module knows the importer"))]
 pub(crate) enum Callback {
@@ -14,8 +14,8 @@ pub(crate) enum Callback {
     Fmi3(fmi3LogMessageCallback),
 }
 
-/// The callback, if the importer has one, and what it wants back with every call. Copied, because the callbacks
-/// structure of FMI 2.0 may go after `fmi2Instantiate`.
+/// The callback, if the importer has one, and the arguments that it gets with every call. Copied because the
+/// callbacks structure of FMI 2.0 may be invalid after `fmi2Instantiate`.
 #[cfg_attr(target_family = "wasm", allow(dead_code, reason = "the C around the module knows the importer"))]
 pub(crate) struct ImporterLog {
     pub callback: Option<Callback>,
@@ -33,7 +33,7 @@ unsafe extern "C" {
     );
 }
 
-/// Hands a message to the C around the module.
+/// Passes a message to the C code around the module.
 #[cfg(target_family = "wasm")]
 pub(super) fn log(message: &Message) {
     fmu_log(message.status, message.category().as_ptr(), message.printable().as_ptr());
@@ -49,8 +49,9 @@ impl ImporterLog {
     pub fn deliver(&self, message: &Message) {
         let Some(callback) = self.callback else { return };
         let (category, text) = (message.category().as_ptr(), message.printable());
-        // SAFETY: the importer's promise that the logger works until the instance is freed; all strings end with a
-        // zero byte, and the message holds no format directive that would ask the variadic one for further arguments.
+        // SAFETY: the importer guarantees that the logger works until the instance is freed. All strings are
+        // NUL-terminated. The message contains no format directive, so the variadic logger reads no further
+        // arguments.
         unsafe {
             match callback {
                 Callback::Fmi2(logger) => logger(

@@ -1,4 +1,4 @@
-//! Making and freeing instances.
+//! Creation and release of instances.
 
 use super::{Component, ImporterLog, forget_panic, panic_message};
 use crate::export::Exported;
@@ -12,19 +12,19 @@ use std::cell::{Cell, UnsafeCell};
 use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What importers pass to make an instance, whatever the standard.
+/// Arguments of an importer for a new instance, in any FMI version.
 pub(crate) struct Arguments<'a> {
     pub name: Option<&'a CStr>,
-    /// The guid, or instantiation token.
+    /// The guid, or the instantiation token.
     pub guid: Option<&'a CStr>,
     pub resources: Option<&'a CStr>,
     pub logging_on: bool,
-    /// What follows from the other arguments, or why it cannot be.
+    /// Interface type that follows from the other arguments, or the reason why it is invalid.
     pub interface: Outcome<Interface>,
     pub importer: Importer,
 }
 
-/// Makes an instance, or says why not and gives NULL. The importer owns the result until it frees it.
+/// Creates an instance, or logs the reason and returns NULL. The importer owns the result until it frees it.
 pub(crate) fn instantiate<M: Exported>(
     function: &str,
     log: impl FnOnce() -> ImporterLog,
@@ -84,19 +84,20 @@ fn make_instance<M: Exported>(arguments: Arguments) -> Outcome<Instance<M>> {
     Instance::new(setup, importer, logging_on)
 }
 
-/// Takes the instance back; NULL is ignored, and so is a call out of the log callback.
+/// Frees an instance; ignores NULL and calls from the log callback.
 ///
 /// # Safety
-/// NULL or an instance of this model that is not freed.
+/// `c` is NULL or an instance of this model that has not been freed.
 pub(crate) unsafe fn free<M: Exported>(c: *mut c_void) {
     let component = c.cast::<Component<M>>();
-    // SAFETY: by contract NULL or a living component of this model.
+    // SAFETY: by contract, NULL or a live component of this model.
     if unsafe { component.as_ref() }.is_none_or(|component| component.delivering.get()) {
         return;
     }
-    // SAFETY: by contract from `instantiate`, which gave the box away, and not freed before.
+    // SAFETY: by contract, the pointer comes from `instantiate`, which leaked the box, and has not been
+    // freed.
     let mut component = unsafe { Box::from_raw(component) };
-    // One at a time: a second panic on the way out of a first would end the process.
+    // Drops one model at a time: a second panic while the first unwinds would abort the process.
     while let Some(model) = component.instance.get_mut().give_any() {
         forget_panic(catch_unwind(AssertUnwindSafe(|| drop(model))));
     }

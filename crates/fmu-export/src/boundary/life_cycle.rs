@@ -1,7 +1,8 @@
-//! The life of an instance (sections 2.1.5 and 2.1.6 of FMI 2.0, 2.3 of FMI 3.0), and what is logged.
+//! The life cycle of an instance (sections 2.1.5 and 2.1.6 of FMI 2.0, 2.3 of FMI 3.0), and the settings of
+//! the log.
 //!
 //! # Safety
-//! As in the contract of the [standards' modules](crate::fmi2).
+//! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
 use super::{array, string};
 use crate::export::Exported;
@@ -12,7 +13,7 @@ use fmi_abi::Category;
 use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 
-/// What the importer says of the times and the tolerance, by truth values of its standard.
+/// Converts times and tolerance of the importer; `Truth` is the Boolean type of the FMI version.
 pub(crate) fn experiment<Truth: Default + PartialEq>(
     tolerance_defined: Truth,
     tolerance: f64,
@@ -52,11 +53,11 @@ pub unsafe fn set_debug_logging<M: Exported, Truth: Default + PartialEq>(
     categories: *const *const c_char,
 ) -> Outcome {
     let on = on != Truth::default();
-    // SAFETY: by contract an array of this length.
+    // SAFETY: by contract, an array of this length.
     let names = unsafe { array(categories, count, "categories") }?;
     let mut found = 0;
     for name in names {
-        // SAFETY: by contract NULL or a string.
+        // SAFETY: by contract, NULL or a string.
         let name = unsafe { string(*name) }.map_or(&b""[..], CStr::to_bytes);
         let Some(bit) = Logger::find(name) else {
             let known = Category::ALL.map(|category| category.name().to_string_lossy()).join(", ");

@@ -1,6 +1,6 @@
-//! What the C functions of both standards have in common: an instance behind a pointer, calls on it, arrays of the
-//! importer's; and the functions that are the same in both but for their names. With [`fmi2`](crate::fmi2) and
-//! [`fmi3`](crate::fmi3), which are on top of it, the only place with pointers and `unsafe`.
+//! The code that the C functions of both FMI versions share: an instance behind a pointer, calls on it, and
+//! the importer's arrays. Also the functions that differ only in their names. Only this module,
+//! [`fmi2`](crate::fmi2) and [`fmi3`](crate::fmi3) contain pointers and `unsafe`.
 
 mod arrays;
 mod call;
@@ -27,7 +27,7 @@ use crate::export::Exported;
 use crate::instance::Instance;
 use fmi_abi::Standard;
 
-/// The name of an argument, as the instance's standard has it.
+/// Returns the name of an argument in the FMI version of the instance.
 fn named<M: Exported>(instance: &Instance<M>, fmi2: &'static str, fmi3: &'static str) -> &'static str {
     match instance.standard() {
         Standard::Fmi2 => fmi2,

@@ -1,7 +1,7 @@
-//! Model Exchange (section 3.2 of both standards).
+//! Model Exchange (section 3.2 of both FMI versions).
 //!
 //! # Safety
-//! As in the contract of the [standards' modules](crate::fmi2).
+//! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
 use super::{array, named, output, place};
 use crate::export::Exported;
@@ -18,7 +18,7 @@ pub unsafe fn completed_integrator_step<M: Exported, Truth: From<bool>>(
     enter_event_mode: *mut Truth,
     terminate_simulation: *mut Truth,
 ) -> Outcome {
-    // SAFETY: by contract each NULL or a pointer to a value.
+    // SAFETY: by contract, each is NULL or points to a value.
     let (enter_event_mode, terminate_simulation) = unsafe {
         (place(enter_event_mode, "enterEventMode")?, place(terminate_simulation, "terminateSimulation")?)
     };
@@ -38,7 +38,7 @@ pub unsafe fn set_continuous_states<M: Exported>(
     count: usize,
 ) -> Outcome {
     let name = named(instance, "x", "continuousStates");
-    // SAFETY: by contract an array of this length.
+    // SAFETY: by contract, an array of this length.
     instance.set_continuous_states(unsafe { array(x, count, name) }?)
 }
 
@@ -47,7 +47,7 @@ pub unsafe fn get_derivatives<M: Exported>(
     derivatives: *mut f64,
     count: usize,
 ) -> Outcome {
-    // SAFETY: by contract an array of this length.
+    // SAFETY: by contract, an array of this length.
     instance.get_derivatives(unsafe { output(derivatives, count, "derivatives") }?)
 }
 
@@ -56,7 +56,7 @@ pub unsafe fn get_event_indicators<M: Exported>(
     indicators: *mut f64,
     count: usize,
 ) -> Outcome {
-    // SAFETY: by contract an array of this length.
+    // SAFETY: by contract, an array of this length.
     instance.get_event_indicators(unsafe { output(indicators, count, "eventIndicators") }?)
 }
 
@@ -66,7 +66,7 @@ pub unsafe fn get_continuous_states<M: Exported>(
     count: usize,
 ) -> Outcome {
     let name = named(instance, "x", "continuousStates");
-    // SAFETY: by contract an array of this length.
+    // SAFETY: by contract, an array of this length.
     instance.get_continuous_states(unsafe { output(x, count, name) }?)
 }
 
@@ -76,6 +76,6 @@ pub unsafe fn get_nominals<M: Exported>(
     count: usize,
 ) -> Outcome {
     let name = named(instance, "x_nominal", "nominals");
-    // SAFETY: by contract an array of this length.
+    // SAFETY: by contract, an array of this length.
     instance.get_nominals(unsafe { output(nominals, count, name) }?)
 }

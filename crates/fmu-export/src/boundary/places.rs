@@ -1,7 +1,8 @@
-//! Reals of a model by their offsets: the pointer arithmetic of this crate.
+//! Access to Reals of a model by offsets: the pointer arithmetic of this crate.
 //!
-//! The functions that [`variables!`](crate::variables) implements take a reference to a place in the model and return its
-//! offset. For paths of fields and elements of arrays the offsets are constants, and the compiler puts them into a table.
+//! The functions that [`variables!`](crate::variables) implements take a reference to a field of the model
+//! and return its offset. For paths of fields and array elements the offsets are constants, and the compiler
+//! stores them in a table.
 
 use crate::table::Variables;
 use crate::value::Place;
@@ -9,16 +10,16 @@ use crate::variable::Index;
 use std::mem::offset_of;
 use std::ops::{Deref, DerefMut};
 
-/// A model, and behind it what is used for a variable without a place in the model.
+/// A model, followed by dummy values for variables without a field in the model.
 #[repr(C)]
 pub(crate) struct Placed<M> {
     model: M,
-    /// Read for a variable that has no place to read. Values are tested for numbers anyway.
+    /// Read for a variable without a field. It is NaN, which the check for finite values detects.
     no_number: f64,
-    /// Written for a variable that has no place to set, together with `is_missed`.
+    /// Written for a variable without a field, together with `is_missed`.
     nowhere: f64,
     is_missed: bool,
-    /// Written for a variable without a mark.
+    /// Written for a variable without a `bool` after `then`.
     no_mark: bool,
 }
 
@@ -33,35 +34,38 @@ impl<M: Clone> Clone for Placed<M> {
         Self::new(self.model.clone())
     }
 
-    /// Passes on to the model, which may have a way to clone into what is there already.
+    /// Calls `clone_from` of the model, which may reuse its allocations.
     fn clone_from(&mut self, source: &Self) {
         self.model.clone_from(source);
     }
 }
 
 impl<M: Variables> Placed<M> {
-    /// The Real of a line; NaN if it has no place in the model.
+    /// Returns the Real of a line; NaN if the line has no field in the model.
     #[inline(always)]
     pub fn real_in_place(&self, line: u32) -> f64 {
         let offset = self.model.offset_to_read(Index(line), offset_of!(Self, no_number));
-        // SAFETY: by the contract of `Variables` the offset of an `f64` in the model, or that of `no_number`.
+        // SAFETY: by the contract of `Variables`, the offset of an `f64` in the model; otherwise the offset
+        // of `no_number`.
         unsafe { (&raw const *self).byte_add(offset).cast::<f64>().read() }
     }
 
-    /// Sets the Real of a line and its mark, if it has a place in the model; see [`missed`](Self::missed).
+    /// Sets the Real of a line and its `bool`, if the line has a field in the model; see
+    /// [`missed`](Self::missed).
     #[inline(always)]
     pub fn set_in_place(&mut self, line: u32, value: f64) {
         let without = const { both_offsets(offset_of!(Self, nowhere), offset_of!(Self, is_missed)).unwrap() };
         let offsets = self.model.offsets_to_set(Index(line), offset_of!(Self, no_mark), without);
         let [place, mark] = [offsets as u32, (offsets >> 32) as u32].map(|offset| offset as usize);
-        // SAFETY: by the contract of `Variables` the offsets of an `f64` and a `bool` in the model, or these behind it.
+        // SAFETY: by the contract of `Variables`, the offsets of an `f64` and a `bool` in the model;
+        // otherwise offsets of fields of `Self`.
         unsafe {
             (&raw mut *self).byte_add(place).cast::<f64>().write(value);
             (&raw mut *self).byte_add(mark).cast::<bool>().write(true);
         }
     }
 
-    /// Whether a variable that was to be set in its place has none. Asked once.
+    /// Returns whether a variable without a field was set since the last call, and clears the record.
     #[inline(always)]
     pub fn missed(&mut self) -> bool {
         self.is_missed && std::mem::take(&mut self.is_missed)
@@ -84,14 +88,15 @@ impl<M> DerefMut for Placed<M> {
     }
 }
 
-/// The offset of a place in the model, if it is one of an `f64` that is part of the model itself.
+/// Returns the offset of a field in the model, if it is an `f64` inside the model.
 #[doc(hidden)]
 #[inline(always)]
 pub fn offset_of_real<M>(model: *const M, place: &impl Place, otherwise: usize) -> usize {
     place.as_real().map_or(otherwise, |real| offset_in(model, real, otherwise))
 }
 
-/// Both as one number: as two they would make two tables. None if there is one of them only.
+/// Returns both offsets as one number, because two numbers would produce two tables. Returns `None` if one of
+/// them is missing (`usize::MAX`) or too large.
 #[doc(hidden)]
 #[inline(always)]
 pub const fn both_offsets(place: usize, mark: usize) -> Option<u64> {
@@ -99,7 +104,7 @@ pub const fn both_offsets(place: usize, mark: usize) -> Option<u64> {
     if place < largest && mark < largest { Some(place as u64 | (mark as u64) << 32) } else { None }
 }
 
-/// The offset of a mark in the model, likewise.
+/// Returns the offset of a reference in the model; `otherwise` if it points outside of the model.
 #[doc(hidden)]
 #[inline(always)]
 pub fn offset_in<M, T>(model: *const M, place: *const T, otherwise: usize) -> usize {

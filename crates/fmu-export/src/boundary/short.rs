@@ -1,10 +1,10 @@
-//! The short ways of the C functions that every step calls, under their names and with their arguments.
+//! Fast paths of the C functions that every step calls, under their names and with their arguments.
 //!
-//! Each function does all that is asked for and returns true, or returns false and has written nothing to the importer: then
-//! the long way finds out what is unusual, and reports what is wrong. Both make the same checks.
+//! Each function either does all work and returns true, or writes nothing to the importer and returns false.
+//! Then the general path handles the call and reports errors. Both paths make equivalent checks.
 //!
 //! # Safety
-//! The contract is that of the C functions.
+//! The contract is the contract of the C functions.
 #![allow(non_snake_case)]
 #![allow(clippy::missing_safety_doc, reason = "the contract above is that of every function")]
 #![allow(clippy::too_many_arguments, reason = "as many as the standard has")]
@@ -15,10 +15,11 @@ use crate::instance::{Instance, Reference};
 use fmi_abi::fmi3::types::fmi3Boolean;
 use std::mem::MaybeUninit;
 
-/// Whether these can be arrays of so many elements: not empty and not larger than memory, not NULL, and aligned.
+/// Returns whether these can be arrays of `count` elements: not empty, not larger than memory, not NULL, and
+/// aligned.
 #[inline(always)]
 fn are_arrays(vr: *const u32, values: *const f64, count: usize) -> bool {
-    // Less 1, NULL and 0 have the highest bits set. References have half the size.
+    // Minus 1, NULL and 0 have the highest bits set. References have half the size of values.
     let highest = vr.addr().wrapping_sub(1) | values.addr().wrapping_sub(1) | count.wrapping_sub(1);
     let lowest = (vr.addr() << 1 | values.addr()) & (size_of::<f64>() - 1);
     highest >> (usize::BITS - 5) | lowest == 0
@@ -32,7 +33,8 @@ unsafe fn get<M: Exported, R: Reference>(
     count: usize,
 ) -> bool {
     let (references, places): (_, *mut MaybeUninit<f64>) = (R::cast(vr), values.cast());
-    // SAFETY: both arrays are not NULL, aligned, and by contract `count` long; `MaybeUninit` needs no initialized values.
+    // SAFETY: both arrays are not NULL, are aligned, and have `count` elements by contract. `MaybeUninit`
+    // requires no initialized values.
     unsafe {
         match count {
             _ if !are_arrays(vr, values, count) => false,
@@ -52,7 +54,7 @@ unsafe fn set<M: Exported, R: Reference>(
     count: usize,
 ) -> bool {
     let references = R::cast(vr);
-    // SAFETY: both arrays are not NULL, aligned, and by contract `count` long.
+    // SAFETY: both arrays are not NULL, are aligned, and have `count` elements by contract.
     unsafe {
         match count {
             _ if !are_arrays(vr, values, count) => false,
@@ -70,7 +72,7 @@ pub(crate) unsafe fn fmi2GetReal<M: Exported>(
     count: usize,
     values: *mut f64,
 ) -> bool {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees the contract.
     unsafe { get::<M, u32>(instance, vr, values, count) }
 }
 
@@ -81,7 +83,7 @@ pub(crate) unsafe fn fmi2SetReal<M: Exported>(
     count: usize,
     values: *const f64,
 ) -> bool {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees the contract.
     unsafe { set::<M, u32>(instance, vr, values, count) }
 }
 
@@ -103,7 +105,7 @@ pub(crate) unsafe fn fmi3GetFloat64<M: Exported>(
     values: *mut f64,
     value_count: usize,
 ) -> bool {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees the contract.
     value_count == count && unsafe { get::<M, FromOne>(instance, vr, values, count) }
 }
 
@@ -115,7 +117,7 @@ pub(crate) unsafe fn fmi3SetFloat64<M: Exported>(
     values: *const f64,
     value_count: usize,
 ) -> bool {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees the contract.
     value_count == count && unsafe { set::<M, FromOne>(instance, vr, values, count) }
 }
 
@@ -130,7 +132,7 @@ pub(crate) unsafe fn fmi3DoStep<M: Exported>(
     early_return: *mut fmi3Boolean,
     last_successful_time: *mut f64,
 ) -> bool {
-    // As in `are_arrays`.
+    // Same tests as in `are_arrays`.
     let highest = event_handling_needed.addr().wrapping_sub(1)
         | terminate_simulation.addr().wrapping_sub(1)
         | early_return.addr().wrapping_sub(1)
@@ -139,7 +141,7 @@ pub(crate) unsafe fn fmi3DoStep<M: Exported>(
     if highest >> (usize::BITS - 5) | lowest != 0 || !instance.step_at_once(point, size) {
         return false;
     }
-    // SAFETY: not NULL and aligned, and values by contract.
+    // SAFETY: the pointers are not NULL and are aligned; by contract, they point to values.
     unsafe {
         event_handling_needed.write(false.into());
         terminate_simulation.write(false.into());
@@ -149,7 +151,7 @@ pub(crate) unsafe fn fmi3DoStep<M: Exported>(
     true
 }
 
-/// Calls a function's body for model `M`, after its short way if it has one.
+/// Calls a function's body for model `M`, after its fast path if it has one.
 macro_rules! call {
     (fmi2GetReal $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi2GetReal $arguments) };
     (fmi2SetReal $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi2SetReal $arguments) };
@@ -158,14 +160,14 @@ macro_rules! call {
     (fmi3SetFloat64 $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi3SetFloat64 $arguments) };
     (fmi3DoStep $arguments:tt) => { $crate::boundary::short::call!(@at_once fmi3DoStep $arguments) };
     (@at_once $function:ident ($c:ident $(, $argument:ident: $type:ty)*)) => {{
-        // By itself, so that the short way needs no room on the stack for it.
+        // A separate function, so that the fast path needs no stack space for it.
         #[cold]
         #[inline(never)]
         unsafe fn at_length<M: $crate::Exported>(
             $c: *mut fmi_abi::c_types::c_void
             $(, $argument: $type)*
         ) -> fmi_abi::Status {
-            // SAFETY: the caller's promise.
+            // SAFETY: the caller guarantees the contract.
             unsafe { $crate::boundary::short::call!(@body $function($c $(, $argument: $type)*)) }
         }
         let way = move |instance: *mut $crate::instance::Instance<M>| {

@@ -1,7 +1,7 @@
-//! Saved states behind pointers. A handle is only ever compared: what it points to is the business of the instance.
+//! Saved states behind pointers. A handle is only compared; the instance looks up the state.
 //!
 //! # Safety
-//! As in the contract of the [standards' modules](crate::fmi2).
+//! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
 use super::{array, output, place};
 use crate::export::Exported;
@@ -9,9 +9,9 @@ use crate::instance::{Instance, Outcome, refuse};
 use fmi_abi::c_types::c_void;
 use std::ptr::without_provenance_mut;
 
-/// The state is the instance's until the importer frees it, or the instance.
+/// The instance owns the state until the importer frees the state or the instance.
 pub unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
-    // SAFETY: by contract NULL or a pointer to a handle, which is initialized.
+    // SAFETY: by contract, NULL or a pointer to a handle, which is initialized.
     let handle = unsafe { place(state, "FMUstate")?.assume_init_mut() };
     check_memory(instance, *handle)?;
     *handle = without_provenance_mut(instance.save(handle.addr())?);
@@ -22,12 +22,12 @@ pub unsafe fn set_state<M: Exported>(instance: &mut Instance<M>, state: *mut c_v
     instance.restore(state.addr())
 }
 
-/// Takes the state back and clears the handle; NULL is ignored.
+/// Frees the state and clears the handle; ignores NULL.
 pub unsafe fn free_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
     if state.is_null() {
         return Ok(());
     }
-    // SAFETY: by contract a pointer to a handle, which is initialized.
+    // SAFETY: by contract, a pointer to a handle, which is initialized.
     let handle = unsafe { place(state, "FMUstate")?.assume_init_mut() };
     if !handle.is_null() {
         let state = instance.give(handle.addr())?;
@@ -42,7 +42,7 @@ pub unsafe fn serialized_size<M: Exported>(
     state: *mut c_void,
     size: *mut usize,
 ) -> Outcome {
-    // SAFETY: by contract NULL or a pointer to a size.
+    // SAFETY: by contract, NULL or a pointer to a size.
     let size = unsafe { place(size, "size")? };
     size.write(instance.serialized_size(state.addr())?);
     Ok(())
@@ -54,7 +54,7 @@ pub unsafe fn serialize<M: Exported, Byte>(
     bytes: *mut Byte,
     size: usize,
 ) -> Outcome {
-    // SAFETY: by contract an array of this length.
+    // SAFETY: by contract, an array of this length.
     let bytes = unsafe { output(bytes.cast::<u8>(), size, "serializedState")? };
     let needed = instance.serialized_size(state.addr())?;
     if size != needed {
@@ -70,15 +70,15 @@ pub unsafe fn serialize<M: Exported, Byte>(
     Ok(())
 }
 
-/// The state is the instance's until the importer frees it, or the instance; one that the handle held before is
-/// overwritten.
+/// The instance owns the state until the importer frees the state or the instance. An existing state of the
+/// handle is overwritten.
 pub unsafe fn deserialize<M: Exported, Byte>(
     instance: &mut Instance<M>,
     bytes: *const Byte,
     size: usize,
     state: *mut *mut c_void,
 ) -> Outcome {
-    // SAFETY: by contract an array of this length; NULL or a pointer to a handle, which is initialized.
+    // SAFETY: by contract, an array of this length, and NULL or a pointer to a handle, which is initialized.
     let (bytes, handle) = unsafe {
         (array(bytes.cast::<u8>(), size, "serializedState")?, place(state, "FMUstate")?.assume_init_mut())
     };
@@ -87,7 +87,7 @@ pub unsafe fn deserialize<M: Exported, Byte>(
     Ok(())
 }
 
-/// Refuses another state where an instance's memory is limited and has no place for it.
+/// Rejects a further state if the memory of the instance is limited and too small for it.
 fn check_memory<M: Exported>(instance: &mut Instance<M>, handle: *mut c_void) -> Outcome {
     #[cfg(target_family = "wasm")]
     if handle.is_null() && !super::webassembly::has_memory(2 * instance.size_of_state()) {

@@ -1,4 +1,4 @@
-//! Values of variables in arrays of the importer's (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI 3.0).
+//! Values of variables in arrays of the importer (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI 3.0).
 
 use super::{array, output, same, string};
 use crate::export::Exported;
@@ -10,8 +10,9 @@ use std::ffi::{CStr, CString};
 use std::fmt::Display;
 use std::mem::MaybeUninit;
 
-/// Getters and setters of a standard under their C names: who carries them out, and for which types of variables. In
-/// FMI 3.0 they are told the number of values as well.
+/// Defines getters and setters of an FMI version under their C names. Each entry lists the function that
+/// implements it and the base types of its variables. In FMI 3.0 the functions also take the number of
+/// values.
 macro_rules! getters_and_setters {
     (
         $reference:ty, $value_count:tt;
@@ -37,13 +38,13 @@ macro_rules! getters_and_setters {
         ) -> Outcome {
             let value_count = [$($value_count,)? count][0];
             if M::ARRAYS && <$reference as crate::instance::Reference>::ARRAYS {
-                // SAFETY: by contract arrays of these lengths that do not overlap.
+                // SAFETY: by contract, arrays of these lengths that do not overlap.
                 return unsafe { crate::boundary::of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
                     let values = crate::boundary::output(values, value_count, <$reference as crate::instance::Reference>::VALUES)?;
                     $get_values(instance, vr, values, &$bases)
                 }) };
             }
-            // SAFETY: by contract arrays of these lengths that do not overlap.
+            // SAFETY: by contract, arrays of these lengths that do not overlap.
             let (vr, values) = unsafe { to_write::<$reference, _>(vr, count, values, value_count) }?;
             $get_values(instance, vr, values, &$bases)
         }
@@ -57,7 +58,7 @@ macro_rules! getters_and_setters {
             $(, $value_count: usize)?
         ) -> Outcome {
             let value_count = [$($value_count,)? count][0];
-            // SAFETY: by contract arrays of these lengths, texts strings.
+            // SAFETY: by contract, arrays of these lengths; `char` pointers are strings.
             unsafe {
                 if M::ARRAYS && <$reference as crate::instance::Reference>::ARRAYS {
                     return crate::boundary::of_elements::<M, $reference>(instance, vr, count, value_count, |instance, vr| {
@@ -73,10 +74,10 @@ macro_rules! getters_and_setters {
 }
 pub(crate) use getters_and_setters;
 
-/// The importer's arrays for values that it reads.
+/// Returns the importer's arrays for a getter.
 ///
 /// # Safety
-/// Each is NULL or an array of its length; nobody else uses the values for `'a`.
+/// Each is NULL or an array of its length; no other code uses the values during `'a`.
 #[inline]
 pub(crate) unsafe fn to_write<'a, R: Reference, T>(
     vr: *const u32,
@@ -85,14 +86,14 @@ pub(crate) unsafe fn to_write<'a, R: Reference, T>(
     value_count: usize,
 ) -> Outcome<(&'a [R], &'a mut [MaybeUninit<T>])> {
     same("values", count, value_count)?;
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees the arrays and their lengths.
     Ok(unsafe { (array(R::cast(vr), count, R::REFERENCES)?, output(values, value_count, R::VALUES)?) })
 }
 
-/// The importer's arrays of values that it sets.
+/// Returns the importer's arrays for a setter.
 ///
 /// # Safety
-/// Each is NULL or an array of its length, which stays as it is for `'a`.
+/// Each is NULL or an array of its length, which does not change during `'a`.
 #[inline]
 pub(crate) unsafe fn to_read<'a, R: Reference, T>(
     vr: *const u32,
@@ -101,7 +102,7 @@ pub(crate) unsafe fn to_read<'a, R: Reference, T>(
     value_count: usize,
 ) -> Outcome<(&'a [R], &'a [T])> {
     same("values", count, value_count)?;
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees the arrays and their lengths.
     Ok(unsafe { (array(R::cast(vr), count, R::REFERENCES)?, array(values, value_count, R::VALUES)?) })
 }
 
@@ -147,7 +148,7 @@ pub(crate) fn set_float32<M: Exported, R: Reference>(
     instance.set(vr, bases, &|index| Value::Real(values[index].into()))
 }
 
-/// `Value` has them in a wider type, and no value is outside of the narrow one.
+/// Gets integers. `Value` stores them in a wider type, and no value is outside of the narrow type.
 pub(crate) fn get_integers<M: Exported, R: Reference, T: TryFrom<i128> + Default>(
     instance: &mut Instance<M>,
     vr: &[R],
@@ -181,7 +182,7 @@ pub(crate) fn get_booleans<M: Exported, R: Reference, T: From<bool>>(
     })
 }
 
-/// Truth values are numbers in C: callers may pass any.
+/// Sets Booleans. They are numbers in C, so callers may pass any number.
 pub(crate) fn set_booleans<M: Exported, R: Reference, T: From<bool> + PartialEq + Display>(
     instance: &mut Instance<M>,
     vr: &[R],
@@ -197,7 +198,7 @@ pub(crate) fn set_booleans<M: Exported, R: Reference, T: From<bool> + PartialEq 
     instance.set(vr, bases, &|index| Value::Boolean(values[index] == known[1]))
 }
 
-/// The texts are the instance's until the next call on it.
+/// Gets strings. The instance owns them until the next call on it.
 pub(crate) fn get_texts<M: Exported, R: Reference>(
     instance: &mut Instance<M>,
     vr: &[R],
@@ -207,7 +208,7 @@ pub(crate) fn get_texts<M: Exported, R: Reference>(
     let mut texts = Vec::with_capacity(vr.len());
     instance.get(vr, bases, &mut |_, value| {
         if let Value::String(text) = value {
-            // A zero byte would end the text for C.
+            // C would read a NUL as the end of the string.
             texts.push(CString::new(text.replace('\0', " ")).unwrap_or_default());
         }
     })?;
@@ -218,6 +219,8 @@ pub(crate) fn get_texts<M: Exported, R: Reference>(
     Ok(())
 }
 
+/// Sets strings.
+///
 /// # Safety
 /// Each value is NULL or a string.
 pub(crate) unsafe fn set_texts<M: Exported, R: Reference>(
@@ -228,7 +231,7 @@ pub(crate) unsafe fn set_texts<M: Exported, R: Reference>(
 ) -> Outcome {
     let mut texts = Vec::with_capacity(vr.len());
     for (place, value) in values.iter().enumerate() {
-        // SAFETY: by contract NULL or a string.
+        // SAFETY: by contract, NULL or a string.
         let fault = match unsafe { string(*value) }.map(CStr::to_str) {
             Some(Ok(text)) => {
                 texts.push(Value::String(text.to_owned()));

@@ -1,5 +1,6 @@
-//! What C around a WebAssembly module needs of it, where an FMU is made into C sources: nothing unwinds there, and the
-//! importer's memory and callbacks are out of reach. Each instance has a module, with its memory, for itself.
+//! Functions for the C code around a WebAssembly module, in an FMU with C sources. A panic does not unwind
+//! there, and the module cannot access the importer's memory and callbacks. Each instance has a separate
+//! module with its own memory.
 
 #![cfg(target_family = "wasm")]
 
@@ -19,7 +20,7 @@ thread_local! {
     static PANIC: Cell<Option<String>> = const { Cell::new(None) };
 }
 
-/// Keeps what panics say, for [`broken`] to tell.
+/// Stores the messages of panics for [`broken`].
 pub(super) fn keep_panics() {
     let keep = |panic: &PanicHookInfo| {
         PANIC.set(Some(panic_message(panic.payload()).to_owned()));
@@ -27,18 +28,18 @@ pub(super) fn keep_panics() {
     std::panic::set_hook(Box::new(keep));
 }
 
-/// Whether there are so many bytes of memory in one piece, and some more for what a call says.
+/// Returns whether `size` contiguous bytes of memory are available, and some more for messages.
 pub(super) fn has_memory(size: usize) -> bool {
     const SPARE: usize = 4096;
     let mut piece = Vec::<u8>::new();
     let is_there = piece.try_reserve_exact(size + SPARE).is_ok();
-    // What nobody uses need not be allocated.
+    // Without this, the compiler may remove the unused allocation.
     std::hint::black_box(piece);
     is_there
 }
 
-/// Makes room for the arguments of a call: `size` bytes in place of those it made before, or NULL if there is not so
-/// much memory.
+/// Allocates `size` bytes for the arguments of a call, in place of the previous ones. Returns NULL if there
+/// is not enough memory.
 pub fn room(size: usize) -> *mut c_void {
     ROOM.with_borrow_mut(|room| {
         *room = Vec::new();
@@ -50,16 +51,17 @@ pub fn room(size: usize) -> *mut c_void {
     })
 }
 
-/// The end of a call that trapped: by a panic, or for `reason`. Without an instance it was `fmi2Instantiate`.
+/// Ends a call that trapped because of a panic or for `reason`. Without an instance, the call was
+/// `fmi2Instantiate`.
 ///
 /// # Safety
-/// `c` is NULL or a living component of this model, the texts are strings.
+/// `c` is NULL or a live component of this model; the other arguments are strings.
 pub unsafe fn broken<M: Exported>(c: *mut c_void, function: *const c_char, reason: *const c_char) -> Status {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees strings.
     let [function, reason] =
         [function, reason].map(|text| unsafe { string(text) }.unwrap_or_default().to_string_lossy());
     let panic = PANIC.take().unwrap_or_else(|| reason.into_owned());
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees that `c` is NULL or a live component.
     match unsafe { c.cast::<Component<M>>().as_ref() } {
         Some(component) => {
             component.delivering.set(false);

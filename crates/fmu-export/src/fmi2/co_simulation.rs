@@ -1,7 +1,7 @@
 //! Co-Simulation (section 4.2).
 //!
 //! # Safety
-//! As in the [module above](super): each argument is what the standard says it is.
+//! The importer guarantees the contract of the [module above](super#safety).
 
 use super::types::*;
 use crate::boundary::{array, output_derivatives, place};
@@ -15,7 +15,7 @@ pub unsafe fn fmi2SetRealInputDerivatives<M: Exported>(
     order: *const fmi2Integer,
     value: *const fmi2Real,
 ) -> Outcome {
-    // SAFETY: by contract arrays of this length.
+    // SAFETY: by contract, arrays of this length.
     let (vr, order, value) =
         unsafe { (array(vr, count, "vr")?, array(order, count, "order")?, array(value, count, "value")?) };
     instance.set_input_derivatives(vr, order, value)
@@ -28,7 +28,7 @@ pub unsafe fn fmi2GetRealOutputDerivatives<M: Exported>(
     order: *const fmi2Integer,
     value: *mut fmi2Real,
 ) -> Outcome {
-    // SAFETY: by contract arrays of this length; the written one does not overlap the others.
+    // SAFETY: by contract, arrays of this length; the written one does not overlap the others.
     unsafe {
         output_derivatives::<M, fmi2ValueReference>(instance, vr, count, (order, "order"), value, count)
     }
@@ -44,12 +44,13 @@ pub unsafe fn fmi2DoStep<M: Exported>(
     instance.do_step(current_communication_point, communication_step_size)
 }
 
-/// Steps are synchronous, so there is never one to cancel: the table of allowed calls has no place for it.
+/// Steps are synchronous, so there is never a step to cancel. The table of allowed calls permits the function
+/// in no state.
 pub unsafe fn fmi2CancelStep<M: Exported>(_: &mut Instance<M>) -> Outcome {
     Ok(())
 }
 
-/// What can be asked for, or why it cannot.
+/// Returns the status kind of this number, or an error.
 fn status_kind(kind: fmi2StatusKind) -> Outcome<StatusKind> {
     StatusKind::from_c(kind).map_or_else(|| refuse(format!("there is no fmi2StatusKind {kind}")), Ok)
 }
@@ -71,7 +72,7 @@ pub unsafe fn fmi2GetRealStatus<M: Exported>(
 ) -> Outcome {
     match status_kind(kind)? {
         StatusKind::LastSuccessfulTime => {
-            // SAFETY: by contract NULL or a pointer to a value.
+            // SAFETY: by contract, NULL or a pointer to a value.
             unsafe { place(value, "value") }?.write(instance.last_successful_time());
             Ok(())
         }
@@ -86,7 +87,7 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
 ) -> Outcome {
     match status_kind(kind)? {
         StatusKind::Terminated => {
-            // SAFETY: by contract NULL or a pointer to a value.
+            // SAFETY: by contract, NULL or a pointer to a value.
             unsafe { place(value, "value") }?.write(instance.has_ended().into());
             Ok(())
         }
@@ -94,7 +95,7 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
     }
 }
 
-/// Answers `fmi2Discard`: it belongs to asynchronous steps.
+/// Returns `fmi2Discard`, because the function is for asynchronous steps.
 pub unsafe fn fmi2GetStatus<M: Exported>(
     _: &mut Instance<M>,
     kind: fmi2StatusKind,

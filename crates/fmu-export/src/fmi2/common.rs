@@ -1,7 +1,7 @@
-//! What both interface types have (section 2.1), and events (section 3.2.2).
+//! Functions of both interface types (section 2.1), and events (section 3.2.2).
 //!
 //! # Safety
-//! As in the [module above](super): each argument is what the standard says it is.
+//! The importer guarantees the contract of the [module above](super#safety).
 
 use super::types::*;
 use crate::boundary::life_cycle::experiment;
@@ -32,7 +32,7 @@ pub unsafe fn fmi2EnterInitializationMode<M: Exported>(instance: &mut Instance<M
     instance.enter_initialization_mode()
 }
 
-// An Enumeration goes through the functions of Integers (section 2.2.7).
+// Enumerations use the functions of Integers (section 2.2.7).
 getters_and_setters! { fmi2ValueReference, [];
     fmi2GetReal get_reals, fmi2SetReal set_reals, fmi2Real: [Real];
     fmi2GetInteger get_integers, fmi2SetInteger set_integers, fmi2Integer: [Integer, Enumeration];
@@ -49,7 +49,7 @@ pub unsafe fn fmi2GetDirectionalDerivative<M: Exported>(
     seed: *const fmi2Real,
     result: *mut fmi2Real,
 ) -> Outcome {
-    // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
+    // SAFETY: by contract, arrays of these lengths; the written one does not overlap the others.
     unsafe {
         partial_derivatives::<M, fmi2ValueReference, false>(
             instance,
@@ -66,7 +66,7 @@ pub unsafe fn fmi2NewDiscreteStates<M: Exported>(
     instance: &mut Instance<M>,
     info: *mut fmi2EventInfo,
 ) -> Outcome {
-    // SAFETY: by contract NULL or a pointer to an event information.
+    // SAFETY: by contract, NULL or a pointer to an event information.
     let info = unsafe { place(info, "fmi2eventInfo") }?;
     let event = instance.event()?;
     info.write(fmi2EventInfo {

@@ -1,4 +1,4 @@
-//! The functions that need no instance: versions, making and freeing (section 2.1.4 and 2.1.5).
+//! Functions without an instance argument: versions, creation and release (sections 2.1.4 and 2.1.5).
 
 use super::types::*;
 use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};
@@ -29,9 +29,10 @@ pub unsafe extern "C" fn fmi2Instantiate<M: Exported>(
     if functions.is_null() {
         return std::ptr::null_mut();
     }
-    // SAFETY: by contract the callbacks; copied, from any address, for they may go after this call.
+    // SAFETY: by contract, the callbacks. Copied because they may be invalid after this call; any alignment
+    // is accepted.
     let functions = unsafe { functions.read_unaligned() };
-    // SAFETY: by contract NULL or a string, each.
+    // SAFETY: by contract, each is NULL or a string.
     let (name, guid, resources) = unsafe { (string(instance_name), string(guid), string(resource_location)) };
     let interface = match fmu_type {
         0 => Ok(Interface::ModelExchange),
@@ -51,8 +52,8 @@ pub unsafe extern "C" fn fmi2Instantiate<M: Exported>(
     )
 }
 
-/// `fmi2FreeInstance`. Takes the instance back; NULL is ignored, and so is a call out of the log callback.
+/// `fmi2FreeInstance`. Ignores NULL and calls from the log callback.
 pub unsafe extern "C" fn fmi2FreeInstance<M: Exported>(c: fmi2Component) {
-    // SAFETY: the module's contract.
+    // SAFETY: the importer guarantees the contract of the module.
     unsafe { free::<M>(c) }
 }

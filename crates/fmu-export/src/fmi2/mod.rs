@@ -1,21 +1,23 @@
-//! FMI 2.0: what its C functions do. With [`fmi3`](crate::fmi3) and `boundary` the only place with pointers and `unsafe`.
+//! Implementation of the C functions of FMI 2.0. Only this module, [`fmi3`](crate::fmi3) and `boundary`
+//! contain pointers and `unsafe`.
 //!
-//! Each C function exists once, generic over the model and under its C name. Those that work on an instance are all
-//! called in the same way (`boundary`): find the instance, ask the table of allowed calls, run the function's body,
-//! turn a refusal or a panic into a status, deliver what is to be logged. No panic leaves this module.
+//! Each C function exists once, generic over the model and under its C name. `boundary` calls all functions
+//! on an instance in the same way. It finds the instance, checks the table of allowed calls and runs the
+//! function's body. It converts an error or a panic into a status and delivers the log messages. No panic
+//! leaves this module.
 //!
 //! # Safety
 //!
-//! All functions share one contract with the importer, the standard's:
-//! * a component is NULL or comes from `fmi2Instantiate` of this library, with the same model, and has not been freed;
-//!   it is not used by two threads at once (the log callback may try: it is refused);
-//! * the handle that `fmi2GetFMUstate`, `fmi2DeSerializeFMUstate` and `fmi2FreeFMUstate` are given a pointer to is
-//!   initialized: NULL before it is used first (section 2.1.8). What it points to does not matter: a handle that is none
-//!   of a state of this instance is refused, not followed;
-//! * a pointer with a length is NULL or points to that many values; a pointer to one value is NULL or points to one;
-//!   strings end with a zero byte; arrays that are written do not overlap others; they may hold anything before, memory
-//!   that was never written as well;
-//! * the callbacks work until the instance is freed.
+//! All functions share one contract with the importer, which is the contract of the FMI standard:
+//! * A component is NULL or comes from `fmi2Instantiate` of this library, with the same model, and has not
+//!   been freed. Two threads do not use it at once. (A call from the log callback is rejected.)
+//! * `fmi2GetFMUstate`, `fmi2DeSerializeFMUstate` and `fmi2FreeFMUstate` get a pointer to an initialized
+//!   handle, which is NULL before its first use (section 2.1.8). Any value of the handle is safe: a handle
+//!   that belongs to no state of this instance is rejected and not dereferenced.
+//! * A pointer with a length is NULL or points to that many values; a pointer to one value is NULL or points
+//!   to one. Strings are NUL-terminated. Arrays that are written do not overlap others; their previous
+//!   content may be uninitialized.
+//! * The callbacks work until the instance is freed.
 #![allow(non_snake_case)]
 #![allow(clippy::missing_safety_doc, reason = "the contract above is that of every function")]
 
@@ -33,7 +35,7 @@ use types::*;
 
 fmi_abi::fmi2_functions!(crate::symbols::c_functions);
 
-/// What the functions do, each under its C name.
+/// Bodies of the functions, each under its C name.
 mod bodies {
     pub(super) use super::co_simulation::*;
     pub(super) use super::common::*;

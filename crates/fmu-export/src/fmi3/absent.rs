@@ -1,5 +1,5 @@
-//! What no model has here, refused with the reason: clocks, structural parameters, Scheduled Execution, dependencies of
-//! the elements of arrays.
+//! Functions that return an error with the reason because no model of this crate supports them: clocks,
+//! structural parameters, Scheduled Execution, dependencies of array elements.
 
 use super::types::*;
 use crate::export::Exported;

@@ -1,7 +1,7 @@
 //! Co-Simulation (section 4.2).
 //!
 //! # Safety
-//! As in the [module above](super): each argument is what the standard says it is.
+//! The importer guarantees the contract of the [module above](super#safety).
 
 use super::{FromOne, types::*};
 use crate::boundary::{output_derivatives, place};
@@ -21,7 +21,7 @@ pub unsafe fn fmi3GetOutputDerivatives<M: Exported>(
     value: *mut fmi3Float64,
     value_count: usize,
 ) -> Outcome {
-    // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
+    // SAFETY: by contract, arrays of these lengths; the written one does not overlap the others.
     unsafe { output_derivatives::<M, FromOne>(instance, vr, count, (order, "orders"), value, value_count) }
 }
 
@@ -36,7 +36,7 @@ pub unsafe fn fmi3DoStep<M: Exported>(
     early_return: *mut fmi3Boolean,
     last_successful_time: *mut fmi3Float64,
 ) -> Outcome {
-    // SAFETY: by contract each NULL or a pointer to a value.
+    // SAFETY: by contract, each is NULL or points to a value.
     let (event_handling_needed, terminate_simulation, early_return, last_successful_time) = unsafe {
         (
             place(event_handling_needed, "eventHandlingNeeded")?,

@@ -1,7 +1,7 @@
-//! What both interface types have (sections 2.2 and 2.3), and the sizes that Model Exchange asks for (section 3.2).
+//! Functions of both interface types (sections 2.2 and 2.3), and the sizes for Model Exchange (section 3.2).
 //!
 //! # Safety
-//! As in the [module above](super): each argument is what the standard says it is.
+//! The importer guarantees the contract of the [module above](super#safety).
 
 use super::{FromOne, types::*};
 use crate::boundary::life_cycle::experiment;
@@ -29,7 +29,7 @@ pub unsafe fn fmi3EnterInitializationMode<M: Exported>(
     ))
 }
 
-// An Enumeration goes through the functions of Int64 (section 2.2.7.2).
+// Enumerations use the functions of Int64 (section 2.2.7.2).
 getters_and_setters! { FromOne, [value_count];
     fmi3GetFloat64 get_reals, fmi3SetFloat64 set_reals, fmi3Float64: [Real];
     fmi3GetFloat32 get_float32, fmi3SetFloat32 set_float32, fmi3Float32: [Float32];
@@ -45,7 +45,7 @@ getters_and_setters! { FromOne, [value_count];
     fmi3GetString get_texts, fmi3SetString set_texts, fmi3String: [String];
 }
 
-/// The bytes are the instance's until the next call on it.
+/// The instance owns the bytes until the next call on it.
 pub unsafe fn fmi3GetBinary<M: Exported>(
     instance: &mut Instance<M>,
     vr: *const fmi3ValueReference,
@@ -54,7 +54,7 @@ pub unsafe fn fmi3GetBinary<M: Exported>(
     values: *mut fmi3Binary,
     value_count: usize,
 ) -> Outcome {
-    // SAFETY: by contract arrays of these lengths that do not overlap.
+    // SAFETY: by contract, arrays of these lengths that do not overlap.
     unsafe {
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
             let values = output(values, value_count, "values")?;
@@ -83,7 +83,7 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
     values: *const fmi3Binary,
     value_count: usize,
 ) -> Outcome {
-    // SAFETY: by contract arrays of these lengths, each value NULL or an array of its size.
+    // SAFETY: by contract, arrays of these lengths; each value is NULL or an array of its size.
     unsafe {
         of_elements::<M, FromOne>(instance, vr, count, value_count, |instance, vr| {
             let values: &[fmi3Binary] = array(values, value_count, "values")?;
@@ -98,7 +98,7 @@ pub unsafe fn fmi3SetBinary<M: Exported>(
     }
 }
 
-/// Each with whether it is the adjoint one.
+/// Defines the functions for partial derivatives; the literal tells whether the derivative is adjoint.
 macro_rules! derivatives {
     ($($function:ident: $adjoint:literal;)+) => {
         $(
@@ -113,7 +113,7 @@ macro_rules! derivatives {
                 sensitivity: *mut fmi3Float64,
                 sensitivity_count: usize,
             ) -> Outcome {
-                // SAFETY: by contract arrays of these lengths; the written one does not overlap the others.
+                // SAFETY: by contract, arrays of these lengths; the written one does not overlap the others.
                 unsafe {
                     partial_derivatives::<M, FromOne, $adjoint>(
                         instance,
@@ -147,7 +147,7 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
     next_defined: *mut fmi3Boolean,
     next: *mut fmi3Float64,
 ) -> Outcome {
-    // SAFETY: by contract each NULL or a pointer to a value.
+    // SAFETY: by contract, each is NULL or points to a value.
     let (again, terminate, nominals_changed, states_changed, next_defined, next) = unsafe {
         (
             place(again, "discreteStatesNeedUpdate")?,
@@ -169,7 +169,7 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
 }
 
 pub unsafe fn fmi3GetNumberOfEventIndicators<M: Exported>(_: &mut Instance<M>, count: *mut usize) -> Outcome {
-    // SAFETY: by contract NULL or a pointer to a value.
+    // SAFETY: by contract, NULL or a pointer to a value.
     unsafe { place(count, "nEventIndicators") }?.write(Instance::<M>::INDICATORS);
     Ok(())
 }
@@ -178,7 +178,7 @@ pub unsafe fn fmi3GetNumberOfContinuousStates<M: Exported>(
     _: &mut Instance<M>,
     count: *mut usize,
 ) -> Outcome {
-    // SAFETY: by contract NULL or a pointer to a value.
+    // SAFETY: by contract, NULL or a pointer to a value.
     unsafe { place(count, "nContinuousStates") }?.write(M::STATES.len());
     Ok(())
 }

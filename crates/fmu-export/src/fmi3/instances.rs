@@ -1,4 +1,4 @@
-//! The functions that need no instance: version, making and freeing (sections 2.2.5 and 2.3.1).
+//! Functions without an instance argument: version, creation and release (sections 2.2.5 and 2.3.1).
 
 use super::types::*;
 use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};
@@ -29,7 +29,7 @@ pub unsafe extern "C" fn fmi3InstantiateModelExchange<M: Exported>(
         environment,
         log_message,
     };
-    // SAFETY: the module's contract.
+    // SAFETY: the importer guarantees the contract of the module.
     unsafe { make::<M>(&call, Ok(Interface::ModelExchange), importer) }
 }
 
@@ -67,11 +67,11 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation<M: Exported>(
         environment,
         log_message,
     };
-    // SAFETY: the module's contract.
+    // SAFETY: the importer guarantees the contract of the module.
     unsafe { make::<M>(&call, interface, importer) }
 }
 
-/// `fmi3InstantiateScheduledExecution`: refused.
+/// `fmi3InstantiateScheduledExecution`. Returns NULL, because Scheduled Execution is not supported.
 pub unsafe extern "C" fn fmi3InstantiateScheduledExecution<M: Exported>(
     instance_name: fmi3String,
     instantiation_token: fmi3String,
@@ -92,24 +92,26 @@ pub unsafe extern "C" fn fmi3InstantiateScheduledExecution<M: Exported>(
         environment,
         log_message,
     };
-    // SAFETY: the module's contract.
+    // SAFETY: the importer guarantees the contract of the module.
     unsafe { make::<M>(&call, refuse("this FMU has no Scheduled Execution"), importer) }
 }
 
-/// What the three have in common.
+/// The arguments that the three functions share.
 struct Call {
     function: &'static str,
-    /// Name, token, resources.
+    /// Instance name, instantiation token, resource path.
     texts: [fmi3String; 3],
     logging_on: fmi3Boolean,
     environment: fmi3InstanceEnvironment,
     log_message: Option<fmi3LogMessageCallback>,
 }
 
+/// Creates an instance.
+///
 /// # Safety
-/// The texts are NULL or strings; the callback works until the instance is freed.
+/// The strings are NULL or valid; the callback works until the instance is freed.
 unsafe fn make<M: Exported>(call: &Call, interface: Outcome<Interface>, importer: Importer) -> fmi3Instance {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees NULL or strings.
     let [name, guid, resources] = call.texts.map(|text| unsafe { string(text) });
     let log = || ImporterLog {
         callback: call.log_message.map(Callback::Fmi3),
@@ -120,8 +122,8 @@ unsafe fn make<M: Exported>(call: &Call, interface: Outcome<Interface>, importer
     instantiate::<M>(call.function, log, Arguments { name, guid, resources, logging_on, interface, importer })
 }
 
-/// `fmi3FreeInstance`. Takes the instance back; NULL is ignored, and so is a call out of the log callback.
+/// `fmi3FreeInstance`. Ignores NULL and calls from the log callback.
 pub unsafe extern "C" fn fmi3FreeInstance<M: Exported>(c: fmi3Instance) {
-    // SAFETY: the module's contract.
+    // SAFETY: the importer guarantees the contract of the module.
     unsafe { free::<M>(c) }
 }

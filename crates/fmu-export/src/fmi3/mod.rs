@@ -1,20 +1,23 @@
-//! FMI 3.0: what its C functions do, in the same form as [`fmi2`](crate::fmi2).
+//! Implementation of the C functions of FMI 3.0, with the structure of [`fmi2`](crate::fmi2).
 //!
-//! A model needs nothing for it: the variables are those of FMI 2.0, the instantiation token is the guid. Arrays are
-//! variables, where FMI 2.0 has one for each element. What FMI 3.0 has more is refused, with the reason: clocks,
-//! structural parameters, intermediate update and Scheduled Execution.
+//! A model needs nothing special for FMI 3.0. It has the variables of FMI 2.0, and the instantiation token is
+//! the guid. An array is one variable, whereas FMI 2.0 has one variable for each element. Clocks, structural
+//! parameters, intermediate update and Scheduled Execution are not supported; their functions return an error
+//! with the reason.
 //!
-//! Every model has a time, as the standard asks for: the independent variable of the table, or one behind all others
-//! ([`independent`]). Behind it there is a local variable for each event indicator ([`indicator`]).
+//! Every model has a time, as the FMI standard requires: the independent variable of the table, or an
+//! additional one after all variables ([`independent`]). After it there is a local variable for each event
+//! indicator ([`indicator`]).
 //!
-//! [Value references](reference()) count from 1 in the order of the variables, where an array counts as many times as it
-//! has elements: OMSimulator 3.0.0 takes those of
-//! dependencies for places in the list, which count from 1 in FMI 2.0, and both readings lead to the same variable.
+//! [Value references](reference()) count from 1 in the order of the variables, and an array takes as many as
+//! it has elements. OMSimulator 3.0.0 interprets value references of dependencies as indices of the list,
+//! which count from 1 in FMI 2.0. With this numbering, both interpretations select the same variable.
 //!
 //! # Safety
 //!
-//! The contract with the importer is that of [`fmi2`](crate::fmi2), with an instance in place of a component. Bytes of
-//! an `fmi3Binary` are NULL or as many as their size says. Truth values are bytes here: C callers may pass any.
+//! The contract with the importer is the contract of [`fmi2`](crate::fmi2), with an instance in place of a
+//! component. The bytes of an `fmi3Binary` are NULL or have the length that their size gives. Booleans are
+//! bytes here, so that C callers may pass any value.
 #![allow(non_snake_case)]
 #![allow(clippy::missing_safety_doc, reason = "the contract above is that of every function")]
 #![allow(clippy::too_many_arguments, reason = "as many as the standard has")]
@@ -36,7 +39,7 @@ use crate::variable::Variable;
 use fmi_abi::Standard;
 use types::*;
 
-/// The value reference of the variable at this place of the table, or behind it.
+/// Returns the value reference of the variable at this index of the table, or after the table.
 pub const fn reference(place: u32) -> fmi3ValueReference {
     Standard::Fmi3.reference(place)
 }
@@ -62,19 +65,19 @@ impl Reference for FromOne {
     }
 }
 
-/// The independent variable with its place: that in the table, or that of `time`, the first behind it.
+/// Returns the independent variable with its index: in the table, or of `time`, the first after the table.
 pub fn independent<M: Variables>() -> (u32, &'static Variable<M>) {
     crate::instance::independent::<M>()
 }
 
-/// The place of an event indicator, counted from 0: behind the table and the time.
+/// Returns the index of an event indicator, counted from 0: after the table and the time.
 pub fn indicator<M: Variables>(number: usize) -> u32 {
     crate::instance::first_indicator::<M>() + number as u32
 }
 
 fmi_abi::fmi3_functions!(crate::symbols::c_functions);
 
-/// What the functions do, each under its C name.
+/// Bodies of the functions, each under its C name.
 mod bodies {
     pub(super) use super::absent::*;
     pub(super) use super::co_simulation::*;

@@ -9,27 +9,27 @@ use fmi_abi::Mode;
 use fmi_abi::Standard;
 use fmi_abi::Status;
 
-/// Where a step has led in FMI 3.0.
+/// Result of a step in FMI 3.0.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reached {
-    /// The importer must handle an event.
+    /// Whether the importer must handle an event.
     pub event: bool,
     pub terminate: bool,
     pub early: bool,
     pub time: f64,
 }
 
-/// In one step, and rounds of one event: more than this is an endless loop.
+/// Limit of events per step, and of iterations per event; more count as an endless loop.
 const MOST_EVENTS: u32 = 10_000;
 
 impl<M: Exported> Instance<M> {
-    /// Whether steps may end early. If not, nothing is paid for it.
+    /// Whether steps may end early. A constant, so that models without early ends have no overhead.
     pub(super) const ENDS_EARLY: bool = match M::CO_SIMULATION {
         Some(offer) => offer.ends_early,
         None => false,
     };
 
-    /// A step of FMI 2.0 (section 4.2.2 there).
+    /// Performs a step of FMI 2.0 (section 4.2.2 there).
     #[inline]
     pub fn do_step(&mut self, point: f64, step_size: f64) -> Outcome {
         match self.step(point, step_size)? {
@@ -38,7 +38,7 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// A step of FMI 3.0 (section 4.2.1 there). One that is not OK has not begun.
+    /// Performs a step of FMI 3.0 (section 4.2.1 there). A step with another status than OK changes nothing.
     #[inline]
     pub fn do_step_to(&mut self, point: f64, step_size: f64) -> Outcome<Reached> {
         let stepped = self.step(point, step_size)?;
@@ -63,8 +63,9 @@ impl<M: Exported> Instance<M> {
         })
     }
 
-    /// To where the step began, whose answer is then an error, or `fmi3Discard` where a shorter one may help (section
-    /// 4.2.1 of FMI 3.0: in the same state as before, and nothing is to be said with earlyReturn).
+    /// Restores the state at the start of the step, which then returns an error, or `fmi3Discard` if a
+    /// shorter step may help. Section 4.2.1 of FMI 3.0 requires the state before the step and no early return
+    /// then.
     #[cold]
     fn go_back<T>(&mut self, why: Outcome<T>) -> Outcome<T> {
         self.listen();
@@ -75,8 +76,8 @@ impl<M: Exported> Instance<M> {
         why
     }
 
-    /// A step that begins where the last one ended and needs no further look. If it is none, it returns false and has
-    /// changed nothing.
+    /// Performs a step that begins where the last one ended and needs no further checks. Otherwise returns
+    /// false and changes nothing.
     #[inline(always)]
     pub fn step_at_once(&mut self, point: f64, step_size: f64) -> bool {
         let end = point + step_size;
@@ -91,7 +92,7 @@ impl<M: Exported> Instance<M> {
 
     pub(super) fn step(&mut self, point: f64, step_size: f64) -> Outcome<Stepped> {
         let end = point + step_size;
-        // False for what is no number, too.
+        // False for NaN as well.
         if !(point > f64::NEG_INFINITY && end > point && end < f64::INFINITY) {
             return refuse_step(point, step_size);
         }
@@ -113,7 +114,7 @@ impl<M: Exported> Instance<M> {
             });
         }
         if Self::ENDS_EARLY {
-            // The importer has not heard of it, or has not listened.
+            // The importer has not received the request to end the simulation, or ignores it.
             if self.state.ended {
                 self.state.time = point;
                 return Ok(Stepped::Terminate(point));
@@ -142,7 +143,8 @@ impl<M: Exported> Instance<M> {
         self.state.model.exported_step(Step { time, size, stop_at_events })
     }
 
-    /// The rest of a step that has not simply reached its end: over the events that the importer does not handle.
+    /// Completes a step that did not simply reach its end; handles the events that the importer does not
+    /// handle.
     #[cold]
     fn through_events(&mut self, mut stepped: Stepped, point: f64, end: f64) -> Outcome<Stepped> {
         self.state.time = point;
@@ -178,7 +180,8 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// A part of the step is done. In FMI 2.0, it ends early; in FMI 3.0, that is not for errors: nothing is done.
+    /// Ends a step that fails after a part of it is done. In FMI 2.0 the step ends early. FMI 3.0 does not
+    /// allow this for errors, so the step is undone.
     fn stuck(&mut self, time: f64, mut why: Refusal) -> Outcome<Stepped> {
         why.message = format!("the step cannot go on at {time}: {}", why.message);
         match self.standard() {
@@ -190,7 +193,7 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// The event iteration, for importers that leave it to the model in Co-Simulation.
+    /// Performs the event iteration in Co-Simulation, for importers that do not handle events.
     pub(super) fn handle_event(&mut self) -> Outcome {
         let time = self.state.time;
         let ended = self.try_on_copy(|model| {
@@ -229,7 +232,7 @@ impl<M: Exported> Instance<M> {
         self.state.time
     }
 
-    /// Whether the model wants the simulation to end.
+    /// Returns whether the model has requested the end of the simulation.
     pub fn has_ended(&self) -> bool {
         self.state.ended
     }
@@ -246,18 +249,18 @@ fn refuse_step<T>(point: f64, step_size: f64) -> Outcome<T> {
     ))
 }
 
-/// A question that only asynchronous steps answer, or that another function does.
+/// Discards a status query that concerns only asynchronous steps, or that another function answers.
 #[cold]
 pub(crate) fn no_status(message: &str) -> Outcome {
     discard(message)
 }
 
-/// How far the last step may end after the stop time, of the whole simulated time: masters that count in
-/// nanoseconds round a step of 1/60 s up, every time.
+/// Tolerance for the end of the last step after the stop time, relative to the simulated time. Importers that
+/// count in nanoseconds round a step of 1/60 s up, every time.
 const STOP_TIME_ROUNDING: f64 = 1e-7;
 
-/// How far a communication point may be off: masters count in nanoseconds, add up step sizes or
-/// multiply them, and lose the last digits each in their own way.
+/// Returns the tolerance for a communication point. Importers count in nanoseconds, add up step sizes or
+/// multiply them, with different rounding errors.
 #[inline]
 fn rounding(point: f64, step_size: f64) -> f64 {
     (0.01 * step_size).min(1e-9) + 8.0 * f64::EPSILON * point.abs()

@@ -11,8 +11,8 @@ use fmi_abi::{Mode, Standard};
 use std::mem::MaybeUninit;
 
 impl<M: Exported> Instance<M> {
-    /// Adds up the partial derivatives of unknowns with respect to knowns, times the seed, in `sums` of zeros: by rows
-    /// for a directional derivative, by columns for an adjoint one.
+    /// Computes the products of partial derivatives and seed, and adds them to `sums`, which are zero before.
+    /// A directional derivative sums over the knowns, an adjoint derivative over the unknowns.
     #[inline]
     pub fn derivatives<R: Reference, const ADJOINT: bool>(
         &mut self,
@@ -26,7 +26,7 @@ impl<M: Exported> Instance<M> {
         }
         self.calculated();
         let initial = self.mode() == Mode::Initialization;
-        // Finite only if all sums are, and these only if all seeds are.
+        // The total is finite only if all sums are finite; these are finite only if all seeds are.
         let mut total = 0.0;
         for (column, known) in knowns.iter().enumerate() {
             self.check_known(*known, initial)?;
@@ -58,7 +58,7 @@ impl<M: Exported> Instance<M> {
         self.refuse_numbers(seeded, seed, wanted, sums)
     }
 
-    /// Names the first seed or sum that is no finite number, if there is one.
+    /// Reports the first seed or sum that is not finite, if there is one.
     #[cold]
     #[inline(never)]
     fn refuse_numbers<R: Reference>(
@@ -99,8 +99,8 @@ impl<M: Exported> Instance<M> {
         ))
     }
 
-    /// What the instance calculates: outputs and derivatives of states, while initializing all InitialUnknowns (section
-    /// 2.1.9 of FMI 2.0).
+    /// Checks that a variable is an unknown: outputs and derivatives of states; in Initialization Mode all
+    /// InitialUnknowns (section 2.1.9 of FMI 2.0).
     #[inline]
     fn check_unknown<R: Reference>(&self, unknown: R, initial: bool) -> Outcome {
         let is_unknown = |of: &Variable<M>| {
@@ -125,9 +125,10 @@ impl<M: Exported> Instance<M> {
         refuse(format!("{} is no unknown: neither output nor state derivative", variable.name()))
     }
 
-    /// What the importer sets: inputs, states and parameters, while initializing all that is exact (section 2.2.8 of FMI
-    /// 2.0). Parameters may be set at any time, whether the description calls them tunable or not. FMI 2.0 has them among
-    /// the knowns in initialization mode alone; CasADi asks later.
+    /// Checks that a variable is a known: inputs, states and parameters; in Initialization Mode all exact
+    /// variables (section 2.2.8 of FMI 2.0). Parameters may be set at any time, whether or not the
+    /// description calls them tunable. In FMI 2.0 they are knowns only in Initialization Mode, but CasADi
+    /// uses them later.
     #[inline]
     fn check_known<R: Reference>(&self, known: R, initial: bool) -> Outcome {
         let is_known = |of: &Variable<M>| {
@@ -145,7 +146,7 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// The time of FMI 3.0 may be no variable of the table.
+    /// Rejects a variable that is no known. Accepts the time of FMI 3.0, which may be outside of the table.
     #[cold]
     #[inline(never)]
     fn refuse_known(&self, place: u32) -> Outcome {
@@ -199,7 +200,7 @@ impl<M: Exported> Instance<M> {
         for (vr, order) in vr.iter().zip(orders) {
             let variable = self.variable(vr.place(), BaseType::Real)?;
             check_order(variable, *order)?;
-            // Section 4.3.1 of FMI 2.0, 4.4.1 of FMI 3.0.
+            // Maximum order: section 4.3.1 of FMI 2.0, 4.4.1 of FMI 3.0.
             if order.unsigned_abs() > M::OUTPUT_DERIVATIVES {
                 return refuse(format!(
                     "the order of the derivative of {} must be at most {} (maxOutputDerivativeOrder), it is {order}",
@@ -223,7 +224,7 @@ impl<M: Exported> Instance<M> {
     }
 }
 
-/// What stands still has no derivatives; the time has one.
+/// Returns the time derivative of a variable: 0 for parameters, 1 or 0 for the time.
 fn derivative<M: Exported>(model: &M, place: usize, order: u32) -> f64 {
     match M::TABLE[place].causality() {
         Causality::Parameter | Causality::CalculatedParameter => 0.0,

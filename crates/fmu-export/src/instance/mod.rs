@@ -1,6 +1,6 @@
-//! One instance of a model: the checks and the effect of every call. No pointers here, and no version of FMI.
+//! An instance of a model: checks and effects of every call, without pointers and C types of an FMI version.
 //!
-//! Every method checks all its arguments before it changes anything; a refusal leaves the instance as it was.
+//! Every method checks all its arguments before it changes anything; an error leaves the instance unchanged.
 
 mod co_simulation;
 mod derivatives;
@@ -32,61 +32,62 @@ use fmi_abi::{Interface, Mode, Situation, Standard};
 /// An instance of model `M`.
 pub(crate) struct Instance<M> {
     pub logger: Logger,
-    /// The state of the standards' state machines, the standard and the interface type, as one bit; follows from
-    /// them.
+    /// State of the FMI state machine, FMI version and interface type, as one bit; derived from these.
     situation: Situation,
-    /// The same once the model has started, before that nowhere: then Reals are set in their places.
+    /// Equal to `situation` once the model has started, before that no situation. Then the fast path may set
+    /// Reals.
     started_in: Situation,
-    /// The latest end of a step that needs no further look; follows from the state, too.
+    /// Latest end of a step for the fast path; derived from the state.
     latest_end: f64,
     importer: Importer,
     setup: Setup,
     state: State<M>,
-    /// Why start values were refused, of the variables that have been set to no other since.
+    /// Messages of rejected start values, for the variables that have not been set to a valid value since.
     refused: Sorted<u32, String>,
-    /// The states that the importer has saved and not freed.
+    /// States that the importer has saved and not freed.
     kept: saved_states::Kept<M>,
-    /// Where the last step began, if one may fail half way: of FMI 3.0, unless each early end and event is the
-    /// importer's at once.
+    /// State at the start of the last step, if a step of FMI 3.0 may fail after a part of it is done. An importer
+    /// that handles events and accepts early returns does not need it.
     before: Option<Box<State<M>>>,
-    /// Texts that the importer reads until the next call.
+    /// Strings that the importer reads until the next call.
     pub texts: Vec<std::ffi::CString>,
     /// Bytes that the importer reads until the next call.
     pub bytes: Vec<Vec<u8>>,
-    /// Room for the places of variables that a call is about, of arrays each element; for models with arrays.
+    /// Reusable buffer for the indices of variables of a call, with each element of arrays; for models with
+    /// arrays.
     pub elements: Vec<u32>,
 }
 
-/// What an importer has said when it made an instance.
+/// Properties of the importer, fixed when the instance is made.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Importer {
     pub standard: Standard,
-    /// It handles events in Co-Simulation.
+    /// Whether the importer handles events in Co-Simulation.
     pub event_mode: bool,
-    /// It copes with steps that end early. Those of FMI 2.0 end with `fmi2Discard`.
+    /// Whether the importer accepts steps that end early. In FMI 2.0 they end with `fmi2Discard`.
     pub early_return: bool,
 }
 
 impl Importer {
-    /// One of FMI 2.0.
+    /// An importer of FMI 2.0.
     pub const FMI2: Self = Self { standard: Standard::Fmi2, event_mode: false, early_return: true };
 }
 
-/// How an importer calls a variable: by a number that stands for its place in the table, or behind it.
+/// A value reference: a number that denotes the index of a variable in the table, or after it.
 pub(crate) trait Reference: Copy {
-    /// Whether one may stand for a whole array.
+    /// Whether a reference may denote a whole array.
     const ARRAYS: bool;
-    /// What the standard calls an array of these, and one of values.
+    /// Name of the array of references in the FMI standard; `VALUES` is the name of the array of values.
     const REFERENCES: &str;
     const VALUES: &str;
 
     fn place(self) -> u32;
 
-    /// An importer's array, as one of these.
+    /// Casts an importer's array to an array of this type.
     fn cast(array: *const u32) -> *const Self;
 }
 
-/// Of FMI 2.0: the place itself.
+/// Value reference of FMI 2.0: the index itself.
 impl Reference for u32 {
     const ARRAYS: bool = false;
     const REFERENCES: &str = "vr";
@@ -103,14 +104,14 @@ impl Reference for u32 {
     }
 }
 
-/// What a saved state brings back.
+/// Content of a saved state.
 struct State<M> {
     mode: Mode,
-    /// Whether the model must calculate before anything is read.
+    /// Whether the model must calculate before a value is read.
     stale: bool,
     /// Whether the model has stepped or been in Continuous-Time Mode, as far as the instance knows.
     started: bool,
-    /// Whether the model wants the simulation to end.
+    /// Whether the model has requested the end of the simulation.
     ended: bool,
     time: f64,
     experiment: Experiment,
@@ -122,7 +123,7 @@ impl<M: Clone> Clone for State<M> {
         Self { model: self.model.clone(), ..*self }
     }
 
-    /// Passes on to the model, which may have a way to clone into what is there already.
+    /// Calls `clone_from` of the model, which may reuse its allocations.
     fn clone_from(&mut self, source: &Self) {
         let Self { mode, stale, started, ended, time, experiment, model } = source;
         (self.mode, self.stale, self.started) = (*mode, *stale, *started);
@@ -133,7 +134,7 @@ impl<M: Clone> Clone for State<M> {
 }
 
 impl<M: Exported> State<M> {
-    /// The state of a new instance and after a reset.
+    /// Creates the state of a new instance and after a reset.
     fn new(setup: &Setup) -> Result<Self, Error> {
         Ok(Self {
             mode: Mode::Instantiated,
@@ -147,7 +148,8 @@ impl<M: Exported> State<M> {
     }
 }
 
-/// Life cycle (sections 2.1.5 and 2.1.6 of FMI 2.0, 2.3 of FMI 3.0); the other rooms have a file each.
+/// Life cycle (sections 2.1.5 and 2.1.6 of FMI 2.0, 2.3 of FMI 3.0). The submodules contain the other
+/// functions.
 impl<M: Exported> Instance<M> {
     pub fn new(setup: Setup, importer: Importer, logging_on: bool) -> Outcome<Self> {
         match setup.interface {
@@ -213,7 +215,7 @@ impl<M: Exported> Instance<M> {
         };
     }
 
-    /// While messages are delivered nothing is allowed.
+    /// Forbids all calls while messages are delivered.
     #[cold]
     pub fn while_delivering(&mut self, is_delivering: bool) {
         self.enter(self.state.mode);
@@ -222,20 +224,20 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Replaces everything that a saved state holds.
+    /// Replaces everything that a saved state contains.
     fn replace(&mut self, state: State<M>) {
         self.state = state;
         self.refused.clear();
         self.enter(self.state.mode);
     }
 
-    /// After a panic: nothing but freeing is left.
+    /// Marks the instance as fatal after a panic: only freeing is allowed.
     #[cold]
     pub fn break_down(&mut self) {
         self.enter(Mode::Fatal);
     }
 
-    /// Takes over what the model has to say. Returns whether it said anything.
+    /// Takes the messages of the model. Returns whether there were any.
     #[inline]
     pub fn listen(&mut self) -> bool {
         self.logger.listen(&mut *self.state.model)
@@ -272,7 +274,7 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Both in one, as FMI 3.0 has it.
+    /// Sets up the experiment and enters Initialization Mode, as FMI 3.0 does in one call.
     pub fn enter_initialization_mode_at(&mut self, experiment: Experiment) -> Outcome {
         let before = (self.state.experiment, self.state.time);
         self.setup_experiment(experiment)?;
@@ -309,14 +311,14 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// What a model may refuse is tried on a copy first; nothing has changed if it does.
+    /// Applies a change that may fail to a copy first, so that an error changes nothing.
     #[cold]
     #[inline(never)]
     fn try_on_copy<T, E: Into<Box<Refusal>>>(
         &mut self,
         change: impl FnOnce(&mut M) -> Result<T, E>,
     ) -> Outcome<T> {
-        // A copy has nothing to say yet, and one that is dropped has been heard.
+        // Takes the messages now, because the copy has an empty log and may replace the model.
         self.listen();
         let mut draft = M::clone(&self.state.model);
         let changed = change(&mut draft);
@@ -327,7 +329,7 @@ impl<M: Exported> Instance<M> {
         Ok(changed)
     }
 
-    /// The model with all calculated that is read.
+    /// Returns the model after all calculations that reading needs.
     #[inline]
     fn calculated(&mut self) -> &M {
         self.calculated_in_place()
@@ -344,7 +346,7 @@ impl<M: Exported> Instance<M> {
 }
 
 impl<M: Exported> Instance<M> {
-    /// The variable at this place.
+    /// Returns the variable at this index.
     #[inline]
     fn find(&self, place: u32) -> Option<&'static Variable<M>> {
         match M::TABLE.get(place as usize) {
@@ -353,7 +355,7 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// The variable at this place, if it has the type.
+    /// Returns the variable at this index, if it has the type.
     #[inline]
     fn variable(&self, place: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
         match self.find(place) {
@@ -373,7 +375,7 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// How many values the variables have that an importer names, in FMI 3.0 arrays among them.
+    /// Returns the number of values of the variables; in FMI 3.0 a reference may denote an array.
     pub fn count_elements<R: Reference>(&self, vr: &[R]) -> Outcome<usize> {
         if !(M::ARRAYS && R::ARRAYS) {
             return Ok(vr.len());
@@ -394,7 +396,8 @@ impl<M: Exported> Instance<M> {
     }
 }
 
-/// The places of the elements of an array of FMI 3.0, whose first has this place; of a scalar its own.
+/// Returns the indices of the elements of an array of FMI 3.0 whose first element has this index; for a
+/// scalar, its index.
 pub(crate) fn elements_of<M: crate::Variables>(place: u32) -> impl Iterator<Item = u32> {
     let length = M::TABLE.get(place as usize).map_or(1, |of| of.length() as u32);
     (0..length).map(move |number| place.wrapping_add(number))
@@ -405,7 +408,7 @@ struct Implicit<M>(std::marker::PhantomData<M>);
 impl<M: 'static> Implicit<M> {
     const TIME: &'static Variable<M> = &Variable::independent(&TIME).finished("time", "Simulation time");
 
-    /// Any of them: who reads it has its value from the model.
+    /// Represents any event indicator; the values come from the model.
     const INDICATOR: &'static Variable<M> = &Variable::local(&NUMBER)
         .read_by(
             Read {
@@ -418,8 +421,8 @@ impl<M: 'static> Implicit<M> {
         .finished("eventIndicator", "An event happens where it changes its sign");
 }
 
-/// What FMI 3.0 asks for in every model, behind the table: the time (section 2.4.7.4), if the table has none; then the
-/// event indicators (section 2.4.8).
+/// Returns a variable that FMI 3.0 requires and that follows the table. These variables are the time (section
+/// 2.4.7.4), if the table has none, and the event indicators (section 2.4.8).
 #[cold]
 fn implicit<M: Exported>(place: u32) -> Option<&'static Variable<M>> {
     let (time, variable) = independent::<M>();
@@ -427,13 +430,13 @@ fn implicit<M: Exported>(place: u32) -> Option<&'static Variable<M>> {
     variable.or_else(|| indicator::<M>(place).map(|_| Implicit::INDICATOR))
 }
 
-/// Which of the event indicators is at this place.
+/// Returns the number of the event indicator at this index.
 fn indicator<M: Exported>(place: u32) -> Option<usize> {
     let number = place.checked_sub(first_indicator::<M>())? as usize;
     (number < Instance::<M>::INDICATORS).then_some(number)
 }
 
-/// The value of a variable behind the table.
+/// Returns the value of a variable after the table.
 #[cold]
 fn implicit_value<M: Exported>(model: &M, time: f64, place: u32) -> f64 {
     let Some(number) = indicator::<M>(place) else { return time };
@@ -442,7 +445,7 @@ fn implicit_value<M: Exported>(model: &M, time: f64, place: u32) -> f64 {
     indicators[number]
 }
 
-/// The place of the first event indicator: behind the table and behind the time.
+/// Returns the index of the first event indicator: after the table and the time.
 pub(crate) fn first_indicator<M: crate::Variables>() -> u32 {
     let (time, _) = independent::<M>();
     (M::TABLE.len() as u32).max(time + 1)
@@ -458,7 +461,7 @@ impl<M: crate::Variables> Implicit<M> {
     };
 }
 
-/// The independent variable as FMI 3.0 has it, with its place.
+/// Returns the independent variable of FMI 3.0 with its index.
 #[inline]
 pub(crate) fn independent<M: crate::Variables>() -> (u32, &'static Variable<M>) {
     Implicit::INDEPENDENT

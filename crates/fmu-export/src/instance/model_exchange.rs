@@ -16,13 +16,13 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// The number of event indicators.
+    /// Number of event indicators.
     pub const INDICATORS: usize = match M::MODEL_EXCHANGE {
         Some(offer) => offer.indicators,
         None => 0,
     };
 
-    /// One round of the event iteration.
+    /// Performs one iteration of the event handling.
     pub fn event(&mut self) -> Outcome<Event> {
         let time = self.state.time;
         let event = self.try_on_copy(|model| {

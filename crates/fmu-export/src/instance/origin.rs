@@ -1,11 +1,11 @@
-//! Where a serialized state comes from.
+//! Origin of a serialized state.
 
 use super::{Outcome, refuse};
 use fmi_abi::{Interface, Standard};
 use std::fmt;
 
-/// Where a serialized state comes from, and what it is tied to: what is allowed next is another question in each standard and
-/// interface type, and some modes are in one of them only.
+/// FMI version and interface type of a serialized state. The state is valid only for this origin: the rules
+/// for the next calls differ, and some modes exist only in one version or interface type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Origin(pub Standard, pub Interface);
 
@@ -17,7 +17,7 @@ impl Origin {
         Self(Standard::Fmi3, Interface::CoSimulation),
     ];
 
-    /// As serialized states have it.
+    /// Returns the byte that represents the origin in a serialized state.
     pub fn byte(self) -> u8 {
         2 * self.0 as u8 + self.1 as u8
     }
@@ -26,7 +26,7 @@ impl Origin {
         Self::ALL.into_iter().find(|origin| origin.byte() == byte)
     }
 
-    /// Why an instance does not take a state from elsewhere.
+    /// Rejects a state of another origin.
     pub fn check(self, own: Self) -> Outcome {
         if self == own {
             return Ok(());

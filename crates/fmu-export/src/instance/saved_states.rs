@@ -6,13 +6,14 @@ use super::{Instance, Outcome, State, refuse, serialized};
 use crate::export::Exported;
 use fmi_abi::{Interface, Mode};
 
-/// The states that an importer keeps. It knows them by their addresses, which are only ever looked up here: one that
-/// was freed, another instance's or no state at all is no address of these, and is never followed.
+/// States that an importer keeps. Addresses identify them, and each address is only looked up here, never
+/// dereferenced. So the address of a freed state, of another instance's state or of any other object is
+/// rejected safely.
 ///
-/// They are the instance's, whose end frees them (section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0).
+/// The instance owns the states and frees them at its end (section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0).
 pub(super) type Kept<M> = Sorted<usize, Box<State<M>>>;
 
-/// The handle of no state.
+/// The handle that denotes no state.
 const NULL: usize = 0;
 
 impl<M: Exported> Instance<M> {
@@ -20,14 +21,14 @@ impl<M: Exported> Instance<M> {
         Origin(self.standard(), self.interface())
     }
 
-    /// How many bytes a saved state takes now, with all that it points to.
+    /// Returns the current size of a saved state in bytes, including all data that it points to.
     #[cfg(target_family = "wasm")]
     pub fn size_of_state(&mut self) -> usize {
         size_of::<State<M>>() + serialized::size(&mut self.state)
     }
 
-    /// Saves into the state of this handle, without allocation if the model clones without, or into a new one; gives
-    /// its handle.
+    /// Saves into the state of this handle, or into a new one; returns the handle. An existing state is
+    /// reused without allocation if the model's `clone_from` does not allocate.
     pub fn save(&mut self, handle: usize) -> Outcome<usize> {
         if handle == NULL {
             return Ok(self.keep(self.state.clone()));
@@ -50,13 +51,13 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// Gives the state away, to be dropped.
+    /// Removes a state and returns it, so that the caller can drop it.
     pub fn give(&mut self, handle: usize) -> Outcome<impl Sized + use<M>> {
         find(&mut self.kept, handle)?;
         Ok(self.kept.remove(handle))
     }
 
-    /// Gives any of its states away, as long as there are some.
+    /// Removes any state and returns it; `None` if there are no more.
     pub fn give_any(&mut self) -> Option<impl Sized + use<M>> {
         self.before.take().or_else(|| self.kept.pop())
     }
@@ -65,13 +66,13 @@ impl<M: Exported> Instance<M> {
         Ok(serialized::size(find(&mut self.kept, handle)?))
     }
 
-    /// Fills `bytes`, which must have the length that [`serialized_size`](Self::serialized_size) tells.
+    /// Fills `bytes`, which must have the length from [`serialized_size`](Self::serialized_size).
     pub fn serialize(&mut self, handle: usize, bytes: &mut [u8]) -> Outcome {
         let origin = self.origin();
         serialized::write(find(&mut self.kept, handle)?, origin, bytes)
     }
 
-    /// Into the state of this handle or a new one, whose handle this gives.
+    /// De-serializes into the state of this handle, or into a new one; returns the handle.
     pub fn deserialize(&mut self, bytes: &[u8], handle: usize) -> Outcome<usize> {
         if handle != NULL {
             find(&mut self.kept, handle)?;
@@ -88,7 +89,7 @@ impl<M: Exported> Instance<M> {
         Ok(handle)
     }
 
-    /// In Co-Simulation not every instance has an event mode.
+    /// Rejects a state in Event Mode if this instance of Co-Simulation has no Event Mode.
     fn check_event_mode(&self, state: &State<M>) -> Outcome {
         if self.interface() == Interface::CoSimulation
             && state.mode == Mode::Event

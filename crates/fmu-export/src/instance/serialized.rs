@@ -10,7 +10,7 @@ use crate::settable::POSSIBLE;
 use fmi_abi::Mode;
 
 impl<M: Exported> State<M> {
-    /// Shows everything to the visitor but what follows from the rest.
+    /// Visits all fields except those that are derived from others.
     fn visit(&mut self, visitor: &mut dyn StateVisitor) {
         let mut mode = i64::from(self.mode as u32);
         visitor.integer(&mut mode);
@@ -27,20 +27,20 @@ impl<M: Exported> State<M> {
     }
 }
 
-/// Begins every serialized state; the last digit is the version of the layout.
+/// Start of every serialized state; the last digit is the version of the layout.
 const MAGIC: &[u8; 8] = b"fmustat2";
-/// The magic, a hash of the guid, the standard and the interface type.
+/// Length of the magic, a hash of the guid, and the FMI version and interface type.
 const HEADER_LENGTH: usize = 8 + 8 + 1;
 const CHECKSUM_LENGTH: usize = 8;
 
-/// The number of bytes of a serialized state, which stays as it is.
+/// Returns the number of bytes of a serialized state. `state` is not changed.
 pub(super) fn size<M: Exported>(state: &mut State<M>) -> usize {
     let mut counter = Counter(0);
     state.visit(&mut counter);
     HEADER_LENGTH + counter.0 + CHECKSUM_LENGTH
 }
 
-/// Fills `bytes`, which must have the length that [`size`] tells. What could not be read is not written.
+/// Fills `bytes`, which must have the length from [`size`]. Rejects a state that could not be read back.
 pub(super) fn write<M: Exported>(state: &mut State<M>, origin: Origin, bytes: &mut [u8]) -> Outcome {
     check(state)?;
     let (content, checksum) = bytes.split_at_mut(bytes.len() - CHECKSUM_LENGTH);
@@ -53,7 +53,7 @@ pub(super) fn write<M: Exported>(state: &mut State<M>, origin: Origin, bytes: &m
     Ok(())
 }
 
-/// Rebuilds a state from bytes that may come from anywhere, in place of any state of the model.
+/// Reads a state from untrusted bytes; overwrites `state`, which may be any state of the model.
 pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<M>) -> Outcome {
     let version = MAGIC.len() - 1;
     if bytes.len() < MAGIC.len() || bytes[..version] != MAGIC[..version] {
@@ -91,7 +91,7 @@ pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<
     Ok(())
 }
 
-/// Values that could be set are as if they had been, and the times are finite; the model's memory is its own affair.
+/// Checks that start values are valid and times are finite. The model must check its `memory` itself.
 fn check<M: Exported>(state: &State<M>) -> Outcome {
     let Experiment { start_time, stop_time, tolerance } = state.experiment;
     let times = [Some(state.time), Some(start_time), stop_time, tolerance];
@@ -110,7 +110,7 @@ fn guid_hash<M: Exported>() -> [u8; 8] {
     fnv1a(M::INFO.guid.as_bytes()).to_le_bytes()
 }
 
-/// FNV-1a: every step is a bijection of the running value, so no single changed byte goes unseen.
+/// FNV-1a. Every step is a bijection of the hash, so it detects any single changed byte.
 fn fnv1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
@@ -243,7 +243,7 @@ mod tests {
         bytes
     }
 
-    /// What the bytes are read as, if they are valid to the last one.
+    /// Returns the value in the bytes, if all bytes are valid.
     fn read<T: Saved + Default>(bytes: &[u8]) -> Option<T> {
         let mut value = T::default();
         let mut reader = Reader { rest: bytes, valid: true };
@@ -303,7 +303,8 @@ mod tests {
         }
     }
 
-    /// However many: what was saved can be read. Of elements that are not there none is made, whatever is claimed.
+    /// Checks that vectors of any length come back, and that a false length creates no elements without
+    /// bytes.
     #[test]
     fn long_vectors() {
         let value = vec![true; (1 << 20) + 1];

@@ -1,4 +1,4 @@
-//! A map for the few entries that an instance holds: a tenth of the code of a `BTreeMap`, in every library.
+//! A map for few entries. Its code is a tenth of a `BTreeMap`, which counts in every library.
 
 /// Entries in the order of their keys.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ impl<K: Ord + Copy, V> Sorted<K, V> {
         self.0.get_mut(index).map(|(_, value)| value)
     }
 
-    /// Replaces the value that the key had.
+    /// Inserts a value or replaces the value of the key.
     pub fn insert(&mut self, key: K, value: V) {
         match self.index(key) {
             Ok(index) => self.0[index].1 = value,

@@ -35,8 +35,8 @@ impl<M: Exported> Instance<M> {
         if is_finite(sum) { Ok(()) } else { self.get_reals_one_by_one(vr, values) }
     }
 
-    /// The same if nothing must be calculated, and all are simply read and finite. If not, it returns false and has
-    /// written nothing.
+    /// Gets Reals if no calculation is needed, all are fields of the model, and all are finite. Otherwise
+    /// returns false and writes nothing.
     #[inline(always)]
     pub fn get_reals_at_once<R: Reference, const N: usize>(
         &mut self,
@@ -58,7 +58,8 @@ impl<M: Exported> Instance<M> {
         true
     }
 
-    /// Elements of one array that follow each other at one go: what calculates an array is called once.
+    /// Gets contiguous elements of an array together, so that the function that calculates the array is
+    /// called once.
     pub(super) fn get_reals_of_arrays(
         &mut self,
         place: impl Fn(usize) -> u32,
@@ -83,8 +84,8 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// With the time and the event indicators of FMI 3.0, which are not in the table; the first value that is not finite
-    /// is named.
+    /// Gets Reals, including the time and the event indicators of FMI 3.0, which are not in the table. The
+    /// error names the first value that is not finite.
     #[cold]
     #[inline(never)]
     fn get_reals_one_by_one<R: Reference>(&mut self, vr: &[R], values: &mut [MaybeUninit<f64>]) -> Outcome {
@@ -123,14 +124,15 @@ impl<M: Exported> Instance<M> {
         Ok(())
     }
 
-    /// The same if all are simply set, and may be. If not, it returns false; then [`set_reals`](Self::set_reals) does all.
+    /// Sets Reals if all are plain fields of the model and may be set. Otherwise returns false; then
+    /// [`set_reals`](Self::set_reals) sets all.
     #[inline(always)]
     pub fn set_reals_at_once<R: Reference, const N: usize>(
         &mut self,
         vr: &[R; N],
         values: &[f64; N],
     ) -> bool {
-        // Copies the arrays: the compiler cannot assume that they do not overlap the model.
+        // Copies the arrays, because the compiler cannot assume that they do not overlap the model.
         let lines: [usize; N] = std::array::from_fn(|number| vr[number].place() as usize);
         let values: [f64; N] = std::array::from_fn(|number| values[number]);
         let is_taken = |line: &usize| {
@@ -153,7 +155,7 @@ impl<M: Exported> Instance<M> {
         self.set(vr, &[BaseType::Real], &|index| Value::Real(values[index]))
     }
 
-    /// Values of any other type: all are checked, then each is handed over with its place.
+    /// Gets values of any other type: checks all, then passes each to `each` with its index.
     #[inline(never)]
     pub fn get<R: Reference>(
         &mut self,
@@ -184,8 +186,8 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Sets values of any type, which `value` returns by index: all are checked, then all are set. One function for all
-    /// types keeps libraries small.
+    /// Sets values of any type, which `value` returns by index. Checks all, then sets all. One function for
+    /// all types keeps libraries small.
     #[inline(never)]
     pub fn set<R: Reference>(
         &mut self,
@@ -207,7 +209,8 @@ impl<M: Exported> Instance<M> {
         }
     }
 
-    /// Refuses to set variables because the value at one place is none of its type. `why` is given the variable's name.
+    /// Rejects setting variables because the value at one index is not valid for its type. `why` gets the
+    /// variable's name.
     #[cold]
     pub fn refuse_value<R: Reference>(
         &mut self,
@@ -226,9 +229,9 @@ impl<M: Exported> Instance<M> {
         vr.iter().try_for_each(|vr| self.check_settable(self.variable_of(vr.place(), bases)?))
     }
 
-    /// Some importers go on after a start value was refused, and the simulation would have another one than the user
-    /// wants: until it is set to one that is possible, the initialization is refused. So it is for those that were to
-    /// be set in the same call, which one of them may be to blame for.
+    /// Records rejected start values. Some importers continue after the error, and the simulation would then
+    /// use other start values than the user wants. So the initialization fails until the variables are set to
+    /// valid values. The record includes all variables of the call.
     fn remember<R: Reference>(&mut self, vr: &[R], blamed: Option<u32>, set: Outcome) -> Outcome {
         if self.situation().is_in(STARTING) {
             for vr in vr.iter().map(|vr| vr.place()) {
@@ -284,7 +287,7 @@ impl<M: Exported> Instance<M> {
         })
     }
 
-    /// The name of a variable that has the type.
+    /// Returns the name of a variable that has the type.
     pub fn name(&self, vr: impl Reference, base: BaseType) -> Outcome<&'static str> {
         Ok(self.variable(vr.place(), base)?.name())
     }
@@ -311,14 +314,15 @@ impl<M: Exported> Instance<M> {
     }
 }
 
-/// Whether a sum is finite: only if all its terms are. One question costs less than one for each.
+/// Returns whether a sum is finite, which requires that all its terms are. One check is faster than one for
+/// each term.
 #[inline(always)]
 pub(super) fn is_finite(sum: f64) -> bool {
     // Takes half as many instructions as `f64::is_finite`.
     !(sum * 0.0).is_nan()
 }
 
-/// Numbers must be finite, parameters in the range of their type, items those of their enumeration.
+/// Checks that numbers are finite, parameters in the range of their type, and items in their enumeration.
 pub(super) fn check_value<M>(variable: &Variable<M>, value: &Value) -> Outcome {
     let name = variable.name();
     let enforced = variable.causality() == Causality::Parameter;

@@ -1,5 +1,4 @@
-//! What a model calculates once for all that is read: again after every change, before it is read, and before an event
-//! works with it.
+//! Tests of `Model::calculate`: it runs again after every change, before a value is read and before an event.
 
 use crate::toys::{Lazy, lazy::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
@@ -11,7 +10,7 @@ const REAL: u32 = Name::real as u32;
 const TRUTH: u32 = Name::truth as u32;
 const STATE: u32 = Name::state as u32;
 
-/// The sum that is read is the sum of what is read.
+/// Returns the sum after checking that it equals the sum of the other values read.
 #[track_caller]
 fn sum(fmu: &Importer) -> f64 {
     let [sum, summands, time] = fmu.get([SUM, Name::summands as u32, Name::time as u32]);
@@ -19,7 +18,7 @@ fn sum(fmu: &Importer) -> f64 {
     sum
 }
 
-/// The call changes the sum, which was calculated before it.
+/// Checks that a call changes the sum, which was calculated before the call.
 #[track_caller]
 fn changes(fmu: &Importer, call: impl FnOnce(&Importer)) {
     let before = sum(fmu);
@@ -64,7 +63,7 @@ fn after_every_change_in_model_exchange() {
     changes(&fmu, |fmu| fmu.ok(fmu.fmi2CompletedIntegratorStep(1, &mut 0, &mut 0)));
 }
 
-/// Whichever function asks, and an event or a completed step that follows a change.
+/// Checks all functions that read calculated values, and an event or a completed step after a change.
 #[test]
 fn before_everything_that_needs_it() {
     let fmu = Importer::of::<Lazy>(ModelExchange);
@@ -103,8 +102,8 @@ fn before_everything_that_needs_it() {
     assert_eq!(fmu.rates([SUM]), [sum(&fmu)]);
 }
 
-/// A state that was saved between a change and the calculation, in memory of its own and in memory that is used again,
-/// and as bytes.
+/// Checks a state that was saved between a change and the calculation: in a new state, in a reused one, and
+/// serialized.
 #[test]
 fn after_a_state_is_restored() {
     let fmu = Importer::of::<Lazy>(CoSimulation);

@@ -1,5 +1,5 @@
-//! Which function may be called when: every function in every state of both state machines, against the tables of the
-//! standard, typed in here once more from the text of FMI 2.0.5.
+//! Allowed calls: every function in every state of both state machines, compared with the tables of the
+//! standard. The tables are copied here independently from the text of FMI 2.0.5.
 
 use crate::offers;
 use crate::settable;
@@ -13,8 +13,8 @@ use fmu_test_kit::checks::modes_of_model;
 use fmu_test_kit::{Either, FUNCTIONS, Importer, Random};
 use std::ptr::{null, null_mut};
 
-/// Section 3.2.3: start/end, instantiated, Initialization Mode, Event Mode, Continuous-Time Mode,
-/// terminated, error, fatal.
+/// Columns of the table in section 3.2.3: start/end, instantiated, Initialization Mode, Event Mode,
+/// Continuous-Time Mode, terminated, error, fatal.
 const MODEL_EXCHANGE: &str = "
     fmi2GetTypesPlatform              |x |x |x |x |x |x |x |
     fmi2GetVersion                    |x |x |x |x |x |x |x |
@@ -52,8 +52,8 @@ const MODEL_EXCHANGE: &str = "
     fmi2GetDerivatives                |  |  |x |x |x |x |7 |
     fmi2GetNominalsOfContinuousStates |  |x |x |x |x |x |7 |";
 
-/// Section 4.2.4: start/end, instantiated, Initialization Mode, stepComplete, stepInProgress,
-/// stepFailed, stepCanceled, terminated, error, fatal.
+/// Columns of the table in section 4.2.4: start/end, instantiated, Initialization Mode, stepComplete,
+/// stepInProgress, stepFailed, stepCanceled, terminated, error, fatal.
 const CO_SIMULATION: &str = "
     fmi2GetTypesPlatform         |x |x |x |x |x |x |x |x |x |
     fmi2GetVersion               |x |x |x |x |x |x |x |x |x |
@@ -90,9 +90,8 @@ const CO_SIMULATION: &str = "
     fmi2GetBooleanStatus         |  |  |  |x |x |x |  |x |  |
     fmi2GetStringStatus          |  |  |  |x |x |x |  |x |  |";
 
-/// The calls beyond the standard that real masters need: FMI Library terminates after an error,
-/// OpenModelica sets time and states in event mode. (What is tolerated for single variables is tested
-/// with them.)
+/// Calls beyond the standard that real importers need: FMI Library terminates after an error, OpenModelica
+/// sets time and states in Event Mode. Other tests cover tolerances for single variables.
 const TOLERATED: [(&str, Interface, Mode); 5] = [
     ("fmi2Terminate", CoSimulation, Error),
     ("fmi2Terminate", ModelExchange, Error),
@@ -101,7 +100,7 @@ const TOLERATED: [(&str, Interface, Mode); 5] = [
     ("fmi2SetContinuousStates", ModelExchange, Event),
 ];
 
-/// Whether the standard allows the call in one of our modes.
+/// Returns whether the standard allows the call in one of our modes.
 fn standard(function: &str, interface: Interface, mode: Mode) -> bool {
     let (table, column) = match (interface, mode) {
         (ModelExchange, mode) => {
@@ -120,12 +119,12 @@ fn standard(function: &str, interface: Interface, mode: Mode) -> bool {
     let row = table
         .lines()
         .find_map(|line| line.trim().strip_prefix(function).filter(|rest| rest.starts_with([' ', '|'])));
-    // A function that the table lacks belongs to the other interface type.
+    // A function that is not in the table belongs to the other interface type.
     let Some(row) = row else { return false };
-    // The name is followed by an empty cell before the first bar and by the column "start, end".
+    // An empty cell and the column "start, end" precede the cell.
     match row.split('|').nth(column + 2).unwrap_or("").trim() {
         "" => false,
-        // Footnote 8 of Model Exchange: only for an FMU without continuous time, which this is not.
+        // Footnote 8 of Model Exchange concerns only an FMU without continuous time.
         "8" if interface == ModelExchange => false,
         _ => true,
     }
@@ -135,13 +134,13 @@ fn accepted(function: &str, interface: Interface, mode: Mode) -> bool {
     standard(function, interface, mode) || TOLERATED.contains(&(function, interface, mode))
 }
 
-/// The first variable that is wanted.
+/// Returns the index of the first variable that satisfies `wanted`.
 fn first<M: Exported>(wanted: impl Fn(&Variable<M>) -> bool) -> Option<u32> {
     M::TABLE.iter().position(wanted).map(|place| place as u32)
 }
 
-/// One harmless call of the function, with arguments that are right in this mode: where the model has no variable for it
-/// with an empty array.
+/// Makes one harmless call of the function, with arguments that are valid in this mode. If the model has no
+/// variable for it, passes an empty array.
 fn call<M: Exported>(fmu: &Importer, function: &str, interface: Interface, mode: Mode) -> Status {
     let (mut real, mut integer, mut text) = (0.0, 0, null());
     let (mut flags, mut array) = ([0; 2], [0.5; 8]);
@@ -231,7 +230,7 @@ fn call<M: Exported>(fmu: &Importer, function: &str, interface: Interface, mode:
     }
 }
 
-/// The functions of saved states, with a state of the instance's own.
+/// Calls a function of saved states with a state of this instance.
 fn call_state_function(fmu: &Importer, function: &str) -> Status {
     let (mut state, mut second, mut size) = (fmu.save(), null_mut(), 0);
     let mut bytes = fmu.bytes();
@@ -252,7 +251,8 @@ fn call_state_function(fmu: &Importer, function: &str) -> Status {
     status
 }
 
-/// The attribute of the description that tells importers not to call a function, where the model lacks the capability.
+/// Returns the attribute by which the description tells importers not to call a function, if the model lacks
+/// the capability.
 fn lacking<M: Exported>(function: &str) -> Option<&'static str> {
     match function {
         "fmi2GetDirectionalDerivative" if !M::PARTIALS => Some("providesDirectionalDerivative"),
@@ -288,22 +288,22 @@ fn check_every_function<M: Exported>() {
                 continue;
             }
             let expected = match *function {
-                // Steps are synchronous: these have nothing to tell.
+                // Steps are synchronous, so these functions have no result.
                 "fmi2GetStatus" | "fmi2GetIntegerStatus" | "fmi2GetStringStatus" => Status::Discard,
                 _ => Status::Ok,
             };
             assert_eq!(call(&fmu), expected, "{label}: {:?}", fmu.take_log());
         }
     }
-    // Counted by hand in the two tables, without the four functions that need no state and without stepInProgress and
-    // stepCanceled, plus what is tolerated.
+    // Counted by hand in the two tables, plus the tolerated calls. Without the four functions that need no
+    // instance, stepInProgress and stepCanceled.
     let cells = [(CoSimulation, CELLS_OF_CO_SIMULATION), (ModelExchange, CELLS_OF_MODEL_EXCHANGE)];
     let offered = cells.into_iter().filter(|(interface, _)| offers::<M>(*interface));
     let tolerated = TOLERATED.iter().filter(|(_, interface, _)| offers::<M>(*interface)).count();
     assert_eq!(allowed_calls, offered.map(|(_, cells)| cells).sum::<usize>() + tolerated);
 }
 
-/// What an accepted call makes of the mode.
+/// Returns the mode after an accepted call.
 fn next(function: &str, interface: Interface, mode: Mode) -> Mode {
     match (function, interface) {
         ("fmi2EnterInitializationMode", _) => Initialization,
@@ -317,7 +317,7 @@ fn next(function: &str, interface: Interface, mode: Mode) -> Mode {
     }
 }
 
-/// Calls in any order: always the same rules, and no call is ever fatal.
+/// Makes random calls: the rules always hold, and no call is ever fatal.
 #[test]
 fn random_walks() {
     walk::<Oscillator>(CoSimulation);
@@ -334,7 +334,7 @@ fn walk<M: Exported>(interface: Interface) {
     let mut visits = std::collections::BTreeMap::new();
     for _ in 0..20_000 {
         let function = FUNCTIONS[random.bits() as usize % FUNCTIONS.len()];
-        // Resets are rare, or nothing else would happen.
+        // Resets are rare, because most other calls need an initialized instance.
         if matches!(function, "fmi2Reset" | "fmi2Terminate") && random.bits() % 8 > 0 {
             continue;
         }
@@ -369,8 +369,8 @@ fn versions_need_no_instance() {
     assert_eq!(Importer::null::<Sum>().version_and_platform(), [c"2.0", c"default"]);
 }
 
-/// The table in the code says the same, also about states that cannot be reached here, and tells standard and tolerance
-/// apart.
+/// Checks that the table in the code agrees, also about states that cannot be reached here, and that it
+/// distinguishes the standard from tolerated calls.
 #[test]
 fn table_in_the_code() {
     assert_eq!(ALLOWED.len(), FUNCTIONS.len());

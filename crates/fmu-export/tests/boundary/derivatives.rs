@@ -1,4 +1,4 @@
-//! Derivatives that the FMU offers: with respect to variables (section 2.1.9) and to time (4.2.1).
+//! Derivatives with respect to variables (section 2.1.9) and to time (4.2.1).
 
 use crate::toys::{Oscillator, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
@@ -21,7 +21,7 @@ fn name(vr: u32) -> &'static str {
     Oscillator::TABLE[vr as usize].name()
 }
 
-/// The central difference of all unknowns, quadratic functions of what is varied here.
+/// Returns the central differences of all unknowns, which are quadratic functions of the knowns.
 fn differences(fmu: &Importer, known: u32) -> [f64; 5] {
     let [start] = fmu.get([known]);
     let width = 1e-5 * start.abs().max(1.0);
@@ -33,7 +33,8 @@ fn differences(fmu: &Importer, known: u32) -> [f64; 5] {
     std::array::from_fn(|i| (above[i] - below[i]) / (2.0 * width))
 }
 
-/// Pair by pair, in every mode that has directional derivatives; parameters are knowns while initializing.
+/// Checks single pairs in every mode that has directional derivatives; parameters are knowns in
+/// Initialization Mode.
 #[test]
 fn pair_by_pair() {
     for (interface, mode) in [
@@ -69,8 +70,8 @@ fn pair_by_pair() {
     }
 }
 
-/// A state that is calculated is an unknown while initializing, and what follows from it goes by the chain rule; later it
-/// is a known.
+/// Checks that a calculated state is an unknown in Initialization Mode, where the chain rule applies to
+/// variables that depend on it. Later it is a known.
 #[test]
 fn calculated_states() {
     use crate::toys::balance::{Balance, Name::*};

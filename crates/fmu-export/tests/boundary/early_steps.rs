@@ -7,11 +7,11 @@ use fmu_export::fmi2::types::*;
 use fmu_test_kit::{Either, Importer, fmi3};
 
 const TEMPERATURE: u32 = Name::temperature as u32;
-/// `fmi2LastSuccessfulTime` and `fmi2Terminated`.
+/// Numbers of `fmi2LastSuccessfulTime` and `fmi2Terminated`.
 const TIME: i32 = 2;
 const TERMINATED: i32 = 3;
 
-/// How far it got, and whether it wants the simulation to end.
+/// Returns the time reached, and whether the model requests the end of the simulation.
 fn progress(fmu: &Importer) -> (f64, bool) {
     let (mut time, mut terminated) = (f64::NAN, -1);
     fmu.ok(fmu.fmi2GetRealStatus(TIME, &mut time));
@@ -26,7 +26,7 @@ fn discarded(fmu: &Importer, point: f64, step_size: f64) -> String {
     log[0].text.clone()
 }
 
-/// Warms up by 10 degrees in a second, from 20: hot after 8 s, melted after 18 s.
+/// Returns a fuse that warms by 10 degrees per second from 20: hot after 8 s, melted after 18 s.
 fn running() -> Importer {
     let fmu = Importer::of::<Fuse>(CoSimulation);
     fmu.ok(fmu.set_debug_logging(true, &[c"logStatusDiscard"]));
@@ -35,7 +35,7 @@ fn running() -> Importer {
     fmu
 }
 
-/// A master finds out when, goes back, and makes a step to just there.
+/// An importer reads the time reached, restores the state, and performs a shorter step to this time.
 #[test]
 fn an_early_end_and_a_shorter_step() {
     let fmu = running();
@@ -54,7 +54,7 @@ fn an_early_end_and_a_shorter_step() {
     assert_eq!(fmu.get([TEMPERATURE]), [110.0]);
 }
 
-/// Or it ends the simulation there; or begins again.
+/// The importer ends the simulation there, or resets the instance.
 #[test]
 fn what_else_a_master_can_do() {
     let fmu = running();
@@ -78,13 +78,13 @@ fn the_model_ends_the_simulation() {
     let bytes = fmu.bytes();
     fmu.ok(fmu.fmi2Terminate());
     assert_eq!(progress(&fmu), (18.0, true));
-    // That it has ended belongs to the state.
+    // The state includes the end of the simulation.
     let other = Importer::of::<Fuse>(CoSimulation);
     other.restore(&bytes);
     assert_eq!(progress(&other), (18.0, true));
 }
 
-/// Without debug logging nothing is said of it: section 2.1.3 has fmi2Discard shown on demand.
+/// Checks that nothing is logged without debug logging: in section 2.1.3, fmi2Discard is logged on demand.
 #[test]
 fn silence() {
     let fmu = Importer::of::<Fuse>(CoSimulation);
@@ -105,7 +105,7 @@ fn rounds(fmu: &Importer) -> i32 {
     rounds
 }
 
-/// Nothing is left of its first round, and the step has come as far as there.
+/// Checks that the first iteration is undone and the step ends at the event.
 #[test]
 fn an_event_that_fails_in_its_second_round() {
     let fmu = grumbler(Trouble::SecondRound);
@@ -121,7 +121,7 @@ fn an_event_that_fails_in_its_second_round() {
     assert_eq!((progress(&fmu), rounds(&fmu)), ((1.0, false), 2));
 }
 
-/// Section 4.2.3: the importer of FMI 2.0 hears of it with the first step.
+/// Section 4.2.3: an importer of FMI 2.0 is informed by the first step.
 #[test]
 fn the_initial_event_ends_the_simulation() {
     let fmu = grumbler(Trouble::End);
@@ -132,7 +132,7 @@ fn the_initial_event_ends_the_simulation() {
     fmu.ok(fmu.fmi2Terminate());
 }
 
-/// More events than a step may have, and an event without end.
+/// Checks more events than a step may have, and an endless event.
 #[test]
 fn endless_events() {
     let fmu = Importer::of::<Ticker>(CoSimulation);
@@ -153,7 +153,7 @@ fn endless_events() {
     );
 }
 
-/// Ends every step early, or at an event if its input is 1, and does not declare it.
+/// A model that ends every step early, or at an event if its input is 1, and declares neither.
 mod hasty {
     use fmu_export::*;
 
@@ -184,7 +184,7 @@ mod hasty {
     offer!(Hasty: CoSimulation);
 }
 
-/// What the description says of the FMU holds, or its author hears of it.
+/// Checks that the FMU does not contradict its description: the step is fatal.
 #[test]
 fn an_early_end_that_the_model_has_not_announced() {
     let (old, new) =

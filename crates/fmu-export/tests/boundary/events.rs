@@ -1,5 +1,5 @@
-//! Model Exchange with events, called as a master with an integrator does it (section 3.2.2, and the pseudocode of
-//! section 3.2.4).
+//! Model Exchange with events, called like an importer with an integrator (section 3.2.2, and the pseudocode
+//! in section 3.2.4).
 
 use crate::toys::{Ball, Counter, Oscillator, ball, counter};
 use fmu_export::Exported;
@@ -8,15 +8,15 @@ use fmu_export::Mode::*;
 use fmu_export::fmi2::types::*;
 use fmu_test_kit::{Either, Importer, Updated};
 
-/// A master of this size: Euler steps, halved as often as it takes to find a state event.
+/// A minimal importer: Euler steps, halved until they locate a state event.
 struct Master {
     fmu: Importer,
     states: usize,
     indicators: usize,
     time: f64,
-    /// What the last events have said, together.
+    /// Combined results of the last event iterations.
     said: Updated,
-    /// When there were events, and which.
+    /// Times and kinds of the events.
     events: Vec<(f64, &'static str)>,
 }
 
@@ -49,14 +49,14 @@ impl Master {
         self.fmu.ok(self.fmu.fmi2SetContinuousStates(x.as_ptr(), x.len()));
     }
 
-    /// To this time or, if that comes first, to the next event; returns false when the model ends the simulation.
+    /// Integrates to this time or to an earlier event. Returns false when the model ends the simulation.
     fn step(&mut self, h: f64) -> bool {
         let (start, x) = (self.time, self.states());
         let rates = self.vector(self.states, |rates, count| self.fmu.fmi2GetDerivatives(rates, count));
         let before = self.indicators();
         let time_event = self.said.next.filter(|next| *next <= start + h);
         let end = time_event.unwrap_or(start + h);
-        // Exact for the ball's velocity; its height gets the middle of both velocities.
+        // Exact for the ball's velocity; the height uses the mean of both velocities.
         let at = |time: f64| -> Vec<f64> {
             let h = time - start;
             let bend = if self.states == 2 { 0.5 * h * h * rates[1] } else { 0.0 };
@@ -93,7 +93,7 @@ impl Master {
         }
         self.fmu.ok(self.fmu.fmi2EnterEventMode());
         self.said = self.fmu.enter_continuous_time();
-        // A ball that rises through the floor is no bounce: the sign changes, and nothing happens.
+        // A ball that rises through the floor changes the sign of the indicator without a bounce.
         let happened = time_event || self.said.states_changed;
         if happened {
             self.events.push((reached, if time_event { "time" } else { "state" }));
@@ -102,8 +102,8 @@ impl Master {
     }
 }
 
-/// The ball bounces when it should: at the times of free fall, each flight shorter by the restitution, until it has
-/// bounced enough and ends the simulation.
+/// Checks the times of the bounces: those of free fall, each flight shorter by the restitution. After enough
+/// bounces the ball ends the simulation.
 #[test]
 fn state_events() {
     let mut master = Master::new::<Ball>(|_| ());
@@ -130,11 +130,11 @@ fn state_events() {
     let mut bounces = 0;
     master.fmu.ok(master.fmu.fmi2GetInteger(&(ball::Name::bounces as u32), 1, &mut bounces));
     assert_eq!(bounces, 5);
-    // The apex of a flight is what is left of the height: restitution^2 per bounce.
+    // The height of each flight is the previous height times restitution^2.
     assert!((nominals[0] - 0.49_f64.powi(4)).abs() < 1e-6, "{nominals:?}");
 }
 
-/// After each step of the integrator the model is asked; it notices an event that was missed, and a ball that is lost.
+/// The model is informed after each step of the integrator. It detects a missed event, and a lost ball.
 #[test]
 fn completed_steps() {
     let fmu = Importer::in_mode::<Ball>(ModelExchange, ContinuousTime);
@@ -149,7 +149,7 @@ fn completed_steps() {
             assert_eq!(found, expected, "{x:?}");
         }
     }
-    // A model that does not want to know is not asked.
+    // A model without STEP_COMPLETED is not informed.
     let fmu = Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime);
     let mut found = [-1; 2];
     let [event, terminate] = &mut found;
@@ -170,7 +170,7 @@ fn prepare_counter(fmu: &Importer) {
     fmu.set(&[counter::Name::period as u32, counter::Name::weight as u32], &[0.25, 0.5]);
 }
 
-/// Time events come when the model has asked for them, whatever the steps of the integrator are.
+/// Checks that time events happen at the requested times for any integrator steps.
 #[test]
 fn time_events() {
     use counter::Name::*;
@@ -181,7 +181,7 @@ fn time_events() {
             assert!(master.step(h));
         }
         assert_eq!(master.events, [0.25, 0.5, 0.75, 1.0].map(|time| (time, "time")), "steps of {h}");
-        // 4 times 7: carried twice.
+        // 4 times 7, with two carries.
         assert_eq!(integers(&master.fmu, [count, carries]), [8, 2]);
         assert_eq!(master.fmu.get([sum as u32]), [14.0]);
         let mut is_odd = -1;
@@ -190,7 +190,8 @@ fn time_events() {
     }
 }
 
-/// An event that causes another at the same time takes a round more, and the count is seen full in between.
+/// Checks that an event that causes another at the same time needs one more iteration, and that the full
+/// count is visible in between.
 #[test]
 fn event_iteration() {
     let fmu = Importer::of::<Counter>(ModelExchange);
@@ -201,7 +202,7 @@ fn event_iteration() {
         (again.into(), next.unwrap(), integers(&fmu, [counter::Name::count])[0])
     };
     assert_eq!(round(), (0, 0.25, 0), "nothing is due at the begin");
-    // Two periods later, both counts are due, the second one fills the count.
+    // After two periods, both counts are due, and the second one fills the count.
     fmu.ok(fmu.fmi2EnterContinuousTimeMode());
     fmu.ok(fmu.fmi2SetTime(0.5));
     fmu.ok(fmu.fmi2EnterEventMode());
@@ -211,7 +212,8 @@ fn event_iteration() {
     assert_eq!(round(), (0, 0.75, 4), "an importer may ask once more");
 }
 
-/// A step that fails has counted nothing: the model tries on a copy, and an event that fails is undone by the crate.
+/// Checks that a failed step or event changes nothing: the model steps on a copy, and the crate undoes a
+/// failed event.
 #[test]
 fn failing_events_and_steps_change_nothing() {
     use fmu_export::Interface::CoSimulation;
@@ -230,7 +232,7 @@ fn failing_events_and_steps_change_nothing() {
     }
 }
 
-/// The same counts at the communication points of Co-Simulation, however long the steps are.
+/// Checks that Co-Simulation gives equal counts at the communication points for any step size.
 #[test]
 fn the_same_in_co_simulation() {
     use counter::Name::*;

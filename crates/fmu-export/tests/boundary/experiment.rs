@@ -1,4 +1,5 @@
-//! What the importer says of itself and of its experiment, and what the model makes of it (sections 2.1.5 and 2.1.6).
+//! Data that the importer passes about itself and its experiment (sections 2.1.5 and 2.1.6), and their effect
+//! on the model.
 
 use crate::toys::{Talker, talker::Name};
 use crate::variables::texts;
@@ -28,7 +29,7 @@ fn the_instance_name() {
     assert_eq!(texts(&one, [Name::who]), ["Gödel"], "after a reset too");
 }
 
-/// Start time, stop time and tolerance; -1 stands for what is not said.
+/// Checks start time, stop time and tolerance; -1 represents an undefined value.
 #[test]
 fn times_and_tolerance() {
     for (tolerance, start, stop) in [(None, 0.0, None), (Some(1e-4), 2.0, Some(3.0)), (Some(0.0), -1.5, None)]
@@ -44,14 +45,14 @@ fn times_and_tolerance() {
         fmu.ok(fmu.fmi2EnterInitializationMode());
         let found = fmu.get([Name::begin, Name::end, Name::tolerance, Name::time].map(|name| name as u32));
         assert_eq!(found, [start, stop.unwrap_or(-1.0), tolerance.unwrap_or(-1.0), start]);
-        // They belong to the state.
+        // The state includes the experiment.
         let other = talker(c"other", None);
         other.restore(&fmu.bytes());
         assert_eq!(other.get([Name::begin, Name::end].map(|name| name as u32)), found[..2]);
     }
 }
 
-/// Without fmi2SetupExperiment the start time is 0.
+/// Checks that the start time is 0 without fmi2SetupExperiment.
 #[test]
 fn no_experiment() {
     let fmu = talker(c"talker", None);
@@ -59,7 +60,7 @@ fn no_experiment() {
     assert_eq!(fmu.get([Name::begin, Name::time].map(|name| name as u32)), [0.0, 0.0]);
 }
 
-/// A folder for resources, with a space in its name.
+/// Creates a directory for resources, with a space in its name.
 fn resources(name: &str, words: &str) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("resources of").join(name);
     std::fs::create_dir_all(&folder).unwrap();
@@ -67,7 +68,7 @@ fn resources(name: &str, words: &str) -> PathBuf {
     folder
 }
 
-/// A file of the resources is read, however importers write where that is.
+/// Checks that a resource file is read for all forms of its location.
 #[test]
 fn files_in_the_resources() {
     let folder = resources("talker", "To be or not to be\n");
@@ -86,7 +87,7 @@ fn files_in_the_resources() {
     }
 }
 
-/// Whatever it is: a model that does without gets its instance.
+/// Checks that a model without resources accepts any location.
 #[test]
 fn resource_locations() {
     for resource_location in [
@@ -107,7 +108,7 @@ fn resource_locations() {
     }
 }
 
-/// A model that cannot be made says why.
+/// Checks that a model that cannot be made returns a message.
 #[test]
 fn bad_resources() {
     let location = CString::new(resources("mute", "\n").to_str().unwrap()).unwrap();
@@ -117,7 +118,7 @@ fn bad_resources() {
     assert_eq!(log[0].text, "fmi2Instantiate: resources/words.txt is empty");
 }
 
-/// An instance name that is no UTF-8 is still a name, and one that a `printf` would expand.
+/// Checks that an instance name may be invalid UTF-8 or contain `printf` directives.
 #[test]
 fn odd_instance_names() {
     for name in [c"wr\xffst", c"%d #r1#"] {

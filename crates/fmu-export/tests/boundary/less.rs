@@ -1,4 +1,4 @@
-//! Models that offer less than everything: the FMU refuses what it does not have, in words, and the rest works.
+//! Models with few capabilities: the FMU rejects missing ones with a message, and the rest works.
 
 use crate::toys::{Sum, sum::Name};
 use fmu_export::Exported;
@@ -30,7 +30,7 @@ fn what_it_has_works() {
     assert_eq!(fmu.get([U, Y, GAIN]), [0.0, 0.0, 1.0]);
 }
 
-/// A model that importers integrate, and nothing else.
+/// A model that supports only Model Exchange.
 mod drift {
     use fmu_export::*;
 
@@ -74,7 +74,7 @@ fn the_other_interface_type() {
     );
 }
 
-/// What the model itself refuses comes back as its words, and the step can be repeated.
+/// Checks that errors of the model reach the importer with their message, and the step can be repeated.
 #[test]
 fn errors_of_the_model() {
     let fmu = Importer::of::<Sum>(CoSimulation);
@@ -91,7 +91,7 @@ fn errors_of_the_model() {
     assert_eq!(fmu.get([Y]), [10.0]);
 }
 
-/// The range of a parameter's type is enforced, that of an input or output is a hint.
+/// Checks that the range of a parameter's type is enforced; the range of an input or output is a hint.
 #[test]
 fn ranges() {
     let fmu = Importer::of::<Sum>(CoSimulation);

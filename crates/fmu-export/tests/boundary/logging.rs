@@ -1,4 +1,4 @@
-//! What the importer's log shows, and when (sections 2.1.5 and 2.2.4).
+//! Content and times of log messages (sections 2.1.5 and 2.2.4).
 
 use crate::toys::grumbler::{self, Trouble};
 use crate::toys::{Grumbler, Oscillator, Talker, talker::Name};
@@ -16,7 +16,7 @@ fn logging<M: Exported>(logging_on: bool) -> Importer {
     Importer::try_with::<M>(&arguments).unwrap()
 }
 
-/// What is logged of an event, a warning, a discarded question and an error: O, W, D, E for their statuses.
+/// Returns the logged statuses of an event, a warning, a discarded query and an error: O, W, D, E.
 fn shown(fmu: &Importer) -> String {
     fmu.take_log();
     fmu.ok(fmu.fmi2Reset());
@@ -43,7 +43,8 @@ fn shown(fmu: &Importer) -> String {
     letters.into_iter().collect()
 }
 
-/// Errors and warnings are always told, the rest on demand: section 2.1.3 has fmi2Discard shown in debug mode only.
+/// Checks that errors and warnings are always logged, other messages on demand: in section 2.1.3, fmi2Discard
+/// is logged only in debug mode.
 #[test]
 fn logging_on_and_off() {
     assert_eq!(shown(&logging::<Talker>(false)), "WE");
@@ -55,11 +56,11 @@ fn logging_on_and_off() {
     assert_eq!(shown(&fmu), "OWDE");
 }
 
-/// A list switches what it names.
+/// Checks that a list changes only the listed categories.
 #[test]
 fn categories() {
     let cases: &[(bool, bool, &[&CStr], &str)] = &[
-        // loggingOn of fmi2Instantiate, of fmi2SetDebugLogging, the list, what is shown
+        // loggingOn of fmi2Instantiate, loggingOn of fmi2SetDebugLogging, the list, the logged statuses
         (false, true, &[c"logEvents"], "OWE"),
         (false, true, &[c"logAll"], "OWDE"),
         (false, true, &[c"logStatusDiscard"], "WDE"),
@@ -90,7 +91,7 @@ fn categories_that_do_not_exist() {
     assert_eq!(shown(&fmu), "WE", "nothing was switched");
 }
 
-/// The course of a run as a user reads it.
+/// Checks the messages of a run.
 #[test]
 fn events() {
     let fmu = logging::<Oscillator>(true);
@@ -105,7 +106,8 @@ fn events() {
     assert!(log.iter().all(|Message { status, category, .. }| (*status, category.as_str()) == (Status::Ok, "logEvents")));
 }
 
-/// What the model says comes at the end of the call in which it says it, once, with a status that is still OK.
+/// Checks that a message of the model is delivered once, at the end of the call in which it is logged, with
+/// status OK.
 #[test]
 fn messages_of_the_model() {
     let fmu = logging::<Talker>(true);
@@ -123,13 +125,13 @@ fn messages_of_the_model() {
     );
     fmu.set(&volume, &[1.0]);
     assert_eq!(fmu.take_log(), []);
-    // Saved states have nothing to say.
+    // Saved states contain no messages.
     let bytes = fmu.bytes();
     fmu.restore(&bytes);
     assert_eq!(fmu.take_log(), []);
 }
 
-/// Also in a call that is refused, and from the first moment on.
+/// Checks messages of the model in a rejected call, and during instantiation.
 #[test]
 fn messages_of_a_model_that_fails() {
     let fmu = logging::<Grumbler>(false);
@@ -148,21 +150,21 @@ fn messages_of_a_model_that_fails() {
     fmu.ok(fmu.fmi2EnterInitializationMode());
     assert_eq!(fmu.fmi2ExitInitializationMode(), Status::Error);
     assert_eq!(said(&fmu), failed("fmi2ExitInitializationMode", "SecondRound"));
-    // Bytes that the model does not take.
+    // Bytes that the model rejects.
     let bytes = with(fmu.bytes(), VALUES..VALUES + 8, &(Trouble::Update as i64).to_le_bytes());
     let status = fmu.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut null_mut());
     assert_eq!(status, Status::Error);
     assert_eq!(said(&fmu), failed("fmi2DeSerializeFMUstate", "Update"));
     fmu.ok(fmu.fmi2Reset());
     assert_eq!(said(&fmu), ["made"]);
-    // What a step says before an event.
+    // Messages of a step before an event.
     fmu.initialize(0.0);
     fmu.ok(fmu.set_debug_logging(true, &[c"logEvents"]));
     fmu.step(0.0, 2.0);
     assert_eq!(said(&fmu), ["stops at 1", "stops at 2"]);
 }
 
-/// Every instance logs under its own name to its own environment.
+/// Checks that every instance logs with its name and its environment.
 #[test]
 fn instances_do_not_mix() {
     let fmus = [c"left", c"right"].map(|name| {
@@ -177,7 +179,7 @@ fn instances_do_not_mix() {
     }
 }
 
-/// NULL as logger silences the FMU, nothing more. (NULL as memory callbacks is what all tests pass.)
+/// Checks that a NULL logger only suppresses the messages. (All tests pass NULL for the memory callbacks.)
 #[test]
 fn no_logger() {
     let arguments = Arguments { logger: false, logging_on: 1, ..Arguments::of::<Talker>(ModelExchange) };

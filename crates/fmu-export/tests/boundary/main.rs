@@ -1,5 +1,5 @@
-//! Toy models as an importer sees them: the C functions of FMI 2.0, called as the standard and as careless masters call
-//! them.
+//! Tests of the C functions of FMI 2.0 with test models, called as in the standard and by fault-injecting
+//! importers.
 #![allow(missing_docs)]
 
 #[path = "../toys/mod.rs"]
@@ -7,7 +7,7 @@ mod toys;
 
 use fmu_export::{Exported, Interface};
 
-/// Runs a function for every toy.
+/// Calls a function for every test model.
 macro_rules! for_every_toy {
     ($function:ident($($argument:expr),*)) => {{
         $function::<crate::toys::Oscillator>($($argument),*);
@@ -44,7 +44,7 @@ mod variables;
 
 const INTERFACES: [Interface; 2] = [Interface::CoSimulation, Interface::ModelExchange];
 
-/// Whether the model has an interface type.
+/// Returns whether the model supports an interface type.
 fn offers<M: Exported>(interface: Interface) -> bool {
     match interface {
         Interface::CoSimulation => M::CO_SIMULATION.is_some(),
@@ -52,7 +52,7 @@ fn offers<M: Exported>(interface: Interface) -> bool {
     }
 }
 
-/// Tests that every FMU with all capabilities passes.
+/// Tests for every FMU with all capabilities.
 mod every {
     fmu_test_kit::every_check!(crate::toys::Oscillator);
 }

@@ -1,4 +1,4 @@
-//! The same motion through both interface types, and against its formula.
+//! The motion of the oscillator in both interface types, compared with its formula.
 
 use crate::INTERFACES;
 use crate::toys::{Oscillator, oscillator::Name};
@@ -30,7 +30,7 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).abs().max((a[1] - b[1]).abs())
 }
 
-/// Without damper and force, it is a cosine.
+/// Checks that the motion without damper and force is a cosine.
 #[test]
 fn free_oscillation() {
     let fmu = Importer::of::<Oscillator>(CoSimulation);
@@ -44,8 +44,8 @@ fn free_oscillation() {
     }
 }
 
-/// A force that is a straight line between the communication points: with the slope given, steps of any size end where
-/// an integrator with tiny steps does.
+/// Checks a force that is linear between the communication points. With the slope given, steps of any size
+/// agree with an integrator with tiny steps.
 #[test]
 fn co_simulation_is_model_exchange_integrated() {
     let force = |t: f64| 3.0 - 2.0 * t;
@@ -83,7 +83,7 @@ fn co_simulation_is_model_exchange_integrated() {
     }
 }
 
-/// A slope counts for the next step, and for that one only; orders that the model has no use for change nothing.
+/// Checks that a slope applies only to the next step, and that higher orders have no effect.
 #[test]
 fn input_derivatives() {
     let [once, never, rich] = [(); 3].map(|()| Importer::in_mode::<Oscillator>(CoSimulation, StepComplete));
@@ -94,7 +94,7 @@ fn input_derivatives() {
     [&once, &never, &rich].iter().for_each(|fmu| fmu.step(0.0, 0.1));
     assert_eq!(once.get(STATES), rich.get(STATES));
     assert!(once.get(STATES)[0] > 0.0 && never.get(STATES) == [0.0; 2]);
-    // The second step is that of an instance that never had a slope.
+    // The second step equals a step of an instance without slope.
     let state = once.get(STATES);
     once.step(0.1, 0.1);
     let other = Importer::of::<Oscillator>(CoSimulation);
@@ -118,7 +118,7 @@ fn derivatives_of_the_initialization_are_used() {
     assert!(with[0] > 0.0 && without[0] == 0.0);
 }
 
-/// An input that is held between points at rest keeps everything at rest, to the last bit.
+/// Checks that the oscillator stays exactly at rest while its input is constant.
 #[test]
 fn waiting_at_rest() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
@@ -144,7 +144,7 @@ fn start_values_are_the_first_states() {
     }
 }
 
-/// From the types, before anything else is known.
+/// Checks that nominal values come from the types, right after instantiation.
 #[test]
 fn nominals() {
     let fmu = Importer::in_mode::<Oscillator>(ModelExchange, Instantiated);
@@ -153,7 +153,7 @@ fn nominals() {
     assert_eq!(nominals, [0.1, 0.5]);
 }
 
-/// A state can be set as variable or among all, with the same effect.
+/// Checks that a state set as a variable and a state set in the array of states have equal effects.
 #[test]
 fn both_ways_to_set_a_state() {
     let fmu = Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime);

@@ -1,4 +1,5 @@
-//! Numbers in every kind of place, read and set alone and together: the short ways give what the long ones do.
+//! Reals in every kind of field, accessed one at a time and in groups: fast paths agree with the general
+//! path.
 
 use crate::toys::{Meter, meter::Name};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
@@ -14,7 +15,7 @@ fn new<F: Either>(interface: Interface) -> F {
     F::make::<Meter>(&fmu_test_kit::Arguments::of::<Meter>(interface)).expect("an instance")
 }
 
-/// Integers come from FMI 2.0 or 3.0.
+/// Access to Integers in FMI 2.0 and 3.0.
 trait Integers: Either {
     fn integer(&self, name: Name) -> i32;
 }
@@ -35,7 +36,8 @@ impl Integers for fmi3::Importer {
     }
 }
 
-/// Sets and reads so many inputs at once, from each on, before the first step and after; all must be there then.
+/// Sets and reads `count` inputs per call, with each as the first, before the first step and after it. All
+/// must keep their values.
 fn set_and_read<F: Integers>(count: usize) {
     let fmu: F = new(CoSimulation);
     fmu.initialize(0.0);
@@ -58,11 +60,11 @@ fn set_and_read<F: Integers>(count: usize) {
         if round == 0 {
             assert_eq!(fmu.get([LEVEL]), [now[0]], "it starts there");
         }
-        // Of any size, of one that the model calculates after, and of one that it makes at once.
+        // The sizes cover rejected fast steps, steps with a later calculation, and fast steps.
         let size = [0.5, 2.0, 1.0][round % 3];
         fmu.step(time, size);
         time += size;
-        // The other number of the ring was never set, or two steps ago.
+        // The other entry of the ring was never set, or was set two steps ago.
         assert_eq!(fmu.get([TOTAL]), fmu.get([SUM]));
         now[5] = fmu.get([Name::moving as u32])[0];
         assert_eq!(fmu.integer(Name::marks), 10 * seconds);
@@ -78,7 +80,7 @@ fn alone_and_together() {
     }
 }
 
-/// What cannot be set or read changes nothing, neither in the model nor in the importer's array, wherever it stands.
+/// Checks that a rejected variable at any index changes neither the model nor the importer's array.
 fn refused<F: Either>() {
     let fmu: F = new(CoSimulation);
     fmu.initialize(0.0);
@@ -100,7 +102,7 @@ fn refused<F: Either>() {
         assert_eq!(fmu.bytes(), before);
         fmu.step(f64::from(round), 1.0);
     }
-    // The sum of them is out of range, each of them is not.
+    // The sum of both is out of range; each one is in range.
     fmu.set(&[0, 1], &[f64::MAX, f64::MAX]);
     assert_eq!(fmu.get([0, 1]), [f64::MAX; 2]);
     fmu.refused_with(&["total", "out of the range"], |fmu| fmu.try_get(&[TOTAL, 0, 1, 2], &mut [0.0; 4]));
@@ -113,7 +115,8 @@ fn refused_as_before() {
     refused::<fmi3::Importer>();
 }
 
-/// A state that starts where an input is follows it until the simulation begins, in whatever order things are set.
+/// Checks that a calculated start value follows an input until the simulation begins, in any order of the
+/// calls.
 #[test]
 fn starts_that_are_calculated() {
     fn check<F: Either>() {

@@ -1,5 +1,5 @@
-//! Calls that make no sense are refused: `fmi2Error`, one message that says what is wrong, and nothing changed.
-//! [`Importer::refused`] checks all that; the tables here say what is tried and what the message must tell.
+//! Invalid calls are rejected: `fmi2Error`, one message with the reason, and no change. [`Importer::refused`]
+//! checks this; the tables here list the calls and parts of their messages.
 
 use crate::INTERFACES;
 use crate::toys::{Ball, Oscillator, Talker, oscillator::Name, talker};
@@ -26,7 +26,7 @@ const UNKNOWN: u32 = Oscillator::TABLE.len() as u32;
 const NAN: f64 = f64::NAN;
 const INF: f64 = f64::INFINITY;
 
-/// What is tried, the call, words of the message.
+/// Label, call, and parts of the message.
 type Case = (&'static str, fn(&Importer) -> Status, &'static [&'static str]);
 
 #[track_caller]
@@ -39,7 +39,7 @@ fn all_refused(fmu: &Importer, cases: &[Case]) {
     }
 }
 
-/// An array whose pointer no processor likes; it is never followed.
+/// Returns a misaligned pointer, which the FMU must not dereference.
 fn misaligned<T>(value: &T) -> *const T {
     (&raw const *value).wrapping_byte_add(1)
 }
@@ -48,7 +48,7 @@ fn misaligned_mut<T>(value: &mut T) -> *mut T {
     (&raw mut *value).wrapping_byte_add(1)
 }
 
-/// Value references and arrays, the same for both interface types and all modes with getters and setters.
+/// Invalid value references and arrays, for both interface types and all modes with getters and setters.
 const ARRAYS: &[Case] = &[
     ("get, unknown", |fmu| fmu.fmi2GetReal(&UNKNOWN, 1, &mut 0.0), &["value reference 12"]),
     ("get, unknown, last", |fmu| fmu.fmi2GetReal(&u32::MAX, 1, &mut 0.0), &["4294967295"]),
@@ -125,7 +125,7 @@ fn empty_arrays_are_fine() {
     fmu.ok(fmu.fmi2SetRealInputDerivatives(null(), 0, null(), null()));
 }
 
-/// Parameters out of their range, with what the message must tell.
+/// Parameters out of their range, with parts of the message.
 const PARAMETERS: &[Case] = &[
     ("mass = 0", |fmu| fmu.try_set(&[MASS], &[0.0]), &["mass", "below 0.001", "0"]),
     ("mass < 0", |fmu| fmu.try_set(&[MASS], &[-0.1]), &["mass", "-0.1"]),
@@ -151,7 +151,7 @@ fn parameters_out_of_range() {
     all_refused(&Importer::in_mode::<Oscillator>(CoSimulation, StepComplete), PARAMETERS);
 }
 
-/// What fits together is tried with all that one call sets: one by one it would not pass.
+/// Checks that all values of one call are checked together: one by one they would be rejected.
 #[test]
 fn combinations_are_set_together() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
@@ -229,7 +229,7 @@ fn experiments() {
             let message = fmu.refused(label, call);
             assert!(message.contains(word), "{message}");
         }
-        // What is not defined is not looked at, and a tolerance of 0 is none.
+        // Undefined values are ignored; a tolerance of 0 means none.
         fmu.ok(setup(0, NAN, 0.0, 0, NAN)(&fmu));
         fmu.ok(setup(1, 0.0, 0.0, 1, 0.0)(&fmu));
     }
@@ -262,7 +262,8 @@ fn steps() {
     fmu.step(1.25, 0.75);
 }
 
-/// A step to infinity is refused, and everything stays usable; so is reading what is infinite.
+/// Checks that a step to infinity is rejected and the instance stays usable, and that reading an infinite
+/// value is rejected.
 #[test]
 fn out_of_the_range_of_numbers() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
@@ -418,7 +419,7 @@ fn status_kinds() {
     }
     fmu.refused("NULL", |fmu| fmu.fmi2GetRealStatus(2, null_mut()));
     fmu.refused("NULL", |fmu| fmu.fmi2GetBooleanStatus(3, null_mut()));
-    // Each question has one function; the others say which.
+    // Each query has one function; the other functions name it in their message.
     fmu.ok(fmu.set_debug_logging(true, &[c"logStatusDiscard"]));
     type Question = fn(&Importer) -> Status;
     let questions: &[(Question, &str)] = &[
@@ -441,7 +442,7 @@ fn status_kinds() {
     assert_eq!((time, terminated), (0.25, 0));
 }
 
-/// What is wrong with the arguments, and words of the message.
+/// Changed arguments, and parts of the message.
 #[test]
 fn instantiation() {
     type Change = fn(&mut Arguments<'static>);
@@ -473,7 +474,7 @@ fn instantiation() {
         for word in *words {
             assert!(message.text.contains(word), "{label}: '{word}' is not in: {}", message.text);
         }
-        // Without anyone to tell it is refused all the same.
+        // Without a logger the call is rejected as well.
         arguments.logger = false;
         assert!(instantiate(&arguments).is_err_and(|log| log.is_empty()), "{label}, silently");
     }

@@ -1,4 +1,4 @@
-//! Saved states (section 2.1.8): what they bring back, and what is refused.
+//! Saved states (section 2.1.8): their content, and rejected states.
 
 use crate::INTERFACES;
 use crate::toys::{Counter, Grumbler, Oscillator, Talker, counter, grumbler, oscillator::Name, talker};
@@ -13,7 +13,8 @@ use fmu_test_kit::{Either, Importer};
 use std::ptr::{null, null_mut, without_provenance_mut};
 
 const FORCE: u32 = Name::force as u32;
-/// Memory besides variables: when the counter counts next, what the talker has said.
+/// Checks that memory other than variables is restored: the next count of the counter, the earlier texts of
+/// the talker.
 #[test]
 fn memory_comes_back() {
     let fmu = Importer::of::<Counter>(CoSimulation);
@@ -37,7 +38,7 @@ fn memory_comes_back() {
     }
 }
 
-/// Between modes of one simulation, too: a state from the initialization can be set while running.
+/// Checks that a state from Initialization Mode can be restored while the simulation runs.
 #[test]
 fn back_to_the_initialization() {
     let fmu = Importer::in_mode::<Oscillator>(ModelExchange, Initialization);
@@ -70,7 +71,7 @@ fn handles_are_reused() {
     fmu.ok(fmu.fmi2SetFMUstate(state));
     assert_eq!(go(4), expected, "with the later state");
 
-    // De-serializing into a handle that holds a state replaces it.
+    // De-serializing into the handle of a state replaces the state.
     let bytes = fmu.bytes();
     fmu.ok(fmu.deserialize(bytes.as_ptr(), bytes.len(), &mut state));
     assert_eq!(state, handle);
@@ -80,8 +81,8 @@ fn handles_are_reused() {
     fmu.forget(state);
 }
 
-/// What an instance has saved goes with it (section 2.1.5), and is its own: handles of others, freed ones and any other
-/// address are told from its states, and not followed.
+/// Checks that an instance frees its saved states (section 2.1.5). Handles of other instances, freed handles
+/// and other addresses are rejected, not dereferenced.
 #[test]
 fn handles_that_are_none() {
     let [fmu, other] = [(); 2].map(|()| Importer::in_mode::<Talker>(CoSimulation, StepComplete));
@@ -113,7 +114,8 @@ fn handles_that_are_none() {
     fmu.ok(fmu.fmi2SetFMUstate(own));
 }
 
-/// In the model's memory any number may have a meaning; a variable that is none could not be read, so it is not written.
+/// Checks that the model's memory may contain any number. A variable that is not finite could not be read
+/// back, so it is not written.
 #[test]
 fn infinite_numbers() {
     let fmu = Importer::of::<Grumbler>(CoSimulation);
@@ -196,7 +198,7 @@ fn restores(fmu: &Importer, bytes: &[u8]) -> bool {
     status == Status::Ok
 }
 
-/// With texts and vectors, too.
+/// Covers strings and vectors, too.
 #[test]
 fn no_changed_byte_goes_unseen() {
     fmu_test_kit::checks::no_changed_byte_goes_unseen::<Importer, Talker>();
@@ -242,7 +244,7 @@ fn messages_say_where_a_state_comes_from() {
     assert!(fmu.refused_bytes(cut).contains("length"));
 }
 
-/// A right checksum around wrong contents.
+/// Checks invalid contents with a correct checksum.
 #[test]
 fn impossible_contents() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
@@ -259,7 +261,7 @@ fn impossible_contents() {
     for number in [f64::NAN, f64::INFINITY] {
         fmu.refused_bytes(&with(bytes.clone(), TIME, &number.to_le_bytes()));
     }
-    // Force, position, velocity, mass, stiffness, springs, damping of 8 bytes each.
+    // Force, position, velocity, mass, stiffness, springs, damping have 8 bytes each.
     let value = |place: usize| VALUES + 8 * place..VALUES + 8 * (place + 1);
     assert_eq!(bytes[value(4)], 50.0_f64.to_le_bytes());
     let message = fmu.refused_bytes(&with(bytes.clone(), value(3), &(-1.0_f64).to_le_bytes()));
@@ -269,18 +271,19 @@ fn impossible_contents() {
     }
     let message = fmu.refused_bytes(&with(bytes.clone(), value(6), &20.0_f64.to_le_bytes()));
     assert!(message.contains("nothing oscillates"), "what update refuses: {message}");
-    // The force may be what it likes, and is as it was written.
+    // The force may have any finite value and is restored exactly.
     assert!(restores(&fmu, &with(bytes, value(0), &f64::MAX.to_le_bytes())));
     assert_eq!(fmu.get([FORCE]), [f64::MAX]);
 }
 
-/// Texts, enumerations and vectors that claim to be what they cannot be.
+/// Checks impossible strings, enumeration items and lengths of vectors.
 #[test]
 fn absurd_lengths() {
     let fmu = Importer::in_mode::<Talker>(CoSimulation, StepComplete);
     say(&fmu, talker::Name::heard, "heard");
     let bytes = fmu.bytes();
-    // The lengths of what is heard and of the greeting, the mood, the vector of what was said and its first text.
+    // Ranges of the length of the heard text, length of the greeting, mood, length of the vector of texts,
+    // length of its first text.
     let heard = VALUES..VALUES + 8;
     let greeting = heard.end + 5..heard.end + 13;
     let mood = greeting.end + 5..greeting.end + 13;
@@ -296,15 +299,15 @@ fn absurd_lengths() {
     }
     let no_text = with(bytes.clone(), heard.end..heard.end + 2, b"\xff\xfe");
     fmu.refused_bytes(&no_text);
-    // A text with a zero byte has an end for C.
+    // C would read a NUL as the end of the string.
     assert!(restores(&fmu, &with(bytes, heard.end..heard.end + 2, b"a\0")));
     assert_eq!(texts(&fmu, [talker::Name::heard]), ["a ard"]);
 }
 
-/// No call is fatal after a damaged state that the FMU accepts.
+/// Checks that no call is fatal after a damaged state that the FMU accepts.
 #[test]
 fn random_contents_break_nothing() {
-    // Texts keep their length, so that more than a few are accepted.
+    // Lengths of strings are kept, so that more than a few states are accepted.
     let accepted = [survivors::<Importer, Counter>(12), survivors::<Importer, Talker>(13)];
     assert!(accepted.iter().all(|accepted| *accepted > DAMAGED / 15), "only {accepted:?} were accepted");
 }

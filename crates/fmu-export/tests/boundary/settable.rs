@@ -1,5 +1,5 @@
-//! Which variable can be set when (footnotes 1, 3, 4, 5 and 6 of sections 3.2.3 and 4.2.4), for every variable in every
-//! state.
+//! Modes in which a variable can be set (footnotes 1, 3, 4, 5 and 6 of sections 3.2.3 and 4.2.4), for every
+//! variable in every state.
 
 use crate::toys::*;
 use crate::{INTERFACES, offers};
@@ -12,7 +12,7 @@ use fmu_test_kit::{Either, Importer};
 use std::ffi::CStr;
 use std::ptr::null;
 
-/// The standard's rule, state by state.
+/// Returns whether the standard allows setting the variable, state by state.
 fn standard<M>(variable: &Variable<M>, interface: Interface, mode: Mode) -> bool {
     let exact = variable.initial() == Some(Initial::Exact) && variable.variability() != Variability::Constant;
     let input = variable.causality() == Causality::Input;
@@ -29,7 +29,8 @@ fn standard<M>(variable: &Variable<M>, interface: Interface, mode: Mode) -> bool
     }
 }
 
-/// What real masters do beyond it: inputs before the initialization, parameters after it.
+/// Returns whether setting is tolerated for real importers: inputs before the initialization, parameters
+/// after it.
 fn tolerated<M>(variable: &Variable<M>, mode: Mode) -> bool {
     match (variable.causality(), mode) {
         (Causality::Input, Instantiated) | (Causality::Parameter, StepComplete | Event) => true,
@@ -42,7 +43,8 @@ pub fn accepted<M>(variable: &Variable<M>, interface: Interface, mode: Mode) -> 
     standard(variable, interface, mode) || tolerated(variable, mode)
 }
 
-/// The same by name, in the letters of the tables, for one variable of each kind: Co-Simulation, Model Exchange.
+/// Checks the rules against expected letters of the tables, for one variable of each kind: Co-Simulation,
+/// Model Exchange.
 fn check_by_hand<M: Exported>(rows: &[(&str, &str, &str)]) {
     for (name, co_simulation, model_exchange) in rows {
         let mut variables = M::TABLE.iter();
@@ -92,7 +94,7 @@ fn set(fmu: &Importer, vr: u32, base: BaseType) -> Status {
     }
 }
 
-/// Whether the value is the one that is set above.
+/// Returns whether the variable has the value that was set above.
 fn is_set(fmu: &Importer, vr: u32, base: BaseType) -> bool {
     let (mut integer, mut text) = (-1, null());
     match base {
@@ -101,7 +103,7 @@ fn is_set(fmu: &Importer, vr: u32, base: BaseType) -> bool {
         BaseType::Boolean => fmu.ok(fmu.fmi2GetBoolean(&vr, 1, &mut integer)),
         _ => {
             fmu.ok(fmu.fmi2GetString(&vr, 1, &mut text));
-            // SAFETY: a string of the instance, until the next call.
+            // SAFETY: a string of the instance, valid until the next call.
             return unsafe { CStr::from_ptr(text) } == c"a text";
         }
     }
@@ -130,13 +132,13 @@ fn check_every_variable<M: Exported>() {
             let message = fmu.refused(&label, |fmu| set(fmu, vr, base));
             let in_this_state = matches!(mode, Instantiated | Initialization | StepComplete | Event)
                 || (mode == ContinuousTime && base == BaseType::Real);
-            // Where the whole function is refused, its variables are not looked at.
+            // If the whole function is rejected, its variables are not checked.
             assert!(!in_this_state || message.contains(variable.name()), "{label}: {message}");
         }
     }
 }
 
-/// What is set is what is read, inputs too, without a step in between.
+/// Checks that set values are read back, including inputs, without a step in between.
 #[test]
 fn values_are_read_back() {
     for_every_toy!(check_values());

@@ -1,5 +1,5 @@
-//! Start values: those that are refused are not forgotten, because some importers (fmi-sim, OMSimulator) go on after a
-//! refusal; those of states may be the model's to calculate.
+//! Start values. Rejected ones are recorded, because some importers (fmi-sim, OMSimulator) continue after the
+//! error. The model may calculate start values of states.
 
 use crate::INTERFACES;
 use crate::toys::{Balance, Oscillator, Talker, balance, oscillator::Name, talker};
@@ -12,7 +12,7 @@ use std::ptr::null;
 const MASS: u32 = Name::mass as u32;
 const STIFFNESS: u32 = Name::stiffness as u32;
 
-/// The end of the mode that an instance is in.
+/// Ends the mode of an instance.
 fn go_on<F: Either>(fmu: &F, mode: Mode) -> Status {
     if mode == Instantiated {
         fmu.enter_initialization_mode(0.0, None)
@@ -21,8 +21,8 @@ fn go_on<F: Either>(fmu: &F, mode: Mode) -> Status {
     }
 }
 
-/// In each mode in which start values are set: refuses a start value by `wrong`, then the end of the mode with the same words
-/// until `right` is done.
+/// Sets a start value with `wrong`, in each mode for start values. Checks that the end of the mode then fails
+/// with the same message until `right` has been called.
 #[track_caller]
 fn is_remembered<F: Either>(wrong: impl Fn(&F) -> Status, right: impl Fn(&F) -> Status) {
     for (interface, mode) in INTERFACES.into_iter().flat_map(|i| [(i, Instantiated), (i, Initialization)]) {
@@ -46,7 +46,7 @@ fn a_refused_start_value_is_remembered() {
         is_remembered::<F>(|fmu| fmu.try_set(&[force], &[f64::NAN]), |fmu| fmu.try_set(&[force], &[0.0]));
         is_remembered::<F>(|fmu| fmu.set_integer(springs, 10), |fmu| fmu.set_integer(springs, 9));
         is_remembered::<F>(|fmu| fmu.set_boolean(damped, 2), |fmu| fmu.set_boolean(damped, 1));
-        // What the model itself refuses.
+        // The model itself rejects this value.
         is_remembered::<F>(|fmu| fmu.try_set(&[damping], &[1e6]), |fmu| fmu.try_set(&[damping], &[0.0]));
         for mode in [Instantiated, Initialization] {
             let fmu = F::in_mode::<Talker>(CoSimulation, mode);
@@ -64,7 +64,7 @@ fn a_refused_start_value_is_remembered() {
     check::<fmi3::Importer>();
 }
 
-/// Nothing of a call that is refused has been set, so each of its variables is to be set again.
+/// Checks that a rejected call sets nothing, so each of its variables must be set again.
 #[test]
 fn every_variable_of_a_refused_call() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
@@ -79,7 +79,7 @@ fn every_variable_of_a_refused_call() {
     fmu.initialize(0.0);
 }
 
-/// What several values are to blame for together is said once.
+/// Checks that an error about several values is reported once.
 #[test]
 fn values_that_do_not_fit_together() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
@@ -106,7 +106,8 @@ fn reset_and_restored_states_begin_anew() {
     fmu.forget(state);
 }
 
-/// Importers probe: what is no start value has no consequences. Neither has a value that is refused while it runs.
+/// Checks that a rejected variable that has no start value has no effect later, because importers probe. The
+/// same holds for a value that is rejected during the simulation.
 #[test]
 fn probing_has_no_consequences() {
     for interface in INTERFACES {
@@ -133,7 +134,8 @@ fn probing_has_no_consequences() {
 const LOAD: u32 = balance::Name::load as u32;
 const STRETCH: u32 = balance::Name::stretch as u32;
 
-/// A state with a calculated start follows from the rest until the first step, or until it is the importer's.
+/// Checks that a calculated start follows the other values until the first step, or until the importer sets
+/// the state.
 #[test]
 fn calculated_start() {
     for interface in INTERFACES {
@@ -159,7 +161,7 @@ fn calculated_start() {
         fmu.set(&[LOAD], &[0.0]);
         assert_eq!(fmu.get([STRETCH]), [4.0], "{interface}");
     }
-    // OpenModelica sets states while still in event mode.
+    // OpenModelica sets states while still in Event Mode.
     let fmu = Importer::in_mode::<Balance>(ModelExchange, Event);
     fmu.ok(fmu.fmi2SetContinuousStates(&7.0, 1));
     fmu.set(&[LOAD], &[8.0]);

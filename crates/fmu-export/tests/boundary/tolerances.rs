@@ -1,4 +1,4 @@
-//! What real masters do outside the standard, or at its edges, and what works all the same.
+//! Unusual calls of real importers, outside the standard or at its limits, that must work.
 
 use crate::INTERFACES;
 use crate::toys::{Oscillator, Sum, oscillator::Name};
@@ -13,7 +13,7 @@ const FORCE: u32 = Name::force as u32;
 const POSITION: u32 = Name::position as u32;
 const ACCELERATION: u32 = Name::der_velocity as u32;
 
-/// OpenModelica and libcosim set inputs before fmi2SetupExperiment; they count at the initialization.
+/// OpenModelica and libcosim set inputs before fmi2SetupExperiment; these apply to the initialization.
 #[test]
 fn inputs_before_the_initialization() {
     for interface in INTERFACES {
@@ -24,8 +24,8 @@ fn inputs_before_the_initialization() {
     }
 }
 
-/// The standard forbids it in Co-Simulation (section 4.2.4), OMSimulator does it at every step. States wait for the step,
-/// what depends on the input directly follows it at once.
+/// The standard forbids it in Co-Simulation (section 4.2.4), but OMSimulator does it at every step. States
+/// change only in a step; direct dependencies change at once.
 #[test]
 fn get_after_set_without_a_step() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
@@ -36,8 +36,8 @@ fn get_after_set_without_a_step() {
     assert_ne!(fmu.get([ACCELERATION]), [acceleration]);
 }
 
-/// OpenModelica sets fixed parameters after the initialization, users tune while the simulation runs; the next values are
-/// those of the new parameters.
+/// OpenModelica sets fixed parameters after the initialization, and users tune during the simulation. The
+/// next values use the new parameters.
 #[test]
 fn parameters_after_the_initialization() {
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, Event)] {
@@ -67,7 +67,7 @@ fn terminate_after_an_error() {
     }
 }
 
-/// A rejected step can be repeated with better arguments.
+/// Checks that a rejected step can be repeated with valid arguments.
 #[test]
 fn a_step_after_a_refused_one() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
@@ -76,10 +76,10 @@ fn a_step_after_a_refused_one() {
     fmu.step(0.1, 0.1);
 }
 
-/// The communication points of a master: number of the step -> point and step size.
+/// Communication points of an importer: number of the step -> point and step size.
 type Clock = fn(i32) -> (f64, f64);
 
-/// Points as masters compute them, each losing the last digits in its own way.
+/// Communication points as importers compute them, with different rounding errors.
 const CLOCKS: &[(&str, Clock)] = &[
     ("multiplied, 1 ms", |i| (f64::from(i) * 1e-3, 1e-3)),
     ("differences of multiplied times, 0.1 s", |i| {
@@ -135,7 +135,7 @@ fn communication_points_that_are_added_up() {
     }
 }
 
-/// The last step may end beyond the stop time by rounding, in whichever way the master counts.
+/// Checks that the last step may exceed the stop time by a rounding error, for several ways to compute times.
 #[test]
 fn stop_time_passed_by_rounding() {
     let cases: &[(&str, f64, i32, f64)] = &[
@@ -161,9 +161,9 @@ fn stop_time_passed_by_rounding() {
 
 const H: f64 = 1e-3;
 
-/// Steps of 1 ms, `range.start * H` being the first point of a master that multiplies, `sum` that of one that adds up.
-/// Both must be let through, and the FMU's time is always theirs, to the last bit. Returns where the one that adds up
-/// ends.
+/// Performs steps of 1 ms with an importer that multiplies, beginning at `range.start * H`, and with one that
+/// adds, beginning at `sum`. Both must be accepted, and the FMU's time must equal theirs exactly. Returns the
+/// final time of the adding importer.
 fn run<F: Either>(range: Range<u64>, mut sum: f64) -> f64 {
     let multiplying = F::initialized_at::<Sum>(range.start as f64 * H);
     let adding = F::initialized_at::<Sum>(sum);
@@ -177,14 +177,14 @@ fn run<F: Either>(range: Range<u64>, mut sum: f64) -> f64 {
 
 const MANY_STEPS: u64 = 100_000_000;
 
-/// The clock of a master that adds up, after so many steps.
+/// Returns the time of an adding importer after this number of steps.
 fn added_up(steps: u64) -> f64 {
     (0..steps).fold(0.0, |sum, _| sum + H)
 }
 
-/// The instance keeps no count of its own: the end of a step is the master's point plus the master's step size, and the
-/// next point may be off by what rounding can do to it. So the steps on the way to 10^8 need not all be made; some at the
-/// begin and some at the end are, there also from where a master would be that adds up.
+/// The instance keeps no separate time. The end of a step is the importer's point plus its step size, and the
+/// next point may differ by a rounding error. So the test makes only some steps at the start and some before
+/// 10^8, with the accumulated time of an adding importer.
 #[test]
 fn time_does_not_drift() {
     let first = MANY_STEPS - 10_000;
@@ -195,7 +195,7 @@ fn time_does_not_drift() {
     run::<fmi3::Importer>(first..MANY_STEPS, sum);
 }
 
-/// All of them: seconds in a release build, minutes otherwise.
+/// Makes all steps: seconds in a release build, minutes otherwise.
 #[test]
 #[ignore = "make sanitize runs it, with optimization"]
 fn a_hundred_million_steps() {
@@ -203,11 +203,11 @@ fn a_hundred_million_steps() {
     assert_eq!(run::<fmi3::Importer>(0..MANY_STEPS, 0.0), end);
     let drift = end - MANY_STEPS as f64 * H;
     println!("adding up ends at {end:?}, {drift:.1e} s off");
-    // A clock of the FMU's own would have parted from one of the masters: rounding is forgiven up to 2e-10 s.
+    // A separate clock of the FMU would differ from one of the importers: the tolerance is only 2e-10 s.
     assert!(drift.abs() > 1e-5);
 }
 
-/// Points that are off by more than rounding are another matter.
+/// Checks that points with more than a rounding error are rejected.
 #[test]
 fn a_point_that_is_really_off_is_refused() {
     let fmu = slave::<Sum>(99_999.0);

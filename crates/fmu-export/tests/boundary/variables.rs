@@ -1,4 +1,4 @@
-//! Texts, enumerations and the odd kinds of variables (section 2.2.7), as an importer sees them.
+//! Strings, enumerations and rarer kinds of variables (section 2.2.7).
 
 use crate::INTERFACES;
 use crate::toys::{Talker, talker::Name};
@@ -12,7 +12,7 @@ use std::ptr::null;
 pub fn texts<const N: usize>(fmu: &Importer, names: [Name; N]) -> [String; N] {
     let mut texts = [null(); N];
     fmu.ok(fmu.fmi2GetString(names.map(|name| name as u32).as_ptr(), N, texts.as_mut_ptr()));
-    // SAFETY: strings of the instance, until the next call (section 2.1.7).
+    // SAFETY: strings of the instance, valid until the next call (section 2.1.7).
     texts.map(|text| unsafe { CStr::from_ptr(text) }.to_str().unwrap().to_owned())
 }
 
@@ -35,7 +35,7 @@ fn set_mood(fmu: &Importer, mood: i32) -> Status {
     fmu.fmi2SetInteger(&(Name::mood as u32), 1, &mood)
 }
 
-/// In and out, several at once and repeated, of any length and script.
+/// Checks strings in both directions, several at once and repeated, of any length and script.
 #[test]
 fn texts_in_and_out() {
     let long = "long ".repeat(10_000);
@@ -53,7 +53,8 @@ fn texts_in_and_out() {
     }
 }
 
-/// The texts of one call stay until the next one on this instance, whatever other instances do.
+/// Checks that the strings of a call stay valid until the next call on this instance, regardless of other
+/// instances.
 #[test]
 fn how_long_texts_live() {
     let [one, other] = [(); 2].map(|()| Importer::in_mode::<Talker>(CoSimulation, StepComplete));
@@ -62,11 +63,11 @@ fn how_long_texts_live() {
     one.ok(one.fmi2GetString(&(Name::reply as u32), 1, &mut text));
     say(&other, Name::heard, "the other");
     texts(&other, [Name::reply]);
-    // SAFETY: no call on this instance since.
+    // SAFETY: there was no call on this instance since.
     assert_eq!(unsafe { CStr::from_ptr(text) }, c"the one");
 }
 
-/// What a step says is heard after it.
+/// Checks that a text logged by a step is available after it.
 #[test]
 fn steps_with_texts() {
     let fmu = Importer::in_mode::<Talker>(CoSimulation, StepComplete);
@@ -79,7 +80,7 @@ fn steps_with_texts() {
     }
 }
 
-/// Enumerations go through the functions of Integers; only their items exist.
+/// Checks that Enumerations use the functions of Integers and accept only their items.
 #[test]
 fn enumerations() {
     let fmu = Importer::in_mode::<Talker>(CoSimulation, Initialization);
@@ -97,7 +98,7 @@ fn enumerations() {
     });
 }
 
-/// A tunable parameter and what follows from it, while the simulation runs.
+/// Checks a tunable parameter and a variable that depends on it, during the simulation.
 #[test]
 fn tunable_and_calculated_parameters() {
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, Event)] {
@@ -112,7 +113,7 @@ fn tunable_and_calculated_parameters() {
     }
 }
 
-/// Approx: the calculation begins with the start value, so that there are two roots to find.
+/// Checks that the calculation begins with the start value: different start values lead to different roots.
 #[test]
 fn start_values_of_calculations() {
     for (start, root) in [(1.0, 3.0), (-0.1, -3.0)] {

@@ -1,4 +1,4 @@
-//! Arrays of float64 that live in Python.
+//! Arrays of float64 in Python objects.
 
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyFloat, PyTuple};
 
-/// Numbers that are read: those of an array as it lies there, or one.
+/// Input numbers: a single number, a copied row, or an array that is read in place.
 pub enum Numbers {
     One(f64),
     Row(Vec<f64>),
@@ -14,7 +14,7 @@ pub enum Numbers {
 }
 
 impl Numbers {
-    /// A number, an array, or what NumPy makes an array of.
+    /// Converts a number, an array, or an object that NumPy converts to an array.
     pub fn of(values: &Bound<'_, PyAny>) -> PyResult<Self> {
         if let Ok(number) = values.cast::<PyFloat>() {
             return Ok(Self::One(number.value()));
@@ -26,7 +26,7 @@ impl Numbers {
         }
         let numpy = values.py().import("numpy")?;
         let array = numpy.call_method1("asarray", (values,))?;
-        // Else None were not a number, and texts were numbers.
+        // NumPy would convert None to NaN and strings to numbers.
         if !"biuf".contains(&array.getattr("dtype")?.getattr("kind")?.extract::<String>()?) {
             return Err(PyValueError::new_err(format!(
                 "{} is no number, nor an array of such",
@@ -56,23 +56,23 @@ impl Numbers {
     }
 }
 
-/// The numbers of an array. Who writes them from another thread meanwhile has nobody else to blame, as with NumPy's own
-/// functions.
+/// Returns the numbers of an array. The caller must not write to it from another thread meanwhile, as for
+/// NumPy's own functions.
 fn read(buffer: &PyBuffer<f64>) -> &[f64] {
     match buffer.item_count() {
         0 => &[],
-        // SAFETY: PyO3 has checked type, alignment and size; the memory is contiguous (`Numbers::of`), and stays where it is
-        // for as long as the buffer is held.
+        // SAFETY: PyO3 has checked type, alignment and size. The memory is contiguous (`Numbers::of`) and
+        // stays valid while the buffer is held.
         #[allow(unsafe_code)]
         count => unsafe { std::slice::from_raw_parts(buffer.buf_ptr().cast(), count) },
     }
 }
 
-/// An array that is written.
+/// An output array.
 pub struct Room(PyBuffer<f64>);
 
 impl Room {
-    /// An array of NumPy's with this shape, made anew or given by the caller.
+    /// Creates a NumPy array of this shape, or checks the array that the caller passes.
     pub fn of<'py>(
         py: Python<'py>,
         given: Option<Bound<'py, PyAny>>,
@@ -80,7 +80,7 @@ impl Room {
     ) -> PyResult<(Bound<'py, PyAny>, Self)> {
         let array = match given {
             Some(array) => array,
-            // NumPy asks the kernel for large pages.
+            // NumPy's `zeros` asks the kernel for large pages.
             None => {
                 static ZEROS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
                 ZEROS.import(py, "numpy", "zeros")?.call1((PyTuple::new(py, shape)?,))?
@@ -98,7 +98,7 @@ impl Room {
         Ok((array, Self(buffer)))
     }
 
-    /// Fails if it shares memory with what is read at the same time.
+    /// Fails if it shares memory with numbers that are read at the same time.
     pub fn apart_from(&self, read: &Numbers) -> PyResult<()> {
         let (own, other) = (self.0.buf_ptr().addr(), read.values().as_ptr_range());
         let apart = own + 8 * self.0.item_count() <= other.start.addr() || other.end.addr() <= own;
@@ -109,7 +109,7 @@ impl Room {
     pub fn values(&mut self) -> &mut [f64] {
         match self.0.item_count() {
             0 => &mut [],
-            // SAFETY: as in `read`, and it may be written (`Room::of`).
+            // SAFETY: the conditions of `read` hold, and `Room::of` has checked that the array is writable.
             #[allow(unsafe_code)]
             count => unsafe { std::slice::from_raw_parts_mut(self.0.buf_ptr().cast(), count) },
         }

@@ -1,4 +1,4 @@
-//! `fmu_run.Instances`.
+//! The class `fmu_run.Instances`.
 
 use crate::buffers::{Numbers, Room};
 use crate::start::Start;
@@ -10,32 +10,33 @@ use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict, PyString, PyTuple};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Instances of one FMU, side by side; made by `Fmu.instances`.
+/// Instances of one FMU, run in parallel; made by `Fmu.instances`.
 ///
-/// Every call does the same with all of them, in threads and without the GIL. Arrays are (n,) where one variable is named by a
-/// text, (n, variables) where several are named by a sequence; values that are set may also be one number or one row for all.
-/// Arrays are written in place if they are given as `out`.
+/// Every call acts on all of them, in threads and without the GIL. Arrays have the shape (n,) if one variable
+/// is given as a str, and (n, variables) for a sequence of str. Values to set may also be one number or one
+/// row for all. Arrays passed as `out` are written in place.
 ///
-/// An instance that the FMU refuses something drops out: `errors` says why, what is read of it is not a number, the others go
-/// on; `reset` and `restore` bring it back. The call in which the last one drops out raises FmuError with the reason, as do all
-/// calls after it until one is brought back.
+/// If a call fails for an instance, the instance drops out and the others continue. `errors` contains the
+/// reason; values read from the instance are NaN. `reset` and `restore` make it usable again. If the last
+/// instance drops out, the call raises FmuError with the reason. Later calls raise FmuError as well until an
+/// instance is usable again.
 #[pyclass(frozen, module = "fmu_run")]
 pub struct Instances {
     system: System,
     count: usize,
     held: Arc<Mutex<fmu_run::Instances>>,
-    /// What names stand for that were given before, by the objects they were given as.
+    /// Cache of looked-up names, by the objects that named them.
     known: Mutex<Vec<(Py<PyAny>, Arc<Named>)>>,
 }
 
-/// The variables that a call names, and whether by one text.
+/// Variables of a call, and whether a single str named them.
 #[derive(Default)]
 struct Named {
     selection: Selection,
     one: bool,
 }
 
-/// States that instances have saved; freed with this.
+/// Saved states of instances; freed with this object.
 #[pyclass(frozen, module = "fmu_run")]
 pub struct States {
     held: Arc<Mutex<fmu_run::Instances>>,
@@ -54,7 +55,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Which instances: true in a sequence of n truth values.
+/// Mask: a sequence of n Booleans, true for the selected instances.
 type Given<'py> = Option<Bound<'py, PyAny>>;
 
 #[pymethods]
@@ -96,11 +97,11 @@ impl Instances {
         format!("<Instances: {} of {}{failed}>", self.count, self.system.name())
     }
 
-    /// dict[int, str]: those that have dropped out, and why, in the words of the FMU.
+    /// dict[int, str]: the instances that have dropped out, each with the reason from the FMU.
     #[getter]
     fn errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let errors = PyDict::new(py);
-        // Nothing of Python's while it is locked: a States that is collected wants the lock, too.
+        // Calls no Python code while the lock is held: dropping a States object takes the lock, too.
         let found: Vec<_> = lock(&self.held).errors().map(|(place, why)| (place, why.to_owned())).collect();
         for (place, why) in found {
             errors.set_item(place, why)?;
@@ -108,7 +109,7 @@ impl Instances {
         Ok(errors)
     }
 
-    /// (n,): the time of each, s.
+    /// (n,): the time of each instance, s.
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (array, mut room) = Room::of(py, None, &[self.count])?;
@@ -116,32 +117,32 @@ impl Instances {
         Ok(array)
     }
 
-    /// (n,): when the next event of each is due, s; not a number where none is.
+    /// (n,): the time of the next event of each instance, s; NaN if there is none.
     #[getter]
     fn next_event_time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.of_events(py, |event| event.next.unwrap_or(f64::NAN))
     }
 
-    /// (n,): 1 where the last event has changed continuous states, else 0.
+    /// (n,): 1 if the last event of the instance has changed continuous states, else 0.
     #[getter]
     fn states_changed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.of_events(py, |event| f64::from(u8::from(event.states_changed)))
     }
 
-    /// (n,): 1 where the FMU wants to end the simulation, else 0.
+    /// (n,): 1 if the instance requests the end of the simulation, else 0.
     #[getter]
     fn wants_to_end<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.of_events(py, |event| f64::from(u8::from(event.terminate)))
     }
 
-    /// Set variables: a number or a row for all, or an array with one for each.
+    /// Set variables: a number or a row for all instances, or an array with a row for each.
     ///
     /// Parameters
     /// ----------
     /// variables : str or sequence of str
     /// values : number, (n,) for a str; number, (variables,) or (n, variables) for a sequence
     /// mask : (n,) of bool, optional
-    ///     Which instances; all if it is not given.
+    ///     Selected instances; all by default.
     #[pyo3(signature = (variables, values, mask=None))]
     fn set(
         &self,
@@ -153,7 +154,7 @@ impl Instances {
         self.put(py, variables, values, mask, fmu_run::Instances::set)
     }
 
-    /// Read variables: (n,) for a str, (n, variables) for a sequence; into `out` if it is given.
+    /// Read variables: (n,) for a str, (n, variables) for a sequence; written to `out` if it is given.
     #[pyo3(signature = (variables, out=None))]
     fn get<'py>(
         &self,
@@ -168,7 +169,8 @@ impl Instances {
         })
     }
 
-    /// list[str | None]: the text of a variable in each; None of those that have dropped out.
+    /// list[str | None]: the value of a string variable in each instance; None for an instance that has
+    /// dropped out.
     fn texts(&self, py: Python, variable: &str) -> PyResult<Vec<Option<String>>> {
         let mut texts = Vec::new();
         self.attempt(py, |all| {
@@ -178,7 +180,7 @@ impl Instances {
         Ok(texts)
     }
 
-    /// A step of Co-Simulation: by `size`, or to the time `to`, s.
+    /// Perform a step of Co-Simulation: by `size`, or to the time `to`, s.
     #[pyo3(signature = (size=None, *, to=None, mask=None))]
     fn step(&self, py: Python, size: Option<f64>, to: Option<f64>, mask: Given) -> PyResult<()> {
         self.only(Interface::CoSimulation)?;
@@ -190,7 +192,7 @@ impl Instances {
         }
     }
 
-    /// Set variables, step and read others, in one go: `set`, `step` and `get`.
+    /// Set variables, perform a step and read other variables in one call: `set`, `step` and `get`.
     #[pyo3(signature = (set, values, size, get, out=None))]
     fn advance<'py>(
         &self,
@@ -212,14 +214,14 @@ impl Instances {
         Ok(array)
     }
 
-    /// Back to the start values, initialized.
+    /// Reset the instances to their start values and initialize them.
     ///
     /// Parameters
     /// ----------
     /// mask : (n,) of bool, optional
-    ///     Which instances; all if it is not given.
+    ///     Selected instances; all by default.
     /// start : dict, optional
-    ///     New start values by name, in place of those given before: numbers, (n,), or texts.
+    ///     Start values by name that replace earlier ones: numbers, (n,), or strings.
     #[pyo3(signature = (mask=None, *, start=None))]
     fn reset(&self, py: Python, mask: Given, start: Option<Bound<'_, PyDict>>) -> PyResult<()> {
         let (mask, start) = (self.mask(mask)?, Start::of(&self.system, start.as_ref())?);
@@ -230,7 +232,7 @@ impl Instances {
         })
     }
 
-    /// Save the state of each, with its time.
+    /// Save the state and the time of each instance.
     fn save(&self, py: Python) -> PyResult<States> {
         let mut states = None;
         self.attempt(py, |all| {
@@ -240,7 +242,7 @@ impl Instances {
         Ok(States { held: Arc::clone(&self.held), states: states.map(Arc::new) })
     }
 
-    /// Go back to states that these instances have saved.
+    /// Restore states that these instances have saved.
     #[pyo3(signature = (states, mask=None))]
     fn restore(&self, py: Python, states: &States, mask: Given) -> PyResult<()> {
         let (mask, states) = (self.mask(mask)?, self.own(states)?);
@@ -250,7 +252,8 @@ impl Instances {
         })
     }
 
-    /// Saved states as bytes, for another process: one for each instance, None for those that had dropped out.
+    /// Return saved states as bytes, for use in another process: one for each instance, None for an instance
+    /// without a state.
     fn serialize<'py>(&self, py: Python<'py>, states: &States) -> PyResult<Vec<Option<Bound<'py, PyBytes>>>> {
         let states = self.own(states)?;
         let mut found = Vec::new();
@@ -261,13 +264,14 @@ impl Instances {
         Ok(found.into_iter().map(|bytes| bytes.map(|bytes| PyBytes::new(py, &bytes))).collect())
     }
 
-    /// States of bytes that `serialize` has made, here or in another process: one for each instance, None for those that have none.
+    /// Read states from the bytes that `serialize` returned, here or in another process: one or None for each
+    /// instance.
     fn deserialize(&self, py: Python, states: Vec<Option<PyBackedBytes>>) -> PyResult<States> {
         let read = py.detach(|| lock(&self.held).deserialize(&states)).map_err(python)?;
         Ok(States { held: Arc::clone(&self.held), states: Some(Arc::new(read)) })
     }
 
-    /// The derivatives of unknowns in the direction of a seed.
+    /// Compute directional derivatives of unknowns for a seed.
     ///
     /// Parameters
     /// ----------
@@ -298,7 +302,7 @@ impl Instances {
         Ok(array)
     }
 
-    /// Co-Simulation, FMI 2.0: time derivatives of inputs, of order 1, in the shapes of `set`.
+    /// Co-Simulation, FMI 2.0: set time derivatives of inputs, of order 1, in the shapes of `set`.
     #[pyo3(signature = (variables, values, mask=None))]
     fn set_input_derivatives(
         &self,
@@ -311,7 +315,7 @@ impl Instances {
         self.put(py, variables, values, mask, fmu_run::Instances::set_input_derivatives)
     }
 
-    /// Co-Simulation: time derivatives of outputs, of order 1, in the shapes of `get`.
+    /// Co-Simulation: read time derivatives of outputs, of order 1, in the shapes of `get`.
     #[pyo3(signature = (variables, out=None))]
     fn get_output_derivatives<'py>(
         &self,
@@ -326,7 +330,7 @@ impl Instances {
         })
     }
 
-    /// Model Exchange: the time of each, s: a number or (n,).
+    /// Model Exchange: set the time, s: a number for all instances or (n,).
     #[pyo3(signature = (time, mask=None))]
     fn set_time(&self, py: Python, time: &Bound<'_, PyAny>, mask: Given) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
@@ -334,7 +338,7 @@ impl Instances {
         self.attempt(py, |all| all.set_time(time.values(), mask.as_deref()))
     }
 
-    /// Model Exchange: the continuous states, (states,) for all or (n, states).
+    /// Model Exchange: set the continuous states, (states,) for all instances or (n, states).
     #[pyo3(signature = (states, mask=None))]
     fn set_continuous_states(&self, py: Python, states: &Bound<'_, PyAny>, mask: Given) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
@@ -346,39 +350,40 @@ impl Instances {
         })
     }
 
-    /// Model Exchange: the continuous states, (n, states).
+    /// Model Exchange: read the continuous states, (n, states).
     #[pyo3(signature = (out=None))]
     fn get_continuous_states<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.continuous(py, Continuous::States, out)
     }
 
-    /// Model Exchange: the derivatives of the continuous states, (n, states).
+    /// Model Exchange: read the derivatives of the continuous states, (n, states).
     #[pyo3(signature = (out=None))]
     fn get_derivatives<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.continuous(py, Continuous::Derivatives, out)
     }
 
-    /// Model Exchange: the nominal values of the continuous states, (n, states).
+    /// Model Exchange: read the nominal values of the continuous states, (n, states).
     #[pyo3(signature = (out=None))]
     fn get_nominals<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.continuous(py, Continuous::Nominals, out)
     }
 
-    /// Model Exchange: the event indicators, (n, indicators).
+    /// Model Exchange: read the event indicators, (n, indicators).
     #[pyo3(signature = (out=None))]
     fn get_event_indicators<'py>(&self, py: Python<'py>, out: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.continuous(py, Continuous::EventIndicators, out)
     }
 
-    /// Model Exchange: an event with all its rounds, and back to Continuous-Time Mode. What it did is told by
-    /// `next_event_time`, `states_changed` and `wants_to_end`.
+    /// Model Exchange: handle an event with all its iterations, and return to Continuous-Time Mode.
+    /// `next_event_time`, `states_changed` and `wants_to_end` contain the results.
     ///
     /// Parameters
     /// ----------
     /// variables, values : optional
-    ///     What is set in Event Mode before the event, as by `set`: what is discrete can be set only there.
+    ///     Values to set in Event Mode before the event, as for `set`. Discrete variables can be set only
+    /// there.
     /// mask : (n,) of bool, optional
-    ///     Which instances; all if it is not given.
+    ///     Selected instances; all by default.
     #[pyo3(signature = (variables=None, values=None, *, mask=None))]
     fn handle_events(&self, py: Python, variables: Given, values: Given, mask: Given) -> PyResult<()> {
         self.only(Interface::ModelExchange)?;
@@ -396,11 +401,11 @@ impl Instances {
         self.attempt(py, |all| all.handle_events((&named.selection, values), mask.as_deref()))
     }
 
-    /// Model Exchange: a step of the integrator is complete.
+    /// Model Exchange: report a completed step of the integrator.
     ///
     /// Returns
     /// -------
-    /// (n, 2): 1 where an instance wants an event, and where it wants the end, else 0
+    /// (n, 2): 1 if an instance requests an event, and 1 if it requests the end of the simulation, else 0
     fn completed_integrator_step<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.only(Interface::ModelExchange)?;
         self.read(py, Some(2), None, |all, values| {
@@ -411,9 +416,9 @@ impl Instances {
 }
 
 impl Instances {
-    /// What the names stand for; those that were given before as the same object are not looked up again.
+    /// Looks up variables by name; results are cached by the identity of the Python object.
     fn named(&self, variables: &Bound<'_, PyAny>) -> PyResult<Arc<Named>> {
-        /// Objects that are remembered.
+        /// Size of the cache.
         const MOST: usize = 64;
         let mut known = lock(&self.known);
         if let Some((_, named)) = known.iter().find(|(object, _)| object.is(variables)) {
@@ -426,7 +431,7 @@ impl Instances {
         };
         let selection = self.system.select(&names).map_err(python)?;
         let named = Arc::new(Named { selection, one: text.is_ok() });
-        // A list may be another one next time.
+        // A list is mutable, so it is not cached.
         if text.is_ok() || variables.is_instance_of::<PyTuple>() {
             known.truncate(MOST - 1);
             known.insert(0, (variables.clone().unbind(), Arc::clone(&named)));
@@ -447,12 +452,12 @@ impl Instances {
         Err(PyValueError::new_err(why))
     }
 
-    /// The shape of an array with so many columns for each instance, or with none.
+    /// Returns the shape of an array with a row of `columns` values, or a single value, for each instance.
     fn shape(&self, columns: Option<usize>) -> Vec<usize> {
         std::iter::once(self.count).chain(columns).collect()
     }
 
-    /// Values that fit: one for all, a row for all, or a row for each.
+    /// Checks the shape of values: one for all, a row for all, or a row for each instance.
     fn fitting(&self, columns: Option<usize>, values: Numbers) -> PyResult<Numbers> {
         let (whole, length) = (self.shape(columns), columns.unwrap_or(1));
         match &values {
@@ -471,7 +476,7 @@ impl Instances {
         }
     }
 
-    /// Fails unless they are for this interface, before an instance is asked what it must refuse.
+    /// Fails if the instances are for another interface type, before the FMU would reject the call.
     fn only(&self, wanted: Interface) -> PyResult<()> {
         let why = match (wanted, lock(&self.held).interface()) {
             (wanted, interface) if wanted == interface => return Ok(()),
@@ -485,7 +490,7 @@ impl Instances {
         Err(PyValueError::new_err(why))
     }
 
-    /// The states, if they are of these instances.
+    /// Returns the states if they belong to these instances.
     fn own(&self, states: &States) -> PyResult<Arc<fmu_run::States>> {
         let own = states.states.clone().filter(|_| Arc::ptr_eq(&self.held, &states.held));
         own.ok_or_else(|| {
@@ -495,7 +500,7 @@ impl Instances {
         })
     }
 
-    /// A call without the GIL; raises if no instance is left, before it or after it.
+    /// Runs a call without the GIL; raises FmuError if no instance is left before or after it.
     fn attempt(
         &self,
         py: Python,
@@ -511,7 +516,7 @@ impl Instances {
         self.revive(py, body)
     }
 
-    /// A call that may bring instances back.
+    /// Runs a call that may make instances usable again.
     fn revive(
         &self,
         py: Python,
@@ -525,7 +530,7 @@ impl Instances {
         left.map_err(python)?.map_or(Ok(()), |why| Err(FmuError::new_err(why)))
     }
 
-    /// Hands values of variables over, by rows or one for all.
+    /// Sets values of variables: a row for each instance or one for all.
     fn put(
         &self,
         py: Python,
@@ -577,7 +582,7 @@ impl Instances {
 }
 
 impl Named {
-    /// The columns of an array; a text stands for none.
+    /// Returns the number of columns of an array; None for a single str.
     fn columns(&self) -> Option<usize> {
         (!self.one).then(|| self.selection.len())
     }

@@ -1,5 +1,5 @@
-//! The part of the Python package `fmu_run` that is written in Rust: `fmu_run._native`. What users see is in
-//! `fmu_run/__init__.py`.
+//! The Rust part of the Python package `fmu_run`: the module `fmu_run._native`. `fmu_run/__init__.py`
+//! contains the public interface.
 
 mod buffers;
 mod instances;
@@ -20,10 +20,10 @@ use std::time::Duration;
 
 create_exception!(fmu_run, FmuError, PyException, "An FMU that cannot be loaded or run, or refuses a run.");
 
-/// How often Ctrl-C is looked for and progress is told.
+/// Interval for checks of Ctrl-C and reports of progress.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// An FMU or a system that is unpacked and loaded, until it is closed.
+/// An unpacked and loaded FMU or system, until it is closed.
 #[pyclass(frozen, module = "fmu_run._native")]
 struct Loaded(Mutex<Option<Model>>);
 
@@ -56,11 +56,11 @@ type Described = (
     Option<f64>,
     Option<f64>,
 );
-/// Outputs and the inputs they feed, by stages.
+/// Outputs and connected inputs, by stage.
 type Stages = Vec<Vec<(String, String)>>;
-/// Texts by run.
+/// Messages by run.
 type Told = Vec<(usize, String)>;
-/// Courses and measures, (runs, outputs, times or measures) each, errors, notes and start values.
+/// Trajectories and statistics, (runs, outputs, times or statistics) each, errors, notes and start values.
 type Result5<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Told, Told, Bound<'py, PyDict>);
 
 fn python(error: Error) -> PyErr {
@@ -74,27 +74,27 @@ fn python(error: Error) -> PyErr {
 
 #[pymethods]
 impl Loaded {
-    /// An FMU.
+    /// Loads an FMU.
     #[new]
     fn new(py: Python, path: PathBuf, execution_tool: bool) -> PyResult<Self> {
         let open = if execution_tool { Fmu::open_with_execution_tool } else { Fmu::open };
-        // SAFETY: the user names a file that is an FMU; its library is trusted as any extension module is.
+        // SAFETY: the user passes a file that is an FMU and trusts its library like any extension module.
         #[allow(unsafe_code)]
         let fmu = py.detach(|| unsafe { open(&path) }).map_err(python)?;
         Ok(Self(Mutex::new(Some(Model::Fmu(fmu)))))
     }
 
-    /// A system from an SSP.
+    /// Loads a system from an SSP file.
     #[staticmethod]
     fn ssp(py: Python, path: PathBuf, order: &str) -> PyResult<Self> {
         let order = order_of(order)?;
-        // SAFETY: as in `new`.
+        // SAFETY: the user trusts the libraries, as in `new`.
         #[allow(unsafe_code)]
         let system = py.detach(|| unsafe { System::open(&path, order) }).map_err(python)?;
         Ok(Self(Mutex::new(Some(Model::System(system)))))
     }
 
-    /// FMUs that are wired: components by name, connections from outputs to inputs.
+    /// Connects FMUs: components by name, connections from outputs to inputs.
     #[staticmethod]
     fn wired(
         name: &str,
@@ -128,12 +128,12 @@ impl Loaded {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).is_none()
     }
 
-    /// Factor and offset: value in the other unit = factor * value + offset.
+    /// Returns factor and offset: value in the other unit = factor * value + offset.
     fn display_unit(&self, name: &str, unit: &str) -> PyResult<(f64, f64)> {
         self.model()?.display_unit(name, unit).map_err(python)
     }
 
-    /// Of an FMU: edition of the standard, name of the model, token, whether there may be one instance only.
+    /// Returns, for an FMU: FMI version, model name, token, and whether a process may have only one instance.
     fn about(&self) -> PyResult<(String, String, String, bool)> {
         let Model::Fmu(fmu) = self.model()? else {
             return Err(PyValueError::new_err("a system has no model description"));
@@ -147,7 +147,7 @@ impl Loaded {
         Ok((version.to_owned(), about.model_name.clone(), about.token.clone(), once))
     }
 
-    /// Of a system: its name, the stages of its connections, when its experiment ends.
+    /// Returns, for a system: name, stages of its connections, and stop time.
     fn about_system(&self) -> PyResult<(String, Stages, Option<f64>)> {
         let system = self.model()?;
         let stages = system
@@ -167,7 +167,7 @@ impl Loaded {
         Ok(self.model()?.variables().map(describe).collect())
     }
 
-    /// Sees to Ctrl-C, which ends all runs after their steps, and calls progress(done, runs).
+    /// Performs the runs. Ctrl-C ends all runs after their current steps. Calls progress(done, runs).
     #[allow(clippy::too_many_arguments, reason = "named where it is called")]
     fn run<'py>(
         &self,
@@ -233,7 +233,7 @@ fn numbers(given: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<(String, Number
     given.iter().map(|(name, values)| Ok((name.clone(), Numbers::of(values)?))).collect()
 }
 
-/// Numbers that are always the same, courses that all runs share, or one for each run.
+/// Converts numbers to constants, time series for all runs, or time series for each run.
 fn courses(given: &[(String, Numbers)]) -> Vec<(&str, Course<'_>)> {
     let course = given.iter().map(|(name, values)| match values.shape() {
         [] => (name.as_str(), Course::Constant(values.values()[0])),
@@ -243,7 +243,7 @@ fn courses(given: &[(String, Numbers)]) -> Vec<(&str, Course<'_>)> {
     course.collect()
 }
 
-/// The runs, in other threads; this one listens to Python.
+/// Performs the runs in other threads; this thread handles Python signals.
 fn carry_out(
     py: Python,
     planned: &Planned,
@@ -252,7 +252,7 @@ fn carry_out(
 ) -> PyResult<[Told; 2]> {
     let watch = Watch::default();
     let (sender, receiver) = channel();
-    // Messages may be sent to one thread only.
+    // `Receiver` is not `Sync`, so `detach` needs a mutex around it.
     let receiver = Mutex::new(receiver);
     std::thread::scope(|scope| {
         scope.spawn(|| sender.send(planned.run(&watch, courses, measures)));
@@ -280,7 +280,7 @@ fn carry_out(
     })
 }
 
-/// `fmu_run._native`.
+/// The module `fmu_run._native`.
 #[pymodule]
 mod _native {
     #[pymodule_export]

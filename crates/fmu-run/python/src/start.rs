@@ -6,7 +6,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
-/// By name: a number or an array with one for each run or instance, a text or a sequence of such.
+/// Start values by name: a number or an array with one for each run or instance, a string or a sequence of
+/// strings.
 #[derive(Default)]
 pub struct Start(Vec<(String, Value, Py<PyAny>)>);
 
@@ -17,7 +18,7 @@ enum Value {
 }
 
 impl Start {
-    /// Values that are given as (value, unit) become those in the unit of their variable.
+    /// Reads start values. Converts values given as (value, unit) to the unit of their variable.
     pub fn of(system: &System, given: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut start = Self::default();
         for (name, value) in given.into_iter().flatten() {
@@ -28,12 +29,12 @@ impl Start {
         Ok(start)
     }
 
-    /// As Rust has them.
+    /// Returns the values for the Rust interface.
     pub fn values(&self) -> Vec<(&str, fmu_run::Start<'_>)> {
         self.0.iter().map(|(name, of, _)| (name.as_str(), of.value())).collect()
     }
 
-    /// As Python has them, in the units of the variables.
+    /// Returns the values as Python objects, in the units of the variables.
     pub fn dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let dict = PyDict::new(py);
         for (name, _, value) in &self.0 {
@@ -43,7 +44,7 @@ impl Start {
     }
 }
 
-/// (value, unit) in the unit of the variable; what has no unit as it is.
+/// Converts (value, unit) to the unit of the variable; returns a value without unit unchanged.
 fn in_own_unit<'py>(system: &System, name: &str, value: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let Ok((number, unit)) = value.extract::<(Bound<'py, PyAny>, String)>() else { return Ok(value) };
     if number.is_instance_of::<PyString>() {

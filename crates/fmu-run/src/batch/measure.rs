@@ -1,8 +1,8 @@
-//! What is calculated of a course on the way.
+//! Statistics of trajectories, calculated during a run.
 
 use std::str::FromStr;
 
-/// A number that stands for a course: for all its times, whether they are kept or not.
+/// A statistic of a trajectory over all times, including times that are not kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
     /// The smallest value.
@@ -11,7 +11,7 @@ pub enum Measure {
     Max,
     /// The largest magnitude.
     Peak,
-    /// When that is reached first, s.
+    /// Time at which the peak is reached first, s.
     TimeOfPeak,
     /// The mean of the samples.
     Mean,
@@ -22,7 +22,7 @@ pub enum Measure {
 }
 
 impl Measure {
-    /// All of them, with their names.
+    /// All statistics, with their names.
     pub const ALL: [(&str, Self); 7] = [
         ("min", Self::Min),
         ("max", Self::Max),
@@ -46,7 +46,7 @@ impl FromStr for Measure {
     }
 }
 
-/// What is remembered of the courses of all outputs, as far as the measures need it.
+/// Running data of all outputs for the requested statistics.
 #[derive(Clone, Debug)]
 pub(super) struct Measured {
     extremes: bool,
@@ -81,7 +81,7 @@ impl Measured {
         }
     }
 
-    /// Forgets the run before.
+    /// Clears the data of the previous run.
     pub fn begin(&mut self) {
         self.count = 0.0;
         self.min.fill(f64::INFINITY);
@@ -91,7 +91,7 @@ impl Measured {
         self.squares.fill(0.0);
     }
 
-    /// The outputs at a time.
+    /// Adds the outputs at a time.
     #[inline]
     pub fn add(&mut self, time: f64, row: &[f64]) {
         self.count += 1.0;

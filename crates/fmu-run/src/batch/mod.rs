@@ -11,64 +11,66 @@ use crate::error::Error;
 use crate::start::Start;
 use crate::system::System;
 
-/// What is to be run. A value for each run is what makes it many runs; without one it is a single run.
+/// Specification of runs. If an input or a start value is given for each run, there are many runs; otherwise
+/// there is one.
 ///
-/// In each run all start values are set before the initialization, inputs of the first time in it. At each time the inputs
-/// are set, the outputs read, and the step to the next time is taken.
+/// In each run, start values are set before Initialization Mode, and inputs of the first time in it. At each
+/// time, inputs are set, outputs are read, and a step to the next time follows.
 #[derive(Clone, Debug, Default)]
 pub struct Batch<'a> {
-    /// The communication points, s: finite, each after the one before, two at least.
+    /// Communication points, s: finite, increasing, at least two.
     pub time: &'a [f64],
-    /// Inputs and what they do. Others stay at their start values.
+    /// Inputs and their values. All other inputs keep their start values.
     pub inputs: Vec<(&'a str, Course<'a>)>,
-    /// Time derivatives of order 1 of inputs, set with them (FMI 2.0 alone has these).
+    /// Time derivatives of inputs, of order 1, set together with the inputs (only FMI 2.0).
     pub input_derivatives: Vec<(&'a str, Course<'a>)>,
     /// Start values of parameters, states, inputs and so on.
     pub start: Vec<(&'a str, Start<'a>)>,
-    /// What is read; any variable that is a number.
+    /// Outputs to read: any numeric variables.
     pub outputs: Vec<&'a str>,
-    /// Outputs are kept at the first time and at each of this many from there; `None` keeps no courses.
+    /// Outputs are kept at the first time and then at each `every`-th time; `None` keeps no trajectories.
     pub every: Option<usize>,
-    /// What is calculated on the way, of each output, over all times.
+    /// Statistics of each output, over all times.
     pub measures: Vec<Measure>,
-    /// How many threads; `None` takes as many as the machine has processors.
+    /// Number of threads; `None` uses one thread for each processor.
     pub threads: Option<usize>,
-    /// Read outputs as each step leaves them, before the next inputs are set, as section 4.2.4 of FMI 2.0 has it to the
-    /// letter, and FMPy. What depends on inputs at once, without a step, is then late by a step.
+    /// Whether outputs are read directly after a step, before the next inputs are set. Section 4.2.4 of FMI
+    /// 2.0 describes this order, and FMPy uses it. Outputs that depend directly on inputs then lag by one
+    /// step.
     pub read_before_set: bool,
 }
 
-/// What an input does.
+/// Values of an input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Course<'a> {
-    /// The same value always.
+    /// One constant value.
     Constant(f64),
-    /// A value for each time, the same in each run.
+    /// A value for each time, equal in all runs.
     Shared(&'a [f64]),
-    /// A course for each run, one after the other: runs times times.
+    /// A time series for each run, concatenated: runs times times.
     EachRun(&'a [f64]),
 }
 
-/// How much comes of a [`Batch`].
+/// Size of the results of a [`Batch`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Size {
-    /// The number of runs.
+    /// Number of runs.
     pub runs: usize,
-    /// The number of outputs.
+    /// Number of outputs.
     pub outputs: usize,
-    /// How many times are [kept](Batch::every): the length of a course.
+    /// Number of [kept](Batch::every) times: the length of a trajectory.
     pub kept: usize,
-    /// The number of measures.
+    /// Number of statistics.
     pub measures: usize,
 }
 
 impl Size {
-    /// The number of all values of all courses; `None` if no memory holds so many.
+    /// Returns the number of values of all trajectories; `None` if they exceed the address space.
     pub fn courses(&self) -> Option<usize> {
         self.values(self.kept)
     }
 
-    /// The number of all measures; `None` if no memory holds so many.
+    /// Returns the number of all statistics; `None` if they exceed the address space.
     pub fn measures(&self) -> Option<usize> {
         self.values(self.measures)
     }
@@ -79,32 +81,33 @@ impl Size {
     }
 }
 
-/// What came of a [`Batch`].
+/// Results of a [`Batch`].
 #[derive(Clone, Debug, Default)]
 pub struct Runs {
-    /// The shape of what follows.
+    /// Shape of the results.
     pub size: Size,
-    /// Courses: runs, outputs, times, the last fastest. What a run has not reached is not a number.
+    /// Trajectories: runs, outputs, times; the last index varies fastest. Times that a run has not reached
+    /// are NaN.
     pub courses: Vec<f64>,
-    /// Measures: runs, outputs, measures, the last fastest. Those of runs that were refused are not a number, those of runs
-    /// that the FMU itself has ended are of the times until then.
+    /// Statistics: runs, outputs, statistics; the last index varies fastest. They are NaN for a failed run.
+    /// If the FMU ended a run, they cover the times until then.
     pub measures: Vec<f64>,
-    /// The runs that have not reached the last time, in their order, how far they got and why, in the words of the FMU:
-    /// those it has refused, and those it has ended. Where it gave no reason, the run is made once more with logging on,
-    /// after all others, unless that takes much longer than these.
+    /// Runs that did not reach the last time, in ascending order, each with the time reached and the message
+    /// of the FMU. Either a call failed or the FMU ended the simulation. If a run failed without a message,
+    /// it is repeated with logging on after all other runs, unless this takes much longer.
     pub errors: Vec<(usize, String)>,
-    /// What is to be said of runs that have reached the last time: that the FMU ended there by itself, or refused to be
-    /// terminated.
+    /// Notes about runs that reached the last time: the FMU ended the simulation there, or its termination
+    /// failed.
     pub notes: Vec<(usize, String)>,
 }
 
 impl System {
-    /// Carries out the runs.
+    /// Performs the runs.
     ///
     /// # Errors
-    /// [`Error::Request`] when what is asked for does not fit the FMU or itself, [`Error::Memory`], [`Error::Fmu`] when there are
-    /// no threads, [`Error::Cancelled`]. A run that the FMU refuses, or makes no instance for, is no error here, see
-    /// [`Runs::errors`].
+    /// Returns [`Error::Request`] if the batch is inconsistent or does not fit the FMU. Also returns
+    /// [`Error::Memory`], [`Error::Cancelled`], or [`Error::Fmu`] if no threads can be made. A failed run is
+    /// not an error here; see [`Runs::errors`].
     pub fn run(&self, batch: &Batch, watch: &Watch) -> Result<Runs, Error> {
         let planned = self.plan(batch)?;
         let size = planned.size();
@@ -113,16 +116,16 @@ impl System {
         Ok(Runs { size, courses, measures, errors, notes })
     }
 
-    /// Checks a batch, for who has memory for its results.
+    /// Checks a batch, for callers that provide the memory for its results.
     ///
     /// # Errors
-    /// [`Error::Request`], as [`run`](Self::run).
+    /// Returns [`Error::Request`] as [`run`](Self::run) does.
     pub fn plan<'a>(&'a self, batch: &'a Batch) -> Result<Planned<'a>, Error> {
         Ok(Planned { system: self, plan: plan::Plan::of(self, batch)? })
     }
 }
 
-/// A [`Batch`] that fits its system, which stays loaded for it.
+/// A checked [`Batch`]; it keeps its system loaded.
 ///
 /// ```compile_fail,E0505
 /// fn close_too_early(fmu: fmu_run::Fmu, batch: fmu_run::Batch) {
@@ -137,7 +140,7 @@ pub struct Planned<'a> {
 }
 
 impl Planned<'_> {
-    /// How much comes of it.
+    /// Returns the size of the results.
     pub fn size(&self) -> Size {
         let plan = &self.plan;
         Size {
@@ -148,13 +151,14 @@ impl Planned<'_> {
         }
     }
 
-    /// Carries out the runs, into memory of the caller, as [`Runs`] has it; returns [`Runs::errors`] and [`Runs::notes`].
+    /// Performs the runs and writes the results to memory of the caller, in the layout of [`Runs`]. Returns
+    /// [`Runs::errors`] and [`Runs::notes`].
     ///
     /// # Errors
-    /// As [`System::run`].
+    /// Same errors as [`System::run`].
     ///
     /// # Panics
-    /// When there is too little room.
+    /// Panics if a slice is too short.
     pub fn run(
         &self,
         watch: &Watch,

@@ -1,4 +1,4 @@
-//! From names to value references: a batch that fits the FMU.
+//! Checks a batch and looks up its names.
 
 use super::{Batch, Course, Measure};
 use crate::error::{Error, request};
@@ -7,7 +7,7 @@ use crate::start::StartValues;
 use crate::system::{System, article};
 use fmi_abi::{BaseType, Interface};
 
-/// A batch after all checks.
+/// A checked batch.
 pub(super) struct Plan<'a> {
     pub time: &'a [f64],
     pub runs: usize,
@@ -21,7 +21,7 @@ pub(super) struct Plan<'a> {
     pub read_before_set: bool,
 }
 
-/// Inputs, and what each does.
+/// Inputs and their values.
 #[derive(Default)]
 pub(super) struct Inputs<'a> {
     pub variables: Selection,
@@ -33,13 +33,14 @@ pub(super) struct Inputs<'a> {
 pub(super) struct Values<'a> {
     values: &'a [f64],
     constant: f64,
-    /// From one run to the next, and from one time to the next; 0 where it makes no difference.
+    /// Increments of the index from one run to the next and from one time to the next; 0 if the values are
+    /// equal.
     of_run: usize,
     of_time: usize,
 }
 
 impl<'a> Values<'a> {
-    /// Those of a run, by time.
+    /// Returns the values of a run, by time.
     pub fn of_run(&self, run: usize) -> ByTime<'a> {
         let values = &self.values[(run * self.of_run).min(self.values.len())..];
         match self.of_time {
@@ -57,7 +58,7 @@ pub(super) struct ByTime<'a> {
 }
 
 impl ByTime<'_> {
-    /// The value at the time of this number.
+    /// Returns the value at the time with this index.
     #[inline]
     pub fn at(&self, time: usize) -> f64 {
         self.values.get(time).copied().unwrap_or(self.constant)
@@ -88,7 +89,7 @@ impl<'a> Plan<'a> {
         Ok(plan)
     }
 
-    /// How many times are kept.
+    /// Returns the number of kept times.
     pub fn kept(&self) -> usize {
         self.every.map_or(0, |every| self.time.len().div_ceil(every))
     }
@@ -163,7 +164,7 @@ fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
     Ok(time)
 }
 
-/// The number of runs, which all that have a value for each run agree on.
+/// Returns the number of runs; checks that all values for each run agree on it.
 fn runs(batch: &Batch) -> Result<usize, Error> {
     let mut found: Option<(&str, usize)> = None;
     let courses =

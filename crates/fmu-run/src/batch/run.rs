@@ -1,4 +1,4 @@
-//! Carries out a plan: threads over instances, each reset from run to run.
+//! Performs a plan: each thread has an instance, which it resets from run to run.
 
 use super::measure::Measured;
 use super::plan::{ByTime, Plan, Values};
@@ -11,13 +11,13 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{self, Duration};
 
-/// What is told of runs, by their numbers.
+/// Messages with the number of their run.
 pub(super) type Told = Vec<(usize, String)>;
 
-/// How much longer than the runs took [`ask`] may take.
+/// Maximum time for [`ask`], in addition to the time of the runs.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// How the caller of [`System::run`] looks on from another thread.
+/// Access for another thread to the progress of [`System::run`].
 #[derive(Debug, Default)]
 pub struct Watch {
     done: AtomicUsize,
@@ -28,17 +28,17 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// One that hears all messages of the FMU, whose logging is then on.
+    /// Creates a watch that receives all messages of the FMU. Logging is switched on.
     pub fn listening() -> Self {
         Self { messages: Some(Mutex::default()), ..Self::default() }
     }
 
-    /// The messages until now: the number of the run, the time of the communication point, the message.
+    /// Returns the messages so far, each with the number of the run and the time of the communication point.
     pub fn messages(&self) -> Vec<(usize, f64, Message)> {
         self.messages.as_ref().map(|messages| lock(messages).clone()).unwrap_or_default()
     }
 
-    /// The runs that the FMU itself has ended, and when, s.
+    /// Returns the runs that the FMU has ended, with their end times in s.
     pub fn ended(&self) -> Vec<(usize, f64)> {
         lock(&self.ended).clone()
     }
@@ -50,12 +50,12 @@ impl Watch {
         }
     }
 
-    /// How many runs are done, refused ones among them.
+    /// Returns the number of finished runs, including failed ones.
     pub fn done(&self) -> usize {
         self.done.load(Ordering::Relaxed)
     }
 
-    /// No run begins any more, and those under way end after their step.
+    /// Cancels the runs: no further run begins, and current runs end after their step.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
@@ -76,7 +76,7 @@ struct Row<'a> {
     measures: &'a mut [f64],
 }
 
-/// Fills the courses and the measures; returns the errors and the notes.
+/// Fills trajectories and statistics; returns errors and notes.
 pub(super) fn run(
     system: &System,
     plan: &Plan,
@@ -95,7 +95,7 @@ pub(super) fn run(
     let rows = rows.take(plan.runs).enumerate();
     let rows = Mutex::new(rows.map(|(run, (courses, measures))| Row { run, courses, measures }));
     let next = || rows.lock().unwrap_or_else(PoisonError::into_inner).next();
-    // One instance a thread, whoever takes the next run.
+    // Each thread has one instance and takes the next run.
     let found = pool.broadcast(|_| {
         let mut worker = Worker::new(system, plan, watch, None);
         let (mut failures, mut notes) = (Vec::new(), Vec::new());
@@ -132,8 +132,8 @@ pub(super) fn run(
     Ok([failures.into_iter().map(|(run, failure)| (run, failure.text)).collect(), notes])
 }
 
-/// Many FMUs give their reasons only where logging is on. Runs that failed without one are made again with it, as far as
-/// they got, after all others and with nothing kept of them but the reason.
+/// Repeats runs that failed without a message, because many FMUs give reasons only with logging on. Repeats
+/// each run up to its failure, after all other runs, and keeps only the message.
 fn ask(system: &System, plan: &Plan, watch: &Watch, until: time::Instant, failures: &mut [(usize, Failure)]) {
     let silent = Mutex::new(failures.iter_mut().filter(|(_, failure)| failure.is_silent));
     let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
@@ -156,7 +156,7 @@ fn ask(system: &System, plan: &Plan, watch: &Watch, until: time::Instant, failur
     });
 }
 
-/// Parts of the same length, as many as are asked for; empty ones after the values have come to an end.
+/// Returns the requested number of parts of equal length; parts after the end of the values are empty.
 fn split(values: &mut [f64], length: usize) -> impl Iterator<Item = &mut [f64]> {
     let mut rest = values;
     std::iter::repeat_with(move || {
@@ -166,37 +166,37 @@ fn split(values: &mut [f64], length: usize) -> impl Iterator<Item = &mut [f64]> 
     })
 }
 
-/// Why a run has not reached its last time.
+/// Failure of a run before its last time.
 struct Failure {
-    /// The number of the time at which it was refused, if it was initialized.
+    /// Index of the time of the failure; `None` before the end of the initialization.
     at: Option<usize>,
     text: String,
-    /// The FMU has not said why.
+    /// Whether the FMU gave no reason.
     is_silent: bool,
 }
 
-/// A thread's instance, and room for what goes to and fro.
+/// Instance and buffers of a thread.
 struct Worker<'a> {
     system: &'a System,
     plan: &'a Plan<'a>,
     watch: &'a Watch,
-    /// Logging is on, until then at most.
+    /// Deadline of a run with logging on; `None` without logging.
     logging: Option<time::Instant>,
     instance: Option<Running>,
     room: Room<'a>,
 }
 
 struct Room<'a> {
-    /// What the inputs of this run do.
+    /// Values of the inputs in this run.
     inputs: Vec<ByTime<'a>>,
     derivatives: Vec<ByTime<'a>>,
-    /// What goes to the FMU in one call.
+    /// Buffers for calls of the FMU.
     set: Vec<f64>,
     slopes: Vec<f64>,
     orders: Vec<i32>,
-    /// The outputs of a time, in their order.
+    /// Outputs at a time, in their order.
     row: Vec<f64>,
-    /// How many times the run has reached.
+    /// Number of times that the run has reached.
     rows: usize,
     measured: Measured,
 }
@@ -229,7 +229,7 @@ impl<'a> Worker<'a> {
         Self { system, plan, watch, logging, instance: None, room: Room::of(plan) }
     }
 
-    /// A run over these times. There may be something to note of one that reaches the last of them.
+    /// Performs a run over these times. May return a note if the run reaches the last time.
     fn run(
         &mut self,
         run: usize,
@@ -280,7 +280,7 @@ impl<'a> Worker<'a> {
         Err(Failure { at, text, is_silent: refusal.is_silent() })
     }
 
-    /// An instance as new, or why there is none, and whether that comes without a reason.
+    /// Returns a new or reset instance. The error contains the reason, and whether there is no message.
     fn instance(&mut self) -> Result<Running, (String, bool)> {
         let used = self.instance.take();
         let logging_on = self.logging.is_some() || self.watch.messages.is_some();
@@ -290,16 +290,17 @@ impl<'a> Worker<'a> {
     }
 }
 
-/// The number of the time, after the initialization, and what was refused.
+/// Index of the time (`None` before the end of the initialization) and the error.
 type Stopped = (Option<usize>, Refusal);
 
-/// What ends a run before its last time.
+/// Conditions that end a run early.
 struct Until<'a> {
     watch: &'a Watch,
     logging: Option<time::Instant>,
 }
 
-/// From the start values to the last of these times, or until the caller cancels or logging has taken too long.
+/// Runs an instance from the start values to the last time, or until the caller cancels or the deadline
+/// passes.
 fn follow(
     plan: &Plan,
     times: &[f64],
@@ -318,7 +319,7 @@ fn follow(
     };
     hear(times[0], instance);
     let measures = !plan.measures.is_empty();
-    // The places in a course that are filled, and how many times go by until the next is.
+    // Index of the next kept value in a trajectory, and number of times until then.
     let (kept, mut place, mut wait) = (plan.kept(), 0, 0);
     let mut ended: Option<Refusal> = None;
     for (k, &time) in times.iter().enumerate() {
@@ -327,7 +328,7 @@ fn follow(
             return Ok(());
         }
         if let Some(logged) = until.logging {
-            // Messages about earlier steps are no reason.
+            // Messages about earlier steps are not the reason of a later error.
             instance.forget_log();
             drop(instance.take_messages());
             if time::Instant::now() > logged {
@@ -344,7 +345,7 @@ fn follow(
             return Err(at(ended.unwrap_or(refusal)));
         }
         if keep {
-            // Not by chunks, whose number would be calculated anew each time.
+            // Avoids `chunks`, which would calculate the number of chunks each time.
             for (output, value) in room.row.iter().enumerate() {
                 courses[output * kept + place] = *value;
             }
@@ -378,7 +379,7 @@ fn follow(
     Ok(())
 }
 
-/// Start values before the initialization, inputs in it.
+/// Sets start values before Initialization Mode and inputs in it.
 fn start(plan: &Plan, instance: &mut Running, room: &mut Room, run: usize) -> Result<(), Refusal> {
     instance.begin(plan.time[0], plan.time.last().copied(), &plan.start, run)?;
     set_values(plan, instance, room, 0)?;

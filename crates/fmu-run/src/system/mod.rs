@@ -1,4 +1,4 @@
-//! FMUs that run as one.
+//! Systems of connected FMUs.
 
 mod order;
 mod ssp;
@@ -12,12 +12,12 @@ use fmi_abi::{BaseType, Interface};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// FMUs whose outputs feed each other's inputs, in Co-Simulation; they run as one FMU does, also side by side in
-/// [batches](System::run) and as [instances](System::instances). An [`Fmu`](crate::Fmu) is one of a single component.
+/// Connected FMUs in Co-Simulation. A system runs like one FMU, also in parallel in [batches](System::run)
+/// and as [instances](System::instances). An [`Fmu`](crate::Fmu) is a system with one component.
 ///
-/// Variables are named `component.variable`, or as the system itself calls its inputs and outputs. From one communication
-/// point to the next all components step from the values they were given there; when those are passed on is said by the
-/// [`Order`].
+/// Variables are named `component.variable`, or by the names of the system's inputs and outputs. From one
+/// communication point to the next, each component steps with its inputs at the first point. [`Order`]
+/// determines when outputs are passed to inputs.
 #[derive(Clone, Debug)]
 pub struct System(Arc<Whole>);
 
@@ -25,7 +25,7 @@ pub struct System(Arc<Whole>);
 struct Whole {
     name: String,
     parts: Vec<Part>,
-    /// Names of the system's own inputs and outputs, and the variables they stand for.
+    /// Names of the system's inputs and outputs, and the variables that they denote.
     connectors: BTreeMap<String, Vec<String>>,
     connections: Vec<(String, String)>,
     exchange: Exchange,
@@ -36,78 +36,80 @@ struct Whole {
 /// A component.
 #[derive(Debug)]
 pub(crate) struct Part {
-    /// Its name; empty where it is the only one.
+    /// Name; empty for a single component.
     pub name: String,
     pub fmu: Arc<Loaded>,
 }
 
-/// When outputs are passed on to the inputs they feed.
+/// Time at which outputs are passed to the connected inputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
-    /// At each communication point until all agree: an output is read after the inputs are set on which it depends without a
-    /// step, by what the FMUs say of their outputs. Where such dependencies go in a circle, an algebraic loop, the system is
-    /// refused.
+    /// At each communication point, until all values are consistent. An output is read after the inputs on
+    /// which it depends directly, according to the model description. Circular dependencies are an algebraic
+    /// loop, which is an error.
     #[default]
     Dependencies,
-    /// When a step is done all outputs are read, and when the next begins all inputs are set, as FMPy and libcosim do. What
-    /// depends on inputs without a step is late by one; so there are no algebraic loops.
+    /// After a step, all outputs are read; before the next step, all inputs are set, as in FMPy and libcosim.
+    /// Outputs that depend directly on inputs lag by one step, so there are no algebraic loops.
     Jacobi,
 }
 
-/// How FMUs are wired.
+/// Specification of a system: components and connections.
 #[derive(Clone, Debug, Default)]
 pub struct Wiring<'a> {
-    /// What the system is called.
+    /// Name of the system.
     pub name: &'a str,
-    /// Names and FMUs; one FMU may be there more than once.
+    /// Names and FMUs of the components; an FMU may occur several times.
     pub components: Vec<(&'a str, &'a Fmu)>,
-    /// Outputs and the inputs they feed, as `component.variable`.
+    /// Connections from outputs to inputs, as `component.variable`.
     pub connections: Vec<(&'a str, &'a str)>,
-    /// When values are passed on.
+    /// Time at which values are passed.
     pub order: Order,
 }
 
-/// How values are passed on: all of a stage are read, then all are set, then those of the next.
+/// Sequence of the exchange: all outputs of a stage are read and all its inputs are set, then the next stage
+/// follows.
 #[derive(Debug, Default)]
 pub(crate) struct Exchange {
     pub order: Order,
     pub stages: Vec<Stage>,
 }
 
-/// Outputs and the inputs they feed, one after the other.
+/// Outputs and the connected inputs, in the same order.
 #[derive(Debug)]
 pub(crate) struct Stage {
     pub outputs: Selection,
     pub inputs: Selection,
 }
 
-/// A start value, as it is set.
+/// A start value of a system.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StartValue {
-    /// A number, 0 and 1 for Booleans.
+    /// A number; 0 or 1 for a Boolean.
     Number(f64),
-    /// A text.
+    /// A string.
     Text(String),
 }
 
 /// A variable of a component.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Found<'a> {
-    /// Which component.
+    /// Index of the component.
     pub part: usize,
     pub of: &'a Variable,
     pub description: &'a Description,
-    /// The output that feeds it.
+    /// Name of the output that feeds the variable.
     pub fed_by: Option<&'a str>,
 }
 
 impl System {
-    /// Wires FMUs.
+    /// Connects FMUs.
     ///
     /// # Errors
-    /// [`Error::Request`] when components share a name, a variable is not there or of the wrong causality, the ends of a
-    /// connection do not fit, an input is fed twice, or there is an algebraic loop; [`Error::Fmu`] when an FMU has no
-    /// Co-Simulation, or can be there only once.
+    /// Returns [`Error::Request`] for duplicate names of components, unknown variables or wrong causalities.
+    /// It also reports connections that do not fit, inputs that are fed twice, and algebraic loops. Returns
+    /// [`Error::Fmu`] if an FMU does not support Co-Simulation, or a process may have only one instance of
+    /// it.
     pub fn connect(wiring: &Wiring) -> Result<Self, Error> {
         let parts =
             wiring.components.iter().map(|(name, fmu)| ((*name).to_owned(), Arc::clone(fmu.loaded())));
@@ -117,18 +119,19 @@ impl System {
         whole.finish(wiring.order)
     }
 
-    /// An FMU alone.
+    /// Creates a system with a single FMU.
     pub(crate) fn of_one(fmu: Loaded) -> Self {
         let name = fmu.description.model_name.clone();
         Self(Arc::new(Whole::of(&name, vec![Part { name: String::new(), fmu: Arc::new(fmu) }])))
     }
 
-    /// What it is called; for an FMU, its model.
+    /// Returns the name of the system; for an FMU, the name of its model.
     pub fn name(&self) -> &str {
         &self.0.name
     }
 
-    /// All variables of its components, by the names they have here; connectors of the system first.
+    /// Returns all variables with their names in the system: inputs and outputs of the system first, then
+    /// variables of the components.
     pub fn variables(&self) -> impl Iterator<Item = (String, &Variable)> {
         let own = self.0.connectors.iter();
         let own = own.filter_map(|(name, ends)| Some((name.clone(), self.0.look_up(ends.first()?)?.of)));
@@ -137,29 +140,29 @@ impl System {
         }))
     }
 
-    /// In which order values are passed on at a communication point: outputs and the inputs they feed, those of a stage
-    /// together.
+    /// Returns the sequence in which values are passed at a communication point: outputs and connected
+    /// inputs, by stage.
     pub fn stages(&self) -> Vec<Vec<(&str, &str)>> {
         let stages = self.0.exchange.stages.iter();
         let pairs = stages.map(|Stage { outputs, inputs }| outputs.names().iter().zip(inputs.names()));
         pairs.map(|pairs| pairs.map(|(from, to)| (from.as_str(), to.as_str())).collect()).collect()
     }
 
-    /// Start values that it came with.
+    /// Returns the start values of the system.
     pub fn start(&self) -> &[(String, StartValue)] {
         &self.0.start
     }
 
-    /// When the experiment it came with ends, s, if that is said.
+    /// Returns the stop time of the system's experiment, s, if given.
     pub fn stop_time(&self) -> Option<f64> {
         self.0.stop_time
     }
 
-    /// How a value in another unit becomes one in the variable's own: factor and offset, value in the other = factor * value
-    /// + offset.
+    /// Returns the conversion between the unit of a variable and another unit, as factor and offset: value in
+    /// the other unit = factor * value + offset.
     ///
     /// # Errors
-    /// [`Error::Request`] when the variable is not there, or its FMU does not say how these units belong together.
+    /// Returns [`Error::Request`] if the variable is unknown, or if its FMU does not define the conversion.
     pub fn display_unit(&self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
         self.find_first(name)?.display_unit(name, unit)
     }
@@ -172,12 +175,12 @@ impl System {
         &self.0.exchange
     }
 
-    /// The one FMU, if there are no others.
+    /// Returns the FMU of a system with a single FMU.
     pub(crate) fn sole(&self) -> Option<&Loaded> {
         self.parts().first().filter(|part| part.name.is_empty()).map(|part| &*part.fmu)
     }
 
-    /// Fails unless all components have this type of interface.
+    /// Fails if a component does not support this interface type.
     pub(crate) fn check_interface(&self, interface: Interface) -> Result<(), Error> {
         if interface == Interface::ModelExchange && self.sole().is_none() {
             return Err(Error::Fmu(format!("{} is a system, which has Co-Simulation only", self.name())));
@@ -185,12 +188,12 @@ impl System {
         self.parts().iter().try_for_each(|part| part.fmu.library(interface).map(drop))
     }
 
-    /// One at a time is all there may be in a process.
+    /// Returns whether a process may have only one instance.
     pub(crate) fn once_per_process(&self, interface: Interface) -> bool {
         self.parts().iter().any(|part| part.fmu.once_per_process(interface))
     }
 
-    /// How many threads instances may be in: those asked for, or one for each processor.
+    /// Returns the number of threads for instances: the requested number, or one for each processor.
     pub(crate) fn threads(&self, interface: Interface, asked: Option<usize>) -> Result<usize, Error> {
         if asked == Some(0) {
             return request("threads must be at least 1".to_owned());
@@ -201,10 +204,10 @@ impl System {
         Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)))
     }
 
-    /// The variables that have this name: more than one where an input of the system feeds several.
+    /// Returns the variables of this name: several if an input of the system feeds several.
     ///
     /// # Errors
-    /// [`Error::Request`] when there is none; one of a similar name is told.
+    /// Returns [`Error::Request`] if there is none; the message suggests a similar name.
     pub(crate) fn find(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         self.0.find(name)
     }
@@ -213,21 +216,21 @@ impl System {
         self.find(name).map(|found| found[0])
     }
 
-    /// Variables that are numbers.
+    /// Returns numeric variables of this name.
     pub(crate) fn find_numbers(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         let found = self.find(name)?;
         found.iter().try_for_each(|found| found.check_number(name))?;
         Ok(found)
     }
 
-    /// Variables that take a start value: inputs that are fed by outputs do not.
+    /// Returns variables that accept a start value. Inputs that are fed by outputs do not.
     pub(crate) fn find_startable(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         let found = self.find(name)?;
         found.iter().try_for_each(|found| found.check_start(name))?;
         Ok(found)
     }
 
-    /// Fails unless it is a Real input of a single FMU that takes derivatives of inputs.
+    /// Fails unless it is a Real input of a single FMU that accepts input derivatives.
     pub(crate) fn takes_input_derivative(&self, name: &str) -> Result<Vec<Found<'_>>, Error> {
         let offer = self.sole().and_then(|fmu| fmu.description.co_simulation.as_ref());
         if offer.is_none_or(|offer| !offer.input_derivatives) {
@@ -244,7 +247,7 @@ impl System {
         Ok(variables)
     }
 
-    /// Fails unless all components offer something by this interface.
+    /// Fails if a component lacks a capability for this interface type.
     pub(crate) fn check_offer(
         &self,
         interface: Interface,
@@ -265,7 +268,7 @@ impl Found<'_> {
         }
     }
 
-    /// Fails if an output feeds it.
+    /// Fails if an output feeds the variable.
     pub fn check_own(self, name: &str) -> Result<(), Error> {
         match self.fed_by {
             Some(output) => request(format!("{name} is fed by {output}, it cannot be set")),
@@ -273,7 +276,7 @@ impl Found<'_> {
         }
     }
 
-    /// Fails if it cannot be set after the initialization.
+    /// Fails if the variable cannot be set after the initialization.
     pub fn check_settable(self, name: &str) -> Result<(), Error> {
         self.check_own(name)?;
         if self.of.is_settable() {
@@ -286,7 +289,8 @@ impl Found<'_> {
         request(format!("{name} is read-only: it is {kind}"))
     }
 
-    /// Fails if it takes no start value (section 2.2.7 of FMI 2.0, 2.4.7.5 of FMI 3.0: what has one, or is set from outside).
+    /// Fails if the variable accepts no start value. Variables with a start value and variables set from
+    /// outside do (section 2.2.7 of FMI 2.0, 2.4.7.5 of FMI 3.0).
     pub fn check_start(self, name: &str) -> Result<(), Error> {
         self.check_own(name)?;
         let constant = self.of.variability.as_deref() == Some("constant");
@@ -327,7 +331,7 @@ impl Whole {
         }
     }
 
-    /// Checks the wiring and puts it into its order.
+    /// Checks the connections and sorts them into stages.
     fn finish(mut self, order: Order) -> Result<System, Error> {
         if self.parts.is_empty() {
             return request("a system needs one component at least".to_owned());
@@ -409,14 +413,15 @@ impl Whole {
     }
 }
 
-/// The name that is most like another, if one is. The derivative of a variable is seldom meant.
+/// Returns the most similar name, if one is similar enough. Derivatives rank lower, because users rarely mean
+/// them.
 pub fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
-    /// Names less similar than this have little in common.
+    /// Minimum similarity.
     const SIMILAR: f64 = 0.8;
     let wanted = name.to_lowercase();
     let similarity = |known: &String| {
         let known = known.to_lowercase();
-        // The beginning of a name, too, but not its first letter only.
+        // Prefixes of a name match too, if they have at least two letters.
         let short =
             known.len().min(wanted.len()) > 1 && (wanted.starts_with(&known) || known.starts_with(&wanted));
         let derived = known.starts_with("der(") && !wanted.starts_with("der(");

@@ -1,17 +1,17 @@
-//! In which order values are passed on at a communication point.
+//! Sequence in which values are passed at a communication point.
 
 use super::{Found, Order, Stage, Whole};
 use crate::error::{Error, request};
 use crate::selection::Selection;
 
-/// A connection: an output of a component and the input it feeds.
+/// A connection from an output of a component to an input.
 struct Wire<'a> {
     from: Found<'a>,
     to: Found<'a>,
 }
 
 impl Wire<'_> {
-    /// Whether the output of this one depends on the input of the other without a step.
+    /// Returns whether the output of this connection depends directly on the input of the other one.
     fn follows(&self, other: &Wire) -> bool {
         let depends_on = self.from.of.depends_on.as_ref();
         other.to.part == self.from.part
@@ -19,7 +19,7 @@ impl Wire<'_> {
     }
 }
 
-/// The stages, each after those that it needs.
+/// Returns the stages, each after the stages that it depends on.
 pub(super) fn stages(whole: &Whole, order: Order) -> Result<Vec<Stage>, Error> {
     let end = |name: &str| whole.find(name).map(|found| found[0]);
     let wires = whole.connections.iter().map(|(from, to)| Ok(Wire { from: end(from)?, to: end(to)? }));
@@ -42,7 +42,7 @@ pub(super) fn stages(whole: &Whole, order: Order) -> Result<Vec<Stage>, Error> {
     Ok((0..count).map(stage).collect())
 }
 
-/// For each connection the number of those that must be passed on before it, one after the other.
+/// Returns the level of each connection: the length of the longest chain of connections that must precede it.
 fn levels(whole: &Whole, wires: &[Wire]) -> Result<Vec<usize>, Error> {
     let mut levels: Vec<Option<usize>> = vec![None; wires.len()];
     for first in 0..wires.len() {

@@ -1,4 +1,4 @@
-//! Reads systems from SSP (System Structure and Parameterization 1.0).
+//! Reads systems from SSP files (System Structure and Parameterization 1.0).
 
 use super::{Order, Part, StartValue, System, Whole};
 use crate::error::Error;
@@ -8,18 +8,18 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What is read from `SystemStructure.ssd`.
+/// Content of `SystemStructure.ssd`.
 #[derive(Default)]
 struct Read {
     /// Components with the files of their FMUs, in their order.
     components: Vec<(String, String)>,
-    /// The connectors of systems.
+    /// Connectors of systems.
     connectors: Vec<String>,
     connections: Vec<(String, String)>,
     start: Vec<(String, Value)>,
 }
 
-/// A start value, with its unit.
+/// A start value with its unit.
 #[derive(Clone)]
 struct Value {
     kind: String,
@@ -28,16 +28,16 @@ struct Value {
 }
 
 impl System {
-    /// Unpacks an SSP, and loads and wires its FMUs. Systems in it may hold systems. A connector of the system itself is an input
-    /// or output by its name. Start values are those of its parameter bindings.
+    /// Unpacks an SSP file, then loads and connects its FMUs. Systems may be nested. A connector of the outer
+    /// system is an input or output with its name. Start values come from parameter bindings.
     ///
     /// # Safety
-    /// As of [`Fmu::open`](crate::Fmu::open), for each FMU in it.
+    /// The requirement of [`Fmu::open`](crate::Fmu::open), for each FMU in the file.
     ///
     /// # Errors
-    /// [`Error::Fmu`] when the file is no SSP, or an FMU in it cannot be loaded; [`Error::Request`] as
-    /// [`connect`](Self::connect), and for what is not supported: components that are no FMUs, parameter mappings, signal
-    /// dictionaries, transformations of what is passed on.
+    /// Returns [`Error::Fmu`] if the file is no SSP file, or one of its FMUs cannot be loaded. Returns
+    /// [`Error::Request`] as [`connect`](Self::connect) does, and for unsupported content: components that
+    /// are no FMUs, parameter mappings, signal dictionaries, transformations of connections.
     pub unsafe fn open(path: &Path, order: Order) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let folder = unpacked(path).map_err(|why| fail(why.replace("no FMU", "no SSP")))?;
@@ -57,7 +57,7 @@ impl System {
             let fmu = match loaded.get(source.as_str()) {
                 Some(fmu) => Arc::clone(fmu),
                 None => {
-                    // SAFETY: the caller's promise.
+                    // SAFETY: the caller guarantees that the libraries are sound.
                     let opened = unsafe { Loaded::open(&folder.path().join(source), false) };
                     let opened = opened.map_err(|error| {
                         let inside = format!("{}/", folder.path().display());
@@ -79,7 +79,7 @@ impl System {
 }
 
 impl Read {
-    /// A system whose elements' names begin with `path`.
+    /// Reads a system; names of its elements begin with `path`.
     fn system(&mut self, folder: &Path, node: Node, path: &str) -> Result<(), String> {
         self.bindings(folder, node, path)?;
         for connector in children(node, "Connectors") {
@@ -124,7 +124,7 @@ impl Read {
         Ok(())
     }
 
-    /// Start values that are bound to an element, later ones in place of earlier.
+    /// Reads the start values that are bound to an element; later values replace earlier ones.
     fn bindings(&mut self, folder: &Path, node: Node, path: &str) -> Result<(), String> {
         for binding in children(node, "ParameterBindings") {
             let path = format!("{path}{}", binding.attribute("prefix").unwrap_or_default());
@@ -163,8 +163,8 @@ impl Read {
         Ok(())
     }
 
-    /// Connections from component to component, through all connectors of systems between them, and the connectors of the
-    /// system itself.
+    /// Finds the connections between components, through all connectors of nested systems, and the connectors
+    /// of the outer system.
     fn wire(&self, whole: &mut Whole) {
         let is_own = |whole: &Whole, name: &str| whole.look_up(name).is_some();
         for (_, to) in &self.connections {
@@ -178,10 +178,10 @@ impl Read {
         }
     }
 
-    /// Where what arrives here comes from at last.
+    /// Returns the origin of a connection that ends here.
     fn origin<'a>(&'a self, end: &'a str) -> &'a str {
         let mut at = end;
-        // No way is longer than all connections, except in a circle.
+        // A path without a circle has at most as many steps as there are connections.
         for _ in &self.connections {
             match self.connections.iter().find(|(_, to)| to == at) {
                 Some((from, _)) => at = from,
@@ -191,8 +191,9 @@ impl Read {
         at
     }
 
-    /// By variables, in their own units. Those for inputs that outputs feed would not stay, those for connectors that lead
-    /// nowhere are for nothing: they are left out.
+    /// Returns the start values by variable, in the variable's unit. Omits values of inputs that outputs
+    /// feed, because outputs would overwrite them. Omits values of connectors without a connection, because
+    /// they have no effect.
     fn start_values(&self, whole: &Whole) -> Result<Vec<(String, StartValue)>, Error> {
         let mut all: Vec<(String, StartValue)> = Vec::new();
         for (name, Value { kind, text, unit }) in &self.start {

@@ -1,5 +1,5 @@
-//! The arguments of a call, from bytes: mostly sensible ones, so that simulations get somewhere, and everything else that
-//! a C caller can pass.
+//! Decodes the arguments of a call from bytes. Most are valid, so that simulations make progress; the rest
+//! covers everything that a C caller can pass.
 
 use arbitrary::{Result, Unstructured};
 use fmu_export::fmi2::types::*;
@@ -7,7 +7,7 @@ use fmu_export::{BaseType, Causality, Exported, Standard};
 use std::ffi::CStr;
 use std::ptr::null;
 
-/// The value references that functions have a use for.
+/// Value references, grouped by the functions that use them.
 pub struct Variables {
     all: u32,
     reals: Vec<u32>,
@@ -17,19 +17,19 @@ pub struct Variables {
     whole: Vec<u32>,
     booleans: Vec<u32>,
     texts: Vec<u32>,
-    /// The types that FMI 3.0 alone has functions for, by the ends of their names.
+    /// Variables of the types that exist only in FMI 3.0, by the final part of the function names.
     typed: [(&'static str, Vec<u32>); 10],
     states: usize,
     indicators: usize,
-    /// The value references of arrays and how many values each has, in FMI 3.0.
+    /// Value references of arrays in FMI 3.0, each with its number of values.
     arrays: Vec<(u32, usize)>,
 }
 
 impl Variables {
-    /// Those of a standard.
+    /// Collects the value references of a model in an FMI version.
     pub fn of<M: Exported>(standard: Standard) -> Self {
         let reference = |place| standard.reference(place);
-        // Elements of arrays are no variables in FMI 3.0.
+        // In FMI 3.0, elements of arrays are not variables.
         let is_one =
             |variable: &fmu_export::Variable<M>| standard == Standard::Fmi2 || variable.element() == 0;
         let those = |wanted: &dyn Fn(&fmu_export::Variable<M>) -> bool| {
@@ -73,13 +73,13 @@ impl Variables {
         }
     }
 
-    /// How many values these have.
+    /// Returns the number of values of these variables.
     fn values(&self, references: &[u32]) -> usize {
         let length = |reference: &u32| self.arrays.iter().find(|(array, _)| array == reference);
         references.iter().map(|reference| length(reference).map_or(1, |(_, length)| *length)).sum()
     }
 
-    /// Value references, mostly of variables that the function can use.
+    /// Chooses value references, mostly of variables that suit the function.
     fn references(&self, u: &mut Unstructured, count: usize, function: &str) -> Result<Vec<u32>> {
         let fitting = match function {
             "fmi2SetReal" if u.ratio(1, 2)? => &self.real_inputs,
@@ -103,7 +103,7 @@ impl Variables {
     }
 }
 
-/// What is wrong with a pointer. Wrong pointers that the FMU cannot recognize are not passed.
+/// Fault of a pointer. Wrong pointers that the FMU cannot detect are not passed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     None,
@@ -111,12 +111,12 @@ enum Fault {
     Misaligned,
 }
 
-/// The arguments of any function; each takes what it has a use for.
+/// Arguments for any function; each function uses some of them.
 #[derive(Clone, Debug)]
 pub struct CallArguments {
     pub vr: Vec<u32>,
     pub known: Vec<u32>,
-    /// How many values these have.
+    /// Number of values of `vr`.
     pub values: usize,
     pub known_values: usize,
     pub orders: Vec<i32>,
@@ -128,11 +128,11 @@ pub struct CallArguments {
     pub kind: i32,
     pub numbers: [f64; 3],
     faults: [Fault; 4],
-    /// A length that no array can have.
+    /// Whether to pass a length that no array can have.
     endless: bool,
 }
 
-/// Real numbers to try at least.
+/// Real numbers that are tried often.
 #[rustfmt::skip]
 const SPECIAL: [f64; 20] = [
     0.0, -0.0, 1.0, -1.0, 1e-9, 1e9, 1e150, -1e150, 1e308, -1e308, f64::MAX, f64::MIN, f64::EPSILON,
@@ -158,17 +158,17 @@ const CATEGORIES: [Option<&CStr>; 8] = [
 
 const STEP_SIZES: [f64; 8] = [1e-3, 1e-3, 1e-2, 1.0 / 60.0, 0.1, 2.0, 1e-9, 1e4];
 
-/// Any number.
+/// Chooses any number.
 fn wild(u: &mut Unstructured) -> Result<f64> {
     Ok(if u.ratio(2, 3)? { *u.choose(&SPECIAL)? } else { f64::from_bits(u.arbitrary()?) })
 }
 
-/// An ordinary number.
+/// Chooses an ordinary number.
 fn tame(u: &mut Unstructured) -> Result<f64> {
     Ok(f64::from(u.arbitrary::<i16>()?) / 8192.0)
 }
 
-/// An array; a long one repeats itself.
+/// Fills an array; a long array repeats its first elements.
 fn array<T: Clone>(count: usize, element: impl FnMut() -> Result<T>) -> Result<Vec<T>> {
     let first: Vec<T> = std::iter::repeat_with(element).take(count.min(16)).collect::<Result<_>>()?;
     Ok(first.into_iter().cycle().take(count).collect())
@@ -183,7 +183,7 @@ fn texts(u: &mut Unstructured, count: usize, known: &[Option<&CStr>]) -> Result<
     array(count, || Ok(u.choose(known)?.map_or(null(), CStr::as_ptr)))
 }
 
-/// The function of FMI 2.0 with arguments like these.
+/// Returns the function of FMI 2.0 with similar arguments.
 fn like(function: &str) -> &str {
     match function {
         "fmi3GetFloat64" => "fmi2GetReal",
@@ -232,7 +232,7 @@ impl CallArguments {
         } else {
             [wild(u)?, wild(u)?, wild(u)?]
         };
-        // Not all of 5000 with respect to 5000, which would take seconds.
+        // At most 100 knowns for many unknowns, because all 5000 by 5000 derivatives would take seconds.
         let known_count = if count > 100 { 100 } else { u.int_in_range(0..=6)? };
         let small = |u: &mut Unstructured| -> Result<i32> {
             Ok(if u.ratio(15, 16)? { u.int_in_range(0..=3)? } else { u.arbitrary()? })
@@ -241,7 +241,7 @@ impl CallArguments {
         if known_count == 0 && u.ratio(1, 8)? {
             known.push(u.arbitrary()?);
         }
-        // Not every second text a wrong one.
+        // Only a quarter of the calls may contain invalid strings.
         let good = if u.ratio(3, 4)? { &TEXTS[..5] } else { &TEXTS };
         let vr = variables.references(u, count, function)?;
         let (values, known_values) = (variables.values(&vr), variables.values(&known));
@@ -263,16 +263,18 @@ impl CallArguments {
         })
     }
 
-    /// The length to pass for arrays of `count` values.
+    /// Returns the length to pass for arrays of `count` values.
     pub fn count(&self, count: usize) -> usize {
         if self.endless { usize::MAX } else { count }
     }
 
-    /// The address to pass for an array with elements of this size that is at this place among the function's arrays.
+    /// Returns the address to pass for an array with elements of this size; `place` is its index among the
+    /// function's arrays.
     pub fn address(&self, place: usize, array: usize, size: usize) -> usize {
         match self.faults[place % self.faults.len()] {
             Fault::Null => 0,
-            // Never followed: the FMU refuses it. Bytes are never misaligned, and then there is no fault.
+            // Never dereferenced, because the FMU rejects the pointer. Bytes are always aligned, so they have
+            // no such fault.
             Fault::Misaligned if size > 1 => array + 1,
             _ => array,
         }

@@ -1,4 +1,4 @@
-//! One call of a function that works on an instance: what each argument is, is read off the standard's list.
+//! One call of a function on an instance. The list of functions gives the meaning of each argument.
 
 use super::arguments::CallArguments;
 use super::standards::Caller;
@@ -14,28 +14,28 @@ pub struct Call {
     pub arguments: CallArguments,
 }
 
-/// What a call answered, as bits: NaN compares too.
+/// Result of a call, with values as bits, so that NaN compares as well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     pub status: Status,
     pub values: Vec<u64>,
 }
 
-/// The functions of saved states have handles besides arguments: the session calls them.
+/// Returns whether a function has handles of saved states; the session calls such functions.
 pub fn has_handles(function: &str) -> bool {
     function.contains("FMUstate") || function.contains("FMUState")
 }
 
 impl Call {
-    /// Whether the state must be the same after an answer with this status. A step that ends early in FMI 2.0 has got
-    /// somewhere.
+    /// Returns whether a call with this status must leave the state unchanged. A step that ends early in FMI
+    /// 2.0 changes the state.
     pub fn must_not_change(&self, status: Status) -> bool {
         let early = self.function == "fmi2DoStep" && status == Status::Discard;
         status != Status::Ok && !early || self.function[4..].starts_with("Get")
     }
 
-    /// Calls the function. Panics if it answers what it must not: a status that no function here has, a value that is no
-    /// finite number, more values than were asked for.
+    /// Calls the function. Panics on an invalid result: an unexpected status, a value that is not finite, or
+    /// more values than requested.
     pub fn run<F: Caller>(&self, fmu: &F) -> Answer {
         let (name, a) = (self.function, &self.arguments);
         let list = signature(name).expect("a function of the standard").arguments;
@@ -54,7 +54,7 @@ impl Call {
                 (_, "stop_time") => (a.numbers[0] + a.numbers[2]).to_bits(),
                 (_, "step_size") => a.numbers[1].to_bits(),
                 (of, _) if of.ends_with("Real") || of.ends_with("Float64") => a.numbers[0].to_bits(),
-                // At times none.
+                // Sometimes passes an invalid Boolean.
                 (of, _) if of.ends_with("Boolean") => match flags.next() {
                     Some(0 | 2) => 0,
                     other => other.map_or(0, |flag| *flag as u64),
@@ -63,8 +63,9 @@ impl Call {
             }
         };
         let words: Vec<u64> = list.iter().map(word).collect();
-        // SAFETY: a function of this name, with pointers to as many values as the counts say, and one more: they live as long
-        // as `arrays`. What is NULL, misaligned or endless is refused and not followed.
+        // SAFETY: the function has this name, and each pointer refers to as many values as the counts give,
+        // plus one; they live as long as `arrays`. The FMU rejects NULL, misaligned and endless arrays
+        // without access.
         let status = unsafe { fmu.call(name, &words) };
         let discards = (name.ends_with("Status") || name.ends_with("DoStep")) && status == Status::Discard;
         assert!(discards || [Status::Ok, Status::Error].contains(&status), "{name} answers {status:?}");
@@ -90,7 +91,7 @@ impl Call {
         Answer { status, values }
     }
 
-    /// The number to pass for the size of this name.
+    /// Returns the number to pass for the size argument of this name.
     fn count(&self, of: &str) -> usize {
         let (a, adjoint) = (&self.arguments, self.function.contains("Adjoint"));
         match of {
@@ -98,17 +99,17 @@ impl Call {
             "n_seed" if !adjoint => a.known_values,
             "n_sensitivity" if adjoint => a.known_values,
             "n_seed" | "n_sensitivity" => a.count(a.values),
-            // At times another number of values.
+            // Sometimes passes a wrong number of values.
             "n_value" => a.count(a.values).saturating_add((a.kind == 3).into()),
             _ => a.count(a.vr.len()),
         }
     }
 }
 
-/// What is in an array before the FMU writes.
+/// Content of an array before the FMU writes to it.
 const UNTOUCHED: u8 = 0xa5;
 
-/// Numbers or pointers of one size, with two more behind them, aligned for any of them.
+/// Numbers or pointers of one size, followed by two more elements, aligned for any type.
 struct Elements {
     size: usize,
     memory: Vec<u64>,
@@ -126,7 +127,7 @@ impl Elements {
         self.memory.as_mut_ptr().expose_provenance()
     }
 
-    /// The bits of the element at this place.
+    /// Returns the bits of the element at this index.
     fn bits(&self, place: usize) -> u64 {
         let at = place * self.size;
         let shifted = self.memory[at / 8] >> (8 * (at % 8));
@@ -137,7 +138,7 @@ impl Elements {
         u64::from_le_bytes([UNTOUCHED; 8]) >> (64 - 8 * self.size)
     }
 
-    /// Whether nothing is written behind so many.
+    /// Returns whether nothing is written after `count` elements.
     fn end_untouched(&self, count: usize) -> bool {
         let all = 8 * self.memory.len() / self.size;
         (count..all).all(|place| self.bits(place) == self.untouched())
@@ -146,17 +147,17 @@ impl Elements {
 
 /// An array that a function reads or writes.
 struct Array {
-    /// The type of its elements, without the standard's name.
+    /// Type of the elements, without the prefix of the FMI version.
     of: &'static str,
     elements: Elements,
-    /// How many may be written, if any.
+    /// Number of elements that the function may write; `None` if it only reads.
     written: Option<usize>,
-    /// What the elements point to.
+    /// Memory to which the elements point.
     _bytes: Vec<u8>,
 }
 
 impl Array {
-    /// For the argument of this name, which points to such elements.
+    /// Creates the array for the argument of this name with this element type.
     fn new(
         (of, to_read): (&'static str, bool),
         name: &str,
@@ -185,14 +186,14 @@ impl Array {
             return Self { of, elements, written: Some(count), _bytes: bytes };
         }
         let address = |text: *const c_char| text.expose_provenance() as u64;
-        // As many as any count may say.
+        // Room for as many elements as any count may give.
         let room = a.values.max(a.known_values).max(a.vr.len()) + 2;
         let bits: Vec<u64> = match (of, name) {
             ("ValueReference", "known") => a.known.iter().map(|vr| u64::from(*vr)).collect(),
             ("ValueReference", _) => a.vr.iter().map(|vr| u64::from(*vr)).collect(),
             ("String", "categories") => a.categories.iter().map(|text| address(*text)).collect(),
             ("String", _) => a.texts.iter().map(|text| address(*text)).collect(),
-            // Some are longer than any variable here allows.
+            // Some sizes are larger than any variable here permits.
             ("usize", _) => a.integers.iter().map(|n| *n as u64 % (LONGEST + 1)).collect(),
             ("Binary", _) => {
                 bytes = a.reals.iter().flat_map(|value| value.to_le_bytes()).collect();
@@ -213,7 +214,7 @@ impl Array {
         Self { of, elements: Elements::new(size, count, bits), written: None, _bytes: bytes }
     }
 
-    /// Adds what was written, `sizes` being the array before it.
+    /// Adds the written values; `sizes` is the previous array.
     fn values(&self, count: usize, sizes: Option<&Elements>, values: &mut Vec<u64>) {
         if self.of == "EventInfo" {
             let bits = |place| self.elements.bits(place);
@@ -233,7 +234,7 @@ impl Array {
                 "Boolean" | "Clock" => truth(bits),
                 "String" => {
                     assert!(bits != 0, "no text");
-                    // SAFETY: a string of the FMU's, valid until the next call.
+                    // SAFETY: a string of the FMU, valid until the next call.
                     let text = unsafe { CStr::from_ptr(std::ptr::with_exposed_provenance(bits as usize)) }
                         .to_bytes();
                     assert!(std::str::from_utf8(text).is_ok(), "no UTF-8: {text:?}");
@@ -241,7 +242,7 @@ impl Array {
                 }
                 "Binary" => {
                     let size = sizes.expect("their sizes come before").bits(place) as usize;
-                    // SAFETY: as many bytes of the FMU's, valid until the next call.
+                    // SAFETY: bytes of the FMU with this length, valid until the next call.
                     let bytes = unsafe {
                         std::slice::from_raw_parts(std::ptr::with_exposed_provenance(bits as usize), size)
                     };
@@ -253,19 +254,19 @@ impl Array {
     }
 }
 
-/// The longest bytes that are set.
+/// Length of the longest bytes that are set.
 const LONGEST: u64 = 24;
 
-/// The bytes of `fmi2EventInfo`: five truth values, a gap, a number.
+/// Size of `fmi2EventInfo`: five Booleans, a gap, a number.
 const EVENT_INFO: usize = size_of::<fmu_export::fmi2::types::fmi2EventInfo>();
 
-/// The bits of a number, which is one.
+/// Checks that a number is finite and returns its bits.
 fn finite(value: f64) -> u64 {
     assert!(value.is_finite(), "{value} is no number to answer");
     value.to_bits()
 }
 
-/// The bits of a truth value, which is one.
+/// Checks that a Boolean is 0 or 1 and returns its bits.
 fn truth(flag: u64) -> u64 {
     assert!(flag <= 1, "{flag} is no truth value");
     flag

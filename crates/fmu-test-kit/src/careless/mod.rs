@@ -1,9 +1,11 @@
-//! A careless importer of either standard: bytes become calls, on several instances at once, and every answer is checked.
+//! A fault-injecting importer for both FMI versions: it decodes bytes into calls on several instances, and
+//! checks every result.
 //!
-//! After every call: the status is one that the standard has; a call that is refused, or only reads, has left the state
-//! as it was, byte for byte; every value is a finite number, a truth or a text; nothing is written behind an array;
-//! messages are clean. From time to time an instance's calls since its last saved state are made again, from that
-//! state, in the same or another instance: every answer and the final state must have the same bits.
+//! After every call, the importer checks that the status is valid, and that a rejected or reading call has
+//! left the serialized state unchanged. Values must be valid, nothing may be written after the end of an
+//! array, and messages must be clean. Sometimes the importer restores the last saved state of an instance,
+//! here or in another instance, and repeats the calls made since. All results and the final state must be
+//! bit-identical.
 //!
 //! The bytes come from [`random_bytes`] or from a fuzzer.
 
@@ -25,21 +27,21 @@ use std::marker::PhantomData;
 use std::ptr::{null, null_mut};
 use std::time::{Duration, Instant};
 
-/// How often each function was called, by status: OK, discarded, refused.
+/// Number of calls of each function by status: OK, discarded, rejected.
 pub type Tally = BTreeMap<&'static str, [u64; 3]>;
 
-/// Makes the calls that the bytes stand for and counts them.
+/// Decodes the bytes into calls, makes them and counts them.
 ///
 /// # Panics
-/// At the first broken promise.
+/// Panics at the first violated guarantee.
 pub fn run<F: Caller, M: Exported>(bytes: &[u8], tally: &mut Tally) {
     session::<F, M>(&F::make::<M>, bytes, tally, None);
 }
 
-/// Makes the calls on these functions of a model, and tells what was answered and logged, call by call.
+/// Makes the calls with these functions of a model, and returns the results and messages of each call.
 ///
 /// # Panics
-/// At the first broken promise.
+/// Panics at the first violated guarantee.
 pub fn record<M: Exported>(functions: crate::Functions, bytes: &[u8]) -> Vec<String> {
     let mut record = Vec::new();
     let make = |arguments: &Arguments| Importer::instantiate(functions, arguments);
@@ -68,14 +70,14 @@ fn session<F: Caller, M: Exported>(
     session.end();
 }
 
-/// One sequence of calls, made from bytes: [`run`] of a standard and a model.
+/// One sequence of calls, decoded from bytes: [`run`] for an FMI version and a model.
 pub type RunBytes = fn(&[u8], &mut Tally);
 
-/// Sequences of every model from seeds 0, 1, ... for some seconds, `ROBUSTNESS_SECONDS` if that is set, and of at least
-/// some seeds, so that what is checked of the counts does not depend on the machine. Prints the counts.
+/// Runs sequences of every model with seeds 0, 1, ... for some seconds, which `ROBUSTNESS_SECONDS` sets. Runs
+/// at least `at_least` seeds, so that checks of the counts do not depend on the machine. Prints the counts.
 ///
 /// # Panics
-/// When a sequence breaks a promise, or `ROBUSTNESS_SECONDS` is no number.
+/// Panics if a sequence violates a guarantee, or if `ROBUSTNESS_SECONDS` is no number.
 pub fn run_seeds(at_least: u64, models: &[(&str, RunBytes)]) -> Tally {
     let seconds = std::env::var("ROBUSTNESS_SECONDS").map_or(3, |text| text.parse().expect("a number"));
     let end = Instant::now() + Duration::from_secs(seconds);
@@ -83,7 +85,7 @@ pub fn run_seeds(at_least: u64, models: &[(&str, RunBytes)]) -> Tally {
     let mut seed = 0;
     while seed < at_least || Instant::now() < end {
         for (model, session) in models {
-            println!("{model}, seed {seed}"); // for who looks into a failure
+            println!("{model}, seed {seed}"); // to reproduce a failure
             session(&random_bytes(seed, 1 << 16), &mut tally);
         }
         seed += 1;
@@ -96,7 +98,7 @@ pub fn run_seeds(at_least: u64, models: &[(&str, RunBytes)]) -> Tally {
     tally
 }
 
-/// Bytes that look random and are the same in every run (splitmix64).
+/// Returns pseudorandom bytes that are equal in every run (splitmix64).
 pub fn random_bytes(seed: u64, count: usize) -> Vec<u8> {
     const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
     let mix = |z: u64| {
@@ -104,7 +106,8 @@ pub fn random_bytes(seed: u64, count: usize) -> Vec<u8> {
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
     };
-    // A begin of its own for each seed: from a multiple of the step the same bytes would come, only later.
+    // Mixed start value: seeds that differ by a multiple of the step would give the same bytes with an
+    // offset.
     let begin = mix(seed ^ STEP);
     (1..=count.div_ceil(8) as u64)
         .flat_map(|n| mix(begin.wrapping_add(n.wrapping_mul(STEP))).to_le_bytes())
@@ -118,14 +121,14 @@ struct Session<'a, F, M> {
     instances: [Option<Slot<F>>; 3],
     /// Saved states of each instance.
     states: [[*mut c_void; 3]; 3],
-    /// A serialized state, intact or not.
+    /// A serialized state, possibly damaged.
     saved: Vec<u8>,
     variables: arguments::Variables,
     tally: &'a mut Tally,
     model: PhantomData<M>,
 }
 
-/// An instance, where it was last saved, and what was done since.
+/// An instance, its last saved state, and the calls since then.
 struct Slot<F> {
     fmu: F,
     made_of: Arguments<'static>,
@@ -133,7 +136,7 @@ struct Slot<F> {
     since: Vec<(Call, Answer)>,
 }
 
-/// Calls that are remembered for a replay.
+/// Number of calls that are stored for a replay.
 const MEMORY: usize = 40;
 
 impl<F: Caller, M: Exported> Session<'_, F, M> {
@@ -152,7 +155,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         }
     }
 
-    /// Frees an instance, and with it what it has saved.
+    /// Frees an instance and its saved states.
     fn free(&mut self, index: usize) {
         self.instances[index] = None;
         self.states[index] = [null_mut(); 3];
@@ -176,7 +179,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
             }
             _ => {
                 let function = *u.choose(&callable::<F>())?;
-                // They end a simulation: rarely.
+                // These functions end a simulation, so they are rare.
                 if !function.ends_with("Reset") && !function.ends_with("Terminate") || u.ratio(1, 8)? {
                     self.call(index, function, u)?;
                 }
@@ -185,7 +188,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         Ok(())
     }
 
-    /// A new instance in place of another, which is freed before.
+    /// Makes an instance in place of another one, which is freed first.
     fn instantiate(&mut self, index: usize, u: &mut Unstructured) -> Result<()> {
         self.free(index);
         self.count(F::FREE, Status::Ok);
@@ -213,7 +216,8 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
             }
             made_of.resource_location = *u.choose(&texts)?;
             made_of.callbacks = u.arbitrary()?;
-            // None that is accepted differs: a model may show its name, which comes along with the states of others.
+            // Accepted names are all equal: a model may display its name, which is included in states of
+            // other instances.
             made_of.instance_name = match *u.choose(&texts)? {
                 Some(name) if !name.to_bytes().trim_ascii().is_empty() => Some(c"instance"),
                 refused => refused,
@@ -237,7 +241,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         Ok(())
     }
 
-    /// What needs no instance, and what must survive that there is none.
+    /// Makes calls without an instance, which must not crash.
     fn without_instance(&mut self, u: &mut Unstructured) -> Result<()> {
         let nothing = F::nothing::<M>();
         for function in nothing.check_version() {
@@ -251,10 +255,10 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         Ok(())
     }
 
-    /// The calls that random ones seldom make in this order.
+    /// Makes the calls that initialize an instance, which random sequences rarely contain.
     fn initialize(&mut self, index: usize) {
         let Some(slot) = &mut self.instances[index] else { return };
-        // With 0 for all times, which are not limited.
+        // Passes 0 for all arguments, so times have no limit.
         let begin = |function: &&'static str| (*function, slot.fmu.call_with_zeros(function));
         let statuses: Vec<_> = F::BEGINNING.iter().map(begin).collect();
         slot.start_over();
@@ -290,7 +294,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         Ok(())
     }
 
-    /// Makes the calls since the last saved state again, in this instance or in a new one.
+    /// Repeats the calls since the last saved state, in this instance or in another one.
     fn replay(&mut self, index: usize, elsewhere: bool) {
         let Some(slot) = &mut self.instances[index] else { return };
         let end = slot.fmu.bytes();
@@ -308,7 +312,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         }
     }
 
-    /// The six functions of saved states, at times on those of another instance.
+    /// Calls one of the six functions of saved states, sometimes with a state of another instance.
     fn handle(&mut self, index: usize, u: &mut Unstructured) -> Result<()> {
         let which = u.int_in_range(0..=self.states.len() - 1)?;
         let owner = if u.ratio(1, 8)? && !self.states[which][which].is_null() { which } else { index };
@@ -355,7 +359,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         }
         check_messages(messages);
         assert!([Status::Ok, Status::Error].contains(&status), "{function} answers {status:?}");
-        // Nowhere to free one is no error.
+        // Freeing through a NULL pointer is no error.
         let refused = status == Status::Error || function == free;
         assert!(!foreign || refused && !state.is_null(), "{function} takes another instance's state");
         if function == set && status == Status::Ok {
@@ -367,7 +371,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         Ok(())
     }
 
-    /// Replays what is left, then frees everything: instances with their states.
+    /// Replays the remaining calls, then frees all instances.
     fn end(mut self) {
         for index in 0..self.instances.len() {
             self.replay(index, index % 2 == 0);
@@ -377,9 +381,9 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
 }
 
 impl<F: Caller> Slot<F> {
-    /// Remembers calls from here on.
+    /// Starts a new record of calls at the current state.
     ///
-    /// From a state that is restored: start values that were refused are no part of it.
+    /// The state is restored immediately, because a state does not contain rejected start values.
     fn start_over(&mut self) {
         self.saved = self.fmu.bytes();
         self.fmu.restore(&self.saved);
@@ -387,12 +391,12 @@ impl<F: Caller> Slot<F> {
     }
 }
 
-/// The functions that are called with arguments that stand for themselves.
+/// Returns the functions without handles.
 fn callable<F: Caller>() -> Vec<&'static str> {
     F::functions().iter().copied().filter(|name| !has_handles(name)).collect()
 }
 
-/// The pointer to pass for one value; at times NULL or misaligned, which the FMU never follows.
+/// Returns a pointer for one value, sometimes NULL or misaligned; the FMU does not dereference such pointers.
 fn place<T>(value: &mut T, u: &mut Unstructured) -> Result<*mut T> {
     Ok(match u.int_in_range(0..=15_u8)? {
         0 => null_mut(),
@@ -401,7 +405,7 @@ fn place<T>(value: &mut T, u: &mut Unstructured) -> Result<*mut T> {
     })
 }
 
-/// Bytes that were no serialized state, or not quite; with a checksum that fits, at times.
+/// Damages some bytes of a serialized state, sometimes with a matching checksum.
 fn damage(bytes: &mut Vec<u8>, u: &mut Unstructured) -> Result<()> {
     if u.ratio(1, 2)? || bytes.len() < 16 {
         return Ok(());
@@ -419,7 +423,7 @@ fn damage(bytes: &mut Vec<u8>, u: &mut Unstructured) -> Result<()> {
     Ok(())
 }
 
-/// Messages that every importer shows as they are, and one at most about what is refused.
+/// Checks that messages are clean, and that at most one reports an error.
 fn check_messages(messages: Vec<Message>) {
     let refusals = messages.iter().filter(|message| ![Status::Ok, Status::Warning].contains(&message.status));
     assert!(refusals.count() <= 1, "{messages:#?}");

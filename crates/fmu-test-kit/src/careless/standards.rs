@@ -1,26 +1,26 @@
-//! What the careless importer calls most, and what it must know by name.
+//! Functions that the fault-injecting importer calls most, and those that it must know by name.
 
 use crate::{Either, Importer, fmi3};
 use fmu_export::Standard;
 use std::ffi::CStr;
 
-/// A standard as the careless importer speaks it.
+/// An FMI version for the fault-injecting importer.
 #[allow(missing_docs, reason = "names of functions")]
 pub trait Caller: Either + Sized {
     const STANDARD: Standard;
-    /// What importers call most in Co-Simulation.
+    /// Most frequent functions in Co-Simulation.
     const STEPS: &'static [&'static str];
-    /// What they call most in Model Exchange.
+    /// Most frequent functions in Model Exchange.
     const INTEGRATION: &'static [&'static str];
-    /// From a reset to the end of the initialization.
+    /// Functions from a reset to the end of the initialization.
     const BEGINNING: &'static [&'static str];
-    /// For Co-Simulation and for Model Exchange.
+    /// Functions that make instances, for Co-Simulation and for Model Exchange.
     const INSTANTIATE: [&'static str; 2];
     const FREE: &'static str;
-    /// Of saved states: get, set, free, size, serialize, de-serialize.
+    /// Functions of saved states: get, set, free, size, serialize, de-serialize.
     const HANDLES: [&'static str; 6];
 
-    /// Checks what needs no instance; the names of the functions.
+    /// Checks the functions without an instance; returns their names.
     fn check_version(&self) -> &'static [&'static str];
 }
 

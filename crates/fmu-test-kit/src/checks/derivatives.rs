@@ -1,11 +1,11 @@
-//! Derivatives that the FMU offers: with respect to variables (section 2.1.9 of FMI 2.0) and to time (4.2.1).
+//! Checks of derivatives: with respect to variables (section 2.1.9 of FMI 2.0) and to time (4.2.1).
 
 use super::*;
 use crate::{Importer, Random};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 
-/// Several unknowns and knowns at once, in any order and repeated: a matrix product.
+/// Checks several unknowns and knowns at once, in any order and repeated: the result is a matrix product.
 pub fn several_at_once<M: Exported>() {
     let mut random = Random(1);
     let fmu = Importer::in_mode::<M>(ModelExchange, ContinuousTime);
@@ -35,8 +35,8 @@ pub fn several_at_once<M: Exported>() {
     assert!(none.iter().all(|sum| *sum == 0.0), "without knowns the sum is empty");
 }
 
-/// Compares the derivatives of order 1 with differences of the values after short steps, from a state that comes back.
-/// `go_on` moves the inputs as they are expected to move.
+/// Compares time derivatives of order 1 with finite differences over short steps, each from the same saved
+/// state. `go_on` sets the inputs as a function of time.
 #[track_caller]
 pub fn output_derivatives_fit_steps<M: Exported>(
     fmu: &Importer,
@@ -61,14 +61,15 @@ pub fn output_derivatives_fit_steps<M: Exported>(
     for (i, place) in moving.iter().enumerate() {
         let expected =
             (-25.0 * y[0][i] + 48.0 * y[1][i] - 36.0 * y[2][i] + 16.0 * y[3][i] - 3.0 * y[4][i]) / (12.0 * H);
-        // What rounding does to the difference, and what is left of the series.
+        // Tolerance for the rounding error of the difference and the truncation error of the series.
         let tolerance = 1e-7 * (1.0 + y[0][i].abs() + expected.abs());
         let name = M::TABLE[*place as usize].name();
         assert!((found[i] - expected).abs() < tolerance, "{label}: {name}' is {expected}, not {}", found[i]);
     }
 }
 
-/// Right after the initialization and after each step, with derivatives of the inputs that are given.
+/// Checks output derivatives right after the initialization and after each step, with given input
+/// derivatives.
 pub fn output_derivatives_are_exact<M: Exported>() {
     let (fmu, inputs) = (Importer::of::<M>(CoSimulation), inputs::<M>());
     fmu.initialize(0.0);
@@ -78,7 +79,7 @@ pub fn output_derivatives_are_exact<M: Exported>() {
         let slopes: Vec<_> = inputs.iter().map(|_| random.between(-2.0, 2.0)).collect();
         fmu.set(&inputs, &values);
         fmu.give_rates(&inputs, &slopes);
-        // What the model has no use for stands still.
+        // An input whose derivative the model ignores is constant.
         let slopes: Vec<_> = inputs.iter().map(|place| fmu.rate(*place)).collect();
         let after =
             |h: f64| values.iter().zip(&slopes).map(|(value, slope)| value + slope * h).collect::<Vec<_>>();
@@ -93,8 +94,8 @@ pub fn output_derivatives_are_exact<M: Exported>() {
     }
 }
 
-/// Any Real variable has a derivative, 0 for parameters; the model's highest order is 1, and others are refused (section
-/// 4.3.1).
+/// Checks that every Real variable has a derivative, 0 for parameters. The highest order of the model is 1;
+/// higher orders are errors (section 4.3.1).
 pub fn derivatives_of_every_variable_and_order<M: Exported>() {
     let fmu = Importer::in_mode::<M>(CoSimulation, StepComplete);
     fmu.set(&inputs::<M>(), &signals::<M>(0.2));

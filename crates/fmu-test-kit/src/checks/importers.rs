@@ -1,5 +1,5 @@
-//! The sequences of calls that real importers were seen to make, odd ones included. What is in their sources or traces is
-//! replayed here call by call; every answer must be `fmi2OK` unless said otherwise.
+//! Call sequences of real importers, including unusual ones, taken from their sources or traces. Every status
+//! must be `fmi2OK` unless a comment states otherwise.
 
 use super::*;
 use crate::{Arguments, Importer};
@@ -23,8 +23,8 @@ fn initialize(fmu: &Importer, stop_time: Option<f64>) {
     fmu.ok(fmu.fmi2EnterInitializationMode());
 }
 
-/// Model Exchange only; fixed parameters after the initialization, states while in event mode, all outputs and locals in
-/// one call at the end of a step.
+/// OpenModelica: only Model Exchange. Sets fixed parameters after the initialization and states in Event
+/// Mode; reads all outputs and locals in one call at the end of a step.
 pub fn openmodelica<M: Exported>() {
     let fmu = Importer::with::<M>(&Arguments {
         logging_on: 1,
@@ -38,7 +38,7 @@ pub fn openmodelica<M: Exported>() {
     let states = M::STATES.len();
     let (mut x, mut rates) = (vec![f64::NAN; states], vec![f64::NAN; states]);
     fmu.ok(fmu.fmi2GetContinuousStates(x.as_mut_ptr(), states));
-    fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), states)); // still in event mode
+    fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), states)); // still in Event Mode
     fmu.enter_continuous_time();
     let mut values = Vec::new();
     for i in 0..200 {
@@ -55,7 +55,7 @@ pub fn openmodelica<M: Exported>() {
     fmu.ok(fmu.fmi2Terminate());
 }
 
-/// OMSimulator reads and writes one variable per call, all that are exposed, at every step.
+/// Reads all variables one by one, as OMSimulator does at every step.
 fn read_all_one_by_one<M: Exported>(fmu: &Importer) -> Vec<f64> {
     let read = |(vr, variable): (u32, &Variable<M>)| {
         let (mut real, mut integer) = (f64::NAN, -1);
@@ -69,8 +69,8 @@ fn read_all_one_by_one<M: Exported>(fmu: &Importer) -> Vec<f64> {
     (0..).zip(M::TABLE).map(read).collect()
 }
 
-/// With input extrapolation: derivatives of the declared order between slaves, and every step done twice around a saved
-/// state in a handle that is used again.
+/// OMSimulator with input extrapolation: passes derivatives of the declared order between slaves. Performs
+/// every step twice from a saved state, in a handle that is reused.
 pub fn omsimulator<M: Exported>() {
     let fmu = Importer::with::<M>(&Arguments {
         visible: true,
@@ -109,7 +109,7 @@ pub fn omsimulator<M: Exported>() {
     fmu.ok(fmu.fmi2Terminate());
 }
 
-/// It ignores a NULL from fmi2Instantiate and goes on with it: errors, no crash.
+/// OMSimulator ignores a NULL from fmi2Instantiate and makes further calls, which must return errors.
 pub fn omsimulator_without_instance<F: Either, M: Exported>() {
     let arguments = Arguments { guid: Some(c"{stale}".into()), ..Arguments::of::<M>(CoSimulation) };
     assert!(F::make::<M>(&arguments).is_err());
@@ -118,8 +118,8 @@ pub fn omsimulator_without_instance<F: Either, M: Exported>() {
     }
 }
 
-/// Variables before SetupExperiment, time in whole nanoseconds, instances stepped side by side, each time by another
-/// thread.
+/// libcosim: sets variables before fmi2SetupExperiment, counts time in integer nanoseconds, and steps
+/// instances in parallel, each step in another thread.
 pub fn libcosim<M: Exported>() {
     const STEP: i64 = 16_666_667;
     const SLAVES: usize = 6;
@@ -153,14 +153,14 @@ pub fn libcosim<M: Exported>() {
         let expected = (0..120).fold(Vec::new(), |_, i| step(&alone, i));
         assert_eq!(last, expected, "slave {number}");
     }
-    // The destructor terminates, whatever went wrong before; the log category is streamed, so never NULL.
+    // The destructor calls terminate after any error. It prints the log category, which must not be NULL.
     let broken = slaves.pop().expect("a slave");
     assert_eq!(broken.try_step(0.0, f64::NAN), Status::Error);
     assert!(broken.take_log().iter().all(|message| !message.category.is_empty()));
     broken.ok(broken.fmi2Terminate());
 }
 
-/// FMPy with set_input_derivatives: derivatives while initializing, outputs right after it.
+/// FMPy with set_input_derivatives: sets derivatives in Initialization Mode, reads outputs right after it.
 pub fn fmpy<M: Exported>() {
     let fmu = Importer::of::<M>(CoSimulation);
     change_parameters::<M>(&fmu, 1);
@@ -178,8 +178,9 @@ pub fn fmpy<M: Exported>() {
     fmu.ok(fmu.fmi2Terminate());
 }
 
-/// Maestro (INTO-CPS) asks for the derivative of an output by the value reference of the derivative variable; PyFMI
-/// extrapolates inputs with orders 1 and 2, asks for those that the description has, and raises on anything but `fmi2OK`.
+/// Maestro (INTO-CPS) requests the derivative of an output by the value reference of the derivative variable.
+/// PyFMI extrapolates inputs with orders 1 and 2 and requests output derivatives of the orders in the
+/// description. PyFMI raises an exception for any status but `fmi2OK`.
 pub fn maestro_and_pyfmi<M: Exported>() {
     let fmu = Importer::in_mode::<M>(CoSimulation, StepComplete);
     let inputs = inputs::<M>();
@@ -194,8 +195,8 @@ pub fn maestro_and_pyfmi<M: Exported>() {
     }
 }
 
-/// FMIKit (Simulink) sets no input before the end of the initialization, reads before it sets, and has communication
-/// points that are off by 3e-12; its fast restart begins again with a reset.
+/// FMIKit (Simulink) sets no input before the end of the initialization and reads before it sets. Its
+/// communication points are off by 3e-12, and its fast restart begins with a reset.
 pub fn fmikit<M: Exported>() {
     let fmu = Importer::of::<M>(CoSimulation);
     let run = || {

@@ -1,5 +1,6 @@
-//! What holds for every FMU with both interface types and all derivatives: [`every_check!`](crate::every_check) makes the
-//! tests for a model. What a model is moved by follows from its table.
+//! Checks that hold for every FMU with both interface types and all derivatives.
+//! [`every_check!`](crate::every_check) defines the tests for a model. The test inputs are derived from the
+//! variable table.
 
 mod derivatives;
 mod importers;
@@ -13,7 +14,7 @@ use crate::Either;
 use fmu_export::{BaseType, Causality, Exported, Interface, Mode, Variable};
 use std::ops::Range;
 
-/// A test for each check of a model: those of FMI 2.0, then those of both standards.
+/// Defines a test for each check of a model: checks of FMI 2.0, then checks of both FMI versions.
 #[macro_export]
 macro_rules! every_check {
     ($model:ty) => {
@@ -34,7 +35,7 @@ macro_rules! every_check {
     };
 }
 
-/// The places of the variables that are wanted.
+/// Returns the indices of the variables that satisfy `wanted`.
 pub fn places<M: Exported>(wanted: impl Fn(&Variable<M>) -> bool) -> Vec<u32> {
     (0..).zip(M::TABLE).filter(|(_, variable)| wanted(variable)).map(|(place, _)| place).collect()
 }
@@ -51,27 +52,27 @@ pub(crate) fn outputs<M: Exported>() -> Vec<u32> {
     places::<M>(|of| is_real(of) && of.causality() == Causality::Output)
 }
 
-/// Parameters of a type.
+/// Returns the parameters of a type.
 pub(crate) fn parameters<M: Exported>(base: BaseType) -> Vec<u32> {
     places::<M>(|of| of.base() == base && of.causality() == Causality::Parameter)
 }
 
-/// All that moves: outputs and locals.
+/// Returns all Reals that may change: outputs and locals.
 fn moving<M: Exported>() -> Vec<u32> {
     places::<M>(|of| is_real(of) && matches!(of.causality(), Causality::Output | Causality::Local))
 }
 
-/// What the inputs are at a time, 0 at 0.
+/// Returns the values of the inputs at a time; 0 at time 0.
 fn signals<M: Exported>(t: f64) -> Vec<f64> {
     (0..inputs::<M>().len()).map(|i| ((3 + i) as f64 * t).sin()).collect()
 }
 
-/// The time derivatives of that.
+/// Returns the time derivatives of [`signals`].
 fn slopes<M: Exported>(t: f64) -> Vec<f64> {
     (0..inputs::<M>().len()).map(|i| (3 + i) as f64).map(|f| f * (f * t).cos()).collect()
 }
 
-/// Other parameters than usual: Reals a little larger, so that ranges hold, all truths the same.
+/// Sets non-default parameters: Reals 1 % larger, which stays within their ranges, all Booleans to `truth`.
 fn change_parameters<M: Exported>(fmu: &dyn Either, truth: u8) {
     for place in parameters::<M>(BaseType::Boolean) {
         fmu.ok(fmu.set_boolean(place, truth));
@@ -81,7 +82,7 @@ fn change_parameters<M: Exported>(fmu: &dyn Either, truth: u8) {
     }
 }
 
-/// The start value of a Real parameter.
+/// Returns the start value of a Real parameter.
 pub(crate) fn start_of<M: Exported>(variable: &Variable<M>) -> Option<f64> {
     use fmu_export::{Setup, Value};
     if variable.causality() != Causality::Parameter {
@@ -93,7 +94,7 @@ pub(crate) fn start_of<M: Exported>(variable: &Variable<M>) -> Option<f64> {
     }
 }
 
-/// Every interface type that the model has, with every one of its modes that can be entered.
+/// Returns every interface type of the model with each of its modes that can be entered.
 pub fn modes_of_model<F: Either, M: Exported>() -> Vec<(Interface, Mode)> {
     let has_events = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
     let offered = [
@@ -106,16 +107,16 @@ pub fn modes_of_model<F: Either, M: Exported>() -> Vec<(Interface, Mode)> {
     all.filter(|pair| has_events || *pair != (Interface::CoSimulation, Mode::Event)).collect()
 }
 
-/// Every Real variable to the last bit.
+/// Returns the bits of every Real variable.
 fn observe<M: Exported>(fmu: &dyn Either) -> Vec<u64> {
     fmu.read(&places::<M>(is_real)).into_iter().map(f64::to_bits).collect()
 }
 
-/// A Co-Simulation run with uneven steps, from any step to any other.
+/// A Co-Simulation run with uneven steps; it can begin and end at any step.
 struct Run {
-    /// Whether derivatives of the inputs are given.
+    /// Whether input derivatives are set.
     slopes: bool,
-    /// What truths are.
+    /// Value of all Boolean parameters.
     truth: u8,
     points: Vec<f64>,
 }
@@ -156,7 +157,7 @@ impl Run {
         fmu.step(self.points[i], self.points[i + 1] - self.points[i]);
     }
 
-    /// From step to step; what is seen on the way.
+    /// Performs steps and returns the observed values.
     fn go<M: Exported>(&self, fmu: &dyn Either, steps: Range<usize>) -> Vec<Vec<u64>> {
         let see = |i| {
             self.set_inputs::<M>(fmu, i);

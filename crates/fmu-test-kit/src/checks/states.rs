@@ -1,4 +1,4 @@
-//! Saved states (section 2.1.8 of FMI 2.0, 2.2.7.4 of FMI 3.0), events and steps.
+//! Checks of saved states (section 2.1.8 of FMI 2.0, 2.2.7.4 of FMI 3.0), events and steps.
 
 use super::*;
 use crate::Random;
@@ -8,7 +8,7 @@ use fmu_export::Mode::*;
 use fmu_export::{BaseType, Status};
 use std::ptr::null_mut;
 
-/// From a saved state, also from its bytes and in another instance, all goes as it went.
+/// Checks that a run repeats bit-identically from a saved state, also from its bytes and in another instance.
 pub fn replay_is_bit_identical<F: Either, M: Exported>() {
     for run in Run::all() {
         for saved_at in [0, 1, 2, 3, 11] {
@@ -25,7 +25,7 @@ pub fn replay_is_bit_identical<F: Either, M: Exported>() {
             fmu.restore(&bytes);
             assert_eq!(run.go::<M>(&fmu, saved_at..Run::STEPS), expected, "from {saved_at}, serialized");
 
-            // Another instance, even one that was never initialized, takes the bytes.
+            // Another instance accepts the bytes, even if it was never initialized.
             let other = F::in_mode::<M>(CoSimulation, Instantiated);
             other.restore(&bytes);
             assert_eq!(run.go::<M>(&other, saved_at..Run::STEPS), expected, "from {saved_at}, elsewhere");
@@ -34,7 +34,7 @@ pub fn replay_is_bit_identical<F: Either, M: Exported>() {
     }
 }
 
-/// Inputs and their derivatives that wait for the step belong to the state.
+/// Checks that a state includes inputs and their derivatives that have been set for the next step.
 pub fn state_between_inputs_and_step<F: Either, M: Exported>() {
     for run in Run::all() {
         let (fmu, other) = (run.start::<F, M>(), F::in_mode::<M>(CoSimulation, Instantiated));
@@ -47,7 +47,7 @@ pub fn state_between_inputs_and_step<F: Either, M: Exported>() {
     }
 }
 
-/// Simulink steps back to operating points that it saved as bytes, in any order.
+/// Restores serialized states in any order, as Simulink does with its operating points.
 pub fn stepping_back_in_any_order<F: Either, M: Exported>() {
     let [run, ..] = Run::all();
     let fmu = run.start::<F, M>();
@@ -62,7 +62,7 @@ pub fn stepping_back_in_any_order<F: Either, M: Exported>() {
     }
 }
 
-/// What was read before the state was saved is read again, whatever was calculated in between.
+/// Checks that a restored state gives the values read before it was saved, after any calculations in between.
 pub fn values_come_back<F: Either, M: Exported>() {
     let [_, run, _] = Run::all();
     let fmu = run.start::<F, M>();
@@ -79,7 +79,7 @@ pub fn values_come_back<F: Either, M: Exported>() {
     fmu.forget(state);
 }
 
-/// A reset leaves nothing of a run behind (section 2.1.6 of FMI 2.0).
+/// Checks that a reset restores all values (section 2.1.6 of FMI 2.0).
 pub fn reset_is_a_new_beginning<F: Either, M: Exported>() {
     for (interface, mode) in modes_of_model::<F, M>() {
         let fmu = F::in_mode::<M>(interface, Initialization);
@@ -100,7 +100,7 @@ pub fn reset_is_a_new_beginning<F: Either, M: Exported>() {
     }
 }
 
-/// The same with an importer's integrator; the mode comes back, too.
+/// Checks that a run in Model Exchange repeats bit-identically from a saved state; the mode is restored, too.
 pub fn replay_in_model_exchange<F: Either, M: Exported>() {
     let fmu = F::in_mode::<M>(ModelExchange, ContinuousTime);
     let mut x = vec![0.0; M::STATES.len()];
@@ -129,7 +129,7 @@ pub fn replay_in_model_exchange<F: Either, M: Exported>() {
     fmu.forget(state);
 }
 
-/// Every state brings its mode, its time and its stop time back, also from a mode to an earlier one.
+/// Checks that every state restores its mode, time and stop time, even an earlier mode.
 pub fn every_mode_comes_back<F: Either, M: Exported>() {
     for (interface, mode) in modes_of_model::<F, M>() {
         let bytes = F::in_mode::<M>(interface, mode).bytes();
@@ -150,8 +150,8 @@ pub fn every_mode_comes_back<F: Either, M: Exported>() {
     fmu.refused("past the stop time", |fmu| fmu.try_step(2.5, 0.6));
 }
 
-/// The state machines differ, so a state stays within its standard: nothing is read from bytes of the other. And a handle is
-/// its instance's alone.
+/// Checks that bytes of a state are rejected in the other FMI version, because the state machines differ.
+/// Also checks that a handle is valid only in its instance.
 pub fn states_of_the_other_standard<F: Either, M: Exported>() {
     fn other<F: Either, O: Either, M: Exported>([from, to]: [&str; 2]) {
         for interface in [CoSimulation, ModelExchange] {
@@ -173,7 +173,8 @@ pub fn states_of_the_other_standard<F: Either, M: Exported>() {
     }
 }
 
-/// Each is reported; the state in the handle stays what it was. Miri, which is slow, changes one bit of each byte.
+/// Checks that any changed byte is detected and the state of the handle stays unchanged. Miri, which is slow,
+/// changes one bit of each byte.
 pub fn no_changed_byte_goes_unseen<F: Either, M: Exported>() {
     let changes = || 1..=if cfg!(miri) { 1 } else { u8::MAX };
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, ContinuousTime)] {
@@ -197,16 +198,16 @@ pub fn no_changed_byte_goes_unseen<F: Either, M: Exported>() {
     }
 }
 
-/// No call is fatal after a damaged state that the FMU accepts. Miri, which is slow, tries fewer.
+/// Checks that no call is fatal after a damaged state that the FMU accepts. Miri, which is slow, tries fewer.
 pub fn random_contents_break_nothing<F: Either, M: Exported>() {
     let accepted = survivors::<F, M>(11);
     assert!(accepted > DAMAGED / 10, "only {accepted} of {DAMAGED} were accepted");
 }
 
-/// How many damaged states are tried.
+/// Number of damaged states that are tried.
 pub const DAMAGED: usize = if cfg!(miri) { 60 } else { 3_000 };
 
-/// How many damaged states the FMU accepts.
+/// Returns the number of damaged states that the FMU accepts.
 pub fn survivors<F: Either, M: Exported>(seed: u64) -> usize {
     let fmu = F::in_mode::<M>(CoSimulation, StepComplete);
     let original = fmu.bytes();
@@ -214,7 +215,7 @@ pub fn survivors<F: Either, M: Exported>(seed: u64) -> usize {
     for _ in 0..DAMAGED {
         let mut bytes = original.clone();
         for _ in 0..=random.bits() % 3 {
-            // Odd numbers of every size, in the places where numbers begin and in others.
+            // Writes numbers of any magnitude, aligned with values or not.
             let at = MODE.end + random.bits() as usize % (bytes.len() - MODE.end - 16);
             let word = random.bits() >> (random.bits() % 64);
             let width = if random.between(0.0, 1.0) < 0.5 { 4 } else { 8 };
@@ -238,7 +239,7 @@ pub fn survivors<F: Either, M: Exported>(seed: u64) -> usize {
     accepted
 }
 
-/// An importer's own events, one after the other, and settling more than once: nothing happens.
+/// Checks that events of the importer, in any number, change nothing.
 pub fn events_of_the_importer<F: Either, M: Exported>() {
     let fmu = F::in_mode::<M>(ModelExchange, ContinuousTime);
     assert_eq!(fmu.completed_step(), [false; 2]);
@@ -249,7 +250,7 @@ pub fn events_of_the_importer<F: Either, M: Exported>() {
     }
 }
 
-/// Masters that wait for long take long steps. However long, an answer comes at once.
+/// Checks that a step of any size returns quickly, because importers may take very long steps.
 pub fn steps_of_any_size<F: Either, M: Exported>() {
     for step_size in [1e-300, 1e-9, 1.0, 1e9, 1e100, 1e300, 0.5 * f64::MAX] {
         let (answer, answers) = std::sync::mpsc::channel();

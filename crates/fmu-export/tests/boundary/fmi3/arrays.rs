@@ -38,7 +38,7 @@ fn names_and_places() {
     assert_eq!(Rod::STATES.len(), PIECES);
 }
 
-/// Several at once, scalars among them, in any order and repeated.
+/// Checks several arrays at once, with scalars, in any order and repeated.
 #[test]
 fn whole_arrays_are_read_and_set() {
     let fmu = Importer::in_mode::<Rod>(Interface::CoSimulation, Mode::StepComplete);
@@ -47,7 +47,7 @@ fn whole_arrays_are_read_and_set() {
     let both = [vr(Name::wall), vr(Name::power)];
     fmu.ok(fmu.fmi3SetFloat64(both.as_ptr(), 2, [30.0, 3.0, 4.0].as_ptr(), 3));
     assert_eq!(reals(&fmu, &[Name::power, Name::wall]), [3.0, 4.0, 30.0]);
-    // Row by row.
+    // Matrices are stored row by row.
     assert_eq!(reals(&fmu, &[Name::limits]), [10.0, 25.0, 12.5, 30.0]);
     fmu.ok(set(&fmu, Name::limits, &[1.0, 2.0, 3.0, 4.0]));
     assert_eq!(reals(&fmu, &[Name::limits]), [1.0, 2.0, 3.0, 4.0]);
@@ -69,7 +69,7 @@ fn whole_arrays_are_read_and_set() {
     fmu.ok(fmu.fmi3SetString(&vr(Name::labels), 1, texts.as_ptr(), 2));
     let mut read: [*const c_char; 2] = [null(); 2];
     fmu.ok(fmu.fmi3GetString(&vr(Name::reports), 1, read.as_mut_ptr(), 2));
-    // SAFETY: texts of the FMU's, until the next call.
+    // SAFETY: strings of the FMU, valid until the next call.
     let read = read.map(|text| unsafe { CStr::from_ptr(text) });
     assert_eq!(read, [c"one is warm", c"two is warm"]);
 }
@@ -86,7 +86,7 @@ fn states_and_their_derivatives_are_in_the_same_order() {
     assert_eq!(other.derivatives::<PIECES>(), fmu.derivatives());
 }
 
-/// Seeds and sensitivities of whole arrays.
+/// Checks seeds and sensitivities of whole arrays.
 #[test]
 fn partial_derivatives_of_arrays() {
     let fmu = Importer::in_mode::<Rod>(Interface::ModelExchange, Mode::ContinuousTime);
@@ -143,7 +143,7 @@ fn refusals_name_the_element() {
 
 macro_rules! rack {
     ($($name:ident: $type:ty, $kind:expr, $get:ident $set:ident;)+) => {
-        /// Two of every number that FMI 3.0 has.
+        /// A model with arrays of two values of every numeric type of FMI 3.0.
         #[derive(Clone, Default)]
         struct Rack {
             $($name: [$type; 2],)+
@@ -214,7 +214,7 @@ fn bytes_of_two() {
     fmu.ok(fmu.fmi3SetBinary(&vr, 1, sizes.as_ptr(), values.as_ptr(), 2));
     let (mut sizes, mut read) = ([0; 2], [null::<u8>(); 2]);
     fmu.ok(fmu.fmi3GetBinary(&vr, 1, sizes.as_mut_ptr(), read.as_mut_ptr(), 2));
-    // SAFETY: as many bytes of the FMU's, until the next call.
+    // SAFETY: bytes of the FMU with these lengths, valid until the next call.
     let read = [0, 1].map(|k| unsafe { std::slice::from_raw_parts(read[k], sizes[k]) });
     assert_eq!(read, [&b"abc"[..], b"d"]);
     fmu.refused_with(&["bytes[2]", "NULL"], |fmu| {

@@ -1,5 +1,5 @@
-//! Every function in every state, against the states of FMI 3.0 (sections 2.3, 3.2 and 4.2), typed in here once more:
-//! as in the text state by state.
+//! Every function in every state, compared with the states of FMI 3.0 (sections 2.3, 3.2 and 4.2). The table
+//! is copied here independently from the text, state by state.
 
 use crate::toys::*;
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
@@ -11,12 +11,12 @@ use fmu_test_kit::Either;
 use fmu_test_kit::checks::modes_of_model;
 use fmu_test_kit::fmi3::{FUNCTIONS, Importer};
 
-/// Section 2.3.1, super state FMU State Settable.
+/// Functions of the super state FMU State Settable, section 2.3.1.
 const EVERYWHERE: &str = "SetDebugLogging Reset GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize \
     SerializeFMUState DeserializeFMUState";
 
-/// Its states, with what Model Exchange and what Co-Simulation have more. `Set{VariableType}` and
-/// `Get{VariableType}` stand for all types.
+/// Functions of its states: common ones, further ones of Model Exchange, further ones of Co-Simulation.
+/// `Set*` and `Get*` represent the functions of all types.
 const STATES: [(Mode, &str, &str, &str); 6] = [
     (
         Instantiated,
@@ -68,7 +68,7 @@ const STATES: [(Mode, &str, &str, &str); 6] = [
     ),
 ];
 
-/// The calls beyond the standard, in interface types that have the function.
+/// Calls beyond the standard, in interface types that have the function.
 const TOLERATED: [(&str, &[Mode]); 6] = [
     ("EnterEventMode", &[Event]),
     ("SetTime", &[Initialization, Event]),

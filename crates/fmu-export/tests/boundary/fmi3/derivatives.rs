@@ -1,4 +1,4 @@
-//! Partial derivatives, derivatives of outputs, and what depends on what.
+//! Partial derivatives, derivatives of outputs, and dependencies.
 
 use crate::toys::oscillator::Name::{self, *};
 use crate::toys::{Oscillator, Sum};
@@ -18,7 +18,7 @@ fn moving() -> Importer {
     fmu
 }
 
-/// The adjoint derivative is the transposed of the directional one, bit for bit.
+/// Checks that the adjoint derivative is the transpose of the directional one, bit-identical.
 #[test]
 fn adjoint_is_transposed() {
     let fmu = moving();
@@ -30,7 +30,7 @@ fn adjoint_is_transposed() {
             assert_eq!(forward.to_bits(), adjoint.to_bits());
         }
     }
-    // And of all at once: seeds that are powers of two add up without rounding.
+    // Checks all at once: seeds that are powers of two add up without rounding.
     let (unknowns, knowns) =
         (UNKNOWNS.map(|name| reference(name as u32)), KNOWNS.map(|name| reference(name as u32)));
     let (rows, columns) = ([1.0, 2.0, -4.0, 0.5, 0.25], [1.0, -2.0, 8.0]);
@@ -59,7 +59,7 @@ fn lengths_and_kinds() {
     });
 }
 
-/// Which may be set at any time.
+/// Checks derivatives with respect to parameters, which may be set at any time.
 #[test]
 fn with_respect_to_parameters() {
     let fmu = moving();
@@ -90,7 +90,7 @@ fn of_outputs() {
     }
 }
 
-/// No importer is told more by the functions than by the description.
+/// Checks that no function returns dependencies; the description contains them.
 #[test]
 fn dependencies_are_in_the_description_alone() {
     let fmu = moving();

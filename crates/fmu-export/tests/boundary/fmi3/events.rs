@@ -1,4 +1,4 @@
-//! Events: of Model Exchange, of Co-Simulation with event mode and without, and steps that end early.
+//! Events in Model Exchange and in Co-Simulation with and without Event Mode, and steps that end early.
 
 use crate::toys::grumbler::{self, Trouble};
 use crate::toys::ticker::Name;
@@ -40,7 +40,7 @@ fn in_model_exchange() {
     assert_eq!(rates, [-1.0, -9.81]);
     fmu.ok(fmu.fmi3GetEventIndicators(&mut z, 1));
     assert_eq!(z, -0.1);
-    // Section 2.4.8: a variable stands for it.
+    // Section 2.4.8: a variable represents the event indicator.
     let vr = reference(indicator::<Ball>(0));
     assert_eq!(fmu.get([indicator::<Ball>(0)]), [-0.1]);
     fmu.refused("a calculated local", |fmu| fmu.fmi3SetFloat64(&vr, 1, &1.0, 1));
@@ -55,7 +55,7 @@ fn in_model_exchange() {
     fmu.ok(fmu.fmi3Terminate());
 }
 
-/// Section 2.3.5: states without reinit may be set in event mode.
+/// Section 2.3.5: states without reinit may be set in Event Mode.
 #[test]
 fn states_in_event_mode() {
     let fmu = Importer::of::<Oscillator>(ModelExchange);
@@ -89,7 +89,8 @@ fn the_importer_handles_them() {
     assert_eq!(fmu.do_step(0.25, 0.25), at(0.5, false));
 }
 
-/// Where it does not, they are handled within the step; FMI 2.0 has the same values.
+/// Checks that the library handles events within the step if the importer does not; FMI 2.0 gives equal
+/// values.
 #[test]
 fn the_library_handles_them() {
     for (event_mode, early) in [(fmi3False, fmi3False), (fmi3False, fmi3True)] {
@@ -103,7 +104,7 @@ fn the_library_handles_them() {
     fmu.initialize(0.0);
     fmu.step(0.0, 0.6);
     assert_eq!(fmu.get([SUM]), [3.0]);
-    // With event mode, but without early return: those within the step.
+    // With Event Mode but without early return, the library handles events within the step.
     let fmu = ticker(fmi3True, fmi3False);
     fmu.update();
     fmu.ok(fmu.fmi3EnterStepMode());
@@ -119,13 +120,13 @@ fn an_event_ends_the_simulation() {
     fmu.initialize(0.0);
     let stepped = fmu.do_step(0.0, 1.0).unwrap();
     assert_eq!((stepped.terminate, stepped.last_successful_time), (true, 0.5));
-    // Who has not listened hears it again.
+    // A repeated step gives the same result if the importer ignored it.
     assert_eq!(fmu.do_step(0.5, 1.0), Ok(stepped));
     fmu.ok(fmu.fmi3Terminate());
 }
 
-/// With event mode, an importer that does not listen to fmi3UpdateDiscreteStates (FMPy) hears of it with the step;
-/// without, everyone does.
+/// With Event Mode, an importer that ignores the result of fmi3UpdateDiscreteStates (FMPy) is informed by the
+/// step. Without Event Mode, every importer is.
 #[test]
 fn the_initial_event_ends_the_simulation() {
     for (event_mode_used, early_return) in [(fmi3False, false), (fmi3True, false), (fmi3True, true)] {
@@ -157,7 +158,7 @@ fn grumbler(trouble: Trouble, event_mode_used: fmi3Boolean, early_return_allowed
     fmu
 }
 
-/// The step as it must be refused: all is as it was before. Returns what is said last.
+/// Checks that a step is rejected with this status and changes nothing. Returns the last message.
 #[track_caller]
 fn undone(fmu: &Importer, expected: Status, point: f64, step_size: f64) -> String {
     let before = fmu.bytes();
@@ -168,7 +169,7 @@ fn undone(fmu: &Importer, expected: Status, point: f64, step_size: f64) -> Strin
     said.text
 }
 
-/// Section 4.2.1: no earlyReturn for what is an error; and what is discarded has not happened.
+/// Section 4.2.1: no earlyReturn for errors, and a discarded step changes nothing.
 #[test]
 fn a_step_that_fails_half_way() {
     for (event_mode_used, early_return_allowed) in
@@ -189,7 +190,7 @@ fn a_step_that_fails_half_way() {
     }
 }
 
-/// A shorter step helps.
+/// Checks that a shorter step succeeds.
 #[test]
 fn more_events_than_a_step_may_have() {
     for (event_mode_used, early_return_allowed) in
@@ -224,7 +225,7 @@ fn early_return() {
         last_successful_time: 8.0,
     };
     assert_eq!(stepped, early);
-    // It goes on from there, until it melts.
+    // The simulation continues from there until the fuse melts.
     let stepped = fmu.do_step(8.0, 20.0).unwrap();
     assert_eq!(stepped, Stepped { terminate: true, last_successful_time: 18.0, ..early });
     assert_eq!(fmu.do_step(18.0, 1.0), Ok(stepped));
@@ -233,14 +234,14 @@ fn early_return() {
     fmu.step(0.0, 1.0);
 }
 
-/// Section 4.2.1: a step that has not happened, so that a shorter one can.
+/// Section 4.2.1: the step changes nothing, so that a shorter one is possible.
 #[test]
 fn early_return_that_is_not_allowed() {
     let fmu = fuse(fmi3False);
     let text = undone(&fmu, Status::Discard, 0.0, 10.0);
     assert!(text.contains("ends early, at 8: the model stops there, and earlyReturnAllowed has"), "{text}");
     fmu.step(0.0, 8.0);
-    // The end of the simulation is said without.
+    // The end of the simulation is reported without early return.
     let stepped = fmu.do_step(8.0, 20.0).unwrap();
     assert_eq!((stepped.terminate, stepped.early_return), (true, false));
     assert_eq!(stepped.last_successful_time, 18.0);

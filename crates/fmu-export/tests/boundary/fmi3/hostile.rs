@@ -1,4 +1,5 @@
-//! Arguments that no importer should pass. (Loggers that call back: `tests/soundness`; models that break: `tests/panics`.)
+//! Invalid arguments. (`tests/soundness` covers loggers that call back; `tests/panics` covers models that
+//! panic.)
 
 use crate::toys::*;
 use fmu_export::Interface::*;
@@ -48,12 +49,12 @@ fn scheduled_execution_is_refused() {
         _: fmi3String,
         text: fmi3String,
     ) {
-        // SAFETY: a string.
+        // SAFETY: the FMU passes a string.
         let text = unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned();
         LOG.with_borrow_mut(|log| log.push((Status::from_c(status), text)));
     }
     let functions = fmu_export::fmi3::functions::<Sum>();
-    // SAFETY: strings, NULL and a logger.
+    // SAFETY: strings, NULL and a logger are valid arguments.
     let instance = unsafe {
         (functions.fmi3InstantiateScheduledExecution)(
             c"name".as_ptr(),
@@ -81,7 +82,7 @@ fn version() {
     assert_eq!(unsafe { CStr::from_ptr((nothing.functions().fmi3GetVersion)()) }, c"3.0");
 }
 
-/// NULL and zeros in every state: an answer, and a number of messages that an importer can read.
+/// Checks that NULL and zeros as arguments do not crash in any state.
 #[test]
 fn zeros() {
     fn zeros<M: Exported>() {
@@ -98,7 +99,7 @@ fn zeros() {
 fn instances_of_the_other_standard() {
     let old = fmu_test_kit::Importer::of::<Sum>(CoSimulation);
     let functions = fmu_export::fmi3::functions::<Sum>();
-    // SAFETY: an instance of the same model, alive.
+    // SAFETY: a live instance of the same model.
     let status = unsafe { (functions.fmi3Reset)(old.instance()) };
     assert_eq!(Status::from_c(status), Status::Error);
     old.take_log();
@@ -121,7 +122,7 @@ fn what_no_model_has() {
     fmu.refused("partitions", |fmu| fmu.fmi3ActivateModelPartition(0, 0.0));
 }
 
-/// Section 2.3.1: without logging there are errors only; with it, and for single categories, more.
+/// Section 2.3.1: without logging there are only errors; with logging, or for single categories, more.
 #[test]
 fn logging() {
     let fmu = Importer::of::<Talker>(CoSimulation);
@@ -134,7 +135,7 @@ fn logging() {
     fmu.ok(fmu.fmi3SetDebugLogging(fmi3True, 0, null()));
     fmu.initialize(0.0);
     assert!(fmu.take_log().iter().any(|message| message.text == "initialized"));
-    // Errors cannot be switched off.
+    // Errors cannot be disabled.
     fmu.ok(fmu.fmi3SetDebugLogging(fmi3False, 1, &c"logAll".as_ptr()));
     fmu.refused("no category", |fmu| fmu.fmi3SetDebugLogging(fmi3True, 1, &c"logNothing".as_ptr()));
 }

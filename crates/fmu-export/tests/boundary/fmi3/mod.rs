@@ -1,4 +1,4 @@
-//! What FMI 3.0 alone has, or has another way.
+//! Features that exist only in FMI 3.0, or differ from FMI 2.0.
 
 mod arrays;
 mod call_table;

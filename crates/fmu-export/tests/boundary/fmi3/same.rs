@@ -1,11 +1,11 @@
-//! The same inputs and the same steps give the same bits in both standards.
+//! Equal inputs and steps give bit-identical results in both FMI versions.
 
 use crate::toys::*;
 use fmu_export::{Causality, Exported, Interface::*, Mode::ContinuousTime};
 use fmu_test_kit::checks::places;
 use fmu_test_kit::{Either, Importer, fmi3, serialized};
 
-/// All but the byte with standard and interface type, the mode, and the checksum.
+/// Returns the state without the byte for FMI version and interface type, the mode, and the checksum.
 fn content(fmu: &dyn Either) -> Vec<u8> {
     let bytes = fmu.bytes();
     bytes[serialized::ENDED..bytes.len() - serialized::CHECKSUM].to_vec()

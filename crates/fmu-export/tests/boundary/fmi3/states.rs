@@ -1,4 +1,4 @@
-//! Saved states, which belong to a standard.
+//! Saved states, which are valid only in one FMI version.
 
 use crate::toys::{Palette, Ticker};
 use fmu_export::Interface::*;
@@ -17,7 +17,7 @@ fn of_event_mode() {
     });
 }
 
-/// None can be missing, of values of every type.
+/// Checks that a state with values of every type is rejected if any bytes are missing.
 #[test]
 fn cut_short() {
     let fmu = Importer::of::<Palette>(CoSimulation);

@@ -43,14 +43,14 @@ fn numbers() {
         int64 fmi3GetInt64 fmi3SetInt64 [i64::MIN, i64::MAX];
         uint64 fmi3GetUInt64 fmi3SetUInt64 [0, u64::MAX];
     }
-    // All of them survive.
+    // A serialized state contains all of them.
     let bytes = fmu.bytes();
     let other = palette();
     other.restore(&bytes);
     assert_eq!(other.bytes(), bytes);
 }
 
-/// A type of the author's with no more than it must have; and numbers that are none.
+/// Checks a user-defined type with only the required functions, and values that are not finite.
 #[test]
 fn types_of_authors() {
     let fmu = Importer::of::<Grumbler>(CoSimulation);
@@ -83,7 +83,8 @@ fn ranges() {
     fmu.refused_with(&["must be a finite number"], |fmu| fmu.fmi3SetFloat32(&shade, 1, &f32::NAN, 1));
 }
 
-/// Every function of values with every variable: it has those of its type, and an Enumeration is an Int64.
+/// Checks every function of values with every variable: only the function of its type succeeds, and an
+/// Enumeration is an Int64.
 #[test]
 fn wrong_types() {
     let fmu = palette();
@@ -150,7 +151,7 @@ fn texts() {
     fmu.ok(fmu.fmi3SetString(&vr, 1, &c"Gödel".as_ptr(), 1));
     let mut read = null();
     fmu.ok(fmu.fmi3GetString(&vr, 1, &mut read, 1));
-    // SAFETY: a string of the FMU's, valid until the next call.
+    // SAFETY: a string of the FMU, valid until the next call.
     assert_eq!(unsafe { CStr::from_ptr(read) }, c"Gödel");
     fmu.refused("no text", |fmu| fmu.fmi3SetString(&vr, 1, &null(), 1));
     fmu.refused("no UTF-8", |fmu| fmu.fmi3SetString(&vr, 1, &c"\xff".as_ptr(), 1));
@@ -162,7 +163,7 @@ fn bytes() {
     let read = || {
         let (mut size, mut value) = (usize::MAX, null());
         fmu.ok(fmu.fmi3GetBinary(&vr, 1, &mut size, &mut value, 1));
-        // SAFETY: bytes of the FMU's, valid until the next call.
+        // SAFETY: bytes of the FMU, valid until the next call.
         unsafe { std::slice::from_raw_parts(value, size) }.to_vec()
     };
     assert!(read().is_empty());
@@ -191,7 +192,7 @@ fn enumerations() {
     fmu.refused("beyond Int32", |fmu| fmu.fmi3SetInt64(&mood, 1, &(7 + (1 << 32)), 1));
 }
 
-/// The first variable has the value reference 1; 0 is nobody's, whatever it is used for.
+/// Checks that value references begin with 1; every function rejects 0.
 #[test]
 fn value_references_count_from_1() {
     let (fmu, mut value) = (Importer::of::<Oscillator>(CoSimulation), 0.0);
@@ -209,7 +210,7 @@ fn value_references_count_from_1() {
     }));
 }
 
-/// As many values as variables: all are scalars.
+/// Checks that the number of values must equal the number of variables, which are all scalars.
 #[test]
 fn counts() {
     let (fmu, vr) = (palette(), reference(Name::float64 as u32));
@@ -223,7 +224,7 @@ fn counts() {
     fmu.refused("texts", |fmu| fmu.fmi3GetString(&reference(Name::string as u32), 1, null_mut(), 0));
 }
 
-/// Every model has a time: its own, or one behind all others.
+/// Checks that every model has a time: in its table, or after all other variables.
 #[test]
 fn time() {
     fn check<M: Exported>(expected: Option<u32>) {
@@ -242,7 +243,7 @@ fn time() {
     check::<Counter>(None);
     let of_talker = Talker::TABLE.iter().position(|variable| variable.causality() == Causality::Independent);
     check::<Talker>(of_talker.map(|place| place as u32));
-    // There is none in FMI 2.0.
+    // FMI 2.0 has no such variable.
     let fmu = fmu_test_kit::Importer::of::<Palette>(CoSimulation);
     fmu.initialize(0.0);
     fmu.refused("the time", |fmu| fmu.fmi2GetReal(&(Palette::TABLE.len() as u32), 1, &mut 0.0));
