@@ -37,7 +37,7 @@ Folders = Mapping[str, tuple[Target, ...]]
 
 def make(libraries: Path, out: Path, scratch: Path) -> None:
     """The files of a release that are made of libraries in folders called like their targets."""
-    packages = [argument for model in PACKERS for argument in ("--package", model)]
+    packages = [argument for _, package in PACKERS.values() for argument in ("--package", package)]
     _run("cargo", "build", "--locked", "--release", "--bins", *packages, what="the programs that pack FMUs")
     for model in PACKERS:
         say(f"packing {model}")
@@ -88,7 +88,7 @@ def _pack(model: str, fmi: int, folders: Folders, libraries: dict[Target, Path],
     if model == MODEL:
         _, environment, _ = prepare(WEBASSEMBLY)
         options += ("--live-page",)
-    command = (_program(PACKERS[model]), f"--fmi={fmi}", f"--out={scratch}", *options)
+    command = (_program(PACKERS[model][0]), f"--fmi={fmi}", f"--out={scratch}", *options)
     _run(*command, what=f"the FMU {model}", environment=environment)
     return scratch / ("fmi3" if fmi == 3 else "") / f"{model}.fmu"
 
@@ -97,7 +97,7 @@ def _sources(scratch: Path) -> Path:
     """The FMU of C sources."""
     _, environment, _ = prepare(WEBASSEMBLY)
     environment["WASM2C"] = _wasm2c()
-    command = (_program(PACKERS[MODEL]), "--c-sources", f"--out={scratch}")
+    command = (_program(PACKERS[MODEL][0]), "--c-sources", f"--out={scratch}")
     _run(*command, what=f"the C sources of {MODEL}", environment=environment)
     return scratch / "source" / f"{MODEL}.fmu"
 

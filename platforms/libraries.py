@@ -43,7 +43,8 @@ def compile_library(model: str, target: Target) -> tuple[Path, str]:
 @cache
 def guid(model: str) -> str:
     """The guid of a model's FMU, which is compiled into its libraries."""
-    command = ["cargo", "run", "--quiet", "--locked", "--release", "--package", model, "--bin", PACKERS[model]]
+    program, package = PACKERS[model]
+    command = ["cargo", "run", "--quiet", "--locked", "--release", "--package", package, "--bin", program]
     done = subprocess.run([*command, "--", "--guid"], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
     if done.returncode:
         raise SystemExit(f"error: the program that packs {model} could not be made; the messages are above")

@@ -11,8 +11,8 @@ ROOT = Path(__file__).resolve().parents[1]
 MODEL = "prw_testbed"
 CONTROLLER = "prw_controller"
 MODELS = (MODEL, CONTROLLER)
-#: The program that packs a model's FMUs.
-PACKERS = {MODEL: "build_fmu", CONTROLLER: "build_controller"}
+#: The program that packs the FMUs of a model, and the package of the program.
+PACKERS = {MODEL: ("build_fmu", "build_fmu"), CONTROLLER: ("build_controller", CONTROLLER)}
 
 #: Enterprise Linux 7 and everything since.
 GLIBC = "2.17"
