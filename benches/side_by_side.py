@@ -19,8 +19,8 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
-from tools.closed_loop import masters  # noqa: E402
-from tools.closed_loop.system import read  # noqa: E402
+from tools.validation import masters  # noqa: E402
+from tools.validation.system import read  # noqa: E402
 
 FMUS = ROOT / "target" / "fmu"
 STEP = 1e-3
@@ -103,7 +103,7 @@ def loops() -> None:
         rounds = []
         for _ in range(1 if QUICK else 3):
             begin = time.perf_counter()
-            rows = master.simulate(system)
+            rows = master.run(system)
             rounds.append(time.perf_counter() - begin)
         times[f"{master.name} {master.version()}"] = min(rounds)
         if master.name == "libcosim":

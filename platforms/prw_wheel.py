@@ -14,17 +14,12 @@ from targets import MODEL, ROOT
 
 PACKAGE = ROOT / "python" / "prw"
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
-#: The scripts that an animation as a page is made of (prw.moving).
-PAGES = (
-    *(Path("crates/fmu-package/page", name) for name in ("live.css", "player.js", "plot.js")),
-    *(Path("docs/fmu-page/wrist", name) for name in ("animation.js", "wrist.js", "wrist.json")),
-)
-#: The first time that a zip can hold: the same sources give the same bytes.
+#: The earliest time in a zip file. A fixed time makes the wheel reproducible.
 EPOCH = "315532800"
 
 
 def check_version(version: str) -> None:
-    """Stops if the package is not of this version, that of everything else."""
+    """Exits if the package does not have this version, the version of Cargo.toml."""
     own = tomllib.loads((PACKAGE / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
     if own != version:
         raise SystemExit(
@@ -33,18 +28,19 @@ def check_version(version: str) -> None:
 
 
 def build(fmu: Path, out: Path) -> Path:
-    """The wheel, in `out`."""
+    """Build the wheel in `out`."""
     with tempfile.TemporaryDirectory() as folder:
-        copy, made = Path(folder, "sources"), Path(folder, "made")
+        copy, made = Path(folder, "python", "prw"), Path(folder, "made")
         inside = copy / "src" / "prw" / "fmu"
         ignored = shutil.ignore_patterns("__pycache__", "*.egg-info", "fmu", "page")
         shutil.copytree(PACKAGE / "src", copy / "src", ignore=ignored)
         inside.mkdir()
-        for path in (PACKAGE / "pyproject.toml", PACKAGE / "README.md", *(ROOT / name for name in LICENCES)):
+        own = (PACKAGE / name for name in ("pyproject.toml", "setup.py", "README.md"))
+        for path in (*own, *(ROOT / name for name in LICENCES)):
             shutil.copyfile(path, copy / path.name)
-        (copy / "src" / "prw" / "page").mkdir()
-        for path in PAGES:
-            shutil.copyfile(ROOT / path, copy / "src" / "prw" / "page" / path.name)
+        # setup.py copies the files of the page from there.
+        for name in ("crates", "docs"):
+            Path(folder, name).symlink_to(ROOT / name)
         shutil.copyfile(fmu, inside / f"{MODEL}.fmu")
         command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(made), str(copy)]
         environment = {**os.environ, "SOURCE_DATE_EPOCH": EPOCH}

@@ -1,5 +1,4 @@
-"""What only this repository needs: its documentation, its figures, its validation, the closed loop under
-several masters.
+"""Tools of this repository: documentation, figures, validation, and the closed loop under several masters.
 
-Run in the project's folder as `python -m tools COMMAND`.
+Run in the repository root as `python -m tools COMMAND`.
 """

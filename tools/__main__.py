@@ -3,7 +3,8 @@
 import sys
 
 from prw.cli import run
-from tools import closed_loop, compatibility, documentation, examples, figures, validation
+from tools import compatibility, documentation, examples, figures, validation
+from tools.validation import closed_loop
 
 COMMANDS = (documentation, examples, figures, validation, closed_loop, compatibility)
-sys.exit(run("tools", "What only this repository needs.", COMMANDS, None))
+sys.exit(run("tools", "Tools of this repository.", COMMANDS, None))

@@ -1,4 +1,4 @@
-"""Checks what has changed since the last commit, or the last commit if nothing has; `make check`.
+"""Checks the changes since the last commit, or the last commit if there are none; `make check`.
 
 Format and lints of the changed files, the unit tests of the changed crates, and, if the FMU may have changed, a new one
 under its core tests. `make test` runs everything.
@@ -23,7 +23,7 @@ CORE = [f"tests/fmpy/test_{name}.py" for name in ("fig4", "exactness", "descript
 
 
 def changed_files() -> list[str]:
-    """Paths from the root of the repository, without those that were deleted."""
+    """Paths from the root of the repository, without deleted ones."""
 
     def git(*arguments: str) -> list[str]:
         return subprocess.run(["git", *arguments], cwd=ROOT, check=True, capture_output=True, text=True).stdout.split(

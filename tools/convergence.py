@@ -1,4 +1,4 @@
-"""How the Co-Simulation FMU's error shrinks with the step, for each way of telling it how the motors move."""
+"""The error of the Co-Simulation FMU over the step, for each kind of input that describes the motors' motion."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from prw.testbed import OUTPUTS, Testbed
 
 #: The motion: theta_i = AMPLITUDE_i sin(RATE_i t + PHASE_i), rad; wrist moves of some hertz.
 AMPLITUDE, RATE, PHASE = np.array([0.3, 0.2]), np.array([14.0, 23.0]), np.array([0.4, 1.9])
-#: Seconds, and from when on errors count: with angles alone the first two steps do not know how the motors move.
+#: Duration, and time from which errors count, s: with angles only, the rates are unknown in the first two steps.
 DURATION, FROM = 1.0, 0.3
 STEPS_PER_SECOND = (125, 250, 500, 1000, 2000)
-#: Each step of the broken line is cut in so many for the run it is compared with.
+#: Number of parts of each step of the broken line in the reference run.
 CUTS = 16
 
 
 class Convergence(NamedTuple):
-    """step: (k,) s. Errors by output name, (k,) each, as a fraction of the largest value that the output takes: with
-    `angles` alone, with `rates` as well (use_omega), and for motors on a `broken_line` whose slope is given."""
+    """Errors over the step. step: (k,) s. Errors by output name, (k,) each, as a fraction of the output's largest value: with
+    `angles` only, with `rates` as well (use_omega), and for motors on a `broken_line` whose slope is given."""
 
     step: np.ndarray
     angles: dict[str, np.ndarray]
@@ -85,7 +85,7 @@ def _error(fmu: Path, model: StateSpace, n: int, rates: bool) -> dict[str, float
 def _broken_line_error(fmu: Path, n: int) -> dict[str, float]:
     corners = _sines(n)
     slope = np.diff(corners.theta, axis=0) * n
-    # Along each line: at the corner, and at CUTS - 1 points on the way; rates are those of the line that follows.
+    # Each line has its corner and CUTS - 1 points; the rate at a corner is the rate of the next line.
     way = np.arange(CUTS)[None, :, None] / CUTS
     theta = np.vstack([(corners.theta[:-1, None] + way * slope[:, None] / n).reshape(-1, 2), corners.theta[-1:]])
     rate = np.vstack([np.repeat(slope, CUTS, axis=0), slope[-1:]])

@@ -1,4 +1,4 @@
-"""Frequency responses: measured on the FMU by stepped sines, to lay over those of its linear model."""
+"""Frequency responses: measured on the FMU by stepped sines, for comparison with its linear model."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class Sweep(NamedTuple):
 def sweep(fmu: Path, frequency: ArrayLike, slowest: float, outputs: Sequence[str] = (*SHAFTS, *TORQUES)) -> Sweep:
     """Turn one motor of the Co-Simulation FMU at a time to and fro, theta = sin(2 pi f t), and compare the outputs.
 
-    frequency: (k,) Hz. slowest: the rate at which transients decay, 1/s. After they have settled, the component of each
-    output at f over whole periods (one bin of its discrete Fourier transform) is divided by that of the motor's angle.
-    Units: those of the output per rad.
+    frequency: (k,) Hz. slowest: decay rate of the slowest transient, 1/s. After it has settled, the component of each
+    output at f over whole periods (one bin of its discrete Fourier transform) is divided by the component of the motor's angle.
+    Units: the output's unit per rad.
     """
     frequencies = np.atleast_1d(np.asarray(frequency, dtype=float))
     response = np.empty((len(frequencies), len(outputs), 2), dtype=complex)

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-#: What is checked, the target of the Makefile and its variables.
+#: Names of the checks, each with a target of the Makefile and its variables.
 PARTS = {
     "tests": ("test",),
     "seeded faults": ("test-faults",),
@@ -59,7 +59,7 @@ def run(name: str, arguments: tuple[str, ...], logs: Path) -> tuple[str, float]:
 
 
 def main() -> int:
-    """Run the parts, or those whose targets are named."""
+    """Run all parts, or the parts with the named targets."""
     targets = [arguments[0] for arguments in PARTS.values()]
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"parts to run: {', '.join(targets)}")

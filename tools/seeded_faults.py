@@ -1,4 +1,4 @@
-"""Puts faults into the sources, one at a time, and runs the tests with each: a fault that no test finds has escaped.
+"""Puts faults into the sources, one at a time, and runs the tests with each. A fault that no test finds has escaped.
 
     python tools/seeded_faults.py [--only TEXT] [--check] [LIST.toml ...]
 
@@ -33,19 +33,13 @@ class Fault:
     file: Path
     old: str
     new: str
-    prelude: str
     tests: tuple[str, ...]
 
     def put_into(self, text: str) -> str:
-        """The text of the file with the fault."""
+        """Return the content of the file with the fault."""
         if text.count(self.old) != 1:
             raise ValueError(f"{self.file}: the text to replace occurs {text.count(self.old)} times: {self.name}")
-        faulty = text.replace(self.old, self.new)
-        if not self.prelude:
-            return faulty
-        # Imports stand behind the comment on the module.
-        head, separator, rest = faulty.partition("\n\n")
-        return head + separator + self.prelude + rest
+        return text.replace(self.old, self.new)
 
 
 def read(path: Path) -> list[Fault]:
@@ -58,7 +52,6 @@ def read(path: Path) -> list[Fault]:
             directory / fault["file"],
             fault["old"],
             fault["new"],
-            fault.get("prelude", ""),
             tuple(fault.get("tests", content["tests"])),
         )
         for fault in content["fault"]

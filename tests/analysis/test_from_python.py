@@ -131,7 +131,7 @@ def test_excite(fmu):
     assert np.abs(ranking[0].motion.theta).max() <= np.deg2rad(40.001)
     for arguments, message in [
         ({"measure": "tau3"}, "measure: tau3 is not known"),
-        ({"angle": None}, "angle None is not a positive number"),
+        ({"angle": None}, "angle: None is not a positive number"),
     ]:
         with pytest.raises(prw.UserError, match=message):
             prw.excite(fmu=fmu, **arguments)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from built import built
 
-from tools.closed_loop import masters, system
+from tools.validation import importers, masters, system
 
 
 @pytest.fixture(scope="session")
@@ -22,7 +22,7 @@ def closed_loop() -> system.System:
 
 
 @pytest.fixture(scope="session", params=masters.MASTERS, ids=lambda master: master.name)
-def master(request) -> masters.Master:
+def master(request) -> importers.Tool:
     """Every master in turn, as far as it is installed."""
     if request.param.version() is None:
         pytest.skip(f"{request.param.package} is not installed")

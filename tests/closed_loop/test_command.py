@@ -11,8 +11,8 @@ import pytest
 from built import FMUS, ROOT, built
 from fmpy.validation import validate_fmu
 
-from tools.closed_loop import masters
 from tools.documentation.sources import read_table
+from tools.validation import masters
 
 
 def tools(*arguments):

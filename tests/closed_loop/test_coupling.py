@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tools.closed_loop import coupling
+from tools.validation import coupling
 
 
 @pytest.fixture(scope="module")

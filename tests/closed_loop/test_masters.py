@@ -6,7 +6,8 @@ import fmu_run
 import numpy as np
 import pytest
 
-from tools.closed_loop import coupling, masters, settling_time
+from tools.validation import coupling, masters
+from tools.validation.closed_loop import settling_time
 
 
 def by_fmu_run(closed_loop, starts_late: bool) -> np.ndarray:

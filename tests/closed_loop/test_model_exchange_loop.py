@@ -15,8 +15,8 @@ from fmpy.fmi2 import FMU2Model
 from fmpy.simulation import instantiate_fmu
 from fmpy.sundials import CVodeSolver
 
-from tools.closed_loop import coupling
-from tools.closed_loop.system import System
+from tools.validation import coupling
+from tools.validation.system import System
 
 SAMPLE, SAMPLES = 1e-3, 480
 MEASURED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")

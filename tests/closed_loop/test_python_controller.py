@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from built import ROOT
 
-from tools.closed_loop import masters, settling_time, system
+from tools.validation import masters, system
+from tools.validation.closed_loop import settling_time
 
 
 @pytest.fixture(scope="module")

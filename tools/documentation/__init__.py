@@ -26,7 +26,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `tools docs`. Raises UserError with one line on what is wrong, and then writes nothing."""
+    """Carry out `tools docs`. Raises UserError with a message of one line, and then writes no file."""
     # Loaded when they are needed: FMPy takes a while.
     from tools.documentation.pages import PAGES, render
 

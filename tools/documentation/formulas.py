@@ -9,7 +9,7 @@ from prw.errors import UserError
 
 
 def typeset(text: str) -> str:
-    r"""Formulas as MathML; \tag{8} between \[ \] puts the paper's number beside the equation."""
+    r"""Formulas as MathML; \tag{8} between \[ \] puts the paper's number next to the equation."""
     try:
         from latex2mathml.converter import convert
     except ImportError:
@@ -28,8 +28,8 @@ def typeset(text: str) -> str:
 
 
 def _tidy(mathml: str) -> str:
-    """Without what HTML does not need; matrices get brackets from the style sheet, for brackets made of characters grow
-    with the matrix only where the reader has a font for mathematics."""
+    """Remove parts that HTML does not need. Matrices get brackets from the style sheet, because brackets that are characters
+    grow with the matrix only with a font for mathematics."""
     mathml = mathml.replace(' xmlns="http://www.w3.org/1998/Math/MathML"', "")
     special = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
     mathml = re.sub(r"&#x([0-9A-Fa-f]+);", lambda m: special.get(chr(int(m[1], 16)), chr(int(m[1], 16))), mathml)

@@ -22,7 +22,7 @@ PRINTED = Path("modelDescription/parameters.json")
 
 @dataclass(frozen=True)
 class Page:
-    """The page of an FMU: the folder of its text within SOURCES/text, and what goes into the FMU."""
+    """The page of an FMU: the directory of its text within SOURCES/text, and the files for the FMU."""
 
     text: str
     content: Path
@@ -103,7 +103,7 @@ def _section(environment: Any, path: Path, values: dict[str, Any]) -> tuple[str,
 
 
 def _figure(path: Path, meaning: str) -> str:
-    """A figure's SVG, to be put into the page, with what it shows in words."""
+    """A figure's SVG for the page, with a description."""
     if not path.is_file():
         raise UserError(f"{path}: missing; `make figures` makes it")
     start = f'<svg class="plot" role="img" aria-label="{html.escape(meaning)}"'
@@ -111,7 +111,7 @@ def _figure(path: Path, meaning: str) -> str:
 
 
 def _picture(path: Path, meaning: str) -> str:
-    """A PNG within the page, with what it shows in words."""
+    """A PNG within the page, with a description."""
     if not path.is_file():
         raise UserError(f"{path}: missing; `make figures` makes it")
     content = base64.b64encode(path.read_bytes()).decode()
@@ -119,12 +119,12 @@ def _picture(path: Path, meaning: str) -> str:
 
 
 def _program(name: str, text: str) -> str:
-    """A program, which the tests run as it stands here."""
+    """A program, which the tests run unchanged."""
     return f'<pre data-run="{name}" tabindex="0"><code>{html.escape(text.strip(), quote=False)}</code></pre>'
 
 
 def _roots(roots: Iterable[Sequence[float]]) -> str:
-    """Real and conjugate complex numbers in words: -174.873 and -9.68 ± 34.68 i."""
+    """Real and conjugate complex numbers as text: -174.873 and -9.68 ± 34.68 i."""
     words = []
     for real, imaginary in roots:
         words.append(f"{real:.2f}" + (f" ± {imaginary:.2f} i" if imaginary else ""))
@@ -132,5 +132,5 @@ def _roots(roots: Iterable[Sequence[float]]) -> str:
 
 
 def _minus(number: object) -> str:
-    """A number, or words with numbers in them, with the sign that mathematics has."""
+    """A number, or text with numbers, with the mathematical minus sign."""
     return str(number).replace("-", "\N{MINUS SIGN}")

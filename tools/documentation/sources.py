@@ -1,4 +1,4 @@
-"""What the documentation is made from: files of the project, and tables in Markdown."""
+"""Sources of the documentation: files of the repository, and tables in Markdown."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Table(NamedTuple):
 
 
 def read(path: Path) -> str:
-    """The text of a file. Raises UserError."""
+    """The content of a text file. Raises UserError."""
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:

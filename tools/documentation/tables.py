@@ -9,7 +9,7 @@ from typing import Any
 
 from tools.documentation.sources import Table, start_of, unit_of
 
-#: The outputs in the table of orders, in words.
+#: Labels of the outputs in the table of orders.
 OUTPUT_NAMES = {
     "pitch": "pitch",
     "roll": "roll",

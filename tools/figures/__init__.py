@@ -10,12 +10,12 @@ from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 
 #: The copies that are kept with the sources, for the documentation and the README.
 COMMITTED = Path("docs/fmu-page/figures")
-#: README's first picture, and a still for the page in the FMU, which the film would double in size.
+#: README's first image, and a still for the page in the FMU, whose size the film would double.
 FILM = Path("docs/wrist.gif")
-#: README's second, of the page in the FMU.
+#: README's second image, of the page in the FMU.
 VISIT = Path("docs/try-it.gif")
 STILL = Path("wrist.png")
-#: Within the folder of what goes into an FMU: its icon for importers, and to scale it.
+#: Within the directory of an FMU's files: its icon for importers, and the scalable icon.
 ICON = Path("model.png")
 ICON_SVG = Path("documentation/model.svg")
 
@@ -42,7 +42,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `tools figures`. Raises UserError with one line on what is wrong."""
+    """Carry out `tools figures`. Raises UserError with a message of one line."""
     # FMPy and matplotlib take a while to load.
     from tools.documentation.pages import CONTROLLER, TESTBED
     from tools.figures.gallery import figures

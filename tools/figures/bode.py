@@ -18,8 +18,8 @@ SUBSCRIPTS = "₀₁₂₃₄₅₆₇₈₉"
 
 
 class Transfer(NamedTuple):
-    """One Bode plot. key: the letter of Fig. 5 and of its files. title: what is driven and what answers. unit: that of
-    0 dB. curve: complex over CURVE. frequency, points: what was measured, Hz and complex."""
+    """One Bode plot. key: the letter of Fig. 5 and of its files. title: input and output. unit: unit of 0 dB. curve: complex
+    over CURVE. frequency, points: measured values, Hz and complex."""
 
     key: str
     title: str

@@ -1,4 +1,4 @@
-"""The animation that shows what the wrist does: equal motors, opposite motors, and both with a controller."""
+"""The animation of the wrist: equal motors, opposite motors, and both with a controller."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from prw.simulation import Run
 
 #: Communication step, s.
 STEP = 1e-3
-#: Seconds of the run in a second of the animation.
+#: Seconds of the run per second of the animation.
 SPEED = 0.8
-#: The angle that motors turn by when they are led, rad, and the times they take there, across and back, s.
+#: Amplitude of prescribed motor motions, rad, and the durations there, across and back, s.
 SWING, LEGS = np.deg2rad(35), (0.45, 0.7, 0.45)
-#: Where the controller goes, pitch and roll in rad, one after the other, and the time that each takes, s.
+#: Goals of the controller in sequence, pitch and roll in rad, and the time for each, s.
 GOALS, STAY = (np.deg2rad((30, 60)), np.zeros(2)), 0.8
 #: When the controller has reached the first of them, s.
 POSE = 2 * sum(LEGS) + 0.95 * STAY

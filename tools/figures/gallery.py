@@ -14,7 +14,7 @@ from tools.figures.bode import draw_bode, transfers
 from tools.figures.results import Results, Run
 
 COLUMN = 4.5  # inches
-#: Relative errors up to here are those of arithmetic.
+#: Relative errors up to this value are rounding errors.
 ROUNDING = 1e-13
 #: Seconds of the two of Fig. 4 that fit into a column.
 SHOWN = 1.0
@@ -74,7 +74,7 @@ def _draw_velocities(figure: Any, run: Run) -> None:
 
 
 def _fig4_plate(found: Results) -> Figure:
-    """Fig. 4 beside its counterpart."""
+    """Fig. 4 next to its counterpart."""
     figure = Figure(figsize=(2 * COLUMN, 4.8), layout="constrained")
     left, right = np.asarray(figure.subfigures(1, 2, wspace=0.04))
     for place, title, run in (
@@ -126,7 +126,7 @@ def _steps(found: Results) -> Figure:
 
 
 def _power_of_ten(value: float) -> str:
-    """10⁻³ in plain characters, which grow with the text around them."""
+    """Powers of ten such as 10⁻³ in plain characters, which scale with the text around them."""
     exponent = round(float(np.log10(value)))
     return "1" if exponent == 0 else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 

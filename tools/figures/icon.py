@@ -64,7 +64,7 @@ def _card() -> tuple[Figure, Axes]:
 
 
 def _cam(x: float, y: float, size: float) -> Array:
-    """A wheel with four lobes, seen along its shaft."""
+    """A wheel with four lobes, viewed along its shaft."""
     angle = np.linspace(0, 2 * np.pi, 161)
     radius = size + 0.055 * np.cos(4 * angle)
     return np.column_stack([x + radius * np.sin(angle), y + radius * np.cos(angle)])

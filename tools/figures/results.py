@@ -1,4 +1,4 @@
-"""What the figures show, computed by running the FMU."""
+"""The data of the figures, from runs of the FMU."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Results(NamedTuple):
 
 
 def results(fmu: Path) -> Results:
-    """Run and measure the FMU file `fmu`; takes some seconds. Raises UserError where it is missing or refuses."""
+    """Run and measure the FMU file `fmu`; takes some seconds. Raises UserError if it is missing or rejects a call."""
     model = linearize(fmu=fmu)
     slowest = -np.linalg.eigvals(model.A).real.max()
     return Results(
@@ -72,7 +72,7 @@ def _run(fmu: Path, motion: Motion) -> Run:
 
 def _step(fmu: Path, sides: tuple[int, int]) -> Step:
     before, end, coarse = -0.02, 0.6, 0.025
-    # Nothing has moved yet at 0; what the impulse through the dampers does is there right after.
+    # At 0 the outputs are unchanged; the impulse through the dampers acts directly afterwards.
     times = np.array([before, 0, 1e-9, *np.arange(1, 601) * 1e-3]), np.array([before, *np.arange(0, end, coarse), end])
     runs = []
     for time in times:
@@ -83,7 +83,7 @@ def _step(fmu: Path, sides: tuple[int, int]) -> Step:
 
 
 def numbers(found: Results) -> dict[str, object]:
-    """What the documentation quotes, by name, and which matplotlib drew the figures."""
+    """The quoted results by name, and the version of matplotlib that drew the figures."""
     low = POINTS <= STATED
     ratio = found.sweep.response / found.model.response_at_hz(POINTS, ANGLE_OF)
     high = found.model.response_at_hz(1e5, ANGLE_OF)

@@ -14,11 +14,11 @@ from PIL import Image, ImageSequence
 from prw.errors import UserError
 from prw.files import replacing
 
-#: What is shown: a motion of the page, in so many pictures, each for so many ms.
+#: A motion of the page, the number of frames, and the duration of each, ms.
 MOTION, PICTURES, STAY = "tour", 42, 120
-#: The window in px, and how much of its width the film has.
+#: Size of the window and width of the film, px.
 WINDOW, WIDTH = (1000, 700), 720
-#: What a hand on a slider does, without the mark of the focus.
+#: Moves a slider as a user does, without the focus mark.
 SEEK = "(slider, value) => { slider.value = value; slider.dispatchEvent(new Event('input')); }"
 
 
@@ -37,19 +37,19 @@ def film(fmu: Path, path: Path) -> None:
         page.goto(f"{page_file.as_uri()}#try&motion={MOTION}")
         player, time = page.locator(".live-player"), page.get_by_label("Time", exact=True)
         time.wait_for()
-        # Calculates all of the motion first: a frame of the page calculates only as far as its time allows.
+        # Calculates the whole motion first: a frame of the page calculates only as far as its time allows.
         with page.expect_download():
             page.get_by_role("button", name="Save as CSV").evaluate("button => button.click()")
         pictures = []
         for number in range(PICTURES):
             time.evaluate(SEEK, str(round(1000 * number / PICTURES)))
-            # The picture is drawn with the next one of the screen.
+            # The page draws with the next frame of the screen.
             page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
             picture = Image.open(io.BytesIO(player.screenshot())).convert("RGB")
             height = round(picture.height * WIDTH / picture.width)
             pictures.append(picture.resize((WIDTH, height), Image.Resampling.LANCZOS))
         browser.close()
-    # Of one palette, lest colours flicker.
+    # One palette for all frames avoids flicker.
     palette = pictures[PICTURES // 3].quantize(128, kmeans=1, dither=Image.Dither.NONE)
     few = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     if path.exists() and _look_alike(path, few):
@@ -59,7 +59,7 @@ def film(fmu: Path, path: Path) -> None:
 
 
 def _look_alike(path: Path, pictures: list[Image.Image]) -> bool:
-    """Returns whether a GIF shows these pictures. Chromium draws the edges of a few pixels differently from run to run."""
+    """Whether a GIF has these frames. Chromium draws a few edge pixels differently in each run."""
     with Image.open(path) as kept:
         before = [np.asarray(frame.convert("RGB"), dtype=int) for frame in ImageSequence.Iterator(kept)]
     after = [np.asarray(picture.convert("RGB"), dtype=int) for picture in pictures]

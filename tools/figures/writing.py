@@ -16,7 +16,7 @@ from PIL import Image
 from prw.files import replacing
 from prw.plots import BLUE, PAGE_STYLE, VERMILION
 
-#: matplotlib's colours, and the page's names for them with what they are without a page.
+#: The page's colour by matplotlib's colour, with a default for files without a page.
 COLOURS = {
     "#000000": "currentColor",
     BLUE.lower(): f"var(--curve-1, {BLUE})",
@@ -24,14 +24,14 @@ COLOURS = {
     "#e6e6e6": "var(--grid, #e5e5e5)",
     "#e5e5e5": "var(--grid, #e5e5e5)",
 }
-#: What matplotlib's ids begin with, and what they are called here.
+#: Prefixes of matplotlib's ids, and their replacements.
 ID_WORDS = {"p": "clip", "m": "mark", "h": "hatch"}
 SVG = "{http://www.w3.org/2000/svg}"
 XLINK = "{http://www.w3.org/1999/xlink}"
 
 
 def write_svg(path: Path, figure: Figure) -> None:
-    """Write the figure as SVG with text as text."""
+    """Write the figure as SVG with text, not paths."""
     with replacing(path) as temporary:
         temporary.write_bytes(_svg(figure))
 
@@ -53,7 +53,7 @@ def write_small_png(path: Path, figure: Figure) -> None:
 
 
 def write_picture(path: Path, picture: Image.Image) -> None:
-    """Write a picture, with its transparency, as PNG of 255 colours."""
+    """Write an image, with transparency, as PNG of 255 colours."""
     with replacing(path) as temporary:
         few = picture.quantize(255, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
         few.save(temporary, format="PNG", optimize=True)
@@ -66,7 +66,7 @@ def write_json(path: Path, content: object) -> None:
 
 
 def write_for_page(path: Path, figure: Figure) -> None:
-    """Write the figure as an SVG element to put into the page: no fonts, sizes or colours of its own, unique ids."""
+    """Write the figure as an SVG element for the page: with the page's fonts, sizes and colours, and unique ids."""
     with replacing(path) as temporary:
         temporary.write_bytes(for_page(_svg(figure, transparent=True), path.stem))
 
@@ -89,7 +89,7 @@ def _with_counted_ids(svg: str) -> str:
 
 
 def for_page(svg: bytes, name: str) -> bytes:
-    """matplotlib's SVG, tidied for a page that holds several; `name` tells its ids from theirs."""
+    """matplotlib's SVG, tidied for a page that holds several; `name` makes its ids unique."""
     root = etree.fromstring(svg, etree.XMLParser(remove_comments=True, remove_blank_text=True))
     for element in [*root.findall(f".//{SVG}metadata"), *root.findall(f".//{SVG}style")]:
         element.getparent().remove(element)
@@ -139,7 +139,7 @@ def _shorter(numbers: str) -> str:
 
 
 def _restyle(element: Any) -> None:
-    """The page's colours and fonts in place of matplotlib's."""
+    """Replace matplotlib's colours and fonts by the page's."""
     style = element.attrib.pop("style", "")
     if not style and element.tag != f"{SVG}text":
         return
@@ -161,7 +161,7 @@ def _restyle(element: Any) -> None:
 
 
 def _draw_ticks(root: Any) -> None:
-    """Markers keep their style once, with their definition; those that are straight lines, ticks, become paths."""
+    """Keep the style of markers only in their definition; replace straight markers (ticks) by paths."""
     defined = {f"#{path.get('id')}": path for path in root.iter(f"{SVG}path") if path.get("id")}
     for use in list(root.iter(f"{SVG}use")):
         path, style = defined[use.get("href")], use.attrib.pop("style", None)
@@ -180,7 +180,7 @@ def _draw_ticks(root: Any) -> None:
 
 
 def _join_ticks(root: Any) -> None:
-    """Neighbours of one style and nothing else are one path."""
+    """Join neighbouring paths with the same style and no other attributes."""
     for path in reversed(list(root.iter(f"{SVG}path"))):
         before = path.getprevious()
         alike = before is not None and before.tag == path.tag and before.get("style") == path.get("style")

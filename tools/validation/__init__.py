@@ -26,7 +26,7 @@ def add_parser(subparsers: Any) -> None:
         type=Path,
         default=DEFAULT_FMUS,
         metavar="DIR",
-        help="folder with prw_testbed.fmu, fmi3/ and the closed loop (default: %(default)s)",
+        help="directory with prw_testbed.fmu, fmi3/ and the closed loop (default: %(default)s)",
     )
     parser.add_argument(
         "--result",
@@ -43,7 +43,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `tools validation`. Raises UserError with one line on what is wrong, also where something does not
+    """Carry out `tools validation`. Raises UserError with a message of one line, also if a run does not
     agree."""
     # SciPy and FMPy take a while to load.
     from prw.files import write_text

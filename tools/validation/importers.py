@@ -21,27 +21,28 @@ from prw.testbed import OUTPUTS, Testbed
 #: Relative tolerance of the solver in Model Exchange.
 SOLVER_TOLERANCE = 1e-7
 
-Run = Callable[[Path, Experiment, Mapping[str, Value]], Result]
-
 
 @dataclass(frozen=True)
-class Importer:
-    """run(fmu, experiment, parameters) gives what the FMU does, with these parameters instead of the experiment's.
-    interface: the type that it imports. package: of Python, where it comes from."""
+class Tool:
+    """An importer or a co-simulation master. package: the Python package that contains it. interface: the type that it
+    imports. run: of an importer run(fmu, experiment, parameters), with these parameters instead of the experiment's; of
+    a master run(system)."""
 
     name: str
     package: str
     interface: str
-    run: Run
+    run: Callable[..., Any]
 
-    @property
-    def version(self) -> str:
-        """The version that is installed."""
-        return metadata.version(self.package)
+    def version(self) -> str | None:
+        """The installed version, or None."""
+        try:
+            return metadata.version(self.package)
+        except metadata.PackageNotFoundError:
+            return None
 
 
 def at_rest(description: Any, experiment: Experiment) -> dict[str, float]:
-    """Start values of the motors, and of the states where the testbed has to be told where it rests."""
+    """Start values of the motors, and of the states if they are settable."""
     first = {name: float(experiment.inputs[name][0]) for name in ANGLES}
     states = {f"theta{i}": first["theta1" if i % 2 else "theta2"] for i in (3, 4, 5, 6)}
     settable = {v.name for v in description.modelVariables if v.initial == "exact"}
@@ -70,8 +71,8 @@ def by_fmpy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value]) 
 
 
 def by_scipy(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value]) -> Result:
-    """Model Exchange through FMPy's calls, solved by SciPy, with inputs interpolated whenever the solver asks. (FMPy's
-    own master holds inputs between communication points, and so is of first order in these.)"""
+    """Model Exchange through FMPy's calls, solved by SciPy, with inputs interpolated at every evaluation. (FMPy's
+    own master holds inputs between communication points, and so is of first order in the inputs.)"""
     import fmpy
     from fmpy.simulation import apply_start_values, instantiate_fmu
     from scipy.integrate import solve_ivp
@@ -135,7 +136,7 @@ def by_fmu_run(fmu: Path, experiment: Experiment, parameters: Mapping[str, Value
 
 
 IMPORTERS = (
-    Importer("FMPy", "fmpy", "CoSimulation", by_fmpy),
-    Importer("fmu_run", "fmu-run", "CoSimulation", by_fmu_run),
-    Importer("SciPy's RK45 through FMPy's calls", "fmpy", "ModelExchange", by_scipy),
+    Tool("FMPy", "fmpy", "CoSimulation", by_fmpy),
+    Tool("fmu_run", "fmu-run", "CoSimulation", by_fmu_run),
+    Tool("SciPy's RK45 through FMPy's calls", "fmpy", "ModelExchange", by_scipy),
 )

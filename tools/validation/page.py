@@ -40,7 +40,7 @@ def page(found: Validation) -> str:
 
 
 def outcome(found: Validation) -> str:
-    """How many runs agree, and what they were made with."""
+    """The number of runs that agree, and the versions used."""
     far = [row for row in found.rows if not row.agrees]
     worst = max((row for row in found.rows if row.agrees), key=lambda row: row.share, default=None)
     lines = [f"{len(found.rows) - len(far)} of {len(found.rows)} runs agree with the reference."]
@@ -83,7 +83,7 @@ def runs(found: Validation) -> str:
 
 
 def sensitivity(found: Validation) -> str:
-    """How many tolerances a change of a parameter takes."""
+    """The effect of a change of each parameter in terms of the tolerance."""
     names = list(next(iter(found.sensitivity.values())))
     rows = [[f"`{name}`", *(f"{shares[p]:.1f}" for p in names)] for name, shares in found.sensitivity.items()]
     return (

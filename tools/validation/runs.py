@@ -1,4 +1,4 @@
-"""What was run, and how far it agreed with the reference."""
+"""Runs of the reference experiments, and their differences from the reference."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from prw.checking.experiments import Experiment, find, read_experiments
 from prw.checking.result import Result
 from prw.motion import Array
 from prw.testbed import existing_fmu
-from tools.closed_loop import masters, system
-from tools.validation.importers import IMPORTERS, by_fmu_run
+from tools.validation import masters, system
+from tools.validation.importers import IMPORTERS, Tool, by_fmu_run
 
-#: Where the FMUs are, by version of FMI.
+#: Paths of the FMUs by FMI version.
 FMUS = {"2.0": Path("prw_testbed.fmu"), "3.0": Path("fmi3/prw_testbed.fmu")}
-#: Parameters that are changed to see what the tolerances tell apart, and by how much.
+#: Parameters that are changed to find the sensitivity of the tolerances, and the relative change.
 CHANGED, CHANGE = ("J2", "J3", "H3", "k1", "k2", "c1", "c2", "c3"), 0.01
 
 
 @dataclass(frozen=True)
 class Row:
-    """One run. version, interface, fmi: empty where a file does not tell. share: the largest difference in terms of its tolerance.
+    """One run. version, interface, fmi: empty if a file does not contain it. share: the largest difference in terms of its tolerance.
     largest: difference by quantity (angle, rate, torque), in rad, rad/s and N.m."""
 
     importer: str
@@ -56,7 +56,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Validation:
-    """All of it. experiments: description by name. sensitivity: the share of the tolerance that a change of a parameter
+    """All results. experiments: description by name. sensitivity: the share of the tolerance that a change of a parameter
     by CHANGE takes, by experiment and parameter. absent: importers that are not installed."""
 
     guid: str
@@ -68,34 +68,31 @@ class Validation:
     absent: list[str]
 
     def to_json(self) -> str:
-        """Everything in numbers."""
+        """All numbers as JSON."""
         rows = [{**asdict(row), "agrees": row.agrees} for row in self.rows]
         content = {**asdict(self), "rows": rows, "parameters_changed_by": CHANGE}
         return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
 
 
 def validate(fmus: Path, results: Sequence[tuple[str, Path]] = ()) -> Validation:
-    """Run everything. results: (tool, file) that other tools wrote. Raises UserError where an FMU or a file is missing,
-    or refuses something."""
+    """Run all experiments. results: (tool, file) of other tools. Raises UserError if an FMU or a file is missing, or if an
+    FMU rejects a call."""
     from fmpy import read_model_description
 
     paths = {fmi: existing_fmu(fmus / name) for fmi, name in FMUS.items()}
     known = read_experiments(paths["2.0"])
-    rows = []
-    for importer in IMPORTERS:
+    rows, absent = [], [f"{t.name} (pip {t.package})" for t in (*IMPORTERS, *masters.MASTERS) if t.version() is None]
+    for importer in filter(Tool.version, IMPORTERS):
         for fmi, path in paths.items():
             for experiment in known:
                 found = importer.run(path, experiment, experiment.parameters)
                 agreement = compare(found, experiment, importer.interface)
-                rows.append(row(importer.name, importer.version, fmi, agreement))
-    loop, absent = system.read(fmus / "prw_closed_loop.ssp", fmus / "prw_closed_loop"), []
-    for master in masters.MASTERS:
-        version = master.version()
-        if version is None:
-            absent.append(f"{master.name} (pip {master.package})")
-            continue
-        agreement = compare(of_testbed(masters.run_apart(master, loop)), find(known, "closed_loop"), "CoSimulation")
-        rows.append(row(f"{master.name}, with the controller's FMU", version, "2.0", agreement))
+                rows.append(row(importer.name, str(importer.version()), fmi, agreement))
+    loop = system.read(fmus / "prw_closed_loop.ssp", fmus / "prw_closed_loop")
+    for master in filter(Tool.version, masters.MASTERS):
+        found = of_testbed(masters.run_apart(master, loop))
+        agreement = compare(found, find(known, "closed_loop"), master.interface)
+        rows.append(row(f"{master.name}, with the controller's FMU", str(master.version()), "2.0", agreement))
     for tool, file in results:
         told = row(f"{tool}, from the file {file.name}", "", "", check(file, fmu=paths["2.0"]))
         rows.append(replace(told, interface=""))
@@ -111,7 +108,7 @@ def validate(fmus: Path, results: Sequence[tuple[str, Path]] = ()) -> Validation
 
 
 def row(importer: str, version: str, fmi: str, agreement: Agreement) -> Row:
-    """What is told of a comparison."""
+    """The row of a comparison."""
     largest = dict.fromkeys(("angle", "rate", "torque"), 0.0)
     for name, difference in agreement.variables.items():
         quantity = MEASURED[name].quantity
@@ -126,7 +123,7 @@ def share(agreement: Agreement) -> float:
 
 
 def of_testbed(values: Mapping[str, Array]) -> Result:
-    """The testbed's part of what a master recorded."""
+    """The testbed's outputs in a master's results."""
     outputs = {name.removeprefix("testbed."): v for name, v in values.items() if name.startswith("testbed.")}
     return Result(Path("closed loop"), values["time"], outputs)
 

@@ -19,6 +19,9 @@ pub struct Options {
     /// house (a file, texts, units with an offset)
     #[arg(long, value_enum, value_name = "MODEL", default_value_t, hide_possible_values = true)]
     from: Begin,
+    /// Take fmu-export from this git repository, as a URL, so that others can build the model
+    #[arg(long, value_name = "URL")]
+    git: Option<String>,
 }
 
 /// The models to begin with.
@@ -59,7 +62,6 @@ pub fn new(options: &Options) -> Result<()> {
         Some(name) => name.clone(),
         None => folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
     };
-    let export = dependency()?;
     // Cargo knows what may be a name, and of the workspace and the repository around.
     let cargo = cargo();
     let mut command = Command::new(&cargo);
@@ -86,9 +88,11 @@ pub fn new(options: &Options) -> Result<()> {
         };
         write(&path, &text)?;
     }
-    write(&folder.join("Cargo.toml"), &manifest(&name, &export))?;
+    let in_workspace = in_workspace(folder);
+    let export = Dependency::of(folder, options.git.as_deref())?;
+    write(&folder.join("Cargo.toml"), &manifest(&name, &export, !in_workspace))?;
     let lock = tested();
-    if !lock.is_empty() && !in_workspace(folder) {
+    if !lock.is_empty() && !in_workspace {
         write(&folder.join("Cargo.lock"), &lock)?;
     }
     // With the width of its new place; without rustfmt it stays as it is.
@@ -102,6 +106,12 @@ pub fn new(options: &Options) -> Result<()> {
             _ => "cargo fmu run",
         },
     );
+    if let Dependency::Here(path) = export {
+        println!(
+            "Its Cargo.toml names {}, which is only on this machine; --git URL names a repository for everyone",
+            path.display()
+        );
+    }
     Ok(())
 }
 
@@ -114,18 +124,80 @@ fn in_workspace(folder: &Path) -> bool {
     !matches!((root.and_then(fs::canonicalize), own), (Ok(root), Ok(own)) if root == own)
 }
 
-/// fmu-export as it came with this command: beside it in a clone, of the registry otherwise.
-fn dependency() -> Result<String> {
-    let version = env!("CARGO_PKG_VERSION");
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("fmu-export");
-    Ok(if beside.join("Cargo.toml").is_file() {
-        format!("{{ version = {version:?}, path = {:?} }}", beside.display().to_string())
-    } else {
-        format!("{version:?}")
-    })
+/// The source of fmu-export in a model's `Cargo.toml`.
+enum Dependency {
+    /// A registry has it.
+    Registry,
+    /// A commit of a git repository: URL and revision.
+    Git(String, String),
+    /// A path from the model, which is in the same git repository.
+    Beside(String),
+    /// A path on this machine.
+    Here(PathBuf),
 }
 
-fn manifest(name: &str, export: &str) -> String {
+impl Dependency {
+    /// fmu-export of the version of this command.
+    fn of(folder: &Path, git: Option<&str>) -> Result<Self> {
+        let package = Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("fmu-export");
+        let is_there = package.join("Cargo.toml").is_file();
+        if let Some(url) = git {
+            let revision = git_says(&package, &["rev-parse", "HEAD"]);
+            let revision = revision.with_context(|| {
+                format!("{} is in no git repository, so there is no revision to name", package.display())
+            })?;
+            return Ok(Self::Git(url.to_owned(), revision));
+        }
+        if !is_there {
+            return Ok(Self::Registry);
+        }
+        let folder = fs::canonicalize(folder).with_context(|| short(folder))?;
+        // cargo may have made the directory itself a repository.
+        let around = folder.parent().unwrap_or(&folder);
+        let root = git_says(around, &["rev-parse", "--show-toplevel"]).map(PathBuf::from);
+        Ok(match root.filter(|root| package.starts_with(root)) {
+            Some(_) => Self::Beside(relative(&folder, &package)),
+            None => Self::Here(package),
+        })
+    }
+
+    fn in_manifest(&self) -> String {
+        let version = env!("CARGO_PKG_VERSION");
+        match self {
+            Self::Registry => format!("{version:?}"),
+            Self::Git(url, revision) => format!("{{ git = {url:?}, rev = {revision:?} }}"),
+            Self::Beside(path) => format!("{{ version = {version:?}, path = {path:?} }}"),
+            Self::Here(path) => {
+                format!("{{ version = {version:?}, path = {:?} }}", path.display().to_string())
+            }
+        }
+    }
+}
+
+/// What git prints in a directory, if it succeeds there.
+fn git_says(folder: &Path, arguments: &[&str]) -> Option<String> {
+    let output = Command::new("git").arg("-C").arg(folder).args(arguments).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    output.status.success().then(|| text.trim().to_owned())
+}
+
+/// The path from one directory to another.
+fn relative(from: &Path, to: &Path) -> String {
+    let common = from.components().zip(to.components()).take_while(|(one, other)| one == other).count();
+    let up = from.components().skip(common).map(|_| "..".to_owned());
+    let down = to.components().skip(common).map(|part| part.as_os_str().to_string_lossy().into_owned());
+    up.chain(down).collect::<Vec<_>>().join("/")
+}
+
+fn manifest(name: &str, export: &Dependency, with_profile: bool) -> String {
+    let export = export.in_manifest();
+    // A workspace has profiles in its own Cargo.toml only.
+    let profile = match with_profile {
+        true => {
+            "# A small library, which asks for little of the system it runs on.\n[profile.release]\nlto = true\nstrip = true\n\n"
+        }
+        false => "",
+    };
     format!(
         r#"[package]
 name = {name:?}
@@ -139,12 +211,7 @@ crate-type = ["cdylib", "rlib"]
 [dependencies]
 fmu-export = {export}
 
-# A small library, which asks for little of the system it runs on.
-[profile.release]
-lto = true
-strip = true
-
-[lints.rust]
+{profile}[lints.rust]
 missing_docs = "warn"
 unsafe_code = "deny"
 "#

@@ -11,6 +11,8 @@ pub struct Course<'a> {
     pub unit: &'a str,
     /// Whether it stays as it is until it jumps.
     pub jumps: bool,
+    /// Whether 0 and 1 stand for false and true.
+    pub is_boolean: bool,
     pub values: &'a [f64],
 }
 
@@ -75,7 +77,8 @@ fn draw(
             .x_label_area_size(40 * FINE)
             .y_label_area_size(76 * FINE)
             .build_cartesian_2d(time[0]..time[time.len() - 1], low - margin..high + margin)?;
-        let label = |value: &f64| format!("{}", (value * 1e9).round() / 1e9);
+        let [label, label_of_time] = [high - low + 2.0 * margin, time[time.len() - 1] - time[0]]
+            .map(|range| move |value: &f64| label(*value, range));
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
@@ -84,7 +87,8 @@ fn draw(
             .set_all_tick_mark_size(5 * FINE)
             .x_desc("time in s")
             .y_desc(if unit.is_empty() || *unit == "1" { String::new() } else { format!("in {unit}") })
-            .x_label_formatter(&label)
+            .x_label_formatter(&label_of_time)
+            .y_label_formatter(&label)
             .label_style(("sans-serif", 14 * FINE))
             .axis_desc_style(("sans-serif", 14 * FINE))
             .draw()?;
@@ -113,4 +117,42 @@ fn draw(
     }
     root.present()?;
     Ok(())
+}
+
+/// A number at an axis of this length, with as many digits as tell the numbers there apart, and without a sign of 0.
+fn label(value: f64, range: f64) -> String {
+    let value = if value.abs() < 1e-6 * range { 0.0 } else { value };
+    let digits = 4.0 - range.log10().ceil();
+    if !(-2.0..=9.0).contains(&digits) {
+        let text = format!("{value:.4e}");
+        let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        let digits = digits.trim_end_matches('0').trim_end_matches('.');
+        return if value == 0.0 { "0".to_owned() } else { format!("{digits}e{exponent}") };
+    }
+    let text = format!("{value:.*}", digits.max(0.0) as usize);
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::label;
+
+    #[test]
+    fn axes_have_plain_numbers() {
+        let cases =
+            [(-1e-17, 1.0, "0"), (-0.0, 1.0, "0"), (0.30000000000000004, 1.0, "0.3"), (-0.25, 1.0, "-0.25")];
+        let more = [
+            (1500.0, 3000.0, "1500"),
+            (2e-4, 1e-3, "0.0002"),
+            (20.0, 0.5, "20"),
+            (2e-8, 1e-7, "2e-8"),
+            (0.0, 1e-7, "0"),
+        ];
+        for (value, range, expected) in cases.into_iter().chain(more) {
+            assert_eq!(label(value, range), expected, "{value} on {range}");
+        }
+    }
 }

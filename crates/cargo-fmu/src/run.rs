@@ -6,7 +6,9 @@ use crate::project::{Place, Project};
 use anyhow::{Context, Result, bail, ensure};
 use fmu_package::terminal::short;
 use fmu_package::{BuildOptions, Fmi};
-use fmu_run::{BaseType, Batch, Course, Description, Fmu, Interface, Start, Variable, Watch};
+use fmu_run::{
+    BaseType, Batch, Course, Description, Fmu, Interface, Runs, Start, Status, Variable, Watch, nearest,
+};
 use notify::{RecursiveMode, Watcher};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,7 +21,8 @@ use std::time::{Duration, Instant};
 pub struct Options {
     #[command(flatten)]
     place: Place,
-    /// A start value: a number, true, false, a name of an enumeration, or a text; repeat it for several
+    /// A start value: a number, true, false, a name of an enumeration, or a string; of an array one for each element, with
+    /// commas; repeat it for several
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     set: Vec<(String, String)>,
     /// Inputs over time: a table (CSV) with a column time and one for each input
@@ -37,6 +40,9 @@ pub struct Options {
     /// Simulate the FMU for FMI 2.0 or that for FMI 3.0 [default: 2, if the model has only what that has]
     #[arg(long, value_enum, value_name = "2|3", hide_possible_values = true)]
     fmi: Option<Fmi>,
+    /// Show all messages of the model, not only its warnings
+    #[arg(long)]
+    log: bool,
     /// Stay, and do it again whenever a file of the model changes
     #[arg(long)]
     watch: bool,
@@ -47,7 +53,7 @@ fn assignment(text: &str) -> Result<(String, String), String> {
     Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 
-/// Builds and simulates; tells whether that was possible.
+/// Builds and simulates; tells whether the run reached its end.
 pub fn run(options: &Options) -> Result<bool> {
     if !options.watch {
         return once(options);
@@ -123,8 +129,7 @@ fn once(options: &Options) -> Result<bool> {
     }
     let fmu = newest(&folder, begin).or_else(|| newest(&folder.join("fmi3"), begin));
     let fmu = fmu.with_context(|| format!("there is no new FMU in {}", short(&folder)))?;
-    simulate(options, &fmu, &folder)?;
-    Ok(true)
+    simulate(options, &fmu, &folder)
 }
 
 /// The FMU in a folder that was just made.
@@ -142,7 +147,8 @@ fn newest(folder: &Path, since: std::time::SystemTime) -> Option<PathBuf> {
     made.pop()
 }
 
-fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<()> {
+/// Simulates an FMU; tells whether it reached the end.
+fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
     // SAFETY: the FMU is the user's own model, which was just compiled.
     #[allow(unsafe_code)]
     let fmu = unsafe { Fmu::open(path) }?;
@@ -155,29 +161,38 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<()> {
         short(path)
     );
     let table = options.input.as_deref().map(Table::read).transpose()?;
-    let time = times(options, description, table.as_ref())?;
-    let courses = match &table {
-        Some(table) => table.at(&time),
-        None => Vec::new(),
-    };
     let shown = shown(&options.show, description)?;
-    let names: Vec<&str> = shown.iter().map(|variable| variable.name.as_str()).collect();
-    let batch = Batch {
-        time: &time,
-        inputs: courses.iter().map(|(name, course)| (name.as_str(), Course::Shared(course))).collect(),
-        start: options
-            .set
-            .iter()
-            .map(|(name, value)| Ok((name.as_str(), start(description, name, value)?)))
-            .collect::<Result<_>>()?,
-        outputs: names,
-        every: Some(1),
-        threads: Some(1),
-        ..Batch::default()
+    let starts = options
+        .set
+        .iter()
+        .map(|(name, value)| starts(description, name, value))
+        .collect::<Result<Vec<_>>>()?
+        .concat();
+    let mut time = times(options, description, table.as_ref())?;
+    let (runs, watch) = follow(&fmu, &time, table.as_ref(), &starts, &shown)?;
+    let (runs, watch) = match watch.ended().first() {
+        // The last values are those at the end, which is between the communication points.
+        Some((_, end)) if !runs.errors.is_empty() => {
+            time.retain(|time| time < end);
+            time.push(*end);
+            follow(&fmu, &time, table.as_ref(), &starts, &shown)?
+        }
+        _ => (runs, watch),
     };
-    let runs = fmu.run(&batch, &Watch::default())?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (csv, svg) = (folder.join(format!("{name}.csv")), folder.join(format!("{name}.svg")));
+    let failed = watch.ended().is_empty() && !runs.errors.is_empty();
+    for (_, reason) in runs.errors.iter().filter(|_| failed) {
+        eprintln!("error: {reason}");
+    }
+    say(&watch, options.log);
+    // A run that has failed has values until then, or none.
+    let unreached = runs.courses.chunks(time.len()).map(unreached).min().filter(|_| !runs.errors.is_empty());
+    let reached = time.len() - unreached.unwrap_or_default();
+    if reached == 0 {
+        [&csv, &svg].iter().for_each(|old| drop(fs::remove_file(old)));
+        return Ok(false);
+    }
     let curves: Vec<Curve> = shown
         .iter()
         .zip(runs.courses.chunks(time.len()))
@@ -185,35 +200,85 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<()> {
             name: &variable.name,
             unit: variable.unit.as_deref().unwrap_or_default(),
             jumps: variable.base != BaseType::Real || variable.variability.as_deref() == Some("discrete"),
-            values,
+            is_boolean: variable.base == BaseType::Boolean,
+            values: &values[..reached],
         })
         .collect();
-    write_table(&csv, &time, &curves).with_context(|| format!("cannot write {}", short(&csv)))?;
-    plot(&svg, &description.model_name, &time, &curves)
+    let time = &time[..reached];
+    write_table(&csv, time, &curves).with_context(|| format!("cannot write {}", short(&csv)))?;
+    plot(&svg, &description.model_name, time, &curves)
         .with_context(|| format!("cannot draw {}", short(&svg)))?;
-    let width = curves.iter().map(|curve| curve.name.len()).max().unwrap_or_default();
-    for curve in &curves {
-        let finite = || curve.values.iter().copied().filter(|value| value.is_finite());
-        println!(
-            "{:width$}  from {:.6} to {:.6} {}",
-            curve.name,
-            finite().fold(f64::INFINITY, f64::min),
-            finite().fold(f64::NEG_INFINITY, f64::max),
-            curve.unit,
-        );
-    }
+    summarize(&curves, &shown);
     println!(
         "{}, {}: {} to {} s in {} steps",
         short(&csv),
         short(&svg),
         time[0],
-        time[time.len() - 1],
-        time.len() - 1
+        time[reached - 1],
+        reached - 1
     );
-    for (_, note) in runs.notes.iter().chain(&runs.errors) {
+    for (_, note) in runs.notes.iter().chain(&runs.errors).filter(|_| !failed) {
         println!("{note}");
     }
-    Ok(())
+    Ok(!failed)
+}
+
+/// A run over these times, and what was heard of it.
+fn follow(
+    fmu: &Fmu,
+    time: &[f64],
+    table: Option<&Table>,
+    starts: &[(&str, Start)],
+    shown: &[&Variable],
+) -> Result<(Runs, Watch)> {
+    let courses = table.map(|table| table.at(time)).unwrap_or_default();
+    let batch = Batch {
+        time,
+        inputs: courses.iter().map(|(name, course)| (name.as_str(), Course::Shared(course))).collect(),
+        start: starts.to_vec(),
+        outputs: shown.iter().map(|variable| variable.name.as_str()).collect(),
+        every: Some(1),
+        threads: Some(1),
+        ..Batch::default()
+    };
+    let watch = Watch::listening();
+    let runs = fmu.run(&batch, &watch)?;
+    Ok((runs, watch))
+}
+
+/// Shows the messages of the FMU: warnings and worse, or all.
+fn say(watch: &Watch, all: bool) {
+    for (_, time, message) in watch.messages() {
+        // Errors are the reason of a failure, which is shown first.
+        if all || message.status == Status::Warning {
+            println!("t = {time} s, {}: {}", message.category, message.text.trim());
+        }
+    }
+}
+
+/// The number of values at the end that the run has not reached.
+fn unreached(values: &[f64]) -> usize {
+    values.iter().rev().take_while(|value| value.is_nan()).count()
+}
+
+/// Prints the range of each variable.
+fn summarize(curves: &[Curve], shown: &[&Variable]) {
+    let width = curves.iter().map(|curve| curve.name.len()).max().unwrap_or_default();
+    for (curve, variable) in curves.iter().zip(shown) {
+        let finite = || curve.values.iter().copied().filter(|value| value.is_finite());
+        let [low, high] =
+            [finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max)];
+        let range = match variable.base {
+            _ if low > high => "no finite values".to_owned(),
+            BaseType::Boolean if low == high => format!("always {}", low != 0.0),
+            BaseType::Boolean => "false and true".to_owned(),
+            BaseType::Real | BaseType::Float32 => {
+                format!("from {:.6} to {:.6} {}", low + 0.0, high + 0.0, curve.unit)
+            }
+            _ => format!("from {low} to {high} {}", curve.unit),
+        };
+        println!("{:width$}  {}", curve.name, range.trim_end());
+    }
 }
 
 /// From the proposed start on, or the times of the inputs if nothing else is said.
@@ -248,31 +313,66 @@ fn shown<'a>(names: &[String], description: &'a Description) -> Result<Vec<&'a V
         );
         return Ok(outputs);
     }
-    names
-        .iter()
-        .map(|name| {
-            description.variable(name).with_context(|| format!("there is no variable {name} to show"))
-        })
-        .collect()
+    let mut shown = Vec::new();
+    for name in names {
+        let found = named(description, name);
+        ensure!(!found.is_empty(), "there is no variable {name} to show{}", hint(description, name));
+        shown.extend(found);
+    }
+    Ok(shown)
 }
 
-/// A start value as the variable's type has it.
-fn start<'a>(description: &Description, name: &str, value: &'a str) -> Result<Start<'a>> {
-    let variable =
-        description.variable(name).with_context(|| format!("there is no variable {name} to set"))?;
-    // Texts are for texts and Booleans, and name the items of enumerations.
-    Ok(match value.parse() {
+/// The variable of this name, or the elements of the array.
+fn named<'a>(description: &'a Description, name: &str) -> Vec<&'a Variable> {
+    if let Some(variable) = description.variable(name) {
+        return vec![variable];
+    }
+    let is_element = |of: &&Variable| {
+        of.name.strip_prefix(name).is_some_and(|index| index.starts_with('[') && index.ends_with(']'))
+    };
+    description.variables.iter().filter(is_element).collect()
+}
+
+/// Names a similar variable, if there is one.
+fn hint(description: &Description, name: &str) -> String {
+    let near = nearest(name, description.variables.iter().map(|variable| variable.name.clone()));
+    near.map_or(String::new(), |near| format!("; did you mean {near}?"))
+}
+
+/// Start values as the variable's type has them: one, or one for each element of an array.
+fn starts<'a>(description: &'a Description, name: &str, value: &'a str) -> Result<Vec<(&'a str, Start<'a>)>> {
+    let found = named(description, name);
+    ensure!(!found.is_empty(), "there is no variable {name} to set{}", hint(description, name));
+    let is_array = found.len() > 1 || found[0].name != name;
+    let values: Vec<&str> = if is_array { value.split(',').map(str::trim).collect() } else { vec![value] };
+    ensure!(
+        values.len() == found.len() || values.len() == 1,
+        "{name} has {} elements, --set gives {} values; give one for each, with commas between them, or one for all",
+        found.len(),
+        values.len()
+    );
+    // Strings are for strings and Booleans, and name the items of enumerations.
+    let start = |variable: &Variable, value: &'a str| match value.parse() {
         Ok(number) if variable.base != BaseType::String => Start::Same(number),
         _ => Start::Text(value),
-    })
+    };
+    let values = values.iter().cycle();
+    Ok(found
+        .iter()
+        .zip(values)
+        .map(|(variable, value)| (variable.name.as_str(), start(variable, value)))
+        .collect())
 }
 
 fn write_table(path: &Path, time: &[f64], curves: &[Curve]) -> Result<()> {
     let mut writer = csv::Writer::from_path(path)?;
     writer.write_record(std::iter::once("time").chain(curves.iter().map(|curve| curve.name)))?;
     for (row, time) in time.iter().enumerate() {
-        let values = curves.iter().map(|curve| curve.values[row]);
-        writer.write_record(std::iter::once(*time).chain(values).map(|value| value.to_string()))?;
+        let value = |curve: &Curve| match curve.values[row] {
+            value if curve.is_boolean => (value != 0.0).to_string(),
+            value => value.to_string(),
+        };
+        writer.write_record(std::iter::once(time.to_string()).chain(curves.iter().map(value)))?;
     }
     Ok(writer.flush()?)
 }
@@ -291,8 +391,12 @@ impl Table {
         let mut columns = vec![Vec::new(); names.len()];
         for (row, record) in reader.records().enumerate() {
             for (place, field) in record.with_context(of)?.iter().enumerate() {
-                let value: f64 = field
-                    .parse()
+                let value = match field {
+                    "true" => Ok(1.0),
+                    "false" => Ok(0.0),
+                    number => number.parse::<f64>(),
+                };
+                let value = value
                     .with_context(|| format!("{}, line {}: {} is {field:?}", of(), row + 2, names[place]))?;
                 columns[place].push(value);
             }

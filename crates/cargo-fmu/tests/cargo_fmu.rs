@@ -126,6 +126,11 @@ fn lag() {
 #[test]
 fn ball() {
     let folder = grows("ball", &[], "time,height,velocity,bounces", "ended by the FMU at t = 2.0527167766");
+    // The last row is that of the end, between two communication points.
+    let table = folder.read("my-ball/target/fmu/my_ball.csv");
+    let last = table.lines().next_back().unwrap();
+    assert!(last.starts_with("2.0527167766") && last.ends_with(",5"), "{last}");
+    a_failed_run_fails(&folder);
     // The first FMU has a finding that fails; the second is checked all the same.
     let fmus = ["--fmu", "target/fmu/my_ball.fmu", "--fmu", "target/fmu/fmi3/my_ball.fmu"];
     let output =
@@ -136,12 +141,30 @@ fn ball() {
 
 #[test]
 fn motor() {
-    grows("motor", &["--set", "duty=1"], "time,current,speed,on", "rad/s");
+    let folder = grows("motor", &["--set", "duty=1"], "time,current,speed,on", "rad/s");
+    assert!(folder.read("my-motor/target/fmu/my_motor.csv").trim_end().ends_with(",true"));
 }
 
 #[test]
 fn house() {
-    grows("house", &[], "time,room,outside", "from -6.000000 to 2.500000 degC");
+    let folder = grows("house", &[], "time,room,outside", "from -6.000000 to 2.500000 degC");
+    let read = "logEvents: read 9 temperatures from winter.csv";
+    assert!(folder.says("my-house", &["run", "--log"]).contains(read));
+    assert!(!folder.says("my-house", &["run"]).contains(read));
+}
+
+/// The reason comes first, and no file of values that are none.
+fn a_failed_run_fails(folder: &Folder) {
+    for fmi in ["2", "3"] {
+        let output = folder.fmu("my-ball", &["run", "--fmi", fmi, "--set", "gravity=1e6"]);
+        let [said, why] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+        assert_eq!(output.status.code(), Some(1));
+        assert!(why.contains("error: ") && why.contains("gravity must not be above 1000"), "{why}");
+        assert!(!said.contains("from"), "{said}");
+        let files = if fmi == "2" { "" } else { "fmi3/" };
+        assert!(folder.path(&format!("my-ball/target/fmu/{files}my_ball.fmu")).is_file());
+        assert!(!folder.path("my-ball/target/fmu/my_ball.csv").exists());
+    }
 }
 
 /// Without `--fmu` both FMUs are made first.
@@ -165,6 +188,7 @@ fn inputs_come_from_a_table(folder: &Folder) {
 
     for (arguments, word) in [
         (&["run", "--set", "y=1"][..], "there is no variable y to set"),
+        (&["run", "--set", "der(y)=1"], "there is no variable der(y) to set; did you mean der(x)?"),
         (&["run", "--show", "y"], "there is no variable y to show"),
         (&["run", "--step", "0"], "--step 0 positive"),
         (&["run", "--input", "nothing.csv"], "nothing.csv"),
@@ -229,6 +253,73 @@ fn what_is_no_model_is_named() {
     assert!(said.contains("could not find `Cargo.toml`"), "{said}");
 }
 
+/// In one tree, the model names a path from itself; with `--git`, a commit. Both are valid in another place.
+#[test]
+#[cfg(unix)]
+fn a_model_is_built_at_another_place() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap();
+    let folder = Folder::new();
+    let git = |arguments: &[&str]| {
+        let output = Command::new("git").args(arguments).current_dir(folder.path("")).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    if !root.join(".git").exists() {
+        return;
+    }
+    let root = root.to_str().unwrap();
+    git(&["clone", "--quiet", "--bare", root, "origin.git"]);
+    git(&["clone", "--quiet", "origin.git", "second"]);
+    let second = fs::canonicalize(folder.path("second")).unwrap();
+    // A clone by cargo goes with the test; crates of the registry are those that are there.
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.unwrap_or_else(|| Path::new(&std::env::var_os("HOME").unwrap()).join(".cargo"));
+    fs::create_dir(folder.path("home")).unwrap();
+    std::os::unix::fs::symlink(home.join("registry"), folder.path("home/registry")).unwrap();
+    // The source of fmu-export, as cargo resolves it there.
+    let source = |place: &str| {
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(["metadata", "--format-version", "1"]).current_dir(folder.path(place));
+        let output = cargo.env("CARGO_HOME", folder.path("home")).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let metadata: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let packages = metadata["packages"].as_array().unwrap();
+        let export = packages.iter().find(|package| package["name"] == "fmu-export").unwrap();
+        export["manifest_path"].as_str().unwrap().to_owned()
+    };
+
+    fs::create_dir_all(Path::new(root).join("target")).unwrap();
+    let inside = tempfile::tempdir_in(Path::new(root).join("target")).unwrap();
+    let name = inside.path().file_name().unwrap().to_str().unwrap();
+    let model = inside.path().join("shared");
+    // A package of its own, beside the workspace of the clone.
+    fs::write(inside.path().join("Cargo.toml"), "[workspace]\nmembers = [\"shared\"]\nresolver = \"3\"\n")
+        .unwrap();
+    folder.says("", &["new", model.to_str().unwrap()]);
+    let manifest = fs::read_to_string(model.join("Cargo.toml")).unwrap();
+    assert!(
+        manifest.contains("path = \"../../../crates/fmu-export\"") && !manifest.contains(root),
+        "{manifest}"
+    );
+    // Its workspace decides on the profile; cargo would warn of another one.
+    assert!(!manifest.contains("[profile"), "{manifest}");
+    let copy = second.join("target").join(name);
+    fs::create_dir_all(second.join("target")).unwrap();
+    let copied = Command::new("cp").arg("-r").args([inside.path(), &copy]).status().unwrap();
+    assert!(copied.success());
+    let place = format!("second/target/{name}/shared");
+    assert_eq!(source(&place), second.join("crates/fmu-export/Cargo.toml").to_str().unwrap());
+
+    let url = format!("file://{}", folder.path("origin.git").display());
+    let said = folder.says("", &["new", "from-git", "--git", &url]);
+    assert!(!said.contains("only on this machine"), "{said}");
+    assert!(!folder.read("from-git/Cargo.toml").contains(root));
+    fs::rename(folder.path("from-git"), folder.path("elsewhere")).unwrap();
+    assert!(source("elsewhere").contains("/git/checkouts/"));
+
+    let said = folder.says("", &["new", "alone"]);
+    assert!(said.contains("only on this machine; --git URL"), "{said}");
+}
+
 /// The READMEs show the least there is, word for word.
 #[test]
 fn the_readme_shows_a_whole_fmu() {
@@ -237,4 +328,58 @@ fn the_readme_shows_a_whole_fmu() {
     let (_, code) = source.split_once("\n\n").unwrap();
     let readme = fs::read_to_string(crates.join("fmu-export/README.md")).unwrap();
     assert!(readme.contains(&format!("```rust,ignore\n{code}```")), "{readme}");
+}
+
+/// The code of the guide for authors is a model with tests, which is packed, run and checked as it says.
+#[test]
+fn the_guide_leads_to_a_checked_fmu() {
+    let guide = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/author-guide.md");
+    let guide = fs::read_to_string(guide).unwrap();
+    let folder = Folder::new();
+    folder.says("", &["new", "tank"]);
+    for path in ["src/lib.rs", "tests/tank.rs"] {
+        // Each block of code is introduced by the name of its file.
+        let begin = format!("<!-- {path} -->\n```rust\n");
+        let blocks = guide.split(&begin).skip(1);
+        let code: Vec<_> = blocks.map(|block| block.split("```").next().unwrap()).collect();
+        assert!(!code.is_empty(), "{path}");
+        fs::write(folder.path(&format!("tank/{path}")), code.join("\n")).unwrap();
+    }
+    let output = folder.run("tank", env!("CARGO"), &["test", "--quiet"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = folder.fmu("tank", &["build"]);
+    let why = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{why}");
+    if cfg!(all(target_os = "linux", target_env = "gnu")) {
+        assert!(
+            why.contains("note: the library needs glibc 2.") && why.contains("for glibc 2.17, add --target"),
+            "{why}"
+        );
+    }
+
+    // An array is set as a whole, in both versions; in between its values would not rise.
+    for fmi in ["2", "3"] {
+        let run = ["run", "--fmi", fmi, "--set", "levels=0,2,4,6", "--show", "level,pumping,switches,flows"];
+        let said = folder.says("tank", &run);
+        assert!(
+            said.contains("pumping   false and true\n") && said.contains("switches  from 0 to"),
+            "{said}"
+        );
+        let table = folder.read("tank/target/fmu/tank.csv");
+        assert_eq!(
+            table.lines().next(),
+            Some("time,level,pumping,switches,flows[1],flows[2],flows[3],flows[4]")
+        );
+        assert!(table.lines().nth(1).unwrap().starts_with("0,1,false,0,0,"), "{table}");
+        for (values, words) in
+            [("0,1", "levels has 4 elements, --set gives 2 values"), ("3,2,1,0", "levels must rise")]
+        {
+            let said = folder.refuses("tank", &["run", "--fmi", fmi, "--set", &format!("levels={values}")]);
+            assert!(said.contains(words), "{said}");
+        }
+    }
+    let fmus = ["--fmu", "target/fmu/tank.fmu", "--fmu", "target/fmu/fmi3/tank.fmu"];
+    let options = ["check", "--fail-on", "fragile", "--no-shrink", "--repeat", "0.3"];
+    let said = folder.says("tank", &[&options[..], &fmus].concat());
+    assert!(said.contains("(FMI 2.0,") && said.contains("(FMI 3.0,"), "{said}");
 }

@@ -251,14 +251,9 @@ impl Description {
             wrong.push(("description.interfaces", "it offers no interface type".to_owned()));
         }
         for offer in [&self.co_simulation, &self.model_exchange].into_iter().flatten() {
-            let mut letters = offer.identifier.chars();
-            let good = letters.next().is_some_and(|first| first.is_ascii_alphabetic() || first == '_')
-                && letters.all(|letter| letter.is_ascii_alphanumeric() || letter == '_');
-            if !good {
-                wrong.push((
-                    "description.identifier",
-                    format!("modelIdentifier {:?} is no name in C", offer.identifier),
-                ));
+            if !is_c_name(&offer.identifier) {
+                let why = format!("modelIdentifier {:?} is no name in C", offer.identifier);
+                wrong.push(("description.identifier", why));
             }
         }
         let named = |group: &str| -> HashSet<String> {
@@ -525,6 +520,51 @@ fn default_initial(causality: &str, variability: &str) -> &'static str {
     }
 }
 
+/// Whether a string is a valid identifier of C.
+fn is_c_name(text: &str) -> bool {
+    let mut letters = text.chars();
+    letters.next().is_some_and(|first| first.is_ascii_alphabetic() || first == '_')
+        && letters.all(|letter| letter.is_ascii_alphanumeric() || letter == '_')
+}
+
+/// The default of `variability`.
+fn default_variability(standard: Standard, causality: &str, base: Option<BaseType>) -> &'static str {
+    match causality {
+        "parameter" | "calculatedParameter" | "structuralParameter" if standard == Standard::Fmi3 => "fixed",
+        _ if base.is_some_and(BaseType::is_float) => "continuous",
+        _ => "discrete",
+    }
+}
+
+/// The number of elements; `None` if it is not known. `sizes` has the start values of structural parameters.
+fn array_size(node: Node, sizes: &HashMap<u32, Option<usize>>) -> Option<usize> {
+    let dimensions = node.children().filter(|child| child.has_tag_name("Dimension"));
+    dimensions.into_iter().try_fold(1, |size, dimension| {
+        let fixed = dimension.attribute("start").and_then(|text| text.parse::<usize>().ok());
+        let other = dimension.attribute("valueReference").and_then(|text| text.parse::<u32>().ok());
+        let of_other = other.and_then(|reference| sizes.get(&reference).copied().flatten());
+        Some(size * fixed.or(of_other)?)
+    })
+}
+
+/// The start values; one value for an array stands for all elements.
+fn start_values(node: Node, of_type: Node, base: Option<BaseType>, size: Option<usize>) -> Vec<String> {
+    let mut start: Vec<String> = match (base, of_type.attribute("start")) {
+        (Some(BaseType::String | BaseType::Binary) | None, Some(text)) => vec![text.to_owned()],
+        (_, Some(text)) => text.split_whitespace().map(str::to_owned).collect(),
+        (_, None) => Vec::new(),
+    };
+    if start.is_empty() {
+        let starts = node.children().filter(|child| child.has_tag_name("Start"));
+        start = starts.filter_map(|child| Some(child.attribute("value")?.to_owned())).collect();
+    }
+    let is_array = node.children().any(|child| child.has_tag_name("Dimension"));
+    match (size, &start[..]) {
+        (Some(size), [one]) if is_array => vec![one.clone(); size],
+        _ => start,
+    }
+}
+
 fn variables(root: Node, standard: Standard, wrong: &mut Vec<Observation>) -> Vec<Variable> {
     let types: HashMap<&str, Node> =
         elements(root, "TypeDefinitions").filter_map(|node| Some((node.attribute("name")?, node))).collect();
@@ -544,10 +584,9 @@ fn variables(root: Node, standard: Standard, wrong: &mut Vec<Observation>) -> Ve
             wrong.push(("description.references", format!("{name} has no value reference")));
             continue;
         };
+        let is_type = |child: &Node| base_of(standard, child.tag_name().name()).is_some();
         let of_type = match standard {
-            Standard::Fmi2 => {
-                node.children().find(|child| base_of(standard, child.tag_name().name()).is_some())
-            }
+            Standard::Fmi2 => node.children().find(is_type),
             Standard::Fmi3 => Some(*node),
         };
         let Some(of_type) = of_type else {
@@ -565,43 +604,15 @@ fn variables(root: Node, standard: Standard, wrong: &mut Vec<Observation>) -> Ve
         };
         let number = |name: &str| of_both(name).and_then(|text| text.trim().parse::<f64>().ok());
         let causality = node.attribute("causality").unwrap_or("local").to_owned();
-        let variability = node.attribute("variability").map_or_else(
-            || {
-                let fixed = ["parameter", "calculatedParameter", "structuralParameter"];
-                if fixed.contains(&causality.as_str()) && standard == Standard::Fmi3 {
-                    "fixed".to_owned()
-                } else if base.is_some_and(BaseType::is_float) {
-                    "continuous".to_owned()
-                } else {
-                    "discrete".to_owned()
-                }
-            },
-            str::to_owned,
-        );
+        let variability = node
+            .attribute("variability")
+            .unwrap_or_else(|| default_variability(standard, &causality, base))
+            .to_owned();
         let initial = node
             .attribute("initial")
             .map_or_else(|| default_initial(&causality, &variability).to_owned(), str::to_owned);
-        let mut size = Some(1_usize);
-        for dimension in node.children().filter(|child| child.has_tag_name("Dimension")) {
-            let fixed = dimension.attribute("start").and_then(|text| text.parse::<usize>().ok());
-            let other = dimension.attribute("valueReference").and_then(|text| text.parse::<u32>().ok());
-            let of_other = other.and_then(|reference| sizes.get(&reference).copied().flatten());
-            size = size.zip(fixed.or(of_other)).map(|(one, other)| one * other);
-        }
-        let mut start: Vec<String> = match (base, of_type.attribute("start")) {
-            (Some(BaseType::String | BaseType::Binary) | None, Some(text)) => vec![text.to_owned()],
-            (_, Some(text)) => text.split_whitespace().map(str::to_owned).collect(),
-            (_, None) => Vec::new(),
-        };
-        if start.is_empty() {
-            let starts = node.children().filter(|child| child.has_tag_name("Start"));
-            start = starts.filter_map(|child| Some(child.attribute("value")?.to_owned())).collect();
-        }
-        if let (Some(size), 1, true) =
-            (size, start.len(), node.children().any(|child| child.has_tag_name("Dimension")))
-        {
-            start = vec![start[0].clone(); size];
-        }
+        let size = array_size(*node, &sizes);
+        let start = start_values(*node, of_type, base, size);
         // Structural parameters, which define the sizes of arrays.
         if base.is_some_and(|base| base == BaseType::UInt64) {
             sizes.insert(reference, start.first().and_then(|text| text.parse().ok()));

@@ -1,6 +1,6 @@
-//! Whether a sequence keeps to the standard: a finding must not come from a call that may not be made there.
+//! Checks that a call sequence follows the standard: no finding may come from a call that the standard does not allow.
 
-use crate::call_sequence::{Arg, NOBODY, Numbered, Step};
+use crate::call_sequence::{Arg, Make, NOBODY, Numbered, Step};
 use crate::description::Description;
 use fmi_abi::calls::signature;
 use fmi_abi::{Interface, Mode, Standard};
@@ -17,171 +17,180 @@ struct State {
     updated: bool,
 }
 
-/// The first call that may not be made where it is, by its number; forbidden calls apart, which change nothing.
+/// Returns the number of the first call that the standard does not allow. Calls that are marked as forbidden are skipped.
 pub fn first_illegal(description: &Description, sequence: &[Numbered]) -> Option<u32> {
-    walk(description, sequence, &mut Trajectory::default())
+    walk(description, sequence, &mut Objects::default())
 }
+
+/// Index of the instance that a saved state belongs to, and the state.
+type SavedState = (usize, State);
 
 /// State of all instances, saved states and byte buffers.
 #[derive(Default)]
-struct Trajectory {
+struct Objects {
     instances: HashMap<usize, State>,
-    slots: HashMap<usize, (usize, State)>,
+    slots: HashMap<usize, SavedState>,
     bytes: HashMap<usize, State>,
 }
 
-fn walk(description: &Description, sequence: &[Numbered], trajectory: &mut Trajectory) -> Option<u32> {
-    let standard = description.standard;
-    for Numbered { id, forbidden, step } in sequence {
-        let Trajectory { instances, slots, bytes } = &mut *trajectory;
-        if *forbidden {
-            continue;
-        }
-        let good = match step {
-            Step::Make(index, make) => {
-                let interface =
-                    if make.co_simulation { Interface::CoSimulation } else { Interface::ModelExchange };
-                let once = description
-                    .offer(interface)
-                    .is_some_and(|offer| offer.can(&["canBeInstantiatedOnlyOncePerProcess"]));
-                let state = State {
-                    interface,
-                    mode: Mode::Instantiated,
-                    time: 0.0,
-                    event_mode: make.event_mode,
-                    early_return: make.early_return,
-                    set_up: standard == Standard::Fmi3,
-                    updated: false,
-                };
-                let free = !instances.contains_key(index) && (!once || instances.is_empty());
-                instances.insert(*index, state);
-                free
-            }
+/// Returns the number of the first step that the standard does not allow.
+fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects) -> Option<u32> {
+    for Numbered { step, id, .. } in sequence.iter().filter(|numbered| !numbered.forbidden) {
+        let is_legal = match step {
+            Step::Make(index, make) => objects.make(description, *index, make),
             Step::Free(index) if *index == NOBODY => true,
             Step::Free(index) => {
-                slots.retain(|_, (owner, _)| owner != index);
-                instances.remove(index).is_some()
+                objects.slots.retain(|_, (owner, _)| owner != index);
+                objects.instances.remove(index).is_some()
             }
             Step::Call { of, function, args } => {
-                let Some((index, state)) = of.and_then(|index| Some((index, instances.get_mut(&index)?)))
-                else {
-                    return Some(*id);
-                };
-                let allowed = signature(function)
-                    .is_some_and(|of| of.rule.standard.contain(standard, state.interface, state.mode));
-                let real = |index: usize| match args.get(index) {
-                    Some(Arg::Real(bits)) => f64::from_bits(*bits),
-                    _ => 0.0,
-                };
-                let mut good = allowed;
-                match &function[4..] {
-                    "SetupExperiment" => {
-                        state.set_up = true;
-                        state.time = real(2);
-                    }
-                    "EnterInitializationMode" => {
-                        good &= state.set_up;
-                        state.mode = Mode::Initialization;
-                        if standard == Standard::Fmi3 {
-                            state.time = real(2);
-                        }
-                    }
-                    "ExitInitializationMode" => {
-                        state.updated = false;
-                        state.mode = if state.interface == Interface::ModelExchange || state.event_mode {
-                            Mode::Event
-                        } else {
-                            Mode::StepComplete
-                        };
-                    }
-                    "UpdateDiscreteStates" | "NewDiscreteStates" => state.updated = true,
-                    "EnterEventMode" => {
-                        state.updated = false;
-                        state.mode = Mode::Event;
-                    }
-                    "EnterContinuousTimeMode" => {
-                        good &= state.updated;
-                        state.mode = Mode::ContinuousTime;
-                    }
-                    "EnterStepMode" => {
-                        good &= state.updated;
-                        state.mode = Mode::StepComplete;
-                    }
-                    "DoStep" => {
-                        let off = real(0) - state.time;
-                        // After an early return, only the run knows the time.
-                        let here =
-                            off.abs() <= 1e-9 * (1.0 + state.time.abs()) || state.early_return && off < 0.0;
-                        good &= here && real(1) > 0.0;
-                        state.time = real(0) + real(1);
-                    }
-                    "SetTime" => {
-                        good &= real(0) >= state.time - 1e-12;
-                        state.time = real(0);
-                    }
-                    "Terminate" => state.mode = Mode::Terminated,
-                    "Reset" => {
-                        state.mode = Mode::Instantiated;
-                        state.set_up = standard == Standard::Fmi3;
-                    }
-                    "GetFMUstate" | "GetFMUState" => {
-                        if let Some(Arg::StateOut(slot)) = args.first() {
-                            slots.insert(*slot, (index, *state));
-                        }
-                    }
-                    "SetFMUstate" | "SetFMUState" => match args.first() {
-                        Some(Arg::State(slot)) => match slots.get(slot) {
-                            Some((owner, saved)) if *owner == index => *state = *saved,
-                            _ => good = false,
-                        },
-                        _ => good = false,
-                    },
-                    "FreeFMUstate" | "FreeFMUState" => {
-                        if let Some(Arg::StateOut(slot)) = args.first() {
-                            slots.remove(slot);
-                        }
-                    }
-                    "SerializedFMUstateSize"
-                    | "SerializedFMUStateSize"
-                    | "SerializeFMUstate"
-                    | "SerializeFMUState" => match args.first() {
-                        Some(Arg::State(slot)) if slots.contains_key(slot) => {
-                            if let Some(Arg::SavedOut(to)) = args.get(1) {
-                                bytes.insert(*to, slots[slot].1);
-                            }
-                        }
-                        _ => good = false,
-                    },
-                    "DeSerializeFMUstate" | "DeserializeFMUState" => match (args.first(), args.get(2)) {
-                        (Some(Arg::Saved(from)), Some(Arg::StateOut(slot))) if bytes.contains_key(from) => {
-                            slots.insert(*slot, (index, bytes[from]));
-                        }
-                        _ => good = false,
-                    },
-                    _ => {}
-                }
-                good
+                of.is_some_and(|index| objects.call(description.standard, index, function, args))
             }
             // A call that is allowed twice is allowed any number of times.
-            Step::Repeat(_, steps) => {
-                walk(description, steps, trajectory).is_none()
-                    && walk(description, steps, trajectory).is_none()
-            }
+            Step::Repeat(_, steps) => (0..2).all(|_| walk(description, steps, objects).is_none()),
+            // Each thread has separate instances.
             Step::Parallel(sequences) => {
-                // Each thread has instances of its own.
                 sequences.iter().all(|sequence| first_illegal(description, sequence).is_none())
             }
             Step::FreshProcess => {
-                instances.clear();
-                slots.clear();
+                objects.instances.clear();
+                objects.slots.clear();
                 true
             }
-            Step::Unload | Step::Quit => instances.is_empty(),
+            Step::Unload | Step::Quit => objects.instances.is_empty(),
             Step::Version(_) | Step::Measure => true,
         };
-        if !good {
+        if !is_legal {
             return Some(*id);
         }
     }
     None
+}
+
+impl Objects {
+    /// Instantiates; returns whether that is allowed.
+    fn make(&mut self, description: &Description, index: usize, make: &Make) -> bool {
+        let interface = if make.co_simulation { Interface::CoSimulation } else { Interface::ModelExchange };
+        let once = description
+            .offer(interface)
+            .is_some_and(|offer| offer.can(&["canBeInstantiatedOnlyOncePerProcess"]));
+        let is_free = !self.instances.contains_key(&index) && (!once || self.instances.is_empty());
+        let state = State {
+            interface,
+            mode: Mode::Instantiated,
+            time: 0.0,
+            event_mode: make.event_mode,
+            early_return: make.early_return,
+            set_up: description.standard == Standard::Fmi3,
+            updated: false,
+        };
+        self.instances.insert(index, state);
+        is_free
+    }
+
+    /// Calls a function on an instance; returns whether that is allowed.
+    fn call(&mut self, standard: Standard, index: usize, function: &str, args: &[Arg]) -> bool {
+        let Some(state) = self.instances.get_mut(&index) else { return false };
+        let is_allowed = signature(function)
+            .is_some_and(|of| of.rule.standard.contain(standard, state.interface, state.mode));
+        let is_legal = match function[4..].to_lowercase().contains("fmustate") {
+            true => saved_states(&mut self.slots, &mut self.bytes, index, state, function, args),
+            false => state.call(standard, function, args),
+        };
+        is_allowed && is_legal
+    }
+}
+
+impl State {
+    /// Changes the state as the function does; returns whether the arguments are allowed.
+    fn call(&mut self, standard: Standard, function: &str, args: &[Arg]) -> bool {
+        let real = |index: usize| match args.get(index) {
+            Some(Arg::Real(bits)) => f64::from_bits(*bits),
+            _ => 0.0,
+        };
+        match &function[4..] {
+            "SetupExperiment" => {
+                self.set_up = true;
+                self.time = real(2);
+            }
+            "EnterInitializationMode" => {
+                self.mode = Mode::Initialization;
+                if standard == Standard::Fmi3 {
+                    self.time = real(2);
+                }
+                return self.set_up;
+            }
+            "ExitInitializationMode" => {
+                self.updated = false;
+                let has_event = self.interface == Interface::ModelExchange || self.event_mode;
+                self.mode = if has_event { Mode::Event } else { Mode::StepComplete };
+            }
+            "UpdateDiscreteStates" | "NewDiscreteStates" => self.updated = true,
+            "EnterEventMode" => {
+                self.updated = false;
+                self.mode = Mode::Event;
+            }
+            "EnterContinuousTimeMode" => {
+                self.mode = Mode::ContinuousTime;
+                return self.updated;
+            }
+            "EnterStepMode" => {
+                self.mode = Mode::StepComplete;
+                return self.updated;
+            }
+            "DoStep" => {
+                let off = real(0) - self.time;
+                // After an early return, only the run knows the time.
+                let here = off.abs() <= 1e-9 * (1.0 + self.time.abs()) || self.early_return && off < 0.0;
+                self.time = real(0) + real(1);
+                return here && real(1) > 0.0;
+            }
+            "SetTime" => {
+                let is_later = real(0) >= self.time - 1e-12;
+                self.time = real(0);
+                return is_later;
+            }
+            "Terminate" => self.mode = Mode::Terminated,
+            "Reset" => {
+                self.mode = Mode::Instantiated;
+                self.set_up = standard == Standard::Fmi3;
+            }
+            _ => {}
+        }
+        true
+    }
+}
+
+/// Calls a function of saved states; returns whether the state and the bytes exist.
+fn saved_states(
+    slots: &mut HashMap<usize, SavedState>,
+    bytes: &mut HashMap<usize, State>,
+    index: usize,
+    state: &mut State,
+    function: &str,
+    args: &[Arg],
+) -> bool {
+    match (function[4..].to_lowercase().as_str(), args.first()) {
+        ("getfmustate", Some(Arg::StateOut(slot))) => {
+            slots.insert(*slot, (index, *state));
+        }
+        ("setfmustate", Some(Arg::State(slot))) => match slots.get(slot) {
+            Some((owner, saved)) if *owner == index => *state = *saved,
+            _ => return false,
+        },
+        ("freefmustate", Some(Arg::StateOut(slot))) => drop(slots.remove(slot)),
+        ("serializedfmustatesize" | "serializefmustate", Some(Arg::State(slot))) => {
+            let Some((_, saved)) = slots.get(slot) else { return false };
+            if let Some(Arg::SavedOut(to)) = args.get(1) {
+                bytes.insert(*to, *saved);
+            }
+        }
+        ("deserializefmustate", Some(Arg::Saved(from))) => match (bytes.get(from), args.get(2)) {
+            (Some(saved), Some(Arg::StateOut(slot))) => drop(slots.insert(*slot, (index, *saved))),
+            _ => return false,
+        },
+        ("getfmustate" | "freefmustate", _) => {}
+        _ => return false,
+    }
+    true
 }

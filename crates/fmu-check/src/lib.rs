@@ -163,6 +163,36 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
     }
 }
 
+/// Findings outside of the arrays and logs that any call can show, or that prevent other checks.
+const ALWAYS: [&str; 6] = [
+    "functions.status",
+    "package.unloadable",
+    "package.symbols",
+    "life_cycle.simulation",
+    "life_cycle.crash",
+    "life_cycle.hang",
+];
+
+/// Finds a trajectory for each interface type that has a library.
+fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
+    for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
+        if checker.setting.libraries[index].is_none() {
+            continue;
+        }
+        match reach(checker, interface) {
+            Ok(trajectory) => checker.trajectories.push(trajectory),
+            Err(error) if error.is::<NoTrajectory>() => {
+                checker.unchecked(INTERFACES[index], format!("no simulation succeeds: {error}"));
+            }
+            Err(error) if error.is::<TimeOver>() || error.is::<run::OutOfMemory>() => {
+                checker.unchecked(INTERFACES[index], error.to_string());
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
 /// Checks an FMU, with a line on the standard error that says how far it is.
 ///
 /// # Errors
@@ -207,37 +237,15 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     checker.quick = options.quick;
     of_files.into_iter().for_each(|(name, observed)| checker.add(checker.claim(name).of_files(observed)));
     without.into_iter().for_each(|(name, why)| checker.unchecked(name, why));
-    for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
-        if checker.setting.libraries[index].is_none() {
-            continue;
-        }
-        match reach(&mut checker, interface) {
-            Ok(trajectory) => checker.trajectories.push(trajectory),
-            Err(error) if error.is::<NoTrajectory>() => {
-                checker.unchecked(INTERFACES[index], format!("no simulation succeeds: {error}"));
-            }
-            Err(error) if error.is::<TimeOver>() || error.is::<run::OutOfMemory>() => {
-                checker.unchecked(INTERFACES[index], error.to_string());
-            }
-            Err(error) => return Err(error),
-        }
-    }
+    simulate(&mut checker)?;
     attack(&checker, progress, &wanted)?;
     let mut findings = checker.take();
-    // Findings that show in any call come first, and so do those that prevent other checks.
-    let always = |finding: &Finding| {
-        ["arrays", "logs"].contains(&finding.topic())
-            || [
-                "functions.status",
-                "package.unloadable",
-                "package.symbols",
-                "life_cycle.simulation",
-                "life_cycle.crash",
-                "life_cycle.hang",
-            ]
-            .contains(&finding.name.as_str())
+    let is_kept = |finding: &Finding| {
+        wanted(finding.topic())
+            || ["arrays", "logs"].contains(&finding.topic())
+            || ALWAYS.contains(&finding.name.as_str())
     };
-    findings.retain(|finding| options.only.is_empty() || wanted(finding.topic()) || always(finding));
+    findings.retain(|finding| options.only.is_empty() || is_kept(finding));
     findings.sort_by(|one, other| other.severity.cmp(&one.severity).then_with(|| one.name.cmp(&other.name)));
     shorten(&checker, &mut findings, options, progress);
     if worker::interrupted() {

@@ -68,6 +68,26 @@ pub struct CoSimulationOffer {
 }
 
 impl CoSimulationOffer {
+    /// Panics if a step ended in a way that the model has not declared, because importers rely on the declaration.
+    #[doc(hidden)]
+    #[inline]
+    pub fn check(&self, stepped: &Result<Stepped, Error>) {
+        match stepped {
+            Ok(Stepped::Done | Stepped::Calculated) | Err(_) => {}
+            Ok(Stepped::Event(_)) => assert!(
+                self.has_event_mode(),
+                "a step stopped at an event (Stepped::Event), but the model does not declare events: add \
+                 `const EVENTS: Events = Events::Stop;` to its impl CoSimulation, and handle them in \
+                 ModelExchange::event"
+            ),
+            Ok(Stepped::Early(_) | Stepped::Terminate(_)) => assert!(
+                self.ends_early,
+                "a step ended early (Stepped::Early or Stepped::Terminate), but the model does not declare that: add \
+                 `const ENDS_EARLY: bool = true;` to its impl CoSimulation"
+            ),
+        }
+    }
+
     /// Returns whether an importer of FMI 3.0 can handle events.
     pub const fn has_event_mode(&self) -> bool {
         !matches!(self.events, Events::None)
@@ -144,16 +164,9 @@ macro_rules! offer {
         #[inline]
         fn exported_step(&mut self, step: $crate::Step) -> ::core::result::Result<$crate::Stepped, $crate::Error> {
             let stepped = $crate::CoSimulation::step(self, step);
-            // The importer may rely on the capability.
-            ::core::assert!(
-                <Self as $crate::Exported>::CO_SIMULATION.is_some_and(|offer| offer.ends_early)
-                    || ::core::matches!(
-                        stepped,
-                        ::core::result::Result::Ok($crate::Stepped::Done | $crate::Stepped::Calculated)
-                            | ::core::result::Result::Err(_)
-                    ),
-                "a step ended early although the model does not say `const ENDS_EARLY: bool = true`"
-            );
+            if let ::core::option::Option::Some(offer) = <Self as $crate::Exported>::CO_SIMULATION {
+                offer.check(&stepped);
+            }
             stepped
         }
 

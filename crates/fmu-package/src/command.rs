@@ -5,9 +5,9 @@ use crate::cargo::LibraryBuild;
 use crate::changes::Changes;
 use crate::connectors::{Terminal, terminals};
 use crate::content::ContentFile;
-use crate::cross::{TARGETS, check_targets};
+use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets};
 use crate::files::write_atomically;
-use crate::library::check_platform;
+use crate::library::{check_platform, needed_glibc};
 use crate::live::{self, Runnable};
 use crate::model::LoadedModel;
 use crate::pack::{Library, Parts, pack};
@@ -224,6 +224,7 @@ impl Builder {
         };
         let tunable = if options.tunable { ", tunable" } else { "" };
         println!("guid {guid}{start}{tunable}");
+        self.warn_of_glibc(options, &libraries);
         if is_default && !options.c_sources {
             self.compare_with_kept(&kept, &descriptions, &guid);
         }
@@ -239,6 +240,22 @@ impl Builder {
             Some(file) if !self.is_default => short(file),
             _ => model.identifier().to_owned(),
         })
+    }
+
+    /// Tells the user if the library, compiled for this machine, needs a newer glibc than those compiled for a target.
+    fn warn_of_glibc(&self, options: &BuildOptions, libraries: &[Library]) {
+        // A library that is compiled with other settings is only tried here.
+        let is_shipped = self.settings.is_empty() && options.target.is_empty() && options.binary.is_empty();
+        let needed = |library: &Library| needed_glibc(&fs::read(&library.path).ok()?);
+        if let Some((major, minor)) = libraries.first().filter(|_| is_shipped).and_then(needed)
+            && format!("{major}.{minor}") != GLIBC
+        {
+            let target = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
+            eprintln!(
+                "note: the library needs glibc {major}.{minor}, as this system has it; for glibc {GLIBC}, add --target {target} \
+                 (with {ZIGBUILD}: pip install {ZIGBUILD})"
+            );
+        }
     }
 
     /// Tells the user if the description that is kept with the sources is another one.

@@ -22,7 +22,7 @@ pub const TARGETS: [&str; 5] = [
 ];
 
 /// The oldest glibc that libraries for Linux ask for: that of Enterprise Linux 7 and of everything since.
-const GLIBC: &str = "2.17";
+pub const GLIBC: &str = "2.17";
 
 /// Fails with all that is missing to compile for these targets, and where to get it; only `all` of them need
 /// cargo-zigbuild, as cargo's configuration may have a linker for one.

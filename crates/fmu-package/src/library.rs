@@ -3,7 +3,7 @@
 use crate::platform::Platform;
 use anyhow::{Context, Result, bail, ensure};
 use object::read::macho::{FatArch, MachOFatFile32};
-use object::{Architecture, BinaryFormat, File, FileKind, Object, ObjectKind};
+use object::{Architecture, BinaryFormat, File, FileKind, Object, ObjectKind, ObjectSection};
 
 /// The platforms that a library is for: one, or several if it is a universal library of macOS.
 fn platforms(library: &[u8]) -> Result<Vec<Platform>> {
@@ -58,9 +58,20 @@ pub fn check_platform(library: &[u8], wanted: Platform, any_processor: bool) -> 
     Ok(())
 }
 
+/// The newest version of glibc that a library for Linux needs, if it needs any.
+pub fn needed_glibc(library: &[u8]) -> Option<(u32, u32)> {
+    let file = File::parse(library).ok().filter(|file| file.format() == BinaryFormat::Elf)?;
+    let strings = file.section_by_name(".dynstr")?.data().ok()?;
+    let version = |name: &[u8]| {
+        let mut numbers = std::str::from_utf8(name).ok()?.strip_prefix("GLIBC_")?.split('.');
+        Some((numbers.next()?.parse().ok()?, numbers.next()?.parse().ok()?))
+    };
+    strings.split(|byte| *byte == 0).filter_map(version).max()
+}
+
 #[cfg(test)]
 mod tests {
-    use super::check_platform;
+    use super::{check_platform, needed_glibc};
     use crate::platform::Platform;
 
     /// A universal library of macOS with nothing in its parts.
@@ -97,6 +108,15 @@ mod tests {
         for folder in ["linux64", "win64", "darwin64"].into_iter().filter(|folder| *folder != host) {
             assert!(check(&program, folder, false).is_err(), "{folder}");
         }
+    }
+
+    #[test]
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    fn the_glibc_of_a_program_is_found() {
+        let program = std::fs::read(std::env::current_exe().unwrap()).unwrap();
+        // Rust itself asks for 2.17.
+        assert!(needed_glibc(&program).is_some_and(|version| version >= (2, 17)));
+        assert_eq!(needed_glibc(b"GLIBC_2.34"), None);
     }
 
     #[test]

@@ -54,7 +54,7 @@ fn inputs(model: &LoadedModel, starts: &Starts) -> Inputs {
         let mut drawn = vec![None; variables.len()];
         for (place, of) in variables.iter().enumerate().filter(|(_, of)| of.causality == Causality::Input) {
             let Some(start) = &starts[place] else { continue };
-            drawn[place] = draw_value(&mut random, &of.of, start, now[place].as_ref());
+            drawn[place] = draw_value(&mut random, &of.of, start, now[place].as_ref(), 1.0);
             now[place] = drawn[place].clone().or(now[place].take());
         }
         drawn

@@ -4,8 +4,9 @@ use crate::check::{Starts, rounded};
 use crate::instance::{Instance, Outcome};
 use crate::model::LoadedModel;
 use crate::table::{Attributes, Type, Variable};
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow};
 use fmi_abi::{Causality, Interface, Standard, Value, Variability};
+use std::collections::BTreeMap;
 
 /// Values of everything that an importer can set before the simulation, and how it uses the model.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +24,13 @@ pub(crate) struct FactorSample<'a> {
     pub model: Instance<'a>,
 }
 
+/// The point that a draw begins at, whether it has a new time, and the variables that it moves.
+struct Draw<'d> {
+    before: Option<&'d Point>,
+    time: bool,
+    which: &'d dyn Fn(&Variable) -> bool,
+}
+
 /// Draws points.
 pub(crate) struct Sampler<'a> {
     /// Whether the models are at a communication point or in Continuous-Time Mode, not in Initialization Mode.
@@ -31,6 +39,32 @@ pub(crate) struct Sampler<'a> {
     random: fastrand::Rng,
     starts: Starts,
     tunable_parameters: bool,
+    /// The messages on the variables that could not be moved from a point, by place.
+    pub stuck: BTreeMap<u32, String>,
+}
+
+/// Attempts with the same reach.
+const ATTEMPTS: usize = 10;
+/// The number of reaches.
+const REACHES: usize = 10;
+
+/// How far variables are moved, as parts of the usual distance.
+#[derive(Clone, Copy)]
+struct Reach {
+    /// The first reach moves each element around its start value. All others move it around its value at the point before.
+    first: bool,
+    /// The part by which each element is moved separately.
+    single: f64,
+    /// The part by which all elements of an array are moved in proportion, which keeps their order.
+    common: f64,
+}
+
+impl Reach {
+    fn of(number: usize) -> Self {
+        let halvings = number.saturating_sub(1) as i32;
+        let common = if number == 0 { 0.0 } else { 0.5_f64.powi(halvings) };
+        Self { first: number == 0, single: 0.25_f64.powi(halvings), common }
+    }
 }
 
 impl<'a> Sampler<'a> {
@@ -38,7 +72,7 @@ impl<'a> Sampler<'a> {
     pub fn new(of: &'a LoadedModel, starts: Starts, tunable_parameters: bool) -> Self {
         // The seed is fixed: the same model always gets the same description.
         let random = fastrand::Rng::with_seed(2);
-        Self { running: false, of, random, starts, tunable_parameters }
+        Self { running: false, of, random, starts, tunable_parameters, stuck: BTreeMap::new() }
     }
 
     /// Models that differ in fixed parameters, in tunable ones, and in inputs, states and time.
@@ -63,51 +97,129 @@ impl<'a> Sampler<'a> {
     }
 
     /// Draws new values for some variables, and a new time or not, the rest being as before, until the model accepts
-    /// them.
+    /// them. A variable that the model accepts no new value of stays where it is, and is [`stuck`](Self::stuck).
     pub fn draw(
         &mut self,
         before: Option<&Point>,
         time: bool,
         which: impl Fn(&Variable) -> bool,
     ) -> Result<(Point, Instance<'a>)> {
-        let table = &self.of.table;
         let mut point = before.cloned().unwrap_or_else(|| Point {
-            values: vec![None; table.variables.len()],
+            values: vec![None; self.of.table.variables.len()],
             time: 0.0,
             interface: self.draw_interface(),
         });
         if time {
             point.time = self.random.f64();
         }
-        let mut rejected = None;
-        for _ in 0..100 {
-            for (place, variable) in
-                table.variables.iter().enumerate().filter(|(_, variable)| which(variable))
-            {
-                // States of a running model have been set, however they start.
-                let zero = (self.running && variable.state).then_some(&Value::Real(0.0));
-                if let Some(start) = self.starts[place].as_ref().or(zero)
-                    && variable.variability != Variability::Constant
-                {
-                    let value = &mut point.values[place];
-                    *value = draw_value(&mut self.random, &variable.of, start, value.as_ref());
+        let draw = Draw { before, time, which: &which };
+        for number in 0..REACHES {
+            for _ in 0..ATTEMPTS {
+                self.move_values(&mut point, &draw, Reach::of(number), &which);
+                if let Ok(model) = self.accepted(&point, &draw) {
+                    return Ok((point, model));
                 }
             }
-            // No function sets states in Co-Simulation: they must not follow there from what is changed.
-            let is_held = self.running && !time && point.interface == Interface::CoSimulation;
-            let model = match before.filter(|_| is_held) {
-                Some(before) => model_at(self.of, before, true, Standard::Fmi3).and_then(|mut model| {
-                    model.set(&point.values, |of| which(of) && !of.state)?;
-                    Ok(model)
-                }),
-                None => model_at(self.of, &point, self.running, Standard::Fmi3),
-            };
-            match model {
-                Ok(model) => return Ok((point, model)),
-                Err(message) => rejected = Some(message),
+        }
+        self.draw_one_by_one(point, &draw)
+    }
+
+    /// Moves one variable or array after the other, each as far as the model accepts it, the others being as before.
+    fn draw_one_by_one(&mut self, at: Point, draw: &Draw) -> Result<(Point, Instance<'a>)> {
+        let table = &self.of.table;
+        let values = match draw.before {
+            Some(before) => before.values.clone(),
+            // Strings and bytes are not moved.
+            None => {
+                let is_moved = |value: &&Value| !matches!(value, Value::String(_) | Value::Binary(_));
+                let starts = table.variables.iter().zip(&self.starts);
+                starts
+                    .map(|(of, start)| start.as_ref().filter(is_moved).filter(|_| of.is_moved()).cloned())
+                    .collect()
+            }
+        };
+        let mut point = Point { values, ..at };
+        let mut model = self.accepted(&point, draw).map_err(|message| {
+            let Point { time, interface, .. } = point;
+            anyhow!(
+                "the model rejects its own start values in {interface} at t = {time:.3} s, where it is tried: {message}"
+            )
+        })?;
+        for place in 0..table.variables.len() {
+            let of = &table.variables[place];
+            let array = table.array(place as u32);
+            let whole = array.iter().all(|place| (draw.which)(&table.variables[*place as usize]));
+            if !(draw.which)(of) || whole && of.element > 0 || !of.is_moved() {
+                continue;
+            }
+            let first = if whole { array[0] as usize } else { place };
+            let places = first..first + if whole { array.len() } else { 1 };
+            let mut message = String::new();
+            let reaches = (1..REACHES).map(Reach::of);
+            // Elements that cannot change separately may still change together.
+            let together = reaches.clone().map(|reach| Reach { single: 0.0, ..reach });
+            for reach in reaches.chain(together.filter(|_| places.len() > 1)) {
+                let mut moved = point.clone();
+                let is_here =
+                    |of: &Variable| places.clone().any(|place| table.variables[place].name == of.name);
+                self.move_values(&mut moved, draw, reach, &is_here);
+                match self.accepted(&moved, draw) {
+                    Ok(accepted) => {
+                        (point, model) = (moved, accepted);
+                        message.clear();
+                        break;
+                    }
+                    Err(rejected) => message = rejected,
+                }
+            }
+            if !message.is_empty() {
+                self.stuck.insert(place as u32, message);
             }
         }
-        bail!("the model takes no values near its start values: {}", rejected.unwrap_or_default())
+        Ok((point, model))
+    }
+
+    /// Draws new values for some variables of a point.
+    fn move_values(
+        &mut self,
+        point: &mut Point,
+        draw: &Draw,
+        reach: Reach,
+        which: &dyn Fn(&Variable) -> bool,
+    ) {
+        let table = &self.of.table;
+        let mut share = 0.0;
+        for (place, of) in table.variables.iter().enumerate().filter(|(_, of)| which(of) && of.is_moved()) {
+            // States of a running model have been set, however they start.
+            let zero = (self.running && of.state).then_some(&Value::Real(0.0));
+            let Some(start) = self.starts[place].as_ref().or(zero) else { continue };
+            let before = draw.before.and_then(|before| before.values[place].as_ref());
+            let around = before.filter(|_| !reach.first).unwrap_or(start);
+            let is_array =
+                || table.array(place as u32).iter().all(|place| which(&table.variables[*place as usize]));
+            if of.element == 0 && reach.common > 0.0 {
+                share = 2.0 * self.random.f64() - 1.0;
+            }
+            let around = match reach.common > 0.0 && of.length() > 1 && is_array() {
+                true => &moved_in_common(&of.of, around, share * reach.common),
+                false => around,
+            };
+            let value = &mut point.values[place];
+            *value = draw_value(&mut self.random, &of.of, around, value.as_ref(), reach.single);
+        }
+    }
+
+    /// The model at a point, if it accepts that.
+    fn accepted(&self, point: &Point, draw: &Draw) -> Outcome<Instance<'a>> {
+        // No function sets states in Co-Simulation: they must not follow there from what is changed.
+        let is_held = self.running && !draw.time && point.interface == Interface::CoSimulation;
+        match draw.before.filter(|_| is_held) {
+            Some(before) => model_at(self.of, before, true, Standard::Fmi3).and_then(|mut model| {
+                model.set(&point.values, |of| (draw.which)(of) && !of.state)?;
+                Ok(model)
+            }),
+            None => model_at(self.of, point, self.running, Standard::Fmi3),
+        }
     }
 
     /// The lists serve both interface types, so both are looked at.
@@ -176,23 +288,38 @@ pub(crate) fn model_at<'a>(
     Ok(model)
 }
 
-/// A value in the range of the type, near the start value; another one than before where possible. `None` for
-/// texts and bytes, of which nobody knows what else they could be.
+/// The value of an array's element when all elements change by a common factor, or integers by a common number.
+fn moved_in_common(of: &Type, value: &Value, share: f64) -> Value {
+    match (&of.attributes, value) {
+        (Attributes::Real { .. }, &Value::Real(value)) => Value::Real(value * (1.0 + 0.5 * share)),
+        (Attributes::Integer { .. }, &Value::Integer(value)) => {
+            Value::Integer(value.saturating_add((3.0 * share).round() as i128))
+        }
+        _ => value.clone(),
+    }
+}
+
+/// A value in the range of the type, near the start value by a `part` of the usual distance; another one than before where
+/// possible. `None` for strings and bytes, whose other possible values are unknown.
 pub(crate) fn draw_value(
     random: &mut fastrand::Rng,
     of: &Type,
     start: &Value,
     before: Option<&Value>,
+    part: f64,
 ) -> Option<Value> {
     Some(match (&of.attributes, start) {
         (Attributes::Real { min, max, nominal, .. }, &Value::Real(start)) => {
             let reach = if start == 0.0 { nominal.unwrap_or(1.0) } else { 0.5 * start.abs() };
-            let value = start + reach * (2.0 * random.f64() - 1.0);
+            let value = start + part * reach * (2.0 * random.f64() - 1.0);
             let value = value.clamp(min.unwrap_or(f64::MIN), max.unwrap_or(f64::MAX));
             Value::Real(rounded(of.base, value))
         }
         (Attributes::Integer { min, max }, &Value::Integer(start)) => {
-            let (low, high) = (*min.max(&start.saturating_sub(3)), *max.min(&start.saturating_add(3)));
+            let reach = (3.0 * part).ceil() as i128;
+            let start = start.clamp(*min, *max);
+            let (low, high) =
+                (*min.max(&start.saturating_sub(reach)), *max.min(&start.saturating_add(reach)));
             Value::Integer(random.i128(low..=high))
         }
         (Attributes::Enumeration(items), _) => {

@@ -78,8 +78,8 @@ impl ModelStructure {
     /// The structure of a model whose parameters are `tunable`, or are what its table says.
     ///
     /// # Errors
-    /// When the model contradicts itself, reacts to what it has not declared, or refuses every set of
-    /// parameters near its start values.
+    /// When the model contradicts itself, reacts to what it has not declared, or rejects its start values; if it is
+    /// `smooth`, also when it rejects every change of a variable.
     pub fn of(model: &LoadedModel, tunable_parameters: bool) -> Result<Self> {
         Self::with(model, tunable_parameters, None)
     }
@@ -376,6 +376,16 @@ impl Sampler<'_> {
             let after = after.values();
             let pair = |place: &u32| [&base.values, &after].map(|values| values[*place as usize].clone());
             reactions.values.push(unknowns.iter().map(pair).collect());
+        }
+        if let Some(message) =
+            self.stuck.get(&known).filter(|_| table.info.smooth && reactions.changes.is_empty())
+        {
+            let name = table.name(known);
+            bail!(
+                "{name} cannot be tried separately: the model rejects every other value that is near, from 50 % of it down to \
+                 0.0008 %: {message}; let `update` accept some, or leave `smooth` out of INFO and name what follows from \
+                 {name} with `depends_on`"
+            );
         }
         for (place, unknown) in unknowns.iter().enumerate() {
             let values = reactions.values.iter().flat_map(|row| &row[place]);

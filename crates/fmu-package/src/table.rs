@@ -225,6 +225,11 @@ impl Variable {
         self.causality == Causality::Input || matches!(self.initial, Some(Initial::Exact | Initial::Approx))
     }
 
+    /// Whether it has other values than its start value.
+    pub fn is_moved(&self) -> bool {
+        self.variability != Variability::Constant
+    }
+
     /// Whether it begins with exactly its start value, which may be changed.
     pub fn is_exact(&self) -> bool {
         self.initial == Some(Initial::Exact) && self.variability != Variability::Constant

@@ -239,3 +239,92 @@ fn derivatives_that_are_not_those_of_the_values_are_refused() {
     // Time is no variable here, so FMI 2.0 has no derivatives with respect to it.
     describe::<wrong_by_time::Deriver>(&Changes::default()).unwrap();
 }
+
+/// A characteristic: breakpoints that must rise, as interpolation needs them.
+macro_rules! characteristic {
+    ($module:ident $smooth:literal [$length:literal] $start:expr; $fits:expr) => {
+        mod $module {
+            use super::*;
+
+            #[derive(Clone)]
+            pub struct Table {
+                u: f64,
+                x: [f64; $length],
+            }
+
+            variables! { for Table;
+                /// Input
+                u = input(&NUMBER) in u;
+                /// Breakpoints
+                x = parameter(&NUMBER) in x;
+                /// Mean of the breakpoints, times the input
+                y = output(&NUMBER) by |table| table.u * table.x.iter().sum::<f64>();
+            }
+
+            impl Model for Table {
+                const INFO: Info = Info { smooth: $smooth, ..Info::new("Table", "table", "{table}") };
+
+                fn new(_: &Setup) -> Result<Self, Error> {
+                    Ok(Self { u: 1.0, x: $start })
+                }
+
+                fn update(&mut self) -> Result<(), Error> {
+                    let fits: fn(&[f64]) -> bool = $fits;
+                    if fits(&self.x) { Ok(()) } else { Err(Error::new("the breakpoints do not fit")) }
+                }
+            }
+
+            impl CoSimulation for Table {
+                fn step(&mut self, _: Step) -> Result<Stepped, Error> {
+                    Ok(Stepped::Done)
+                }
+            }
+
+            offer!(Table: CoSimulation);
+        }
+    };
+}
+
+fn rise(x: &[f64]) -> bool {
+    x.is_sorted_by(|one, next| one < next)
+}
+
+/// Whether the distances are all the same.
+fn are_even(x: &[f64]) -> bool {
+    x.windows(3).all(|x| (x[2] - 2.0 * x[1] + x[0]).abs() < 1e-9)
+}
+
+characteristic! { twelve false [12] std::array::from_fn(|i| 1.0 + i as f64); rise }
+characteristic! { twenty true [20] std::array::from_fn(|i| 0.1 * i as f64); rise }
+characteristic! { signed true [7] [-1.0, -0.3, -0.1, 0.0, 0.1, 0.3, 1.0]; rise }
+characteristic! { close true [4] [500.0, 500.1, 500.15, 501.0]; rise }
+characteristic! { even false [5] [0.0, 1.0, 2.0, 3.0, 4.0]; are_even }
+characteristic! { smooth_and_even true [5] [0.0, 1.0, 2.0, 3.0, 4.0]; are_even }
+
+/// Every value must fit the others; few of those that are drawn separately do.
+#[test]
+fn parameters_that_must_rise_are_tried_within_their_order() {
+    fn initial<M: Exported>() -> Vec<(u32, fmu_package::structure::DependencyKind)> {
+        let structure = common::structure::<M>(false).unwrap();
+        common::fmi3::describe::<M>(&Changes::default()).unwrap();
+        structure.initial_unknowns[0].dependencies.clone()
+    }
+    let all = |length: u32| (0..=length).map(|place| (place, Dependent)).collect::<Vec<_>>();
+    assert_eq!(initial::<twelve::Table>(), all(12));
+    // Of these every single breakpoint was found to act.
+    assert_eq!(initial::<twenty::Table>(), all(20));
+    assert_eq!(initial::<signed::Table>(), all(7));
+    assert_eq!(initial::<close::Table>(), all(4));
+    // None of them can change separately, so each may act.
+    assert_eq!(initial::<even::Table>(), all(5));
+    let message = describe::<smooth_and_even::Table>(&Changes::default()).unwrap_err().to_string();
+    for word in [
+        "x[1] cannot be tried separately",
+        "0.0008 %",
+        "the breakpoints do not fit",
+        "`smooth`",
+        "`depends_on`",
+    ] {
+        assert!(message.contains(word), "{message}");
+    }
+}

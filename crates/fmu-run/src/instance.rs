@@ -226,7 +226,7 @@ impl Instance {
         logging_on: bool,
     ) -> Result<Self, (String, bool)> {
         let library = fmu.library(interface).map_err(|error| (error.to_string(), false))?;
-        let log = Arc::<Log>::default();
+        let log = Arc::new(if logging_on { Log::keeping() } else { Log::default() });
         let environment = Arc::as_ptr(&log).cast_mut().cast();
         let token = CString::new(fmu.description.token.as_str()).unwrap_or_default();
         let own_name = if component.is_empty() { "instance" } else { component };
@@ -326,6 +326,11 @@ impl Instance {
 
     pub(crate) fn forget_log(&self) {
         self.log.take();
+    }
+
+    /// Returns the messages since the last call, of an instance with logging enabled.
+    pub(crate) fn take_messages(&self) -> Vec<Message> {
+        self.log.take_all()
     }
 
     /// Sets up the experiment in FMI 2.0, before the start values are set.

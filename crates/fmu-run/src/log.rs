@@ -10,11 +10,27 @@ use std::sync::{Mutex, PoisonError};
 
 /// Messages of the FMU; the address of the log is the instance environment.
 #[derive(Debug, Default)]
-pub(crate) struct Log(Mutex<Vec<Message>>);
+pub(crate) struct Log {
+    /// Messages since the last failed call.
+    new: Mutex<Vec<Message>>,
+    /// All messages, if the caller requests them.
+    all: Option<Mutex<Vec<Message>>>,
+}
 
 impl Log {
+    /// Creates a log that also keeps all messages.
+    pub(crate) fn keeping() -> Self {
+        Self { all: Some(Mutex::default()), ..Self::default() }
+    }
+
     pub(crate) fn take(&self) -> Vec<Message> {
-        std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(&mut self.new.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Returns all messages since the last call, if they are kept.
+    pub(crate) fn take_all(&self) -> Vec<Message> {
+        let all = self.all.as_ref().map(|all| all.lock().unwrap_or_else(PoisonError::into_inner));
+        all.map(|mut all| std::mem::take(&mut *all)).unwrap_or_default()
     }
 
     /// Stores a message.
@@ -36,7 +52,10 @@ impl Log {
         // SAFETY: the caller guarantees NULL or a live `Log`.
         if let Some(log) = unsafe { environment.cast::<Self>().as_ref() } {
             let message = Message { status: Status::from_c(status), category, text };
-            log.0.lock().unwrap_or_else(PoisonError::into_inner).push(message);
+            if let Some(all) = &log.all {
+                all.lock().unwrap_or_else(PoisonError::into_inner).push(message.clone());
+            }
+            log.new.lock().unwrap_or_else(PoisonError::into_inner).push(message);
         }
     }
 }

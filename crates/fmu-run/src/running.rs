@@ -1,11 +1,11 @@
 //! Instances of the components of a system, which run together.
 
 use crate::instance::{Instance, Saved};
-use crate::refusal::Refusal;
+use crate::refusal::{Message, Refusal};
 use crate::selection::{Place, Selection};
 use crate::start::StartValues;
 use crate::system::{Exchange, Order, System};
-use fmi_abi::Interface;
+use fmi_abi::{BaseType, Interface};
 
 /// One instance of each component; each function acts on all of them. A single FMU is a system with one
 /// component and no connections.
@@ -59,8 +59,20 @@ impl Running {
         for (place, text) in start.texts(of) {
             self.parts[place.part].set_text(place.reference, text)?;
         }
-        for (Place { part, base, reference }, value) in start.numbers(of) {
-            self.parts[part].set_number(base, reference, value)?;
+        let numbers: Vec<_> = start.numbers(of).collect();
+        // One call sets values that must be consistent, such as the elements of an array that must increase.
+        let is_real = |place: &Place, part: usize| place.part == part && place.base == BaseType::Real;
+        for together in
+            numbers.chunk_by(|(one, _), (next, _)| is_real(one, next.part) && is_real(next, one.part))
+        {
+            let (Place { part, base, reference }, value) = together[0];
+            if together.len() == 1 {
+                self.parts[part].set_number(base, reference, value)?;
+                continue;
+            }
+            let (references, values): (Vec<u32>, Vec<f64>) =
+                together.iter().map(|(place, value)| (place.reference, *value)).unzip();
+            self.parts[part].set_reals(&references, &values)?;
         }
         self.each(|_, instance| instance.enter_initialization_mode(start_time, stop_time))
     }
@@ -191,6 +203,11 @@ impl Running {
 
     pub fn forget_log(&self) {
         self.parts.iter().for_each(Instance::forget_log);
+    }
+
+    /// Returns the messages since the last call, of instances with logging enabled.
+    pub fn take_messages(&self) -> Vec<Message> {
+        self.parts.iter().flat_map(Instance::take_messages).collect()
     }
 
     pub fn terminate(&mut self) -> Result<(), Refusal> {

@@ -90,155 +90,123 @@ fn amid(writer: &mut Writer, trajectory: &Trajectory) -> Vec<f64> {
     states
 }
 
-/// Each column against differences, the transposed against the adjoint, a sum of seeds against the sum.
+/// Checks directional derivatives against differences, adjoint derivatives against directional ones, and the derivative for
+/// a sum of seeds against the sum of derivatives.
 pub fn directional(checker: &Checker) -> anyhow::Result<()> {
     for trajectory in &checker.trajectories {
         let interface = trajectory.interface;
         let has_directional =
             checker.can(interface, &["providesDirectionalDerivative", "providesDirectionalDerivatives"]);
         let has_adjoint = checker.can(interface, &["providesAdjointDerivatives"]);
-        if !has_directional && !has_adjoint {
-            continue;
-        }
-        let description = &checker.description;
-        let unknowns = unknowns(description, interface);
-        let mut knowns = knowns(description, interface);
+        let unknowns = unknowns(&checker.description, interface);
+        let mut knowns = knowns(&checker.description, interface);
         knowns.truncate(checker.most(40));
-        if unknowns.is_empty() || knowns.is_empty() {
+        if !has_directional && !has_adjoint || unknowns.is_empty() || knowns.is_empty() {
             continue;
         }
-        let reference = |indices: &[usize]| -> Vec<u32> {
-            indices.iter().map(|index| description.variables[*index].reference).collect()
-        };
-        let (of_unknowns, of_knowns) = (reference(&unknowns), reference(&knowns));
         let mut writer = checker.writer();
         amid(&mut writer, trajectory);
-        let first = writer.read(0);
+        let before = writer.read(0);
+        let [outputs, inputs] = [&unknowns, &knowns].map(|indices| references(&checker.description, indices));
+        let mut request = |function: &str, seed: &[f64], count: usize| {
+            derivative(&mut writer, function, &outputs, &inputs, seed, count)
+        };
         let unit = |index: usize, count: usize| -> Vec<f64> {
             (0..count).map(|at| f64::from(u8::from(at == index))).collect()
         };
-        let columns: Vec<u32> = if has_directional {
-            (0..knowns.len())
-                .map(|index| {
-                    derivative(
-                        &mut writer,
-                        "GetDirectionalDerivative",
-                        &of_unknowns,
-                        &of_knowns,
-                        &unit(index, knowns.len()),
-                        unknowns.len(),
-                    )
-                })
-                .collect()
-        } else {
-            Vec::new()
-        };
-        let sum = has_directional.then(|| {
-            derivative(
-                &mut writer,
-                "GetDirectionalDerivative",
-                &of_unknowns,
-                &of_knowns,
-                &vec![1.0; knowns.len()],
-                unknowns.len(),
-            )
-        });
-        let rows: Vec<u32> = if has_adjoint {
-            (0..unknowns.len())
-                .map(|index| {
-                    derivative(
-                        &mut writer,
-                        "GetAdjointDerivative",
-                        &of_unknowns,
-                        &of_knowns,
-                        &unit(index, unknowns.len()),
-                        knowns.len(),
-                    )
-                })
-                .collect()
-        } else {
-            Vec::new()
-        };
-        let last = writer.read(0);
-        let names: Vec<String> =
-            unknowns.iter().map(|index| description.variables[*index].name.clone()).collect();
-        let knows: Vec<String> =
-            knowns.iter().map(|index| description.variables[*index].name.clone()).collect();
-        let sequence = writer.sequence.clone();
+        let columns: Vec<u32> = (0..knowns.len() * usize::from(has_directional))
+            .map(|index| request("GetDirectionalDerivative", &unit(index, knowns.len()), unknowns.len()))
+            .collect();
+        let sum = has_directional
+            .then(|| request("GetDirectionalDerivative", &vec![1.0; knowns.len()], unknowns.len()));
+        let rows: Vec<u32> = (0..unknowns.len() * usize::from(has_adjoint))
+            .map(|index| request("GetAdjointDerivative", &unit(index, unknowns.len()), knowns.len()))
+            .collect();
+        let after = writer.read(0);
 
-        // Asking changes nothing.
-        let model = description.clone();
-        let judge: Judge = Arc::new(move |run| {
-            let (name, before, after) = crate::writer::difference(&model, run, &first, &last)?;
+        let sequence = writer.sequence.clone();
+        let model = checker.description.clone();
+        let is_unchanged: Judge = Arc::new(move |run| {
+            let (name, before, after) = crate::writer::difference(&model, run, &before, &after)?;
             Some(format!("{name} was {before}, after derivatives were asked for it is {after}"))
         });
-        let run = checker.judge("derivatives.changed", sequence.clone(), judge)?;
+        let run = checker.judge("derivatives.changed", sequence.clone(), is_unchanged)?;
         if run.end != crate::call_sequence::End::Done {
             continue;
         }
-        if has_directional {
-            let (columns, names, sum) = (columns.clone(), names.clone(), sum.unwrap_or_default());
-            let judge: Judge = Arc::new(move |run| {
-                let columns: Option<Vec<Vec<f64>>> = columns
-                    .iter()
-                    .map(|id| {
-                        (run.status(*id) == Some(0)).then(|| run.written(*id).map(|of| of.numbers()))?
-                    })
-                    .collect();
-                let columns = columns?;
-                let together = run.written(sum).filter(|_| run.status(sum) == Some(0))?.numbers();
-                (0..names.len()).find_map(|row| {
-                    let added: f64 = columns.iter().map(|column| column[row]).sum();
-                    let scale: f64 = columns.iter().map(|column| column[row].abs()).sum();
-                    let off = (added - together[row]).abs() > 1e-6 * scale.max(1e-12);
-                    off.then(|| {
-                        format!(
-                            "the derivatives of {} add up to {added:?}, asked for together they are {:?}",
-                            names[row], together[row]
-                        )
-                    })
-                })
-            });
+        let [unknown_names, known_names] =
+            [&unknowns, &knowns].map(|indices| names(&checker.description, indices));
+        if let Some(sum) = sum {
+            let judge = is_linear(columns.clone(), sum, unknown_names.clone());
             checker.keep("derivatives.linear", &run, &sequence, judge);
         }
         if has_directional && has_adjoint {
             for (name, tolerance) in [("derivatives.adjoint", 1e-6), ("derivatives.adjoint-digits", 1e-11)] {
-                let (columns, rows, names, knows) =
-                    (columns.clone(), rows.clone(), names.clone(), knows.clone());
-                let judge: Judge = Arc::new(move |run| {
-                    let matrix = |ids: &[u32]| -> Option<Vec<Vec<f64>>> {
-                        ids.iter()
-                            .map(|id| {
-                                (run.status(*id) == Some(0))
-                                    .then(|| run.written(*id).map(|of| of.numbers()))?
-                            })
-                            .collect()
-                    };
-                    let (columns, rows) = (matrix(&columns)?, matrix(&rows)?);
-                    for (row, name) in names.iter().enumerate() {
-                        for (column, known) in knows.iter().enumerate() {
-                            let (one, other) = (columns[column][row], rows[row][column]);
-                            if (one - other).abs() > tolerance * one.abs().max(other.abs()).max(1e-300) {
-                                return Some(format!(
-                                    "of {name} by {known}: directional {one:?}, adjoint {other:?}"
-                                ));
-                            }
-                        }
-                    }
-                    None
-                });
+                let names = [unknown_names.clone(), known_names.clone()];
+                let judge = is_transposed(columns.clone(), rows.clone(), names, tolerance);
                 if checker.keep(name, &run, &sequence, judge) {
                     break;
                 }
             }
         }
         if has_directional {
-            order(checker, trajectory, &of_unknowns, &of_knowns)?;
+            order(checker, trajectory, &outputs, &inputs)?;
         }
-        let by_column = has_directional;
-        differences(checker, trajectory, &unknowns, &knowns, by_column)?;
+        differences(checker, trajectory, &unknowns, &knowns, has_directional)?;
     }
     Ok(())
+}
+
+/// Value references of variables.
+fn references(description: &Description, indices: &[usize]) -> Vec<u32> {
+    indices.iter().map(|index| description.variables[*index].reference).collect()
+}
+
+/// Names of variables.
+fn names(description: &Description, indices: &[usize]) -> Vec<String> {
+    indices.iter().map(|index| description.variables[*index].name.clone()).collect()
+}
+
+/// The numbers that a successful call wrote.
+fn numbers(run: &Run, id: u32) -> Option<Vec<f64>> {
+    run.written(id).filter(|_| run.status(id) == Some(0)).map(|of| of.numbers())
+}
+
+/// Judges whether the derivatives for unit seeds add up to the derivative for a seed of ones.
+fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> Judge {
+    Arc::new(move |run| {
+        let columns: Vec<Vec<f64>> = columns.iter().map(|id| numbers(run, *id)).collect::<Option<_>>()?;
+        let together = numbers(run, sum)?;
+        (0..names.len()).find_map(|row| {
+            let added: f64 = columns.iter().map(|column| column[row]).sum();
+            let scale: f64 = columns.iter().map(|column| column[row].abs()).sum();
+            let off = (added - together[row]).abs() > 1e-6 * scale.max(1e-12);
+            off.then(|| {
+                format!(
+                    "the derivatives of {} add up to {added:?}, asked for together they are {:?}",
+                    names[row], together[row]
+                )
+            })
+        })
+    })
+}
+
+/// Judges whether the adjoint derivatives are the transposed directional derivatives.
+fn is_transposed(columns: Vec<u32>, rows: Vec<u32>, names: [Vec<String>; 2], tolerance: f64) -> Judge {
+    Arc::new(move |run| {
+        let matrix = |ids: &[u32]| ids.iter().map(|id| numbers(run, *id)).collect::<Option<Vec<_>>>();
+        let (columns, rows) = (matrix(&columns)?, matrix(&rows)?);
+        let [unknowns, knowns] = &names;
+        for (row, name) in unknowns.iter().enumerate() {
+            for (column, known) in knowns.iter().enumerate() {
+                let (one, other) = (columns[column][row], rows[row][column]);
+                if (one - other).abs() > tolerance * one.abs().max(other.abs()).max(1e-300) {
+                    return Some(format!("of {name} by {known}: directional {one:?}, adjoint {other:?}"));
+                }
+            }
+        }
+        None
+    })
 }
 
 /// Requests the derivatives again with unknowns and knowns in another order.
@@ -282,7 +250,7 @@ fn moved(writer: &mut Writer, states: &[f64], trajectory: &Trajectory, known: us
     }
 }
 
-/// Each derivative against differences with two distances, whose own error shows in what they differ by.
+/// Checks each derivative against differences with two step sizes, whose disagreement estimates their error.
 fn differences(
     checker: &Checker,
     trajectory: &Trajectory,
@@ -291,33 +259,24 @@ fn differences(
     by_column: bool,
 ) -> anyhow::Result<()> {
     let description = &checker.description;
-    if trajectory.interface == Interface::ModelExchange
-        && description.states().len() != description.states_count().unwrap_or(0)
-    {
+    let count = description.states_count().unwrap_or(0);
+    if trajectory.interface == Interface::ModelExchange && description.states().len() != count {
         return Ok(());
     }
-    let reference = |indices: &[usize]| -> Vec<u32> {
-        indices.iter().map(|index| description.variables[*index].reference).collect()
-    };
-    let of_unknowns = reference(unknowns);
     // The current values are the base of the differences.
     let mut writer = checker.writer();
     amid(&mut writer, trajectory);
     let read = writer.read_these(0, knowns);
-    let count = description.states_count().unwrap_or(0);
     let of_states = (trajectory.interface == Interface::ModelExchange && count > 0)
         .then(|| writer.vector(0, "GetContinuousStates", count));
     let run = checker.play(&writer.sequence)?;
     let states = of_states.and_then(|id| run.written(id)).map(|of| of.numbers()).unwrap_or_default();
     for known in knowns {
         let variable = &description.variables[*known];
-        let Some(value) = value_of(&run, &read, *known).and_then(|value| value.numbers().first().copied())
-        else {
+        let value = value_of(&run, &read, *known).and_then(|value| value.numbers().first().copied());
+        let Some(value) = value.filter(|value| value.is_finite() && !variable.once_per_instant) else {
             continue;
         };
-        if !value.is_finite() || variable.once_per_instant {
-            continue;
-        }
         let step = 1e-4 * variable.nominal.max(value.abs()).max(1e-3);
         let inside = |number: f64| {
             variable.min.is_none_or(|min| number >= min) && variable.max.is_none_or(|max| number <= max)
@@ -327,107 +286,96 @@ fn differences(
         }
         let mut writer = checker.writer();
         amid(&mut writer, trajectory);
-        let of_known = [variable.reference];
-        let analytic: Vec<u32> = if by_column {
-            vec![derivative(
-                &mut writer,
-                "GetDirectionalDerivative",
-                &of_unknowns,
-                &of_known,
-                &[1.0],
-                unknowns.len(),
-            )]
-        } else {
-            (0..unknowns.len())
-                .map(|row| {
-                    derivative(
-                        &mut writer,
-                        "GetAdjointDerivative",
-                        &of_unknowns[row..=row],
-                        &of_known,
-                        &[1.0],
-                        1,
-                    )
-                })
-                .collect()
-        };
+        let analytic = column(&mut writer, &references(description, unknowns), variable.reference, by_column);
         let mut reads: Vec<Vec<Read>> = Vec::new();
-        for by in [step, -step, step / 2.0, -step / 2.0] {
+        for by in [step, -step, step / 2.0, -step / 2.0, 0.0] {
             moved(&mut writer, &states, trajectory, *known, value + by);
             reads.push(writer.read_these(0, unknowns));
         }
-        moved(&mut writer, &states, trajectory, *known, value);
-        let back = writer.read_these(0, unknowns);
-        let same: Vec<usize> = description.aliases(*known).collect();
-        let stepped = trajectory.interface == Interface::CoSimulation;
-        let (unknowns, model, known_name) = (unknowns.to_vec(), description.clone(), variable.name.clone());
-        let compare = Arc::new(move |run: &Run, tolerance: f64| {
-            for (row, unknown) in unknowns.iter().enumerate() {
-                // The standard does not define the derivative of a state with respect to itself.
-                if same.contains(unknown) {
-                    continue;
-                }
-                let number = |reads: &[Read]| {
-                    value_of(run, reads, *unknown)?
-                        .numbers()
-                        .first()
-                        .copied()
-                        .filter(|number| number.is_finite())
-                };
-                let values: Option<Vec<f64>> = reads.iter().map(|reads| number(reads)).collect();
-                let values = values?;
-                let here = number(&back)?;
-                let answer = if analytic.len() == 1 && unknowns.len() != 1 || by_column {
-                    run.written(analytic[0])
-                        .filter(|_| run.status(analytic[0]) == Some(0))?
-                        .numbers()
-                        .get(row)
-                        .copied()?
-                } else {
-                    run.written(analytic[row])
-                        .filter(|_| run.status(analytic[row]) == Some(0))?
-                        .numbers()
-                        .first()
-                        .copied()?
-                };
-                let (wide, narrow) = ((values[0] - values[1]) / (2.0 * step), (values[2] - values[3]) / step);
-                // One-sided differences show a kink, where there is no derivative to compare with.
-                let (left, right) = ((here - values[3]) / (step / 2.0), (values[2] - here) / (step / 2.0));
-                let rounding = 1e-13 * here.abs().max(values[0].abs()) / step;
-                let doubt = (wide - narrow).abs() * 10.0 + rounding * 100.0;
-                let kink = (left - right).abs() > 0.05 * narrow.abs().max(answer.abs()) + rounding * 100.0;
-                if kink && doubt > 1e-9 {
-                    continue;
-                }
-                let scale = narrow.abs().max(answer.abs());
-                // An output that changes only in the next step has no difference here.
-                let silent = narrow == 0.0 && wide == 0.0;
-                if silent && stepped {
-                    continue;
-                }
-                let enough = tolerance * (scale + 1e-5);
-                if !answer.is_finite() || (answer - narrow).abs() > enough + doubt {
-                    return Some(format!(
-                        "of {} by {known_name}: {answer:?}, differences give {narrow:?}",
-                        model.variables[*unknown].name
-                    ));
-                }
-            }
-            None
+        let differences = Arc::new(Differences {
+            // The standard does not define the derivative of a state with respect to itself.
+            unknowns: unknowns.to_vec(),
+            itself: description.aliases(*known).collect(),
+            names: names(description, unknowns),
+            known: variable.name.clone(),
+            is_stepped: trajectory.interface == Interface::CoSimulation,
+            step,
+            analytic,
+            reads,
         });
-        let precise = Arc::clone(&compare);
+        let precise = Arc::clone(&differences);
         let sequence = writer.sequence.clone();
-        let run = checker.judge(
-            "derivatives.directional",
-            sequence.clone(),
-            Arc::new(move |run| compare(run, 1e-4)),
-        )?;
-        let judge: Judge = Arc::new(move |run| precise(run, 2e-7));
+        let judge: Judge = Arc::new(move |run| differences.judge(run, 1e-4));
+        let run = checker.judge("derivatives.directional", sequence.clone(), judge)?;
         if !checker.has("derivatives.directional") {
+            let judge: Judge = Arc::new(move |run| precise.judge(run, 2e-7));
             checker.keep("derivatives.precision", &run, &sequence, judge);
         }
     }
     Ok(())
+}
+
+/// Requests the derivatives of all unknowns with respect to one known: in one call, or by one adjoint derivative each.
+fn column(writer: &mut Writer, unknowns: &[u32], known: u32, by_column: bool) -> Vec<(u32, usize)> {
+    if by_column {
+        let id = derivative(writer, "GetDirectionalDerivative", unknowns, &[known], &[1.0], unknowns.len());
+        return (0..unknowns.len()).map(|row| (id, row)).collect();
+    }
+    let adjoint = |row: &u32| (derivative(writer, "GetAdjointDerivative", &[*row], &[known], &[1.0], 1), 0);
+    unknowns.iter().map(adjoint).collect()
+}
+
+/// The derivatives with respect to one known, and the reads for their differences.
+struct Differences {
+    unknowns: Vec<usize>,
+    names: Vec<String>,
+    known: String,
+    /// The variables that are the known.
+    itself: Vec<usize>,
+    is_stepped: bool,
+    step: f64,
+    /// The call that wrote the derivative of each unknown, and its index there.
+    analytic: Vec<(u32, usize)>,
+    /// The unknowns with the known at +step, -step, +step/2, -step/2 and 0.
+    reads: Vec<Vec<Read>>,
+}
+
+impl Differences {
+    fn judge(&self, run: &Run, tolerance: f64) -> Option<String> {
+        for (row, unknown) in self.unknowns.iter().enumerate() {
+            if self.itself.contains(unknown) {
+                continue;
+            }
+            let number = |reads: &Vec<Read>| {
+                let value = value_of(run, reads, *unknown)?.numbers().first().copied();
+                value.filter(|number| number.is_finite())
+            };
+            let values: Vec<f64> = self.reads.iter().map(number).collect::<Option<_>>()?;
+            let (id, index) = self.analytic[row];
+            let answer = numbers(run, id)?.get(index).copied()?;
+            let (step, here) = (self.step, values[4]);
+            let (wide, narrow) = ((values[0] - values[1]) / (2.0 * step), (values[2] - values[3]) / step);
+            // One-sided differences show a kink, where there is no derivative to compare with.
+            let (left, right) = ((here - values[3]) / (step / 2.0), (values[2] - here) / (step / 2.0));
+            let rounding = 1e-13 * here.abs().max(values[0].abs()) / step;
+            let doubt = (wide - narrow).abs() * 10.0 + rounding * 100.0;
+            let scale = narrow.abs().max(answer.abs());
+            let kink = (left - right).abs() > 0.05 * scale + rounding * 100.0;
+            // An output that changes only in the next step has no difference here.
+            let silent = self.is_stepped && narrow == 0.0 && wide == 0.0;
+            if kink && doubt > 1e-9 || silent {
+                continue;
+            }
+            let enough = tolerance * (scale + 1e-5);
+            if !answer.is_finite() || (answer - narrow).abs() > enough + doubt {
+                return Some(format!(
+                    "of {} by {}: {answer:?}, differences give {narrow:?}",
+                    self.names[row], self.known
+                ));
+            }
+        }
+        None
+    }
 }
 
 /// The vectors of states and derivatives are the values of their variables, in the order of the model structure.

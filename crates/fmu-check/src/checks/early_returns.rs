@@ -3,12 +3,11 @@
 use crate::call_sequence::{Run, Step};
 use crate::checker::Checker;
 use crate::finding::Judge;
-use crate::writer::{Writer, value_of};
+use crate::writer::{Read, Trajectory, Writer, value_of};
 use fmi_abi::Interface;
 use std::sync::Arc;
 
-/// Steps over events in FMI 3.0, by importers that handle them, that let steps return early, or both: what a step says of
-/// where it ended and why is so.
+/// Checks the outputs of steps over events in FMI 3.0: for importers that handle events, that allow early returns, or both.
 pub fn told(checker: &Checker) -> anyhow::Result<()> {
     let trajectory =
         checker.trajectories.iter().find(|trajectory| trajectory.interface == Interface::CoSimulation);
@@ -20,77 +19,20 @@ pub fn told(checker: &Checker) -> anyhow::Result<()> {
             continue;
         }
         let mut writer = checker.writer();
-        let mut how = writer.how(Interface::CoSimulation);
-        (how.event_mode, how.early_return) = (event_mode, early_return);
-        writer.add(Step::Make(0, how));
-        writer.enter(0);
-        writer.call(0, "ExitInitializationMode", vec![]);
-        let mut next = None;
-        if event_mode {
-            next = over_event(checker, &mut writer)?;
-            writer.call(0, "EnterStepMode", vec![]);
-        }
-        let (mut steps, mut handled) = (Vec::new(), Vec::new());
-        let (mut at, mut number) = (checker.description.start_time, 0);
-        // Steps of the trajectory, which may now end at events between its points.
-        while number < trajectory.points.len() && steps.len() < 30 {
-            let point = &trajectory.points[number];
-            let end = point.time + point.size;
-            // Section 4.2.1: Event Mode at the time that was told, or where the step says so; none is passed by.
-            let goal = next.filter(|next| !early_return && *next > at && *next < end).unwrap_or(end);
-            let size = goal - at;
-            if size <= 1e-9 * point.size {
-                number += 1;
-                continue;
-            }
-            let id = writer.step(0, at, size);
-            let values = writer.read_these(0, time.as_slice());
-            let run = checker.play(&writer.sequence)?;
-            steps.push((id, values, goal));
-            handled.push(None);
-            let Some(outcome) = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1)) else {
-                break;
-            };
-            let flag = |index: usize| outcome.written[index].numbers() == [1.0];
-            let reached = outcome.written[3].numbers()[0];
-            // A step that went nowhere, without an event, would do so again.
-            if flag(1) || !(reached > at || flag(0) && reached == at) || reached > goal + point.size {
-                break;
-            }
-            at = if flag(2) { reached } else { goal };
-            if event_mode && (flag(0) || next.is_some_and(|next| at >= next)) {
-                let id = writer.call(0, "EnterEventMode", vec![]);
-                handled.pop();
-                handled.push(Some(id));
-                next = over_event(checker, &mut writer)?;
-                writer.call(0, "EnterStepMode", vec![]);
-            }
-        }
-        // In a shortened call sequence, the required events were still handled.
-        let ids: Vec<u32> = steps.iter().map(|(id, ..)| *id).collect();
-        let ended = move |run: &Run, id: u32| {
-            let before = ids.iter().zip(&handled).take_while(|(step, _)| **step != id);
-            let passed_by = |(step, event): (&u32, &Option<u32>)| {
-                run.of(*step).is_some() && event.is_some_and(|event| run.of(event).is_none())
-            };
-            let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
-            let flag = |index: usize| outcome.written[index].numbers() == [1.0];
-            let reached = outcome.written.get(3)?.numbers()[0];
-            (!before.into_iter().any(passed_by)).then(|| (flag(0), flag(2), reached))
-        };
-        let (ended, again) = (Arc::new(ended), steps.clone());
-        let told = Arc::clone(&ended);
+        let steps = Arc::new(play(checker, &mut writer, trajectory, time, event_mode, early_return)?);
+        let again = Arc::clone(&steps);
         let judge: Judge = Arc::new(move |run| {
-            again.iter().find_map(|(id, values, end)| {
-                let (event, early, reached) = ended(run, *id)?;
+            again.iter().find_map(|step| {
+                let (event, early, reached) = ended(&again, run, step.id)?;
                 if early && !early_return {
                     return Some("a step returns early, where earlyReturnAllowed is false".to_owned());
                 }
                 if event && !event_mode {
                     return Some("a step says eventHandlingNeeded, where eventModeUsed is false".to_owned());
                 }
-                let now = *value_of(run, values, time?)?.numbers().first()?;
+                let now = *value_of(run, &step.values, time?)?.numbers().first()?;
                 let off = (now - reached).abs() > 1e-9 * (1.0 + now.abs());
+                let end = step.end;
                 off.then(|| {
                     format!("lastSuccessfulTime is {reached:?} of a step to {end:?}, and the time is {now:?}")
                 })
@@ -98,8 +40,9 @@ pub fn told(checker: &Checker) -> anyhow::Result<()> {
         });
         let run = checker.judge("results.early-return", writer.sequence.clone(), judge)?;
         let judge: Judge = Arc::new(move |run| {
-            steps.iter().find_map(|(id, _, end)| {
-                let (event, early, reached) = told(run, *id)?;
+            steps.iter().find_map(|step| {
+                let (event, early, reached) = ended(&steps, run, step.id)?;
+                let end = step.end;
                 let short = reached < end - 1e-9 * (1.0 + end.abs());
                 (short && event && !early).then(|| {
                     format!("a step to {end:?} ends at an event at {reached:?} and does not say earlyReturn")
@@ -109,6 +52,81 @@ pub fn told(checker: &Checker) -> anyhow::Result<()> {
         checker.keep("results.early-unsaid", &run, &writer.sequence, judge);
     }
     Ok(())
+}
+
+/// A step: its number, the reads after it, its end, and the call that enters Event Mode after it.
+struct Stepped {
+    id: u32,
+    values: Vec<Read>,
+    end: f64,
+    event: Option<u32>,
+}
+
+/// Runs the steps of the trajectory, which may end at events between its points.
+fn play(
+    checker: &Checker,
+    writer: &mut Writer<'_>,
+    trajectory: &Trajectory,
+    time: Option<usize>,
+    event_mode: bool,
+    early_return: bool,
+) -> anyhow::Result<Vec<Stepped>> {
+    let mut how = writer.how(Interface::CoSimulation);
+    (how.event_mode, how.early_return) = (event_mode, early_return);
+    writer.add(Step::Make(0, how));
+    writer.enter(0);
+    writer.call(0, "ExitInitializationMode", vec![]);
+    let mut next = None;
+    if event_mode {
+        next = over_event(checker, writer)?;
+        writer.call(0, "EnterStepMode", vec![]);
+    }
+    let mut steps = Vec::new();
+    let (mut at, mut number) = (checker.description.start_time, 0);
+    while number < trajectory.points.len() && steps.len() < 30 {
+        let point = &trajectory.points[number];
+        let end = point.time + point.size;
+        // Section 4.2.1: the importer enters Event Mode at the next event time, or when the step requests it.
+        let goal = next.filter(|next| !early_return && *next > at && *next < end).unwrap_or(end);
+        let size = goal - at;
+        if size <= 1e-9 * point.size {
+            number += 1;
+            continue;
+        }
+        let id = writer.step(0, at, size);
+        let values = writer.read_these(0, time.as_slice());
+        let run = checker.play(&writer.sequence)?;
+        steps.push(Stepped { id, values, end: goal, event: None });
+        let Some(outcome) = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1)) else {
+            break;
+        };
+        let flag = |index: usize| outcome.written[index].numbers() == [1.0];
+        let reached = outcome.written[3].numbers()[0];
+        // A step that did not advance, without an event, would not advance again.
+        if flag(1) || !(reached > at || flag(0) && reached == at) || reached > goal + point.size {
+            break;
+        }
+        at = if flag(2) { reached } else { goal };
+        if event_mode && (flag(0) || next.is_some_and(|next| at >= next)) {
+            let event = writer.call(0, "EnterEventMode", vec![]);
+            steps.iter_mut().rev().take(1).for_each(|step| step.event = Some(event));
+            next = over_event(checker, writer)?;
+            writer.call(0, "EnterStepMode", vec![]);
+        }
+    }
+    Ok(steps)
+}
+
+/// The outputs eventHandlingNeeded, earlyReturn and lastSuccessfulTime of a step that succeeded. In a shortened call sequence,
+/// `None` if an event before the step was not handled.
+fn ended(steps: &[Stepped], run: &Run, id: u32) -> Option<(bool, bool, f64)> {
+    let mut before = steps.iter().take_while(|step| step.id != id);
+    let is_skipped =
+        |step: &Stepped| run.of(step.id).is_some() && step.event.is_some_and(|event| run.of(event).is_none());
+    let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
+    let flag = |index: usize| outcome.written[index].numbers() == [1.0];
+    let reached = outcome.written.get(3)?.numbers()[0];
+    (!before.any(is_skipped)).then(|| (flag(0), flag(2), reached))
 }
 
 /// Runs the updates to count how many the event needs; returns the next time event.

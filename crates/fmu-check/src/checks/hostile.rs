@@ -7,7 +7,7 @@ use crate::description::{kind_of, type_name};
 use crate::finding::Judge;
 use crate::values::Value;
 use crate::writer::{Trajectory, Writer, readable};
-use fmi_abi::calls::signatures;
+use fmi_abi::calls::{Signature, signatures};
 use fmi_abi::{Interface, Mode};
 use std::sync::Arc;
 
@@ -47,93 +47,92 @@ pub fn free_null(checker: &Checker) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// NULL for the instance, NULL for arrays, unknown references, sizes that do not fit.
+/// Passes NULL as the instance, NULL for arrays, unknown references, and sizes that do not fit.
 pub fn calls(checker: &Checker) -> anyhow::Result<()> {
     let standard = checker.description.standard;
     for trajectory in &checker.trajectories {
-        let offered = |name: &str| {
-            let modes = [
-                Mode::Instantiated,
-                Mode::Initialization,
-                Mode::StepComplete,
-                Mode::Event,
-                Mode::ContinuousTime,
-            ];
-            let rule = signatures(standard).iter().find(|of| of.rule.name == name);
-            rule.and_then(|of| {
-                modes
-                    .into_iter()
-                    .rev()
-                    .find(|mode| of.rule.standard.contain(standard, trajectory.interface, *mode))
-            })
-        };
-        let mut of_null = Vec::new();
-        let mut nulls = Vec::new();
+        let (mut of_null, mut nulls) = (Vec::new(), Vec::new());
         for signature in signatures(standard) {
             let name = &signature.rule.name[4..];
-            let Some(mode) = offered(signature.rule.name) else { continue };
-            let states = name.to_lowercase().contains("fmustate");
-            if states && !checker.saves(trajectory.interface) {
+            let mode = MODES
+                .into_iter()
+                .rev()
+                .find(|mode| signature.rule.standard.contain(standard, trajectory.interface, *mode));
+            let Some(mode) = mode else { continue };
+            if name.to_lowercase().contains("fmustate") && !checker.saves(trajectory.interface) {
                 continue;
             }
-            let plain = |of: &str| match of {
-                "usize" | "fmi2ValueReference" | "fmi3ValueReference" => Arg::Whole(0),
-                of if of.starts_with('*')
-                    || of.contains("state")
-                    || of.contains("State")
-                    || of.contains("String") =>
-                {
-                    Arg::Null
-                }
-                of if of.contains("Real") || of.contains("Float64") => Arg::real(0.0),
-                _ => Arg::Whole(0),
-            };
-            let args: Vec<Arg> = signature.arguments.iter().map(|argument| plain(argument.of)).collect();
             let mut writer = checker.writer();
-            writer.forbidden(None, name, args);
+            writer.forbidden(
+                None,
+                name,
+                signature.arguments.iter().map(|argument| harmless(argument.of)).collect(),
+            );
             of_null.push(writer.sequence);
-            // Each array NULL where one value is asked for.
             let pointers = signature.arguments.iter().filter(|argument| argument.of.starts_with('*')).count();
             for null in 0..pointers {
-                let mut at = 0;
-                let args = signature.arguments.iter().map(|argument| {
-                    if argument.of == "usize" {
-                        return Arg::Whole(1);
-                    }
-                    if !argument.of.starts_with('*') {
-                        return if argument.of.contains("FMU") { Arg::Null } else { plain(argument.of) };
-                    }
-                    at += 1;
-                    match argument.pointee() {
-                        _ if at - 1 == null => Arg::Null,
-                        Some(("ValueReference", true)) => {
-                            let of_type = checker.description.variables.iter().find(|variable| {
-                                variable.size == Some(1)
-                                    && variable
-                                        .base
-                                        .is_some_and(|base| name.ends_with(type_name(standard, base)))
-                            });
-                            Arg::In(
-                                Kind::U32,
-                                vec![of_type.map_or(0, |variable| u64::from(variable.reference))],
-                            )
-                        }
-                        Some((_, true)) => Arg::In(Kind::F64, vec![0]),
-                        _ => Arg::Out(Kind::F64, 4),
-                    }
-                });
-                let args: Vec<Arg> = args.collect();
                 let mut writer = checker.writer();
                 to_mode(&mut writer, trajectory, mode);
-                writer.forbidden(Some(0), name, args);
+                writer.forbidden(Some(0), name, with_null(checker, signature, null));
                 nulls.push(writer.sequence);
             }
         }
         all(checker, "hostile.null-instance", of_null)?;
         all(checker, "hostile.null", nulls)?;
         references(checker, trajectory)?;
+        sizes(checker, trajectory)?;
     }
     Ok(())
+}
+
+/// The modes in which functions are called.
+const MODES: [Mode; 5] =
+    [Mode::Instantiated, Mode::Initialization, Mode::StepComplete, Mode::Event, Mode::ContinuousTime];
+
+/// An argument of a type: zero, or NULL.
+fn harmless(of: &str) -> Arg {
+    match of {
+        "usize" | "fmi2ValueReference" | "fmi3ValueReference" => Arg::Whole(0),
+        of if of.starts_with('*')
+            || of.contains("state")
+            || of.contains("State")
+            || of.contains("String") =>
+        {
+            Arg::Null
+        }
+        of if of.contains("Real") || of.contains("Float64") => Arg::real(0.0),
+        _ => Arg::Whole(0),
+    }
+}
+
+/// The arguments of a call for one value, in which one array is NULL.
+fn with_null(checker: &Checker, signature: &Signature, null: usize) -> Vec<Arg> {
+    let standard = checker.description.standard;
+    let name = &signature.rule.name[4..];
+    let mut at = 0;
+    let args = signature.arguments.iter().map(|argument| {
+        if argument.of == "usize" {
+            return Arg::Whole(1);
+        }
+        if !argument.of.starts_with('*') {
+            return if argument.of.contains("FMU") { Arg::Null } else { harmless(argument.of) };
+        }
+        at += 1;
+        match argument.pointee() {
+            _ if at - 1 == null => Arg::Null,
+            Some(("ValueReference", true)) => {
+                let of_type = checker.description.variables.iter().find(|variable| {
+                    variable.size == Some(1)
+                        && variable.base.is_some_and(|base| name.ends_with(type_name(standard, base)))
+                });
+                let reference = of_type.map_or(0, |variable| u64::from(variable.reference));
+                Arg::In(Kind::U32, vec![reference])
+            }
+            Some((_, true)) => Arg::In(Kind::F64, vec![0]),
+            _ => Arg::Out(Kind::F64, 4),
+        }
+    });
+    args.collect()
 }
 
 fn to_mode(writer: &mut Writer, trajectory: &Trajectory, mode: Mode) {
@@ -156,28 +155,29 @@ fn to_mode(writer: &mut Writer, trajectory: &Trajectory, mode: Mode) {
     }
 }
 
-/// References that no variable has, in all functions; in FMI 3.0 sizes that do not fit.
+/// The types of FMI 2.0 and FMI 3.0 in the names of getters and setters, and their types in C.
+const FMI2_TYPES: &[(&str, Kind)] =
+    &[("Real", Kind::F64), ("Integer", Kind::I32), ("Boolean", Kind::I32), ("String", Kind::Pointer)];
+const FMI3_TYPES: &[(&str, Kind)] = &[
+    ("Float64", Kind::F64),
+    ("Float32", Kind::F32),
+    ("Int8", Kind::I8),
+    ("UInt8", Kind::U8),
+    ("Int16", Kind::I16),
+    ("UInt16", Kind::U16),
+    ("Int32", Kind::I32),
+    ("UInt32", Kind::U32),
+    ("Int64", Kind::I64),
+    ("UInt64", Kind::U64),
+    ("Boolean", Kind::U8),
+    ("String", Kind::Pointer),
+];
+
+/// Passes references that no variable has to all getters and setters.
 fn references(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let fmi3 = checker.fmi3();
-    let types: &[(&str, Kind)] = if fmi3 {
-        &[
-            ("Float64", Kind::F64),
-            ("Float32", Kind::F32),
-            ("Int8", Kind::I8),
-            ("UInt8", Kind::U8),
-            ("Int16", Kind::I16),
-            ("UInt16", Kind::U16),
-            ("Int32", Kind::I32),
-            ("UInt32", Kind::U32),
-            ("Int64", Kind::I64),
-            ("UInt64", Kind::U64),
-            ("Boolean", Kind::U8),
-            ("String", Kind::Pointer),
-        ]
-    } else {
-        &[("Real", Kind::F64), ("Integer", Kind::I32), ("Boolean", Kind::I32), ("String", Kind::Pointer)]
-    };
+    let types = if fmi3 { FMI3_TYPES } else { FMI2_TYPES };
     let mut wrong = Vec::new();
     for reference in [unknown_reference(checker), u64::from(u32::MAX), 1 << 31, 1 << 20] {
         if description.variables.iter().any(|variable| u64::from(variable.reference) == reference) {
@@ -201,7 +201,13 @@ fn references(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
             }
         }
     }
-    all(checker, "hostile.references", wrong)?;
+    all(checker, "hostile.references", wrong)
+}
+
+/// Passes sizes that do not fit: for arrays of FMI 3.0, and in Model Exchange for the vectors of states.
+fn sizes(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let fmi3 = checker.fmi3();
     let mut sizes = Vec::new();
     for index in readable(description) {
         let variable = &description.variables[index];
@@ -247,7 +253,29 @@ fn references(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> 
     all(checker, "hostile.sizes", sizes)
 }
 
-/// Numbers that are none, too great or too small, and texts that are none, for parameters and inputs.
+/// Extreme values of a type that is not floating-point. A large count asks for much memory, which the machine may not have.
+fn extreme_values(name: &str, kind: Kind, size: usize) -> Vec<Value> {
+    let numbers = |numbers: &[f64]| -> Vec<Value> {
+        numbers.iter().map(|number| Value::Numbers(vec![*number; size])).collect()
+    };
+    match kind {
+        Kind::Pointer if name == "String" => {
+            [&b""[..], b"%s%n%s%n%s%n", b"\xff\xfe no UTF-8", &[b'x'; 100_000]]
+                .map(|text| Value::Texts(vec![text.to_vec(); size]))
+                .to_vec()
+        }
+        Kind::Pointer => {
+            vec![Value::Texts(vec![Vec::new(); size]), Value::Texts(vec![vec![7; 100_000]; size])]
+        }
+        kind if kind.is_float() => Vec::new(),
+        Kind::I8 | Kind::U8 => numbers(&[0.0, 127.0]),
+        Kind::I16 | Kind::U16 => numbers(&[0.0, 32767.0]),
+        Kind::U32 | Kind::U64 | Kind::Size => numbers(&[0.0, 4294967295.0]),
+        _ => numbers(&[0.0, -1.0, 2147483647.0, -2147483648.0]),
+    }
+}
+
+/// Sets NaN, infinite, extreme and malformed values of parameters and inputs.
 pub fn values(checker: &Checker) -> anyhow::Result<()> {
     let description = &checker.description;
     for trajectory in &checker.trajectories {
@@ -281,19 +309,12 @@ pub fn values(checker: &Checker) -> anyhow::Result<()> {
         for number in [f64::NAN, f64::INFINITY, 1e308, -1e308, 5e-324, 0.0, -1.0, 1e9] {
             for input in [true, false] {
                 let these = |want: bool| -> Vec<(usize, Value)> {
-                    settable
-                        .iter()
-                        .filter(|index| {
-                            let variable = &description.variables[**index];
-                            variable.is_float() && (variable.causality == "input") == want && want == input
-                        })
-                        .map(|index| {
-                            (
-                                *index,
-                                Value::Numbers(vec![number; description.variables[*index].size.unwrap_or(1)]),
-                            )
-                        })
-                        .collect()
+                    let variables = settable.iter().map(|index| (*index, &description.variables[*index]));
+                    let chosen = variables.filter(|(_, variable)| {
+                        variable.is_float() && (variable.causality == "input") == want && want == input
+                    });
+                    let values = |size: Option<usize>| Value::Numbers(vec![number; size.unwrap_or(1)]);
+                    chosen.map(|(index, variable)| (index, values(variable.size))).collect()
                 };
                 let (inputs, parameters) = (these(true), these(false));
                 if inputs.is_empty() && parameters.is_empty() {
@@ -309,28 +330,7 @@ pub fn values(checker: &Checker) -> anyhow::Result<()> {
         {
             let size = description.variables[index].size.unwrap_or(1);
             let kind = kind_of(description.standard, base);
-            let tries: Vec<Value> = match kind {
-                Kind::Pointer if type_name(description.standard, base) == "String" => {
-                    [&b""[..], b"%s%n%s%n%s%n", b"\xff\xfe no UTF-8", &[b'x'; 100_000]]
-                        .map(|text| Value::Texts(vec![text.to_vec(); size]))
-                        .to_vec()
-                }
-                Kind::Pointer => {
-                    vec![Value::Texts(vec![Vec::new(); size]), Value::Texts(vec![vec![7; 100_000]; size])]
-                }
-                kind if kind.is_float() => continue,
-                // Numbers of things: a great one asks for much memory, which there may not be.
-                Kind::I8 | Kind::U8 => [0.0, 127.0].map(|number| Value::Numbers(vec![number; size])).to_vec(),
-                Kind::I16 | Kind::U16 => {
-                    [0.0, 32767.0].map(|number| Value::Numbers(vec![number; size])).to_vec()
-                }
-                Kind::U32 | Kind::U64 | Kind::Size => {
-                    [0.0, 4294967295.0].map(|number| Value::Numbers(vec![number; size])).to_vec()
-                }
-                _ => [0.0, -1.0, 2147483647.0, -2147483648.0]
-                    .map(|number| Value::Numbers(vec![number; size]))
-                    .to_vec(),
-            };
+            let tries = extreme_values(type_name(description.standard, base), kind, size);
             for value in tries {
                 let of = vec![(index, value)];
                 let mut writer = checker.writer();

@@ -3,6 +3,7 @@
 
 use crate::call_sequence::Written;
 use crate::checker::Checker;
+use crate::description::Variable;
 use crate::finding::Judge;
 use crate::values::{Value, is_read, other_values};
 use crate::worker::FILL;
@@ -65,9 +66,41 @@ pub fn starts(checker: &Checker) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Tests a value of a variable; returns a description of the error.
+type ValueTest = fn(&Variable, &Written) -> Option<String>;
+
+/// The rules for each value that is read.
+const VALUE_TESTS: [(&str, ValueTest); 5] = [
+    ("start_values.unwritten", |_, value| {
+        let Written::Numbers(kind, bits) = value else { return None };
+        let untouched = u64::from_ne_bytes([FILL; 8]) >> (64 - 8 * kind.size());
+        (kind.size() >= 4 && bits.contains(&untouched)).then(|| "has not been written".to_owned())
+    }),
+    ("start_values.boolean", |variable, value| {
+        let wrong = variable.base == Some(BaseType::Boolean)
+            && value.numbers().iter().any(|number| ![0.0, 1.0].contains(number));
+        wrong.then(|| format!("is {}", value.show(0)))
+    }),
+    ("start_values.range", |variable, value| {
+        let whole = variable.base.is_some_and(|base| !base.is_float())
+            && ["local", "output"].contains(&variable.causality.as_str());
+        let (min, max) = (variable.min.unwrap_or(f64::NEG_INFINITY), variable.max.unwrap_or(f64::INFINITY));
+        let wrong = whole && value.numbers().iter().any(|number| *number < min || *number > max);
+        wrong.then(|| format!("is {}, outside of {min} to {max}", value.show(0)))
+    }),
+    ("start_values.text", |variable, value| {
+        let wrong = variable.base == Some(BaseType::String)
+            && matches!(value, Written::Texts(texts) if texts.contains(&None));
+        wrong.then(|| "is NULL".to_owned())
+    }),
+    ("results.not-finite", |variable, value| {
+        let wrong = variable.is_float() && value.numbers().iter().any(|number| !number.is_finite());
+        wrong.then(|| format!("is {}", value.show(0)))
+    }),
+];
+
 /// Each value that is read along the trajectory is written, valid for its type and within its range.
 fn values(checker: &Checker, trajectory: &crate::writer::Trajectory) -> anyhow::Result<()> {
-    let description = &checker.description;
     let mut writer = checker.writer();
     writer.begin(0, trajectory);
     let mut reads = vec![writer.read(0)];
@@ -76,56 +109,9 @@ fn values(checker: &Checker, trajectory: &crate::writer::Trajectory) -> anyhow::
         reads.push(writer.read(0));
     }
     let model = Arc::clone(&checker.description);
-    let standard = description.standard;
-    type Test = Arc<dyn Fn(&crate::description::Variable, &Written) -> Option<String> + Send + Sync>;
-    let tests: [(&str, Test); 5] = [
-        (
-            "start_values.unwritten",
-            Arc::new(|_, value| {
-                let Written::Numbers(kind, bits) = value else { return None };
-                let untouched = u64::from_ne_bytes([FILL; 8]) >> (64 - 8 * kind.size());
-                (kind.size() >= 4 && bits.contains(&untouched)).then(|| "has not been written".to_owned())
-            }),
-        ),
-        (
-            "start_values.boolean",
-            Arc::new(|variable, value| {
-                let wrong = variable.base == Some(BaseType::Boolean)
-                    && value.numbers().iter().any(|number| ![0.0, 1.0].contains(number));
-                wrong.then(|| format!("is {}", value.show(0)))
-            }),
-        ),
-        (
-            "start_values.range",
-            Arc::new(|variable, value| {
-                let whole = variable.base.is_some_and(|base| !base.is_float())
-                    && ["local", "output"].contains(&variable.causality.as_str());
-                let (min, max) =
-                    (variable.min.unwrap_or(f64::NEG_INFINITY), variable.max.unwrap_or(f64::INFINITY));
-                let wrong = whole && value.numbers().iter().any(|number| *number < min || *number > max);
-                wrong.then(|| format!("is {}, outside of {min} to {max}", value.show(0)))
-            }),
-        ),
-        (
-            "start_values.text",
-            Arc::new(|variable, value| {
-                let wrong = variable.base == Some(BaseType::String)
-                    && matches!(value, Written::Texts(texts) if texts.contains(&None));
-                wrong.then(|| "is NULL".to_owned())
-            }),
-        ),
-        (
-            "results.not-finite",
-            Arc::new(|variable, value| {
-                let wrong = variable.is_float() && value.numbers().iter().any(|number| !number.is_finite());
-                wrong.then(|| format!("is {}", value.show(0)))
-            }),
-        ),
-    ];
-    let _ = standard;
     let run = checker.play(&writer.sequence)?;
     checker.keep_always(&writer.sequence, &run);
-    for (name, test) in tests {
+    for (name, test) in VALUE_TESTS {
         let (model, reads) = (Arc::clone(&model), reads.clone());
         let judge: Judge = Arc::new(move |run| {
             for reads in &reads {

@@ -19,6 +19,7 @@ use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmi_abi::calls;
 use fmi_abi::fmi2::types::{fmi2CallbackFunctions, fmi2CallbackLogger};
 use fmi_abi::fmi3::types::fmi3LogMessageCallback;
+use fmi_abi::{fmi2, fmi3};
 pub use memory::FILL;
 use memory::{Guarded, INSIDE};
 use serde::{Deserialize, Serialize};
@@ -477,10 +478,10 @@ impl Player {
     }
 
     fn make(&self, index: usize, make: &Make, outcome: &mut Outcome) {
-        // Texts are gone after the call: what is needed of them must have been copied.
+        // Strings are unmapped after the call: an FMU must copy what it keeps.
         let text = |text: &Option<String>| {
-            text.as_ref()
-                .map(|text| Guarded::new(CString::new(text.as_str()).unwrap_or_default().as_bytes_with_nul()))
+            let bytes = |text: &String| CString::new(text.as_str()).unwrap_or_default().into_bytes_with_nul();
+            text.as_ref().map(|text| Guarded::new(&bytes(text)))
         };
         let (name, token) = (text(&make.name), text(&make.token));
         let resources = make.resources.then(|| Guarded::new(location(&self.setting).as_bytes_with_nul()));
@@ -500,9 +501,12 @@ impl Player {
             outcome.missing = true;
             return;
         };
-        let logging = make.logging;
+        let find = |name: &str| (name == name_of).then_some(address);
+        let (name_of_instance, guid, location) = (word(&name), word(&token), word(&resources));
+        let logging = u8::from(make.logging);
         INSIDE.enter();
-        // SAFETY: the functions are those of the names; each has the type that the standard gives it.
+        // SAFETY: the function has the type that the standard gives to its name, and the arguments are as the standard
+        // requires.
         let handle = unsafe {
             match (self.setting.fmi3, make.co_simulation) {
                 (false, co_simulation) => {
@@ -513,69 +517,29 @@ impl Player {
                         step_finished: None,
                         component_environment: environment,
                     }));
-                    type Function = unsafe extern "C" fn(
-                        *const c_char,
-                        c_int,
-                        *const c_char,
-                        *const c_char,
-                        *const fmi2CallbackFunctions,
-                        c_int,
-                        c_int,
-                    ) -> *mut c_void;
-                    let function: Function = std::mem::transmute(address);
-                    let kind = c_int::from(co_simulation);
-                    function(word(&name), kind, word(&token), word(&resources), given, 0, logging.into())
+                    let instantiate = fmi2::Functions::find(find).fmi2Instantiate;
+                    let kind = co_simulation.into();
+                    instantiate(name_of_instance, kind, guid, location, given, 0, logging.into())
                 }
                 (true, false) => {
-                    type Function = unsafe extern "C" fn(
-                        *const c_char,
-                        *const c_char,
-                        *const c_char,
-                        bool,
-                        bool,
-                        *mut c_void,
-                        Option<fmi3LogMessageCallback>,
-                    ) -> *mut c_void;
-                    let function: Function = std::mem::transmute(address);
-                    function(
-                        word(&name),
-                        word(&token),
-                        word(&resources),
-                        false,
-                        logging,
-                        environment,
-                        Some(log),
-                    )
+                    let instantiate = fmi3::Functions::find(find).fmi3InstantiateModelExchange;
+                    instantiate(name_of_instance, guid, location, 0, logging, environment, Some(log))
                 }
                 (true, true) => {
-                    type Function = unsafe extern "C" fn(
-                        *const c_char,
-                        *const c_char,
-                        *const c_char,
-                        bool,
-                        bool,
-                        bool,
-                        bool,
-                        *const u32,
-                        usize,
-                        *mut c_void,
-                        Option<fmi3LogMessageCallback>,
-                        *const c_void,
-                    ) -> *mut c_void;
-                    let function: Function = std::mem::transmute(address);
-                    function(
-                        word(&name),
-                        word(&token),
-                        word(&resources),
-                        false,
+                    let instantiate = fmi3::Functions::find(find).fmi3InstantiateCoSimulation;
+                    instantiate(
+                        name_of_instance,
+                        guid,
+                        location,
+                        0,
                         logging,
-                        make.event_mode,
-                        make.early_return,
+                        make.event_mode.into(),
+                        make.early_return.into(),
                         std::ptr::null(),
                         0,
                         environment,
                         Some(log),
-                        std::ptr::null(),
+                        None,
                     )
                 }
             }
@@ -586,17 +550,20 @@ impl Player {
         }
         outcome.status = Some(i32::from(!handle.is_null()));
         outcome.log = messages(environment as usize);
-        let instance = Instance {
-            handle: handle as usize,
-            environment: environment as usize,
-            co_simulation: make.co_simulation,
-            _callbacks: callbacks,
+        let co_simulation = make.co_simulation;
+        let environment = environment as usize;
+        self.keep(
+            index,
+            Instance { handle: handle as usize, environment, co_simulation, _callbacks: callbacks },
+        );
+    }
+
+    /// Replaces an instance. Arguments of an instance that was not freed stay allocated.
+    fn keep(&self, index: usize, instance: Instance) {
+        let before = match instance.handle {
+            0 => locked(&self.instances).remove(&index),
+            _ => locked(&self.instances).insert(index, instance),
         };
-        let before = match handle.is_null() {
-            true => locked(&self.instances).remove(&index),
-            false => locked(&self.instances).insert(index, instance),
-        };
-        // Arguments of an instance that was not freed stay allocated.
         std::mem::forget(before);
     }
 

@@ -153,7 +153,7 @@ fn endless_events() {
     );
 }
 
-/// A model that ends every step early without ENDS_EARLY.
+/// A model that ends every step early, or at an event if its input is 1, and does not declare it.
 mod hasty {
     use fmu_export::*;
 
@@ -177,7 +177,7 @@ mod hasty {
 
     impl CoSimulation for Hasty {
         fn step(&mut self, step: Step) -> Result<Stepped, Error> {
-            Ok(Stepped::Early(step.time))
+            Ok(if self.u == 1.0 { Stepped::Event(step.time) } else { Stepped::Early(step.time) })
         }
     }
 
@@ -196,4 +196,11 @@ fn an_early_end_that_the_model_has_not_announced() {
     for log in [old.take_log(), new.take_log()] {
         assert!(log.len() == 1 && log[0].text.contains("const ENDS_EARLY: bool = true"), "{log:?}");
     }
+}
+
+/// Checks that the message for an event differs from the message for an early end.
+#[test]
+#[should_panic(expected = "add `const EVENTS: Events = Events::Stop;` to its impl CoSimulation")]
+fn an_event_that_the_model_has_not_declared() {
+    let _ = fmu_export::Simulation::<hasty::Hasty>::new().unwrap().set("u", 1.0).unwrap().run(1.0);
 }

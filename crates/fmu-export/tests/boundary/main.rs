@@ -37,6 +37,7 @@ mod places;
 mod refusals;
 mod saved_states;
 mod settable;
+mod simulation;
 mod start_values;
 mod tolerances;
 mod variables;

@@ -1,4 +1,4 @@
-"""Runs FMUs at their own speed: one run or a million, one instance in the hand or thousands.
+"""Runs FMUs fast: batches of one to millions of runs, and one or thousands of stateful instances.
 
     with fmu_run.Fmu("model.fmu") as fmu:
         runs = fmu.run(time, inputs={"u": u}, start={"k": k_of_each_run}, outputs=["y"])
@@ -12,7 +12,7 @@
     loop = fmu_run.System({"law": law, "plant": fmu}, {"law.u": "plant.u", "plant.y": "law.y"})
     loop.run(time, start={"law.gain": gains}, outputs=["plant.y"])
 
-Values are in the FMU's units, which `Fmu.variables` tells. FMI 2.0 and 3.0.
+Values are in the FMU's units, see `Fmu.variables`. FMI 2.0 and 3.0.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ __all__ = ["Fmu", "FmuError", "Instances", "Measure", "Runs", "Start", "States",
 Measure = Literal["min", "max", "peak", "time_of_peak", "mean", "rms", "end"]
 _Array = NDArray[np.float64]
 
-#: A start value: one for all runs or instances, or one for each. Texts are for texts, and name the items of enumerations; a
+#: A start value: one for all runs or instances, or one for each. Strings are values of strings or names of enumeration items; a
 #: number or array with a unit is in that unit, which the FMU must have among its display units.
 Start = ArrayLike | str | Sequence[str] | tuple[ArrayLike, str]
-#: What an input does: values, or values with a unit as for `Start`.
+#: Values of an input over time, with a unit or without, as for `Start`.
 Course = ArrayLike | tuple[ArrayLike, str]
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable as the model description has it.
+    """A variable of the model description.
 
     type: Real, Integer, Boolean, String, Enumeration, or one of FMI 3.0's other types. causality: input, output, parameter,
-    local and so on. variability, start, unit, min, max: None where nothing is said; start as it is written, unit,
+    local and so on. variability, start, unit, min, max: None if not declared; start as a string, unit,
     min and max also from the declared type.
     """
 
@@ -65,7 +65,7 @@ class Variable:
 
 
 class _Model:
-    """What FMUs and systems of FMUs have in common."""
+    """Base class of FMUs and systems of FMUs."""
 
     def __init__(self, loaded: _Loaded):
         self._loaded = loaded
@@ -82,7 +82,7 @@ class _Model:
         self.close()
 
     def close(self) -> None:
-        """Unload it and remove its unpacked files, once its instances are gone, too. Harmless when called again."""
+        """Unload the FMUs and remove the unpacked files, after all instances are freed. Further calls have no effect."""
         self._loaded.close()
 
     def run(
@@ -99,27 +99,27 @@ class _Model:
         read_before_set: bool = False,
         progress: Callable[[int, int], Any] | None = None,
     ) -> Runs:
-        """Run the FMU as often as values for each run are given, once if there are none.
+        """Run the FMU, once for each run that has values, or once if all values are for all runs.
 
         time: (times,), the communication points, s. At each the inputs are set, the outputs read, and the step to the next
         is taken.
         outputs: the variables to read, any that are numbers.
-        inputs: by name; (times,) for all runs, (runs, times) for each its own, or a number that stays; with a unit or without,
+        inputs: by name; (times,) for all runs, (runs, times) for each run, or a constant number; with a unit or without,
         {"theta1": (angles, "deg")}. Inputs that are not named keep their start values.
         input_derivatives: d/dt of inputs, in the same shapes, for FMUs of FMI 2.0 that can interpolate inputs.
-        start: start values of parameters, states and so on by name: one for all runs or (runs,) for each its own; numbers,
-        texts, items of enumerations, or numbers with a unit, {"k1": (1.9, "N.m/deg")}.
+        start: start values of parameters, states and so on by name: one for all runs or (runs,) for each run; numbers,
+        strings, enumeration items, or numbers with a unit, {"k1": (1.9, "N.m/deg")}.
         every: keep the outputs at the first time and each `every` times after it. Default: all, or none if there are
         measures.
-        measures: what to calculate of each output on the way, over all times: min, max, peak (of the magnitude),
+        measures: statistics of each output over all times: min, max, peak (of the magnitude),
         time_of_peak, mean and rms (of the samples), end.
-        threads: default one for each processor; FMUs that can be there only once in a process get one.
+        threads: default one for each processor; FMUs with at most one instance per process get one.
         read_before_set: read outputs before the inputs of their time are set, as FMPy does.
-        progress: called with the number of finished runs and of all, ten times a second.
+        progress: called with the numbers of finished runs and of all runs, ten times per second.
 
-        A run that the FMU refuses or ends does not stop the others, see `Runs.errors` and `Runs.check`. If it is refused
-        without a reason, it is made once more with logging on, after all others, for the FMU's words alone. Raises ValueError for what
-        does not fit the FMU or itself, FmuError if the FMU is closed. Ctrl-C stops all runs after the step that each is in.
+        A run that the FMU rejects or ends does not stop the others, see `Runs.errors` and `Runs.check`. A run that fails
+        without a message is repeated with logging on, after all others, only to get the message. Raises ValueError for
+        invalid arguments, FmuError if the FMU is closed. Ctrl-C stops all runs after the step that each is in.
         """
         times = _array("time", time)
         if times.ndim != 1:
@@ -170,34 +170,34 @@ class _Model:
         Parameters
         ----------
         count
-            How many.
+            Number of instances.
         interface
-            Who integrates. Those for Model Exchange have been through the events at the begin and are in Continuous-Time Mode.
+            The interface type. Instances for Model Exchange have handled the initial events and are in Continuous-Time Mode.
         start
-            Start values of parameters, states, inputs and so on by name: one for all or (count,) for each its own, as in `run`.
+            Start values of parameters, states, inputs and so on by name: one for all or (count,) for each instance, as in `run`.
         start_time, stop_time
-            When they begin, s, and when they will end, if that is known.
+            Start time, s, and stop time, if it is known.
         threads
-            More than one pays where a call takes much longer than a thread takes to wake, some 0.01 ms: from hundreds of
-            instances on, or for slow models. None takes one for each processor.
+            More than one is faster if a call takes much longer than waking a thread, about 0.01 ms: with hundreds of instances,
+            or for slow models. None takes one for each processor.
 
         Raises
         ------
         ValueError
-            For what does not fit the FMU or itself.
+            For invalid arguments.
         MemoryError
-            For more instances than there is memory for.
+            If memory does not suffice for the instances.
         FmuError
-            If the FMU has no such interface, or refuses all of them.
+            If the FMU has no such interface type, or rejects all instances.
         """
         asked, threads = _count("count", count) or 1, _count("threads", threads)
         return Instances(self._loaded, asked, interface, dict(start or {}), start_time, stop_time, threads)
 
 
 class Fmu(_Model):
-    """An FMU, unpacked and loaded once. A context manager: leaving it unloads the FMU, once its instances are gone, too.
+    """An FMU, unpacked and loaded once. A context manager: leaving it unloads the FMU after all instances are freed.
 
-    Its library runs in this process: where it crashes, the process is gone. Raises FmuError where the file is no FMU, or has
+    Its library runs in this process: a crash ends the process. Raises FmuError if the file is no FMU, or has
     no library for this platform.
 
     execution_tool: run it also if its library starts another program (needsExecutionTool), which must be installed.
@@ -214,31 +214,31 @@ class Fmu(_Model):
 
 
 class System(_Model):
-    """FMUs whose outputs feed each other's inputs, which run as one FMU does.
+    """Connected FMUs that run as one FMU.
 
-    Variables are named `component.variable`; connectors of an SSP's own system have their names. From one communication point
-    to the next all components step from the values they were given there.
+    Variables are named `component.variable`; connectors of an SSP's system keep their names. In every communication step
+    all components use the input values from its start.
 
     Parameters
     ----------
     source
-        An SSP file, or the components by name: FMUs of FMI 2.0 or 3.0 with Co-Simulation, open ones or their paths. One may be
-        there more than once.
+        An SSP file, or the components by name: FMUs of FMI 2.0 or 3.0 with Co-Simulation, open ones or their paths. An FMU may occur
+        more than once.
     connections
-        Outputs and the inputs they feed, `{"law.u": "plant.u"}` or pairs; several inputs of one output as a list. Not with an
-        SSP, which has its own.
+        Outputs and the inputs they feed, `{"law.u": "plant.u"}` or pairs; several inputs of one output as a list. Only without an
+        SSP, which defines its connections.
     order
-        When values are passed on. "dependencies": at each communication point until all agree, an output read after the inputs
-        on which it depends without a step; where these go in a circle, an algebraic loop, ValueError names it. "jacobi": all
-        outputs are read when a step is done and all inputs set when the next begins, as FMPy and libcosim do; what depends on
-        inputs without a step is late by one.
+        The order of data exchange. "dependencies": at each communication point every output is read after the inputs on which it
+        depends directly; for an algebraic loop, ValueError names the loop. "jacobi": all
+        outputs are read at the end of a step and all inputs set at the begin of the next, as in FMPy and libcosim; outputs that
+        depend directly on inputs lag one step.
 
     Raises
     ------
     ValueError
-        For connections that do not fit the FMUs or each other.
+        For invalid connections.
     FmuError
-        Where the file is no SSP or one of its FMUs cannot be loaded.
+        If the file is no SSP or one of its FMUs cannot be loaded.
     """
 
     def __init__(
@@ -257,7 +257,7 @@ class System(_Model):
             raise ValueError("an SSP has its own connections; give connections with FMUs only")
         else:
             super().__init__(_Loaded.ssp(os.fspath(source), order))
-        #: Its name. In which order values are passed on: stages of (output, input). When the SSP's experiment ends, s, or None.
+        #: Name of the system; order of data exchange, in stages of (output, input); stop time of the SSP's experiment, s, or None.
         self.name, self.stages, self.stop_time = self._loaded.about_system()
 
     def __repr__(self) -> str:
@@ -282,7 +282,7 @@ def _array(name: str, values: ArrayLike) -> _Array:
         array = np.asarray(values)
     except ValueError as error:
         raise ValueError(f"{name}: these are no numbers ({error})") from None
-    # Else None were not a number, and texts were numbers.
+    # numpy converts None to NaN, and strings to numbers.
     if array.dtype.kind not in "biuf":
         raise ValueError(f"{name}: {values!r} is no number" if array.ndim == 0 else f"{name}: these are no numbers")
     return np.ascontiguousarray(array, dtype=np.float64).reshape(array.shape)

@@ -8,7 +8,7 @@ _Array = NDArray[np.float64]
 _Names = str | Sequence[str]
 
 class FmuError(Exception):
-    """An FMU that cannot be loaded or run, or refuses a run."""
+    """An FMU cannot be loaded or run, or rejects a run."""
 
 class Loaded:
     def __init__(self, path: str, execution_tool: bool) -> None: ...

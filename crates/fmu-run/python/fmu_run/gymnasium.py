@@ -1,4 +1,4 @@
-"""Gymnasium's environments of any FMU: one (`Env`), or thousands side by side (`VectorEnv`), both of one `Task`.
+"""Gymnasium's environments of any FMU: one (`Env`), or thousands in parallel (`VectorEnv`), both of one `Task`.
 
     task = Task(fmu="model.fmu", actions={"u": (-1, 1)}, observations=("y",), step=0.01, length=500,
                 reward=lambda before, action, after: -abs(after[:, 0]), failed_reward=-500.0)
@@ -34,35 +34,35 @@ _Info = dict[str, Any]
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What is to be learned, on which FMU. Its functions take and return arrays, a row for each of n instances.
+    """A learning task on an FMU. Its functions take and return arrays with a row for each of n instances.
 
     Parameters
     ----------
     fmu
-        The path of the FMU, or of an SSP with a system of FMUs, or one that is open and stays so. Only with a path can the task
-        be registered or go to another process.
+        The path of the FMU, or of an SSP with a system of FMUs, or an open one. Only with a path can the task
+        be registered or passed to another process.
     actions
-        What acts: inputs by name with their (low, high), or names alone, whose bounds are those of the description, if any.
+        Inputs by name with their (low, high), or only names; bounds are then taken from the model description, if any.
     observations
-        The variables that are seen after each step, any that are numbers, in the same forms.
+        The numeric variables that are observed after each step, in the same forms.
     reward
         (observation before, action, observation after) -> (n,)
     step
-        The time from action to action, s.
+        The time between actions, s.
     length
-        After how many steps an episode is truncated.
+        Number of steps after which an episode is truncated.
     terminated
-        The same arguments -> (n,) of bool: whose episode ends by itself.
+        As `reward` -> (n,) of bool: whether the episode terminates.
     inputs, to_inputs
-        Where actions are no inputs, which inputs they make, and how: (actions, those inputs before, (n, inputs)) -> (n, inputs).
-        Actions may have any names then.
+        If actions are no inputs: names of the inputs, and (actions, previous inputs (n, inputs)) -> (n, inputs).
+        Actions may then have any names.
     start
-        Start values for all episodes: numbers, or texts.
+        Start values for all episodes: numbers or strings.
     drawn
-        Start values that are drawn anew for each episode: (low, high), or (generator, count) -> (count,).
+        Start values that are drawn for each episode: (low, high), or (generator, count) -> (count,).
     failed_reward
-        The reward for a step that the FMU refuses, which also ends the episode: worse than that of all steps that are left, or
-        breaking the FMU pays.
+        The reward for a step that the FMU rejects, which also ends the episode. It should be lower than the sum of the remaining
+        rewards; otherwise failures are rewarded.
     threads
         See `Fmu.instances`.
     """
@@ -85,28 +85,28 @@ class Task:
 
 
 class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
-    """Instances of one FMU that live through episodes side by side.
+    """Instances of one FMU that run episodes in parallel.
 
-    An instance that the FMU refuses something, or one of whose observations is no finite number, has its episode terminated:
-    the last observation is repeated, `infos["error"]` says why, and the others go on.
+    If the FMU rejects a call of an instance, or an observation is not finite, the episode of the instance terminates: the
+    last observation is repeated, and `infos["error"]` contains the message. Other instances continue.
 
     Parameters
     ----------
     task
-        What is to be learned.
+        The learning task.
     num_envs
-        How many instances.
+        Number of instances.
     autoreset_mode
-        When an episode that is over gives way to the next: NEXT_STEP, in the next step, whose action goes nowhere and whose
-        reward is 0; SAME_STEP, at once, with `infos["final_obs"]` and `infos["final_info"]`; DISABLED, by
+        When a new episode replaces a finished one: NEXT_STEP, in the next step, whose action is ignored and whose reward
+        is 0; SAME_STEP, at once, with `infos["final_obs"]` and `infos["final_info"]`; DISABLED, by
         `reset(options={"reset_mask": ...})`.
 
     Raises
     ------
     ValueError
-        For what does not fit the FMU or itself.
+        For invalid arguments.
     fmu_run.FmuError
-        If the FMU cannot be loaded, or refuses the start values; from `reset` and `step`, if it refuses those drawn.
+        If the FMU cannot be loaded, or rejects the start values; from `reset` and `step`, if it rejects drawn start values.
     """
 
     _own: fmu_run.Fmu | fmu_run.System | None = None
@@ -132,7 +132,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
                     raise ValueError(f"{name} is no input, its causality is {found}")
             self._instances = fmu.instances(num_envs, start=task.start, threads=task.threads)
             for names in (self._inputs, self._observed):
-                self._instances.get(names)  # Are they there?
+                self._instances.get(names)  # Raises for unknown names.
         except Exception:
             self.close()
             raise
@@ -214,7 +214,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
             self._own.close()
 
     def _advance(self, actions: _Array, before: _Array) -> tuple[_Array, dict[int, str]]:
-        """The observations after a step, and who has failed why."""
+        """The observations after a step, and messages of failed instances."""
         after, values = np.full_like(before, np.nan), actions
         if self.task.to_inputs is not None:
             values = np.asarray(self.task.to_inputs(actions, self._instances.get(self._inputs)), dtype=np.float64)
@@ -222,7 +222,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
                 raise ValueError(f"to_inputs must return {wanted}, it returned {values.shape}")
         try:
             self._instances.advance(self._inputs, values, self.task.step, self._observed, out=after)
-        except fmu_run.FmuError:  # The last has failed.
+        except fmu_run.FmuError:  # All instances have failed.
             if not self._instances.errors:
                 raise
         failed = ~np.isfinite(after).all(axis=1)
@@ -233,7 +233,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
         return after, {place: why.get(place, "an observation is no finite number") for place in places}
 
     def _begin(self, which: _Bools, observation: _Array) -> None:
-        """New episodes for some, and what is observed of them."""
+        """New episodes for some instances, and their observations."""
         for name, how in self.task.drawn.items():
             count = int(which.sum())
             self._drawn[name][which] = (
@@ -259,12 +259,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[_Array, _Array, NDArray[Any]]):
 
 
 class Env(gymnasium.Env[_Array, _Array]):
-    """One instance of an FMU that lives through episodes: a `VectorEnv` of one, see there.
+    """One instance of an FMU that runs episodes: a `VectorEnv` of one instance.
 
     Parameters
     ----------
     task
-        What is to be learned.
+        The learning task.
     """
 
     def __init__(self, task: Task):
@@ -279,7 +279,7 @@ class Env(gymnasium.Env[_Array, _Array]):
         return observation[0], {}
 
     def step(self, action: ArrayLike) -> tuple[_Array, SupportsFloat, bool, bool, _Info]:
-        """Take a step; `info["error"]` says why the FMU refused it."""
+        """Take a step; `info["error"]` contains the message if the FMU rejects it."""
         observation, reward, terminated, truncated, info = self._one.step(np.asarray(action)[None])
         said = {name: values[0] for name, values in info.items() if not name.startswith("_")}
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), said

@@ -1,4 +1,4 @@
-"""What came of many runs."""
+"""Results of runs."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ _Array = NDArray[np.float64]
 
 
 class Runs(Mapping[str, _Array]):
-    """What came of `Fmu.run`: courses by output, measures by output and measure.
+    """Results of `Fmu.run`: time series by output, statistics by output and measure.
 
-    runs["roll"]: (runs, times), what was kept. runs["roll", "peak"]: (runs,). Where a run has not reached a time there is
-    not a number. Nor are there measures of a run that the FMU refused; those of one that it ended are of the times until
-    then. As a mapping it has the courses by output, none where only measures were asked for; it is true all the same.
+    runs["roll"]: (runs, times), at the kept times. runs["roll", "peak"]: (runs,). Times that a run has not reached are NaN.
+    Measures are NaN for a rejected run; for a run that the FMU ended they cover the times until then. As a mapping, the
+    object contains time series by output, none if only measures were requested; its truth value is always true.
 
-    Results that are not a number are announced by a RuntimeWarning when they are first used, those of failed runs only if
-    neither `errors` nor `ok` was read before.
+    A RuntimeWarning reports NaN at the first use of a result. It reports failed runs only if neither `errors` nor `ok` was
+    read before.
     """
 
-    #: (times,), s: the times that were kept.
+    #: (times,), s: the kept times.
     time: _Array
-    #: What is to be said of finished runs: that the FMU ended at the last time by itself, or refused to be terminated.
+    #: Notes on finished runs: the FMU ended by itself at the last time, or rejected the termination.
     notes: dict[int, str]
-    #: (runs,): the start values that were given, by name; those that are texts as they are.
+    #: (runs,): the given start values by name; strings unchanged.
     start: dict[str, _Array | str]
 
     def __init__(
@@ -65,20 +65,20 @@ class Runs(Mapping[str, _Array]):
 
     @property
     def errors(self) -> dict[int, str]:
-        """The runs that the FMU refused or ended before the last time, by their numbers, how far they got and why, in the words
-        of the FMU ("at 0.5 s: ...", "ended by the FMU at t = 0.5 s: ...")."""
+        """Messages of the FMU, by index, on runs that it rejected or ended before the last time, with the time reached
+        ("at 0.5 s: ...", "ended by the FMU at t = 0.5 s: ...")."""
         self._told = True
         return self._errors
 
     @property
     def ok(self) -> NDArray[np.bool_]:
-        """(runs,): which have reached the last time."""
+        """(runs,): whether each run has reached the last time."""
         finished = np.ones(self.count, dtype=bool)
         finished[list(self.errors)] = False
         return finished
 
     def check(self) -> Runs:
-        """Itself, if all runs are finished; raises FmuError with the first refusal otherwise."""
+        """Return this object if all runs are finished; else raise FmuError with the first error."""
         if self.errors:
             number, why = next(iter(self.errors.items()))
             many = f" ({len(self.errors)} of {self.count} runs failed)" if self.count > 1 else ""
@@ -100,7 +100,7 @@ class Runs(Mapping[str, _Array]):
         return found
 
     def _announce(self, key: str | tuple[str, str], values: _Array) -> None:
-        """Warn about failed runs, unless the caller knows of them, and about other results that are not a number."""
+        """Warn about failed runs, unless the caller has read `errors`, and about other results with NaN."""
         lines = []
         if not self._told:
             number, why = next(iter(self._errors.items()))
@@ -126,10 +126,9 @@ class Runs(Mapping[str, _Array]):
         return True
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A row for each run and each time that was kept, with both as index; for each run alone where there are only
-        measures.
+        """Return a row for each run and each kept time, with both as index; a row for each run if there are only measures.
 
-        The columns: start values by name, outputs by name, measures as `roll_peak`; what belongs to a run stands in all of its
+        The columns: start values by name, outputs by name, measures as `roll_peak`; values of a run are repeated in all of its
         rows. A start value of an output is called `roll at start`. Raises ImportError without pandas.
         """
         pandas = _needed("pandas")
@@ -142,7 +141,7 @@ class Runs(Mapping[str, _Array]):
         return pandas.DataFrame({**columns, **{name: course.ravel() for name, course in self.items()}}, index=index)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Outputs over the dimensions run and time, measures as `roll_peak` over run, start values as coordinates of run. A
+        """Return outputs over the dimensions run and time, measures as `roll_peak` over run, start values as coordinates of run. A
         start value of an output is called `roll at start`. Raises ImportError without xarray."""
         needed = _needed("xarray")
         starts = {name: value if isinstance(value, str) else ("run", value) for name, value in self._starts().items()}

@@ -3,7 +3,7 @@
 use super::measure::Measured;
 use super::plan::{ByTime, Plan, Values};
 use crate::error::Error;
-use crate::refusal::Refusal;
+use crate::refusal::{Message, Refusal};
 use crate::running::Running;
 use crate::system::System;
 use fmi_abi::Interface;
@@ -22,9 +22,34 @@ const PATIENCE: Duration = Duration::from_secs(2);
 pub struct Watch {
     done: AtomicUsize,
     cancelled: AtomicBool,
+    ended: Mutex<Vec<(usize, f64)>>,
+    /// Messages of runs, each with its time, if the caller requests them.
+    messages: Option<Mutex<Vec<(usize, f64, Message)>>>,
 }
 
 impl Watch {
+    /// Creates a watch that records all messages of the FMU and enables its logging.
+    pub fn listening() -> Self {
+        Self { messages: Some(Mutex::default()), ..Self::default() }
+    }
+
+    /// Returns the messages until now: number of the run, time of the communication point, message.
+    pub fn messages(&self) -> Vec<(usize, f64, Message)> {
+        self.messages.as_ref().map(|messages| lock(messages).clone()).unwrap_or_default()
+    }
+
+    /// Returns the runs that the FMU has ended, each with the time, s.
+    pub fn ended(&self) -> Vec<(usize, f64)> {
+        lock(&self.ended).clone()
+    }
+
+    fn hear(&self, run: usize, time: f64, instance: &Running) {
+        if let Some(messages) = &self.messages {
+            let new = instance.take_messages().into_iter().map(|message| (run, time, message));
+            lock(messages).extend(new);
+        }
+    }
+
     /// Returns the number of finished runs, including failed ones.
     pub fn done(&self) -> usize {
         self.done.load(Ordering::Relaxed)
@@ -38,6 +63,10 @@ impl Watch {
     fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
     }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Result memory of a run.
@@ -220,6 +249,12 @@ impl<'a> Worker<'a> {
         self.room.begin(plan, run);
         let until = Until { watch: self.watch, logging: self.logging };
         let stopped = follow(plan, times, &mut instance, &mut self.room, run, courses, &until).err();
+        if self.logging.is_none() {
+            let at = stopped.as_ref().and_then(|(at, _)| *at).map_or(0, |at| at.min(times.len() - 1));
+            self.watch.hear(run, times[at], &instance);
+            let ended = stopped.as_ref().and_then(|(_, refusal)| refusal.ended());
+            lock(&self.watch.ended).extend(ended.map(|time| (run, time)));
+        }
         let filled = plan.every.map_or(0, |every| self.room.rows.div_ceil(every));
         for course in courses.chunks_mut(plan.kept().max(1)) {
             course[filled..].fill(f64::NAN);
@@ -248,7 +283,7 @@ impl<'a> Worker<'a> {
     /// Returns a new or reset instance. The error contains the reason, and whether there is no message.
     fn instance(&mut self) -> Result<Running, (String, bool)> {
         let used = self.instance.take();
-        let logging_on = self.logging.is_some();
+        let logging_on = self.logging.is_some() || self.watch.messages.is_some();
         let instance = Running::renewed(used, self.system, Interface::CoSimulation, logging_on)?;
         instance.forget_log();
         Ok(instance)
@@ -277,6 +312,12 @@ fn follow(
 ) -> Result<(), Stopped> {
     start(plan, instance, room, run).map_err(|refusal| (None, refusal))?;
     instance.forget_log();
+    let hear = |time: f64, instance: &Running| {
+        if until.logging.is_none() {
+            until.watch.hear(run, time, instance);
+        }
+    };
+    hear(times[0], instance);
     let measures = !plan.measures.is_empty();
     // Index of the next kept value in a trajectory, and number of times until then.
     let (kept, mut place, mut wait) = (plan.kept(), 0, 0);
@@ -289,6 +330,7 @@ fn follow(
         if let Some(logged) = until.logging {
             // Messages about earlier steps are not the reason of a later error.
             instance.forget_log();
+            drop(instance.take_messages());
             if time::Instant::now() > logged {
                 return Ok(());
             }
@@ -324,7 +366,7 @@ fn follow(
         if let Some(next) = times.get(k + 1) {
             let size = next - time;
             match instance.step(time, size) {
-                Ok(()) => {}
+                Ok(()) => hear(time, instance),
                 // The FMU ended at the next time. There, outputs can be read but inputs no longer set
                 // (section 4.2.4 of FMI 2.0).
                 Err(refusal) if refusal.ended().is_some_and(|end| next - end <= 1e-9 * size) => {

@@ -415,7 +415,7 @@ impl Whole {
 
 /// Returns the most similar name, if one is similar enough. Derivatives rank lower, because users rarely mean
 /// them.
-fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
+pub fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
     /// Minimum similarity.
     const SIMILAR: f64 = 0.8;
     let wanted = name.to_lowercase();

@@ -1,12 +1,12 @@
 """The pitch-roll wrist testbed in Python: simulate it, read recordings of it, find its parameters in them, linearize it,
-run it with thousands of parameter sets, show it moving, compare what other tools make of it with a reference.
+run it with thousands of parameter sets, animate it, compare results of other tools with a reference.
 
     import prw
 
     run = prw.simulate("motors.csv", {"k1": 100.0})  # or a prw.Motion; by default the paper's experiment
     run["roll"]  # (n,) rad, at run.time
 
-What there is to call; the modules of this package are its inside:
+The public functions; the modules of this package are internal:
 
     simulate, read, animate, sweep     runs and recordings
     identify, excite                   parameters from measurements, and motions to measure with
@@ -14,13 +14,13 @@ What there is to call; the modules of this package are its inside:
     check                              another tool's results against a reference
     default_fmu                        the path of the FMU
 
-Everything is in SI (s, rad, rad/s, N.m, kg.m2). Nothing writes a file unless it is told where, and nothing prints but the progress
-of long work at a Python prompt or in a notebook. What the caller can put right is a `prw.UserError`, whose text says what is wrong
-and what to do.
+Everything is in SI (s, rad, rad/s, N.m, kg.m2). Functions write files only to paths that they are given, and print only the progress
+of long work at a Python prompt or in a notebook. An error that the caller can fix is a `prw.UserError`; its message names the
+cause and the remedy.
 """
 
 import lazy_loader
 
-# __init__.pyi says where each name is. It is loaded when it is first used, so that `import prw` takes no time. No module
-# or package in this folder may be called like a name there (as `identify` is): once imported, it would be in its place.
+# __init__.pyi lists the module of each name, which is imported at the first use, so that `import prw` is fast. No module
+# of this package may have the name of a function there, such as `identify`: once imported, it would replace the function.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-"""`animate`: a run as a moving picture. What draws it is in prw.picture, and needs matplotlib."""
+"""`animate`: a run as an animation. prw.picture draws it with matplotlib."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
     from prw.simulation import Run
 
-#: Pictures a second, by the file's suffix; "" is for a notebook.
+#: Frames per second, by the file's suffix; "" is for a notebook.
 RATES = {".gif": 10, ".html": 10, ".mp4": 15, "": 10}
-#: What a run is slowed down to or hurried up to, s, when the speed is not given.
+#: Shortest and longest duration of an animation without a given speed, s.
 SHORTEST, LONGEST = 6.0, 40.0
-#: More pictures than this take long to draw and to open.
+#: Most frames; more take long to draw and to open.
 MOST = 1500
 
 
@@ -39,10 +39,10 @@ def animate(
     run
         From `prw.simulate`, with the outputs theta3, theta4, pitch, roll, tau1 and tau2.
     speed
-        Seconds of the run that pass in a second of the animation (default: 1, but so that the whole takes 6 s at
-        least and 40 s at most).
+        Seconds of the run per second of the animation (default: 1, or the speed at which the animation lasts 6 s
+        or 40 s if it would be shorter or longer).
     captions
-        Lines to show from a time (s) of the run on, in order.
+        Lines with the time (s) of the run from which each is shown, in order.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def animate(
 
 
 def suffix_of(path: Path) -> str:
-    """The suffix of the file. Raises UserError where it is no animation's, or what writes it is not installed."""
+    """The suffix of the file. Raises UserError if it is no suffix of an animation, or if a package is missing."""
     suffix = path.suffix.lower()
     if not suffix or suffix not in RATES:
         raise UserError(f"{path}: an animation is a .gif, an .mp4 or an .html")

@@ -1,4 +1,4 @@
-"""What can be measured on the testbed, and in which units."""
+"""The channels that can be measured on the testbed, and their units."""
 
 from __future__ import annotations
 
@@ -54,8 +54,7 @@ QUANTITIES = {"time": "time", **MOTORS, **{name: channel.quantity for name, chan
 
 
 def factor(name: str, unit: str) -> float:
-    """What a value of column `name` in `unit` is multiplied with to be in SI. Raises UserError for a unit that does
-    not fit. A unit may be divided, as in rev/10000 for the counts of an encoder."""
+    """The factor from `unit` to SI for column `name`. Raises UserError for a unit of another quantity. A unit may be divided, as in rev/10000 for the counts of an encoder."""
     whole, slash, count = unit.partition("/")
     if slash and count.strip().isdigit() and int(count) > 0:
         return factor(name, whole) / int(count)

@@ -1,4 +1,4 @@
-"""The command `prw`: finds the subcommand, and turns what the user can mend into one line on stderr."""
+"""The command `prw`: runs the subcommand, and reports errors that the user can fix in one line on stderr."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ COMMANDS = (simulate, check, linearize, identify, excite, sweep)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run `prw` with the arguments argv (default: the process's). Returns the exit status: 0, that of a UserError (1;
-    3 where data do not fit), 130 when interrupted."""
+    """Run `prw` with the arguments argv (default: the process's). Returns the exit status: 0, the `status` of a UserError (1;
+    3 if data do not fit), 130 when interrupted."""
     return run("prw", "Simulate the pitch-roll wrist testbed through its FMU.", COMMANDS, argv)
 
 
@@ -30,18 +30,22 @@ def run(program: str, description: str, commands: Sequence[ModuleType], argv: Se
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for command in commands:
         command.add_parser(subparsers)
-    arguments = parser.parse_args(argv)
-    progress.show()
+    # `options`: the option by argument, if their names differ.
+    arguments = argparse.Namespace(options={})
     try:
+        parser.parse_args(argv, arguments)
+        progress.show()
         arguments.run(arguments)
         sys.stdout.flush()
     except UserError as error:
-        print(f"{program} {arguments.command}: {error}", file=sys.stderr)
+        default = f"--{error.argument}" if hasattr(arguments, error.argument) else error.argument
+        option = arguments.options.get(error.argument, default)
+        print(f"{program} {arguments.command}: {option}{error.detail}", file=sys.stderr)
         return error.status
     except KeyboardInterrupt:
         print(f"\n{program} {arguments.command}: interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:
-        # The reader of our output has gone (`prw ... | head`); keep the interpreter from tripping over it at exit.
+        # The reader has closed the pipe (`prw ... | head`); a write at exit would raise again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0

@@ -1,4 +1,4 @@
-"""The header of a recording: which column is what, and in which unit."""
+"""The header of a recording: quantity and unit of each column."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ RATES = ("omega1", "omega2")
 #: `pitch [deg]`, `pitch (deg)`, or `pitch_deg`, `pitch/deg`, `pitch deg`; names in capitals or not, `t` for time
 NAMES = "|".join(sorted([*QUANTITIES, "t"], key=len, reverse=True))
 COLUMN = re.compile(rf"^\s*({NAMES})(?:\s*\[([^\]]*)\]|\s*\(([^)]*)\)|[\s_/,]+(\S+))?\s*$", re.IGNORECASE)
-#: Names of the header that a complaint repeats.
+#: Maximum number of column names quoted in an error message.
 SHOWN = 12
 
 
 class Columns(NamedTuple):
-    """taken: (name, index) of the columns to read, time first. units: of each by name. notes: lines for the user."""
+    """taken: (name, index) of the columns to read, time first. units: unit by name. notes: lines for the user."""
 
     taken: list[tuple[str, int]]
     units: dict[str, str]
@@ -35,7 +35,7 @@ def columns(
     units: Mapping[str, str] | None = None,
     degrees: bool = False,
 ) -> Columns:
-    """Time, both angles, both rates if they are there, and what there is of `outputs` (names of measured outputs).
+    """Find time, both angles, both rates if present, and those `outputs` (names of measured outputs) that are present.
 
     A column's unit is in its header (`pitch [deg]`) or in `units` by name; without either it is SI, or degrees and
     degrees per second if `degrees`. Raises UserError naming file, row (`line`, 0 where there are none) and column.
@@ -69,12 +69,12 @@ def columns(
 
 
 def shown(header: Sequence[str]) -> str:
-    """The names of the header for a complaint."""
+    """The first names of the header, for an error message."""
     return ", ".join(text or "(blank)" for text in header[:SHOWN]) + (", ..." if len(header) > SHOWN else "")
 
 
 def column(text: str) -> tuple[str, str]:
-    """The name in QUANTITIES that the header `text` stands for, and the unit in it; or "" twice."""
+    """The name in QUANTITIES and the unit of the column title `text`; both "" if it is unknown."""
     match = COLUMN.match(text)
     if not match:
         return "", ""

@@ -1,4 +1,4 @@
-"""What the model description of an FMU says beyond its variables, which `fmu_run` tells: structure and units."""
+"""Structure and units in the model description of an FMU. `fmu_run` reads its variables."""
 
 from __future__ import annotations
 
@@ -8,23 +8,22 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-#: What continuous variables are called in FMI 2.0, and in 3.0.
+#: Types of continuous variables in FMI 2.0 and 3.0.
 CONTINUOUS = ("Real", "Float64", "Float32")
 INTERFACES = ("CoSimulation", "ModelExchange")
 
 
 class Unit(NamedTuple):
-    """exponents: of the base units, as they are written. displayed: of each display unit, what a value in it is
-    multiplied with to be in this one."""
+    """exponents: by base unit, as strings. displayed: by display unit, the factor from the display unit to this unit."""
 
     exponents: Mapping[str, str]
     displayed: Mapping[str, float]
 
 
 class Description(NamedTuple):
-    """What an FMU says of itself. derivatives: the name of each state's derivative, by state. outputs: those that are
-    continuous. directional: the interfaces there are, and whether they offer directional derivatives; attribute: what
-    says so. display_units: by variable. units: by name."""
+    """Parts of a model description. derivatives: the name of each state's derivative, by state. outputs: the continuous
+    ones. directional: by interface type, whether it provides directional derivatives; attribute: the XML attribute that
+    declares them. display_units: by variable. units: by name."""
 
     derivatives: dict[str, str]
     outputs: tuple[str, ...]
@@ -35,10 +34,10 @@ class Description(NamedTuple):
 
 
 def read_description(fmu: Path) -> Description:
-    """What the FMU file says, of FMI 2.0 or 3.0, which `fmu_run` has loaded before."""
+    """Read the model description of an FMU of FMI 2.0 or 3.0. The caller has loaded it with `fmu_run`, which checks it."""
     with zipfile.ZipFile(fmu) as archive:
         root = ElementTree.fromstring(archive.read("modelDescription.xml"))
-    # A place in the list from 1 on (section 2.2.8 of FMI 2.0), or a value reference (section 2.4.8 of FMI 3.0).
+    # An index in the list, from 1 (section 2.2.8 of FMI 2.0), or a value reference (section 2.4.8 of FMI 3.0).
     fmi2 = str(root.get("fmiVersion")).startswith("2.")
     reference, outputs, derivatives = (
         ("index", "Outputs/Unknown", "Derivatives/Unknown")

@@ -1,17 +1,27 @@
-"""The exceptions whose text is meant for the user."""
+"""Exceptions with a message for the user."""
+
+from typing import Any
 
 
 class UserError(ValueError):
-    """Something the user can put right. The message is one line and says what and where; `prw` exits with `status`."""
+    """An error that the user can fix. The message is one line; `prw` exits with `status`.
+
+    argument: the argument of the function that the message concerns; `prw` names its option instead. given: its value.
+    """
 
     status = 1
 
+    def __init__(self, message: str, *, argument: str = "", given: Any = ""):
+        self.argument = argument
+        self.detail = f"{f' {given}'.rstrip()}: {message}" if argument else message
+        super().__init__(argument + self.detail)
+
 
 class MissingPackage(UserError, ImportError):
-    """A package that only some of `prw` needs is not installed."""
+    """An optional package is not installed."""
 
 
 class DoesNotFit(UserError):
-    """The model does not explain the data, whatever its parameters."""
+    """The model does not explain the data with any parameters."""
 
     status = 3

@@ -1,4 +1,4 @@
-"""Packages that only some of `prw` needs."""
+"""Optional packages."""
 
 from __future__ import annotations
 

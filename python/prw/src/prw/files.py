@@ -1,4 +1,4 @@
-"""Writing result files so that a reader never meets half of one; and the files of the pages."""
+"""Atomic writing of result files, and the files of the pages."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from prw.errors import UserError
 
-#: The package, and the clone that it belongs to: the one around it, or the one that it was installed from.
+#: The package, and the clone around it or from which it was installed.
 PACKAGE = Path(__file__).parent
 _INSTALLED_FROM = PACKAGE / "clone.txt"
 CLONE = (
@@ -18,7 +18,7 @@ CLONE = (
     if _INSTALLED_FROM.is_file()
     else Path(os.path.normpath(PACKAGE / "../../../.."))
 )
-#: Where a clone has the files of the pages.
+#: Directories of a clone with the files of the pages.
 PAGE_FOLDERS = ("crates/fmu-package/page", "docs/fmu-page/wrist")
 
 
@@ -30,9 +30,9 @@ def page_file(name: str) -> Path:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; it takes the place of `path` when the block succeeds and vanishes when not.
+    """Yield a temporary path next to `path`. The file replaces `path` if the block succeeds, and is removed otherwise.
 
-    Creates missing directories. Raises UserError when the place cannot be written.
+    Creates missing directories. Raises UserError if the file cannot be written.
     """
     temporary = None
     try:
@@ -51,13 +51,13 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def _umask() -> int:
-    # mkstemp makes private files; results get the permissions any other new file would have.
+    # mkstemp makes private files; results get the permissions of any new file.
     mask = os.umask(0)
     os.umask(mask)
     return mask
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write `text` as UTF-8 with line feeds, all or nothing. Raises UserError when the place cannot be written."""
+    """Write a string as UTF-8 with line feeds, atomically. Raises UserError if the file cannot be written."""
     with replacing(path) as temporary:
         temporary.write_bytes(text.encode("utf-8"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from numbers import Real
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import fmu_run
 import numpy as np
@@ -17,11 +17,11 @@ from prw.parameters import Given, values_of
 from prw.state_space import StateSpace
 from prw.testbed import existing_fmu, loaded
 
-#: With these start values, which the testbed has, its states and inputs are independent of each other in Co-Simulation.
-#: With others a motor angle also changes the rate that is estimated from it, and before the first step the states.
+#: Start values of the testbed with which its states and inputs are independent of each other in Co-Simulation. With
+#: others a motor angle also changes the rate that is estimated from it and, before the first step, the states.
 INDEPENDENT = {"use_omega": True, "start_at_rest": False}
 INTERFACES = {"CoSimulation": "Co-Simulation", "ModelExchange": "Model Exchange"}
-#: The same, as `fmu_run` calls them.
+#: The names of the interface types in `fmu_run`.
 HELD: dict[str, Literal["co-simulation", "model-exchange"]] = {
     "CoSimulation": "co-simulation",
     "ModelExchange": "model-exchange",
@@ -41,27 +41,27 @@ def linearize(
     ----------
     parameters
         Start values of parameters, states and inputs by name, in the FMU's units or with a unit as (1.9, "N.m/deg"), or the
-        JSON file with them that `prw.identify` writes; others keep their own. The
-        testbed is linear, so of these only parameters matter there. `use_omega` is set to true and `start_at_rest` to
-        false where they are not given: A, B, C and D are then those of eq. (11), with the motors' angles and rates as
+        JSON file with them that `prw.identify` writes; other variables keep their start values. The
+        testbed is linear, so only parameters matter there. `use_omega` is set to true and `start_at_rest` to
+        false if they are not given: A, B, C and D are then the matrices of eq. (11), with the motors' angles and rates as
         independent inputs. With `use_omega` false, Co-Simulation estimates the rates from the angles and ignores
         `omega1` and `omega2`.
     fmu
         The FMU (default: the testbed's).
     outputs, fmi_type
-        As for `Linearizer`, which is faster where this is asked for again and again.
+        As for `Linearizer`, which is faster for many models of one FMU.
 
     Raises
     ------
     UserError
-        The FMU is missing, has no directional derivatives, lacks a name or refuses a value.
+        The FMU is missing, has no directional derivatives, lacks a name or rejects a value.
     """
     with Linearizer(fmu, outputs=outputs, fmi_type=fmi_type) as linearizer:
         return linearizer.at(parameters)
 
 
 class Linearizer:
-    """Linear models of one FMU, from one instance of it that stays: `at(parameters)` as often as needed. A context
+    """Linear models of one FMU, from one instance: call `at(parameters)` as often as needed. A context
     manager; leaving it unloads the FMU.
 
     outputs: names of y, outputs or states (default: the FMU's continuous outputs). fmi_type: "CoSimulation" or
@@ -89,7 +89,7 @@ class Linearizer:
             raise
 
     def _look(self, outputs: str | Iterable[str] | None, fmi_type: str | None) -> None:
-        """Find what there is to linearize. Raises UserError."""
+        """Find states, inputs and outputs. Raises UserError."""
         description, variables = read_description(self.fmu), self.loaded.variables
         self._interface = HELD[self._chosen(fmi_type, description.directional, description.attribute)]
         self.states = tuple(description.derivatives)
@@ -143,7 +143,7 @@ class Linearizer:
         self._closed, self._instance = True, None
         self.loaded.close()
 
-    def __enter__(self) -> Linearizer:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -176,8 +176,8 @@ class Linearizer:
         return value
 
     def _initialized(self, start: Mapping[str, Any]) -> fmu_run.Instances:
-        """The instance, or a new one, where derivatives may be asked for."""
-        # What was given before and is not now would stay.
+        """The instance or a new one, in a state in which derivatives are available."""
+        # A start value that was given before and is not given now would persist.
         if self._instance is None or not self._given <= start.keys():
             self._instance = self.loaded.instances(interface=self._interface, start=start)
         else:

@@ -1,4 +1,4 @@
-"""Motions of the two motors: what every simulation starts from."""
+"""Motions of the two motors, the input of every simulation."""
 
 from __future__ import annotations
 
@@ -24,10 +24,9 @@ class Motion:
     """Motor motion at the communication points.
 
     time: (n,) s, strictly increasing. theta: (n, 2) rad, motor angles theta1, theta2. omega: (n, 2) rad/s, their
-    rates at the same instants, or None where only angles are known. name: what files and titles are called after.
-    notes: lines the user should read.
+    rates at the same instants, or None if only angles are known. name: for files and titles. notes: lines for the user.
 
-    Raises UserError where the shapes do not fit or time does not increase.
+    Raises UserError if the shapes do not fit or time does not increase.
     """
 
     time: Array

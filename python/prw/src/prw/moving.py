@@ -1,4 +1,4 @@
-"""Pictures into a file that moves: GIF, MP4, or a page that loads nothing."""
+"""Writes animations: GIF, MP4, or an HTML page that loads no other file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from prw.extras import need
 from prw.files import page_file
 from prw.motion import Array
 
-#: What the page is put together of, in this order.
+#: The scripts of the page, in this order.
 SCRIPTS = ("plot.js", "player.js", "wrist.js", "animation.js")
 PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -45,9 +45,9 @@ animation({run});
 
 
 def write_gif(path: Path, pictures: Iterable[Image.Image], rate: int, colours: Iterable[ArrayLike]) -> None:
-    """Write a GIF of `rate` pictures a second in the colours (red, green, blue: 0 ... 1).
+    """Write a GIF of `rate` frames per second in the colours (red, green, blue: 0 ... 1).
 
-    All pictures share them, without dithering: nothing flickers, and what stays takes no room.
+    All frames share the colours, without dithering, so that unchanged areas do not flicker and compress well.
     """
     table = Image.new("P", (1, 1))
     table.putpalette(np.rint(255 * np.array(list(colours))).astype(int).ravel().tolist())
@@ -59,7 +59,7 @@ def write_gif(path: Path, pictures: Iterable[Image.Image], rate: int, colours: I
 
 
 def write_page(path: Path, title: str, courses: Mapping[str, Array], speed: float, captions: Sequence[Any]) -> None:
-    """Write an HTML page that shows the courses, among them `time`, with the wrist in three dimensions, to be turned."""
+    """Write an HTML page with plots of the columns, among them `time`, and the wrist in 3D, which the reader can turn."""
     files = {name: page_file(name).read_text(encoding="utf-8") for name in (*SCRIPTS, "live.css", "wrist.json")}
     columns = {name: base64.b64encode(np.asarray(one, "<f8").tobytes()).decode() for name, one in courses.items()}
     run = {"title": title, "columns": columns, "speed": speed, "captions": [list(one) for one in captions]}
@@ -68,14 +68,14 @@ def write_page(path: Path, title: str, courses: Mapping[str, Array], speed: floa
         style=files["live.css"],
         scripts="".join(files[name] for name in SCRIPTS),
         parts=files["wrist.json"].strip(),
-        # What a caption says must not end the script.
+        # A caption must not end the script.
         run=json.dumps(run).replace("<", "\\u003c"),
     )
     path.write_text(page, encoding="utf-8")
 
 
 def write_movie(path: Path, pictures: Iterable[Image.Image], rate: int) -> None:
-    """Write an MP4 of `rate` pictures a second. Raises UserError where a package is missing."""
+    """Write an MP4 of `rate` frames per second. Raises UserError if a package is missing."""
     need("imageio_ffmpeg")
     import imageio_ffmpeg
 
@@ -86,7 +86,7 @@ def write_movie(path: Path, pictures: Iterable[Image.Image], rate: int) -> None:
             f"{path.suffix}: imageio-ffmpeg has no ffmpeg for this machine; install ffmpeg, or write a .gif"
         ) from None
     writer = None
-    # Players want even sides.
+    # Players need even widths and heights.
     options = ["-vf", "crop=floor(iw/2)*2:floor(ih/2)*2", "-crf", "20"]
     for one in pictures:
         if writer is None:

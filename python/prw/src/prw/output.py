@@ -35,7 +35,7 @@ def write_table(path: Path, motion: Motion, response: Mapping[str, Array], outpu
     Numbers have as many digits as it takes to read them back unchanged.
     """
     inputs = inputs_of(motion)
-    # + 0.0 turns -0.0, which reads oddly, into 0.0
+    # Adding 0.0 turns -0.0 into 0.0.
     table = np.column_stack([*inputs.values(), *(response[name] for name in outputs)]) + 0.0
     with (
         replacing(path) as temporary,
@@ -44,7 +44,7 @@ def write_table(path: Path, motion: Motion, response: Mapping[str, Array], outpu
     ):
         file.write((",".join([*inputs, *outputs]) + "\n").encode("ascii"))
         for start in range(0, len(table), BLOCK):
-            # Rows as JSON has them, [[1.0,2.0],[3.0,4.0]], with their brackets and null for what is not a number.
+            # JSON: [[1.0,2.0],[3.0,4.0]], with null for NaN. Brackets become line ends.
             rows = orjson.dumps(table[start : start + BLOCK], option=orjson.OPT_SERIALIZE_NUMPY)
             file.write(rows[2:-2].replace(b"],[", b"\n").replace(b"null", b"nan") + b"\n")
             progress(start)

@@ -1,4 +1,4 @@
-"""A run as a moving picture: the testbed in three dimensions, and the courses of its angles and torques below."""
+"""Draws the frames of an animation: the testbed in 3D, and plots of its angles and torques below."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ if TYPE_CHECKING:
 
 #: The outputs of a run that are shown.
 MEASURED = ("theta3", "theta4", "pitch", "roll", "tau1", "tau2")
-#: Pixels, and inches at DPI, of the picture.
+#: Size of a frame in pixels, and in inches at DPI.
 SIZE, DPI = (720, 405), 92
-#: The same for a still, and the upper share of the picture that shows the testbed.
+#: Size of a still, and the upper share of a frame that shows the testbed.
 STILL_DPI, SCENE = 138, 0.66
-#: The twist of a coupling that the largest one in a run is shown with, rad.
+#: Twist at which the largest coupling twist of a run is drawn, rad.
 SHOWN_TWIST = 0.9
-#: But by no more than this.
+#: Largest factor on the twist.
 MOST_TWISTED = 100.0
-#: Where the viewer is, deg: from the left of motor 2, and above.
+#: Direction of the viewer, deg: from the left of motor 2, and above.
 AZIMUTH, ELEVATION = -64, 20
 #: Directions to the viewer and to the lamp in matplotlib's axes.
 VIEWER = np.array([np.cos(np.deg2rad(AZIMUTH)), np.sin(np.deg2rad(AZIMUTH)), np.tan(np.deg2rad(ELEVATION))])
 LAMP = np.array([0.15, -0.62, 0.77])
 #: Degrees of brightness above the darkest: few, so that a GIF needs few colours.
 LEVELS = 2
-#: The share of its colour that a course has before it is reached.
+#: Opacity of a curve after the present instant.
 FAINT = 0.25
-#: Words beside what does not move: place in the figure, text, colour.
+#: Labels of fixed parts: position in the figure, string, colour.
 LABELS = (
     (0.14, 0.585, "motor 1", BLUE),
     (0.86, 0.40, "motor 2", VERMILION),
@@ -57,8 +57,7 @@ LABELS = (
 
 
 class Panel(NamedTuple):
-    """Courses below the testbed: title, factor from SI, digits and format of numbers, and of each variable label and
-    colour."""
+    """A plot below the testbed: title, factor from SI, digits and format of numbers, and label and colour of each variable."""
 
     title: str
     factor: float
@@ -75,7 +74,7 @@ PANELS = (
 
 
 class Moving(NamedTuple):
-    """What is moved for a variable: the line so far, the dot at its end, and the value in figures."""
+    """Moving parts of a variable: the line up to the instant, the dot at its end, and the value as a number."""
 
     name: str
     panel: Panel
@@ -86,13 +85,13 @@ class Moving(NamedTuple):
 
 class _Animation(FuncAnimation):
     def __del__(self) -> None:
-        """Not every animation is shown: one that is written to a file is done. matplotlib would warn."""
+        """Omits matplotlib's warning about animations that are not shown: one that is written to a file is finished."""
 
 
 def drawn(
     run: Run, speed: float, count: int, rate: int, target: Path | None, captions: Sequence[tuple[float, str]]
 ) -> FuncAnimation:
-    """The animation of `count` pictures, `rate` a second, `speed` times as fast as the run, written to `target`; see
+    """The animation of `count` frames, `rate` per second, `speed` times as fast as the run, written to `target`; see
     `prw.animate`."""
     time = run.time
     courses = angles_and_torques(run)
@@ -117,12 +116,12 @@ def drawn(
 
 
 def still(run: Run, instant: float) -> Image.Image:
-    """The testbed at an instant (s) as a picture of its own, sharp and on no ground, for light and dark pages."""
+    """The testbed at an instant (s) as a still image with a transparent background, for light and dark pages."""
     picture = _Picture(run.time, angles_and_torques(run), 1.0, ())
     picture.figure.set_dpi(STILL_DPI)
     for ground in (picture.figure, picture.scene):
         ground.set_facecolor("none")
-    # The page has the words, in letters of its own size and colours.
+    # The page adds the labels in its own font and colours.
     for words in picture.figure.texts:
         words.set_text("")
     pixels = picture.at(instant)
@@ -130,7 +129,7 @@ def still(run: Run, instant: float) -> Image.Image:
 
 
 def angles_and_torques(run: Run) -> dict[str, Array]:
-    """Everything that moves, (n,) each by name. Raises UserError where something is missing."""
+    """The moving variables, (n,) each by name. Raises UserError if one is missing."""
     for name in MEASURED:
         if name not in run:
             raise UserError(f"the run has no {name}, which an animation shows; ask for it with `outputs=`")
@@ -187,7 +186,7 @@ class _Picture:
         ]
 
     def _panel(self, number: int, panel: Panel) -> list[Moving]:
-        """Axes with the whole courses, pale, and what is to be moved on them."""
+        """Axes with the whole curves in pale colours, and the moving parts on them."""
         axis = self.figure.add_axes((0.055 + 0.328 * number, 0.105, 0.265, 0.18))
         axis.set_title(panel.title)
         values = {name: panel.factor * self.courses[name] for name in panel.curves}
@@ -226,16 +225,16 @@ class _Picture:
                 np.append(self.time[before], instant), np.append(panel.factor * self.courses[name][before], value)
             )
             dot.set_data([instant], [value])
-            # Adding 0 to what is rounded leaves no minus before a zero.
+            # Adding 0 turns -0.0 into 0.0.
             shown.set_text(panel.number.format(round(value, panel.digits) + 0.0).replace("-", "\N{MINUS SIGN}"))
 
     def at(self, instant: float) -> Image.Image:
-        """The picture at the instant (s), with its transparency."""
+        """The frame at the instant (s), with transparency."""
         self.draw(instant)
         canvas: Any = self.figure.canvas
         moved = [self.bodies, *(artist for one in self.moving for artist in one[2:]), self.caption]
         if self._ground is None:
-            # What never moves, axes and whole courses, takes longest: it is drawn once.
+            # Axes and whole curves never move and take longest: they are drawn once.
             for artist in moved:
                 artist.set_visible(False)
             canvas.draw()
@@ -250,7 +249,7 @@ class _Picture:
 
 
 def _colours() -> Iterator[ArrayLike]:
-    """All there are but for smooth edges: bodies in every brightness, pale courses, text and grid."""
+    """All colours except those of smooth edges: bodies in every brightness, pale curves, text and grid."""
     for name in (BLUE, VERMILION, GREEN, PURPLE, STEEL, DARK, PALE):
         yield from (_bright(to_rgb(name), level) for level in range(LEVELS + 1))
     for name in (BLUE, VERMILION, GREEN, PURPLE):

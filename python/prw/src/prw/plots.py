@@ -1,4 +1,4 @@
-"""Figures of a simulation. Colours are from Okabe and Ito's set, told apart with any colour vision and in grey."""
+"""Figures of a simulation. Colours are from Okabe and Ito's set, distinguishable with any colour vision and in grey."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from prw.motion import INTERVALS, Array, Motion, envelope
 
 BLUE, VERMILION = "#0072B2", "#D55E00"
-#: Of pitch and roll where the sides have the other two.
+#: Colours of pitch and roll if the sides have the other two.
 GREEN, PURPLE = "#009E73", "#CC79A7"
 STYLE: Any = {
     "font.family": "DejaVu Sans",  # matplotlib brings it along
@@ -29,11 +29,11 @@ STYLE: Any = {
     "axes.axisbelow": True,
     "lines.linewidth": 1.3,
     "legend.frameon": False,
-    # Text stays text, and the same figure is the same file.
+    # SVG keeps text, and a figure always gives the same file.
     "svg.fonttype": "none",
     "svg.hashsalt": "prw",
 }
-#: The same for figures a column wide.
+#: Style of figures that are a column wide.
 PAGE_STYLE: Any = {
     **STYLE,
     "font.size": 9,
@@ -65,7 +65,7 @@ class ShownFigure(Figure):
 
 
 def motion_panel(motion: Motion, angles: bool) -> Panel:
-    """What the motors do: their angles in degrees, or their velocities as in Fig. 4 where the motion has them."""
+    """The motors: their angles in degrees, or their velocities as in Fig. 4 if the motion has them."""
     if angles or motion.omega is None:
         label, (y1, y2) = "θ₁, θ₂  (deg)", np.rad2deg(motion.theta.T)
         return Panel("Motor angles", label, [("motor 1", y1), ("motor 2", y2)])
@@ -74,8 +74,8 @@ def motion_panel(motion: Motion, angles: bool) -> Panel:
 
 
 def response_panels(response: Mapping[str, Array], angles: bool) -> list[Panel]:
-    """What the wrist does: pitch and roll (with `angles` in degrees as well as their rates), and the sensor torques,
-    as far as `response` has them."""
+    """The wrist: pitch and roll rates (with `angles` also the angles in degrees), and the sensor torques, if `response` has
+    them."""
     known = [
         Panel(
             "Pitch and roll rates", "θ₇′, θ₈′  (rad/s)", _both(response, "pitch_rate", "roll_rate", ("pitch", "roll"))
@@ -99,16 +99,20 @@ def draw_response(title: str, motion: Motion, response: Mapping[str, Array], ang
 
     `angles`: show motor and output angles, as for a recording; otherwise motor velocities, as in Fig. 4.
     """
-    panels = [motion_panel(motion, angles), *response_panels(response, angles)]
+    return draw_panels(title, motion.time, [motion_panel(motion, angles), *response_panels(response, angles)])
+
+
+def draw_panels(title: str, time: Array, panels: Sequence[Panel]) -> Figure:
+    """A figure of panels, one below the other, over the same time (n,) in s."""
     with matplotlib.rc_context(STYLE):
         figure = ShownFigure(figsize=(8, 0.8 + 2.1 * len(panels)), layout="constrained")
         figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
         axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
         for axis, panel in zip(axes, panels):
-            draw_panel(axis, motion.time, panel)
+            draw_panel(axis, time, panel)
         figure.align_ylabels(axes)
         axes[-1].set_xlabel("time (s)")
-        axes[-1].set_xlim(motion.time[0], motion.time[-1])
+        axes[-1].set_xlim(time[0], time[-1])
     return figure
 
 

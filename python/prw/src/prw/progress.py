@@ -1,4 +1,4 @@
-"""Progress of long work, on stderr, for those who run a command or work interactively."""
+"""Progress of long work on stderr, in commands and interactive sessions."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ _wanted = False
 
 
 def show() -> None:
-    """From now on, progress is shown in this process. Commands call this."""
+    """Show progress in this process from now on. Commands call this."""
     global _wanted
     _wanted = True
 
 
 def _is_wanted() -> bool:
-    """Whether somebody waits: a command, a Python prompt or a notebook runs. Programs that import the library get no output."""
+    """Whether a command, a Python prompt or a notebook runs. Other programs get no output."""
     return _wanted or hasattr(sys, "ps1") or "ipykernel" in sys.modules
 
 
 class Progress:
-    """Says how far a piece of work has come, once it has taken longer than two seconds, if that is wanted.
+    """Reports the progress of a task that takes longer than two seconds, if that is wanted.
 
     On a terminal one line is rewritten, and wiped on leaving the context; in a log a line is added every ten seconds.
     """

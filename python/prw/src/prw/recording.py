@@ -1,4 +1,4 @@
-"""Reading a recorded experiment, and saying what looks like a slip in it."""
+"""Reads a recorded experiment, and notes probable mistakes in it."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from prw.table import Choice, read_table
 PLAUSIBLE_SPEED = 30.0
 #: More turns than a wrist move takes, in rad.
 PLAUSIBLE_ANGLE = 4 * np.pi
-#: A motor that moves less than this, in rad, says nothing about its rate.
+#: Motion of a motor, in rad, below which its rate is not checked.
 SMALL_MOVE = 0.02
-#: A motor this slow, in rad/s, is taken to stand still.
+#: Rate in rad/s below which a motor counts as at rest.
 SLOW = 0.1
 #: Longer between two samples, in s, than anyone lets a motor run unobserved; milliseconds taken for seconds are beyond.
 SLOW_SAMPLING = 0.5
@@ -34,16 +34,16 @@ SLOW_SAMPLING = 0.5
 MISSING, UNKNOWN, REST = 5.0, 0.04, 5
 #: A motor does not turn this far, in rad, from sample to sample; angles that jump by a turn do.
 JUMP = 0.9 * np.pi
-#: What a recording that comes from no file is called.
+#: Name of a recording that comes from no file.
 IN_MEMORY = Path("recording")
 
 
 @dataclass(frozen=True)
 class Recording:
-    """One recorded experiment, in SI. recording["tau1"]: (n,), and so for time, motors and whatever was measured.
+    """One recorded experiment, in SI. recording["tau1"]: (n,), and likewise time, motors and all measured outputs.
 
-    motion: what the motors did, (n,) times. measured: (n,) by name, of `prw.channels.MEASURED`; NaN where a cell is
-    empty. units: the unit in the file, by column. source: the file, or "recording" where there is none.
+    motion: of the motors, (n,) times. measured: (n,) by name, of `prw.channels.MEASURED`; NaN where a cell is
+    empty. units: the unit in the file, by column. source: the file, or "recording" if there is none.
     """
 
     source: Path
@@ -53,7 +53,7 @@ class Recording:
 
     @property
     def name(self) -> str:
-        """The file's name, without what follows the dot."""
+        """The file's name without suffix."""
         return self.motion.name
 
     @property
@@ -73,7 +73,7 @@ class Recording:
 
     @property
     def notes(self) -> list[str]:
-        """Lines the user should read, on what looks like a slip."""
+        """Lines for the user about probable mistakes."""
         return self.motion.notes
 
     def __getitem__(self, column: str) -> Array:
@@ -99,30 +99,30 @@ def read(
     """Read a recorded experiment from a CSV file, or from a DataFrame or a dict of arrays with the same columns.
 
     Its columns: time (s), theta1, theta2 (rad) and, where present, omega1, omega2 (rad/s) and any of tau1, tau2
-    (N.m), theta3, theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s), in any order; others are ignored. It is
+    (N.m), theta3, theta4, pitch, roll (rad), pitch_rate, roll_rate (rad/s), in any order; others are ignored. The file is
     UTF-8 text (or UTF-16 with its mark) with a header line, perhaps below comments after `#`, separated by commas,
-    semicolons or tabs (with semicolons, a decimal comma is understood). Time may be uneven but must increase; where
-    rows are missing for longer than a path can be laid through, the recording is refused, and where it can, a note says
-    so. A measured column may have empty cells.
+    semicolons or tabs (with semicolons, a decimal comma is understood). Time may be uneven but must increase; if
+    rows are missing, a note reports it, and if they are missing for too long, the recording is rejected. A measured column
+    may have empty cells.
 
     Parameters
     ----------
     units
-        Unit by column, where the header has none (`pitch [deg]` has one). Default: SI. An encoder's counts are
+        Unit by column, if the header has none (`pitch [deg]` has one). Default: SI. An encoder's counts are
         `rev/10000`.
     degrees
         Columns without a unit are in degrees and degrees per second.
     names
-        What columns are called in the file, where that differs: {"theta1": "Motor 1"}.
+        Names of columns in the file, if they differ: {"theta1": "Motor 1"}.
     skip
-        Lines above the header, as dSPACE writes them.
+        Number of lines above the header; dSPACE writes such lines.
     encoding
-        Of the file, as Python calls it (default: UTF-8, or UTF-16 where its mark is there).
+        Encoding of the file, as in Python (default: UTF-8, or UTF-16 if the file begins with its mark).
 
     Raises
     ------
     UserError
-        Something cannot be read; file, row and column are named.
+        The recording cannot be read; the message names file, row and column.
     """
     return _read(path, units, degrees, tuple(MEASURED), names, skip, encoding)
 
@@ -136,7 +136,7 @@ def read_motion(
     skip: int = 0,
     encoding: str = "",
 ) -> Motion:
-    """The motors' motion alone, as `read` reads it: what was measured is ignored, and may be anything."""
+    """Read only the motors' motion, as `read` does; other columns are ignored."""
     return _read(path, units, degrees, (), names, skip, encoding).motion
 
 
@@ -155,10 +155,10 @@ def _read(
     for what, known in (("units", units or {}), ("names", names)):
         for name in known:
             if name not in QUANTITIES:
-                raise UserError(f"{what}: {name} is not known; there are {', '.join(QUANTITIES)}")
+                raise UserError(f"{name} is not known; there are {', '.join(QUANTITIES)}", argument=what)
     called = {header: name for name, header in names.items()}
     if skip < 0:
-        raise UserError(f"skip {skip}: it must be 0 or more lines")
+        raise UserError("it must be 0 or more lines", argument="skip", given=skip)
 
     found = Columns([], {}, [])
 
@@ -179,13 +179,13 @@ def _read(
     time = table.pop("time")
     theta = np.column_stack([table.pop(name) for name in ANGLES])
     omega = np.column_stack([table.pop(name) for name in RATES]) if RATES[0] in table else None
-    with np.errstate(all="ignore"):  # angles near the largest number are the FMU's to refuse
+    with np.errstate(all="ignore"):  # The FMU rejects angles near the largest number.
         notes = found.notes + _gaps(path, time, theta) + doubts(time, theta, omega, found.units)
     return Recording(path, Motion(time, theta, omega, path.stem, notes), table, found.units)
 
 
 def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array:
-    """What `read_table` returns, of columns in memory."""
+    """The result of `read_table` for columns in memory."""
     columns = columns_of(table)
     taken = choose(list(columns), 0)
     found: list[Array] = []
@@ -206,13 +206,13 @@ def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array
 
 
 def _renamed(text: str, names: Mapping[str, str]) -> str:
-    """The header `text` by what `names` calls it, with the unit that follows its own name."""
+    """The header `text` with its name replaced as in `names`; a unit after the name is kept."""
     name = max((n for n in names if re.fullmatch(re.escape(n) + r"\s*([\[(].*[\])])?", text)), key=len, default="")
     return names[name] + text.removeprefix(name) if name else text
 
 
 def _gaps(path: Path, time: Array, theta: Array) -> list[str]:
-    """A note on rows that are missing. Raises UserError where nobody can know what the motors did meanwhile."""
+    """A note on missing rows. Raises UserError if the motion of the motors is unknown in between."""
     steps = np.diff(time)
     usual = float(np.median(steps))
     gaps = np.flatnonzero(steps > MISSING * usual)
@@ -237,7 +237,7 @@ def _moves(theta: Array, k: int) -> bool:
 
 
 def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, str]) -> list[str]:
-    """Notes on values that are legal and yet look like a slip. units: of the columns in the file."""
+    """Notes on values that are legal but look like mistakes. units: of the columns in the file."""
     notes = []
     if len(time) > 1 and (step := (time[-1] - time[0]) / (len(time) - 1)) > SLOW_SAMPLING:
         notes.append(f"a sample every {step:.3g} s; if time is in ms, call its column time [ms]")
@@ -269,7 +269,7 @@ def doubts(time: Array, theta: Array, omega: Array | None, units: Mapping[str, s
 
 
 def _mismatch(time: Array, theta: Array, omega: Array, side: int) -> str:
-    """A note when the integral of the rate omega (n,) is not the angle theta (n,), else nothing."""
+    """A note if the integral of the rate omega (n,) is not the angle theta (n,), else nothing."""
     turned = theta - theta.mean()
     if np.ptp(theta) < SMALL_MOVE:
         return ""

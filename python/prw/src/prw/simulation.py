@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 
 
 class Run(Mapping[str, Array]):
-    """What the testbed did. run["roll"]: (n,), in SI, at the times `time`; so for each of its outputs.
+    """The response of the testbed. run["roll"]: (n,), in SI, at the times `time`; likewise each of its outputs.
 
-    time: (n,) s. motion: what the motors did. parameters: the value of every parameter of the FMU in this run, in SI.
-    sampling_errors: by output the greatest error because the motors are only known at these times, as a fraction of the output's
-    peak; estimated from a run with every other time.
+    time: (n,) s. motion: of the motors. parameters: the value of every parameter of the FMU in this run, in SI.
+    sampling_errors: by output the largest error due to sampling of the motors, as a fraction of the output's peak; estimated
+    from a run with every other time.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class Run(Mapping[str, Array]):
 
     @property
     def notes(self) -> list[str]:
-        """Lines that the user should read."""
+        """Lines for the user."""
         return [*self.motion.notes, *([self.doubt] if self.doubt else [])]
 
     @property
@@ -85,14 +85,14 @@ class Run(Mapping[str, Array]):
         return len(self._outputs)
 
     def recording(self) -> Recording:
-        """The run as if its outputs had been measured."""
+        """The run as a recording of its outputs."""
         measured = {name: self[name] for name in MEASURED if name in self}
         return Recording(Path(self.motion.name), self.motion, measured, dict.fromkeys(self, ""))
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write time (s), the motors' angles (rad) and, where given, rates (rad/s), and the outputs (SI) to `path`, a
-        row each time. Time and motors keep all their digits; outputs have twelve. Raises UserError where that is
-        impossible."""
+        row each time. Time and motors keep all their digits; outputs have twelve. Raises UserError if the
+        file cannot be written."""
         from prw.output import write_table
 
         write_table(Path(path), self.motion, self._outputs, tuple(self))
@@ -108,7 +108,7 @@ class Run(Mapping[str, Array]):
         return pandas.DataFrame(columns, index=pandas.Index(columns.pop("time"), name="time"))
 
     def plot(self, title: str | None = None, *, angles: bool = True) -> Figure:
-        """Motors, pitch and roll, and torques over time, as far as the run has them; save it with `.savefig(path)`.
+        """Motors, pitch and roll, and torques over time, if the run has them; save it with `.savefig(path)`.
 
         angles: show angles, in degrees, of motors and wrist. Otherwise velocities only, as in Fig. 4. Raises UserError
         without matplotlib.
@@ -142,13 +142,13 @@ def simulate(
     fmu: str | os.PathLike[str] | None = None,
     outputs: Sequence[str] = OUTPUTS,
 ) -> Run:
-    """Let the testbed follow the motors, from rest at their first angles.
+    """Simulate the testbed with moving motors, from rest at their first angles.
 
     Parameters
     ----------
     motion
-        What the motors do, or a recording of it (a CSV file, a DataFrame or a dict of arrays as `prw.read` takes it;
-        only its motors matter here), or a run, to be made again. Default: the paper's experiment of Fig. 4.
+        The motion of the motors, or a recording of it (a CSV file, a DataFrame or a dict of arrays as `prw.read` takes it;
+        only its motors matter here), or a run to repeat. Default: the paper's experiment of Fig. 4.
     parameters
         Values by name, in SI or with a unit as (1.9, "N.m/deg"), or the JSON file with them that `prw.identify` writes; others
         keep the FMU's start values.
@@ -160,12 +160,12 @@ def simulate(
     Returns
     -------
     Run
-        The run. Row k of its outputs is read at time[k], with the motors where they are then.
+        The run. Row k of its outputs is read at time[k], with the motors' angles at that time.
 
     Raises
     ------
     UserError
-        The FMU is missing or refuses a value, a name is unknown or a file unreadable.
+        The FMU is missing or rejects a value, a name is unknown or a file unreadable.
 
     Warns
     -----
@@ -185,7 +185,7 @@ def simulated(
     fmu: str | os.PathLike[str] | None = None,
     outputs: Sequence[str] = OUTPUTS,
 ) -> Run:
-    """As `simulate`, without its warning."""
+    """Simulate as `simulate` does, without its warning."""
     course = motion_of(motion)
     names = names_of("outputs", outputs)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
@@ -193,7 +193,9 @@ def simulated(
         values = testbed.with_starts(given)
         for name in names:
             if name not in testbed.loaded.variables:
-                raise UserError(f"outputs: {name} is not known; there are {', '.join(testbed.loaded.variables)}")
+                raise UserError(
+                    f"{name} is not known; there are {', '.join(testbed.loaded.variables)}", argument="outputs"
+                )
         found = testbed.respond(course, names, given)
         coarse = Motion(course.time[::2], course.theta[::2], None if course.omega is None else course.omega[::2])
         other = testbed.respond(coarse, names, given) if len(coarse.time) >= FEWEST else {}
@@ -202,15 +204,15 @@ def simulated(
 
 
 def _sampling_error(fine: Array, coarse: Array) -> float:
-    """The error of a course (n,), as a fraction of its peak, of which the other one is calculated with every other time: the
-    FMU is of second order, so that the other one has four times the error."""
+    """The error of the output `fine` (n,) as a fraction of its peak. `coarse` is calculated with every other time: the FMU is
+    of second order, so that its error is four times as large."""
     peak = float(np.abs(fine).max())
     return float(np.abs(coarse - fine[::2]).max()) / 3 / peak if peak > ROUNDING else 0.0
 
 
 def motion_of(source: Motion | Recording | Run | str | os.PathLike[str] | Table | None) -> Motion:
-    """The motion itself, that of a recording, a run, a file or columns, or that of Fig. 4. Raises UserError for what
-    cannot be read."""
+    """The motion itself, the motion of a recording, a run, a file or columns, or the motion of Fig. 4. Raises UserError if a
+    file or column cannot be read."""
     if source is None:
         return fig4()
     if isinstance(source, (Recording, Run)):

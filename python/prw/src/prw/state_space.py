@@ -44,8 +44,8 @@ class StateSpace:
     def transfer(self, s: ArrayLike, rates: Mapping[str, str] | None = None) -> Complex:
         """The transfer matrix C (s 1 - A)^-1 B + D, for s (k,) in 1/s: complex, (k, p, m).
 
-        rates: inputs that are the derivative of another input, with that one, such as {"omega1": "theta1"}. They move
-        along with it: their columns, times s, are added to its column and left out, see `moved`. Raises UserError for
+        rates: inputs that are the derivative of another input, by name: {"omega1": "theta1"}. Their columns, times s, are
+        added to the column of the other input and left out, see `moved`. Raises UserError for
         names that are no inputs.
         """
         s = np.atleast_1d(np.asarray(s, dtype=np.complex128))
@@ -61,7 +61,7 @@ class StateSpace:
         """The inputs that are not among `rates`: the columns of `transfer` and `response_at_hz`."""
         for name in (*rates, *rates.values()):
             if name not in self.inputs:
-                raise UserError(f"rates: {name} is no input; there are {', '.join(self.inputs)}")
+                raise UserError(f"{name} is no input; there are {', '.join(self.inputs)}", argument="rates")
         return tuple(name for name in self.inputs if name not in rates)
 
     def response_at_hz(self, frequency: ArrayLike, rates: Mapping[str, str] | None = None) -> Complex:
@@ -71,7 +71,7 @@ class StateSpace:
         return self.transfer(2j * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64)), rates)
 
     def to_control(self) -> control.StateSpace:
-        """The same for python-control, with the signals' names. Raises UserError without the package `control`."""
+        """Convert to python-control, with the signals' names. Raises UserError without the package `control`."""
         need("control")
         import control
 
@@ -79,7 +79,7 @@ class StateSpace:
         return control.ss(self.A, self.B, self.C, self.D, **names)
 
     def to_scipy(self) -> scipy.signal.StateSpace:
-        """The same for scipy.signal, without names. Raises UserError without the package `scipy`."""
+        """Convert to scipy.signal, without names. Raises UserError without the package `scipy`."""
         need("scipy")
         import scipy.signal
 

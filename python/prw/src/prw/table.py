@@ -1,4 +1,4 @@
-"""Reading numbers from a CSV file. Every complaint names the file, the line and the column."""
+"""Reads numbers from a CSV file. Every error names the file, the line and the column."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from prw.progress import Progress
 DELIMITERS = (",", ";", "\t")
 #: Rows between two progress reports.
 REPORT_ROWS = 4096
-#: Characters that are read at a time where rows are plain.
+#: Characters per block of plain rows.
 BLOCK = 1 << 22
 
 #: The columns to read, (name, index), of a header in the line with this number.
@@ -37,10 +37,10 @@ def read_table(
     skip: int = 0,
     encoding: str = "",
 ) -> Array:
-    """The columns that `choose` takes of the header, (rows, columns), from UTF-8 text as `prw.read` describes it.
+    """Read the columns (rows, columns) that `choose` selects from the header, in the format that `prw.read` describes.
 
     An empty cell in a column of `may_be_empty` becomes NaN. increasing: whether the first column, the time, must
-    increase. skip: lines above the header. encoding: of the file (default: UTF-8, or UTF-16 where its mark is there).
+    increase. skip: lines above the header. encoding: of the file (default: UTF-8, or UTF-16 if the file begins with its mark).
     Raises UserError naming file, line and column.
     """
     try:
@@ -54,7 +54,7 @@ def read_table(
             f"{_where(path, _undecodable_line(path))}: not UTF-8 text; give its encoding, or save it as UTF-8 CSV"
         ) from None
     except LookupError:
-        raise UserError(f"encoding: {encoding!r} is not known; try utf-16 or latin-1") from None
+        raise UserError(f"{encoding!r} is not known; try utf-16 or latin-1", argument="encoding") from None
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
 
@@ -92,8 +92,8 @@ def _parse(
 
 
 def _top(file: IO[str], skip: int) -> tuple[int, str]:
-    """How many lines stand above the header, `skip` and then blank ones or comments after `#`, and the header, "" if
-    there is none. numpy writes a `#` before the header as well: it is the last comment then, with numbers right below."""
+    """The number of lines above the header (`skip`, then blank lines or comments after `#`) and the header, "" if there is
+    none. numpy also writes a `#` before the header: the header is then the last comment, directly above numbers."""
     for _ in range(skip):
         file.readline()
     count, comment, line = skip, "", file.readline()
@@ -125,7 +125,7 @@ def _plain_rows(
     may_be_empty: Container[str],
     increasing: bool,
 ) -> Array | None:
-    """What `_rows` makes of the lines below `begin`, many at a time; None where there is something to look at."""
+    """The result of `_rows` for the lines below `begin`, in blocks; None if a line needs `_rows`."""
     file.seek(0)
     for _ in range(begin):
         file.readline()

@@ -17,13 +17,13 @@ from prw.files import CLONE, PACKAGE
 from prw.motion import Array, Motion
 
 OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
-#: The angle that each rate belongs to: they move together, see `StateSpace.transfer`.
+#: The angle of each rate, see `StateSpace.transfer`.
 ANGLE_OF = dict(zip(RATES, ANGLES))
 
 Value = float | int | bool
-#: What a continuous variable is called in FMI 2.0 and in 3.0.
+#: Types of continuous variables in FMI 2.0 and 3.0.
 REAL = ("Real", "Float64")
-#: The environment variable that names an FMU, the FMU in the wheel, and that which `make fmu` leaves in the clone.
+#: The environment variable that names an FMU, the FMU in the wheel, and the FMU that `make fmu` writes in the clone.
 VARIABLE = "PRW_FMU"
 INSIDE = PACKAGE / "fmu" / "prw_testbed.fmu"
 BUILT = CLONE / "target" / "fmu" / "prw_testbed.fmu"
@@ -31,8 +31,8 @@ BUILT = CLONE / "target" / "fmu" / "prw_testbed.fmu"
 
 def default_fmu() -> Path:
     """The testbed FMU that is used if none is named: the one that the environment variable PRW_FMU names, else the one inside
-    the installed package, else the one that `make fmu` builds in the clone that the package comes from. For all that runs FMUs:
-    `fmu_run.Fmu(prw.default_fmu())`. Raises UserError where there is none.
+    the installed package, else the one that `make fmu` builds in the clone that the package comes from. It serves any importer:
+    `fmu_run.Fmu(prw.default_fmu())`. Raises UserError if there is none.
     """
     if named := os.environ.get(VARIABLE):
         if not Path(named).is_file():
@@ -48,7 +48,7 @@ def default_fmu() -> Path:
 
 
 def existing_fmu(fmu: str | os.PathLike[str] | None) -> Path:
-    """The FMU file `fmu`, or the default one. Raises UserError where there is none."""
+    """The FMU file `fmu`, or the default one. Raises UserError if there is none."""
     path = default_fmu() if fmu is None else Path(fmu)
     if not path.is_file():
         raise UserError(f"{path}: no such FMU")
@@ -56,7 +56,7 @@ def existing_fmu(fmu: str | os.PathLike[str] | None) -> Path:
 
 
 def loaded(fmu: Path) -> fmu_run.Fmu:
-    """The FMU file, loaded. Raises UserError where that is impossible."""
+    """The FMU file, loaded. Raises UserError if the file cannot be loaded."""
     try:
         return fmu_run.Fmu(fmu)
     except fmu_run.FmuError as error:
@@ -67,7 +67,7 @@ class Testbed:
     """The testbed FMU, loaded once for any number of runs. A context manager: leaving it unloads the library and
     removes the unpacked files.
 
-    Raises UserError where the FMU is missing, is not the testbed, or refuses a call (with what it logged).
+    Raises UserError if the FMU is missing, is not the testbed, or rejects a call (with its log message).
     """
 
     # pytest takes a class for tests by its name.
@@ -108,9 +108,11 @@ class Testbed:
         }
         for name, value in parameters.items():
             if name not in known:
-                raise UserError(f"parameters: {name} is not known; there are {', '.join(known)}")
+                raise UserError(f"{name} is not known; there are {', '.join(known)}", argument="parameters")
             if not isinstance(value, (Real, np.bool_)):
-                raise UserError(f"parameters: {name} is {value!r}, not a number; prw.sweep takes many values")
+                raise UserError(
+                    f"{name} is {value!r}, not a number; prw.sweep takes many values", argument="parameters"
+                )
         return {**known, **parameters}
 
     def respond(
@@ -133,12 +135,12 @@ class Testbed:
 
 
 def stopped(why: str) -> str:
-    """What is told of a run that the FMU has refused."""
+    """The message about a run that the FMU has rejected."""
     return f"the FMU stopped {why}" if why.startswith("at ") else f"the FMU stopped: {why}"
 
 
 def driven_by(motion: Motion, start: Mapping[str, Any] = {}) -> dict[str, Any]:
-    """What `fmu_run.Fmu.run` is given for motors that follow `motion` from rest at its first angles, or from `start`."""
+    """Arguments of `fmu_run.Fmu.run` for motors that follow `motion` from rest at its first angles, or from `start`."""
     inputs = dict(zip(ANGLES, motion.theta.T))
     if motion.omega is not None:
         inputs.update(zip(RATES, motion.omega.T))
@@ -146,7 +148,7 @@ def driven_by(motion: Motion, start: Mapping[str, Any] = {}) -> dict[str, Any]:
 
 
 def _value(kind: str, text: str) -> Value:
-    """A start value as the model description writes it."""
+    """A start value in the format of the model description."""
     if kind == "Boolean":
         return text in ("true", "1")
     return float(text) if kind in REAL else int(text)

@@ -1,7 +1,7 @@
-"""The testbed in three dimensions: bodies of flat faces, and where they are at an instant.
+"""The testbed in 3D: bodies of flat faces, and their positions at an instant.
 
-What they are made of is in wrist.json, which the pages that show the wrist read, too. The frame is that of eq. (4a): X,
-the pitch axis, along the input shafts from motor 1 to motor 2; Y, the roll axis, up to the gripper; Z to the viewer. Lengths are to please the eye: the roller-carriers have a radius of 0.8.
+wrist.json defines the bodies, also for the pages that show the wrist. The frame is the frame of eq. (4a): X,
+the pitch axis, along the input shafts from motor 1 to motor 2; Y, the roll axis, up to the gripper; Z to the viewer. Lengths are not to scale: the roller-carriers have a radius of 0.8.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from prw.files import page_file
 from prw.plots import BLUE, GREEN, VERMILION
 
 Array = np.ndarray
-#: What the bodies are made of.
+#: The definition of the bodies.
 PARTS: dict[str, Any] = json.loads(page_file("wrist.json").read_text(encoding="utf-8"))
 COLOURS: dict[str, str] = PARTS["colours"]
 STEEL, DARK, PALE = COLOURS["steel"], COLOURS["dark"], COLOURS["pale"]
 #: Corners that a face has at most: the end of a roller.
 CORNERS = 6
-#: Sides of what is round.
+#: Sides of round bodies.
 ROUND: int = PARTS["round"]
 
 
@@ -36,13 +36,13 @@ class Face(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Faces that turn together, and how: from the angles at an instant to a rotation matrix (3, 3)."""
+    """Faces that turn together, and a function from the angles at an instant to their rotation matrix (3, 3)."""
 
     faces: Sequence[Face]
     turn: Callable[[Mapping[str, float]], Array]
 
     def corners(self) -> Array:
-        """Of all faces, (n, CORNERS, 3): where a face has fewer, the last one repeated."""
+        """Corners of all faces, (n, CORNERS, 3); a face with fewer repeats the last one."""
         return np.array([face.corners[np.minimum(range(CORNERS), len(face.corners) - 1)] for face in self.faces])
 
 
@@ -59,7 +59,7 @@ def about_y(angle: float) -> Array:
 
 
 class Wrist:
-    """All that is drawn. twist: what the twist of the couplings is multiplied with, for the eye to see it."""
+    """All bodies. twist: factor on the couplings' twist, which makes it visible."""
 
     def __init__(self, twist: float):
         self.twist = twist
@@ -98,7 +98,7 @@ class Wrist:
 
 
 def _side(motor: int, side: int, colour: str) -> Iterable[Part]:
-    """What turns about the pitch axis on one side, from the motor to its roller-carrier."""
+    """The parts that turn about the pitch axis on one side, from the motor to its roller-carrier."""
     shaft, middle, carrier = (f"theta{number + motor - 1}" for number in (1, 3, 5))
 
     def turning(name: str, *bodies: list[Face]) -> Part:

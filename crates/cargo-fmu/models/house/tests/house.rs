@@ -1,33 +1,25 @@
-//! The model as it is, without FMI.
+//! The model as an importer simulates it.
 
 use fmu_export::*;
-use house::{House, Name};
+use house::House;
 
-fn house(weather: &str) -> Result<House, Error> {
+fn house(weather: &str) -> Result<Simulation<House>, Error> {
     let resources = concat!(env!("CARGO_MANIFEST_DIR"), "/modelDescription/resources");
-    let setup =
-        Setup { resource_location: Some(resources.to_owned()), ..Setup::new(Interface::CoSimulation) };
-    let mut house = House::new(&setup)?;
-    House::TABLE[Name::weather as usize].set(&mut house, &Value::String(weather.to_owned()));
-    house.update()?;
-    house.calculate(0.0);
+    let mut house = Simulation::with_resources(resources)?;
+    house.set("weather", weather)?.initialize()?;
     Ok(house)
-}
-
-fn real(house: &House, name: Name) -> f64 {
-    match House::TABLE[name as usize].value(house) {
-        Some(Value::Real(value)) => value,
-        other => panic!("{name:?} is {other:?}"),
-    }
 }
 
 #[test]
 fn the_weather_is_that_of_the_table() {
     let mut house = house("winter.csv").unwrap();
     for (hour, outside) in [(0.0, -4.0), (4.5, -5.75), (24.0 + 13.0, 1.5)] {
-        house.calculate(hour * 3600.0);
-        assert!((real(&house, Name::outside) - outside).abs() < 1e-9, "at {hour} h");
+        let found = house.run(hour * 3600.0).unwrap().get("outside").unwrap();
+        assert!((found - outside).abs() < 1e-9, "{found} at {hour} h");
     }
+    let messages = house.messages();
+    let read = |(_, text): &(Status, String)| text == "read 9 temperatures from winter.csv";
+    assert!(messages.iter().any(read), "{messages:?}");
 }
 
 #[test]
@@ -41,14 +33,10 @@ fn what_is_no_table_is_refused() {
 /// Small steps and large ones come to the same day.
 #[test]
 fn a_day_does_not_depend_on_the_steps() {
-    let day = |steps: u32| {
+    let day = |steps: f64| {
         let mut house = house("winter.csv").unwrap();
-        let size = 86400.0 / f64::from(steps);
-        for k in 0..steps {
-            house.step(Step::new(f64::from(k) * size, size)).unwrap();
-        }
-        real(&house, Name::room)
+        house.step_size(86400.0 / steps).run(86400.0).unwrap().get("room").unwrap()
     };
-    let (coarse, fine) = (day(1), day(2880));
+    let (coarse, fine) = (day(1.0), day(2880.0));
     assert!((coarse - fine).abs() < 1e-3, "{coarse} and {fine}");
 }

@@ -1,16 +1,11 @@
-//! The model as it is, without FMI.
+//! The model as an importer simulates it.
 
 use fmu_export::*;
-use lag::{Lag, Name};
+use lag::Lag;
 
 #[test]
 fn steps_are_exact() {
-    let mut lag = Lag::new(&Setup::new(Interface::CoSimulation)).unwrap();
-    Lag::TABLE[Name::u as usize].set(&mut lag, &Value::Real(2.0));
-    for k in 0..10 {
-        let step = Step::new(f64::from(k) * 0.3, 0.3);
-        assert_eq!(lag.step(step).unwrap(), Stepped::Done);
-    }
-    let Some(Value::Real(x)) = Lag::TABLE[Name::x as usize].value(&lag) else { panic!("x is a Real") };
+    let mut lag = Simulation::<Lag>::new().unwrap();
+    let x = lag.step_size(0.3).set("u", 2.0).unwrap().run(3.0).unwrap().get("x").unwrap();
     assert!((x - 2.0 * (1.0 - (-3.0_f64).exp())).abs() < 1e-15);
 }

@@ -1,7 +1,7 @@
-"""Whether what another tool wrote agrees with the reference experiments that travel in the FMU.
+"""Compares results of other tools with the reference experiments that are included in the FMU.
 
-In the order in which the files build on each other: experiments (what should come out), result (what another tool
-wrote), agreement (how far one is from the other). `check` below puts them together.
+In the order of dependence: experiments (the expected results), result (reads the file of another tool), agreement (the
+differences). `check` below combines them.
 """
 
 from __future__ import annotations
@@ -26,29 +26,29 @@ def check(
     units: Mapping[str, str] = {},
     fmu: str | os.PathLike[str] | None = None,
 ) -> Agreement:
-    """Compare what another tool wrote with a reference experiment.
+    """Compare the result of another tool with a reference experiment.
 
     Parameters
     ----------
     result
         CSV, a .mat file as OpenModelica writes it, or one that MATLAB saved with `-v7` or earlier. Its columns are
-        found by name, also behind that of a component, as in `testbed.roll`; what is not known is left out. Units
-        stand in the names (`roll [deg]`) or in `units`, otherwise they are SI.
+        found by name, with or without a component, as in `testbed.roll`; unknown columns are ignored. Units
+        are part of the names (`roll [deg]`) or in `units`, otherwise they are SI.
     experiment
-        Its name (default: the one that is nearest).
+        Name of the experiment (default: the nearest one).
     model_exchange
-        Judge by the tolerances for that interface type instead of those for Co-Simulation.
+        Apply the tolerances for Model Exchange instead of the tolerances for Co-Simulation.
     component
-        The name before the dot, where several have columns of the same name (default: `testbed`).
+        The name before the dot, if several components have columns of one name (default: `testbed`).
     units
         Unit by name.
     fmu
-        The one whose experiments are taken (default: the testbed's).
+        The FMU with the experiments (default: the testbed's).
 
     Returns
     -------
     Agreement
-        How far each output is off. A result that does not agree is no error.
+        The difference of each output. A result that does not agree raises no error.
 
     Raises
     ------

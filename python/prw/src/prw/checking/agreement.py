@@ -1,4 +1,4 @@
-"""What `prw.check` returns: how far a result is from a reference, where, and what may be the reason."""
+"""The return value of `prw.check`: the differences of a result from a reference, and possible causes."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 SAME_TIME = 1e-9
 #: Motors that are off by more than this share of their largest angle or rate are other motors.
 OTHER_MOTORS = 1e-2
-#: How near a factor must be to that of a unit to be taken for it.
+#: Relative distance within which a factor counts as the factor of a unit.
 NEAR = 0.02
 
 
 class Difference(NamedTuple):
-    """How far one output is off, in `unit` (SI). largest: at the time `at` (s), where it is `found` instead of
+    """The difference of one output, in `unit` (SI). largest: at the time `at` (s), where the value is `found` instead of
     `expected`. allowed: the tolerance."""
 
     largest: float
@@ -44,14 +44,14 @@ class Difference(NamedTuple):
 
     @property
     def agrees(self) -> bool:
-        """Whether it is within the tolerance."""
+        """Whether the difference is within the tolerance."""
         return self.largest <= self.allowed
 
 
 @dataclass(frozen=True, repr=False)
 class Agreement:
-    """How far `source` agrees with an experiment. interface: by whose tolerances it is judged. time: (n,) s, the
-    reference's as far as the result goes. found, expected: (n,) by output. notes: what the user should read."""
+    """The differences of `source` from an experiment. interface: the interface type of the tolerances. time: (n,) s, the
+    reference's times that the result covers. found, expected: (n,) by output. notes: lines for the user."""
 
     source: Path
     experiment: Experiment
@@ -63,7 +63,7 @@ class Agreement:
 
     @property
     def variables(self) -> dict[str, Difference]:
-        """How far each output is off, by name."""
+        """The difference of each output, by name."""
         tolerance, differences = self.experiment.tolerance[self.interface], {}
         for name, found in self.found.items():
             expected = self.expected[name]
@@ -78,7 +78,7 @@ class Agreement:
         return all(difference.agrees for difference in self.variables.values())
 
     def summary(self) -> str:
-        """What was compared, and how far off each output is, in a few lines of text."""
+        """The compared files and the difference of each output, in a few lines."""
         lines = [
             f"compared    {self.source} with {self.experiment.name} ({self.experiment.description})",
             f"            {len(self.time)} times, {self.time[0]:g} to {self.time[-1]:g} s, tolerances for {self.interface}",
@@ -150,8 +150,7 @@ class Agreement:
 
 
 def compare(result: Result, experiment: Experiment, interface: str) -> Agreement:
-    """How far the result agrees with the experiment. Raises UserError where they have no output or no time in
-    common."""
+    """Compare the result with the experiment. Raises UserError if they have no output or no time in common."""
     time = _common_times(result, experiment)
     if not time.size:
         raise UserError(
@@ -212,7 +211,7 @@ def _common_times(result: Result, experiment: Experiment) -> Array:
 
 
 def _notes(bare: Agreement, result: Result) -> list[str]:
-    """What is missing, and what may be the reason where the two do not agree."""
+    """Missing outputs, and possible causes of differences."""
     experiment, notes = bare.experiment, []
     if bare.time[0] > 0 or bare.time[-1] < experiment.stop_time - SAME_TIME:
         span = f"{bare.time[0]:g} to {bare.time[-1]:g} s"

@@ -1,4 +1,4 @@
-"""The reference experiments in an FMU, where the layered standard FMI-LS-REF has its place for them."""
+"""The reference experiments in an FMU, in the directory that the layered standard FMI-LS-REF defines."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Experiment:
 
     @property
     def outputs(self) -> list[str]:
-        """Names of what the reference has besides time."""
+        """Names of the columns of the reference, without time."""
         return [name for name in self.reference if name != "time"]
 
 
@@ -65,11 +65,11 @@ def read_experiments(fmu: Path) -> list[Experiment]:
 
 
 def find(known: Sequence[Experiment], name: str) -> Experiment:
-    """The experiment of that name. Raises UserError where there is none."""
+    """The experiment of that name. Raises UserError if there is none."""
     for experiment in known:
         if experiment.name == name:
             return experiment
-    raise UserError(f"experiment: {name} is not known; there are {', '.join(e.name for e in known)}")
+    raise UserError(f"{name} is not known; there are {', '.join(e.name for e in known)}", argument="experiment")
 
 
 def _text(archive: zipfile.ZipFile, name: str) -> str:

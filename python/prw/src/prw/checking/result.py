@@ -17,15 +17,15 @@ from prw.extras import need
 from prw.motion import Array
 from prw.table import read_table
 
-#: What stands before a name: components, separated by dots in Modelica and SSP, by slashes in Simulink.
+#: The components before a name, separated by dots in Modelica and SSP, by slashes in Simulink.
 PREFIXED = re.compile(rf"^(.*[./:|])?((?:{NAMES}|tout).*)$", re.IGNORECASE)
-#: The component that is meant where several have columns of one name.
+#: The default component if several have columns of one name.
 TESTBED = "testbed"
 
 
 @dataclass(frozen=True)
 class Result:
-    """What another tool wrote, in SI. time: (n,) s, increasing. values: (n,) by name in `prw.channels.QUANTITIES`."""
+    """The result of another tool, in SI. time: (n,) s, increasing. values: (n,) by name in `prw.channels.QUANTITIES`."""
 
     source: Path
     time: Array
@@ -33,11 +33,11 @@ class Result:
 
 
 def read_result(path: Path, units: Mapping[str, str] = {}, component: str | None = None) -> Result:
-    """Read what there is of time, motors and outputs; see `prw.check`. Of several rows at one time the last counts,
-    where inputs and outputs belong together. Raises UserError naming the file, and what is wrong with it."""
+    """Read the columns of time, motors and outputs; see `prw.check`. Of several rows at one time the last one counts: there,
+    inputs and outputs belong together. Raises UserError naming the file and the cause."""
     for name in units:
         if name not in QUANTITIES:
-            raise UserError(f"units: {name} is not known; there are {', '.join(QUANTITIES)}")
+            raise UserError(f"{name} is not known; there are {', '.join(QUANTITIES)}", argument="units")
     if not path.is_file():
         raise UserError(f"{path}: no such file")
     columns = _mat(path) if path.suffix.lower() == ".mat" else _csv(path)
@@ -60,7 +60,7 @@ def read_result(path: Path, units: Mapping[str, str] = {}, component: str | None
 def _choose(
     path: Path, columns: Mapping[str, Array], units: Mapping[str, str], component: str | None
 ) -> dict[str, Array]:
-    """The columns that are known, in SI, by what they are."""
+    """The known columns in SI, by their names in QUANTITIES."""
     candidates: dict[str, list[tuple[str, str, Array]]] = {}
     for title, values in columns.items():
         owner, name, unit = _known(title)
@@ -77,7 +77,9 @@ def _choose(
             continue
         if any(not np.array_equal(other[2], same[0][2]) for other in same[1:]):
             owners = ", ".join(owner or "none" for owner, _, _ in same)
-            raise UserError(f"component: there are several {name} in {path}, of the components {owners}; say which")
+            raise UserError(
+                f"there are several {name} in {path}, of the components {owners}; say which", argument="component"
+            )
         _, unit, values = same[0]
         try:
             found[name] = values * factor(name, unit or units.get(name, "") or si_unit(name))
@@ -89,14 +91,14 @@ def _choose(
 
 
 def _known(title: str) -> tuple[str, str, str]:
-    """The component, what it is of QUANTITIES, and the unit in the title of a column; "" for the last two otherwise."""
+    """The component, the name in QUANTITIES and the unit in the title of a column; the last two are "" if it is unknown."""
     match = PREFIXED.match(title.strip())
     owner, name = (match[1] or "", match[2]) if match else ("", "")
     return owner[:-1], *column(re.sub(r"^tout\b", "time", name, flags=re.IGNORECASE))
 
 
 def _csv(path: Path) -> dict[str, Array]:
-    """The columns of a CSV file by title; of those that are not known the title alone."""
+    """The columns of a CSV file by title; unknown columns without values."""
     titles: list[str] = []
     taken: list[tuple[str, int]] = []
 
@@ -143,7 +145,7 @@ def _is_time(title: str) -> bool:
 
 
 def _of_variable(name: str, value: Any) -> dict[str, Array]:
-    """What a variable of MATLAB holds: a vector, or a structure with time as Simulink logs it (`time` and `signals`, each
+    """The columns in a variable of MATLAB: a vector, or a structure with time as Simulink logs it (`time` and `signals`, each
     with a label and values), or one with vectors as fields."""
     if hasattr(value, "_fieldnames"):
         found: dict[str, Array] = {}

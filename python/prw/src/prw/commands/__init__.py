@@ -1,1 +1,1 @@
-"""The subcommands of `prw`: options, a call of the function that does it, and what is said and written."""
+"""The subcommands of `prw`: options, the call of a function, and the output."""

@@ -1,12 +1,11 @@
-"""Options like --set k1=120: from texts to numbers, with a clear word on what is wrong."""
+"""Options that several subcommands share, and options like --set k1=120."""
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from prw.testbed import existing_fmu, loaded
 
 
 class FORMATTER(argparse.RawDescriptionHelpFormatter):
-    """Keeps the line breaks of descriptions and examples, at the house's width."""
+    """Keeps the line breaks of descriptions and examples, at a width of 110 characters."""
 
     def __init__(self, prog: str):
         super().__init__(prog, max_help_position=30, width=110)
@@ -33,35 +32,34 @@ def add_task_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--set",
-        action="append",
-        default=[],
+        action=Named,
+        read=positive,
         metavar="NAME=VALUE",
         help="start value, or value of a fixed parameter, in SI (default: the FMU's). May be repeated",
     )
     parser.add_argument(
         "--noise",
-        action="append",
-        default=[],
+        action=Named,
+        read=positive,
         metavar="NAME=VALUE",
         help="standard deviation of a channel's noise in SI, where it is known. May be repeated",
     )
 
 
 def add_reading_options(parser: argparse.ArgumentParser) -> None:
-    """Options on how recordings are written."""
+    """Options on the format of recordings."""
     parser.add_argument(
         "--units",
-        default="",
+        action=Named,
         metavar="NAME=UNIT,...",
         help="units of columns whose header has none; an encoder's counts are theta1=rev/10000",
     )
     parser.add_argument("--degrees", action="store_true", help="columns without a unit are in deg and deg/s, not SI")
     parser.add_argument(
         "--names",
-        action="append",
-        default=[],
+        action=Named,
         metavar="NAME=HEADER",
-        help="what a column is called in the file, as in 'theta1=Motor 1'. May be repeated",
+        help="name of a column in the file, as in 'theta1=Motor 1'. May be repeated",
     )
     parser.add_argument(
         "--skip-lines", type=int, default=0, metavar="N", help="lines above the header, as dSPACE writes them"
@@ -74,36 +72,47 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
 def reading_options(arguments: argparse.Namespace) -> dict[str, Any]:
     """Arguments of `prw.read` from these options."""
     return {
-        "units": pairs([arguments.units], "--units"),
+        "units": arguments.units,
         "degrees": arguments.degrees,
-        "names": pairs(arguments.names, "--names"),
+        "names": arguments.names,
         "skip": arguments.skip_lines,
         "encoding": arguments.encoding,
     }
 
 
-def pairs(texts: Iterable[str], option: str) -> dict[str, str]:
-    """NAME=TEXT, each perhaps several with commas, as a dict. Raises UserError naming the option."""
-    found: dict[str, str] = {}
-    for text in texts:
-        for part in filter(None, (p.strip() for p in text.split(","))):
-            name, equals, value = part.partition("=")
-            if not equals or not name.strip() or not value.strip():
-                raise UserError(f"{option} {part}: write NAME=VALUE")
-            if name.strip() in found:
-                raise UserError(f"{option}: {name.strip()} is given twice")
-            found[name.strip()] = value.strip()
-    return found
+class Named(argparse.Action):
+    """Collects NAME=VALUE, with commas or by repetition, as a dict of `read(name, string)` by name."""
+
+    def __init__(self, read: Callable[[str, str], Any] = lambda _, text: text, **options: Any):
+        super().__init__(default={}, **options)
+        self.read = read
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        """Add the pairs in the string `values`. Raises UserError naming the option."""
+        option, found = str(option), dict(getattr(namespace, self.dest))
+        for part in filter(None, (part.strip() for part in values.split(","))):
+            name, _, text = (word.strip() for word in part.partition("="))
+            if not name or not text:
+                raise UserError("write NAME=VALUE", argument=option, given=part)
+            if name in found:
+                raise UserError(f"{name} is given twice", argument=option)
+            try:
+                found[name] = self.read(name, text)
+            except ValueError as error:
+                raise UserError(str(error), argument=option, given=part) from None
+        setattr(namespace, self.dest, found)
 
 
-def number(text: str, what: str) -> float:
-    """A positive number. Raises UserError saying what it was for."""
+def number(text: str) -> float:
+    """A positive number. Raises ValueError."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0):
-        raise UserError(f"{what}: {text!r} is not a positive number")
+        raise ValueError(f"{text!r} is not a positive number")
     return value
 
 
@@ -116,8 +125,8 @@ def add_parameter_options(parser: argparse.ArgumentParser, unit: str) -> None:
     """Options on the parameters of a run or a model."""
     parser.add_argument(
         "--set",
-        action="append",
-        default=[],
+        action=Named,
+        read=value,
         metavar="NAME=VALUE",
         help=f"start value in {unit} (default: the FMU's). May be repeated",
     )
@@ -125,63 +134,48 @@ def add_parameter_options(parser: argparse.ArgumentParser, unit: str) -> None:
         "--parameters",
         type=Path,
         metavar="FILE",
-        help="parameters in JSON, as `prw identify` writes; --set is stronger",
+        help="parameters in JSON, as `prw identify` writes; --set has precedence",
     )
 
 
 def parameters_of(arguments: argparse.Namespace, fmu: Path | None) -> dict[str, Any]:
-    """What these options say."""
+    """The values by name that these options give."""
     found: dict[str, Any] = {}
     if arguments.parameters is not None:
         with loaded(existing_fmu(fmu)) as inside:
             found = values_of(arguments.parameters, inside)
-    for name, text in pairs(arguments.set, "--set").items():
-        try:
-            found[name] = text == "true" if text in ("true", "false") else float(text)
-        except ValueError:
-            raise UserError(f"--set {name}={text}: {text!r} is not a number") from None
-    return found
+    if arguments.set:
+        arguments.options = {"parameters": "--set"}
+    return {**found, **arguments.set}
 
 
-def numbers(texts: Iterable[str], option: str) -> dict[str, float]:
-    """NAME=VALUE with positive values."""
-    return {name: number(text, f"{option} {name}") for name, text in pairs(texts, option).items()}
+def positive(_: str, text: str) -> float:
+    """A positive number. Raises ValueError."""
+    return number(text)
 
 
-def spreads(texts: Iterable[str], option: str) -> dict[str, float | tuple[float, float]]:
-    """NAME=[VALUE:]PERCENT% as a fraction, or (value, fraction), by name."""
-    found: dict[str, float | tuple[float, float]] = {}
-    for name, text in pairs(texts, option).items():
-        match = re.fullmatch(r"(?:([^:]+):)?\s*([^:%]+)%", text)
-        if not match:
-            raise UserError(f"{option} {name}={text}: write {name}=10%, or {name}=VALUE:10%")
-        fraction = number(match.group(2), f"{option} {name}") / 100
-        found[name] = (number(match.group(1), f"{option} {name}"), fraction) if match.group(1) else fraction
-    return found
-
-
-def bounds(texts: Iterable[str]) -> dict[str, tuple[float, float]]:
-    """NAME=LOW:HIGH by name."""
-    found = {}
-    for name, text in pairs(texts, "--bounds").items():
-        low, colon, high = text.partition(":")
-        if not colon:
-            raise UserError(f"--bounds {name}={text}: write {name}=LOW:HIGH")
-        found[name] = (number(low, f"--bounds {name}"), number(high, f"--bounds {name}"))
-        if found[name][0] >= found[name][1]:
-            raise UserError(f"--bounds {name}={text}: the first must be below the second")
-    return found
-
-
-@contextlib.contextmanager
-def said_of_options(**options: str) -> Iterator[None]:
-    """Turn an error on an argument in Python, `parameters: k9 is not known`, into one on the option that it came from,
-    `--set: k9 ...`. options: by argument."""
+def value(_: str, text: str) -> float | bool:
+    """A number, or `true` or `false`. Raises ValueError."""
     try:
-        yield
-    except UserError as error:
-        text = str(error)
-        argument = re.split(r"\W", text, maxsplit=1)[0]
-        if argument in options:
-            raise UserError(f"--{options[argument]}{text.removeprefix(argument)}") from None
-        raise
+        return text == "true" if text in ("true", "false") else float(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a number") from None
+
+
+def spread(name: str, text: str) -> float | tuple[float, float]:
+    """[VALUE:]PERCENT% as a fraction, or (value, fraction). Raises ValueError."""
+    match = re.fullmatch(r"(?:([^:]+):)?\s*([^:%]+)%", text)
+    if not match:
+        raise ValueError(f"write {name}=10%, or {name}=VALUE:10%")
+    fraction = number(match[2]) / 100
+    return (number(match[1]), fraction) if match[1] else fraction
+
+
+def bounds(name: str, text: str) -> tuple[float, float]:
+    """LOW:HIGH. Raises ValueError."""
+    low, colon, high = text.partition(":")
+    if not colon:
+        raise ValueError(f"write {name}=LOW:HIGH")
+    if number(low) >= number(high):
+        raise ValueError("the first must be below the second")
+    return number(low), number(high)

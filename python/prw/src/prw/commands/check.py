@@ -1,4 +1,4 @@
-"""`prw check`: whether what another tool wrote agrees with a reference experiment."""
+"""`prw check`: compares the result of another tool with a reference experiment."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from pathlib import Path
 from typing import Any
 
 from prw.checking import check
-from prw.commands.assignments import FORMATTER, pairs, said_of_options
+from prw.commands.assignments import FORMATTER, Named
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.commands.simulate import write_png
 from prw.errors import MissingPackage, UserError
 
 DESCRIPTION = """\
-Compares a table of results with one of the reference experiments that travel in the FMU: motions of the motors, and
-what the testbed does then, calculated by a program that shares nothing with the FMU. Tells for every output how far it
-is off, when, and whether that is within the tolerance; draws those that are not. Exit status 0 where all agree, else 1.
+Compares a table of results with one of the reference experiments in the FMU: motions of the motors, and the
+response of the testbed, calculated by a program that shares no code with the FMU. Reports for every output the largest
+difference, its time, and whether it is within the tolerance; draws the outputs beyond it. Exit status 0 where all agree, else 1.
 
-FILE is CSV, a .mat file of OpenModelica, or one that MATLAB saved with -v7 or earlier. Columns are found by name, also
-behind that of a component (testbed.roll). Units stand in the header, as in `roll [deg]`, or in --units; otherwise SI.
+FILE is CSV, a .mat file of OpenModelica, or one that MATLAB saved with -v7 or earlier. Columns are found by name, with
+or without a component (testbed.roll). Units are in the header, as in `roll [deg]`, or in --units; otherwise SI.
 """
 
 EXAMPLES = """\
 examples:
-  prw check fig4.csv                                the experiment that is nearest
+  prw check fig4.csv                                the nearest experiment
   prw check wrist_res.mat --experiment closed_loop
   prw check run.csv --units pitch=deg,roll=deg
 The experiments as files: unzip the FMU, extra/org.fmi-standard.fmi-ls-ref; documentation/fmi-ls-ref.txt says how.
@@ -40,12 +40,10 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=FORMATTER,
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="table of results")
-    parser.add_argument("--experiment", metavar="NAME", help="what was run (default: what is nearest)")
+    parser.add_argument("--experiment", metavar="NAME", help="the experiment (default: the nearest one)")
     parser.add_argument("--model-exchange", action="store_true", help="take the tolerances for Model Exchange")
-    parser.add_argument(
-        "--component", metavar="NAME", help="where several have a column of one name (default: testbed)"
-    )
-    parser.add_argument("--units", default="", metavar="NAME=UNIT,...", help="units of columns whose header has none")
+    parser.add_argument("--component", metavar="NAME", help="if several have a column of one name (default: testbed)")
+    parser.add_argument("--units", action=Named, metavar="NAME=UNIT,...", help="units of columns whose header has none")
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
     parser.add_argument(
         "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where the figure goes (default: %(default)s)"
@@ -54,17 +52,15 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `prw check`. Raises UserError with one line on what is wrong, also where the result does not agree."""
-    units = pairs([part for part in arguments.units.split(",") if part], "--units")
-    with said_of_options(experiment="experiment", component="component", units="units"):
-        found = check(
-            arguments.file,
-            arguments.experiment,
-            model_exchange=arguments.model_exchange,
-            component=arguments.component,
-            units=units,
-            fmu=arguments.fmu,
-        )
+    """Carry out `prw check`. Raises UserError with a message of one line, also if the result does not agree."""
+    found = check(
+        arguments.file,
+        arguments.experiment,
+        model_exchange=arguments.model_exchange,
+        component=arguments.component,
+        units=arguments.units,
+        fmu=arguments.fmu,
+    )
     print(found.summary())
     if found.agrees:
         print("agrees      with the reference")

@@ -1,4 +1,4 @@
-"""`prw excite`: motor motions to identify parameters with, ranked by what they tell."""
+"""`prw excite`: motor motions for identification, ranked by the expected standard errors."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from prw.commands.assignments import FORMATTER, add_task_options, listed, number, numbers, said_of_options
+from prw.arguments import positive
+from prw.commands.assignments import FORMATTER, add_task_options, listed
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.extras import need
 from prw.files import write_text
@@ -17,9 +18,9 @@ from prw.identification.excitation import excite
 from prw.output import write_motion
 
 DESCRIPTION = """\
-Proposes motor motions within the motors' limits and ranks them by what they tell about the parameters: the standard
-errors to be expected from measuring the given channels once, with unknown sensor offsets. The noise that is assumed:
-torques 0.02 N.m, angles 0.001 rad, rates 0.01 rad/s, white, a standard deviation; --noise has yours. "typical" is the root
+Proposes motor motions within the motors' limits and ranks them by the standard errors of the parameters that are
+expected from measuring the given channels once, with unknown sensor offsets. The assumed noise is white, with standard
+deviations of 0.02 N.m (torques), 0.001 rad (angles) and 0.01 rad/s (rates); --noise sets others. "typical" is the root
 mean square of a row. Kinds: multisines (slow,
 wide, and one whose spectrum is optimal for the parameters), chirps; with equal, opposite, single and independent
 motors. Each motion becomes a CSV file for `prw simulate` or for your motor controller (s, rad, rad/s).
@@ -28,7 +29,7 @@ motors. Each motion becomes a CSV file for `prw simulate` or for your motor cont
 EXAMPLES = """\
 examples:
   prw excite                                        all channels, a 10 s experiment at 1 kHz
-  prw excite --measure tau1,tau2                    what torque sensors alone can tell
+  prw excite --measure tau1,tau2                    with torque sensors only
   prw excite --angle 20 --speed 120 --acceleration 3000 --duration 30      your motors, in deg, deg/s, deg/s2
   prw excite --estimate J2,J3,H3                    motions for the inertias
 """
@@ -70,38 +71,33 @@ def add_parser(subparsers: Any) -> None:
         metavar="DIR",
         help="where the motions and ranking.json go (default: %(default)s)",
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, options={"parameters": "--set"})
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `prw excite`. Raises UserError with one line on what is wrong."""
+    """Carry out `prw excite`. Raises UserError with a message of one line."""
     need("scipy", "threadpoolctl")
-    angle, speed, acceleration, duration, rate = (
-        number(str(getattr(arguments, name)), f"--{name}")
-        for name in ("angle", "speed", "acceleration", "duration", "rate")
+    for name in ("angle", "speed", "acceleration", "duration", "rate"):
+        positive(name, getattr(arguments, name))
+    ranking = excite(
+        None if arguments.measure == "all" else listed(arguments.measure),
+        angle=np.deg2rad(arguments.angle),
+        speed=np.deg2rad(arguments.speed),
+        acceleration=np.deg2rad(arguments.acceleration),
+        duration=arguments.duration,
+        rate=arguments.rate,
+        estimate=listed(arguments.estimate),
+        parameters=arguments.set,
+        noise=arguments.noise,
+        fmu=arguments.fmu,
     )
-    with said_of_options(
-        measure="measure", duration="duration", rate="rate", noise="noise", estimate="estimate", parameters="set"
-    ):
-        ranking = excite(
-            None if arguments.measure == "all" else listed(arguments.measure),
-            angle=np.deg2rad(angle),
-            speed=np.deg2rad(speed),
-            acceleration=np.deg2rad(acceleration),
-            duration=duration,
-            rate=rate,
-            estimate=listed(arguments.estimate),
-            parameters=numbers(arguments.set, "--set"),
-            noise=numbers(arguments.noise, "--noise"),
-            fmu=arguments.fmu,
-        )
     for entry in ranking:
         write_motion(arguments.out / f"{entry.name}.csv", entry.motion)
     best = ranking[0]
     content = {
         "measured": dict(best.noise),
-        "duration": duration,
-        "rate": rate,
+        "duration": arguments.duration,
+        "rate": arguments.rate,
         "motions": [
             {
                 "file": f"{entry.name}.csv",
@@ -114,7 +110,9 @@ def run(arguments: argparse.Namespace) -> None:
     }
     write_text(arguments.out / "ranking.json", json.dumps(content, indent=2, allow_nan=False) + "\n")
     measured = ", ".join(best.noise)
-    print(f"expected standard errors of one experiment of {duration:g} s at {rate:g} Hz, measuring {measured}")
+    print(
+        f"expected standard errors of one experiment of {arguments.duration:g} s at {arguments.rate:g} Hz, measuring {measured}"
+    )
     print(f"  {'motion':<28}{'typical':>9}" + "".join(f"{name:>9}" for name in best.expected_errors))
     for entry in ranking:
         errors = (entry.typical_error, *entry.expected_errors.values())

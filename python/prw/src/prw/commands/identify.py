@@ -10,15 +10,14 @@ from typing import Any
 from prw.channels import factor
 from prw.commands.assignments import (
     FORMATTER,
+    Named,
     add_reading_options,
     add_task_options,
     bounds,
     listed,
     number,
-    numbers,
     reading_options,
-    said_of_options,
-    spreads,
+    spread,
 )
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import DoesNotFit, UserError
@@ -26,22 +25,22 @@ from prw.extras import need
 from prw.identification import identify
 
 DESCRIPTION = """\
-Estimates parameters of the testbed from measurements: those with which the FMU, driven by the measured motor angles,
-comes closest to what was measured. Sensor offsets and the state at the first row are unknown and estimated along.
+Estimates parameters of the testbed from measurements: the values with which the FMU, driven by the measured motor
+angles, comes closest to the measurements. Sensor offsets and the state at the first row are unknown and estimated along.
 
 Each FILE is one experiment, a CSV table with the columns
   time, theta1, theta2        and, if logged, the motors' rates omega1, omega2
   tau1 tau2 theta3 theta4 pitch roll pitch_rate roll_rate      any of these; cells may be empty
-Units stand in the header, as in `pitch [deg]` or `tau1_mNm`, or in --units; otherwise SI: s, rad, rad/s, N.m. Rows may
+Units are in the header, as in `pitch [deg]` or `tau1_mNm`, or in --units; otherwise SI: s, rad, rad/s, N.m. Rows may
 be uneven; lines above the header that start with # are comments.
 
-Exit status: 0, 1 where something is wrong or parameters stay open, 3 where the FMU does not explain the data.
+Exit status: 0; 1 for an error or undetermined parameters; 3 if the FMU does not explain the data.
 """
 
 EXAMPLES = """\
 examples:
   prw identify run1.csv run2.csv                     k1, k2, c1, c2, c3 from two experiments together
-  prw identify run.csv --units pitch=deg,roll=deg    where the header has no units
+  prw identify run.csv --units pitch=deg,roll=deg    if the header has no units
   prw identify run.csv --prior J3=10% --prior H3=10% inertias too, known to 10 % (one sigma)
   prw identify run.csv --estimate k1,k2 --set c3=0.3 two of them, c3 held at another value
 then:
@@ -62,16 +61,16 @@ def add_parser(subparsers: Any) -> None:
     add_task_options(parser)
     parser.add_argument(
         "--prior",
-        action="append",
-        default=[],
+        action=Named,
+        read=spread,
         metavar="NAME=[VALUE:]PERCENT%",
-        help="what is known of a parameter beforehand, one sigma; VALUE in SI (default: its start value). It is then "
-        "estimated along. May be repeated",
+        help="prior knowledge of a parameter, one sigma; VALUE in SI (default: its start value). The parameter is "
+        "then estimated, too. May be repeated",
     )
     parser.add_argument(
         "--bounds",
-        action="append",
-        default=[],
+        action=Named,
+        read=bounds,
         metavar="NAME=LOW:HIGH",
         help="range of a parameter in SI (default: a factor of 100 about its start value). May be repeated",
     )
@@ -83,16 +82,19 @@ def add_parser(subparsers: Any) -> None:
     )
     for kind, said in (("delay", "come late"), ("lag", "lag, to first order"), ("gain", "read too much or too little")):
         parser.add_argument(
-            f"--{kind}", default="", metavar="NAMES", help=f"channels that may {said}, with commas: estimated along"
+            f"--{kind}",
+            default="",
+            metavar="NAMES",
+            help=f"channels that may {said}, with commas; this is then estimated, too",
         )
     parser.add_argument(
         "--write-anyway", action="store_true", help="write parameters even if the FMU does not explain the data"
     )
     parser.add_argument("--no-offsets", action="store_true", help="the sensors have no offsets")
     parser.add_argument(
-        "--starts", type=int, default=6, metavar="N", help="places to start the search from (default: %(default)s)"
+        "--starts", type=int, default=6, metavar="N", help="starting points of the search (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the random places to start from (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of the random starting points (default: %(default)s)")
     parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
     parser.add_argument(
         "--out",
@@ -101,47 +103,36 @@ def add_parser(subparsers: Any) -> None:
         metavar="DIR",
         help="where report.html, report.json, identified.json and identified.ssv go (default: %(default)s)",
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, options={"parameters": "--set", "priors": "--prior", "skip": "--skip-lines"})
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `prw identify`. Raises UserError with one line on what is wrong."""
-    need("scipy", "jinja2", "threadpoolctl")
-    with said_of_options(
-        estimate="estimate",
-        parameters="set",
-        priors="prior",
-        noise="noise",
-        units="units",
-        names="names",
-        skip="skip-lines",
-        encoding="encoding",
-        starts="starts",
-    ):
-        found = identify(
-            arguments.files,
-            estimate=listed(arguments.estimate),
-            priors=spreads(arguments.prior, "--prior"),
-            parameters=numbers(arguments.set, "--set"),
-            bounds=bounds(arguments.bounds),
-            noise=numbers(arguments.noise, "--noise"),
-            **reading_options(arguments),
-            quantum=_quantum(arguments.quantum),
-            offsets=not arguments.no_offsets,
-            starts=arguments.starts,
-            seed=arguments.seed,
-            delay=listed(arguments.delay),
-            lag=listed(arguments.lag),
-            gain=listed(arguments.gain),
-            fmu=arguments.fmu,
-        )
+    """Carry out `prw identify`. Raises UserError with a message of one line."""
+    need("scipy", "jinja2", "matplotlib", "threadpoolctl")
+    found = identify(
+        arguments.files,
+        estimate=listed(arguments.estimate),
+        priors=arguments.prior,
+        parameters=arguments.set,
+        bounds=arguments.bounds,
+        noise=arguments.noise,
+        **reading_options(arguments),
+        quantum=_quantum(arguments.quantum),
+        offsets=not arguments.no_offsets,
+        starts=arguments.starts,
+        seed=arguments.seed,
+        delay=listed(arguments.delay),
+        lag=listed(arguments.lag),
+        gain=listed(arguments.gain),
+        fmu=arguments.fmu,
+    )
     report, numbers_, parameters, ssv = (
         arguments.out / name for name in ("report.html", "report.json", "identified.json", "identified.ssv")
     )
     found.report(report)
     found.to_json(numbers_)
     print(found.summary(shown=True))
-    # The parameters only if they are those of the testbed, and never beside another fit's report.
+    # Parameters are written only if the model fits. Old ones are removed, so that they are never next to a new report.
     wrong = not found.fits and not arguments.write_anyway
     if wrong or found.undetermined:
         parameters.unlink(missing_ok=True)
@@ -173,5 +164,8 @@ def _quantum(text: str | None) -> float:
         return 0.0
     match = re.fullmatch(r"\s*([-+.\deE]+)\s*([^\d\s].*)?", text)
     if not match:
-        raise UserError(f"--quantum {text}: write an angle like 0.036deg")
-    return number(match.group(1), "--quantum") * factor("theta1", match.group(2) or "rad")
+        raise UserError("write an angle like 0.036deg", argument="quantum", given=text)
+    try:
+        return number(match[1]) * factor("theta1", match[2] or "rad")
+    except ValueError as error:
+        raise UserError(str(error), argument="quantum") from None

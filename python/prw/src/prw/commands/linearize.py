@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from prw.commands.assignments import add_parameter_options, parameters_of, said_of_options
+from prw.commands.assignments import add_parameter_options, parameters_of
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.files import replacing
 from prw.linearization import linearize
@@ -35,9 +35,8 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `prw linearize`. Raises UserError with one line on what is wrong."""
-    with said_of_options(parameters="parameters"):
-        model = linearize(parameters_of(arguments, arguments.fmu), fmu=arguments.fmu)
+    """Carry out `prw linearize`. Raises UserError with a message of one line."""
+    model = linearize(parameters_of(arguments, arguments.fmu), fmu=arguments.fmu)
     with replacing(arguments.out) as temporary:
         temporary.write_text(json.dumps(content(model), indent=2) + "\n", encoding="utf-8")
     for kind in ("states", "inputs", "outputs"):
@@ -47,7 +46,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def content(model: StateSpace) -> dict[str, Any]:
-    """What is written, by name."""
+    """The content of the JSON file."""
     matrices = {name: getattr(model, name).tolist() for name in "ABCD"}
     names = {kind: list(getattr(model, kind)) for kind in ("states", "inputs", "outputs")}
     return {**matrices, **names, "units": dict(model.units)}

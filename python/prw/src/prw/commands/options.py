@@ -1,4 +1,4 @@
-"""What several subcommands take as their default."""
+"""Defaults that several subcommands share."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from prw.errors import UserError
 from prw.testbed import default_fmu
 
-#: None if there is none: a command that needs one then says where it was looked for.
+#: None if there is none: a command that needs an FMU then reports where it was searched for.
 DEFAULT_FMU: Path | None
 try:
     DEFAULT_FMU = default_fmu()

@@ -15,7 +15,6 @@ from prw.commands.assignments import (
     add_reading_options,
     parameters_of,
     reading_options,
-    said_of_options,
 )
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import MissingPackage, UserError
@@ -55,13 +54,13 @@ def add_parser(subparsers: Any) -> None:
         "--animate",
         type=Path,
         metavar="FILE",
-        help="also show the wrist moving: a .gif, an .mp4 (needs the extra prw[movie]) or an .html",
+        help="also write an animation: a .gif, an .mp4 (needs the extra prw[movie]) or an .html",
     )
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `prw simulate`. Raises UserError with one line on what is wrong."""
+    """Carry out `prw simulate`. Raises UserError with a message of one line."""
     if arguments.file is not None and arguments.input is not None:
         raise UserError(f"{arguments.file} and --input {arguments.input}: give one recording")
     arguments.input = arguments.file or arguments.input
@@ -80,10 +79,8 @@ def run(arguments: argparse.Namespace) -> None:
         raise UserError(
             f"{table}: is the recording itself and would be overwritten; choose another directory with --out"
         )
-    with said_of_options(parameters="parameters"):
-        given = parameters_of(arguments, arguments.fmu)
-    with said_of_options(parameters="set" if arguments.set else "parameters"):
-        response = simulated(motion, given, fmu=arguments.fmu)
+    given = parameters_of(arguments, arguments.fmu)
+    response = simulated(motion, given, fmu=arguments.fmu)
     response.to_csv(table)
     written, missing = [table], ""
     try:
@@ -98,7 +95,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def write_png(path: Path, figure: Figure) -> None:
-    """Write the figure to `path`, whole or not at all."""
+    """Write the figure to `path` atomically."""
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=150)
 
@@ -106,7 +103,7 @@ def write_png(path: Path, figure: Figure) -> None:
 def _summary(
     arguments: argparse.Namespace, response: Run, given: Mapping[str, Any], written: Sequence[Path], missing: str
 ) -> list[str]:
-    """What was done, the key figures, and what to do next; one line each."""
+    """The inputs, the key figures and a hint, one line each."""
     motion = response.motion
     time, steps = motion.time, np.diff(motion.time)
     even = np.ptp(steps) < 1e-6 * steps.mean() + 4 * np.spacing(np.abs(time).max())
@@ -145,7 +142,7 @@ def _summary(
 
 
 def _tidy(value: float) -> str:
-    # Below 1e-12 it is zero but for rounding.
+    # Smaller values are rounding errors of zero.
     return "0" if value < 1e-12 else f"{value:.3g}"
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from prw.commands.assignments import FORMATTER, pairs, said_of_options, spreads
+from prw.commands.assignments import FORMATTER, Named, spread
 from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import UserError
 from prw.extras import need
@@ -20,11 +20,11 @@ from prw.sweeps.study import Study
 from prw.testbed import Testbed
 
 DESCRIPTION = """\
-Runs the FMU over and over with other parameters, on all cores of this machine or on a Dask cluster, and writes one row
+Runs the FMU many times with different parameters, on all cores of this machine or on a Dask cluster, and writes one row
 for each run into runs.parquet: its parameters and each output's peak, rms and value at the end (SI).
 
---grid parameters make all combinations; --random ones are drawn for each of --runs runs (per combination). What is
-done is kept: the same command goes on after an interruption. A run that fails is recorded with its message.
+--grid parameters make all combinations; --random ones are drawn for each of --runs runs (per combination). Finished
+chunks are kept: the same command continues after an interruption. A run that fails is recorded with its message.
 """
 
 EXAMPLES = """\
@@ -38,6 +38,18 @@ then:
 """
 
 
+def _steps(name: str, text: str) -> Array:
+    """N even steps from LOW to HIGH. Raises ValueError."""
+    parts = text.split(":")
+    try:
+        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
+        if len(parts) != 3 or count < 1 or not np.isfinite([low, high]).all():
+            raise ValueError
+    except (ValueError, IndexError):
+        raise ValueError(f"write {name}=LOW:HIGH:N with an integer N of at least 1") from None
+    return np.linspace(low, high, count)
+
+
 def add_parser(subparsers: Any) -> None:
     """Add `sweep` to prw's subcommands."""
     parser = subparsers.add_parser(
@@ -48,12 +60,12 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=FORMATTER,
     )
     parser.add_argument(
-        "--grid", action="append", default=[], metavar="NAME=LOW:HIGH:N", help="N even steps, in SI. May be repeated"
+        "--grid", action=Named, read=_steps, metavar="NAME=LOW:HIGH:N", help="N even steps, in SI. May be repeated"
     )
     parser.add_argument(
         "--random",
-        action="append",
-        default=[],
+        action=Named,
+        read=spread,
         metavar="NAME=[VALUE:]PERCENT%",
         help="log-normal about VALUE in SI (default: the start value). May be repeated",
     )
@@ -74,31 +86,25 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `prw sweep`. Raises UserError with one line on what is wrong."""
+    """Carry out `prw sweep`. Raises UserError with a message of one line."""
     need("pyarrow", *(["distributed"] if arguments.scheduler else []))
     motion = fig4() if arguments.input is None else read_motion(arguments.input, degrees=arguments.degrees)
     threads = arguments.threads if arguments.threads is not None else os.cpu_count() or 1
-    for option, number in (("--threads", threads), ("--runs", arguments.runs)):
-        if number < 1:
-            raise UserError(f"{option} {number}: at least 1 is needed")
-    grid = {name: _steps(name, text) for name, text in pairs(arguments.grid, "--grid").items()}
-    random = spreads(arguments.random, "--random")
+    grid, random = arguments.grid, arguments.random
     for name in random:
         if name in grid:
             raise UserError(f"{name} is in --grid and in --random; choose one")
     if not grid and not random:
         raise UserError("nothing varies; add --grid NAME=LOW:HIGH:N or --random NAME=PERCENT% (see --help)")
     with Testbed(arguments.fmu) as testbed:
-        with said_of_options(grid="grid", random="random"):
-            values = layout(grid, random, arguments.runs, arguments.seed, testbed)
+        values = layout(grid, random, arguments.runs, arguments.seed, testbed)
         study = Study.of(testbed, motion, values, None)
-        with said_of_options(scheduler="scheduler", out="out"):
-            swept = carry_out(study, testbed, arguments.out, threads, arguments.scheduler)
+        swept = carry_out(study, testbed, arguments.out, threads, arguments.scheduler)
     print("\n".join(_summary(arguments, swept, threads)))
 
 
 def _summary(arguments: argparse.Namespace, swept: Swept, threads: int) -> list[str]:
-    """What was done, one line each."""
+    """The number of runs, failures and files, one line each."""
     where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
     total = swept.table.num_rows
     lines = [f"ran         nothing: all {total} runs were there already"]
@@ -111,14 +117,3 @@ def _summary(arguments: argparse.Namespace, swept: Swept, threads: int) -> list[
         first = status.index("failed")
         lines.append(f"failed      {failed} runs; run {first}: {swept.table.column('message')[first]}")
     return [*lines, f"wrote       {arguments.out / 'runs.parquet'}"]
-
-
-def _steps(name: str, text: str) -> Array:
-    parts = text.split(":")
-    try:
-        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
-        if len(parts) != 3 or count < 1 or not np.isfinite([low, high]).all():
-            raise ValueError
-    except (ValueError, IndexError):
-        raise UserError(f"--grid {name}={text}: write {name}=LOW:HIGH:N with a whole number N of at least 1") from None
-    return np.linspace(low, high, count)

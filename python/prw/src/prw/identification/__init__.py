@@ -1,9 +1,9 @@
-"""Parameters of the testbed from measurements: those with which the FMU comes closest to what was measured.
+"""Parameters of the testbed from measurements: the values with which the FMU comes closest to the measurements.
 
-In the order in which the files build on each other: path (where the motors really
-were), experiment (spectra of both, and of their errors), model (the FMU's equations), response (what they answer),
-fit (least squares), verdict (whether the model explains the data), diagnosis (what may be wrong if not), statistics and
-profile (how sure the estimates are), design and advice (what would tell more), results and report. `identify` below puts them together.
+In the order of dependence: path (smoothed motor angles), experiment (spectra of inputs, measurements and their errors),
+model (the FMU's equations), response (the model's outputs), fit (least squares), verdict (whether the model explains the
+data), diagnosis (possible causes if not), statistics and profile (standard errors and intervals), design and advice
+(more informative experiments), results and report. `identify` below combines them.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from prw.recording import Recording
     from prw.simulation import Run
 
-    #: What an experiment is read from.
+    #: The sources of an experiment.
     Source: TypeAlias = str | os.PathLike[str] | Recording | Run | Table
 
-#: What is estimated if nothing is said.
+#: The parameters that are estimated by default.
 DEFAULT_ESTIMATE = ("k1", "k2", "c1", "c2", "c3")
-#: What a channel may be distorted by, in the order of `identify`'s arguments.
+#: The distortions of a channel, in the order of `identify`'s arguments.
 KINDS = ("delay", "lag", "gain")
 #: Default bounds: this factor about the start value.
 REACH = 100.0
@@ -61,49 +61,49 @@ def identify(
 ) -> Identification:
     """Estimate parameters of the testbed from one experiment or several.
 
-    Sensor offsets and the state at the first sample are unknown, too, and estimated along. All values are in SI.
+    Sensor offsets and the state at the first sample are estimated, too. All values are in SI.
 
     Parameters
     ----------
     files
-        CSV tables, DataFrames or dicts of arrays as `prw.read` reads them, what it returned, or what `prw.simulate` returned.
+        CSV tables, DataFrames or dicts of arrays for `prw.read`, or return values of `prw.read` or `prw.simulate`.
     estimate
         Names of the parameters, or one.
     priors
-        What is known beforehand of a parameter, by name: the standard deviation as a fraction of its start value
-        (0.1 is 10 %, 1 the most), or (value, fraction). It is then estimated along.
+        Prior knowledge by parameter: the standard deviation as a fraction of its start value
+        (0.1 is 10 %, 1 the most), or (value, fraction). The parameter is then estimated, too.
     parameters
-        Other start values, or values of what is not estimated, as for `prw.simulate`.
+        Other start values, or values of fixed parameters, as for `prw.simulate`.
     bounds
         (least, greatest) by parameter.
     noise
-        Standard deviations of channels, where they are known.
+        Known standard deviations by channel.
     units, degrees, names, skip, encoding
         As for `prw.read`.
     quantum
         Resolution of the motors' encoders, rad (default: found in the data).
     offsets
-        Whether sensors may have any.
+        Whether sensors may have offsets.
     starts
-        Places to search from, at random with `seed`.
+        Number of starting points, random with `seed`.
     delay, lag, gain
-        Channels that may be late, lag (first order), or read too much or too little: estimated along.
+        Channels with an unknown delay, first-order lag or gain, which are then estimated, too.
     fmu
         The testbed FMU (default: as for `prw.simulate`).
 
     Returns
     -------
     Identification
-        Estimates, standard errors and doubts. Data that the model does not explain are no error, nor are parameters
-        that they leave open: see its `fits`, `misfits` and `undetermined`.
+        Estimates, standard errors and doubts. Data that the model does not explain raise no error, nor do undetermined
+        parameters: see `fits`, `misfits` and `undetermined`.
 
     Raises
     ------
     UserError
-        A file cannot be read, a name is not known, or the FMU refuses a value.
+        A file cannot be read, a name is not known, or the FMU rejects a value.
     """
     need("scipy", "threadpoolctl")
-    # They take a while to load.
+    # These imports are slow.
     from threadpoolctl import threadpool_limits
 
     from prw.identification.experiment import may_be_simulated, prepare
@@ -121,9 +121,9 @@ def identify(
     one = is_path(files) or is_table(files) or isinstance(files, Recording) or not isinstance(files, Iterable)
     several = cast("list[Source]", [files] if one else list(cast("Iterable[Source]", files)))
     if not several:
-        raise UserError("files: there are none")
+        raise UserError("there are none", argument="files")
     delay, lag, gain = names_of("delay", delay), names_of("lag", lag), names_of("gain", gain)
-    # Many small matrices: more threads only get into each other's way.
+    # Matrices are small and many: more threads are slower.
     with Model(fmu) as model, threadpool_limits(1):
         distortions = tuple(Distortion(k, n) for k, names in zip(KINDS, (delay, lag, gain)) for n in names)
         task = replace(
@@ -192,26 +192,28 @@ def task_of(
     _check("noise", noise, MEASURED)
     start = {**known.starts, **parameters}
     if not estimate and not priors:
-        raise UserError(f"estimate: nothing is named; there are {', '.join(known.real)}")
-    beliefs = {name: Prior(*spread_of(f"priors: {name}", p, start[name])) for name, p in priors.items()}
+        raise UserError(f"nothing is named; there are {', '.join(known.real)}", argument="estimate")
+    beliefs = {name: Prior(*spread_of("priors", name, p, start[name])) for name, p in priors.items()}
     chosen = tuple(name for name in known.real if name in estimate or name in beliefs)
     for what, values in (("parameters", parameters), ("noise", noise)):
         for name, value in values.items():
-            positive(f"{what}: {name}", value)
+            positive(what, value, name)
     for name in chosen:
         if start[name] <= 0:
             raise UserError(f"{name} starts at {start[name]:g} and cannot be estimated from there; fix another value")
     spans = {**{name: (value / REACH, value * REACH) for name, value in start.items()}, **bounds}
     for name, span in bounds.items():
         if not isinstance(span, Sequence) or len(span) != 2:
-            raise UserError(f"bounds: {name} {span!r}; write (least, greatest)")
-        if not positive(f"bounds: {name}", span[0]) < positive(f"bounds: {name}", span[1]):
-            raise UserError(f"bounds: {name} from {span[0]:g} to {span[1]:g}; the first must be below the second")
+            raise UserError(f"{name} {span!r}; write (least, greatest)", argument="bounds")
+        if not positive("bounds", span[0], name) < positive("bounds", span[1], name):
+            raise UserError(
+                f"{name} from {span[0]:g} to {span[1]:g}; the first must be below the second", argument="bounds"
+            )
     return Task(chosen, start, spans, beliefs, dict(noise), offsets)
 
 
 def _check(what: str, names: Iterable[str], known: Collection[str], others: str = "") -> None:
-    """Raise UserError for a name that is not known."""
+    """Raise UserError for an unknown name."""
     for name in names:
         if name not in known:
-            raise UserError(f"{what}: {name} is not known; there are {', '.join(known)}{others}")
+            raise UserError(f"{name} is not known; there are {', '.join(known)}{others}", argument=what)

@@ -1,4 +1,4 @@
-"""What would settle a combination of parameters that the data leave open: another motion, another sensor."""
+"""Advice on undetermined combinations of parameters: another motion or another sensor."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ SENSORS = {
     "theta3 and theta4": ("theta3", "theta4"),
     "pitch and roll": ("pitch", "roll"),
 }
-#: Estimates that have run away are brought back to this factor of their start values.
+#: Estimates are limited to this factor about their start values.
 REACH = 10.0
 DURATION, RATE = 10.0, 1000.0
-#: How the patterns of a motion are said.
+#: The patterns of a motion in messages.
 SAID = {
     "equal": "equal motors",
     "opposite": "opposite motors",
@@ -33,8 +33,8 @@ SAID = {
 
 
 def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) -> list[str]:
-    """What would determine all parameters, each with the largest standard error to be expected; the best
-    motion with the same sensors, and the best pair of sensors with the same motions. Only what helps is named."""
+    """Experiments that would determine all parameters, each with the largest expected standard error: the best motion with
+    the same sensors, and the best pair of sensors with the same motions. Experiments that do not help are not named."""
     task = replace(solution.task, distortions=())
     first = np.log([task.start[name] for name in task.names])
     point = np.clip(solution.logarithms[: len(first)], first - np.log(REACH), first + np.log(REACH))
@@ -73,7 +73,7 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
 
 
 def _measured_wholly(experiment: Experiment, channels: tuple[str, ...]) -> Experiment:
-    """The same experiment with these channels, every one at all times and without steps."""
+    """The experiment with these channels, each sampled at all times and without encoder steps."""
     exact = np.zeros((1, experiment.bins, len(channels)), dtype=np.complex128)
     return replace(experiment, channels=channels, values=None, samplers=None, channel_errors=exact)
 
@@ -83,7 +83,7 @@ def _worst(information: Array) -> float:
 
 
 def _limits(experiments: Sequence[Experiment]) -> design.Limits:
-    """The motors can do what they have done, and at least a little."""
+    """Limits of the motors: the largest values in the experiments, and at least small ones."""
     angle = max(np.abs(e.theta - e.theta.mean(axis=0)).max() for e in experiments)
     rate = max(np.abs(e.omega).max() for e in experiments)
     least = design.Limits(0.1, 1.0, 50.0)

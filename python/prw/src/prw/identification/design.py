@@ -1,7 +1,7 @@
-"""Motor motions that tell about the parameters, and how much each of them tells.
+"""Motor motions for identification, and the information that each of them gives.
 
-The information about the logarithms of the parameters is that of the fit, F of `statistics`, with offsets and initial
-state unknown, for an experiment that is yet to be made. Multisines have harmonics of 1/duration with Schroeder's
+The information about the logarithms of the parameters is the information of the fit, see `statistics`, with unknown
+offsets and initial state, for a planned experiment. Multisines have harmonics of 1/duration with Schroeder's
 phases (IEEE Trans. Inf. Theory 16 (1970) 85), which keep their peaks low. All motions start and end at rest.
 """
 
@@ -22,11 +22,11 @@ from prw.testbed import ANGLE_OF, OUTPUTS
 
 #: Seconds in which a motion fades in and out.
 FADE = 0.5
-#: At most so many frequencies in a multisine.
+#: Most frequencies in a multisine.
 MOST_LINES = 60
 #: Frequencies in Hz: of the slow multisine, up to; and of the widest motions, up to.
 SLOW, WIDEST = 4.0, 40.0
-#: From this condition on, what an information matrix says of its weakest combination is rounding.
+#: Condition of an information matrix from which its weakest combination is rounding error.
 SINGULAR = 1e12
 #: Rounds of the multiplicative algorithm for the D-optimal spectrum.
 ROUNDS = 300
@@ -34,7 +34,7 @@ ROUNDS = 300
 
 @dataclass(frozen=True)
 class Limits:
-    """What the motors can do: angle from the middle in rad, rate in rad/s, acceleration in rad/s2."""
+    """Limits of the motors: angle from the middle in rad, rate in rad/s, acceleration in rad/s2."""
 
     angle: float = 0.7
     rate: float = 8.0
@@ -62,7 +62,7 @@ def motions(
     return found
 
 
-#: What motors 1 and 2 do with two different waves.
+#: Shares of two waves in the motions of motors 1 and 2.
 PATTERNS = {
     "equal": ((1, 0), (1, 0)),
     "opposite": ((1, 0), (-1, 0)),
@@ -74,8 +74,7 @@ PATTERNS = {
 def information(
     model: Model, experiments: Sequence[Experiment], task: Task, logarithms: Array, noise: Mapping[str, float]
 ) -> Array:
-    """What experiments, made or yet to be made, would tell about the logarithms of task.names: (p, p), without
-    priors."""
+    """Information of measured or planned experiments about the logarithms of task.names: (p, p), without priors."""
     unmeasured = [replace(experiment, values=None) for experiment in experiments]
     channels = {name for experiment in experiments for name in experiment.channels}
     fitter = Fitter(model, unmeasured, task, {name: noise[name] for name in channels})
@@ -84,7 +83,7 @@ def information(
 
 
 def default_noise() -> dict[str, float]:
-    """The noise that is assumed where nothing is known, by channel in SI."""
+    """The default noise by channel, in SI."""
     return {name: channel.noise for name, channel in MEASURED.items()}
 
 
@@ -162,7 +161,7 @@ def _optimal(
     model: Model, task: Task, time: Array, frequency: Array, limits: Limits, noise: Mapping[str, float]
 ) -> Motion:
     """The multisine whose power is spread over frequencies, equal and opposite motors such that the determinant of the
-    information is largest for what it costs of the limits (D-optimal; multiplicative algorithm, Silvey, Titterington
+    information is largest within the limits (D-optimal; multiplicative algorithm, Silvey, Titterington
     and Torsney, Comm. Stat. A 7 (1978) 1379)."""
     share = 1e-4
     logarithms = task.first()
@@ -177,7 +176,7 @@ def _optimal(
     w = 2 * np.pi * frequency
     cost = 1 / limits.angle**2 + (w / limits.rate) ** 2 + (w**2 / limits.acceleration) ** 2
     each /= np.tile(cost, 2)[:, None, None]
-    # A direction that nothing tells about must not stop the search.
+    # An undetermined direction must not stop the search.
     floor = 1e-9 * np.trace(each.sum(axis=0)) * np.eye(len(logarithms))
     power = np.full(len(each), 1 / len(each))
     for _ in range(ROUNDS):
@@ -198,5 +197,5 @@ def typical_error(information: Array) -> float:
 
 
 def with_priors(information: Array, task: Task) -> Array:
-    """Information (p, p) with what the priors add."""
+    """Information (p, p) with the priors'."""
     return information + task.prior_information()

@@ -1,5 +1,5 @@
-"""What may be wrong where the model does not explain the data: faults known by what they look like, and fits in which
-channels may be late, lag, or have another gain."""
+"""Possible causes if the model does not explain the data: faults with a known signature, and fits in which channels have
+a delay, a lag or another gain."""
 
 from __future__ import annotations
 
@@ -19,30 +19,31 @@ from prw.identification.verdict import CLEAR, PAIRS, Verdict, groups, judge, nam
 from prw.motion import Array
 from prw.progress import Progress
 
-#: Gains that a slip with units makes, give or take TOLERANCE (a factor); what a channel is then.
+#: Gains that a wrong unit causes, within the factor TOLERANCE, and the description of the unit.
 SLIPS = {57.3: "in degrees, not radians", 1 / 57.3: "in radians, not degrees", 1000.0: "in thousandths of its unit"}
 TOLERANCE = 1.7
-#: A course that follows another one has this correlation with it, and one that does not, less.
+#: Correlation from which two signals count as alike, and below which they do not.
 ALIKE, UNLIKE = 0.9, 0.7
-#: Values at an end of a channel's range that come one after another so often are no chance, s; so long at rest: stuck.
+#: Equal values in sequence at an end of a channel's range, and such sequences, that are no chance; time after which a
+#: constant channel is stuck, s.
 FLAT, FLATS, STUCK = 4, 3, 0.25
-#: A motor that turns with no more than this share of its greatest rate rests.
+#: Share of its greatest rate below which a motor is at rest.
 AT_REST = 1e-3
-#: So many of the sets of channels that promise most are fitted, with so many rounds of judging the noise.
+#: Number of candidate sets of channels that are fitted, and rounds of estimating the noise.
 TRIED, ROUNDS = 2, 2
-#: A fault that explains this share of what the best explains is named as well; and one that explains this share in addition.
+#: Share of the best fault's gain from which another fault is named; the same for a fault in addition to the best.
 SHARE, SECOND = 0.6, 0.05
 
 
 def diagnose(solution: Solution, verdict: Verdict) -> list[str]:
-    """What may be wrong, a sentence each, the likeliest first."""
+    """Possible causes, a sentence each, the most likely first."""
     found = [text for i, e in enumerate(solution.fitter.experiments) for text in _looks(solution, i, e)]
     if found:
         return list(dict.fromkeys(found))
     causes = _causes(solution, verdict)
     said = [cause.text for cause in causes[:2] if cause.gain > SHARE * causes[0].gain]
     if causes and not causes[0].explains:
-        # What is left when the first is known.
+        # Causes that remain with the first one included.
         after = causes[0].after()
         left = judge(after)
         others = [] if left.fits else _causes(after, left)
@@ -52,8 +53,8 @@ def diagnose(solution: Solution, verdict: Verdict) -> list[str]:
 
 
 class _Cause(NamedTuple):
-    """gain: rise of twice the log likelihood. name: of the fault. text: what it is. explains: whether nothing is left then. after:
-    the fit with it."""
+    """A possible cause. gain: rise of twice the log likelihood. name: of the fault. text: its description. explains: whether
+    the data fit then. after: the fit with the fault."""
 
     gain: float
     name: str
@@ -63,7 +64,7 @@ class _Cause(NamedTuple):
 
 
 def _causes(solution: Solution, verdict: Verdict) -> list[_Cause]:
-    """What may be wrong, what explains most first."""
+    """Possible causes, in decreasing order of gain."""
     causes = list(_refits(solution, verdict))
     signs = [fault for fault in verdict.faults if fault.clear > CLEAR and fault.signs]
     for fault in sorted(signs, key=lambda fault: -fault.gain)[:1]:
@@ -74,7 +75,7 @@ def _causes(solution: Solution, verdict: Verdict) -> list[_Cause]:
 
 
 def _with_fault(solution: Solution, name: str) -> Solution:
-    """The fit with this fault, of unknown size, in all experiments; once more with the rates that it then has."""
+    """The fit with this fault, of unknown size, in all experiments; repeated with the rates of the first fit."""
     found = solution
     for _ in range(2):
         pairs = zip(found.fitter.experiments, found.comparisons)
@@ -84,7 +85,7 @@ def _with_fault(solution: Solution, name: str) -> Solution:
 
 
 def _looks(solution: Solution, i: int, experiment: Experiment) -> Iterator[str]:
-    """Faults that can be seen without another fit."""
+    """Faults that are detected without another fit."""
     assert experiment.values is not None
     before = Fitter(solution.fitter.model, [experiment], replace(solution.task, distortions=()), solution.noise)
     first = before.task.first()
@@ -125,13 +126,13 @@ def _slip(gain: float) -> float:
 
 
 def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> Iterator[str]:
-    """Whether a channel is cut off at an end of its range, or stands still while the motors are moving (n,)."""
+    """Messages if a channel saturates, or is constant while the motors move (n,)."""
     there = np.isfinite(column)
     time, column, moving = time[there], column[there], moving[there]
     edges = np.flatnonzero(np.diff(column) != 0)
     first, last = np.concatenate([[0], edges + 1]), np.concatenate([edges, [len(column) - 1]])
     long = last - first + 1
-    # What an encoder at rest does is no fault: sensors without noise stand still as often anywhere.
+    # Channels without noise are often constant, which is no fault.
     usual = float(np.median(long))
     if usual > 2:
         return
@@ -158,7 +159,7 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
             like = "gain" if kind == "gain" else "delay"
             parts = sum(fault.gain for name in group if (fault := clear.get(named(like, (name,)))))
             whole = clear.get(named(like, group))
-            # A set that explains no more than its parts comes after them.
+            # A set that explains no more than its parts ranks below them.
             promise = max(parts, whole.gain if whole else 0.0) - 10 * len(group)
             trials.append((promise, kind, group, new))
     trials.sort(key=lambda trial: -trial[0])
@@ -175,7 +176,7 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
     results.sort(key=lambda result: -result[0])
     said: set[str] = set()
     for gain, kind, group, found in results:
-        # Of one kind the best set alone.
+        # Only the best set of a kind is reported.
         if gain < SHARE * best or gain < CLEAR**2 or kind in said:
             continue
         said.add(kind)

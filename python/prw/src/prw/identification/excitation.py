@@ -1,4 +1,4 @@
-"""Motor motions to identify parameters with, ranked by what they tell: `prw.excite`."""
+"""Motor motions for identification, ranked by the expected standard errors: `prw.excite`."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from prw.extras import need
 from prw.identification import DEFAULT_ESTIMATE, task_of
 from prw.motion import Motion
 
-#: Samples and samples per second that make sense.
+#: Most samples, and fewest samples per second.
 MOST_SAMPLES, SLOWEST = 2_000_000, 50.0
 
 
 class Excitation(NamedTuple):
-    """A motion, and what one experiment with it would tell. typical_error: root mean square of the expected standard
-    errors, as a fraction; infinite where some stay open. expected_errors: of each
-    parameter. undetermined: combinations that stay open. noise: assumed of the channels, SI."""
+    """A motion, and the expected result of one experiment with it. typical_error: root mean square of the expected standard
+    errors, as a fraction; infinite if a combination is undetermined. expected_errors: by parameter. undetermined:
+    combinations that are not determined. noise: assumed noise by channel, SI."""
 
     motion: Motion
     typical_error: float
@@ -32,7 +32,7 @@ class Excitation(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The motion's name: its kind and what the two motors do."""
+        """The motion's name: its kind and its pattern."""
         return self.motion.name
 
 
@@ -49,7 +49,7 @@ def excite(
     noise: Mapping[str, float] = {},
     fmu: str | os.PathLike[str] | None = None,
 ) -> list[Excitation]:
-    """Motions within the motors' limits, those first that tell most about the parameters.
+    """Motions within the motors' limits, in increasing order of the expected standard errors.
 
     Kinds: multisines (slow, wide, and one whose spectrum is optimal for the parameters) and chirps, with equal,
     opposite, single and independent motors.
@@ -61,7 +61,7 @@ def excite(
     angle, speed, acceleration
         Limits of the motors, rad, rad/s, rad/s2.
     duration
-        Of a motion, s.
+        Duration of a motion, s.
     rate
         Samples per second.
     estimate, parameters, noise, fmu
@@ -70,7 +70,7 @@ def excite(
     Raises
     ------
     UserError
-        A name is not known, or a number makes no sense.
+        A name is not known, or a number is out of range.
     """
     need("scipy", "threadpoolctl")
     from threadpoolctl import threadpool_limits
@@ -93,15 +93,15 @@ def excite(
     channels = tuple(MEASURED) if measure is None else names_of("measure", measure)
     for name in channels:
         if name not in MEASURED:
-            raise UserError(f"measure: {name} is not known; there are {', '.join(MEASURED)}")
+            raise UserError(f"{name} is not known; there are {', '.join(MEASURED)}", argument="measure")
     if not channels:
-        raise UserError(f"measure: nothing is named; there are {', '.join(MEASURED)}")
+        raise UserError(f"nothing is named; there are {', '.join(MEASURED)}", argument="measure")
     if not 4 * design.FADE <= duration <= MOST_SAMPLES / rate:
-        raise UserError(
-            f"duration {duration:g}: it must be {4 * design.FADE:g} s or more, and at most 2 million samples"
-        )
+        least = f"it must be {4 * design.FADE:g} s or more, and at most 2 million samples"
+        raise UserError(least, argument="duration", given=f"{duration:g}")
     if rate < SLOWEST:
-        raise UserError(f"rate {rate:g}: the testbed moves at up to 30 Hz; sample with 50 Hz or more")
+        reason = "the testbed moves at up to 30 Hz; sample with 50 Hz or more"
+        raise UserError(reason, argument="rate", given=f"{rate:g}")
     ranking = []
     with Model(fmu) as model, threadpool_limits(1):
         task = task_of(model.known, estimate, parameters=parameters, noise=noise)
@@ -113,5 +113,5 @@ def excite(
             errors = dict(zip(task.names, np.sqrt(np.diag(covariance_of(told))).tolist()))
             left = [str(combination) for combination in undetermined(task.names, told)]
             ranking.append(Excitation(motion, design.typical_error(told), errors, left, assumed))
-    # Where a combination stays open in all of them, what is known of the others decides.
+    # If all motions leave a combination open, the mean error of the parameters decides.
     return sorted(ranking, key=lambda e: (e.typical_error, float(np.mean(np.log(list(e.expected_errors.values()))))))

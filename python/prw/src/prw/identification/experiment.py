@@ -1,7 +1,7 @@
-"""An experiment as the fit sees it: spectra of the motors' paths and of what was measured, and of the errors in both.
+"""An experiment prepared for the fit: spectra of the motors' paths and of the measurements, and of the errors of both.
 
-What is compared are discrete Fourier transforms of the whole recording, up to the frequency at which the motors' motion
-drowns in the noise of their samples. Transforms are unitary: white noise of variance v has the power v at every
+The fit compares discrete Fourier transforms of the whole recording, up to the frequency at which the motors' motion
+is lost in the noise of their samples. Transforms are unitary: white noise of variance v has the power v at every
 frequency.
 """
 
@@ -22,41 +22,42 @@ from prw.motion import Array, Motion
 from prw.recording import Recording
 from prw.state_space import Complex
 
-#: The fit looks up to the highest frequency at which a motor's motion is this many times stronger than the noise of its
-#: samples (power, averaged over neighbouring frequencies), and this much further.
+#: Ratio of a motor's motion to the noise of its samples (power, averaged over neighbouring frequencies) that defines the
+#: highest frequency of the fit, and a factor on that frequency.
 CLEARLY_MOVING, MARGIN = 10.0, 1.15
 NEIGHBOURS = 9
-#: Less power than this share of the strongest is none.
+#: Share of the greatest power that counts as zero.
 ROUNDING = 1e-10
-#: No line of a spectrum is known to less than this fraction: doubles, CSV digits and the linear model end somewhere. And no value
-#: in SI to less than this.
+#: Least relative error of a spectral line (limited by doubles, CSV digits and the linear model), and least error of a
+#: value in SI.
 FINEST, LEAST = 1e-7, 1e-15
-#: A channel whose values differ by no more than this fraction of its usual noise does not move.
+#: Fraction of its default noise within which a channel counts as constant.
 STILL = 1e-6
-#: How the motors move between the rows of a recording: smoothly, as motors do; or as in a simulation of the FMU in Co-Simulation
-#: with a step from row to row, with the motors' rates as inputs, or with rates that the FMU estimates from the angles.
+#: Motion of the motors between the rows of a recording: smooth; or as in a simulation of the FMU in Co-Simulation with a
+#: step from row to row, with the motors' rates as inputs, or with rates that the FMU estimates from the angles.
 Rates = Literal["motors", "inputs", "angles"]
-#: Motors may be those of a simulation if their samples have no more noise than this fraction of their motion, and no coarser steps
-#: than that; samples with next to no noise are taken as they are.
+#: Fractions of the motion: most noise and coarsest steps of motors that may come from a simulation; noise below which
+#: samples are used without smoothing.
 EXACT, DIGITS, ROUNDED = 1e-3, 1e-4, 1e-6
-#: Draws of encoders' errors, and how many frequencies further a line of theirs still counts.
+#: Draws of encoders' errors, and the distance in frequencies over which a line of them leaks.
 DRAWS, FURTHEST = 64, 100
-#: Times are even if none is off by more than this fraction of a step.
+#: Largest deviation of even times, as a fraction of a step.
 EVEN = 1e-3
-#: The fewest frequencies that are compared, and the fewest values that say something of a channel's noise.
+#: The fewest frequencies that are compared, and the fewest values from which a channel's noise is estimated.
 FEWEST, FEWEST_VALUES = 8, 20
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """name: of the experiment. time: (n,) s, even. theta, omega: (n, 2) rad, rad/s, of the motors at `time`. channels:
-    what was measured. sampled: (s,) s, when. values: (s, c) in SI with NaN for nothing, or None where the experiment is
-    only planned. between: (s, n), interpolation from `time` to `sampled`, or None where both are the same. samplers: the
-    same for each channel, with empty rows where it has no value, or None where nothing is missing either. bins: number
-    of frequencies that are compared, from 0. motor_errors: (d, bins, 2) rad, spectra of d draws of the errors of the
-    motors' samples. channel_errors: (d, bins, c), of what encoders' steps add to the channels. paths: of the two motors, or None where they are known exactly. notes: lines for the user.
-    jumps: (n, 2) rad where the FMU simulated the recording, else None: how far each angle is from where its rate led; the FMU adds
-    them to the states at the start of the next step."""
+    """A measured or planned experiment. name: of the experiment. time: (n,) s, even. theta, omega: (n, 2) rad, rad/s, of the
+    motors at `time`. channels: names of the measured outputs. sampled: (s,) s, their sampling times. values: (s, c) in SI,
+    NaN if missing; None if the experiment is planned. between: (s, n), interpolation from `time` to `sampled`, or None if
+    both are equal. samplers: the interpolation of each channel, with empty rows at missing values; None if no value is
+    missing and `between` is None. bins: number of compared frequencies, from 0. motor_errors: (d, bins, 2) rad, spectra of
+    d draws of the errors of the motors' samples. channel_errors: (d, bins, c), spectra of the channels' errors by encoders'
+    steps. paths: of the two motors, or None if they are known exactly. notes: lines for the user. jumps: (n, 2) rad if the
+    FMU simulated the recording, else None: the difference of each angle from the extrapolation with its rate, which the FMU
+    adds to the states at the start of the next step."""
 
     name: str
     time: Array
@@ -81,12 +82,12 @@ class Experiment:
 
     @property
     def all_bins(self) -> int:
-        """Number of frequencies in all."""
+        """Number of all frequencies."""
         return len(self.time) // 2 + 1
 
     @property
     def needed_bins(self) -> int:
-        """Number of frequencies at which the model is needed: where values are missing, all of them mix."""
+        """Number of frequencies at which the model is needed: all if values are missing, because that mixes frequencies."""
         return self.bins if self.samplers is None else self.all_bins
 
     @property
@@ -101,8 +102,7 @@ class Experiment:
 
     @cached_property
     def finest(self) -> Array:
-        """The least noise (c,) that the channels can have, SI: numbers and the path between samples are this exact. No line of a
-        spectrum is known better."""
+        """Lower bound (c,) of the channels' noise, SI: the error of the numbers and of the path between samples."""
         turn = 2 * np.pi * np.arange(1, self.bins) / len(self.time)
         # Twelve times the error of the cubic between two samples; more where rows are uneven.
         between = turn**4 * (0.0 if self.jumps is not None else 1 / 60 if self.between is None else 1 / 10)
@@ -111,7 +111,7 @@ class Experiment:
 
     @cached_property
     def measured(self) -> Complex:
-        """Spectra of what was measured (bins, c)."""
+        """Spectra of the measurements (bins, c)."""
         assert self.values is not None
         if self.samplers is None:
             return spectra(self.values)[: self.bins]
@@ -133,11 +133,11 @@ class Experiment:
 
     @cached_property
     def channel_power(self) -> Array:
-        """Power (bins, c) of what encoders' steps add to the channels."""
+        """Power (bins, c) of the channels' errors by encoders' steps."""
         return _power(self.channel_errors)
 
     def seen(self, modelled: Complex) -> Complex:
-        """Spectra (bins, c, ...) like `measured` of spectra (needed_bins, c, ...) that a model has."""
+        """Spectra (bins, c, ...) as in `measured`, from a model's spectra (needed_bins, c, ...)."""
         if self.samplers is None:
             return modelled
         courses = np.fft.irfft(modelled, len(self.time), axis=0, norm="ortho")
@@ -158,10 +158,10 @@ def spectra(courses: Array) -> Complex:
 
 
 def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motors", exact: bool = False) -> Experiment:
-    """Find the motors' paths in `recording`, and how far their samples and the other encoders err.
+    """Find the motors' paths in `recording`, and the errors of their samples and of the other encoders.
 
-    quantum: of the motor angles in rad, where it is known to be coarser than it looks. rates_of: see `Rates`. exact: the
-    samples are the motors' angles and rates. Raises UserError where nothing was measured, or too little of something."""
+    quantum: of the motor angles in rad, if it is coarser than the data suggest. rates_of: see `Rates`. exact: the
+    samples are the motors' angles and rates. Raises UserError if a channel has too few values or no channel is measured."""
     sampled, omega = recording.time, recording.omega
     channels, values, notes = _measured(recording)
     paths = [smooth(sampled, recording.theta[:, i], None if omega is None else omega[:, i], quantum) for i in (0, 1)]
@@ -214,7 +214,7 @@ def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motor
 
 
 def may_be_simulated(experiment: Experiment) -> bool:
-    """Whether the motors' samples are as exact as those of a simulation."""
+    """Whether the motors' samples are exact enough for a simulation."""
     paths = experiment.paths or ()
     exact = [
         path.noise <= EXACT * reach and path.quantum <= DIGITS * reach
@@ -240,7 +240,7 @@ def _measured(recording: Recording) -> tuple[tuple[str, ...], Array, tuple[str, 
             f"{recording.source}: nothing measured; at least one column of {', '.join(MEASURED)} is needed, "
             f"the file has {', '.join(recording.units)}"
         )
-    # Rates are found by smoothing here, so the advice that a simulation gives on them is no news.
+    # Rates are found by smoothing here, so the notes for simulations on rates do not apply.
     notes = [note for note in recording.notes if "at rest" not in note and not note.startswith("no omega")]
     moving = {}
     for name, column in recording.measured.items():
@@ -259,8 +259,7 @@ def _measured(recording: Recording) -> tuple[tuple[str, ...], Array, tuple[str, 
 
 
 def planned(motion: Motion, channels: Sequence[str]) -> Experiment:
-    """An experiment that is yet to be made: the motors' motion is known, evenly sampled, and the channels have no
-    values."""
+    """A planned experiment: the motors' motion is known and evenly sampled, and the channels have no values."""
     assert motion.omega is not None
     step = float(motion.time[-1] - motion.time[0]) / (len(motion.time) - 1)
     exact = np.full((1, len(motion.time)), 0.0)
@@ -283,7 +282,7 @@ def planned(motion: Motion, channels: Sequence[str]) -> Experiment:
 
 
 def _drawn(path: Path, time: Array, sampled: Array) -> Array:
-    """Errors like those of the samples, (DRAWS, n), at the times (n,)."""
+    """Draws of the samples' errors, (DRAWS, n), at the times (n,)."""
     random = np.random.default_rng(0)
     return np.array([np.interp(time, sampled, path.errors(random)) for _ in range(DRAWS)])
 
@@ -291,8 +290,8 @@ def _drawn(path: Path, time: Array, sampled: Array) -> Array:
 def _power(errors: Complex) -> Array:
     """Mean power (bins, ...) of the spectra (d, bins, ...) of draws."""
     mean: Array = np.mean(np.abs(errors) ** 2, axis=0)
-    # In a periodic motion errors are lines. What a line leaks to its neighbours is the same error once more, however
-    # little it is: they count as having what a line between two frequencies leaks.
+    # In a periodic motion errors are lines. The leakage of a line is correlated with the line, even if it is small, so
+    # each frequency gets at least the leakage of a line between two frequencies.
     leaked = 1 / (np.pi * np.arange(1, FURTHEST + 1)) ** 2
     spread = [np.convolve(column, [*leaked[::-1], 0.0, *leaked])[FURTHEST:-FURTHEST] for column in mean.T]
     power: Array = np.maximum(mean, np.column_stack(spread))
@@ -300,7 +299,7 @@ def _power(errors: Complex) -> Array:
 
 
 def _with_rates(errors: Array, rate_noise: float | None, step: float) -> Complex:
-    """Spectra (d, f) of draws (d, n) of an angle's errors, if its rate was logged, too, with this noise."""
+    """Spectra (d, f) of draws (d, n) of an angle's errors; smaller if its rate was logged with this noise."""
     found = spectra(errors.T).T
     if rate_noise is None:
         return found
@@ -321,8 +320,8 @@ def _clear(theta: Array, errors: Array, rate_noise: float | None, step: float) -
         found = np.abs(np.fft.rfft((increments - increments.mean()) * window)) ** 2 / (window @ window)
         return np.convolve(found, np.ones(NEIGHBOURS) / NEIGHBOURS, mode="same")
 
-    # In a periodic motion an encoder's errors are lines at multiples of its frequency, which differ much from draw to
-    # draw. The strongest counts; by half, which for white noise is less than its mean.
+    # In a periodic motion an encoder's errors are lines at multiples of its frequency, which differ much between draws.
+    # Half of the strongest counts, which for white noise is less than the mean.
     drawn = [power(course) for course in errors]
     noise = np.maximum(np.mean(drawn, axis=0), np.max(drawn, axis=0) / 2)
     if rate_noise is not None:
@@ -334,13 +333,13 @@ def _clear(theta: Array, errors: Array, rate_noise: float | None, step: float) -
 
 
 def _stepped(values: Array) -> bool:
-    """Whether values (n,) have steps that no other noise blurs."""
+    """Whether values (n,) have steps that are larger than other noise."""
     quantum = quantum_of(values)
     return quantum > 0 and rough_noise(values) < quantum
 
 
 def _samplers(between: csr_matrix | None, values: Array) -> tuple[csr_matrix, ...] | None:
-    """See Experiment."""
+    """The field `samplers` of an Experiment."""
     if between is None and np.isfinite(values).all():
         return None
     keep = [csr_matrix(diags(np.isfinite(column).astype(float))) for column in values.T]

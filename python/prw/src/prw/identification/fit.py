@@ -1,19 +1,19 @@
-"""Least squares: the parameters with which the FMU comes closest to what was measured.
+"""Least squares: the parameters with which the FMU comes closest to the measurements.
 
 Parameters are sought as logarithms, which keeps them positive and makes their errors relative. Sensor offsets and the
 initial state of each experiment enter linearly; they are eliminated in every evaluation by projection (variable
-projection in the form of Kaufman, BIT 15 (1975) 49), so that the search is over the parameters alone.
+projection in the form of Kaufman, BIT 15 (1975) 49), so that the search is only over the parameters.
 
-Encoders err, and what they say of the motors goes through the model: at every frequency the difference of measured and
-modelled spectra has the covariance of the channels' noise plus G P G^H, with the model's transfer G and the power P of
-the encoders' errors. It is weighted with the inverse of that, which depends on the parameters, too; leaving P out would
-bias the dampers (errors in variables; Soderstrom, Automatica 43 (2007) 939, Sec. 8; Pintelon and Schoukens, 2nd ed.,
-Sec. 9.11). The noise of each channel is what its residuals have beyond that, or given.
+Errors of the motors' encoders pass through the model: at every frequency the difference of measured and modelled
+spectra has the covariance of the channels' noise plus G P G^H, with the model's transfer G and the power P of the
+encoders' errors. The difference is weighted with the inverse of this covariance, which depends on the parameters, too.
+Without P the dampers are biased (errors in variables; Soderstrom, Automatica 43 (2007) 939, Sec. 8; Pintelon and
+Schoukens, 2nd ed., Sec. 9.11). The noise of each channel is given, or estimated from its residuals.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -23,22 +23,22 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from prw.errors import UserError
 from prw.identification.experiment import Experiment
-from prw.identification.model import Matrices, Model, stacked
+from prw.identification.model import Model
 from prw.identification.response import Discrete, Response, discrete
 from prw.motion import Array
 from prw.progress import Progress
-from prw.state_space import Complex
+from prw.state_space import Complex, StateSpace
 
-#: Step of the logarithms for the central differences: errors of 1e-8 in the sensitivities.
+#: Step of the logarithms for the central differences, with errors of 1e-8 in the sensitivities.
 DIFFERENCE = 1e-4
-#: Directions of the initial state that the data see this much less than others are left alone.
+#: Relative singular value below which a direction of the initial state is not estimated.
 UNSEEN = 1e-9
-#: Rounds of fitting and judging the noise, and the change at which they end; and of the latter alone.
+#: Most rounds of fitting and estimating the noise, the change that ends them, and most rounds of the latter only.
 ROUNDS, SETTLED = 12, 0.003
 NOISE_ROUNDS = 30
 #: A search starts at least this far inside its bounds.
 INSIDE = 1e-6
-#: When a search ends.
+#: Tolerances of a search.
 FINE, COARSE = {"ftol": 1e-12, "xtol": 1e-9, "max_nfev": 100}, {"ftol": 1e-5, "xtol": 1e-4, "max_nfev": 25}
 #: Two minima are the same if no parameter differs by more than this fraction.
 SAME = 0.01
@@ -46,14 +46,14 @@ SAME = 0.01
 RIVAL = 9.0
 
 
-#: What a channel may be distorted by, and the unit of each, in which 1 is a likely size: the logarithm of a gain is its own.
+#: The distortions of a channel, each with a unit in which 1 is a typical size; a gain is estimated as its logarithm.
 DISTORTIONS = {"delay": 1e-3, "lag": 1e-3, "gain": 1.0}
 #: Bounds of a distortion in these units.
 FURTHEST = 50.0
 
 
 class Distortion(NamedTuple):
-    """What stands between a channel and its record: a delay (s), a first-order lag (time constant, s) or a gain."""
+    """A distortion between a channel and its record: a delay (s), a first-order lag (time constant, s) or a gain."""
 
     kind: str
     channel: str
@@ -66,7 +66,7 @@ class Distortion(NamedTuple):
         return float(np.exp(x)) if self.kind == "gain" else x * DISTORTIONS[self.kind]
 
     def response(self, x: float, s: Complex) -> tuple[Complex, Complex]:
-        """Frequency response (f,) and the derivative of its logarithm by x."""
+        """Frequency response (f,) and the derivative of its logarithm with respect to x."""
         if self.kind == "gain":
             return np.full(len(s), np.exp(x) + 0j), np.ones(len(s), dtype=complex)
         s = s * DISTORTIONS[self.kind]
@@ -76,7 +76,7 @@ class Distortion(NamedTuple):
 
 
 class Prior(NamedTuple):
-    """What is known beforehand: the parameter is `value` (SI) give or take the fraction `relative` (one sigma)."""
+    """Prior knowledge: the parameter is `value` (SI) with the relative standard deviation `relative`."""
 
     value: float
     relative: float
@@ -84,9 +84,9 @@ class Prior(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """What to estimate. names: of the parameters. start: all parameters in SI by name. bounds: (least, greatest) by
+    """The unknowns of a fit. names: of the parameters. start: all parameters in SI by name. bounds: (least, greatest) by
     name, SI. priors: by name. noise: given standard deviations by channel, SI. offsets: whether each channel has an
-    unknown one. distortions: of channels, unknowns that follow the parameters' logarithms in every point (p,)."""
+    unknown offset. distortions: of channels, unknowns that follow the parameters' logarithms in every point (p,)."""
 
     names: tuple[str, ...]
     start: Mapping[str, float]
@@ -116,15 +116,15 @@ class Task:
         return np.append(low, -reach), np.append(high, reach)
 
     def prior_information(self) -> Array:
-        """What the priors know about the unknowns: (p, p)."""
+        """Information of the priors about the unknowns: (p, p)."""
         return np.diag([1 / self.priors[n].relative ** 2 if n in self.priors else 0.0 for n in self.unknowns])
 
 
 class Comparison:
-    """An experiment beside the model at one set of parameters, at given noise.
+    """An experiment compared with the model at one set of parameters, at given noise.
 
     residual: (2, bins, c), real and imaginary parts of the difference of measured and modelled spectra, uncorrelated
-    and of variance 1, offsets and initial state taken out. offsets: (c,) SI. initial: (6,), x[0] - x[n]."""
+    and of variance 1, after elimination of offsets and initial state. offsets: (c,) SI. initial: (6,), x[0] - x[n]."""
 
     def __init__(
         self,
@@ -135,9 +135,9 @@ class Comparison:
         edges: Sequence[int] = (),
         faults: Sequence[Complex] = (),
     ):
-        """noise: (c,) standard deviations, SI. offsets: whether the channels have any. edges: channels that are delayed
-        or lag, of which the first samples come from before the recording. faults: what else may be in the channels by an unknown
-        share, (needed_bins, c) each."""
+        """noise: (c,) standard deviations, SI. offsets: whether the channels have offsets. edges: channels with a delay
+        or lag, whose first samples depend on the time before the recording. faults: spectra (needed_bins, c) that the
+        channels may contain with an unknown factor."""
         self.experiment, self.response = experiment, response
         bins, channels = experiment.bins, len(experiment.channels)
         share = experiment.shares
@@ -181,26 +181,26 @@ class Comparison:
         return float(-4 * np.log(diagonal).sum())
 
     def project(self, table: Array) -> Array:
-        """Parts (2, bins, c, ...) with what offsets and initial state could explain taken out."""
+        """Parts (2, bins, c, ...) after elimination of offsets and initial state."""
         flat = table.reshape(len(self._basis), -1)
         return (flat - self._basis @ (self._basis.T @ flat)).reshape(table.shape)
 
     def slopes(self, change: Discrete) -> tuple[Array, Array]:
         """Derivatives (2, bins, c, p) of `residual`, and the part (p, p) of their squares that is noise.
 
-        change: the model's derivatives by the parameters; those by the distortions follow. What encoders' errors add to the squares is no information:
-        with equal motors, say, the difference of two encoders' steps seems to roll the wrist a little, and J3 would
-        look determined."""
+        change: the model's derivatives with respect to the parameters; derivatives with respect to the distortions follow.
+        The contribution of encoders' errors to the squares is no information. For example, with equal motors the difference
+        of two encoders' steps seems to roll the wrist a little, and J3 would look determined."""
         outputs, transfer = self.response.slopes(change, self.initial)
         bins, whiten = self.experiment.bins, self._whiten
         errors = np.sqrt(self.experiment.motor_power)[:, None, :]
         moving = np.moveaxis(transfer[:, :bins] * (self.experiment.shares[:, None] * errors), 0, 2)
-        # Whitened, what an error of each encoder adds: changes (bins, c, p, 2) and what there is (bins, c, 2).
+        # Whitened transfer from the error of each encoder: its changes (bins, c, p, 2) and its value (bins, c, 2).
         direct = (whiten @ moving.reshape(bins, moving.shape[1], -1)).reshape(moving.shape)
         there = (whiten @ (self._scaled * errors)).conj().swapaxes(-1, -2)
         moved = (direct.reshape(bins, -1, 2) @ there).reshape(*moving.shape[:3], -1)
         direct, moved = np.moveaxis(direct, 2, 0), np.moveaxis(moved, 2, 0)
-        # Of the inverse of a Cholesky factor: the lower half of the covariance's change, seen through it.
+        # Change of the inverse of a Cholesky factor: the lower half of the whitened change of the covariance.
         lower = np.tril(moved + moved.conj().swapaxes(-1, -2))
         diagonal = np.arange(lower.shape[-1])
         lower[..., diagonal, diagonal] /= 2
@@ -224,7 +224,7 @@ class Comparison:
         return found
 
     def score_variance(self, jacobian: Array) -> Array:
-        """Variance (p, p) of the score J'r, with the encoders' errors as they were drawn: in a periodic motion they have
+        """Variance (p, p) of the score J'r, with the drawn encoders' errors: in a periodic motion they have
         its phase and repeat with it. jacobian: (2, bins, c, p)."""
         scores = np.einsum("rfcp,rfcd->dp", jacobian, self._drawn, optimize=True)
         seen = self._whiten * np.sqrt(self._noise)
@@ -234,15 +234,15 @@ class Comparison:
 
     @cached_property
     def _drawn(self) -> Array:
-        """What draws (d) of the encoders' errors make of the residual, (2, bins, c, d)."""
+        """Effect of draws (d) of the encoders' errors on the residual, (2, bins, c, d)."""
         e = self.experiment
         drawn = e.channel_errors * e.shares - (self._scaled @ e.motor_errors[..., None])[..., 0]
         return self._parts(np.moveaxis((self._whiten @ drawn[..., None])[..., 0], 0, -1))
 
     def noise_ratios(self) -> Array:
-        """Sums (3, c) over frequencies, of which the first two have the ratio 1 where each channel's noise explains its
-        residuals, and above where there should be more of it: the score of the likelihood by its variance. The third is
-        the information about the noise's variance, 1 by the square of its standard error."""
+        """Sums (3, c) over frequencies. The ratio of the first two is 1 if a channel's noise explains its residuals, and larger
+        if the noise is too small: the score of the likelihood with respect to its variance. The third sum is the
+        information about the noise's variance, the inverse square of its standard error."""
         inverse = self._whiten.conj().swapaxes(-1, -2) @ self._whiten
         weighted = (inverse @ self._rest[:, :, None])[..., 0]
         expected, share = np.einsum("fcc->c", inverse).real, self.experiment.shares
@@ -253,12 +253,12 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Solution:
-    """What was found. logarithms: (p,) of the parameters. noise: by channel, SI. comparisons: one for each experiment.
+    """The result of a fit. logarithms: (p,) of the parameters. noise: by channel, SI. comparisons: one for each experiment.
     jacobians: for each experiment (2, bins, c, p), derivatives of the residuals. noise_information: (p, p), see
-    Comparison.slopes. modelled: for each experiment (s, c), the channels as the FMU has them, offsets included, SI.
+    Comparison.slopes. modelled: for each experiment (s, c), the FMU's outputs, offsets included, SI.
     misfit: sum of squares of residuals and priors. rivals: other minima that fit as well, as (logarithms, misfit).
-    tried: places that were searched from. evaluations: sets of parameters that were compared. fitter: what found it,
-    ready to compare at other parameters."""
+    tried: number of starting points. evaluations: number of compared sets of parameters. fitter: the fitter that found
+    the solution, ready for other parameters."""
 
     task: Task
     logarithms: Array
@@ -280,12 +280,12 @@ class Solution:
 
     @property
     def unlikeliness(self) -> float:
-        """Minus twice the logarithm of the likelihood, give or take a constant."""
+        """Minus twice the logarithm of the likelihood, up to a constant."""
         return self.misfit + sum(comparison.spread for comparison in self.comparisons)
 
 
 class Fitter:
-    """The experiments and the FMU, ready to be compared at any parameters and noise."""
+    """Compares the experiments with the FMU at any parameters and noise."""
 
     def __init__(
         self,
@@ -307,13 +307,6 @@ class Fitter:
         self._responses: tuple[bytes, list[Response]] = b"", []
         self._comparisons: tuple[tuple[object, ...], list[Comparison]] = (), []
 
-    def _model(self, logarithms: Array, experiment: Experiment) -> Discrete:
-        """The FMU's linear model over the experiment's steps."""
-        one = discrete(
-            self._matrices(logarithms[None]), experiment.step, experiment.channels, experiment.jumps is not None
-        )
-        return Discrete(*(block[0] for block in one))
-
     def _response(self, logarithms: Array, experiment: Experiment, bins: int) -> Response:
         x = logarithms[len(self.task.names) :]
         distortions = [
@@ -322,10 +315,11 @@ class Fitter:
             else None
             for d, xi in zip(self.task.distortions, x)
         ]
-        return Response(self._model(logarithms, experiment), experiment, bins, distortions)
+        models = self._discrete(self._models([logarithms]), experiment)
+        return Response(Discrete(*(block[0] for block in models)), experiment, bins, distortions)
 
     def compare(self, logarithms: Array) -> list[Comparison]:
-        """Every experiment beside the FMU at one set of parameters."""
+        """Compare every experiment with the FMU at one set of parameters."""
         at = logarithms.tobytes()
         if self._responses[0] != at:
             self.evaluations += 1
@@ -349,21 +343,20 @@ class Fitter:
         return self._comparisons[1]
 
     def jacobians(self, logarithms: Array) -> tuple[list[Array], Array]:
-        """For each experiment the derivatives (2, bins, c, p) of the residuals by the logarithms; and the part (p, p)
-        of all their squares that is noise."""
+        """For each experiment the derivatives (2, bins, c, p) of the residuals with respect to the logarithms; and the
+        part (p, p) of all their squares that is noise."""
         steps = DIFFERENCE * np.eye(len(self.task.names), len(logarithms))
-        around = self._matrices(np.vstack([logarithms + steps, logarithms - steps]))
+        around = self._models([*(logarithms + steps), *(logarithms - steps)])
         self.evaluations += 2 * len(steps)
         tables, noise = [], np.zeros((len(logarithms), len(logarithms)))
         for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
-            steps_of = discrete(around, experiment.step, experiment.channels, experiment.jumps is not None)
-            table, of_noise = comparison.slopes(steps_of.slopes(DIFFERENCE))
+            table, of_noise = comparison.slopes(self._discrete(around, experiment).slopes(DIFFERENCE))
             tables.append(table)
             noise += of_noise
         return tables, noise
 
     def modelled(self, logarithms: Array) -> list[Array]:
-        """For each experiment the channels (s, c) as the FMU has them, offsets included, SI."""
+        """For each experiment the FMU's outputs (s, c), offsets included, SI."""
         found = []
         for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
             whole = self._response(logarithms, experiment, experiment.all_bins)
@@ -371,19 +364,19 @@ class Fitter:
         return found
 
     def residuals(self, logarithms: Array) -> Array:
-        """All residuals in one row (r,), and how far the parameters are off their priors."""
+        """All residuals in one row (r,), followed by the weighted differences from the priors."""
         centre, strength = self._priors()
         weighted = (comparison.residual.ravel() for comparison in self.compare(logarithms))
         return np.concatenate([*weighted, strength * (centre - logarithms)])
 
     def slopes(self, logarithms: Array) -> Array:
-        """Derivatives (r, p) of residuals() by the logarithms."""
+        """Derivatives (r, p) of residuals() with respect to the logarithms."""
         rows = [table.reshape(-1, len(logarithms)) for table in self.jacobians(logarithms)[0]]
         return np.vstack([*rows, -np.diag(self._priors()[1])])
 
     def search(self, start: Array, tolerances: Mapping[str, float] = FINE, held: int | None = None) -> OptimizeResult:
-        """scipy's trust-region least squares from `start` (p,) at the present noise. held: a parameter that stays
-        where `start` has it. tolerances: scipy's, for when to end."""
+        """scipy's trust-region least squares from `start` (p,) at the present noise. held: a parameter that keeps
+        its value in `start`. tolerances: scipy's."""
         free = np.arange(len(start)) != (-1 if held is None else held)
         low, high = (bound[free] for bound in self.task.span())
 
@@ -405,7 +398,7 @@ class Fitter:
         return found
 
     def settle(self, point: Array, rounds: int = ROUNDS, tolerances: Mapping[str, float] = FINE) -> Array:
-        """Fit and judge the noise by turns, until the noise settles or so many times."""
+        """Fit and estimate the noise in turns, until the noise settles or `rounds` times."""
         for _ in range(rounds):
             point, before = self.search(point, tolerances).x, self.noise
             for _ in range(NOISE_ROUNDS):
@@ -417,7 +410,7 @@ class Fitter:
         return point
 
     def _judged_noise(self, point: Array) -> dict[str, float]:
-        """Each channel's noise over all experiments, by its residuals at the present noise, where none is given."""
+        """Each channel's noise over all experiments: given, or estimated from its residuals at the present noise."""
         sums, freedom = dict.fromkeys(self.channels, np.zeros(3)), dict.fromkeys(self.channels, 0.0)
         for experiment, comparison in zip(self.experiments, self.compare(point)):
             taken = 1 + int(self.task.offsets) + 6 / len(experiment.channels)
@@ -432,13 +425,17 @@ class Fitter:
         return judged
 
     def _alike(self, noise: Mapping[str, float], other: Mapping[str, float]) -> bool:
-        """Whether two judgements of the noise differ by next to nothing, encoders' steps included."""
+        """Whether two estimates of the noise, encoders' steps included, differ by less than SETTLED."""
         return all(
             abs(np.sqrt((noise[n] ** 2 + e) / (other[n] ** 2 + e)) - 1) < SETTLED for n, e in self._stepped.items()
         )
 
-    def _matrices(self, points: Array) -> Matrices:
-        return stacked([self.model.at(self.task.values(point)) for point in points])
+    def _models(self, points: Iterable[Array]) -> list[StateSpace]:
+        return [self.model.at(self.task.values(point)) for point in points]
+
+    def _discrete(self, models: Sequence[StateSpace], experiment: Experiment) -> Discrete:
+        """The models over the experiment's steps."""
+        return discrete(models, experiment.step, experiment.channels, experiment.jumps is not None)
 
     def _priors(self) -> tuple[Array, Array]:
         """Logarithms (p,) of the priors' values, and 1/sigma (p,), 0 where there is none."""
@@ -453,16 +450,16 @@ class Fitter:
         return [i for i, name in enumerate(experiment.channels) if name in late]
 
     def _columns(self, name: str) -> list[tuple[Array, Array, float]]:
-        """Values (s,), errors' power (bins,) and least noise of the channel in every experiment that has it."""
+        """Values (s,), errors' power (bins,) and least noise of the channel in every experiment that contains it."""
         with_it = [(e, e.channels.index(name)) for e in self.experiments if name in e.channels and e.values is not None]
         return [(e.values[:, i], e.channel_power[:, i], float(e.finest[i])) for e, i in with_it if e.values is not None]
 
 
 def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int = 6, seed: int = 0) -> Solution:
-    """Estimate, from `task.start` and `starts` - 1 other places, of which the best counts.
+    """Estimate the parameters from `task.start` and `starts` - 1 other starting points; return the best solution.
 
-    Where several minima fit alike, the one nearest to task.start counts and the others are reported. Raises UserError
-    where a parameter is out of its bounds or the FMU refuses something.
+    If several minima fit equally well, the one nearest to task.start counts and the others are reported. Raises UserError
+    if a parameter is out of its bounds or the FMU rejects a value.
     """
     for name in task.names:
         low, high = task.bounds[name]
@@ -471,7 +468,7 @@ def fit(model: Model, experiments: Sequence[Experiment], task: Task, starts: int
     fitter, first = Fitter(model, experiments, task), task.first()
     point = fitter.settle(fitter.search(first, COARSE).x)
 
-    # Other minima, at the noise that the first one has.
+    # Other minima, at the noise of the first one.
     minima = [(point, 2 * fitter.search(point).cost)]
     others = _other_starts(task, point, starts - 1, seed)
     with Progress("looking for other minima", len(others)) as progress:
@@ -509,8 +506,8 @@ def settled(
     faults: Sequence[Sequence[Complex]] = (),
     rounds: int = ROUNDS,
 ) -> Solution:
-    """The fit once more, with further distortions as unknowns or faults of each experiment, from where it is and, if it runs away,
-    from where it began. rounds: of fitting and judging the noise; few are enough to compare."""
+    """Repeat the fit with further distortions as unknowns, or faults of each experiment. It starts from the solution and, if
+    it diverges, from the start values. rounds: of fitting and estimating the noise; few suffice for a comparison."""
     task = replace(solution.task, distortions=(*solution.task.distortions, *distortions))
     places = [np.append(solution.logarithms, np.zeros(len(distortions))), task.first()]
     found = []
@@ -527,10 +524,10 @@ def settled(
 
 
 def _other_starts(task: Task, point: Array, count: int, seed: int) -> list[Array]:
-    """Starting points to look for other minima: within a factor of 3 of task.start, and the exchanged couplings.
+    """Starting points for other minima: within a factor of 3 of task.start, and the exchanged couplings.
 
-    Torque, pitch and roll see the two couplings of a side in series, which is the same when they change places; only
-    theta3 and theta4, between them, can tell. So the mirror image is tried first.
+    Torque, pitch and roll depend on the two couplings of a side in series, and do not change if the couplings are
+    exchanged; only theta3 and theta4 distinguish the couplings. So the mirror image is tried first.
     """
     starts = []
     place = {name: i for i, name in enumerate(task.names)}

@@ -1,20 +1,17 @@
-"""The testbed FMU as identification sees it: its parameters, and its linear model with any of them."""
+"""The testbed FMU for identification: its parameters, and its linear model at any parameters."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 import fmu_run
-import numpy as np
 
 from prw.description import CONTINUOUS, Description, read_description
 from prw.linearization import Linearizer
-from prw.motion import Array
-from prw.state_space import StateSpace
 from prw.testbed import OUTPUTS
 
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
@@ -22,8 +19,8 @@ SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 
 
 class Parameter(NamedTuple):
-    """A Real parameter as the FMU declares it. start: its start value in SI. shown, factor: the unit it is shown in,
-    and what a value in that unit is multiplied with to be in SI. meaning: its description."""
+    """A Real parameter of the model description. start: its start value in SI. shown, factor: its display unit, and the
+    factor from that unit to SI. meaning: its description."""
 
     start: float
     unit: str
@@ -32,19 +29,9 @@ class Parameter(NamedTuple):
     meaning: str
 
 
-class Matrices(NamedTuple):
-    """x' = A x + B u, y = C x + D u of m models at a time: A (m, 6, 6), B (m, 6, 4), C (m, 8, 6), D (m, 8, 4), with the
-    FMU's states and inputs in its order, theta before omega, and the outputs in the order of OUTPUTS."""
-
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-
-
 class Parameters:
-    """The parameters that the model description of the testbed declares. real: by name. counts: those that are whole
-    numbers, with their start values. guid: of the FMU, a hash of its sources and start values."""
+    """The parameters that the model description of the testbed declares. real: by name. counts: start values of the
+    Integer parameters. guid: of the FMU, a hash of its sources and start values."""
 
     def __init__(self, fmu: fmu_run.Fmu, description: Description):
         self.guid: str = fmu.token
@@ -53,7 +40,7 @@ class Parameters:
         self._units, self._meanings = description.units, {}
         for v in fmu.variables.values():
             unit, start = v.unit or "", v.start or "0"
-            # Where a run starts is no property of the testbed.
+            # Initial states of a run are no properties of the testbed.
             if v.causality == "parameter" and v.type in CONTINUOUS and not v.name.endswith("_start"):
                 shown = description.display_units[v.name] or unit
                 factor = description.units[unit].displayed.get(shown, 1.0) if unit in description.units else 1.0
@@ -68,7 +55,7 @@ class Parameters:
 
     def for_building(self, values: Mapping[str, float]) -> str:
         """All parameters in the format of modelDescription/parameters.json, for `build_fmu --parameters`; `values` are
-        in SI, and what is shown in another unit is written in that."""
+        in SI and are written in their display units."""
         entries: dict[str, dict[str, object]] = {}
         for name, parameter in self.real.items():
             value = values[name] / parameter.factor
@@ -101,34 +88,13 @@ class Parameters:
         return found.decode("utf-8") + "\n"
 
 
-class Model:
-    """The FMU's linear model, eq. (11), as a function of its parameters. A context manager; leaving it unloads the FMU.
+class Model(Linearizer):
+    """The FMU's linear model, eq. (11), as a function of its parameters: `at(values)`, with the outputs OUTPUTS.
 
-    known: the FMU's parameters. Raises UserError where the FMU is missing, is not the testbed, or refuses something
-    (with what it logged).
+    known: the FMU's parameters. Raises UserError if the FMU is missing, is not the testbed, or rejects a value.
     """
 
     def __init__(self, fmu: str | os.PathLike[str] | None = None):
-        """Unpack, load and instantiate the FMU file `fmu` (default: see prw.testbed.default_fmu)."""
-        self._linearizer = Linearizer(fmu, outputs=OUTPUTS)
-        self.fmu, self.loaded = self._linearizer.fmu, self._linearizer.loaded
-        self.known = Parameters(self._linearizer.loaded, read_description(self.fmu))
-
-    def __enter__(self) -> Model:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Unload the FMU. Harmless when called again."""
-        self._linearizer.close()
-
-    def at(self, values: Mapping[str, float]) -> StateSpace:
-        """The model with the parameters `values` (SI, by name); its outputs are OUTPUTS."""
-        return self._linearizer.at(values)
-
-
-def stacked(models: Sequence[StateSpace]) -> Matrices:
-    """Several models as one with a leading axis."""
-    return Matrices(*(np.stack([getattr(model, block) for model in models]) for block in Matrices._fields))
+        """Load and instantiate the FMU file `fmu` (default: see prw.testbed.default_fmu)."""
+        super().__init__(fmu, outputs=OUTPUTS)
+        self.known = Parameters(self.loaded, read_description(self.fmu))

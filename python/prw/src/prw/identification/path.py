@@ -1,9 +1,9 @@
-"""Where the motors really were: a smooth path through quantised or noisy samples of their angles (and rates).
+"""Smooth paths of the motors through quantised or noisy samples of their angles (and rates).
 
 The FMU derives rates from angles as a simulation must, from the past; the steps of an encoder then become noise in the
-torque that is far above that of the sensor. Here the whole recording is known. The path is a quintic spline, its
-coefficients the most probable ones if the jerk is a white process and the samples carry white noise. How strong either
-is follows from the recording by maximum likelihood; an encoder's noise is at least quantum^2 / 12.
+torque that is far above the sensor's noise. Here the whole recording is known. The path is a quintic spline, its
+coefficients the most probable ones if the jerk is a white process and the samples carry white noise. The strength of both
+follows from the recording by maximum likelihood; an encoder's noise is at least quantum^2 / 12.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scipy.sparse import csr_matrix, diags
 
 from prw.motion import Array
 
-#: Sparse rows from coefficients to what was measured, and the values that were.
+#: Sparse rows from coefficients to measured quantities, and the measured values.
 Block = tuple[csr_matrix, Array]
 DEGREE = 5
 #: The penalty is on third differences of the coefficients: jerk.
@@ -33,23 +33,23 @@ GUESSES: dict[int, list[list[float]]] = {1: [[]], 2: [[-2.0], [-4.0], [-6.0]]}
 #: bias the parameters. It raises the frequency up to which the path follows by its sixth root, 1.6.
 UNDERSMOOTHING = 16.0
 #: Encoders' errors are drawn along a path whose penalty is this many times the most probable one, and that is longer or
-#: shorter by up to a fraction. One that follows the encoder's steps would be rounded to the same steps again wherever
+#: shorter by up to a fraction. A path that follows the encoder's steps would be rounded to the same steps again if
 #: the motor is slow, and the errors drawn would be up to three times too large.
 OVERSMOOTHING, RESCALED = 64.0, 0.05
 #: A column is a multiple of a quantum if all its values are, to this fraction of the quantum.
 ON_GRID = 0.05
-#: So many quanta at most lie between neighbouring values of a typical column.
+#: Most quanta between neighbouring values of a typical column.
 MOST_STEPS = 50
-#: Samples have noise besides their steps if there is this much more variance than the steps make.
+#: Ratio of variance to the variance of the steps from which samples have other noise.
 NOISIER = 1.2
-#: Values that are looked at to find the quantum.
+#: Number of values from which the quantum is found.
 QUANTUM_VALUES = 20000
 
 
 class Path(NamedTuple):
-    """The course of one angle. angle: spline over time (rad, s); its derivative is the rate. noise: standard deviation
+    """The path of one angle. angle: spline over time (rad, s); its derivative is the rate. noise: standard deviation
     of the samples, rad. quantum: of the samples, rad, 0 if none. rate_noise: of the logged rates, rad/s, or None.
-    quiet: (n,) rad, a course at the samples' times that does not follow their errors."""
+    quiet: (n,) rad, a path at the samples' times that does not follow their errors."""
 
     angle: BSpline
     noise: float
@@ -58,15 +58,15 @@ class Path(NamedTuple):
     quiet: Array
 
     def errors(self, random: np.random.Generator) -> Array:
-        """Errors (n,) in rad like those of the samples."""
+        """A draw (n,) of the samples' errors, rad."""
         if self.noise >= self.quantum:
             return random.normal(0, self.noise, len(self.quiet))
         return rounding(self.quiet, self.quantum, random)
 
 
 def smooth(time: Array, theta: Array, omega: Array | None = None, quantum: float = 0.0) -> Path:
-    """The most probable course through the angles theta (n,) rad and, where logged, rates omega (n,) rad/s at the times
-    (n,) s, which may be uneven. quantum: of the angles in rad, where it is known to be coarser than it looks."""
+    """The most probable path through the angles theta (n,) rad and, where logged, rates omega (n,) rad/s at the times
+    (n,) s, which may be uneven. quantum: of the angles in rad, if it is coarser than the data suggest."""
     quantum = max(quantum, quantum_of(theta))
     spline = _Spline(time)
     blocks = [(spline.rows(time, 0), theta)] + ([(spline.rows(time, 1), omega)] if omega is not None else [])
@@ -81,7 +81,7 @@ def quantum_of(values: Array) -> float:
     if len(levels) < 3:
         return float(np.ptp(levels))
     gaps = np.diff(levels)
-    # Digits cut off in the file make two values of one level; what is left of the gaps is one quantum or several.
+    # Truncated digits split a level into two values. The remaining gaps are multiples of the quantum.
     gaps = gaps[gaps > np.median(gaps) / MOST_STEPS]
     quantum = gaps.min()
     for _ in range(3):
@@ -92,16 +92,15 @@ def quantum_of(values: Array) -> float:
 
 
 def rough_noise(values: Array) -> float:
-    """About the standard deviation of white noise on a smooth course (n,), if anything too much: third differences
-    leave next to nothing of the course, and of the noise its variance times 20."""
+    """An estimate, rather too large, of the standard deviation of white noise on smooth values (n,): third differences
+    nearly remove smooth values and multiply the noise's variance by 20."""
     return float(np.std(np.diff(values, 3)) / np.sqrt(20)) if len(values) > 3 else np.inf
 
 
 def rounding(values: Array, quantum: float, random: np.random.Generator) -> Array:
-    """Errors like those an encoder makes at the values (n,). It errs the same way at the same angle, and so alike in
-    every period of a motion."""
-    # What is left of the samples' own errors in `values` must not meet the grid it came from: another zero, another
-    # scale.
+    """A draw of an encoder's errors at the values (n,). An encoder has the same error at the same angle, and so in every
+    period of a motion."""
+    # Remains of the samples' own errors in `values` must not meet their grid again: another zero and another scale.
     level = values * (1 + random.uniform(-RESCALED, RESCALED)) / quantum + random.uniform()
     return (np.rint(level) - level) * quantum
 
@@ -151,7 +150,7 @@ class _Fit(NamedTuple):
 
 
 def _fit(spline: _Spline, blocks: list[Block], least: float) -> _Fit:
-    """The most probable path. blocks: what was measured. least: variance of the first block at least, rad2."""
+    """The most probable path. blocks: the measurements. least: lower bound of the first block's variance, rad2."""
     count = sum(len(values) for _, values in blocks) - ORDER
     normals, rights = [], []
     for rows, values in blocks:

@@ -1,8 +1,8 @@
-"""Ends of intervals where the model bends over the uncertainty: torques alone leave k1 open by several percent, and at
-the lower end of that range the same data would tell more about it than at the upper one.
+"""Intervals if the model is nonlinear within the uncertainty. For example, from torques only, k1 is uncertain by several
+percent, and the data determine it better at the lower end of that range than at the upper one.
 
 An interval ends where the least misfit, over all other parameters, has risen by the square of the quantile (profile
-likelihood; Meeker and Escobar, The American Statistician 49 (1995) 48); by more, where noise is not white.
+likelihood; Meeker and Escobar, The American Statistician 49 (1995) 48), or by more if noise is not white.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ import numpy as np
 from prw.identification.fit import Solution
 from prw.motion import Array
 
-#: Below this standard error (of the logarithm) the model is as good as linear; above the other, there is no interval.
+#: Standard errors (of the logarithm) below which the model counts as linear, and above which there is no interval.
 LINEAR, HOPELESS = 0.01, 1.0
-#: Trials for an end, how close the rise of the misfit's root must come to what is wanted, and how far a trial may reach
-#: beyond the one before.
+#: Most trials for an end, tolerance of the rise of the misfit's root, and longest step relative to the trial before.
 TRIALS, CLOSE, LONGEST = 8, 0.02, 2.0
-#: When the other parameters have followed.
+#: Tolerances of the search over the other parameters.
 FOLLOWED = {"ftol": 1e-5, "xtol": 1e-5}
 
 
@@ -27,7 +26,7 @@ def ends(solution: Solution, white: Array, errors: Array, quantile: float) -> tu
     low, high = solution.logarithms - quantile * errors, solution.logarithms + quantile * errors
     for i, error in enumerate(errors):
         if LINEAR < error < HOPELESS:
-            # Where the others follow parameter i at the least cost.
+            # The direction in which the misfit rises least with parameter i.
             step = quantile * error * white[:, i] / white[i, i]
             rise = (quantile * error) ** 2 / white[i, i]
             low[i], high[i] = _end(solution, i, -step, rise), _end(solution, i, step, rise)
@@ -35,7 +34,7 @@ def ends(solution: Solution, white: Array, errors: Array, quantile: float) -> tu
 
 
 def _end(solution: Solution, i: int, step: Array, wanted: float) -> float:
-    """Logarithm of parameter i at which the least misfit has risen by `wanted`. step: (p,), where to look first."""
+    """Logarithm of parameter i at which the least misfit has risen by `wanted`. step: (p,), the first trial."""
     centre, (low, high) = solution.logarithms, solution.task.span()
     for _ in range(TRIALS):
         point = np.clip(centre + step, low, high)

@@ -1,4 +1,4 @@
-"""The FMU's linear model between samples, and what it answers to the spectra of a recording.
+"""The FMU's linear model between samples, and its response to the spectra of a recording.
 
 Between two samples the motors follow the cubic that has their angles and rates at both; over such a step eq. (11) is
 solved exactly by one matrix exponential. Summed over a recording of n samples, x[k+1] = Ad x[k] + G0 u[k] + G1 u[k+1]
@@ -6,8 +6,8 @@ becomes z X = Ad X + (G0 + z G1) U + z d with z = exp(2 pi i f h) and d = x[0] -
 and ends anywhere differs from a periodic one by six numbers (Pintelon and Schoukens, System Identification: A Frequency
 Domain Approach, 2nd ed., Sec. 6.3.2).
 
-A recording that the FMU simulated in Co-Simulation is compared with what the FMU does: over a step each angle follows its rate, and
-at the start of a step the states jump by what the angle is off from there.
+A recording that the FMU simulated in Co-Simulation is compared with the FMU's own steps: over a step each angle follows its rate, and at
+the start of the next step the states jump by the difference of the angle from this extrapolation.
 """
 
 from __future__ import annotations
@@ -19,12 +19,11 @@ import numpy as np
 from scipy.linalg import expm
 
 from prw.identification.experiment import Experiment
-from prw.identification.model import Matrices
 from prw.motion import Array
-from prw.state_space import Complex
+from prw.state_space import Complex, StateSpace
 from prw.testbed import OUTPUTS
 
-#: The number of a channel, and its frequency response and the derivative of that's logarithm at s = 2 pi i f (f,).
+#: Index of a channel, and a function of s = 2 pi i f (f,): frequency response and the derivative of its logarithm.
 Distorted = tuple[int, Callable[[Complex], tuple[Complex, Complex]]]
 
 
@@ -39,22 +38,22 @@ class Discrete(NamedTuple):
     D: Array
 
     def slopes(self, step: float) -> Discrete:
-        """Derivatives by p parameters, from models at p steps forwards and the same backwards."""
+        """Derivatives with respect to p parameters, from models at p steps forwards and p steps backwards."""
         half = len(self.A) // 2
         return Discrete(*((block[:half] - block[half:]) / (2 * step) for block in self))
 
 
-def discrete(models: Matrices, step: float, channels: tuple[str, ...], simulated: bool = False) -> Discrete:
-    """`models`, one or m of them, over steps of `step` s, with the rows of `channels`. simulated: in steps of the FMU."""
+def discrete(models: Sequence[StateSpace], step: float, channels: tuple[str, ...], simulated: bool = False) -> Discrete:
+    """m models over steps of `step` s, with the rows of `channels`. simulated: in steps of the FMU."""
     rows = [OUTPUTS.index(name) for name in channels]
-    angle, rate = models.B[..., :2], models.B[..., 2:]
+    A, B, C, D = (np.stack([getattr(model, block) for model in models]) for block in "ABCD")
+    angle, rate, C, D = B[..., :2], B[..., 2:], C[..., rows, :], D[..., rows, :]
     # The state, and the motors' angles with three derivatives, in units of the step.
-    whole = np.zeros((*models.A.shape[:-2], 14, 14))
-    whole[..., :6, :6], whole[..., :6, 6:8], whole[..., :6, 8:10] = models.A * step, angle * step, rate
+    whole = np.zeros((len(models), 14, 14))
+    whole[..., :6, :6], whole[..., :6, 6:8], whole[..., :6, 8:10] = A * step, angle * step, rate
     whole[..., 6:12, 8:14] = np.eye(6)
     solved = expm(whole)[..., :6, :]
     e0, e1, e2, e3 = (solved[..., 6 + 2 * i : 8 + 2 * i] for i in range(4))
-    C, D = models.C[..., rows, :], models.D[..., rows, :]
     if simulated:
         before = np.concatenate([e0, step * e1, solved[..., :6] @ rate], axis=-1)
         direct = np.concatenate([D, np.zeros((*D.shape[:-1], 2))], axis=-1)
@@ -65,16 +64,16 @@ def discrete(models: Matrices, step: float, channels: tuple[str, ...], simulated
 
 
 class Response:
-    """What a model answers to the motors of an experiment, at its first `bins` frequencies (f)."""
+    """Response of a model to the motors of an experiment, at its first `bins` frequencies (f)."""
 
     def __init__(
         self, model: Discrete, experiment: Experiment, bins: int, distortions: Sequence[Distorted | None] = ()
     ):
-        """distortions: what each does to its channel, or None where that was not measured."""
+        """distortions: the distortion of a channel, or None if the channel is not measured."""
         self.model = model
         turn = 2j * np.pi * np.arange(bins) / len(experiment.time)
         self._z, self._s = np.exp(turn)[:, None, None], (turn / experiment.step).astype(np.complex128)
-        # The motors as they moved, and each of them alone: an error of an angle comes with one of its rate.
+        # The motors' motion, and a unit error of each angle with the error of its rate.
         motors = experiment.motors[:bins]
         self._motors = np.zeros((*motors.shape, 3), dtype=complex)
         self._motors[..., 0] = motors
@@ -88,7 +87,7 @@ class Response:
         self.outputs: Complex = answers[..., 0]
         #: From the motors' angles, moving with their rates, to the channels: (f, c, 2).
         self.transfer: Complex = answers[..., 1:]
-        #: What each of the six numbers d adds, (f, c, 6).
+        #: Contribution of each of the six numbers d, (f, c, 6).
         self.transients: Complex = self._z * (model.C @ self._resolvent)
         self._filters = np.ones((bins, model.C.shape[0]), dtype=complex)
         self._growths = np.zeros((len(distortions), bins, model.C.shape[0]), dtype=complex)
@@ -102,23 +101,23 @@ class Response:
         self.transfer *= self._filters[..., None]
 
     def moving(self, d: Array) -> tuple[Complex, Complex]:
-        """Spectra of the states (f, 6) with transients `d` (6,), and from what is added to the states in every step to
-        the channels (f, c, 6)."""
+        """Spectra of the states (f, 6) with transients `d` (6,), and the transfer to the channels (f, c, 6) from
+        increments of the states in every step."""
         steps: Complex = np.asarray(self.model.C @ self._resolvent, dtype=np.complex128)
         through = self._filters[..., None] * steps
         return self._with(d)[..., 0], through
 
     def _with(self, d: Array) -> Complex:
-        """The states, with transients `d` (6,) where the motors moved as they did."""
+        """The states, with transients `d` (6,) for the motors' motion."""
         states: Complex = self._states.copy()
         states[..., 0] += (self._z * self._resolvent) @ d
         return states
 
     def slopes(self, change: Discrete, d: Array) -> tuple[Complex, Complex]:
-        """Derivatives by p parameters and the distortions, of outputs with transients `d` (6,): (p, f, c), and of
+        """Derivatives with respect to p parameters and the distortions, of outputs with transients `d` (6,): (p, f, c), and of
         transfer: (p, f, c, 2).
 
-        change: the model's derivatives by them."""
+        change: the model's derivatives with respect to the parameters."""
         count, bins = len(change.A), len(self._states)
 
         def moved_by(block: Array, table: Complex) -> Complex:

@@ -1,4 +1,4 @@
-"""What `prw.identify` returns: the estimates, how sure they are, and the doubts that a careful reader would have."""
+"""The return value of `prw.identify`: estimates, standard errors and doubts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from prw.identification.statistics import Certainty
 from prw.identification.verdict import Verdict
 from prw.motion import Array
 
-#: Residuals this much stronger than the noise that was given, or weaker by as much, are worth a word.
+#: Factor between residuals and given noise that causes a note.
 UNLIKE = 1.5
 #: An estimate that is off its prior by this many standard deviations contradicts it.
 CONTRADICTION = 3.0
@@ -31,8 +31,8 @@ HOPELESS = 1.0
 
 class Estimate(NamedTuple):
     """A parameter that was estimated. value, standard_error: in `unit` (SI), as are both ends of the 95 % `interval`.
-    relative: standard error as a fraction. shown, factor: the unit that the FMU shows it in, and what a value in that
-    unit is multiplied with to be in SI. prior: what was known of it."""
+    relative: standard error as a fraction. shown, factor: the display unit of the FMU, and the factor from that unit to SI.
+    prior: its prior or None."""
 
     value: float
     standard_error: float
@@ -45,14 +45,14 @@ class Estimate(NamedTuple):
 
     @property
     def hopeless(self) -> bool:
-        """Whether the data say next to nothing of it."""
+        """Whether the data hardly determine the parameter."""
         return self.relative > HOPELESS
 
 
 class ChannelFit(NamedTuple):
-    """How one channel of one experiment came out. samples: how many have a value. noise: strength in the band beyond what encoders
-    explain, residual: rms over all frequencies, offset: of the sensor, all SI. explained: share of its motion, or None
-    where the motors do not move it."""
+    """Result of one channel of one experiment. samples: number of values. noise: in the band, without encoders' errors;
+    residual: rms over all frequencies; offset: of the sensor; all SI. explained: share of its motion, or None if the
+    motors do not move the channel."""
 
     experiment: str
     channel: str
@@ -66,11 +66,10 @@ class ChannelFit(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Identification:
-    """What came of identifying the parameters of the FMU `fmu` from `files`.
+    """Result of identifying the parameters of the FMU `fmu` from `files`.
 
     known: the FMU's parameters. solution, sure: the fit itself and its statistics. verdict: whether the model explains
-    the data. diagnosis: what may be wrong if it does not. advice: what would settle open combinations, if there are
-    any."""
+    the data. diagnosis: possible causes if it does not. advice: experiments that would determine undetermined combinations."""
 
     fmu: Path
     known: Parameters
@@ -84,7 +83,7 @@ class Identification:
 
     @property
     def parameters(self) -> dict[str, Estimate]:
-        """What was estimated, by name."""
+        """The estimates by name."""
         task, sure, found = self.solution.task, self.sure, {}
         for i, name in enumerate(task.names):
             parameter, value, relative = self.known.real[name], self.values[name], float(sure.relative[i])
@@ -95,12 +94,12 @@ class Identification:
 
     @property
     def values(self) -> dict[str, float]:
-        """All Real parameters of the FMU in SI by name, those that were held included."""
+        """All Real parameters of the FMU in SI by name, fixed ones included."""
         return self.solution.values
 
     @property
     def distortions(self) -> dict[str, tuple[float, float]]:
-        """Delays and lags (s) and gains that were estimated along, with their standard errors, by name."""
+        """Estimated delays and lags (s) and gains with their standard errors, by name."""
         task, found = self.solution.task, {}
         for i, distortion in enumerate(task.distortions, len(task.names)):
             value = distortion.value(float(self.solution.logarithms[i]))
@@ -115,29 +114,29 @@ class Identification:
 
     @property
     def misfits(self) -> list[str]:
-        """What the model does not explain, by channel, with its frequencies; empty where it fits."""
+        """Descriptions of unexplained residuals by channel, with their frequencies; empty if the model fits."""
         several = len(self.experiments) > 1
         return [f"{misfit.experiment}: {misfit}" if several else str(misfit) for misfit in self.verdict.misfits]
 
     @property
     def correlation(self) -> Array:
-        """Of the estimates, (p, p), in the order of `parameters`; distortions follow."""
+        """Correlation of the estimates, (p, p), in the order of `parameters`; distortions follow."""
         return self.sure.correlation
 
     @property
     def undetermined(self) -> list[str]:
-        """Combinations of parameters that the data leave open; empty where all are determined."""
+        """Combinations of parameters that the data leave open; empty if all are determined."""
         return [str(combination) for combination in self.sure.undetermined]
 
     def residual(self, i: int) -> Array:
-        """Measured minus modelled of experiment i, (n, c), SI, NaN where nothing was measured."""
+        """Measured minus modelled of experiment i, (n, c), SI, NaN if missing."""
         values = self.experiments[i].values
         assert values is not None
         return values - self.solution.modelled[i]
 
     @property
     def channels(self) -> list[ChannelFit]:
-        """How every channel of every experiment came out."""
+        """Results of every channel of every experiment."""
         found = []
         for i, experiment in enumerate(self.experiments):
             residual = self.residual(i)
@@ -154,7 +153,7 @@ class Identification:
 
     @property
     def notes(self) -> list[str]:
-        """What the user should know or doubt, one line each."""
+        """Notes and doubts for the user, one line each."""
         solution, sure = self.solution, self.sure
         lines = [f"{file}: {note}" for file, e in zip(self.files, self.experiments) for note in e.notes]
         for name in solution.task.names:
@@ -193,7 +192,7 @@ class Identification:
         return list(dict.fromkeys(lines))
 
     def summary(self, *, shown: bool = False) -> str:
-        """What was found, in a few lines of text, in SI; with `shown` parameters in the units that the FMU shows."""
+        """The result in a few lines, in SI; with `shown` parameters in display units."""
         channels = ", ".join(dict.fromkeys(name for e in self.experiments for name in e.channels))
         seconds = sum(e.sampled[-1] - e.sampled[0] for e in self.experiments)
         lines = [f"identified  from {', '.join(self.files)}: {seconds:.4g} s with {channels}"]
@@ -217,9 +216,9 @@ class Identification:
         return "\n".join([*lines, *(f"note        {note}" for note in self.notes)])
 
     def report(self, path: str | os.PathLike[str]) -> None:
-        """Write the report, one HTML page that needs nothing beside it: estimates, doubts, residuals. Raises UserError
-        without jinja2, or where it cannot be written."""
-        need("jinja2")
+        """Write the report, an HTML page that loads no other file: estimates, doubts, residuals. Raises UserError without
+        jinja2 or matplotlib, or if the file cannot be written."""
+        need("jinja2", "matplotlib")
         from prw.identification.report import page
 
         residuals = [self.residual(i) for i in range(len(self.experiments))]
@@ -228,11 +227,11 @@ class Identification:
         write_text(Path(path), page(*fitted, found=self, sure=self.sure))
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
-        """Everything in numbers, as JSON; written to `path`, too, where that is given."""
+        """All numbers as JSON, also written to `path` if it is given."""
         return _written(path, json.dumps(self._numbers(), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
     def to_parameters(self, path: str | os.PathLike[str] | None = None) -> str:
-        """All parameters as `build_fmu --parameters` reads them, in the units that the FMU shows."""
+        """All parameters as `build_fmu --parameters` reads them, in display units."""
         return _written(path, self.known.for_building(self.values))
 
     def to_ssv(self, path: str | os.PathLike[str] | None = None, name: str = "identified") -> str:
@@ -256,7 +255,7 @@ class Identification:
         return f"<table><tr>{head}</tr>{''.join(rows)}</table>{notes}"
 
     def _times_its_noise(self, name: str) -> float:
-        """Strength of a channel's residuals in the band in terms of what noise and encoders explain."""
+        """Ratio of a channel's residuals in the band to the expectation from noise and encoders."""
         columns = [
             comparison.residual[..., experiment.channels.index(name)].ravel()
             for experiment, comparison in zip(self.experiments, self.solution.comparisons)

@@ -1,9 +1,9 @@
-"""How sure the estimates are, and which combination of parameters the data do not determine.
+"""Standard errors of the estimates, and combinations of parameters that the data do not determine.
 
-The covariance of the estimates is H^-1 S H^-1: H is the information that the data have, S the variance of the score
-J'r of residuals r. What encoders do to the score is drawn (parametric bootstrap; Efron and Tibshirani 1993, Sec. 6.5),
-and sensors are white: that is one S. The other is the sum over frequencies of each one's own score, squared, as the
-residuals have it, which holds for noise of any colour (White, Econometrica 48 (1980) 817, in the form HC3 of
+The covariance of the estimates is H^-1 S H^-1: H is the information of the data, S the variance of the score J'r of
+residuals r. One S assumes white sensor noise and draws the effect of encoders on the score (parametric bootstrap; Efron
+and Tibshirani 1993, Sec. 6.5). The other S is the sum over frequencies of the squares of the actual scores, which holds
+for noise of any colour (White, Econometrica 48 (1980) 817, in the form HC3 of
 MacKinnon and White, J. Econometrics 29 (1985) 305). The larger of the two errors counts.
 """
 
@@ -19,17 +19,17 @@ from prw.identification.fit import Comparison, Solution
 from prw.identification.profile import ends
 from prw.motion import Array
 
-#: Beyond this, condition numbers are rounding.
+#: Larger condition numbers are rounding errors.
 WORST_CONDITION = 1e15
-#: Exponents of intervals end here: a double can hold them.
+#: Largest exponent of an interval's end that a double can hold.
 WIDEST = 600.0
-#: A residual that the parameters can make vanish is not blown up beyond this.
+#: Least value of 1 - leverage by which a residual is divided.
 LEAST_FREEDOM = 0.1
 #: A combination of parameters that is uncertain by more than this fraction (one sigma) counts as not determined.
 UNDETERMINED = 0.3
-#: Information counts as far as it exceeds this many times what encoders' errors add to it.
+#: Factor of the encoders' contribution that is subtracted from the information.
 MARGIN = 3.0
-#: Parameters that take less than this share in a combination are not named.
+#: Least share of a parameter that is named in a combination.
 SHARE = 0.15
 
 
@@ -51,7 +51,7 @@ class Combination(NamedTuple):
 class Certainty(NamedTuple):
     """names: of the parameters (p). relative: (p,) standard errors as fractions. low, high: (p,) ends of the 95 %
     intervals, SI. covariance, correlation: (p, p). information: (p, p), of the logarithms, priors included, without
-    what encoders' errors add. condition: of its unit-diagonal form. whiteness: by how much the noise's correlation
+    the encoders' contribution. condition: of its unit-diagonal form. whiteness: by how much the noise's correlation
     widens the errors beyond what sensors explain, (p,). undetermined: combinations that the data leave open."""
 
     names: Sequence[str]
@@ -68,7 +68,7 @@ class Certainty(NamedTuple):
 
 def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 0.95) -> Certainty:
     """Standard errors, correlation, intervals and open combinations of a fit. widening: (p,) standard deviations, of
-    what may be wrong besides noise."""
+    possible faults besides noise."""
     names, prior = solution.task.unknowns, solution.task.prior_information()
     squares = prior + information_of(solution.jacobians)
     inverse = covariance_of(_positive(squares - solution.noise_information))
@@ -77,14 +77,14 @@ def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 
         expected += comparison.score_variance(jacobian)
         shown += scores(comparison, jacobian, inverse)
     expected, shown = inverse @ expected @ inverse, inverse @ shown @ inverse
-    # Where a combination is open, rounding makes some of these negative.
+    # If a combination is undetermined, rounding makes some of these negative.
     scale = np.sqrt(np.maximum(np.diag(expected), np.finfo(float).tiny))
     errors = np.maximum(np.sqrt(np.maximum(np.diag(shown), 0.0)), scale)
     whiteness = errors / scale
     covariance = expected * np.outer(whiteness, whiteness)
     corrected = noise_corrected(squares, solution.noise_information)
     open_ones = undetermined(names, corrected)
-    # An open combination is as uncertain as can be.
+    # An undetermined combination keeps its full uncertainty.
     errors = np.hypot(errors, 0.0 if open_ones else widening)
     if open_ones:
         errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(corrected))))
@@ -113,7 +113,7 @@ def information_of(jacobians: Sequence[Array]) -> Array:
 
 def scores(comparison: Comparison, jacobian: Array, inverse: Array) -> Array:
     """Sum over frequencies of the square of each one's score J'r: (p, p). inverse: of the information, (p, p)."""
-    # What the parameters have taken of a residual is given back, as a jackknife would.
+    # Residuals are divided by 1 - leverage, as in a jackknife.
     leverage = np.einsum("rfcp,pq,rfcq->rfc", jacobian, inverse, jacobian, optimize=True)
     residual = comparison.residual / np.maximum(1 - leverage, LEAST_FREEDOM)
     each = np.einsum("rfcp,rfc->fp", jacobian, residual)
@@ -122,7 +122,7 @@ def scores(comparison: Comparison, jacobian: Array, inverse: Array) -> Array:
 
 
 def noise_corrected(information: Array, noise: Array) -> Array:
-    """Information (p, p) without what encoders' errors add to it, `noise` (p, p) times a margin."""
+    """Information (p, p) without the encoders' contribution `noise` (p, p) times a margin."""
     return _positive(information - MARGIN * noise)
 
 

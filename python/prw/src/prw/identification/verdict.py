@@ -1,8 +1,8 @@
-"""Whether the model explains the data, and by what else they would be explained.
+"""Tests whether the model explains the data, and for faults that would explain them.
 
-The residuals of a fit that is right are noise. They are tested against the motion: by local regression on the motors'
-spectra and the channel's own, frequency by frequency (their coherence); along what single faults would leave (a delay,
-a lag or a gain of a channel, or of two in common; friction; backlash), as score tests (Rao, Proc. Cambridge Phil. Soc.
+The residuals of a correct fit are noise. They are tested against the motion: by local regression on the motors' spectra
+and the channel's own, frequency by frequency (their coherence); along the effects of single faults (a delay, a lag or a
+gain of a channel, or of two in common; friction; backlash), as score tests (Rao, Proc. Cambridge Phil. Soc.
 44 (1948) 50); and their strength is compared with that of the noise at frequencies at which the motors do not move.
 """
 
@@ -25,17 +25,17 @@ from prw.testbed import OUTPUTS
 #: assumes, and in slow motion 1e-8 was seen; a fault's estimate over its error that is no
 #: chance, and from which on intervals grow to cover it.
 CHANCE, CLEAR, SMALL = 1e-10, 4.7, 2.5
-#: The same for what follows the sign of a rate, which in a periodic motion encoders' steps do, too.
+#: As CLEAR, for residuals that follow the sign of a rate, as encoders' steps do in a periodic motion.
 CLEAR_SIGN = 7.0
-#: A channel's noise in the band may be this much stronger than above it, besides what chance does in so few values.
+#: Largest ratio of a channel's noise in the band to its noise above, and its tolerance in standard errors.
 EXCESS, LUCK = 1.3, 5.0
-#: Frequencies for each piece in which the residual may follow the motion in its own way, and pieces at most.
+#: Frequencies per piece of the local regression, and most pieces.
 PIECE, MOST_PIECES = 16, 6
-#: A course that moves is this many times stronger (power) than the errors that encoders make in it.
+#: Ratio of a signal's power to the power of encoders' errors in it from which it counts as moving.
 CLEARLY_MOVING = 30.0
-#: Directions that the others explain to this share are none.
+#: Least share of a direction that is independent of the others.
 NEW = 0.02
-#: A rate that is this share of its greatest has a sign.
+#: Share of its greatest magnitude from which a rate has a sign.
 TURNING = 0.02
 
 
@@ -44,19 +44,19 @@ PAIRS = (("tau1", "tau2"), ("theta3", "theta4"), ("pitch", "roll"), ("pitch_rate
 
 
 def groups(channels: Sequence[str]) -> list[tuple[str, ...]]:
-    """Channels that a fault may have in common: each alone, pairs, all."""
+    """Groups of channels that may share a fault: single ones, pairs, all."""
     found = [(name,) for name in channels] + [pair for pair in PAIRS if set(pair) <= set(channels)]
     return found + [tuple(channels)] * (len(channels) > 2)
 
 
 def named(kind: str, group: Sequence[str]) -> str:
-    """The name of a fault that channels have in common."""
+    """The name of a fault that channels share."""
     return f"{kind} of {' and '.join(group) if len(group) < 3 else 'all channels'}"
 
 
 class Fault(NamedTuple):
-    """One thing that may be wrong. name, unit: of its size. size, error: estimated along with the parameters, and
-    standard error. shift: (p,), what it would change of the unknowns. gain: rise of twice the log likelihood."""
+    """A possible fault. name, unit: of its size. size, error: estimated together with the parameters, and its standard
+    error. shift: (p,), the change of the unknowns that it would cause. gain: rise of twice the log likelihood."""
 
     name: str
     unit: str
@@ -67,17 +67,17 @@ class Fault(NamedTuple):
 
     @property
     def signs(self) -> bool:
-        """Whether it follows the sign of a rate."""
+        """Whether the fault follows the sign of a rate."""
         return self.name.startswith(("friction", "backlash"))
 
     @property
     def clear(self) -> float:
-        """Its size in standard errors."""
+        """Size in standard errors."""
         return abs(self.size) / self.error if self.error > 0 else 0.0
 
 
 class Misfit(NamedTuple):
-    """What the model does not explain of a channel. low, high: Hz, where most of it is."""
+    """An unexplained residual of a channel. low, high: Hz, the range with most of it."""
 
     experiment: str
     channel: str
@@ -90,8 +90,8 @@ class Misfit(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """misfits: what the model does not explain; none where it fits. faults: single things that were tried, the
-    clearest first. widening: (p,) standard deviations, of what is too small to be told from chance."""
+    """misfits: unexplained residuals; none if the model fits. faults: tested faults, in decreasing order of significance.
+    widening: (p,) standard deviations by faults that are too small to distinguish from chance."""
 
     misfits: tuple[Misfit, ...]
     faults: tuple[Fault, ...]
@@ -166,21 +166,21 @@ class _Score:
                 self._variance += comparison.score_variance(solution.jacobians[other] @ self._shift)
 
     def chance(self, count: int) -> float:
-        """Probability of so much along all directions in a fit that is right, with noise judged by `count` values."""
+        """Probability of this score along all directions in a correct fit, with noise estimated from `count` values."""
         values, vectors = np.linalg.eigh(self._information)
         whiten = vectors[:, values > NEW] / np.sqrt(values[values > NEW])
         k = whiten.shape[1]
         if not k:
             return 1.0
-        # White residuals have the variance 1 in all directions. DRAWS of encoders' errors tell where there is more, but
-        # they are too few to tell where there is less.
+        # White residuals have the variance 1 in all directions. DRAWS of encoders' errors show larger
+        # variances, but are too few to show smaller ones.
         variance, turn = np.linalg.eigh(whiten.T @ self._variance @ whiten)
         ratio = float(np.sum((turn.T @ whiten.T @ self._score) ** 2 / np.maximum(variance, 1.0)))
         left = max(count - ratio, 0.02 * count) / max(count - k, 1)
         return float(fdtrc(k, max(count - k, 1), ratio / k / left))
 
     def fault(self, name: str, unit: str) -> Fault | None:
-        """The size of the one direction; none where the parameters explain it as well."""
+        """The fault along the only direction; None if the parameters explain it as well."""
         left = float(self._information[0, 0])
         if left < 1e-6:
             return None
@@ -196,8 +196,8 @@ class _Score:
 
 
 def _following(experiment: Experiment, comparison: Comparison, j: int) -> Complex:
-    """What follows the motors, and the channel itself, in channel j: columns (q, f, c), smooth over frequencies. They
-    are 0 where encoders' errors make up much of them: the residual contains the same errors."""
+    """Columns (q, f, c), smooth over frequencies, that follow the motors and the channel itself in channel j. They are 0 at
+    frequencies with large encoders' errors, because the residual contains the same errors."""
     bins, response = experiment.bins, comparison.response
     pieces = int(np.clip(bins // PIECE, 1, MOST_PIECES))
     place = np.linspace(0, pieces - 1 + 1e-9, bins)
@@ -217,12 +217,12 @@ def _following(experiment: Experiment, comparison: Comparison, j: int) -> Comple
 def single_faults(
     solution: Solution, experiment: Experiment, comparison: Comparison
 ) -> Iterator[tuple[str, str, Complex]]:
-    """Name, unit and what it adds to the channels (f, c) per unit, of single faults."""
+    """Single faults: name, unit, and contribution to the channels (f, c) per unit."""
     response, count = comparison.response, experiment.needed_bins
     there = response.outputs + response.transients @ comparison.initial
     s: Complex = 2j * np.pi * np.arange(count, dtype=complex) / (len(experiment.time) * experiment.step)
-    # A lag is the same as a delay to first order. What two channels have in common may be ten standard errors where it is
-    # one and two of each alone, because parameters make up for the rest.
+    # A lag is the same as a delay to first order. A common fault of two channels may have ten standard errors, while each
+    # single one has one or two, because the parameters compensate for the latter.
     for kind, unit in (("delay", "ms"), ("gain", "")):
         for group in groups(experiment.channels):
             distortions = {Distortion(kind, name) for name in group}
@@ -257,8 +257,8 @@ def _sign(rate: Array) -> Array:
 
 
 def _strength(solution: Solution, i: int) -> tuple[Array, Array]:
-    """Noise of the channels (c,) in the band over that at frequencies at which the motors do not move, and the standard
-    error of the former as a fraction: it is large where encoders' errors hide the noise."""
+    """Ratio (c,) of the channels' noise in the band to the noise at frequencies at which the motors do not move, and the
+    relative standard error of the former, which is large if encoders' errors hide the noise."""
     experiment, comparison, found = solution.fitter.experiments[i], solution.comparisons[i], []
     values = experiment.values
     assert values is not None
@@ -268,7 +268,7 @@ def _strength(solution: Solution, i: int) -> tuple[Array, Array]:
     luck = 1 / (2 * inside * np.sqrt(told))
     for j, name in enumerate(experiment.channels):
         column = (values[:, j] - solution.modelled[i][:, j])[np.isfinite(values[:, j])]
-        # Values that are missing are skipped: what is left above the band is noise in any order.
+        # Missing values are skipped: above the band there is only noise, in any order.
         n = len(column)
         share = experiment.band * 2 * (experiment.sampled[-1] - experiment.sampled[0]) / n
         first = max(int(2 * share * n / 2), n // 8)
@@ -284,7 +284,7 @@ def _strength(solution: Solution, i: int) -> tuple[Array, Array]:
 
 
 def _where(experiment: Experiment, comparison: Comparison, j: int) -> tuple[float, float]:
-    """Frequencies in Hz between which lies most of a channel's residual."""
+    """Frequencies in Hz between which most of a channel's residual is."""
     power = np.sum(comparison.residual[:, :, j] ** 2, axis=0)
     total = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
     spacing = experiment.band / max(experiment.bins - 1, 1)

@@ -23,21 +23,19 @@ from prw.parameters import Given, in_own_unit, values_of
 from prw.progress import Progress
 from prw.recording import Recording
 from prw.simulation import Run, motion_of
-from prw.sweeps.study import Rows, Study, chunks, run_chunk
+from prw.sweeps.study import Chunk, Study, run_chunk
 from prw.testbed import Testbed, existing_fmu
 
 if TYPE_CHECKING:
     import pyarrow
 
-#: A chunk is kept when it is done, and is the unit of what an interruption loses: so many in a study, of so many runs.
-CHUNKS, LONGEST_CHUNK = 16, 256
 MOST_RUNS = 10_000_000
-#: How a parameter varies, see `sweep`.
+#: The distribution of a parameter, see `sweep`.
 Spread = float | tuple[float, float] | tuple[str, float, float]
 
 
 class Swept(NamedTuple):
-    """table: a row each run. runs: how many were made now, the others were there already. seconds: what they took."""
+    """table: a row for each run. runs: the number made now; others were there already. seconds: the time they took."""
 
     table: pyarrow.Table
     runs: int
@@ -65,31 +63,31 @@ def sweep(
         Values by parameter, in SI or with a unit as ([1.5, 1.9], "N.m/deg"); all combinations are run.
     random
         By parameter ("uniform", low, high), ("normal", mean, standard deviation) or ("lognormal", median, relative standard
-        deviation), in SI; for the last also the relative standard deviation alone (0.1 is 10 %), about the start value, or
+        deviation), in SI; for the last also only the relative standard deviation (0.1 is 10 %), about the start value, or
         (median, relative). `runs` draws for each combination of the grid, from the seed `seed`.
     parameters
         Values that are the same in all runs, as for `prw.simulate`.
     motion
-        As for `prw.simulate`; so is `fmu`.
+        As for `prw.simulate`, as is `fmu`.
     threads
-        How many make the runs (default: one for each processor).
+        Number of threads (default: one for each processor).
     scheduler
         The address of a Dask cluster that makes the runs instead.
     out
-        A folder in which what is done is kept, so that the same call goes on after an interruption, and the table
-        in the end.
+        A directory in which finished chunks of runs are kept, so that the same call continues after an interruption, and
+        at the end the table.
 
     Returns
     -------
     pyarrow.Table
-        An Arrow table (`.to_pandas()` makes a DataFrame of it), a row each run: `run`; `status`, "done" or
-        "failed"; `message`, why it failed, as where the FMU refuses a value; the parameters; and of each output the
-        peak (of its magnitude), rms and value at the end, such as `roll_peak`, in SI.
+        An Arrow table (`.to_pandas()` makes a DataFrame of it), a row for each run: `run`; `status`, "done" or
+        "failed"; `message`, the cause of a failure, for example that the FMU rejects a value; the parameters; and of each
+        output the peak (of its magnitude), rms and value at the end, such as `roll_peak`, in SI.
 
     Raises
     ------
     UserError
-        An argument makes no sense, a file cannot be read or written, or the cluster does not answer.
+        An argument is out of range, a file cannot be read or written, or the cluster does not answer.
 
     Warns
     -----
@@ -110,27 +108,26 @@ def sweep(
 
 
 def carry_out(study: Study, testbed: Testbed, out: Path | None, threads: int | None, scheduler: str | None) -> Swept:
-    """Make the runs of the study that are missing in the folder `out`, here with `testbed`; the rest as for `sweep`."""
-    from prw.sweeps.store import Memory, Store
+    """Make the runs of the study that are missing in the directory `out`. testbed: for runs on this machine. Other arguments
+    as for `sweep`."""
+    from prw.sweeps.store import Store
 
     threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
-    store = Memory(study) if out is None else Store(out, study)
-    total, done = len(study.table), store.done()
-    missing = [number for number in range(total) if number not in done]
-    start, finished = time.monotonic(), len(done)
-    if missing:
-        parts = chunks(missing, max(threads, min(LONGEST_CHUNK, -(-len(missing) // CHUNKS))))
-        results: Iterable[Rows] = (run_chunk(study, testbed, part, threads) for part in parts)
-        if scheduler:
-            from prw.sweeps.cluster import on_cluster
+    store, start = Store(out, study), time.monotonic()
+    missing, total = store.missing, len(study.table)
+    runs = sum(last - first for first, last in missing)
+    results: Iterable[tuple[Chunk, Any]] = ((chunk, run_chunk(study, testbed, chunk, threads)) for chunk in missing)
+    if scheduler and missing:
+        from prw.sweeps.cluster import on_cluster
 
-            results = on_cluster(study, parts, scheduler)
-        with Progress(f"{total} runs", total) as progress:
-            for rows in results:
-                store.add(rows)
-                finished += len(rows)
-                progress(finished)
-    return Swept(store.finish(), len(missing), time.monotonic() - start)
+        results = on_cluster(study, missing, scheduler)
+    with Progress(f"{total} runs", total) as progress:
+        finished = total - runs
+        for chunk, table in results:
+            store.add(chunk, table)
+            finished += len(table)
+            progress(finished)
+    return Swept(store.finish(), runs, time.monotonic() - start)
 
 
 def layout(
@@ -142,14 +139,14 @@ def layout(
     parameters: Given = None,
 ) -> dict[str, Array]:
     """The values of the parameters that vary, (runs,) each: all combinations of the grid, each with all draws, about
-    `parameters` or the FMU's start values. Raises UserError for what does not fit."""
+    `parameters` or the FMU's start values. Raises UserError for invalid arguments."""
     fixed = values_of(parameters, testbed.loaded)
     testbed.with_starts(fixed)
     starts = {**testbed.starts, **fixed}
     for name in (*grid, *random):
         if name not in testbed.starts:
             argument = "grid" if name in grid else "random"
-            raise UserError(f"{argument}: {name} is not known; there are {', '.join(testbed.starts)}")
+            raise UserError(f"{name} is not known; there are {', '.join(testbed.starts)}", argument=argument)
         if (name in grid) + (name in random) + (name in fixed and name in grid) > 1:
             raise UserError(f"{name} is in more than one of grid, random and parameters; choose one")
     if not grid and not random:
@@ -165,15 +162,15 @@ def layout(
     table = dict(zip(axes, np.repeat(combinations, draws, axis=0).T))
     generator = np.random.default_rng(seed)
     for name, spread in random.items():
-        table[name] = drawn(f"random: {name}", spread, starts[name], generator, total)
+        table[name] = drawn(name, spread, starts[name], generator, total)
     return table
 
 
-def drawn(what: str, spread: Spread, start: float, generator: np.random.Generator, count: int) -> Array:
-    """So many values (count,) of a spread, see `sweep`. Raises UserError for what is none."""
+def drawn(name: str, spread: Spread, start: float, generator: np.random.Generator, count: int) -> Array:
+    """Draw values (count,) from a distribution, see `sweep`. Raises UserError for an invalid distribution."""
     kind, *numbers = spread if isinstance(spread, tuple) and isinstance(spread[0], str) else ("lognormal", spread)
     if kind == "lognormal":
-        median, relative = spread_of(what, tuple(numbers) if len(numbers) > 1 else numbers[0], start)
+        median, relative = spread_of("random", name, tuple(numbers) if len(numbers) > 1 else numbers[0], start)
         return median * np.exp(relative * generator.standard_normal(count))
     finite = len(numbers) == 2 and all(isinstance(n, Real) and math.isfinite(float(n)) for n in numbers)
     one, other = map(float, numbers) if finite else (math.nan, math.nan)  # type: ignore[arg-type]
@@ -182,7 +179,8 @@ def drawn(what: str, spread: Spread, start: float, generator: np.random.Generato
     if kind == "normal" and other > 0:
         return generator.normal(one, other, count)
     raise UserError(
-        f'{what} {spread!r}: write ("uniform", low, high), ("normal", mean, deviation) or ("lognormal", median, relative)'
+        f'{name} {spread!r}: write ("uniform", low, high), ("normal", mean, deviation) or ("lognormal", median, relative)',
+        argument="random",
     )
 
 
@@ -191,7 +189,7 @@ def _column(name: str, values: Any) -> Array:
         column = np.atleast_1d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError):
         column = np.empty(0)
-    # Values that the FMU refuses are runs that fail, not a reason to stop.
+    # If the FMU rejects a value, the run fails and the sweep continues.
     if column.ndim != 1 or not len(column) or not np.isfinite(column).all():
         raise UserError(f"{name}: {values!r} are not the values of a parameter, one or more finite numbers")
     return column

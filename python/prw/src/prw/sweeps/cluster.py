@@ -1,4 +1,4 @@
-"""Runs of a sweep on a Dask cluster. A worker that dies costs nobody else's run."""
+"""Runs of a sweep on a Dask cluster. A worker that dies loses only its own runs."""
 
 from __future__ import annotations
 
@@ -10,17 +10,19 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+
 from prw.errors import UserError
-from prw.sweeps.study import Chunk, Rows, Study, failed, run_chunk
+from prw.sweeps.study import Chunk, Study, lost, run_chunk
 from prw.testbed import Testbed
 
-#: How long to wait for a cluster's scheduler, s.
+#: Timeout of a connection to the scheduler, s.
 PATIENCE = 15
 
 
-def on_cluster(study: Study, chunks: Sequence[Chunk], address: str) -> Iterator[Rows]:
-    """Results of the chunks as they come from the Dask cluster at `address`. What fails as a whole there (its worker
-    died again and again) is recorded as failed, run by run."""
+def on_cluster(study: Study, chunks: Sequence[Chunk], address: str) -> Iterator[tuple[Chunk, pa.Table]]:
+    """Chunks with their results, as they come from the Dask cluster at `address`. The runs of a chunk whose worker died
+    again and again are recorded as failed."""
     client = _connect(address)
     try:
         remote = client.scatter(study, broadcast=True, hash=False)
@@ -30,29 +32,27 @@ def on_cluster(study: Study, chunks: Sequence[Chunk], address: str) -> Iterator[
             error: BaseException | None = future.exception()
             if isinstance(error, ImportError):
                 raise UserError(f"{address}: its workers lack a package ({error}); install prw on them")
-            if error is None:
-                yield future.result()
-            else:
-                yield [failed(study, number, f"lost on the cluster: {error}") for number in range(*futures[future])]
+            chunk = futures[future]
+            yield chunk, future.result() if error is None else lost(study, chunk, f"lost on the cluster: {error}")
     finally:
         client.close()
 
 
-def _on_worker(study: Study, chunk: Chunk) -> Rows:
-    # Of a worker's own threads each makes a chunk.
+def _on_worker(study: Study, chunk: Chunk) -> pa.Table:
+    # A worker makes as many chunks at a time as it has threads.
     return run_chunk(study, _loaded(study.fmu), chunk, threads=1)
 
 
 @lru_cache(maxsize=1)
 def _loaded(fmu: bytes) -> Testbed:
-    """The FMU, which a worker keeps from chunk to chunk."""
+    """The FMU, which a worker loads once."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.fmu"
         path.write_bytes(fmu)
         return Testbed(path)
 
 
-# Removes the unpacked files, which an interpreter that ends does not wait for.
+# Removes the unpacked files at exit.
 atexit.register(_loaded.cache_clear)
 
 
@@ -62,8 +62,10 @@ def _connect(address: str) -> Any:
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise UserError(f"scheduler {address}: no Dask scheduler answers there ({error or 'timeout'})") from None
+        reason = f"no Dask scheduler answers there ({error or 'timeout'})"
+        raise UserError(reason, argument="scheduler", given=address) from None
     if not client.scheduler_info()["workers"]:
         client.close()
-        raise UserError(f"scheduler {address}: the cluster has no workers; start some with `dask worker {address}`")
+        reason = f"the cluster has no workers; start some with `dask worker {address}`"
+        raise UserError(reason, argument="scheduler", given=address)
     return client

@@ -1,11 +1,11 @@
-"""What a sweep consists of, and how its runs are made."""
+"""The runs of a sweep, and how they are made."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import fmu_run
 import numpy as np
@@ -14,17 +14,21 @@ from prw.motion import Array, Motion
 from prw.parameters import Given, values_of
 from prw.testbed import OUTPUTS, Testbed, driven_by, stopped
 
-#: What is kept of each output's course.
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+#: The statistics of each output in a result.
 MEASURES: tuple[fmu_run.Measure, ...] = ("peak", "rms", "end")
-#: Neighbouring runs, (first, last + 1), and what came of runs.
+#: Neighbouring runs, (first, last + 1). An interruption loses the chunks that are in work.
 Chunk = tuple[int, int]
-Rows = list[dict[str, Any]]
+#: Chunks in a study, with at least and at most so many runs each.
+CHUNKS, SHORTEST_CHUNK, LONGEST_CHUNK = 16, 16, 256
 
 
 @dataclass(frozen=True)
 class Study:
-    """fmu: the FMU file's content. motion: what the motors do. names: parameters that vary; table: their values in SI,
-    (runs, len(names)). fixed: values of others. key: a hash of all this."""
+    """The runs of a sweep. fmu: the FMU file's content. motion: of the motors. names: parameters that vary; table: their
+    values in SI, (runs, len(names)). fixed: values of others. key: a hash of all this."""
 
     fmu: bytes
     motion: Motion
@@ -50,46 +54,46 @@ class Study:
             digest.update(repr(sorted(self.fixed.items())).encode())
         object.__setattr__(self, "key", digest.hexdigest()[:16])
 
-    def columns(self) -> list[str]:
-        """Names of a result's columns after `run`, `status` and `message`."""
-        return [*self.names, *(f"{output}_{measure}" for output in OUTPUTS for measure in MEASURES)]
+    def chunks(self) -> list[Chunk]:
+        """All runs in chunks. The chunks depend only on the number of runs, so that a repeated call finds its files."""
+        total = len(self.table)
+        size = min(LONGEST_CHUNK, max(SHORTEST_CHUNK, -(-total // CHUNKS)))
+        return [(first, min(first + size, total)) for first in range(0, total, size)]
+
+    def results(self, chunk: Chunk, errors: Mapping[int, str], measured: Sequence[Array]) -> pa.Table:
+        """The table of a chunk. errors: message by run that failed. measured: (runs of the chunk,) by column."""
+        import pyarrow as pa
+
+        first, last = chunk
+        failed = np.isin(np.arange(first, last), list(errors))
+        columns = {
+            "run": pa.array(range(first, last), pa.int64()),
+            "status": ["failed" if one else "done" for one in failed],
+            "message": [errors.get(run, "") for run in range(first, last)],
+            **dict(zip(self.names, self.table[first:last].T)),
+        }
+        names = (f"{output}_{measure}" for output in OUTPUTS for measure in MEASURES)
+        columns |= {name: pa.array(values, mask=failed) for name, values in zip(names, measured)}
+        return pa.table(columns, metadata={"study": self.key})
 
 
-def run_chunk(study: Study, testbed: Testbed, chunk: Chunk, threads: int) -> Rows:
-    """Results of the runs of the chunk, made by so many threads."""
+def run_chunk(study: Study, testbed: Testbed, chunk: Chunk, threads: int) -> pa.Table:
+    """Make the runs of the chunk with this number of threads."""
     first, last = chunk
-    table = study.table[first:last]
+    varied = dict(zip(study.names, study.table[first:last].T))
     runs = testbed.loaded.run(
         study.motion.time,
         outputs=OUTPUTS,
         measures=MEASURES,
         threads=threads,
-        **driven_by(study.motion, {**study.fixed, **dict(zip(study.names, table.T))}),
+        **driven_by(study.motion, {**study.fixed, **varied}),
     )
-    errors = runs.errors
-    columns = [runs[name, measure].tolist() for name in OUTPUTS for measure in MEASURES]
-    rows = []
-    for number, values, measured in zip(range(first, last), table.tolist(), zip(*columns)):
-        if number - first in errors:
-            rows.append(failed(study, number, stopped(errors[number - first])))
-        else:
-            done = {"run": number, "status": "done", "message": ""}
-            rows.append({**done, **dict(zip(study.columns(), (*values, *measured)))})
-    return rows
+    errors = {first + run: stopped(message) for run, message in runs.errors.items()}
+    return study.results(chunk, errors, [runs[name, measure] for name in OUTPUTS for measure in MEASURES])
 
 
-def failed(study: Study, number: int, message: str) -> dict[str, Any]:
-    """The result of a run that could not be finished."""
-    values = dict(zip(study.names, study.table[number].tolist()))
-    return {**dict.fromkeys(study.columns()), "run": number, "status": "failed", "message": message, **values}
-
-
-def chunks(missing: Sequence[int], size: int) -> list[Chunk]:
-    """Runs that are not done yet, in chunks of at most `size`."""
-    found: list[Chunk] = []
-    for number in missing:
-        if found and found[-1][1] == number and number - found[-1][0] < size:
-            found[-1] = (found[-1][0], number + 1)
-        else:
-            found.append((number, number + 1))
-    return found
+def lost(study: Study, chunk: Chunk, message: str) -> pa.Table:
+    """Results of a chunk of which every run failed with this message."""
+    first, last = chunk
+    nothing = np.zeros(last - first)
+    return study.results(chunk, dict.fromkeys(range(first, last), message), [nothing] * len(OUTPUTS) * len(MEASURES))

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from prw.files import replacing
-from prw.plots import BLUE, STYLE, VERMILION, Panel, draw_panel
-from tools.closed_loop.coupling import Study
-from tools.closed_loop.system import System
+from prw.commands.simulate import write_png
+from prw.plots import BLUE, STYLE, VERMILION, Panel, draw_panels
+from tools.validation.coupling import Study
+from tools.validation.system import System
 
 
 def plot_response(path: Path, system: System, values: dict[str, np.ndarray]) -> None:
@@ -29,21 +29,12 @@ def plot_response(path: Path, system: System, values: dict[str, np.ndarray]) -> 
         Panel("Motor velocities", "θ₁′, θ₂′  (rad/s)", pair(values, "controller.omega", "motor")),
         Panel("Sensor torques", "τ₁, τ₂  (N m)", pair(values, "testbed.tau", "sensor")),
     ]  # fmt: skip
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(8, 0.8 + 2.1 * len(panels)), layout="constrained")
-        goals = [np.rad2deg(value) for _, value in system.inputs.values()]
-        title = "Closed loop: to {:g}° of pitch and {:g}° of roll".format(*goals)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
-        axes = figure.subplots(len(panels), sharex=True)
-        for axis, panel in zip(axes, panels):
-            draw_panel(axis, values["time"], panel)
-        for goal, colour in zip(goals, (BLUE, VERMILION)):
-            axes[0].axhline(goal, color=colour, linestyle=":", linewidth=1)
-        figure.align_ylabels(axes)
-        axes[-1].set_xlabel("time (s)")
-        axes[-1].set_xlim(0, values["time"][-1])
-        with replacing(path) as temporary:
-            figure.savefig(temporary, dpi=150)
+    goals = [np.rad2deg(value) for _, value in system.inputs.values()]
+    title = "Closed loop: to {:g}° of pitch and {:g}° of roll".format(*goals)
+    figure = draw_panels(title, values["time"], panels)
+    for goal, colour in zip(goals, (BLUE, VERMILION)):
+        figure.axes[0].axhline(goal, color=colour, linestyle=":", linewidth=1)
+    write_png(path, figure)
 
 
 def plot_coupling(path: Path, study: Study) -> None:
@@ -68,5 +59,4 @@ def plot_coupling(path: Path, study: Study) -> None:
         axis.set_xticks(step)
         axis.minorticks_off()
         axis.legend(loc="upper left")
-        with replacing(path) as temporary:
-            figure.savefig(temporary, dpi=150)
+    write_png(path, figure)

@@ -1,4 +1,4 @@
-"""The closed loop as `build_closed_loop` describes it: which FMUs, what is wired to what, what it starts with."""
+"""The closed loop in the files of `build_closed_loop`: FMUs, connections and start values."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ OSP = "{http://opensimulationplatform.com/MSMI/OSPSystemStructure}"
 
 @dataclass(frozen=True)
 class System:
-    """ssp: the SSP file; osp: the folder with OspSystemStructure.xml. Variables are written `component.variable`.
+    """ssp: the SSP file; osp: the directory with OspSystemStructure.xml. Variables are written `component.variable`.
 
     fmus: file name by component. connections: output to input. start: values of FMU variables. inputs: the system's
-    inputs with what they feed and their value. stop_time and step in s.
+    inputs, each with its target and its value. stop_time and step in s.
     """
 
     ssp: Path

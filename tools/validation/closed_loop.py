@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from prw.commands.options import DEFAULT_OUT
 from prw.errors import UserError
+from prw.files import replacing
+from tools.validation import DEFAULT_FMUS
 
 if TYPE_CHECKING:
-    from tools.closed_loop.system import System
-
-DEFAULT_FMUS = Path("target/fmu")
-DEFAULT_OUT = Path("out")
+    from tools.validation.system import System
 
 #: A pitch or roll within this of its reference has settled, deg.
 SETTLED = 0.1
@@ -34,7 +35,7 @@ def add_parser(subparsers: Any) -> None:
         type=Path,
         default=DEFAULT_FMUS,
         metavar="DIR",
-        help="folder with prw_closed_loop.ssp and prw_closed_loop/ (default: %(default)s)",
+        help="directory with prw_closed_loop.ssp and prw_closed_loop/ (default: %(default)s)",
     )
     parser.add_argument(
         "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
@@ -43,10 +44,9 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Carry out `tools closed-loop`. Raises UserError with one line on what is wrong."""
-    from tools.closed_loop import coupling, masters, plots
-    from tools.closed_loop.system import read
-    from tools.closed_loop.tables import write_columns
+    """Carry out `tools closed-loop`. Raises UserError with a message of one line."""
+    from tools.validation import coupling, masters, plots
+    from tools.validation.system import read
 
     system = read(arguments.fmus / "prw_closed_loop.ssp", arguments.fmus / "prw_closed_loop")
     runs, absent = {}, []
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> None:
     lines += [f"master      {other}: {_difference(first, values, name)}" for other, values in runs.items()]
     lines += [f"absent      {master.name}: pip package {master.package} is not installed" for master in absent]
     if study is None:
-        lines.append("coupling    not studied, because not every FMU takes and gives derivatives")
+        lines.append("coupling    not studied, because not every FMU has input and output derivatives")
     else:
         lines += [
             f"coupling    {step * 1e3:g} ms: error {held:.2g} deg; with input derivatives {derivatives:.2g} deg"
@@ -82,6 +82,13 @@ def run(arguments: argparse.Namespace) -> None:
         ]
     lines.append(f"wrote       {', '.join(str(out / name) for name in written)}")
     print("\n".join(lines))
+
+
+def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+    """Write columns, each (n,), as CSV with a line of names; twelve digits."""
+    with replacing(path) as temporary:
+        rows = np.column_stack(list(columns.values())) + 0.0
+        np.savetxt(temporary, rows, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
 
 
 def _experiment(system: System) -> str:

@@ -1,8 +1,8 @@
-"""Co-simulation masters of others that run the closed loop: FMPy's SSP support, libcosim, Ecos.
+"""Third-party co-simulation masters that run the closed loop: FMPy's SSP support, libcosim, Ecos.
 
 All three couple by Jacobi's method: every FMU does its step with the outputs the others had at its beginning. So with
-the same step they must agree to rounding. Each runs in a process of its own, because libraries in C++ bring their own
-loggers, thread pools and crashes.
+the same step they must agree within rounding error. Each runs in a separate process, because libraries in C++ bring
+their own loggers, thread pools and crashes.
 """
 
 from __future__ import annotations
@@ -12,45 +12,27 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
-from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 
 from prw.errors import UserError
-from tools.closed_loop.system import System, read
+from tools.validation.importers import Tool
+from tools.validation.system import System, read
 
-#: What is recorded, as `component.variable`.
+#: The recorded variables, as `component.variable`.
 RECORDED = (
     *(f"controller.{name}" for name in ("theta1", "theta2", "omega1", "omega2")),
     *(f"testbed.{name}" for name in ("pitch", "roll", "tau1", "tau2")),
 )
 TIMEOUT = 300.0
-#: Of the project.
+#: Repository root.
 ROOT = Path(__file__).resolve().parents[2]
-
-
-@dataclass(frozen=True)
-class Master:
-    """A master: its name, the pip package it comes in, and what runs the system under it."""
-
-    name: str
-    package: str
-    simulate: Callable[[System], np.ndarray]
-
-    def version(self) -> str | None:
-        """The installed version, or None."""
-        try:
-            return metadata.version(self.package)
-        except metadata.PackageNotFoundError:
-            return None
 
 
 def fmpy_ssp(system: System) -> np.ndarray:
     """FMPy's simulate_ssp. It leaves the start values in the SSP to its caller, and feeds the system's inputs to the
-    FMUs after the first step only, so that the whole experiment is one step late; that row is left out."""
+    FMUs after the first step only. Results therefore lag one step, and the first row is dropped."""
     from fmpy.ssp.simulation import simulate_ssp
     from fmpy.ssp.ssd import Parameter, ParameterSet
 
@@ -62,7 +44,7 @@ def fmpy_ssp(system: System) -> np.ndarray:
 
 
 def libcosim(system: System) -> np.ndarray:
-    """libcosim, from OspSystemStructure.xml with all it says."""
+    """libcosim, from OspSystemStructure.xml only."""
     from fmpy import read_model_description
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
@@ -88,12 +70,12 @@ def libcosim(system: System) -> np.ndarray:
 
 
 def ecos(system: System) -> np.ndarray:
-    """Ecos, wired call by call: its SSP import knows no connectors of the system itself ("No element named").
+    """Ecos, connected call by call: its SSP import knows no connectors of the system itself ("No element named").
 
-    It shows outputs after the inputs of the next step have been set. Torques follow from those directly, so they differ
-    from the other masters' by the jump of an input at a communication point; nothing in the loop does.
+    Ecos returns outputs after the inputs of the next step have been set. Torques depend on these inputs directly, so they differ
+    from the other masters' by the jump of an input at a communication point. Signals that are fed back do not differ.
     """
-    # Ecos does not say where its dependency is: the wheel `tbb` puts it into the environment's lib.
+    # Ecos does not name the path of its dependency: the wheel `tbb` puts it into the environment's lib.
     ctypes.CDLL(str(Path(sys.prefix, "lib", "libtbb.so.12")), mode=ctypes.RTLD_GLOBAL)
     from ecospy import EcosSimulation, EcosSimulationStructure
 
@@ -117,17 +99,17 @@ def ecos(system: System) -> np.ndarray:
 
 
 MASTERS = (
-    Master("FMPy", "fmpy", fmpy_ssp),
-    Master("libcosim", "libcosimpy", libcosim),
-    Master("Ecos", "ecospy", ecos),
+    Tool("FMPy", "fmpy", "CoSimulation", fmpy_ssp),
+    Tool("libcosim", "libcosimpy", "CoSimulation", libcosim),
+    Tool("Ecos", "ecospy", "CoSimulation", ecos),
 )
 
 
-def run_apart(master: Master, system: System) -> dict[str, np.ndarray]:
-    """Run the system under the master in a process of its own.
+def run_apart(master: Tool, system: System) -> dict[str, np.ndarray]:
+    """Run the system under the master in a separate process.
 
-    Returns `time` and RECORDED by name, each (steps,): the values at the end of every step. Raises UserError with what
-    the process said if it fails, or if it logs a warning or an error.
+    Returns `time` and RECORDED by name, each (steps,): the values at the end of every step. Raises UserError with the
+    output of the process if it fails, or if it logs a warning or an error.
     """
     with tempfile.TemporaryDirectory() as folder:
         result = Path(folder, "result.npy")
@@ -149,5 +131,5 @@ def run_apart(master: Master, system: System) -> dict[str, np.ndarray]:
 
 if __name__ == "__main__":
     _name, _ssp, _osp, _result = sys.argv[1:]
-    _simulate = next(master.simulate for master in MASTERS if master.name == _name)
+    _simulate = next(master.run for master in MASTERS if master.name == _name)
     np.save(_result, _simulate(read(Path(_ssp), Path(_osp))))

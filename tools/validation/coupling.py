@@ -1,9 +1,8 @@
-"""What coupling at communication points costs: Jacobi's method with and without input derivatives, over the step
-size."""
+"""The error of coupling at communication points: Jacobi's method with and without input derivatives, over the step."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any, NamedTuple
 
@@ -11,9 +10,9 @@ import fmpy
 import numpy as np
 from fmu_run import Fmu, Instances
 
-from tools.closed_loop.system import System
+from tools.validation.system import System
 
-#: Communication steps (s) and the one that stands for the exact solution; all are whole multiples of it.
+#: Communication steps (s), and the step of the reference solution; the former are integer multiples of the latter.
 STEPS = (125e-6, 250e-6, 500e-6, 1e-3, 2e-3, 4e-3, 8e-3, 16e-3)
 FINEST = 31.25e-6
 DURATION = 0.96
@@ -28,7 +27,7 @@ class Study(NamedTuple):
     derivatives: np.ndarray
 
     def columns(self) -> dict[str, np.ndarray]:
-        """For a table."""
+        """The columns of a table."""
         return {"step": self.step, "error_held_deg": self.held, "error_with_derivatives_deg": self.derivatives}
 
 
@@ -69,18 +68,18 @@ def couple(
         for name, fmu in system.fmus.items():
             start = {key.split(".")[1]: value for key, value in values.items() if key.split(".")[0] == name}
             instances[name] = stack.enter_context(Fmu(system.osp / fmu)).instances(start=start)
-        wires = [_wire(instances, [w for w in system.connections if _ends(w) == ends]) for ends in _pairs(system)]
+        connections = _connections(system, instances)
         watched = [(instances[name.split(".")[0]], name.split(".")[1]) for name in outputs]
         rows = np.empty((n + 1, len(outputs)))
         for k, row in enumerate(rows):
             row[:] = [instance.get(variable)[0] for instance, variable in watched]
             if k < n:
-                # All outputs before any input: setting one must not change what another reads.
-                for source, variables, _, _, read, slopes in wires:
+                # All outputs are read before any input is set, because an input may change outputs.
+                for source, variables, _, _, read, slopes in connections:
                     source.get(variables, read)
                     if derivatives:
                         source.get_output_derivatives(variables, slopes)
-                for _, _, target, inputs, read, slopes in wires:
+                for _, _, inputs, target, read, slopes in connections:
                     target.set(inputs, read)
                     if derivatives:
                         target.set_input_derivatives(inputs, slopes)
@@ -89,20 +88,13 @@ def couple(
     return rows
 
 
-def _ends(wire: tuple[str, str]) -> list[str]:
-    return [end.split(".")[0] for end in wire]
-
-
-def _pairs(system: System) -> list[list[str]]:
-    pairs = []
-    for wire in system.connections:
-        if _ends(wire) not in pairs:
-            pairs.append(_ends(wire))
-    return pairs
-
-
-def _wire(instances: dict[str, Instances], wires: list[tuple[str, str]]) -> Any:
-    """All connections from one FMU to another: the source and its outputs, the target and its inputs, and two rows."""
-    source, target = (instances[end] for end in _ends(wires[0]))
-    outputs, inputs = (tuple(wire[end].split(".")[1] for wire in wires) for end in (0, 1))
-    return source, outputs, target, inputs, np.empty((1, len(wires))), np.empty((1, len(wires)))
+def _connections(system: System, instances: Mapping[str, Instances]) -> list[Any]:
+    """For each pair of connected FMUs: the source and its outputs, the target and its inputs, and two rows of memory."""
+    pairs: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for output, input_ in system.connections:
+        (source, output), (target, input_) = output.split("."), input_.split(".")
+        pairs.setdefault((source, target), []).append((output, input_))
+    return [
+        (instances[source], *zip(*names), instances[target], np.empty((1, len(names))), np.empty((1, len(names))))
+        for (source, target), names in pairs.items()
+    ]

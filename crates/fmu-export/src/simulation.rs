@@ -1,0 +1,260 @@
+//! [`Simulation`]: runs a model in the tests of its author.
+
+use crate::export::Exported;
+use crate::instance::{Importer, Instance, Refusal};
+use crate::model::{Error, Experiment, Setup};
+use crate::table::Variables;
+use crate::variable::Variable;
+use fmi_abi::{BaseType, Interface, Mode, Standard, Status, Value};
+
+/// Simulates a model in this process, for the tests of the model. It makes the calls of a Co-Simulation
+/// importer.
+///
+/// The FMU checks every value, handles events within a step and stores messages.
+///
+/// ```
+/// # use fmu_export::*;
+/// # #[derive(Clone, Default)]
+/// # struct Lag { u: f64, x: f64 }
+/// # variables! { for Lag;
+/// #     /// Input
+/// #     u = input(&NUMBER) in u;
+/// #     /// Output
+/// #     x = output(&NUMBER).exact() in x;
+/// # }
+/// # impl Model for Lag {
+/// #     const INFO: Info = Info::new("Lag", "lag", "{lag}");
+/// #     fn new(_: &Setup) -> Result<Self, Error> { Ok(Self::default()) }
+/// # }
+/// # impl CoSimulation for Lag {
+/// #     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+/// #         self.x += (self.u - self.x) * (1.0 - (-step.size).exp());
+/// #         Ok(Stepped::Done)
+/// #     }
+/// # }
+/// # offer!(Lag: CoSimulation);
+/// let x = Simulation::<Lag>::new()?.set("u", 1.0)?.run(5.0)?.get("x")?;
+/// assert!((x - (1.0 - (-5.0_f64).exp())).abs() < 1e-12);
+/// # Ok::<(), Error>(())
+/// ```
+pub struct Simulation<M> {
+    instance: Instance<M>,
+    step_size: f64,
+}
+
+impl<M: Exported> Simulation<M> {
+    /// Creates a simulation of the model with its start values. The step size comes from
+    /// [`INFO`](crate::Model::INFO).
+    ///
+    /// # Errors
+    /// Fails if the model cannot be made, or does not support Co-Simulation.
+    pub fn new() -> Result<Self, Error> {
+        Self::with(Setup::new(Interface::CoSimulation))
+    }
+
+    /// Creates a simulation with the directory of the model's resources, such as `modelDescription/resources`
+    /// of the package.
+    ///
+    /// # Errors
+    /// Same errors as [`new`](Self::new).
+    pub fn with_resources(directory: &str) -> Result<Self, Error> {
+        let resource_location = Some(directory.to_owned());
+        Self::with(Setup { resource_location, ..Setup::new(Interface::CoSimulation) })
+    }
+
+    fn with(setup: Setup) -> Result<Self, Error> {
+        let importer = Importer { standard: Standard::Fmi3, event_mode: false, early_return: true };
+        let instance = Instance::new(setup, importer, true)?;
+        Ok(Self { instance, step_size: M::INFO.default_experiment.step_size })
+    }
+
+    /// Sets the size of the following steps, s.
+    pub fn step_size(&mut self, size: f64) -> &mut Self {
+        self.step_size = size;
+        self
+    }
+
+    /// Sets a variable, an element, or all elements of an array, for example `x` or `x[2]`. Set start values
+    /// before the first step; set inputs and tunable parameters at any time.
+    ///
+    /// # Errors
+    /// Fails if there is no such variable, or if the model rejects the value.
+    pub fn set(&mut self, name: &str, value: impl Into<Value>) -> Result<&mut Self, Error> {
+        let places = places::<M>(name)?;
+        let values = vec![value.into(); places.len()];
+        self.set_all(&places, values)
+    }
+
+    /// Sets the elements of an array together, row by row.
+    ///
+    /// # Errors
+    /// Fails for the errors of [`set`](Self::set), and if the array has another length.
+    pub fn set_array<V: Into<Value>>(
+        &mut self,
+        name: &str,
+        values: impl IntoIterator<Item = V>,
+    ) -> Result<&mut Self, Error> {
+        let places = places::<M>(name)?;
+        let values: Vec<Value> = values.into_iter().map(Into::into).collect();
+        if values.len() != places.len() {
+            return Err(Error::new(format!(
+                "{name} has {} elements, there are {} values",
+                places.len(),
+                values.len()
+            )));
+        }
+        self.set_all(&places, values)
+    }
+
+    fn set_all(&mut self, places: &[u32], values: Vec<Value>) -> Result<&mut Self, Error> {
+        let variable = variable::<M>(places[0]);
+        let kind = |value: &Value| match value {
+            Value::Real(_) => matches!(variable.base(), BaseType::Real | BaseType::Float32),
+            Value::Boolean(_) => variable.base() == BaseType::Boolean,
+            Value::String(_) => variable.base() == BaseType::String,
+            Value::Binary(_) => variable.base() == BaseType::Binary,
+            Value::Integer(_) => {
+                variable.base().range().is_some() || variable.base() == BaseType::Enumeration
+            }
+        };
+        if let Some(value) = values.iter().find(|value| !kind(value)) {
+            let (name, base) = (variable.name(), variable.base());
+            return Err(Error::new(format!("{name} is of type {base} and cannot be {value:?}")));
+        }
+        self.instance.set(places, &[variable.base()], &|index| values[index].clone())?;
+        self.instance.listen();
+        Ok(self)
+    }
+
+    /// Initializes the model. Without this call, [`run`](Self::run) initializes it.
+    ///
+    /// # Errors
+    /// Fails if the model cannot start with these values.
+    pub fn initialize(&mut self) -> Result<&mut Self, Error> {
+        if self.instance.mode() == Mode::Instantiated {
+            self.instance.enter_initialization_mode_at(Experiment::default())?;
+            self.instance.exit_initialization_mode()?;
+            self.instance.listen();
+        }
+        Ok(self)
+    }
+
+    /// Performs steps to this time, s, or until the model ends the simulation; see
+    /// [`has_ended`](Self::has_ended).
+    ///
+    /// # Errors
+    /// Fails if the model rejects a step.
+    pub fn run(&mut self, until: f64) -> Result<&mut Self, Error> {
+        self.initialize()?;
+        let begin = self.time();
+        let steps = ((until - begin) / self.step_size - 1e-9).ceil();
+        for step in 1..=steps as u64 {
+            let end = if step as f64 == steps { until } else { begin + step as f64 * self.step_size };
+            // A step may end early; the next step then begins there.
+            while self.time() < end && !self.has_ended() {
+                let time = self.time();
+                self.instance.do_step_to(time, end - time)?;
+                self.instance.listen();
+            }
+        }
+        Ok(self)
+    }
+
+    /// Returns the current time, s.
+    pub fn time(&self) -> f64 {
+        self.instance.last_successful_time()
+    }
+
+    /// Returns whether the model has ended the simulation.
+    pub fn has_ended(&self) -> bool {
+        self.instance.has_ended()
+    }
+
+    /// Returns the value of a variable.
+    ///
+    /// # Errors
+    /// Fails if there is no such variable, or if its value is not finite.
+    pub fn value(&mut self, name: &str) -> Result<Value, Error> {
+        Ok(self.values(name)?.swap_remove(0))
+    }
+
+    /// Returns the value of a number; 0 or 1 for a Boolean.
+    ///
+    /// # Errors
+    /// Fails for the errors of [`value`](Self::value), and if the variable is no number.
+    pub fn get(&mut self, name: &str) -> Result<f64, Error> {
+        match self.value(name)? {
+            Value::Real(value) => Ok(value),
+            Value::Integer(value) => Ok(value as f64),
+            Value::Boolean(value) => Ok(f64::from(u8::from(value))),
+            other => Err(Error::new(format!("{name} is no number but {other:?}"))),
+        }
+    }
+
+    /// Returns the values of all elements of an array, row by row.
+    ///
+    /// # Errors
+    /// Same errors as [`value`](Self::value).
+    pub fn values(&mut self, name: &str) -> Result<Vec<Value>, Error> {
+        let places = places::<M>(name)?;
+        let mut values = Vec::new();
+        let base = variable::<M>(places[0]).base();
+        self.instance.get(&places, &[base], &mut |_, value| values.push(value))?;
+        self.instance.listen();
+        Ok(values)
+    }
+
+    /// Returns the serialized state, as an importer gets it: the values of the table and its `memory`.
+    ///
+    /// # Errors
+    /// Fails if the state cannot be saved.
+    pub fn save(&mut self) -> Result<Vec<u8>, Error> {
+        let handle = self.instance.save(0)?;
+        let mut bytes = vec![0; self.instance.serialized_size(handle)?];
+        self.instance.serialize(handle, &mut bytes)?;
+        drop(self.instance.give(handle)?);
+        Ok(bytes)
+    }
+
+    /// Restores a state that this or another simulation has saved.
+    ///
+    /// # Errors
+    /// Fails if the bytes are no state of this model, or if the model rejects them.
+    pub fn restore(&mut self, bytes: &[u8]) -> Result<&mut Self, Error> {
+        let handle = self.instance.deserialize(bytes, 0)?;
+        self.instance.restore(handle)?;
+        drop(self.instance.give(handle)?);
+        Ok(self)
+    }
+
+    /// Returns the messages since the last call, of the model and of the FMU.
+    pub fn messages(&mut self) -> Vec<(Status, String)> {
+        self.instance.logger.take().into_iter().map(|message| (message.status, message.text)).collect()
+    }
+}
+
+impl From<Box<Refusal>> for Error {
+    fn from(refusal: Box<Refusal>) -> Self {
+        Self::new(refusal.message)
+    }
+}
+
+fn variable<M: Variables>(place: u32) -> &'static Variable<M> {
+    &M::TABLE[place as usize]
+}
+
+/// Returns the indices of a variable, an element, or all elements of an array.
+fn places<M: Exported>(name: &str) -> Result<Vec<u32>, Error> {
+    let of_name = |of: &Variable<M>| of.name() == name || of.length() > 1 && of.name_of_array() == name;
+    let places: Vec<u32> =
+        (0..).zip(M::TABLE).filter(|(_, of)| of_name(of)).map(|(place, _)| place).collect();
+    if places.is_empty() {
+        let names: Vec<_> = M::LINES.iter().map(Variable::name).collect();
+        return Err(Error::new(format!(
+            "{} has no variable {name}; it has {}",
+            M::INFO.name,
+            names.join(", ")
+        )));
+    }
+    Ok(places)
+}

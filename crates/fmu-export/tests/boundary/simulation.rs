@@ -1,0 +1,62 @@
+//! Tests of [`Simulation`], the test driver for authors.
+
+use crate::toys::{Rod, Ticker};
+use fmu_export::{Simulation, Value};
+
+/// Checks a variable that follows arrays, array elements, and whole arrays.
+#[test]
+fn variables_have_the_names_of_the_description() {
+    let mut rod = Simulation::<Rod>::new().unwrap();
+    rod.set("conductance", 0.5).unwrap().set("limits[2,1]", 12.0).unwrap();
+    rod.set_array("power", [1.0, 2.0]).unwrap().set("labels", "half").unwrap();
+    assert_eq!(rod.get("conductance").unwrap(), 0.5);
+    let limits = [10.0, 25.0, 12.0, 30.0].map(Value::Real);
+    assert_eq!(rod.values("limits").unwrap(), limits);
+    assert_eq!(rod.get("power[2]").unwrap(), 2.0);
+    assert_eq!(rod.value("labels[1]").unwrap(), Value::from("half"));
+    // The derivatives of a calculated array depend on the values that were set.
+    let wall = rod.get("der(T[1])").unwrap();
+    assert!(rod.set("wall", 500.0).unwrap().get("der(T[1])").unwrap() > wall);
+}
+
+#[test]
+fn what_does_not_fit_is_named() {
+    let mut rod = Simulation::<Rod>::new().unwrap();
+    let rejected =
+        |result: Result<&mut Simulation<Rod>, fmu_export::Error>| result.err().unwrap().to_string();
+    assert!(rejected(rod.set("wal", 1.0)).starts_with("Rod has no variable wal; it has wall, T, power,"));
+    assert_eq!(rejected(rod.set_array("power", [1.0; 3])), "power has 2 elements, there are 3 values");
+    assert_eq!(rejected(rod.set("wall", 1)), "wall is of type Real and cannot be Integer(1)");
+    assert_eq!(rejected(rod.set("conductance", 2.0)), "conductance must not be above 1, it is 2");
+    assert_eq!(rejected(rod.set("mean", 2.0)).split(" in state").next(), Some("mean cannot be set"));
+    assert_eq!(
+        rod.get("labels[1]").err().unwrap().to_string().split(" but").next(),
+        Some("labels[1] is no number")
+    );
+}
+
+/// Checks events within a step, and an end of the simulation that the model requests.
+#[test]
+fn events_are_handled() {
+    let mut ticker = Simulation::<Ticker>::new().unwrap();
+    ticker.set("amount", 2.0).unwrap().set("last", 4).unwrap().step_size(0.6).run(0.6).unwrap();
+    assert_eq!((ticker.get("ticks").unwrap(), ticker.get("sum").unwrap()), (3.0, 6.0));
+    assert!(!ticker.has_ended() && ticker.time() == 0.6);
+    ticker.run(9.0).unwrap();
+    assert!(ticker.has_ended() && ticker.time() == 0.75);
+    assert_eq!(ticker.get("ticks").unwrap(), 4.0);
+}
+
+/// Checks that a state includes `next`, the time of the next tick, which is memory of the model.
+#[test]
+fn a_state_goes_on_in_another_simulation() {
+    let mut ticker = Simulation::<Ticker>::new().unwrap();
+    let saved = ticker.step_size(0.3).set("amount", 2.0).unwrap().run(0.6).unwrap().save().unwrap();
+    let mut other = Simulation::<Ticker>::new().unwrap();
+    other.step_size(0.3).restore(&saved).unwrap();
+    assert_eq!(other.time(), 0.6);
+    for simulation in [&mut ticker, &mut other] {
+        assert_eq!(simulation.run(1.2).unwrap().get("sum").unwrap(), 10.0);
+    }
+    assert!(other.restore(&saved[1..]).is_err());
+}
