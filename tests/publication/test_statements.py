@@ -75,6 +75,6 @@ def test_no_package_of_the_project_is_asked_of_a_registry() -> None:
         for arguments in INSTALL.findall(text(name)):
             words = [word.strip("\"'").lower().replace("_", "-") for word in arguments.split()]
             asked = {re.split(r"[\[=<>~@]", word)[0] for word in words}
-            assert "--no-index" in words or not asked & own, f"{name}: {arguments}"
+            assert {"--no-index", "--git"} & set(words) or not asked & own, f"{name}: {arguments}"
         links = re.findall(r"docs\.rs/([\w-]+)", text(name))
         assert name.endswith(".toml") or not own & {*links}, name
