@@ -68,7 +68,7 @@ pub struct CoSimulationOffer {
 }
 
 impl CoSimulationOffer {
-    /// Panics if a step ended in a way that the model has not declared, because importers rely on the declaration.
+    /// Panics if a step ended in a way that the model does not declare, because importers rely on the declaration.
     #[doc(hidden)]
     #[inline]
     pub fn check(&self, stepped: &Result<Stepped, Error>) {

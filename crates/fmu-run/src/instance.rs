@@ -328,7 +328,7 @@ impl Instance {
         self.log.take();
     }
 
-    /// Returns the messages since the last call, of an instance with logging enabled.
+    /// Returns the messages since the last call, if logging is on.
     pub(crate) fn take_messages(&self) -> Vec<Message> {
         self.log.take_all()
     }

@@ -153,7 +153,7 @@ fn endless_events() {
     );
 }
 
-/// A model that ends every step early, or at an event if its input is 1, and does not declare it.
+/// A model that ends every step early, or at an event if its input is 1, and declares neither.
 mod hasty {
     use fmu_export::*;
 
@@ -198,7 +198,7 @@ fn an_early_end_that_the_model_has_not_announced() {
     }
 }
 
-/// Checks that the message for an event differs from the message for an early end.
+/// The message names what an event needs, which an early end does not.
 #[test]
 #[should_panic(expected = "add `const EVENTS: Events = Events::Stop;` to its impl CoSimulation")]
 fn an_event_that_the_model_has_not_declared() {

@@ -23,22 +23,22 @@ pub struct Watch {
     done: AtomicUsize,
     cancelled: AtomicBool,
     ended: Mutex<Vec<(usize, f64)>>,
-    /// Messages of runs, each with its time, if the caller requests them.
+    /// Messages of runs, each with its time, if the caller wants them.
     messages: Option<Mutex<Vec<(usize, f64, Message)>>>,
 }
 
 impl Watch {
-    /// Creates a watch that records all messages of the FMU and enables its logging.
+    /// Creates a watch that receives all messages of the FMU. Logging is switched on.
     pub fn listening() -> Self {
         Self { messages: Some(Mutex::default()), ..Self::default() }
     }
 
-    /// Returns the messages until now: number of the run, time of the communication point, message.
+    /// Returns the messages so far, each with the number of the run and the time of the communication point.
     pub fn messages(&self) -> Vec<(usize, f64, Message)> {
         self.messages.as_ref().map(|messages| lock(messages).clone()).unwrap_or_default()
     }
 
-    /// Returns the runs that the FMU has ended, each with the time, s.
+    /// Returns the runs that the FMU has ended, with their end times in s.
     pub fn ended(&self) -> Vec<(usize, f64)> {
         lock(&self.ended).clone()
     }
@@ -69,7 +69,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Result memory of a run.
+/// What a run has to fill.
 struct Row<'a> {
     run: usize,
     courses: &'a mut [f64],
@@ -367,8 +367,8 @@ fn follow(
             let size = next - time;
             match instance.step(time, size) {
                 Ok(()) => hear(time, instance),
-                // The FMU ended at the next time. There, outputs can be read but inputs no longer set
-                // (section 4.2.4 of FMI 2.0).
+                // The end is at the next time, whose outputs can be read, but inputs no longer set (section 4.2.4 of
+                // FMI 2.0).
                 Err(refusal) if refusal.ended().is_some_and(|end| next - end <= 1e-9 * size) => {
                     ended = Some(refusal);
                 }
