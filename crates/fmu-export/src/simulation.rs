@@ -1,4 +1,4 @@
-//! [`Simulation`]: a model in the tests of its author.
+//! [`Simulation`]: runs a model in the tests of its author.
 
 use crate::export::Exported;
 use crate::instance::{Importer, Instance, Refusal};
@@ -7,9 +7,10 @@ use crate::table::Variables;
 use crate::variable::Variable;
 use fmi_abi::{BaseType, Interface, Mode, Standard, Status, Value};
 
-/// Simulates a model in this process as an importer of Co-Simulation does, for the tests of the model.
+/// Simulates a model in this process, for the tests of the model. It makes the calls of a Co-Simulation
+/// importer.
 ///
-/// The FMU checks every value, handles events within a step and keeps messages.
+/// The FMU checks every value, handles events within a step and stores messages.
 ///
 /// ```
 /// # use fmu_export::*;
@@ -42,18 +43,20 @@ pub struct Simulation<M> {
 }
 
 impl<M: Exported> Simulation<M> {
-    /// The model with its start values. Steps have the size of [`INFO`](crate::Model::INFO).
+    /// Creates a simulation of the model with its start values. The step size comes from
+    /// [`INFO`](crate::Model::INFO).
     ///
     /// # Errors
-    /// When the model cannot be made, or has no Co-Simulation.
+    /// Fails if the model cannot be made, or does not support Co-Simulation.
     pub fn new() -> Result<Self, Error> {
         Self::with(Setup::new(Interface::CoSimulation))
     }
 
-    /// The model with the directory of its resources, such as `modelDescription/resources` of the package.
+    /// Creates a simulation with the directory of the model's resources, such as `modelDescription/resources`
+    /// of the package.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Same errors as [`new`](Self::new).
     pub fn with_resources(directory: &str) -> Result<Self, Error> {
         let resource_location = Some(directory.to_owned());
         Self::with(Setup { resource_location, ..Setup::new(Interface::CoSimulation) })
@@ -65,17 +68,17 @@ impl<M: Exported> Simulation<M> {
         Ok(Self { instance, step_size: M::INFO.default_experiment.step_size })
     }
 
-    /// Sets the size of the steps that follow, s.
+    /// Sets the size of the following steps, s.
     pub fn step_size(&mut self, size: f64) -> &mut Self {
         self.step_size = size;
         self
     }
 
-    /// Sets a variable, or all elements of an array, as `x` or `x[2]`: start values before the first step, inputs and
-    /// tunable parameters later.
+    /// Sets a variable, an element, or all elements of an array, for example `x` or `x[2]`. Set start values
+    /// before the first step; set inputs and tunable parameters at any time.
     ///
     /// # Errors
-    /// When there is no such variable, or the model rejects the value.
+    /// Fails if there is no such variable, or if the model rejects the value.
     pub fn set(&mut self, name: &str, value: impl Into<Value>) -> Result<&mut Self, Error> {
         let places = places::<M>(name)?;
         let values = vec![value.into(); places.len()];
@@ -85,7 +88,7 @@ impl<M: Exported> Simulation<M> {
     /// Sets the elements of an array together, row by row.
     ///
     /// # Errors
-    /// As [`set`](Self::set), and when the array has another length.
+    /// Fails for the errors of [`set`](Self::set), and if the array has another length.
     pub fn set_array<V: Into<Value>>(
         &mut self,
         name: &str,
@@ -123,10 +126,10 @@ impl<M: Exported> Simulation<M> {
         Ok(self)
     }
 
-    /// Ends the initialization, which the first step does otherwise.
+    /// Initializes the model. Without this call, [`run`](Self::run) initializes it.
     ///
     /// # Errors
-    /// When the model cannot start there.
+    /// Fails if the model cannot start with these values.
     pub fn initialize(&mut self) -> Result<&mut Self, Error> {
         if self.instance.mode() == Mode::Instantiated {
             self.instance.enter_initialization_mode_at(Experiment::default())?;
@@ -136,17 +139,18 @@ impl<M: Exported> Simulation<M> {
         Ok(self)
     }
 
-    /// Steps to this time, s, or until the model ends the simulation, see [`has_ended`](Self::has_ended).
+    /// Performs steps to this time, s, or until the model ends the simulation; see
+    /// [`has_ended`](Self::has_ended).
     ///
     /// # Errors
-    /// When the model rejects a step.
+    /// Fails if the model rejects a step.
     pub fn run(&mut self, until: f64) -> Result<&mut Self, Error> {
         self.initialize()?;
         let begin = self.time();
         let steps = ((until - begin) / self.step_size - 1e-9).ceil();
         for step in 1..=steps as u64 {
             let end = if step as f64 == steps { until } else { begin + step as f64 * self.step_size };
-            // A step may end early, and the next one then begins there.
+            // A step may end early; the next step then begins there.
             while self.time() < end && !self.has_ended() {
                 let time = self.time();
                 self.instance.do_step_to(time, end - time)?;
@@ -156,28 +160,28 @@ impl<M: Exported> Simulation<M> {
         Ok(self)
     }
 
-    /// The time that is reached, s.
+    /// Returns the current time, s.
     pub fn time(&self) -> f64 {
         self.instance.last_successful_time()
     }
 
-    /// Whether the model has ended the simulation.
+    /// Returns whether the model has ended the simulation.
     pub fn has_ended(&self) -> bool {
         self.instance.has_ended()
     }
 
-    /// The value of a variable.
+    /// Returns the value of a variable.
     ///
     /// # Errors
-    /// When there is no such variable, or its value is not finite.
+    /// Fails if there is no such variable, or if its value is not finite.
     pub fn value(&mut self, name: &str) -> Result<Value, Error> {
         Ok(self.values(name)?.swap_remove(0))
     }
 
-    /// The value of a number; 0 and 1 of a Boolean.
+    /// Returns the value of a number; 0 or 1 for a Boolean.
     ///
     /// # Errors
-    /// As [`value`](Self::value), and when it is no number.
+    /// Fails for the errors of [`value`](Self::value), and if the variable is no number.
     pub fn get(&mut self, name: &str) -> Result<f64, Error> {
         match self.value(name)? {
             Value::Real(value) => Ok(value),
@@ -187,10 +191,10 @@ impl<M: Exported> Simulation<M> {
         }
     }
 
-    /// The values of all elements of an array, row by row.
+    /// Returns the values of all elements of an array, row by row.
     ///
     /// # Errors
-    /// As [`value`](Self::value).
+    /// Same errors as [`value`](Self::value).
     pub fn values(&mut self, name: &str) -> Result<Vec<Value>, Error> {
         let places = places::<M>(name)?;
         let mut values = Vec::new();
@@ -200,10 +204,10 @@ impl<M: Exported> Simulation<M> {
         Ok(values)
     }
 
-    /// The state as bytes, as an importer keeps it: the values of the table and what it lists as `memory`.
+    /// Returns the serialized state, as an importer gets it: the values of the table and its `memory`.
     ///
     /// # Errors
-    /// When the state cannot be saved.
+    /// Fails if the state cannot be saved.
     pub fn save(&mut self) -> Result<Vec<u8>, Error> {
         let handle = self.instance.save(0)?;
         let mut bytes = vec![0; self.instance.serialized_size(handle)?];
@@ -212,10 +216,10 @@ impl<M: Exported> Simulation<M> {
         Ok(bytes)
     }
 
-    /// Continues from a state that this or another simulation has saved.
+    /// Restores a state that this or another simulation has saved.
     ///
     /// # Errors
-    /// When the bytes are no state of this model, or the model rejects them.
+    /// Fails if the bytes are no state of this model, or if the model rejects them.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<&mut Self, Error> {
         let handle = self.instance.deserialize(bytes, 0)?;
         self.instance.restore(handle)?;
@@ -223,7 +227,7 @@ impl<M: Exported> Simulation<M> {
         Ok(self)
     }
 
-    /// The messages since the last time, with those of the FMU itself.
+    /// Returns the messages since the last call, of the model and of the FMU.
     pub fn messages(&mut self) -> Vec<(Status, String)> {
         self.instance.logger.take().into_iter().map(|message| (message.status, message.text)).collect()
     }
@@ -239,7 +243,7 @@ fn variable<M: Variables>(place: u32) -> &'static Variable<M> {
     &M::TABLE[place as usize]
 }
 
-/// The places of a variable, an element or all elements of an array.
+/// Returns the indices of a variable, an element, or all elements of an array.
 fn places<M: Exported>(name: &str) -> Result<Vec<u32>, Error> {
     let of_name = |of: &Variable<M>| of.name() == name || of.length() > 1 && of.name_of_array() == name;
     let places: Vec<u32> =

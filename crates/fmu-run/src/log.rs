@@ -11,14 +11,14 @@ use std::sync::{Mutex, PoisonError};
 /// Messages of the FMU; the address of the log is the instance environment.
 #[derive(Debug, Default)]
 pub(crate) struct Log {
-    /// The messages since the last call that failed.
+    /// Messages since the last failed call.
     new: Mutex<Vec<Message>>,
-    /// All messages, for a caller that wants them.
+    /// All messages, if the caller requests them.
     all: Option<Mutex<Vec<Message>>>,
 }
 
 impl Log {
-    /// A log that also keeps all messages.
+    /// Creates a log that also keeps all messages.
     pub(crate) fn keeping() -> Self {
         Self { all: Some(Mutex::default()), ..Self::default() }
     }
@@ -27,7 +27,7 @@ impl Log {
         std::mem::take(&mut self.new.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// All messages since the last time, if they are kept.
+    /// Returns all messages since the last call, if they are kept.
     pub(crate) fn take_all(&self) -> Vec<Message> {
         let all = self.all.as_ref().map(|all| all.lock().unwrap_or_else(PoisonError::into_inner));
         all.map(|mut all| std::mem::take(&mut *all)).unwrap_or_default()

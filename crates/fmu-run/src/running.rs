@@ -60,7 +60,7 @@ impl Running {
             self.parts[place.part].set_text(place.reference, text)?;
         }
         let numbers: Vec<_> = start.numbers(of).collect();
-        // Values may have to fit together, as those of an array that must rise: one call sets them.
+        // One call sets values that must be consistent, such as the elements of an array that must increase.
         let is_real = |place: &Place, part: usize| place.part == part && place.base == BaseType::Real;
         for together in
             numbers.chunk_by(|(one, _), (next, _)| is_real(one, next.part) && is_real(next, one.part))
@@ -205,7 +205,7 @@ impl Running {
         self.parts.iter().for_each(Instance::forget_log);
     }
 
-    /// The messages since the last time, of instances whose logging is on.
+    /// Returns the messages since the last call, of instances with logging enabled.
     pub fn take_messages(&self) -> Vec<Message> {
         self.parts.iter().flat_map(Instance::take_messages).collect()
     }

@@ -1,9 +1,9 @@
-//! The test driver of authors sets, steps and reads as an importer does.
+//! Tests of [`Simulation`], the test driver for authors.
 
 use crate::toys::{Rod, Ticker};
 use fmu_export::{Simulation, Value};
 
-/// A variable behind arrays, their elements and the whole arrays.
+/// Checks a variable that follows arrays, array elements, and whole arrays.
 #[test]
 fn variables_have_the_names_of_the_description() {
     let mut rod = Simulation::<Rod>::new().unwrap();
@@ -14,7 +14,7 @@ fn variables_have_the_names_of_the_description() {
     assert_eq!(rod.values("limits").unwrap(), limits);
     assert_eq!(rod.get("power[2]").unwrap(), 2.0);
     assert_eq!(rod.value("labels[1]").unwrap(), Value::from("half"));
-    // The slopes of a calculated array follow what was set.
+    // The derivatives of a calculated array depend on the values that were set.
     let wall = rod.get("der(T[1])").unwrap();
     assert!(rod.set("wall", 500.0).unwrap().get("der(T[1])").unwrap() > wall);
 }
@@ -35,7 +35,7 @@ fn what_does_not_fit_is_named() {
     );
 }
 
-/// Events within a step, and the end that the model asks for.
+/// Checks events within a step, and an end of the simulation that the model requests.
 #[test]
 fn events_are_handled() {
     let mut ticker = Simulation::<Ticker>::new().unwrap();
@@ -47,7 +47,7 @@ fn events_are_handled() {
     assert_eq!(ticker.get("ticks").unwrap(), 4.0);
 }
 
-/// `next`, by which a tick is due, is memory of the model.
+/// Checks that a state includes `next`, the time of the next tick, which is memory of the model.
 #[test]
 fn a_state_goes_on_in_another_simulation() {
     let mut ticker = Simulation::<Ticker>::new().unwrap();
