@@ -174,7 +174,7 @@ static void *make(const char *name, const char *token, int cs, int logging, Logg
     if (!IS(unwritten_memory)) *m->scratch = 0;
     if (IS(leak_instance) && !malloc(24)) return NULL;
     if (IS(file_left)) (void)!open("/dev/null", O_RDONLY);
-    if (IS(thread_left)) { pthread_t thread; pthread_create(&thread, NULL, idle, NULL); pthread_detach(thread); }
+    if (IS(thread_left)) { pthread_t thread; if (!pthread_create(&thread, NULL, idle, NULL)) pthread_detach(thread); }
     if (IS(pool_of_eight) && ++alive > 8) { free(m->scratch); free(m); m = NULL; alive--; }
     if (!m) return NULL;
     if (IS(second_run_refused) && runs++ > 300) { free(m->scratch); free(m); return NULL; }
