@@ -32,10 +32,10 @@ old = "            4 => Self::Fatal,"
 new = "            4 | 5 => Self::Fatal,"
 
 [[fault]]
-name = "a comment is shorter"
+name = "a number is hexadecimal"
 file = "status.rs"
-old = "    /// All well."
-new = "    /// Well."
+old = "            4 => Self::Fatal,"
+new = "            0x4 => Self::Fatal,"
 """
 
 
@@ -74,7 +74,7 @@ def test_seeded_faults_are_found_or_escape(tmp_path: Path) -> None:
     command = [sys.executable, "tools/seeded_faults.py", str(faults)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 1 and done.stderr == ""
-    assert done.stdout == "found    Pending is a status\nescaped  a comment is shorter\n1 of 2 faults found\n"
+    assert done.stdout == "found    Pending is a status\nescaped  a number is hexadecimal\n1 of 2 faults found\n"
 
 
 def test_the_reference_experiments_are_written(tmp_path: Path) -> None:
