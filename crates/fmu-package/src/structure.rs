@@ -109,8 +109,9 @@ impl ModelStructure {
 
         let mut sampler = Sampler::new(model, starts.clone(), tunable_parameters);
         sampler.running = true;
-        let outputs = by_derivative(&mut sampler, &outputs, &knowns)?;
-        let derivatives = by_derivative(&mut sampler, &derivatives, &knowns)?;
+        let count = outputs.len();
+        let mut outputs = by_derivative(&mut sampler, &[outputs, derivatives].concat(), &knowns)?;
+        let derivatives = outputs.split_off(count);
         sampler.running = false;
         let initial_unknowns = by_value(&mut sampler, &initial_unknowns, &initial_knowns)?;
         let itself = |unknown: Unknown| {
