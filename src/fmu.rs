@@ -14,10 +14,11 @@ pub struct TestbedFmu {
     pub(crate) testbed: Testbed,
     pub(crate) interface: Interface,
     pub(crate) start: Start,
-    /// Sensor torques at the last calculation of the outputs. `angles` are pitch and roll; `rates` are pitch
-    /// rate and roll rate.
+    /// Sensor torques `tau1` and `tau2`. Like the two fields below, they are updated when outputs are calculated.
     pub(crate) torques: [f64; 2],
+    /// Pitch and roll.
     pub(crate) angles: [f64; 2],
+    /// Pitch rate and roll rate.
     pub(crate) rates: [f64; 2],
     /// Partial derivatives with respect to angles and rates of the motors and to the states. They depend only
     /// on the parameters.

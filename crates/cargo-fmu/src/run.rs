@@ -53,7 +53,7 @@ fn assignment(text: &str) -> Result<(String, String), String> {
     Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 
-/// Builds and simulates; tells whether the run reached its end.
+/// Builds and simulates. Returns false if the build or the run failed.
 pub fn run(options: &Options) -> Result<bool> {
     if !options.watch {
         return once(options);
@@ -90,7 +90,7 @@ pub fn run(options: &Options) -> Result<bool> {
     }
 }
 
-/// Builds and attacks, or attacks what is there; tells whether nothing was found that is to fail.
+/// Checks the given FMUs, or builds and checks those of the project. Returns false if a check failed.
 pub fn check(place: &Place, given: &[PathBuf], options: &fmu_check::Options) -> Result<bool> {
     let mut fmus = given.to_vec();
     if fmus.is_empty() {
@@ -147,7 +147,7 @@ fn newest(folder: &Path, since: std::time::SystemTime) -> Option<PathBuf> {
     made.pop()
 }
 
-/// Simulates an FMU; tells whether it reached the end.
+/// Simulates an FMU, and writes the table and the plot. Returns false if the run failed.
 fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
     // SAFETY: the FMU is the user's own model, which was just compiled.
     #[allow(unsafe_code)]
@@ -171,7 +171,7 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
     let mut time = times(options, description, table.as_ref())?;
     let (runs, watch) = follow(&fmu, &time, table.as_ref(), &starts, &shown)?;
     let (runs, watch) = match watch.ended().first() {
-        // The last values are those at the end, which is between the communication points.
+        // The model ended between two communication points. A second run ends there and has the last values.
         Some((_, end)) if !runs.errors.is_empty() => {
             time.retain(|time| time < end);
             time.push(*end);
@@ -186,7 +186,7 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
         eprintln!("error: {reason}");
     }
     say(&watch, options.log);
-    // A run that has failed has values until then, or none.
+    // A failed run has values up to its failure, or none.
     let unreached = runs.courses.chunks(time.len()).map(unreached).min().filter(|_| !runs.errors.is_empty());
     let reached = time.len() - unreached.unwrap_or_default();
     if reached == 0 {
@@ -223,7 +223,7 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
     Ok(!failed)
 }
 
-/// A run over these times, and what was heard of it.
+/// Runs the FMU over these times. The watch has its messages.
 fn follow(
     fmu: &Fmu,
     time: &[f64],

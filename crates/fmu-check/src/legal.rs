@@ -17,7 +17,7 @@ struct State {
     updated: bool,
 }
 
-/// Returns the number of the first call that the standard does not allow. Calls that are marked as forbidden are skipped.
+/// Returns the id of the first step that the standard does not allow. Steps that are illegal on purpose are skipped.
 pub fn first_illegal(description: &Description, sequence: &[Numbered]) -> Option<u32> {
     walk(description, sequence, &mut Objects::default())
 }
@@ -33,7 +33,7 @@ struct Objects {
     bytes: HashMap<usize, State>,
 }
 
-/// Returns the number of the first step that the standard does not allow.
+/// Returns the id of the first illegal step, and updates the objects up to that step.
 fn walk(description: &Description, sequence: &[Numbered], objects: &mut Objects) -> Option<u32> {
     for Numbered { step, id, .. } in sequence.iter().filter(|numbered| !numbered.forbidden) {
         let is_legal = match step {

@@ -204,7 +204,7 @@ impl<M: Exported> Simulation<M> {
         Ok(values)
     }
 
-    /// Returns the serialized state, as an importer gets it: the values of the table and its `memory`.
+    /// Serializes the state of the model: its variables and the fields that `memory` lists.
     ///
     /// # Errors
     /// Fails if the state cannot be saved.

@@ -742,7 +742,7 @@ impl Instance {
         call!(self, fmi2EnterContinuousTimeMode(), fmi3EnterContinuousTimeMode())
     }
 
-    /// Performs all iterations of an event, in Event Mode.
+    /// Updates the discrete states until the event is over. The instance must be in Event Mode.
     pub(crate) fn event(&mut self) -> Result<Event, Refusal> {
         let mut all = Event::default();
         for _ in 0..MOST_ROUNDS {

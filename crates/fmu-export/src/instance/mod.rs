@@ -1,4 +1,4 @@
-//! An instance of a model: checks and effects of every call, without pointers and C types of an FMI version.
+//! An instance of a model. Its methods check and carry out the calls of both FMI versions. They use Rust types, no pointers.
 //!
 //! Every method checks all its arguments before it changes anything; an error leaves the instance unchanged.
 

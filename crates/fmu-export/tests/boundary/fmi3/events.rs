@@ -89,8 +89,7 @@ fn the_importer_handles_them() {
     assert_eq!(fmu.do_step(0.25, 0.25), at(0.5, false));
 }
 
-/// Checks that the library handles events within the step if the importer does not; FMI 2.0 gives equal
-/// values.
+/// If the importer does not handle events, the library handles them within the step. FMI 2.0 returns the same values.
 #[test]
 fn the_library_handles_them() {
     for (event_mode, early) in [(fmi3False, fmi3False), (fmi3False, fmi3True)] {
