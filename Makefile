@@ -39,7 +39,11 @@ WEBASSEMBLY := wasm32-unknown-unknown
 HAS_WEBASSEMBLY = ls "$$(env -u MAKEFLAGS -u MFLAGS rustc --print target-libdir --target $(WEBASSEMBLY))" 2>/dev/null | grep -q libstd
 ADD_WEBASSEMBLY = $(HAS_WEBASSEMBLY) || rustup target add $(WEBASSEMBLY)
 
-BUILD_FMU = $(CARGO) run $(LOCKED) --release --bin build_fmu --
+# Directory of the compiled programs that build FMUs. If empty, cargo compiles them.
+PROGRAMS ?=
+BUILD_FMU = $(if $(PROGRAMS),$(PROGRAMS)/build_fmu,$(CARGO) run $(LOCKED) --release --bin build_fmu --)
+BUILD_CONTROLLER = $(if $(PROGRAMS),$(PROGRAMS)/build_controller,$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller --)
+BUILD_CLOSED_LOOP = $(if $(PROGRAMS),$(PROGRAMS)/build_closed_loop,$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_closed_loop --)
 # Succeeds if the existing FMU contains the page that runs it.
 HAS_PAGE = $(PYTHON) -c 'import sys, zipfile; sys.exit(b".catch(withoutIt)" not in zipfile.ZipFile("$(FMU)").read("documentation/index.html"))' 2>/dev/null
 
@@ -105,7 +109,11 @@ check: $(VENV)/test.stamp need-rust
 check-release: $(VENV)/importers.stamp need-rust
 	@$(PY) tools/release_check.py $(ARGS)
 
-test: test-rust test-python test-fmu test-closed-loop test-importers test-examples
+# The Python tests use the programs that the Rust tests compiled.
+test: test-rust test-python $(VENV)/importers.stamp $(VENV)/examples.stamp
+	@$(MAKE) --no-print-directory PROGRAMS=target/debug importer-fmus
+	$(PY) platforms/bill_of_materials.py --check
+	$(PYTEST) $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
 
 # C programs are compiled against the standard's headers, which FMPy brings.
 headers: $(VENV)/test.stamp
@@ -131,9 +139,11 @@ test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 	@$(PIP_INSTALL) --quiet --upgrade --no-deps --target target/newest-fmpy fmpy
 	PYTHONPATH=target/newest-fmpy $(PYTEST) tests/fmpy tests/fmu_run
 
+FMU_TESTS := $(addprefix tests/,check oracle fmu_run fmpy prw analysis publication scripts)
+
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
 	$(PY) platforms/bill_of_materials.py --check
-	$(PYTEST) tests/check tests/oracle tests/fmu_run tests/fmpy tests/prw tests/analysis tests/publication tests/scripts
+	$(PYTEST) $(FMU_TESTS)
 
 # In browsers that were never here before, from a file. What needs none is in tests/fmpy/test_page.py.
 test-page: $(VENV)/test.stamp closed-loop-fmus
@@ -153,8 +163,8 @@ figures: need-rust $(VENV)/test.stamp closed-loop-fmus
 
 # The pages' tables come from the model descriptions.
 docs: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
-	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --describe
-	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --describe
+	@$(BUILD_FMU) --describe
+	@$(BUILD_CONTROLLER) --describe
 	@$(PY) -m tools docs
 	@$(PY) -m tools examples
 
@@ -167,9 +177,9 @@ validation: need-rust $(VENV)/importers.stamp closed-loop-fmus
 
 # A controller FMU, the system of both, and the example FMU to copy.
 closed-loop-fmus: fmu
-	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller
-	@$(CARGO) run $(LOCKED) --release -p prw_controller --bin build_closed_loop
-	@$(CARGO) build $(LOCKED) --quiet -p cargo-fmu
+	@$(BUILD_CONTROLLER)
+	@$(BUILD_CLOSED_LOOP)
+	@$(if $(PROGRAMS),,$(CARGO) build $(LOCKED) --quiet -p cargo-fmu)
 	@rm -rf target/lag && target/debug/cargo-fmu fmu new target/lag --name lag > /dev/null
 	@cd target/lag && CARGO_TARGET_DIR=$(CURDIR)/target/models ../debug/cargo-fmu fmu build --out ../fmu
 
@@ -187,7 +197,7 @@ test-closed-loop: $(VENV)/importers.stamp closed-loop-fmus
 
 # Also with tunable parameters, which some importers treat otherwise.
 importer-fmus: closed-loop-fmus
-	@$(CARGO) run $(LOCKED) --release --bin build_fmu -- --tunable --out target/fmu/tunable
+	@$(BUILD_FMU) --tunable --out target/fmu/tunable
 
 # What its tests saw goes into docs/compatibility.md by `python -m tools compatibility`.
 test-importers: $(VENV)/importers.stamp importer-fmus
@@ -205,10 +215,10 @@ release: need-rust $(DIST_VENV)/dist.stamp
 # The library as WebAssembly, and that as C: for targets that have a C compiler and no Rust.
 source-fmu: need-rust $(VENV)/wasm2c.stamp
 	@$(ADD_WEBASSEMBLY)
-	@$(WITH_WASM2C) $(CARGO) run $(LOCKED) --release --bin build_fmu -- --c-sources
+	@$(WITH_WASM2C) $(BUILD_FMU) --c-sources
 
 test-source-fmu: source-fmu fmu $(VENV)/test.stamp
-	@$(WITH_WASM2C) $(CARGO) run $(LOCKED) --release -p prw_controller --bin build_controller -- --c-sources
+	@$(WITH_WASM2C) $(BUILD_CONTROLLER) --c-sources
 	$(PYTEST) tests/source_fmu
 
 test-platforms: release source-fmu $(DIST_VENV)/test.stamp
