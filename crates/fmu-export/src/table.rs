@@ -424,11 +424,11 @@ macro_rules! variables {
             $name:ident $( as $label:literal )? =
                 $kind:tt $of:tt $( . $refinement:ident $arguments:tt )*
                 $(
-                    in $first:ident $([ $at:expr ])* $( . $field:tt $([ $place:expr ])* )*
+                    in $first:tt $([ $at:expr ])* $( . $field:tt $([ $place:expr ])* )*
                     $( then $mark:ident $([ $mark_at:expr ])* $( . $mark_field:tt $([ $mark_place:expr ])* )* )?
                     $( then | $changed:ident | $after:block )?
                 )?
-                $( from $from:ident $([ $from_at:expr ])* $( . $from_field:tt $([ $from_place:expr ])* )* )?
+                $( from $from:tt $([ $from_at:expr ])* $( . $from_field:tt $([ $from_place:expr ])* )* )?
                 $( by $calculate:expr )? ;
         )+
     ) => {
@@ -470,69 +470,63 @@ macro_rules! variables {
                             @refined [$crate::Variable::<$model>::$kind $of] $( . $refinement $arguments )*
                         )
                     };
+                    // Bound to its own name, a field lets the compiler point at the author's line. The function hides
+                    // constants of this name, which cannot be bound.
+                    $( #[allow(dead_code)] fn $first() {} )?
                     $(
                         let variable = variable.stored(
                             $crate::Read {
-                                shape: $crate::shape_of_place(|model: &$model| {
+                                shape: match |model: &$model| $crate::type_of(
                                     &(*model).$first $([$at])* $( .$field $([$place])* )*
-                                }),
-                                real: |model| {
-                                    $crate::read_real(&(*model).$first $([$at])* $( .$field $([$place])* )*, 0)
+                                ) {
+                                    $first => $crate::shape_of_place($first),
                                 },
-                                value: |model| {
-                                    $crate::read_value(&(*model).$first $([$at])* $( .$field $([$place])* )*, 0)
+                                real: |model| match &(*model).$first $([$at])* $( .$field $([$place])* )* {
+                                    $first => $crate::read_real($first, 0),
+                                },
+                                value: |model| match &(*model).$first $([$at])* $( .$field $([$place])* )* {
+                                    $first => $crate::read_value($first, 0),
                                 },
                             },
                             $crate::Store {
                                 real: |model, value| {
-                                    $crate::set_real(
-                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
-                                        0,
-                                        value,
-                                    );
+                                    match &mut (*model).$first $([$at])* $( .$field $([$place])* )* {
+                                        $first => $crate::set_real($first, 0, value),
+                                    }
                                     $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
                                 value: |model, value| {
-                                    $crate::set_value(
-                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
-                                        0,
-                                        value,
-                                    );
+                                    match &mut (*model).$first $([$at])* $( .$field $([$place])* )* {
+                                        $first => $crate::set_value($first, 0, value),
+                                    }
                                     $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
-                                visit: |model, visitor| $crate::Saved::visit(
-                                    &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
-                                    visitor,
-                                ),
+                                visit: |model, visitor| match &mut (*model).$first $([$at])* $( .$field $([$place])* )* {
+                                    $first => $crate::Saved::visit($first, visitor),
+                                },
                             },
                             $crate::ReadAt {
-                                reals: |model, first, values| $crate::read_reals(
-                                    &(*model).$first $([$at])* $( .$field $([$place])* )*,
-                                    first,
-                                    values,
-                                ),
-                                value: |model, number| {
-                                    $crate::read_value(&(*model).$first $([$at])* $( .$field $([$place])* )*, number)
+                                reals: |model, from, values| match &(*model).$first $([$at])* $( .$field $([$place])* )* {
+                                    $first => $crate::read_reals($first, from, values),
+                                },
+                                value: |model, number| match &(*model).$first $([$at])* $( .$field $([$place])* )* {
+                                    $first => $crate::read_value($first, number),
                                 },
                             },
                             $crate::StoreAt {
                                 real: |model, number, value| {
-                                    $crate::set_real(
-                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
-                                        number,
-                                        value,
-                                    );
+                                    match &mut (*model).$first $([$at])* $( .$field $([$place])* )* {
+                                        $first => $crate::set_real($first, number, value),
+                                    }
                                     $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
                                 value: |model, number, value| {
-                                    $crate::set_value(
-                                        &mut (*model).$first $([$at])* $( .$field $([$place])* )*,
-                                        number,
-                                        value,
-                                    );
+                                    match &mut (*model).$first $([$at])* $( .$field $([$place])* )* {
+                                        $first => $crate::set_value($first, number, value),
+                                    }
                                     $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
@@ -584,16 +578,14 @@ macro_rules! variables {
                     match line {
                         $(index::$name => {
                             let offset = without;
-                            $( let offset = $crate::offset_of_real(
-                                self,
-                                &(*self).$first $([$at])* $( .$field $([$place])* )*,
-                                without,
-                            ); )?
-                            $( let offset = $crate::offset_of_real(
-                                self,
-                                &(*self).$from $([$from_at])* $( .$from_field $([$from_place])* )*,
-                                without,
-                            ); )?
+                            $( #[allow(dead_code)] fn $first() {} )?
+                            $( #[allow(dead_code)] fn $from() {} )?
+                            $( let offset = match &(*self).$first $([$at])* $( .$field $([$place])* )* {
+                                $first => $crate::offset_of_real(self, $first, without),
+                            }; )?
+                            $( let offset = match &(*self).$from $([$from_at])* $( .$from_field $([$from_place])* )* {
+                                $from => $crate::offset_of_real(self, $from, without),
+                            }; )?
                             $( let offset = $crate::variables!(@instead_of $calculate without); )?
                             offset
                         })+
@@ -607,12 +599,11 @@ macro_rules! variables {
                     match line {
                         $(index::$name => {
                             let offsets = without;
+                            $( #[allow(dead_code)] fn $first() {} )?
                             $(
-                                let place = $crate::offset_of_real(
-                                    model,
-                                    &mut (*self).$first $([$at])* $( .$field $([$place])* )*,
-                                    usize::MAX,
-                                );
+                                let place = match &mut (*self).$first $([$at])* $( .$field $([$place])* )* {
+                                    $first => $crate::offset_of_real(model, $first, usize::MAX),
+                                };
                                 let mark = no_mark;
                                 $(
                                     let mark: &mut bool =
@@ -664,13 +655,13 @@ macro_rules! variables {
     (@calculated $variable:ident $model:ty, $calculate:expr) => {
         $variable.read_by(
             $crate::Read {
-                shape: $crate::shape_of_calculation(|model: &$model| $crate::read(model, $calculate)),
-                real: |model| $crate::read_real(&$crate::read(model, $calculate), 0),
-                value: |model| $crate::read_value(&$crate::read(model, $calculate), 0),
+                shape: $crate::shape_of_calculation(::core::marker::PhantomData::<$model>, $calculate),
+                real: |model| $crate::read_real_by(model, $calculate, 0),
+                value: |model| $crate::read_value_by(model, $calculate, 0),
             },
             $crate::ReadAt {
-                reals: |model, first, values| $crate::read_reals(&$crate::read(model, $calculate), first, values),
-                value: |model, number| $crate::read_value(&$crate::read(model, $calculate), number),
+                reals: |model, first, values| $crate::read_reals_by(model, $calculate, first, values),
+                value: |model, number| $crate::read_value_by(model, $calculate, number),
             },
         )
     };

@@ -9,6 +9,7 @@ use fmi_abi::BaseType;
 use fmi_abi::Situations;
 use fmi_abi::Value;
 use fmi_abi::{Causality, Initial, Variability};
+use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 
 /// Line of a variable in the table. Authors write the name of the variable; see
@@ -623,15 +624,21 @@ impl<M: Variables> Variable<M> {
     }
 }
 
+/// Returns the type of a field.
+#[doc(hidden)]
+pub fn type_of<T>(_: &T) -> PhantomData<T> {
+    PhantomData
+}
+
 /// Returns the shape of a field of the model.
 #[doc(hidden)]
-pub const fn shape_of_place<M, T: Place>(_: fn(&M) -> &T) -> Shape {
+pub const fn shape_of_place<M, T: Place>(_: fn(&M) -> PhantomData<T>) -> Shape {
     Shape { base: T::Element::BASE, dimensions: T::DIMENSIONS }
 }
 
 /// Returns the shape of a calculated value.
 #[doc(hidden)]
-pub const fn shape_of_calculation<M, T: Place>(_: fn(&M) -> T) -> Shape {
+pub const fn shape_of_calculation<M, T: Place>(_: PhantomData<M>, _: fn(&M) -> T) -> Shape {
     Shape { base: T::Element::BASE, dimensions: T::DIMENSIONS }
 }
 
@@ -673,11 +680,30 @@ pub fn read_reals(array: &impl Place, first: usize, values: &mut [MaybeUninit<f6
         .sum()
 }
 
-/// Calls a closure, so that the compiler infers the type of its argument.
+/// [Reads](read_real) a Real of a calculated value.
 #[doc(hidden)]
 #[inline(always)]
-pub fn read<M, T>(model: &M, calculate: impl Fn(&M) -> T) -> T {
-    calculate(model)
+pub fn read_real_by<M, T: Place>(model: &M, calculate: fn(&M) -> T, number: usize) -> f64 {
+    read_real(&calculate(model), number)
+}
+
+/// [Reads](read_value) a calculated value.
+#[doc(hidden)]
+#[inline(always)]
+pub fn read_value_by<M, T: Place>(model: &M, calculate: fn(&M) -> T, number: usize) -> Value {
+    read_value(&calculate(model), number)
+}
+
+/// [Reads](read_reals) Reals of a calculated array.
+#[doc(hidden)]
+#[inline(always)]
+pub fn read_reals_by<M, T: Place>(
+    model: &M,
+    calculate: fn(&M) -> T,
+    first: usize,
+    values: &mut [MaybeUninit<f64>],
+) -> f64 {
+    read_reals(&calculate(model), first, values)
 }
 
 /// Ends the compilation with a message that contains a variable's name and its fault.

@@ -412,7 +412,7 @@ impl<M: 'static> Implicit<M> {
     const INDICATOR: &'static Variable<M> = &Variable::local(&NUMBER)
         .read_by(
             Read {
-                shape: shape_of_calculation(|_: &M| f64::NAN),
+                shape: shape_of_calculation(std::marker::PhantomData::<M>, |_| f64::NAN),
                 real: |_| f64::NAN,
                 value: |_| Value::Real(f64::NAN),
             },

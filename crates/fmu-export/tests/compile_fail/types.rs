@@ -37,6 +37,21 @@ mod no_type_for_values {
     }
 }
 
+// No variable is a duration.
+mod no_type_in_place {
+    use fmu_export::*;
+
+    #[derive(Clone)]
+    pub struct Plant {
+        delay: [std::time::Duration; 2],
+    }
+
+    variables! { for Plant;
+        /// An input
+        u = input(&NUMBER) in delay[1];
+    }
+}
+
 // A place is a field of the model.
 mod unknown_field {
     include!("shared/fields.rs");
