@@ -1,8 +1,10 @@
 //! What cargo knows of the package that is to be an FMU.
 
+use crate::builder::cargo;
 use anyhow::{Context, Result, bail};
-use cargo_metadata::{CrateType, Metadata, MetadataCommand, Package};
-use std::path::PathBuf;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// Where the model is.
 #[derive(clap::Args, Clone, Debug)]
@@ -30,53 +32,67 @@ pub struct Project {
 impl Project {
     /// Asks cargo.
     pub fn find(place: &Place) -> Result<Self> {
-        let mut command = MetadataCommand::new();
-        if let Some(path) = &place.manifest_path {
-            command.manifest_path(path);
-        }
-        let metadata = command.exec().map_err(|error| match error {
-            cargo_metadata::Error::CargoMetadata { stderr } => {
-                anyhow::anyhow!("{}", stderr.trim().trim_start_matches("error: "))
-            }
-            other => other.into(),
-        })?;
+        let metadata = metadata(place)?;
         let package = chosen(&metadata, place.package.as_deref())?;
-        if !package.targets.iter().any(|target| target.crate_types.contains(&CrateType::CDyLib)) {
+        let name = text(&package["name"]);
+        let targets = list(&package["targets"]);
+        if !targets.iter().any(|target| list(&target["crate_types"]).contains(&"cdylib".into())) {
             bail!(
-                "{} makes no shared library; its Cargo.toml needs\n\n  [lib]\n  crate-type = [\"cdylib\", \"rlib\"]\n",
-                package.name
+                "{name} makes no shared library; its Cargo.toml needs\n\n  [lib]\n  crate-type = [\"cdylib\", \"rlib\"]\n"
             );
         }
-        if !package.dependencies.iter().any(|of| of.name == "fmu-export") {
-            bail!("{} does not use fmu-export: cargo fmu new begins a model that does", package.name);
+        if !list(&package["dependencies"]).iter().any(|of| of["name"] == "fmu-export") {
+            bail!("{name} does not use fmu-export: cargo fmu new begins a model that does");
         }
-        let builders = package.targets.iter().filter(|target| {
-            target.is_bin() && (target.name == "build_fmu" || target.name.starts_with("build_fmu_"))
-        });
+        let programs = targets.iter().filter(|target| list(&target["kind"]).contains(&"bin".into()));
+        let mut programs = programs.map(|target| text(&target["name"]));
+        let folder = Path::new(text(&package["manifest_path"])).parent();
         Ok(Self {
-            name: package.name.to_string(),
-            folder: folder(package),
-            workspace: metadata.workspace_root.clone().into(),
-            own_builder: builders.map(|target| target.name.clone()).next(),
+            name: name.to_owned(),
+            folder: folder.context("cargo names no Cargo.toml")?.to_owned(),
+            workspace: text(&metadata["workspace_root"]).into(),
+            own_builder: programs
+                .find(|name| *name == "build_fmu" || name.starts_with("build_fmu_"))
+                .map(str::to_owned),
         })
     }
 }
 
-fn folder(package: &Package) -> PathBuf {
-    package.manifest_path.parent().map(Into::into).unwrap_or_default()
+/// Returns the output of `cargo metadata`.
+fn metadata(place: &Place) -> Result<Value> {
+    let mut command = Command::new(cargo());
+    command.args(["metadata", "--format-version", "1"]);
+    if let Some(path) = &place.manifest_path {
+        command.arg("--manifest-path").arg(path);
+    }
+    let output = command.output().context("cannot start cargo")?;
+    if !output.status.success() {
+        bail!("{}", String::from_utf8_lossy(&output.stderr).trim().trim_start_matches("error: "));
+    }
+    serde_json::from_slice(&output.stdout).context("cargo metadata returns no JSON")
 }
 
-fn chosen<'a>(metadata: &'a Metadata, name: Option<&str>) -> Result<&'a Package> {
-    let members = metadata.workspace_packages();
+fn text(value: &Value) -> &str {
+    value.as_str().unwrap_or_default()
+}
+
+fn list(value: &Value) -> &[Value] {
+    value.as_array().map_or(&[], Vec::as_slice)
+}
+
+fn chosen<'a>(metadata: &'a Value, name: Option<&str>) -> Result<&'a Value> {
+    let members = list(&metadata["workspace_members"]);
+    let packages = list(&metadata["packages"]).iter().filter(|package| members.contains(&package["id"]));
+    let packages: Vec<_> = packages.collect();
     if let Some(name) = name {
-        let named = members.iter().find(|package| package.name.as_str() == name);
+        let named = packages.iter().find(|package| package["name"] == name);
         return named.copied().with_context(|| format!("there is no package {name} here"));
     }
-    match (metadata.root_package(), &members[..]) {
-        (Some(package), _) => Ok(package),
-        (None, [package]) => Ok(*package),
+    let root = packages.iter().find(|package| package["id"] == metadata["resolve"]["root"]);
+    match (root, &packages[..]) {
+        (Some(package), _) | (None, [package]) => Ok(package),
         _ => {
-            let names: Vec<_> = members.iter().map(|package| package.name.as_str()).collect();
+            let names: Vec<_> = packages.iter().map(|package| text(&package["name"])).collect();
             bail!("there are several packages here; choose with --package: {}", names.join(", "))
         }
     }

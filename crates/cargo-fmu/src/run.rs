@@ -9,12 +9,12 @@ use fmu_package::{BuildOptions, Fmi};
 use fmu_run::{
     BaseType, Batch, Course, Description, Fmu, Interface, Runs, Start, Status, Variable, Watch, nearest,
 };
-use notify::{RecursiveMode, Watcher};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::mpsc;
-use std::time::{Duration, Instant};
+use std::thread::sleep;
+use std::time::{Duration, Instant, SystemTime};
 
 /// How to simulate.
 #[derive(clap::Args, Clone, Debug)]
@@ -59,24 +59,11 @@ pub fn run(options: &Options) -> Result<bool> {
         return once(options);
     }
     let project = Project::find(&options.place)?;
-    let (sender, changes) = mpsc::channel();
-    let mut watcher = notify::recommended_watcher(move |event: notify::Result<notify::Event>| {
-        if event.is_ok_and(|event| !event.kind.is_access()) {
-            // The other end is gone when the program ends.
-            let _ = sender.send(());
-        }
-    })?;
-    for name in ["Cargo.toml", "src", "modelDescription"] {
-        let path = project.folder.join(name);
-        if path.exists() {
-            watcher.watch(&path, RecursiveMode::Recursive)?;
-        }
-    }
-    if let Some(input) = &options.input {
-        watcher.watch(input, RecursiveMode::NonRecursive)?;
-    }
+    let names = ["Cargo.toml", "src", "modelDescription"].map(|name| project.folder.join(name));
+    let watched: Vec<_> = names.into_iter().chain(options.input.clone()).collect();
     loop {
         let begin = Instant::now();
+        let before = changes(watched.clone());
         match once(options) {
             Ok(true) => {
                 println!("done in {:.1} s; waiting for a change (Ctrl-C ends)", begin.elapsed().as_secs_f64())
@@ -84,10 +71,23 @@ pub fn run(options: &Options) -> Result<bool> {
             Ok(false) => println!("waiting for a change (Ctrl-C ends)"),
             Err(error) => println!("error: {error:#}\nwaiting for a change (Ctrl-C ends)"),
         }
-        changes.recv().context("nobody watches the files any more")?;
-        // An editor changes several at once.
-        while changes.recv_timeout(Duration::from_millis(100)).is_ok() {}
+        while changes(watched.clone()) == before {
+            sleep(Duration::from_millis(300));
+        }
+        // An editor writes several files.
+        sleep(Duration::from_millis(100));
     }
+}
+
+/// Returns files and the files in directories, each with the time of its last change.
+fn changes(mut open: Vec<PathBuf>) -> BTreeMap<PathBuf, Option<SystemTime>> {
+    let mut found = BTreeMap::new();
+    while let Some(path) = open.pop() {
+        open.extend(fs::read_dir(&path).into_iter().flatten().flatten().map(|entry| entry.path()));
+        let time = fs::metadata(&path).and_then(|data| data.modified()).ok();
+        found.insert(path, time);
+    }
+    found
 }
 
 /// Checks the given FMUs, or builds and checks those of the project. Returns false if a check failed.
@@ -96,7 +96,7 @@ pub fn check(place: &Place, given: &[PathBuf], options: &fmu_check::Options) -> 
     if fmus.is_empty() {
         let project = Project::find(place)?;
         let folder = project.workspace.join("target/fmu");
-        let begin = std::time::SystemTime::now();
+        let begin = SystemTime::now();
         let build = BuildOptions { out: Some(folder.clone()), ..BuildOptions::default() };
         if !builder::build(&project, &build, Purpose::Use, &["--out".into(), folder.clone().into()])? {
             return Ok(false);
@@ -119,7 +119,7 @@ fn once(options: &Options) -> Result<bool> {
     let project = Project::find(&options.place)?;
     let folder = project.workspace.join("target/fmu");
     let build = BuildOptions { fmi: options.fmi, out: Some(folder.clone()), ..BuildOptions::default() };
-    let begin = std::time::SystemTime::now();
+    let begin = SystemTime::now();
     let mut words = vec!["--out".into(), folder.clone().into()];
     if let Some(fmi) = options.fmi {
         words.extend(["--fmi".into(), if fmi == Fmi::V2 { "2" } else { "3" }.into()]);
@@ -133,7 +133,7 @@ fn once(options: &Options) -> Result<bool> {
 }
 
 /// The FMU in a folder that was just made.
-fn newest(folder: &Path, since: std::time::SystemTime) -> Option<PathBuf> {
+fn newest(folder: &Path, since: SystemTime) -> Option<PathBuf> {
     let made = |path: &PathBuf| {
         let is_new = |data: fs::Metadata| {
             // Files may know whole seconds only.
@@ -170,18 +170,10 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
         .concat();
     let mut time = times(options, description, table.as_ref())?;
     let (runs, watch) = follow(&fmu, &time, table.as_ref(), &starts, &shown)?;
-    let (runs, watch) = match watch.ended().first() {
-        // The model ended between two communication points. A second run ends there and has the last values.
-        Some((_, end)) if !runs.errors.is_empty() => {
-            time.retain(|time| time < end);
-            time.push(*end);
-            follow(&fmu, &time, table.as_ref(), &starts, &shown)?
-        }
-        _ => (runs, watch),
-    };
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (csv, svg) = (folder.join(format!("{name}.csv")), folder.join(format!("{name}.svg")));
-    let failed = watch.ended().is_empty() && !runs.errors.is_empty();
+    let ended = watch.ended().pop();
+    let failed = ended.is_none() && !runs.errors.is_empty();
     for (_, reason) in runs.errors.iter().filter(|_| failed) {
         eprintln!("error: {reason}");
     }
@@ -193,20 +185,28 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
         [&csv, &svg].iter().for_each(|old| drop(fs::remove_file(old)));
         return Ok(false);
     }
+    let mut courses: Vec<_> =
+        runs.courses.chunks(time.len()).map(|values| values[..reached].to_vec()).collect();
+    let step_size = time[1] - time[0];
+    time.truncate(reached);
+    // The model may end between two communication points.
+    if let Some((_, end, values)) = ended.filter(|(_, end, _)| *end > time[reached - 1] + 1e-9 * step_size) {
+        time.push(end);
+        courses.iter_mut().zip(values).for_each(|(course, value)| course.push(value));
+    }
     let curves: Vec<Curve> = shown
         .iter()
-        .zip(runs.courses.chunks(time.len()))
+        .zip(&courses)
         .map(|(variable, values)| Curve {
             name: &variable.name,
             unit: variable.unit.as_deref().unwrap_or_default(),
             jumps: variable.base != BaseType::Real || variable.variability.as_deref() == Some("discrete"),
             is_boolean: variable.base == BaseType::Boolean,
-            values: &values[..reached],
+            values,
         })
         .collect();
-    let time = &time[..reached];
-    write_table(&csv, time, &curves).with_context(|| format!("cannot write {}", short(&csv)))?;
-    plot(&svg, &description.model_name, time, &curves)
+    write_table(&csv, &time, &curves).with_context(|| format!("cannot write {}", short(&csv)))?;
+    plot(&svg, &description.model_name, &time, &curves)
         .with_context(|| format!("cannot draw {}", short(&svg)))?;
     summarize(&curves, &shown);
     println!(
@@ -214,8 +214,8 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
         short(&csv),
         short(&svg),
         time[0],
-        time[reached - 1],
-        reached - 1
+        time[time.len() - 1],
+        time.len() - 1
     );
     for (_, note) in runs.notes.iter().chain(&runs.errors).filter(|_| !failed) {
         println!("{note}");

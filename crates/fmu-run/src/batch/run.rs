@@ -22,7 +22,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 pub struct Watch {
     done: AtomicUsize,
     cancelled: AtomicBool,
-    ended: Mutex<Vec<(usize, f64)>>,
+    ended: Mutex<Vec<(usize, f64, Vec<f64>)>>,
     /// Messages of runs, each with its time, if the caller wants them.
     messages: Option<Mutex<Vec<(usize, f64, Message)>>>,
 }
@@ -38,8 +38,9 @@ impl Watch {
         self.messages.as_ref().map(|messages| lock(messages).clone()).unwrap_or_default()
     }
 
-    /// Returns the runs that the FMU has ended, with their end times in s.
-    pub fn ended(&self) -> Vec<(usize, f64)> {
+    /// Returns the runs that the FMU has ended, each with its end time in s and the outputs at this time, which
+    /// are NaN if they cannot be read.
+    pub fn ended(&self) -> Vec<(usize, f64, Vec<f64>)> {
         lock(&self.ended).clone()
     }
 
@@ -253,7 +254,7 @@ impl<'a> Worker<'a> {
             let at = stopped.as_ref().and_then(|(at, _)| *at).map_or(0, |at| at.min(times.len() - 1));
             self.watch.hear(run, times[at], &instance);
             let ended = stopped.as_ref().and_then(|(_, refusal)| refusal.ended());
-            lock(&self.watch.ended).extend(ended.map(|time| (run, time)));
+            lock(&self.watch.ended).extend(ended.map(|time| (run, time, self.room.row.clone())));
         }
         let filled = plan.every.map_or(0, |every| self.room.rows.div_ceil(every));
         for course in courses.chunks_mut(plan.kept().max(1)) {
@@ -367,12 +368,17 @@ fn follow(
             let size = next - time;
             match instance.step(time, size) {
                 Ok(()) => hear(time, instance),
-                // The end is at the next time, whose outputs can be read, but inputs no longer set (section 4.2.4 of
-                // FMI 2.0).
-                Err(refusal) if refusal.ended().is_some_and(|end| next - end <= 1e-9 * size) => {
+                Err(refusal) => {
+                    let Some(end) = refusal.ended() else { return Err(at(refusal)) };
+                    // Outputs can be read, but inputs no longer set (section 4.2.4 of FMI 2.0).
+                    if instance.get(&plan.outputs, &mut room.row).is_err() {
+                        room.row.fill(f64::NAN);
+                    }
+                    if next - end > 1e-9 * size {
+                        return Err(at(refusal));
+                    }
                     ended = Some(refusal);
                 }
-                Err(refusal) => return Err(at(refusal)),
             }
         }
     }
