@@ -19,7 +19,7 @@ FMI2_FUNCTIONS = {f"fmi2{name}" for name in re.findall(r"F\((\w+)\)", (INCLUDED[
 FMI3_HEADER = Path(fmpy.__file__).parent / "c-code" / "fmi3Functions.h"
 FMI3_FUNCTIONS = set(re.findall(r"^FMI3_Export +fmi3\w+TYPE +(fmi3\w+);", FMI3_HEADER.read_text(), re.MULTILINE))
 #: The library describes itself to the program that packs it.
-FUNCTIONS = FMI2_FUNCTIONS | FMI3_FUNCTIONS | {"fmu_export_description"}
+FUNCTIONS = FMI2_FUNCTIONS | FMI3_FUNCTIONS | {"fmu_export_describe"}
 
 
 def test_the_functions_are_known():

@@ -3,7 +3,7 @@
 //! Floating-point numbers and integers of types are strings, which keep all digits. The functions are not
 //! inlined and take trait objects: the description runs once, and its size counts in every library.
 
-use crate::boundary::{forget_panic, panic_message};
+use crate::boundary::{forget_panic, panic_message, string};
 use crate::capabilities::Events;
 use crate::export::Exported;
 use crate::info::Info;
@@ -12,7 +12,7 @@ use crate::types::{Attributes, Type};
 use crate::units::{BaseUnit, Unit};
 use crate::variable::Variable;
 use fmi_abi::Interface;
-use fmi_abi::c_types::c_void;
+use fmi_abi::c_types::{c_char, c_void};
 use std::fmt::{Debug, Display, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -23,13 +23,21 @@ const VERSION: u32 = 1;
 #[doc(hidden)]
 pub type Receive = unsafe extern "C" fn(context: *mut c_void, text: *const u8, length: usize);
 
-/// Passes the description of a model to `receive`, or an empty description if the model panics.
+/// Passes the description of a model to `receive`, or an empty description if the model panics. The model may
+/// read the files in the directory `resources`.
 ///
 /// # Safety
-/// The caller guarantees that `receive` may be called with this context.
+/// The caller guarantees that `receive` may be called with this context, and that `resources` is a string or
+/// NULL.
 #[doc(hidden)]
-pub unsafe fn pass_description<M: Exported>(receive: Receive, context: *mut c_void) {
-    let text = catch_unwind(describe::<M>).unwrap_or_else(|panic| {
+pub unsafe fn pass_description<M: Exported>(
+    resources: *const c_char,
+    receive: Receive,
+    context: *mut c_void,
+) {
+    // SAFETY: the caller guarantees a string or NULL.
+    let resources = unsafe { string(resources) }.map(|path| path.to_string_lossy().into_owned());
+    let text = catch_unwind(|| describe_with::<M>(resources.as_ref())).unwrap_or_else(|panic| {
         forget_panic(Err(panic));
         String::new()
     });
@@ -38,8 +46,12 @@ pub unsafe fn pass_description<M: Exported>(receive: Receive, context: *mut c_vo
     unsafe { receive(context, text.as_ptr(), text.len()) }
 }
 
-/// Returns the description of a model in this program.
+/// Returns the description of a model in this program, which has no resources.
 pub fn describe<M: Exported>() -> String {
+    describe_with::<M>(None)
+}
+
+fn describe_with<M: Exported>(resources: Option<&String>) -> String {
     let mut json = Json::default();
     json.open("", '{');
     json.word("version", &VERSION);
@@ -71,7 +83,8 @@ pub fn describe<M: Exported>() -> String {
     let co_simulation = M::CO_SIMULATION.map(|_| Interface::CoSimulation);
     let model_exchange = M::MODEL_EXCHANGE.map(|_| Interface::ModelExchange);
     for interface in [co_simulation, model_exchange].into_iter().flatten() {
-        starts::<M>(&mut json, interface);
+        let setup = Setup { resource_location: resources.cloned(), ..Setup::new(interface) };
+        starts::<M>(&mut json, &setup);
     }
     json.close(']');
     json.close('}');
@@ -179,9 +192,9 @@ fn unit(json: &mut Json, of: &Unit) {
 
 /// Writes the start values of a new model, `null` for a variable without start value, or the reason why the
 /// model has none. For Model Exchange, also writes the first event indicator that the model does not write.
-fn starts<M: Exported>(json: &mut Json, interface: Interface) {
+fn starts<M: Exported>(json: &mut Json, setup: &Setup) {
     json.open("", '{');
-    let made = catch_unwind(|| M::new(&Setup::new(interface)));
+    let made = catch_unwind(|| M::new(setup));
     match made {
         Ok(Ok(model)) => {
             json.open("values", '[');
@@ -198,7 +211,7 @@ fn starts<M: Exported>(json: &mut Json, interface: Interface) {
                 }
             }
             json.close(']');
-            if interface == Interface::ModelExchange
+            if setup.interface == Interface::ModelExchange
                 && let Ok(Some(number)) = catch_unwind(AssertUnwindSafe(|| forgotten_indicator(model)))
             {
                 json.word("forgottenIndicator", &number);

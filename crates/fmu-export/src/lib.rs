@@ -17,7 +17,9 @@ pub mod fmi2;
 pub mod fmi3;
 mod info;
 mod instance;
+mod integrate;
 mod log;
+mod lookup;
 mod model;
 mod saved;
 mod settable;
@@ -40,7 +42,9 @@ pub use fmi_abi::{
     Variability,
 };
 pub use info::{DefaultExperiment, Info};
+pub use integrate::{Crossing, find_event, rk4};
 pub use log::Log;
+pub use lookup::{LookupTable, interpolate};
 pub use model::{Error, Experiment, Model, Setup};
 pub use saved::{Saved, StateVisitor};
 pub use simulation::Simulation;

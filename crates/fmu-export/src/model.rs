@@ -124,6 +124,26 @@ impl Setup {
     pub fn resources(&self) -> Option<PathBuf> {
         resources(self.resource_location.as_deref()?, cfg!(windows))
     }
+
+    /// Returns the path of a file in the directory `resources`. In the package, the file is in
+    /// `modelDescription/resources`.
+    ///
+    /// # Errors
+    /// Fails if there is no such directory, or if the name is no plain file name.
+    pub fn resource(&self, name: &str) -> Result<PathBuf, Error> {
+        if name.contains(['/', '\\', ':']) || name.starts_with('.') {
+            return Err(Error::new(format!(
+                "{name:?} must be the name of a file in the directory resources"
+            )));
+        }
+        let directory = self.resources().ok_or_else(|| {
+            Error::new(format!(
+                "there is no directory with {name:?}: a package needs modelDescription/resources, a test \
+                 Simulation::with_resources, and an importer passes the location of the resources"
+            ))
+        })?;
+        Ok(directory.join(name))
+    }
 }
 
 fn resources(location: &str, windows: bool) -> Option<PathBuf> {
@@ -210,7 +230,8 @@ impl std::error::Error for Error {}
 
 #[cfg(test)]
 mod tests {
-    use super::resources;
+    use super::{Setup, resources};
+    use fmi_abi::Interface;
     use std::path::Path;
 
     #[test]
@@ -232,6 +253,18 @@ mod tests {
         let elsewhere = ["file://localhostname/tmp/r", "file://server/share/r"];
         for location in ["", " ", "fmi2://elsewhere/r", "https://a/b"].into_iter().chain(elsewhere) {
             assert_eq!(resources(location, false), None, "{location}");
+        }
+    }
+
+    #[test]
+    fn a_resource_is_a_file_of_the_fmu() {
+        let mut setup = Setup::new(Interface::CoSimulation);
+        let error = |setup: &Setup, name| setup.resource(name).unwrap_err().to_string();
+        assert!(error(&setup, "a.csv").starts_with("there is no directory with \"a.csv\": "));
+        setup.resource_location = Some("/tmp/r".to_owned());
+        assert_eq!(setup.resource("a.csv").as_deref(), Ok(Path::new("/tmp/r/a.csv")));
+        for name in ["../a.csv", "/a.csv", "C:a.csv", "..\\a.csv", ".."] {
+            assert!(error(&setup, name).ends_with("must be the name of a file in the directory resources"));
         }
     }
 

@@ -85,12 +85,13 @@ macro_rules! symbols {
 
             /// See `fmu_export::pass_description`.
             #[unsafe(no_mangle)]
-            pub unsafe extern "C" fn fmu_export_description(
+            pub unsafe extern "C" fn fmu_export_describe(
+                resources: *const ::core::ffi::c_char,
                 receive: $crate::Receive,
                 context: *mut ::core::ffi::c_void,
             ) {
                 // SAFETY: the caller guarantees the contract of this function.
-                unsafe { $crate::pass_description::<__fmu_model>(receive, context) }
+                unsafe { $crate::pass_description::<__fmu_model>(resources, receive, context) }
             }
         }
     };

@@ -140,7 +140,7 @@ fn exported_symbols() {
         output(Command::new("nm").args(flags).arg(library("oscillator")), "this test needs nm (binutils)");
     let symbol = |line: &str| line.rsplit(' ').next().unwrap().trim_start_matches('_').to_owned();
     let mut exported: BTreeSet<_> = printed.lines().map(symbol).collect();
-    assert!(exported.remove("fmu_export_description"), "{exported:?}");
+    assert!(exported.remove("fmu_export_describe"), "{exported:?}");
     let expected = FUNCTIONS.iter().chain(fmi3::FUNCTIONS).chain(&WITHOUT_INSTANCE);
     let expected: BTreeSet<_> = expected.map(|name| (*name).to_owned()).collect();
     assert_eq!(expected.len(), 44 + 75);

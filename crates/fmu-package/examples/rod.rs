@@ -9,7 +9,7 @@ fn main() -> Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     let [library, folder] = arguments.as_slice() else { bail!("usage: rod LIBRARY FOLDER") };
     // SAFETY: the test's library.
-    let model = unsafe { LoadedModel::load(Path::new(library)) }?;
+    let model = unsafe { LoadedModel::load(Path::new(library), None) }?;
     let libraries = [Library { platform: Platform::host()?, path: library.into() }];
     let (changes, identifier) = (Changes::default(), model.identifier());
     for (fmi, description) in

@@ -125,6 +125,9 @@ const DESCRIBED_IN: &str = "release";
 /// The description of a model as it is built by default, where it is kept with the sources.
 const DESCRIPTION: &str = "modelDescription/modelDescription.xml";
 
+/// The files that the model reads.
+const RESOURCES: &str = "modelDescription/resources";
+
 impl Builder {
     /// For a package in the usual layout, started as `cargo run --release --bin build_fmu`.
     ///
@@ -345,7 +348,7 @@ impl Builder {
         };
         // SAFETY: cargo has made it of the author's model just now, or it has the guid of its sources.
         #[allow(unsafe_code)]
-        let model = unsafe { LoadedModel::load(&path) }?;
+        let model = unsafe { LoadedModel::load(&path, Some(&self.sources.folder.join(RESOURCES))) }?;
         check_guid(&fs::read(&path)?, guid, &path)?;
         Ok(model)
     }

@@ -84,7 +84,7 @@ impl<'a> Instance<'a> {
                     name,
                     interface as c_int,
                     token,
-                    null(),
+                    of.resources(),
                     &raw const callbacks,
                     0,
                     0,
@@ -92,7 +92,7 @@ impl<'a> Instance<'a> {
                 (Standard::Fmi3, Interface::ModelExchange) => (of.fmi3.fmi3InstantiateModelExchange)(
                     name,
                     token,
-                    null(),
+                    of.resources(),
                     0,
                     0,
                     environment,
@@ -101,7 +101,7 @@ impl<'a> Instance<'a> {
                 (Standard::Fmi3, Interface::CoSimulation) => (of.fmi3.fmi3InstantiateCoSimulation)(
                     name,
                     token,
-                    null(),
+                    of.resources(),
                     0,
                     0,
                     event_mode.into(),

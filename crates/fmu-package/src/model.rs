@@ -3,14 +3,16 @@
 
 use crate::table::Table;
 use anyhow::{Context, Result, ensure};
-use fmi_abi::c_types::c_void;
+use fmi_abi::c_types::{c_char, c_void};
 use fmi_abi::{BaseType, Value, fmi2, fmi3};
+use std::ffi::CString;
 use std::path::Path;
+use std::ptr::null;
 use std::sync::OnceLock;
 
 /// The function of a library that describes its model, as `fmu-export` declares it.
-const DESCRIPTION: &str = "fmu_export_description";
-type Describe = unsafe extern "C" fn(receive: Receive, context: *mut c_void);
+const DESCRIPTION: &str = "fmu_export_describe";
+type Describe = unsafe extern "C" fn(resources: *const c_char, receive: Receive, context: *mut c_void);
 type Receive = unsafe extern "C" fn(context: *mut c_void, text: *const u8, length: usize);
 
 /// A model that describes itself, with its functions of both FMI versions.
@@ -23,6 +25,8 @@ pub struct LoadedModel {
     pub(crate) groups: Vec<Group>,
     /// The start values by variable, once the model has been checked.
     pub(crate) starts: OnceLock<Vec<Option<Value>>>,
+    /// The directory with the files that the model reads.
+    resources: Option<CString>,
     _library: Option<libloading::Library>,
 }
 
@@ -43,10 +47,11 @@ impl LoadedModel {
     /// # Errors
     /// When the description cannot be read.
     pub unsafe fn new(description: &str, fmi2: fmi2::Functions, fmi3: fmi3::Functions) -> Result<Self> {
-        Self::with(description, fmi2, fmi3, None)
+        Self::with(description, fmi2, fmi3, None, None)
     }
 
-    /// The model of a shared library for this machine.
+    /// Loads the model of a shared library for this machine. The model may read the files in the directory `resources`,
+    /// if it exists.
     ///
     /// # Safety
     /// The file is the library of an FMU that was made with `fmu-export`, or no library; what the library does when it is
@@ -54,13 +59,18 @@ impl LoadedModel {
     ///
     /// # Errors
     /// When the library cannot be loaded, or does not describe itself.
-    pub unsafe fn load(path: &Path) -> Result<Self> {
+    pub unsafe fn load(path: &Path, resources: Option<&Path>) -> Result<Self> {
         let of = || path.display().to_string();
         // SAFETY: the caller's promise, here and below.
         let library = unsafe { libloading::Library::new(path) }.with_context(of)?;
+        let resources = resources.and_then(|path| path.canonicalize().ok());
+        let resources = resources
+            .map(|path| CString::new(path.to_string_lossy().into_owned()))
+            .transpose()
+            .with_context(of)?;
         let mut description = Vec::new();
         // SAFETY: the functions have the types of the standards, and the description that of fmu-export; `keep` gets a
-        // pointer to a vector, which lives.
+        // pointer to a vector, which lives; `directory` is a string or NULL.
         let (fmi2, fmi3) = unsafe {
             let symbol = |name: &str| library.get::<*const c_void>(name).ok().map(|found| *found);
             let mut names = fmi2::Functions::NAMES.iter().chain(fmi3::Functions::NAMES);
@@ -77,16 +87,18 @@ impl LoadedModel {
                     env!("CARGO_PKG_VERSION")
                 )
             })?;
-            describe(keep, (&raw mut description).cast());
+            let directory = resources.as_ref().map_or(null(), |path| path.as_ptr());
+            describe(directory, keep, (&raw mut description).cast());
             (fmi2, fmi3)
         };
-        Self::with(std::str::from_utf8(&description)?, fmi2, fmi3, Some(library)).with_context(of)
+        Self::with(std::str::from_utf8(&description)?, fmi2, fmi3, resources, Some(library)).with_context(of)
     }
 
     fn with(
         description: &str,
         fmi2: fmi2::Functions,
         fmi3: fmi3::Functions,
+        resources: Option<CString>,
         library: Option<libloading::Library>,
     ) -> Result<Self> {
         let table = Table::read(description)?;
@@ -96,7 +108,12 @@ impl LoadedModel {
             Group { base, places, first }
         };
         let groups = BaseType::ALL.into_iter().map(group).filter(|group| !group.places.is_empty()).collect();
-        Ok(Self { table, fmi2, fmi3, groups, starts: OnceLock::new(), _library: library })
+        Ok(Self { table, fmi2, fmi3, groups, starts: OnceLock::new(), resources, _library: library })
+    }
+
+    /// Returns the directory of resources, or NULL.
+    pub(crate) fn resources(&self) -> *const c_char {
+        self.resources.as_ref().map_or(null(), |path| path.as_ptr())
     }
 
     /// The `modelIdentifier`.

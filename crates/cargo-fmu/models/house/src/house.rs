@@ -1,7 +1,6 @@
 //! The house: a table in a file that the FMU brings, texts, units with an offset.
 
 use fmu_export::*;
-use std::path::PathBuf;
 
 /// A house of one room, which the heating warms and the weather cools.
 #[derive(Clone)]
@@ -11,12 +10,12 @@ pub struct House {
     capacity: f64,
     loss: f64,
     weather: String,
-    /// The hours of a day and how warm it is outside then, degC.
-    table: Vec<(f64, f64)>,
-    /// The file that it is from.
+    /// Outside temperatures in degC over the hours of a day.
+    table: LookupTable,
+    /// Name of the file of the table.
     read: String,
     outside: f64,
-    resources: Option<PathBuf>,
+    setup: Setup,
     log: Log,
 }
 
@@ -63,39 +62,9 @@ impl House {
         }
     }
 
-    /// Of the table, straight lines between its hours; every day is like the first.
+    /// Returns the temperature outside; every day is like the first.
     fn outside_at(&self, time: f64) -> f64 {
-        let hour = (time / 3600.0).rem_euclid(24.0);
-        let after = self.table.partition_point(|(given, _)| *given <= hour);
-        match (after.checked_sub(1).and_then(|before| self.table.get(before)), self.table.get(after)) {
-            (Some(begin), Some(end)) => begin.1 + (hour - begin.0) / (end.0 - begin.0) * (end.1 - begin.1),
-            (Some(nearest), None) | (None, Some(nearest)) => nearest.1,
-            (None, None) => 0.0,
-        }
-    }
-
-    fn read_table(&self) -> Result<Vec<(f64, f64)>, Error> {
-        let name = &self.weather;
-        let fault = |fault: String| Error::new(format!("weather {name:?}: {fault}"));
-        // Without an importer, as in a test, there are no resources.
-        let Some(folder) = &self.resources else { return Ok(Vec::new()) };
-        if name.contains(['/', '\\', ':']) || name.starts_with('.') {
-            return Err(fault("name a file in the FMU's folder resources".to_owned()));
-        }
-        let text = std::fs::read_to_string(folder.join(name)).map_err(|error| fault(error.to_string()))?;
-        let number = |text: &str| text.trim().parse().ok().filter(|number: &f64| number.is_finite());
-        let row = |line: &str| {
-            let (hour, temperature) = line.split_once(',')?;
-            Some((number(hour)?, number(temperature)?))
-        };
-        let rows = text.lines().skip(1).filter(|line| !line.trim().is_empty());
-        let table: Vec<_> = rows
-            .map(|line| row(line).ok_or_else(|| fault(format!("{line:?} is no hour and temperature"))))
-            .collect::<Result<_, _>>()?;
-        if !table.is_sorted_by(|one, next| one.0 < next.0) {
-            return Err(fault("its hours must rise".to_owned()));
-        }
-        Ok(table)
+        self.table.at((time / 3600.0).rem_euclid(24.0))
     }
 }
 
@@ -117,10 +86,10 @@ impl Model for House {
             capacity: 5e6,
             loss: 150.0,
             weather: "winter.csv".to_owned(),
-            table: Vec::new(),
+            table: LookupTable::default(),
             read: String::new(),
             outside: 0.0,
-            resources: setup.resources(),
+            setup: setup.clone(),
             log: Log::default(),
         };
         house.update()?;
@@ -128,12 +97,13 @@ impl Model for House {
         Ok(house)
     }
 
-    /// A file that cannot be read is refused, and the house stays as it is.
+    /// Rejects a file that is no table; the house then stays as it is.
     fn update(&mut self) -> Result<(), Error> {
         if self.weather != self.read {
-            self.table = self.read_table()?;
+            self.table = LookupTable::read(&self.setup.resource(&self.weather)?)?;
             self.read.clone_from(&self.weather);
-            self.log.event(format!("read {} temperatures from {}", self.table.len(), self.weather));
+            let count = self.table.xs().len();
+            self.log.event(format!("read {count} temperatures from {}", self.weather));
         }
         Ok(())
     }
@@ -148,20 +118,13 @@ impl Model for House {
 }
 
 impl CoSimulation for House {
-    /// In parts of five minutes at most, in which the weather is taken as it is in the middle; the rest is exact.
+    /// The weather is constant in parts of five minutes at most; the rest is exact.
     fn step(&mut self, step: Step) -> Result<Stepped, Error> {
-        const PART: f64 = 300.0;
-        const MOST: f64 = 1e6;
-        let parts = (step.size / PART).ceil();
-        if parts > MOST {
-            return Err(Error::new(format!("a step may have {} s at most", MOST * PART)));
-        }
-        let size = step.size / parts;
         let mut room = self.room;
-        for part in 0..parts as u32 {
-            let outside = self.outside_at(step.time + (f64::from(part) + 0.5) * size);
+        for part in step.parts(300.0)? {
+            let outside = self.outside_at(part.time + 0.5 * part.size);
             let end = outside + self.heating / self.loss;
-            room = end + (room - end) * (-size * self.loss / self.capacity).exp();
+            room = end + (room - end) * (-part.size * self.loss / self.capacity).exp();
         }
         if !room.is_finite() {
             return Err(Error::new("no house gets as warm as that"));

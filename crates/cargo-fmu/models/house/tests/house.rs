@@ -26,7 +26,7 @@ fn the_weather_is_that_of_the_table() {
 fn what_is_no_table_is_refused() {
     for weather in ["summer.csv", "../../Cargo.toml"] {
         let error = house(weather).err().expect("there is no such table").to_string();
-        assert!(error.starts_with(&format!("weather {weather:?}: ")), "{error}");
+        assert!(error.contains(weather), "{error}");
     }
 }
 

@@ -51,9 +51,11 @@ variables! { for Motor, memory in next, rises, begin;
     /// Whether the supply is on
     on = output(&BOOLEAN).exact() in on;
     /// Rate of the current
-    der_current as "der(current)" = local(&CURRENT_RATE).derivative_of(current) by |motor| motor.rates().0;
+    der_current as "der(current)" = local(&CURRENT_RATE).derivative_of(current)
+        by |motor| motor.rates([motor.current, motor.speed])[0];
     /// Rate of the speed
-    der_speed as "der(speed)" = local(&ACCELERATION).derivative_of(speed) by |motor| motor.rates().1;
+    der_speed as "der(speed)" = local(&ACCELERATION).derivative_of(speed)
+        by |motor| motor.rates([motor.current, motor.speed])[1];
     /// Of the supply
     supply = parameter(&VOLTAGE) in supply;
     /// Of the winding
@@ -69,13 +71,13 @@ variables! { for Motor, memory in next, rises, begin;
 }
 
 impl Motor {
-    /// Of current and speed.
-    fn rates(&self) -> (f64, f64) {
+    /// Rates of current and speed.
+    fn rates(&self, [current, speed]: [f64; 2]) -> [f64; 2] {
         let voltage = if self.on { self.supply } else { 0.0 };
-        (
-            (voltage - self.resistance * self.current - self.constant * self.speed) / self.inductance,
-            (self.constant * self.current - self.load) / self.inertia,
-        )
+        [
+            (voltage - self.resistance * current - self.constant * speed) / self.inductance,
+            (self.constant * current - self.load) / self.inertia,
+        ]
     }
 
     /// Switches on where a period begins, off after its part; tells itself when to come back.
@@ -89,26 +91,12 @@ impl Motor {
         self.next = self.begin + if self.rises { self.period } else { duty * self.period };
     }
 
-    /// Integrates with the classical Runge-Kutta method, in steps that are short for the winding.
-    fn integrate(&mut self, time: f64) {
-        let short = 0.2 * (self.inductance / self.resistance).min(self.period);
-        let steps = (time / short).ceil().max(1.0);
-        let size = time / steps;
-        for _ in 0..steps as u64 {
-            let (current, speed) = (self.current, self.speed);
-            let mut slope = [self.rates(); 4];
-            for stage in 1..4 {
-                let part = if stage == 3 { size } else { 0.5 * size };
-                self.current = current + part * slope[stage - 1].0;
-                self.speed = speed + part * slope[stage - 1].1;
-                slope[stage] = self.rates();
-            }
-            let mean = |of: fn((f64, f64)) -> f64| {
-                (of(slope[0]) + 2.0 * (of(slope[1]) + of(slope[2])) + of(slope[3])) / 6.0
-            };
-            self.current = current + size * mean(|slope| slope.0);
-            self.speed = speed + size * mean(|slope| slope.1);
+    /// Integrates in parts that are short for the winding.
+    fn integrate(&mut self, step: Step) -> Result<(), Error> {
+        for part in step.parts(0.2 * (self.inductance / self.resistance).min(self.period))? {
+            [self.current, self.speed] = rk4([self.current, self.speed], part, |_, state| self.rates(state));
         }
+        Ok(())
     }
 }
 
@@ -164,11 +152,11 @@ impl CoSimulation for Motor {
         let mut motor = self.clone();
         let mut time = step.time;
         while motor.next < last {
-            motor.integrate((motor.next - time).max(0.0));
+            motor.integrate(Step::new(time, (motor.next - time).max(0.0)))?;
             time = motor.next;
             motor.switch();
         }
-        motor.integrate(end - time);
+        motor.integrate(Step::new(time, end - time))?;
         if !(motor.current.is_finite() && motor.speed.is_finite()) {
             return Err(Error::new("current or speed leave the range of numbers"));
         }

@@ -1,0 +1,216 @@
+//! Integration within a step of Co-Simulation: parts of a step, a Runge-Kutta method, and the search for an
+//! event.
+
+use crate::capabilities::Step;
+use crate::model::Error;
+
+/// Maximum number of parts of a step.
+const MOST_PARTS: f64 = 1e7;
+
+impl Step {
+    /// Returns the time at the end of the step, s.
+    pub fn end(&self) -> f64 {
+        self.time + self.size
+    }
+
+    /// Splits the step into parts of equal size, each at most `longest` s.
+    ///
+    /// # Errors
+    /// Fails for more than 10,000,000 parts.
+    pub fn parts(self, longest: f64) -> Result<impl Iterator<Item = Self>, Error> {
+        let count = (self.size / longest).ceil().max(1.0);
+        if !(longest > 0.0 && count <= MOST_PARTS) {
+            return Err(Error::new(format!(
+                "a step of {} s has more than {MOST_PARTS} parts of {longest} s; make shorter steps",
+                self.size
+            )));
+        }
+        let size = self.size / count;
+        Ok((0..count as u32).map(move |part| Self { time: self.time + f64::from(part) * size, size, ..self }))
+    }
+}
+
+/// Returns the state after a step of the classical Runge-Kutta method of order 4.
+///
+/// `rates` returns the time derivatives of a state at a time, s.
+///
+/// ```
+/// # use fmu_export::{Step, rk4};
+/// // An oscillator: x' = v, v' = -x.
+/// let [x, v] = rk4([1.0, 0.0], Step::new(0.0, 0.1), |_, [x, v]| [v, -x]);
+/// assert!((x - 0.1_f64.cos()).abs() < 1e-6 && (v + 0.1_f64.sin()).abs() < 1e-6);
+/// ```
+pub fn rk4<const N: usize>(
+    state: [f64; N],
+    step: Step,
+    mut rates: impl FnMut(f64, [f64; N]) -> [f64; N],
+) -> [f64; N] {
+    let size = step.size;
+    let after = |size: f64, rates: [f64; N]| std::array::from_fn(|n| state[n] + size * rates[n]);
+    let first = rates(step.time, state);
+    let second = rates(step.time + 0.5 * size, after(0.5 * size, first));
+    let third = rates(step.time + 0.5 * size, after(0.5 * size, second));
+    let fourth = rates(step.end(), after(size, third));
+    after(size, std::array::from_fn(|n| (first[n] + 2.0 * (second[n] + third[n]) + fourth[n]) / 6.0))
+}
+
+/// Direction in which an indicator of an event changes its sign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Crossing {
+    /// From above zero to zero or below.
+    Falling,
+    /// From below zero to zero or above.
+    Rising,
+    /// Either direction.
+    Any,
+}
+
+/// Returns the part of a step up to the event at which an indicator changes its sign, or `None` if the
+/// indicator has the same sign at both ends of the step.
+///
+/// `indicator` returns the value at the end of a part of the step: it integrates the model over this part.
+/// The part may have size 0. The returned part ends at most `tolerance` s after the change of sign, never
+/// before. An indicator that begins at zero does not change its sign. Two changes of sign in a step are not
+/// found; [`Step::parts`] makes shorter steps.
+///
+/// ```
+/// # use fmu_export::{Crossing, Step, find_event};
+/// // A stone falls from 5 m at t = 2 s.
+/// let height = |part: Step| 5.0 - 0.5 * 9.81 * part.size * part.size;
+/// let fall = find_event(Step::new(2.0, 3.0), Crossing::Falling, 1e-9, height).unwrap();
+/// let exact = 2.0 + (10.0_f64 / 9.81).sqrt();
+/// assert!(fall.end() >= exact && fall.end() < exact + 2e-9);
+/// ```
+pub fn find_event(
+    step: Step,
+    crossing: Crossing,
+    tolerance: f64,
+    mut indicator: impl FnMut(Step) -> f64,
+) -> Option<Step> {
+    let part = |size: f64| Step { size, ..step };
+    let begin = indicator(part(0.0));
+    let falls = match crossing {
+        Crossing::Falling | Crossing::Any if begin > 0.0 => true,
+        Crossing::Rising | Crossing::Any if begin < 0.0 => false,
+        _ => return None,
+    };
+    let is_after = |value: f64| if falls { value <= 0.0 } else { value >= 0.0 };
+    let end = indicator(step);
+    if !is_after(end) {
+        return None;
+    }
+    // The ITP method (Oliveira and Takahashi, 2020): the regula falsi, with at most one evaluation more than
+    // bisection.
+    let tolerance = tolerance.max(4.0 * f64::EPSILON * step.size);
+    let (mut before, mut after) = ((0.0, begin), (step.size, end));
+    let mut widest = step.size;
+    while after.0 - before.0 > tolerance {
+        let width = after.0 - before.0;
+        let middle = before.0 + 0.5 * width;
+        let falsi = (after.1 * before.0 - before.1 * after.0) / (after.1 - before.1);
+        let shift = 0.2 * width * (width / step.size);
+        let towards =
+            if (middle - falsi).abs() > shift { falsi + shift.copysign(middle - falsi) } else { middle };
+        let radius = widest - 0.5 * width;
+        let size = if (towards - middle).abs() <= radius {
+            towards
+        } else {
+            middle - radius.copysign(middle - falsi)
+        };
+        let value = indicator(part(size));
+        if is_after(value) {
+            after = (size, value)
+        } else {
+            before = (size, value)
+        }
+        widest *= 0.5;
+    }
+    Some(part(after.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_fill_the_step() {
+        for (size, longest, count) in [(1.0, 0.3, 4), (0.2, 0.3, 1), (0.3, 0.1, 3), (2.0, 2.0, 1)] {
+            let parts: Vec<Step> = Step::new(5.0, size).parts(longest).unwrap().collect();
+            assert_eq!(parts.len(), count);
+            assert_eq!(parts[0].time, 5.0);
+            assert!(parts.windows(2).all(|two| (two[0].end() - two[1].time).abs() < 1e-14));
+            assert!((parts[count - 1].end() - (5.0 + size)).abs() < 1e-14);
+        }
+        for longest in [1e-8, 0.0, -1.0, f64::NAN] {
+            let error = Step::new(0.0, 1.0).parts(longest).err().unwrap().to_string();
+            assert!(error.ends_with("make shorter steps"), "{error}");
+        }
+    }
+
+    /// x' = cos(t) x has the solution e^(sin t); half the step size gives 1/16 of the error.
+    #[test]
+    fn rk4_has_order_4() {
+        let error = |size: f64| {
+            let parts = Step::new(0.0, 2.0).parts(size).unwrap();
+            let [x] = parts.fold([1.0], |x, part| rk4(x, part, |time: f64, [x]| [time.cos() * x]));
+            (x - 2.0_f64.sin().exp()).abs()
+        };
+        let order = (error(0.1) / error(0.05)).log2();
+        assert!((order - 4.0).abs() < 0.1, "{order}");
+    }
+
+    #[test]
+    fn events_are_found_in_their_direction() {
+        // cos(t) falls through zero at pi / 2 and rises through zero at 3 pi / 2.
+        let find = |time, size, crossing| {
+            find_event(Step::new(time, size), crossing, 1e-10, |part| part.end().cos()).map(|part| part.end())
+        };
+        let instants = [(1.0, 0.5 * std::f64::consts::PI), (4.0, 1.5 * std::f64::consts::PI)];
+        for ((begin, exact), direction) in instants.into_iter().zip([Crossing::Falling, Crossing::Rising]) {
+            for crossing in [Crossing::Falling, Crossing::Rising, Crossing::Any] {
+                match find(begin, 1.0, crossing) {
+                    Some(found) => assert!(found >= exact && found < exact + 2e-10, "{found} for {exact}"),
+                    None => assert!(crossing != Crossing::Any && crossing != direction),
+                }
+            }
+        }
+        assert_eq!(find(2.0, 1.0, Crossing::Any), None);
+    }
+
+    /// Smooth, discontinuous, infinite and flat indicators. Bisection needs 32 evaluations for this tolerance.
+    #[test]
+    fn the_search_never_needs_much_more_than_bisection() {
+        type Case = (fn(f64) -> f64, usize);
+        let indicators: [Case; 6] = [
+            (|x| 0.3 - x, 10),
+            (|x| 0.3 - x * x * x, 11),
+            (|x| if x < 0.3 { 1.0 } else { -1e-9 }, 33),
+            (|x| if x < 0.3 { f64::INFINITY } else { -1.0 }, 32),
+            (|x| (0.3 - x).powi(9), 33),
+            (|x| 1e-300 - x, 6),
+        ];
+        for (number, (indicator, most)) in indicators.into_iter().enumerate() {
+            let mut count = 0;
+            let found = find_event(Step::new(0.0, 1.0), Crossing::Any, 1e-9, |part| {
+                count += 1;
+                indicator(part.size)
+            });
+            let end = found.unwrap().size;
+            assert!(indicator(end) <= 0.0 && indicator(end - 1e-9) > 0.0, "indicator {number}: {end}");
+            assert!(count <= most, "indicator {number}: {count} evaluations");
+        }
+    }
+
+    #[test]
+    fn no_event_begins_at_zero_or_without_a_number() {
+        let find = |indicator: fn(f64) -> f64| {
+            find_event(Step::new(0.0, 1.0), Crossing::Any, 0.0, |part| indicator(part.size))
+        };
+        assert_eq!(find(|x| x), None);
+        assert_eq!(find(|x| if x > 0.0 { f64::NAN } else { 1.0 }), None);
+        assert_eq!(find(|x| x / 0.0), None);
+        // No tolerance: as close as numbers are.
+        let exact = find(|x| 0.7 - x).unwrap().size;
+        assert!((exact - 0.7).abs() < 1e-15, "{exact}");
+    }
+}
