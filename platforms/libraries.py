@@ -21,6 +21,8 @@ from targets import GLIBC, LINUX, MODEL, MODELS, PACKERS, ROOT, TARGETS, WINDOWS
 
 #: Compiles the standard library too, without the code that prints backtraces, a third of a library. Importers print none.
 STD = ("-Zbuild-std=std,panic_unwind", "-Zbuild-std-features=panic-unwind")
+#: The earliest time in a zip file. A fixed time makes archives reproducible.
+EPOCH = "315532800"
 #: The Python package fmu-run.
 PACKAGE = ROOT / "crates" / "fmu-run"
 
@@ -47,41 +49,47 @@ def target_directory() -> Path:
     return Path(json.loads(run("cargo", "metadata", "--locked", "--no-deps", "--format-version=1"))["target_directory"])
 
 
-def environment(*flags: str) -> dict[str, str]:
-    """The environment of cargo, with flags of rustc. Messages of the libraries name no directory of this machine."""
+def environment(target: Target | None = None) -> dict[str, str]:
+    """The environment of cargo for a target. Messages of the libraries name no directory of this machine."""
     cargo = Path(os.environ.get("CARGO_HOME") or Path.home() / ".cargo")
     (commit,) = re.findall(r"^commit-hash: (\w+)$", run("rustc", "-vV"), re.MULTILINE)
-    std = Path(run("rustc", "--print", "sysroot"), "lib/rustlib/src/rust")
+    sysroot = Path(run("rustc", "--print", "sysroot"))
     # rustc takes the last prefix that fits.
-    names = {ROOT: MODEL, target_directory(): "target", std: f"/rustc/{commit}"}
+    names = {ROOT: MODEL, target_directory(): "target", sysroot / "lib/rustlib/src/rust": f"/rustc/{commit}"}
     names |= dict.fromkeys(sorted((cargo / "registry" / "src").glob("*/")), "crates")
-    remap = [f"--remap-path-prefix={path}={name}" for path, name in names.items()]
+    flags = [f"--remap-path-prefix={path}={name}" for path, name in names.items()]
     path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
+    found = {**os.environ, "PATH": path}
+    if target:
+        # Cargo has the unstable options STD with any compiler.
+        found["RUSTC_BOOTSTRAP"] = "1"
+    if target is WINDOWS:
+        # The linker writes this time, the earliest in a zip file, into the library.
+        found["SOURCE_DATE_EPOCH"] = EPOCH
+    if target and target.macos:
+        flags.insert(0, "-Clinker-flavor=ld64.lld")
+        (lld,) = sysroot.glob("lib/rustlib/*/bin/rust-lld")
+        found[f"CARGO_TARGET_{target.triple.replace('-', '_').upper()}_LINKER"] = macos_linker.__file__
+        found |= {"RUST_LLD": str(lld), "SDKROOT": str(macos_sdk()), "MACOSX_DEPLOYMENT_TARGET": target.macos}
+        found["CARGO_PROFILE_LIBRARY_STRIP"] = "false"
     # Cargo splits the flags at this character, which paths do not contain.
-    return {**os.environ, "PATH": path, "CARGO_ENCODED_RUSTFLAGS": "\x1f".join([*flags, *remap])}
+    return found | {"CARGO_ENCODED_RUSTFLAGS": "\x1f".join(flags)}
 
 
-def cross(target: Target, library: str, exports: Sequence[str]) -> dict[str, str]:
-    """The environment that compiles a library for a target; exports: the names of its functions."""
+def link(target: Target, name: str, exports: Sequence[str]) -> list[str]:
+    """Flags of rustc for the library `name` that exports these functions."""
+    arguments: Sequence[str] = ()
     if target is WINDOWS:
         # cargo-zigbuild drops rustc's own list, and zig would export all functions.
-        listed = ROOT / "target" / f"{library}.def"
+        listed = ROOT / "target" / f"{name}.def"
         listed.parent.mkdir(exist_ok=True)
         listed.write_text("\n".join(["EXPORTS", *exports, ""]), encoding="utf-8")
-        # A relative path, because symbols have a hash of the flags. The linker writes the time into the library.
-        found = environment(f"-Clink-arg=target/{listed.name}") | {"SOURCE_DATE_EPOCH": "0"}
+        # A relative path, because symbols have a hash of the flags.
+        arguments = (f"target/{listed.name}",)
     elif target.macos:
-        (lld,) = Path(run("rustc", "--print", "sysroot")).glob("lib/rustlib/*/bin/rust-lld")
         # -S -x: strips the library before it is signed.
-        arguments = ("-install_name", f"@rpath/{library}", "-dead_strip_dylibs", "-S", "-x")
-        found = environment("-Clinker-flavor=ld64.lld", *(f"-Clink-arg={argument}" for argument in arguments))
-        found |= {"CARGO_PROFILE_LIBRARY_STRIP": "false", "MACOSX_DEPLOYMENT_TARGET": target.macos}
-        found |= {"RUST_LLD": str(lld), "SDKROOT": str(macos_sdk())}
-        found[f"CARGO_TARGET_{target.triple.replace('-', '_').upper()}_LINKER"] = macos_linker.__file__
-    else:
-        found = environment()
-    # Cargo has the unstable options STD with any compiler.
-    return found | {"RUSTC_BOOTSTRAP": "1"}
+        arguments = ("-install_name", f"@rpath/{name}", "-dead_strip_dylibs", "-S", "-x")
+    return ["--", *(f"-Clink-arg={argument}" for argument in arguments)] if arguments else []
 
 
 def macos_sdk() -> Path:
@@ -116,7 +124,8 @@ def library(model: str, target: Target) -> Path:
     program, glibc = ("cargo", "") if target.macos else ("cargo-zigbuild", f".{GLIBC}" * ("linux" in target.triple))
     command = [program, "rustc", *STD, "--target", target.triple + glibc, "--package", model, "--no-default-features"]
     command += ["--lib", "--crate-type=cdylib", "--profile=library", "--locked"]
-    run(*command, environment=cross(target, f"{model}{target.suffix}", exports) | {"FMU_GUID": guid(model)})
+    command += link(target, f"{model}{target.suffix}", exports)
+    run(*command, environment=environment(target) | {"FMU_GUID": guid(model)})
     return target_directory() / target.triple / "library" / target.library(model)
 
 
@@ -128,7 +137,7 @@ def wheel(target: Target, out: Path) -> Path:
     if "linux" in target.triple:
         command += ["--compatibility", f"manylinux_{GLIBC.replace('.', '_')}"]
     name = "_native.dll" if target is WINDOWS else "fmu_run._native.abi3.so"
-    run(*command, environment=cross(target, name, ["PyInit__native"]), directory=PACKAGE)
+    run(*command, *link(target, name, ["PyInit__native"]), environment=environment(target), directory=PACKAGE)
     (path,) = out.glob(f"fmu_run-*{target.wheel}*.whl")
     return path
 
