@@ -97,7 +97,7 @@ def macos_sdk() -> Path:
     import ziglang
 
     text = (Path(ziglang.__file__).parent / "lib/libc/darwin/libSystem.tbd").read_text(encoding="utf-8")
-    text = re.sub(r"targets:.*", "targets: [ x86_64-macos, arm64-macos ]", text)
+    text = re.sub(r"targets:\s*\[[^\]]*\]", "targets: [ x86_64-macos, arm64-macos ]", text)
     folder = target_directory() / "macos-sdk" / "usr" / "lib"
     folder.mkdir(parents=True, exist_ok=True)
     # The other libraries that Rust names are parts of libSystem, or (iconv) are not used.

@@ -204,7 +204,9 @@ def test_every_system_gives_the_same_bits(system: System, here: str, tmp_path: P
     """In an empty directory, where prw finds no FMU but that in its wheel."""
     files = (HERE / "elsewhere.py", ROOT / "examples" / "point_to_point.csv", system.fmu, FMUS[1])
     command = (*system.start, system.python, *map(system.path, files))
-    assert run(*command, environment=system.environment, directory=tmp_path) == here
+    printed = run(*command, environment=system.environment, directory=tmp_path)
+    # FMPy for ARM first prints that it has no function to format messages.
+    assert printed[printed.index("prw tau1") :] == here
 
 
 def zig_cc(target: str, *arguments: object) -> None:

@@ -12,6 +12,7 @@ import fmpy
 import lief
 import pytest
 from conftest import DIST, ROOT, binaries, wheel
+from libraries import EPOCH
 from targets import FOLDERS, GLIBC, MODELS, TARGETS, WINDOWS, Target
 
 #: Bytes per target.
@@ -93,6 +94,7 @@ def windows(pe: lief.PE.Binary, exports: set[str], name: str, others: set[str]) 
     assert all(WINDOWS_LIBRARIES.fullmatch(library) for library in imports), imports
     flags = lief.PE.OptionalHeader.DLL_CHARACTERISTICS
     assert pe.optional_header.has(flags.NX_COMPAT) and pe.optional_header.has(flags.DYNAMIC_BASE)
+    assert (pe.header.time_date_stamps, pe.get_export().timestamp) == (int(EPOCH), 0)
     assert pe.header.pointerto_symbol_table == 0, "not stripped"
 
 
