@@ -151,11 +151,11 @@ test-page: $(VENV)/test.stamp closed-loop-fmus
 
 # Ratios of one run; quiet the machine first.
 bench: $(VENV)/test.stamp closed-loop-fmus source-fmu
-	@benches/run $(FMU) $(SOURCE_FMU) $(PY)
+	@$(PY) benches/bench.py $(FMU) --sources $(SOURCE_FMU)
 
 # Instructions of a step, counted by callgrind.
 profile: $(VENV)/test.stamp fmu
-	@benches/profile $(FMU) $(PY)
+	@$(PY) benches/bench.py $(FMU) --profile
 
 # The figures and their copies for documentation and README.
 figures: need-rust $(VENV)/test.stamp closed-loop-fmus
@@ -207,9 +207,10 @@ test-importers: $(VENV)/importers.stamp importer-fmus
 test-faults: need-rust headers
 	@$(PY) tools/seeded_faults.py $(ARGS)
 
-# The tools for other platforms have a separate environment. Programs that are no Python packages are installed
-# where that is possible, else named.
+# The tools for other platforms have a separate environment. The standard library is compiled from its sources.
 release: need-rust $(DIST_VENV)/dist.stamp
+	@$(ADD_WEBASSEMBLY)
+	@rustup component list --installed | grep -q rust-src || rustup component add rust-src
 	@$(DIST_VENV)/bin/python platforms/release.py
 
 # The library as WebAssembly, and that as C: for targets that have a C compiler and no Rust.

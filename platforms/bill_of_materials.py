@@ -1,16 +1,15 @@
-"""Lists what is compiled into the libraries of the FMUs and of fmu-run for Python, with versions and licences.
+"""Lists the packages that are compiled into the libraries of the FMUs and of fmu-run for Python, with versions and licences.
 
-    python platforms/bill_of_materials.py            writes the lists anew
+    python platforms/bill_of_materials.py            updates the lists
     python platforms/bill_of_materials.py --check    fails if they are out of date
 
-Those in folders modelDescription/licenses/ go into the FMUs, those in crates/fmu-run/python/ into the wheels:
-third-party.txt for people and bill-of-materials.cdx.json (CycloneDX 1.6) for tools. Needs cargo and nothing else.
+The FMUs contain the lists in modelDescription/licenses/, the wheels the lists in crates/fmu-run/python/: third-party.txt for
+people and bill-of-materials.cdx.json (CycloneDX 1.6) for tools.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import re
 import subprocess
 import sys
@@ -27,7 +26,7 @@ from targets import CONTROLLER, MODEL, ROOT, TARGETS
 
 @dataclass(frozen=True)
 class Product:
-    """What the libraries go into, the package that they are compiled from, and where the lists are kept."""
+    """An FMU or a Python package, the Rust package of its libraries, and the directory of its lists."""
 
     kind: str
     name: str
@@ -51,15 +50,14 @@ CONTROLLER_FMU = Product("FMU", CONTROLLER, CONTROLLER, ROOT / "crates" / "prw-c
 WHEEL = Product("package", "fmu_run", "fmu-run-python", ROOT / "crates" / "fmu-run" / "python")
 PRODUCTS = (FMU, CONTROLLER_FMU, WHEEL)
 
-#: Compiled in, but no packages of Cargo.lock: name, licence, copyright, where it is.
-BESIDE_CRATES = (
+#: Compiled in, but no packages of Cargo.lock: name, licence, copyright, and the libraries that contain them.
+NO_CRATES = (
     ("std", "MIT OR Apache-2.0", "The Rust Project Developers", "all, the Rust standard library"),
-    ("libunwind", "Apache-2.0 WITH LLVM-exception", "The LLVM Project contributors", "Linux, from zig"),
-    ("libgcc", "GPL-3.0-or-later WITH GCC-exception-3.1", "Free Software Foundation", "Windows, from MinGW"),
-    ("mingw-w64", "ZPL-2.1", "The mingw-w64 project", "Windows, start-up code"),
+    ("libunwind", "Apache-2.0 WITH LLVM-exception", "The LLVM Project contributors", "Linux and Windows, from zig"),
+    ("mingw-w64", "ZPL-2.1", "The mingw-w64 project", "Windows, start-up code, from zig"),
 )
 
-#: A line of a licence file that names one.
+#: A line of a licence file that names a holder.
 HOLDER = re.compile(r"\s*Copyright\s+(?:\(c\)\s+|©\s+)?(?=[\dA-Z])(.+?)(?: or)?[.,]?\s*(?:\[.*\])?$")
 
 HEADER = """\
@@ -71,8 +69,7 @@ Each is a published Rust crate of that name and version. For tools: bill-of-mate
 """
 
 FOOTER = """
-What the Rust standard library contains of others is listed in the file COPYRIGHT-library.html of every Rust
-distribution. libgcc is linked under the GCC Runtime Library Exception, which asks nothing of this {kind}.
+The file COPYRIGHT-library.html of every Rust distribution lists the third-party parts of the Rust standard library.
 """
 
 
@@ -81,11 +78,10 @@ def packages(product: Product) -> list[dict[str, Any]]:
     """The packages that are compiled into a library for any target, as cargo describes them."""
     names: set[tuple[str, ...]] = set()
     for target in TARGETS:
-        # Without build scripts and procedural macros: they run, but nothing of them gets in.
+        # Build scripts and procedural macros run, but are not compiled in.
         command = ["cargo", "tree", "--locked", "--no-default-features", "--package", product.package]
-        command += ["--target", target.triple, "--edges", "normal,no-proc-macro"]
-        lines = _cargo([*command, "--prefix", "none", "--format", "{p}"])
-        names.update(tuple(line.split()[:2]) for line in lines.splitlines() if line)
+        command += ["--target", target.triple, "--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"]
+        names.update(tuple(line.split()[:2]) for line in _cargo(command).splitlines() if line)
     metadata = json.loads(_cargo(["cargo", "metadata", "--locked", "--format-version", "1"]))
     found = [p for p in metadata["packages"] if (p["name"], f"v{p['version']}") in names]
     return sorted(found, key=lambda package: (package["name"], package["version"]))
@@ -132,7 +128,7 @@ def bill(product: Product) -> str:
     (main,) = (key for key in components if key[0] == product.package)
     metadata = {"component": components.pop(main)}
     every = list(components.values())
-    for name, licence, holder, where in BESIDE_CRATES:
+    for name, licence, holder, where in NO_CRATES:
         component = {"type": "library", "bom-ref": name, "name": name, "description": where}
         every.append(component | {"licenses": [{"expression": licence}], "copyright": holder})
     content = {"metadata": metadata, "components": every}
@@ -152,9 +148,8 @@ def notice(product: Product) -> str:
             if "Apache-2.0" not in licence:
                 paths = sorted(Path(package["manifest_path"]).parent.glob("LICEN[CS]E*"))
                 texts += [f"\n\n==== {name} {version} ====\n\n{path.read_text(encoding='utf-8')}" for path in paths]
-    beside = [("beside packages", "licence", "copyright", "in the libraries for"), *BESIDE_CRATES]
-    kind = {"kind": product.kind}
-    return "".join([HEADER.format(**kind), _table(rows), "\n", _table(beside), FOOTER.format(**kind), *texts])
+    others = [("no packages", "licence", "copyright", "in the libraries for"), *NO_CRATES]
+    return "".join([HEADER.format(kind=product.kind), _table(rows), "\n", _table(others), FOOTER, *texts])
 
 
 def _table(rows: Sequence[tuple[str, ...]]) -> str:
@@ -163,29 +158,20 @@ def _table(rows: Sequence[tuple[str, ...]]) -> str:
     return "".join(f"{line.rstrip()}\n" for line in lines)
 
 
-def out_of_date() -> dict[Path, str]:
-    """The lists that are not what they should be, with what they should."""
-    lists = {path: text for p in PRODUCTS for path, text in ((p.bill, bill(p)), (p.notice, notice(p)))}
-    return {path: text for path, text in lists.items() if not path.is_file() or path.read_text("utf-8") != text}
-
-
-def check() -> None:
-    """Stops if a list is out of date."""
-    for path in out_of_date():
-        name = path.relative_to(ROOT).as_posix()
-        raise SystemExit(f"error: {name} is out of date; write it anew: python3 platforms/bill_of_materials.py")
-
-
-def write() -> None:
-    """Writes the lists that are out of date."""
-    for path, text in out_of_date().items():
-        unfinished = path.with_name(f".{path.name}.unfinished")
-        unfinished.write_bytes(text.encode())
-        os.replace(unfinished, path)
-        print(f"{path.relative_to(ROOT)} written")
+def check(write: bool = False) -> None:
+    """Exits if a list is out of date, or writes it."""
+    for product in PRODUCTS:
+        for path, text in ((product.bill, bill(product)), (product.notice, notice(product))):
+            if path.is_file() and path.read_text("utf-8") == text:
+                continue
+            name = path.relative_to(ROOT).as_posix()
+            if not write:
+                raise SystemExit(f"error: {name} is out of date; run python3 platforms/bill_of_materials.py")
+            path.write_bytes(text.encode())
+            print(f"{name} written")
 
 
 if __name__ == "__main__":
     if sys.argv[1:] not in ([], ["--check"]):
         raise SystemExit(__doc__)
-    check() if sys.argv[1:] else write()
+    check(write=not sys.argv[1:])

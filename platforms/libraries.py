@@ -1,16 +1,13 @@
-"""Compiles the libraries of the FMUs for other platforms.
+"""Compiles the libraries of the FMUs and the wheels of fmu-run for all platforms.
 
-    python platforms/libraries.py FOLDER TRIPLE...
-
-puts them in FOLDER/TRIPLE/, and beside them compiler.txt. The same sources and tools give the same bytes, wherever they
-are.
+zig links for Linux and Windows, Rust's own linker for macOS. The same sources and tools give the same bytes in any directory.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import shutil
+import re
 import subprocess
 import sys
 import sysconfig
@@ -20,108 +17,138 @@ from functools import cache
 from pathlib import Path
 
 import macos_linker
-import mingw_linker
-import toolchain as tools
-from targets import GLIBC, MODEL, MODELS, PACKERS, ROOT, WEBASSEMBLY, Target, target
+from targets import GLIBC, LINUX, MODEL, MODELS, PACKERS, ROOT, TARGETS, WINDOWS, Target
 
-#: Beside the libraries: what compiled them.
-COMPILER = "compiler.txt"
+#: Compiles the standard library too, without the code that prints backtraces, a third of a library. Importers print none.
+STD = ("-Zbuild-std=std,panic_unwind", "-Zbuild-std-features=panic-unwind")
+#: The earliest time in a zip file. A fixed time makes archives reproducible.
+EPOCH = "315532800"
+#: The Python package fmu-run.
+PACKAGE = ROOT / "crates" / "fmu-run"
 
 
-def compile_library(model: str, target: Target) -> tuple[Path, str]:
-    """The library of a model and what compiled it."""
-    toolchain, environment, glibc = prepare(target, f"@rpath/{model}{target.suffix}")
-    environment["FMU_GUID"] = guid(model)
-    command = [tools.zigbuild() if glibc else "cargo", "rustc", *toolchain.flags]
-    command += ["--lib", "--crate-type", "cdylib", "--profile", "library", "--locked"]
-    command += ["--no-default-features", "--package", model, "--target", target.triple + (f".{GLIBC}" if glibc else "")]
-    if subprocess.run(command, cwd=ROOT, env=environment).returncode:
-        raise SystemExit(f"error: {model} could not be compiled for {target.triple}; the messages are above")
-    return target_folder() / target.triple / "library" / target.library(model), toolchain.description
+def say(text: str) -> None:
+    """Prints progress, in order with the messages of the started programs."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def run(*command: str, environment: dict[str, str] | None = None, directory: Path = ROOT) -> str:
+    """Returns the output of a command. Exits if the command fails."""
+    try:
+        done = subprocess.run(command, cwd=directory, env=environment, stdout=subprocess.PIPE, text=True)
+    except FileNotFoundError:
+        raise SystemExit(f"error: {command[0]} is missing; start this with make release") from None
+    if done.returncode:
+        raise SystemExit(f"error: {' '.join(command)}\nfailed; the messages are above")
+    return done.stdout.strip()
+
+
+@cache
+def target_directory() -> Path:
+    """Cargo's target directory."""
+    return Path(json.loads(run("cargo", "metadata", "--locked", "--no-deps", "--format-version=1"))["target_directory"])
+
+
+def environment(target: Target | None = None) -> dict[str, str]:
+    """The environment of cargo for a target. Messages of the libraries name no directory of this machine."""
+    cargo = Path(os.environ.get("CARGO_HOME") or Path.home() / ".cargo")
+    (commit,) = re.findall(r"^commit-hash: (\w+)$", run("rustc", "-vV"), re.MULTILINE)
+    sysroot = Path(run("rustc", "--print", "sysroot"))
+    # rustc takes the last prefix that fits.
+    names = {ROOT: MODEL, target_directory(): "target", sysroot / "lib/rustlib/src/rust": f"/rustc/{commit}"}
+    names |= dict.fromkeys(sorted((cargo / "registry" / "src").glob("*/")), "crates")
+    flags = [f"--remap-path-prefix={path}={name}" for path, name in names.items()]
+    path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
+    found = {**os.environ, "PATH": path}
+    if target:
+        # Cargo has the unstable options STD with any compiler.
+        found["RUSTC_BOOTSTRAP"] = "1"
+    if target is WINDOWS:
+        # The linker writes this time, the earliest in a zip file, into the library.
+        found["SOURCE_DATE_EPOCH"] = EPOCH
+    if target and target.macos:
+        flags.insert(0, "-Clinker-flavor=ld64.lld")
+        (lld,) = sysroot.glob("lib/rustlib/*/bin/rust-lld")
+        found[f"CARGO_TARGET_{target.triple.replace('-', '_').upper()}_LINKER"] = macos_linker.__file__
+        found |= {"RUST_LLD": str(lld), "SDKROOT": str(macos_sdk()), "MACOSX_DEPLOYMENT_TARGET": target.macos}
+        found["CARGO_PROFILE_LIBRARY_STRIP"] = "false"
+    # Cargo splits the flags at this character, which paths do not contain.
+    return found | {"CARGO_ENCODED_RUSTFLAGS": "\x1f".join(flags)}
+
+
+def link(target: Target, name: str, exports: Sequence[str]) -> list[str]:
+    """Flags of rustc for the library `name` that exports these functions."""
+    arguments: Sequence[str] = ()
+    if target is WINDOWS:
+        # cargo-zigbuild drops rustc's own list, and zig would export all functions.
+        listed = ROOT / "target" / f"{name}.def"
+        listed.parent.mkdir(exist_ok=True)
+        listed.write_text("\n".join(["EXPORTS", *exports, ""]), encoding="utf-8")
+        # A relative path, because symbols have a hash of the flags.
+        arguments = (f"target/{listed.name}",)
+    elif target.macos:
+        # -S -x: strips the library before it is signed.
+        arguments = ("-install_name", f"@rpath/{name}", "-dead_strip_dylibs", "-S", "-x")
+    return ["--", *(f"-Clink-arg={argument}" for argument in arguments)] if arguments else []
+
+
+def macos_sdk() -> Path:
+    """The part of a macOS SDK that Rust links with: zig's list of the functions in libSystem, declared for all Macs."""
+    import ziglang
+
+    text = (Path(ziglang.__file__).parent / "lib/libc/darwin/libSystem.tbd").read_text(encoding="utf-8")
+    text = re.sub(r"targets:\s*\[[^\]]*\]", "targets: [ x86_64-macos, arm64-macos ]", text)
+    folder = target_directory() / "macos-sdk" / "usr" / "lib"
+    folder.mkdir(parents=True, exist_ok=True)
+    # The other libraries that Rust names are parts of libSystem, or (iconv) are not used.
+    for name in ("System", "c", "m", "iconv"):
+        (folder / f"lib{name}.tbd").write_text(text, encoding="utf-8")
+    return folder.parents[1]
 
 
 @cache
 def guid(model: str) -> str:
     """The guid of a model's FMU, which is compiled into its libraries."""
     program, package = PACKERS[model]
-    command = ["cargo", "run", "--quiet", "--locked", "--release", "--package", package, "--bin", program]
-    done = subprocess.run([*command, "--", "--guid"], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"error: the program that packs {model} could not be made; the messages are above")
-    return done.stdout.strip()
+    cargo = ("cargo", "run", "--quiet", "--locked", "--release", "--package", package, "--bin", program)
+    return run(*cargo, "--", "--guid")
 
 
-def prepare(target: Target, name: str = "") -> tuple[tools.Toolchain, dict[str, str], bool]:
-    """What compiles for a target from here: toolchain, environment, and whether zig links.
+@cache
+def library(model: str, target: Target) -> Path:
+    """Compiles the library of a model for a target. The library for Linux shows the exports of the others."""
+    exports: list[str] = []
+    if target is WINDOWS:
+        listed = run("nm", "-D", "--defined-only", str(library(model, LINUX)))
+        exports = [line.split()[-1] for line in listed.splitlines()]
+    program, glibc = ("cargo", "") if target.macos else ("cargo-zigbuild", f".{GLIBC}" * ("linux" in target.triple))
+    command = [program, "rustc", *STD, "--target", target.triple + glibc, "--package", model, "--no-default-features"]
+    command += ["--lib", "--crate-type=cdylib", "--profile=library", "--locked"]
+    command += link(target, f"{model}{target.suffix}", exports)
+    run(*command, environment=environment(target) | {"FMU_GUID": guid(model)})
+    return target_directory() / target.triple / "library" / target.library(model)
 
-    name: what a macOS library is to be called by those who link to it.
-    """
-    toolchain = tools.toolchain(target)
-    environment, flags, glibc = link(target, name)
-    flags += [f"--remap-path-prefix={path}={shown}" for path, shown in remap(toolchain)]
-    environment = {**os.environ, **toolchain.environment, **environment}
-    # Separated by what no path contains.
-    environment["CARGO_ENCODED_RUSTFLAGS"] = "\x1f".join(flags)
-    return toolchain, environment, glibc
 
-
-def link(target: Target, name: str) -> tuple[dict[str, str], list[str], bool]:
-    """How to link for a target from here: environment, rustc's flags, and whether zig does it."""
+def wheel(target: Target, out: Path) -> Path:
+    """The wheel of fmu-run for a target and every Python from 3.11 on, in `out`."""
+    command = ["maturin", "build", "--profile", "library", *STD, "--target", target.triple, "--out", str(out)]
+    if not target.macos:
+        command += ["--zig"]
     if "linux" in target.triple:
-        # cargo-zigbuild looks for zig and, when it is called as the linker, for itself.
-        return {"PATH": os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])}, [], True
-    if target.triple.endswith("-windows-gnu"):
-        tools.need(mingw_linker.LINKER)
-        environment = {f"{target.environment}LINKER": mingw_linker.__file__, "PRW_TARGET_FOLDER": str(target_folder())}
-        return environment, ["-Clink-arg=-Wl,--no-insert-timestamp"], False
-    if target is WEBASSEMBLY:
-        return {}, [], False
-    if target.triple.endswith("-windows-msvc"):
-        return {}, ["-Ctarget-feature=+crt-static", "-Clink-arg=/Brepro"], False
-
-    # -S -x: what `strip` would do, but before the library is signed.
-    arguments = [*(["-install_name", name] if name else []), "-dead_strip_dylibs", "-S", "-x"]
-    environment = {"CARGO_PROFILE_LIBRARY_STRIP": "false", "MACOSX_DEPLOYMENT_TARGET": target.macos}
-    if sys.platform == "darwin":
-        return environment, [f"-Clink-arg=-Wl,{','.join(arguments)}"], False
-    environment[f"{target.environment}LINKER"] = macos_linker.__file__
-    environment["PRW_RUST_LLD"] = tools.rust_lld()
-    environment["SDKROOT"] = str(tools.macos_sdk())
-    return environment, ["-Clinker-flavor=ld64.lld", *(f"-Clink-arg={a}" for a in arguments)], False
+        command += ["--compatibility", f"manylinux_{GLIBC.replace('.', '_')}"]
+    name = "_native.dll" if target is WINDOWS else "fmu_run._native.abi3.so"
+    run(*command, *link(target, name, ["PyInit__native"]), environment=environment(target), directory=PACKAGE)
+    (path,) = out.glob(f"fmu_run-*{target.wheel}*.whl")
+    return path
 
 
-def remap(toolchain: tools.Toolchain) -> list[tuple[Path, str]]:
-    """Folders whose names would get into the library through messages of a panic."""
-    cargo = Path(os.environ.get("CARGO_HOME") or Path.home() / ".cargo")
-    crates = sorted((cargo / "registry" / "src").glob("*/"))
-    std = (toolchain.sysroot / "lib/rustlib/src/rust", f"/rustc/{toolchain.commit}")
-    # The last that fits counts.
-    return [(ROOT, MODEL), (target_folder(), "target"), std, *((path, "crates") for path in crates)]
-
-
-def target_folder() -> Path:
-    """Cargo's target folder."""
-    command = ["cargo", "metadata", "--locked", "--no-deps", "--format-version", "1"]
-    metadata = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
-    return Path(json.loads(metadata)["target_directory"])
-
-
-def compile_all(folder: Path, targets: Sequence[Target]) -> None:
-    """Puts the libraries of all models for these targets in FOLDER/TRIPLE."""
-    for number, each in enumerate(targets, start=1):
-        tools.say(f"[{number}/{len(targets)}] libraries for {each.triple}")
+def compile_all(out: Path) -> dict[str, dict[Target, Path]]:
+    """The libraries of all models for all targets, and the wheels in `out`."""
+    found: dict[str, dict[Target, Path]] = {model: {} for model in MODELS}
+    for number, target in enumerate(TARGETS, start=1):
+        say(f"[{number}/{len(TARGETS)}] {target.triple}")
         start = time.monotonic()
-        destination = folder / each.triple
-        destination.mkdir(parents=True, exist_ok=True)
-        for model in MODELS:
-            library, compiler = compile_library(model, each)
-            shutil.copyfile(library, destination / library.name)
-            tools.say(f"      {library.name}: {library.stat().st_size / 1000:.0f} kB")
-        (destination / COMPILER).write_text(f"{compiler}\n", encoding="utf-8")
-        tools.say(f"      {compiler}, {time.monotonic() - start:.0f} s")
-
-
-if __name__ == "__main__":
-    if len(sys.argv) < 3:
-        raise SystemExit(__doc__)
-    compile_all(Path(sys.argv[1]), [target(triple) for triple in sys.argv[2:]])
+        paths = [found[model].setdefault(target, library(model, target)) for model in MODELS] + [wheel(target, out)]
+        sizes = ", ".join(f"{path.name}: {path.stat().st_size / 1000:.0f} kB" for path in paths)
+        say(f"      {sizes}; {time.monotonic() - start:.0f} s")
+    return found

@@ -10,12 +10,11 @@ import tempfile
 import tomllib
 from pathlib import Path
 
+from libraries import EPOCH
 from targets import MODEL, ROOT
 
 PACKAGE = ROOT / "python" / "prw"
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
-#: The earliest time in a zip file. A fixed time makes the wheel reproducible.
-EPOCH = "315532800"
 
 
 def check_version(version: str) -> None:

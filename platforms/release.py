@@ -1,85 +1,97 @@
 """Makes dist/, all that a release has, or nothing: FMUs for all platforms and as C sources, the closed loop, reference
 experiments, wheels, bills of materials, release notes, and the checksums of all of them.
 
-    python platforms/release.py [--libraries FOLDER --wheels FOLDER]
-
-The libraries and the wheels of fmu-run are compiled here, or taken from where other machines put them
-(platforms/libraries.py, platforms/wheels.py).
+    python platforms/release.py              makes dist/
+    python platforms/release.py --tag TAG    exits with an error unless TAG names the newest version in the changelog
 """
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import os
+import re
 import shutil
+import sys
 import tempfile
+import tomllib
 from pathlib import Path
 
 import bill_of_materials
 import fmus
 import libraries
 import prw_wheel
-import release_notes
-import wheels
-from targets import MODEL, ROOT, TARGETS, WEBASSEMBLY
+from targets import MODEL, ROOT
 
 DIST = ROOT / "dist"
 SUMS = "SHA256SUMS"
+CHANGELOG = ROOT / "CHANGELOG.md"
+#: The compilers, linkers and translators of a release.
+VERSIONS = (("rustc", "--version"), ("python-zig", "version"), ("wasm2c", "--version"))
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--libraries", type=Path, metavar="FOLDER")
-    parser.add_argument("--wheels", type=Path, metavar="FOLDER")
-    options = parser.parse_args()
-    if (options.libraries is None) != (options.wheels is None):
-        parser.error("--libraries and --wheels go together")
-    # What takes no time comes first.
-    version = release_notes.version()
-    notes = release_notes.notes(release_notes.CHANGELOG.read_text(encoding="utf-8"), version)
+    version, changelog = cargo_version(), CHANGELOG.read_text(encoding="utf-8")
+    notes = release_notes(changelog, version)
+    if len(sys.argv) == 3 and sys.argv[1] == "--tag":
+        return check_tag(sys.argv[2], changelog, version)
+    # The checks that take no time come first.
     prw_wheel.check_version(version)
     bill_of_materials.check()
-    source_compiler = fmus.source_compiler()
+    compilers = [
+        f"{command[0]}: {libraries.run(*command, environment=libraries.environment())}\n" for command in VERSIONS
+    ]
 
     (ROOT / "target").mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(dir=ROOT / "target", prefix="release-") as made:
         out, scratch = Path(made, "dist"), Path(made, "scratch")
         out.mkdir()
         scratch.mkdir()
-        if options.libraries is None:
-            options.libraries, options.wheels = scratch / "libraries", scratch / "wheels"
-            libraries.compile_all(options.libraries, TARGETS)
-            wheels.compile_all(options.wheels, TARGETS)
-        fmus.make(options.libraries.resolve(), out, scratch)
-        for wheel in wheels.found(options.wheels, version):
-            shutil.copyfile(wheel, out / wheel.name)
+        fmus.make(libraries.compile_all(out), out, scratch)
         prw_wheel.build(out / f"{MODEL}.fmu", out)
         for product in bill_of_materials.PRODUCTS:
             shutil.copyfile(product.bill, out / f"{product.name}.cdx.json")
         (out / "RELEASE_NOTES.md").write_text(notes, encoding="utf-8")
-        (out / "compilers.txt").write_text(compilers(options.libraries, source_compiler), encoding="utf-8")
+        (out / "compilers.txt").write_text("".join(compilers), encoding="utf-8")
         (out / SUMS).write_text(checksums(out), encoding="utf-8")
         put(out)
     for path in sorted(DIST.iterdir()):
         print(f"dist/{path.name}: {path.stat().st_size / 1000:.0f} kB")
 
 
-def compilers(folder: Path, source_compiler: str) -> str:
-    """What compiled the libraries for each target, and what made the C sources."""
-    paths = sorted(folder.glob(f"*/{libraries.COMPILER}"))
-    lines = [f"{path.parent.name}: {path.read_text(encoding='utf-8')}" for path in paths]
-    return "".join([*lines, f"{WEBASSEMBLY.triple}: {source_compiler}\n"])
+def cargo_version() -> str:
+    """The version of all packages."""
+    workspace = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]
+    return str(workspace["package"]["version"])
+
+
+def release_notes(changelog: str, version: str) -> str:
+    """The section of this version in the changelog, without its heading."""
+    found = re.search(rf"^## {re.escape(version)}(?![\w.-]).*\n((?:(?!## ).*\n)*)", changelog, re.MULTILINE)
+    if found is None:
+        raise SystemExit(
+            f"error: CHANGELOG.md has no heading that begins with '## {version}', the version in Cargo.toml"
+        )
+    return f"{found[1].strip()}\n"
+
+
+def check_tag(tag: str, changelog: str, version: str) -> None:
+    """Exits unless the tag, the version in Cargo.toml and the dated newest section of the changelog agree."""
+    newest = re.findall(r"^## .*", changelog, re.MULTILINE)[0]
+    if tag != f"v{version}" or not re.fullmatch(rf"## {re.escape(version)} \(\d{{4}}-\d\d-\d\d\)", newest):
+        raise SystemExit(
+            f"error: the tag is {tag}, the version in Cargo.toml is {version}, and the changelog begins with '{newest}'; "
+            f"expected are v{version} and '## {version} (YYYY-MM-DD)'"
+        )
 
 
 def checksums(folder: Path) -> str:
-    """As `sha256sum --check` takes them."""
+    """The input of `sha256sum --check`."""
     files = sorted(path for path in folder.iterdir() if path.name != SUMS)
     return "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files)
 
 
 def put(made: Path) -> None:
-    """Makes this folder dist/, with nothing of what was there."""
+    """Makes this folder dist/, without any file of the previous dist/."""
     if DIST.exists():
         os.replace(DIST, made.with_name("previous"))
     os.replace(made, DIST)

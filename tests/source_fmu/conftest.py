@@ -39,7 +39,7 @@ class Compiler:
         """Skips the test where it is missing."""
         for program in self.programs():
             if not shutil.which(program):
-                pytest.skip(f"{program} is missing; on Debian: apt install {' '.join(toolchain.PACKAGES[program])}")
+                pytest.skip(f"{program} is missing; on Debian: apt install {toolchain.PACKAGES[program]}")
 
     def compile(self, sources: Path, output: Path, *arguments: str, check: bool = True) -> str:
         """Compiles; the compiler's messages."""

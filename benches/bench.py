@@ -1,0 +1,342 @@
+"""Times the FMUs against programs in C and other tools, and writes Markdown tables to out/bench.md; `make bench`.
+
+With --profile it counts the instructions of a step with callgrind, which repeat exactly on a busy machine.
+All programs of a table are measured in turn; a figure is the least of several rounds. With BENCH_QUICK in the environment
+counts are small, and the tables in target/bench/quick.md are meaningless.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from collections.abc import Callable, Iterable
+from ctypes import c_double, c_uint32
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import fmu_run
+import numpy as np
+from fmpy.simulation import instantiate_fmu
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "fmu_run")]
+from unruly import build  # noqa: E402
+
+from tools.validation import masters  # noqa: E402
+from tools.validation.system import read  # noqa: E402
+
+FMUS, WORK = ROOT / "target" / "fmu", ROOT / "target" / "bench"
+QUICK = "BENCH_QUICK" in os.environ
+STEP = 1e-3
+SAMPLES, RUNS, ROUNDS, LOOPS = (21, 4, 1, 2) if QUICK else (2001, 2000, 7, 1000)
+#: Numbers of instances, each with the number of steps.
+SIZES = ((1, 50), (8, 5)) if QUICK else ((1, 50_000), (1024, 300), (16384, 40))
+MOTORS, OUTPUTS = ("theta1", "theta2"), ("tau1", "tau2", "pitch", "roll")
+#: The ways to step of bench.c, each with the number of steps of a measurement.
+WAYS = {
+    "angles set, step, 4 outputs, as vectors": 100_000,
+    "the same, one scalar per call": 100_000,
+    "with input derivatives": 100_000,
+    "with use_omega and rates set": 100_000,
+    "step size alternating among 4": 100_000,
+    "a new step size every step": 4_000,
+    "fmi2GetFMUstate and Set every step": 100_000,
+    "8 x 10 directional derivatives": 20_000,
+}
+VECTORS, RATES, OMEGA, ALTERNATING, NEW_SIZES = 0, 2, 3, 4, 5
+
+
+def table(*rows: Iterable[object]) -> None:
+    """Prints a table and adds it to the page."""
+    lines = [f"| {' | '.join(f'{x:,.3g}' if isinstance(x, float) else str(x) for x in row)} |\n" for row in rows]
+    lines.insert(1, "|---" * lines[0].count(" |") + "|\n")
+    print("", *lines, sep="", flush=True)
+    page = WORK / "quick.md" if QUICK else ROOT / "out" / "bench.md"
+    with page.open("a", encoding="utf-8") as file:
+        file.writelines(["\n", *lines])
+
+
+def compile_c(output: str, *arguments: object) -> None:
+    headers = Path(fmpy.__file__).parent / "c-code"
+    command = ["cc", "-I", headers, "-o", WORK / output, *arguments, "-ldl", "-lpthread", "-lm"]
+    subprocess.run([str(word) for word in command], check=True)
+
+
+def prepare(fmu: Path) -> str:
+    """Compiles and unpacks what the benchmarks load into target/bench. Returns the guid."""
+    (ROOT / "out").mkdir(exist_ok=True)
+    shutil.rmtree(WORK, ignore_errors=True)
+    WORK.mkdir(parents=True)
+    if not QUICK:
+        (ROOT / "out" / "bench.md").unlink(missing_ok=True)
+    with zipfile.ZipFile(fmu) as archive:
+        (WORK / "fmu.so").write_bytes(archive.read("binaries/linux64/prw_testbed.so"))
+    strict, folder = ("-Wall", "-Wextra", "-Werror"), ROOT / "benches" / "c"
+    for library in ("bare_exact", "euler", "empty"):
+        compile_c(f"{library}.so", "-O3", *strict, "-shared", "-fPIC", folder / f"{library}.c")
+    compile_c("bench", "-O2", *strict, folder / "bench.c")
+    return str(fmpy.read_model_description(str(fmu)).guid)
+
+
+def bench(library: object, guid: str, *arguments: object, stdin: bytes = b"") -> tuple[float, np.ndarray]:
+    """The number that bench.c prints, and the outputs as rows of four."""
+    command = [str(word) for word in (WORK / "bench", library, guid, *arguments)]
+    done = subprocess.run(command, input=stdin, capture_output=True)
+    if done.returncode:
+        raise SystemExit(f"error: {' '.join(command)}: {done.stderr.decode()}")
+    return float(done.stderr), np.frombuffer(done.stdout)
+
+
+def steps(guid: str, sources: Path | None) -> None:
+    """Whole steps of the FMU against C, and its C sources, if given, against its library."""
+
+    def of(library: str, way: int, count: int, threads: int = 1) -> float:
+        return bench(WORK / f"{library}.so", guid, way, count // 100 if QUICK else count, threads)[0]
+
+    def outputs(library: str, way: int) -> np.ndarray:
+        return bench(WORK / f"{library}.so", guid, way, 2000, 0)[1].reshape(-1, 4)
+
+    others = [("euler", OMEGA, 20_000)]
+    if sources:
+        with zipfile.ZipFile(sources) as archive:
+            archive.extractall(WORK / "source")
+        files = sorted((WORK / "source" / "sources").glob("*.c"))
+        compile_c("sources.so", "-O3", "-shared", "-fPIC", *files)
+        np.testing.assert_array_equal(outputs("sources", VECTORS), outputs("fmu", VECTORS))
+        others.append(("sources", VECTORS, 100_000))
+    for way in (VECTORS, RATES, OMEGA, ALTERNATING):
+        np.testing.assert_allclose(outputs("bare_exact", way), outputs("fmu", way), rtol=0, atol=1e-10)
+    measured: dict[object, list[float]] = {}
+    for _ in range(1 if QUICK else 25):
+        for way, count in enumerate(WAYS.values()):
+            for library in ("fmu", "bare_exact"):
+                measured.setdefault((library, way), []).append(of(library, way, count))
+        for library, way, count in others:
+            measured.setdefault(library, []).append(of(library, way, count))
+        for threads in (1, 2):
+            measured.setdefault(threads, []).append(of("fmu", VECTORS, 400_000, threads))
+    least = {name: min(found) for name, found in measured.items()}
+    ratios = [(name, least["fmu", way] / least["bare_exact", way]) for way, name in enumerate(WAYS)]
+    table(("time of the FMU / time of bare_exact.c", "ratio"), *ratios)
+    one, exact, euler = least["fmu", VECTORS], outputs("fmu", RATES), outputs("euler", OMEGA)
+    torque, roll = (100 * np.abs(euler - exact)[:, k].max() / np.abs(exact[:, k]).max() for k in (0, 3))
+    rows = {
+        "step of the FMU, ns": 1e9 * one,
+        "new step size / known step size": least["fmu", NEW_SIZES] / one,
+        "two threads / one, throughput": least[1] / least[2],
+        "forward Euler in C / FMU": least["euler"] / one,
+        "error of forward Euler in roll, % of the peak": roll,
+        "error of forward Euler in torque, % of the peak": torque,
+        "memory of an instance / 4 KiB": bench(WORK / "fmu.so", guid, "memory")[0] / 4096,
+    }
+    if sources:
+        rows["step of the C sources / step of the library"] = least["sources"] / one
+    table(("other ratios", "ratio"), *rows.items())
+
+
+def profile(guid: str) -> None:
+    """Instructions of a step."""
+    ways = ("angles as vectors", "one scalar per call", "with input derivatives", "with use_omega")[: 1 if QUICK else 4]
+
+    def count(library: str, way: int, steps: int) -> dict[str, int]:
+        file = str(WORK / f"callgrind.{steps}")
+        program = (str(WORK / "bench"), str(WORK / f"{library}.so"), guid, str(way), str(steps), "1")
+        command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={file}", *program]
+        subprocess.run(command, check=True, capture_output=True)
+        command = ["callgrind_annotate", "--threshold=100", file]
+        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout.replace(",", "")
+        lines = re.findall(r"^ *(\d+) .*?(PROGRAM TOTALS|fmi2\w+)", text, re.MULTILINE)
+        return {name: int(number) for number, name in reversed(lines)}
+
+    names = {"PROGRAM TOTALS": "all"} | {name: name for name in ("fmi2SetReal", "fmi2DoStep", "fmi2GetReal")}
+    rows = []
+    for library in ("fmu",) if QUICK else ("fmu", "bare_exact", "empty"):
+        for way, label in enumerate(ways):
+            # The difference of a long run and a short run is without the start.
+            short, long = (count(library, way, number) for number in (1000, 11000))
+            found = [f"{(long.get(name, 0) - short.get(name, 0)) / 10000:.0f}" for name in names]
+            rows.append((f"{library}, {label}", *found))
+    table(("instructions per step", *names.values()), *rows)
+
+
+class Case:
+    """An FMU with time series of its inputs (samples, n) and names of its outputs."""
+
+    def __init__(self, name: str, fmu: Path, inputs: dict[str, np.ndarray], outputs: list[str], runs: int):
+        self.name, self.inputs, self.outputs, self.runs = name, inputs, outputs, runs
+        self.description = fmpy.read_model_description(str(fmu))
+        self.folder = fmpy.extract(str(fmu))
+        of = {v.name: v.valueReference for v in self.description.modelVariables}
+        self.references = [of[name] for name in inputs], [of[name] for name in outputs]
+        self.table = np.ascontiguousarray(np.column_stack(list(inputs.values())))
+        self.slave = instantiate_fmu(self.folder, self.description, fmi_type="CoSimulation")
+        self.loaded = fmu_run.Fmu(fmu)
+        # One start value for each run makes as many runs.
+        self.start = {next(iter(inputs)): np.full(runs, self.table[0, 0])}
+
+    def close(self) -> None:
+        self.slave.freeInstance()
+        self.loaded.close()
+        shutil.rmtree(self.folder)
+
+    def in_c(self) -> tuple[float, np.ndarray]:
+        """Seconds per run in C, and the outputs (samples, n) of the last run."""
+        library = Path(self.folder, "binaries", "linux64", f"{self.description.coSimulation.modelIdentifier}.so")
+        lists = (",".join(map(str, references)) for references in self.references)
+        arguments = (self.runs, SAMPLES, STEP, *lists, 1)
+        seconds, rows = bench(library, self.description.guid, *arguments, stdin=self.table.tobytes())
+        return seconds / self.runs, rows.reshape(SAMPLES, -1)
+
+    def by_fmu_run(self, threads: int, **kept: Any) -> tuple[float, fmu_run.Runs]:
+        begin = time.perf_counter()
+        given: dict[str, Any] = {"inputs": self.inputs, "start": self.start, "outputs": self.outputs, **kept}
+        runs = self.loaded.run(np.arange(SAMPLES) * STEP, threads=threads, **given)
+        return (time.perf_counter() - begin) / self.runs, runs.check()
+
+    def by_fmpy(self) -> tuple[float, np.ndarray]:
+        """Seconds of one run by FMPy's bare calls, reading and writing rows of arrays in place, and its outputs."""
+        slave, component = self.slave, self.slave.component
+        (n_in, n_out), found = map(len, self.references), np.empty((SAMPLES, len(self.outputs)))
+        into, out_of = ((c_uint32 * len(vr))(*vr) for vr in self.references)
+        in_row, out_row, inputs = c_double * n_in, c_double * n_out, self.table
+        begin = time.perf_counter()
+        slave.reset()
+        slave.setupExperiment()
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        for k in range(SAMPLES):
+            slave.fmi2SetReal(component, into, n_in, in_row.from_buffer(inputs, k * inputs.strides[0]))  # type: ignore[arg-type]
+            slave.fmi2GetReal(component, out_of, n_out, out_row.from_buffer(found, k * found.strides[0]))  # type: ignore[arg-type]
+            if k + 1 < SAMPLES:
+                slave.fmi2DoStep(component, k * STEP, STEP, True)
+        slave.terminate()
+        return time.perf_counter() - begin, found
+
+    def row(self) -> tuple[object, ...]:
+        rounds = []
+        for _ in range(ROUNDS):
+            (c, expected), (one, runs), (two, _) = self.in_c(), self.by_fmu_run(1), self.by_fmu_run(2)
+            (measures, _), (fmpy_, found) = self.by_fmu_run(1, measures=["peak", "rms", "end"]), self.by_fmpy()
+            for number, name in enumerate(self.outputs):
+                for values in (runs[name][-1], found[:, number]):
+                    np.testing.assert_allclose(values, expected[:, number], rtol=0, atol=1e-12)
+            rounds.append((c, one, two, measures, fmpy_))
+        c, one, two, measures, fmpy_ = map(min, zip(*rounds))
+        return self.name, one / c, measures / c, one / two, fmpy_ / one
+
+
+def many_runs() -> None:
+    """Many runs from Python against a loop in C and FMPy. All store the same outputs at every step."""
+    wave = 2 * np.sin(10 * np.pi * np.arange(SAMPLES) * STEP / 2) ** 2 / (10 * np.pi)
+    motors = {"theta1": wave, "theta2": -wave}
+    wrist = {"pitch_ref": 3 * wave, "roll_ref": -2 * wave, "pitch": 2 * wave, "roll": -wave}
+    with tempfile.TemporaryDirectory() as folder:
+        ramp = build(Path(folder), "-DCOMPLETE")
+        cases = (
+            Case("testbed", FMUS / "prw_testbed.fmu", motors, ["tau1", "pitch", "roll", "roll_rate"], RUNS),
+            Case("controller", FMUS / "prw_controller.fmu", wrist, ["theta1", "theta2", "omega1", "omega2"], RUNS),
+            Case("a ramp in C", ramp, {"slope": 1 + wave}, ["y"], 2 * RUNS),
+        )
+        heads = ("one thread / C, outputs stored", "one thread / C, statistics", "two threads, throughput")
+        table(("FMU", *heads, "FMPy / one thread"), *(case.row() for case in cases))
+        for case in cases:
+            case.close()
+
+
+def least(body: Callable[..., tuple[float, Any]], *arguments: Any) -> float:
+    return min(body(*arguments)[0] for _ in range(ROUNDS))
+
+
+def instances(guid: str) -> None:
+    """Stateful instances against a loop in C over as many; bit-identical."""
+    with fmu_run.Fmu(FMUS / "prw_testbed.fmu") as fmu:
+
+        def in_c(count: int, moves: np.ndarray) -> tuple[float, np.ndarray]:
+            lists = ("0,1", ",".join(str(list(fmu.variables).index(name)) for name in OUTPUTS))
+            arguments = (1, len(moves), STEP, *lists, count)
+            seconds, rows = bench(WORK / "fmu.so", guid, *arguments, stdin=moves.tobytes())
+            return seconds / count / len(moves), rows.reshape(len(moves), -1)
+
+        def by_fmu_run(count: int, threads: int, moves: np.ndarray, one_call: bool) -> tuple[float, np.ndarray]:
+            wrists = fmu.instances(count, threads=threads)
+            rows, last = np.empty((count, len(OUTPUTS))), np.empty((len(moves), len(OUTPUTS)))
+            begin = time.perf_counter()
+            for k, move in enumerate(moves):
+                if one_call:
+                    wrists.advance(MOTORS, move, STEP, OUTPUTS, rows)
+                    continue
+                wrists.set(MOTORS, move)
+                wrists.get(OUTPUTS, rows)
+                last[k] = rows[-1]
+                wrists.step(STEP)
+            return (time.perf_counter() - begin) / count / len(moves), last
+
+        rows = []
+        for count, number in SIZES:
+            angle = 0.1 * np.sin(10 * np.pi * STEP * np.arange(number))
+            moves = np.column_stack([angle, -angle])
+            np.testing.assert_array_equal(by_fmu_run(count, 1, moves, False)[1], in_c(count, moves)[1])
+            c, three = least(in_c, count, moves), least(by_fmu_run, count, 1, moves, False)
+            one, two = (least(by_fmu_run, count, threads, moves, True) for threads in (1, 2))
+            rows.append((f"{count:,}", three / c, one / c, one / two))
+        table(("testbeds", "three calls / C", "one call / C", "two threads, throughput"), *rows)
+
+
+def loops() -> None:
+    """Closed loops against other masters."""
+    system = read(FMUS / "prw_closed_loop.ssp", FMUS / "prw_closed_loop")
+    # libcosim counts nanoseconds.
+    instants = np.arange(system.steps + 1) * round(system.step * 1e9) / 1e9
+    with fmu_run.System(FMUS / "prw_closed_loop.ssp", order="jacobi") as loop:
+        gains = {"controller.pitch_ref": np.full(LOOPS, system.inputs["pitch_ref"][1])}
+
+        def ours(threads: int) -> tuple[float, fmu_run.Runs]:
+            begin = time.perf_counter()
+            kept: dict[str, Any] = {"outputs": ["pitch"], "measures": ["end"]}
+            runs = loop.run(instants, start=gains, threads=threads, **kept).check()
+            return (time.perf_counter() - begin) / LOOPS, runs
+
+        rows = [(f"fmu_run, {threads} thread{'s' * (threads > 1)}", 1 / least(ours, threads)) for threads in (1, 2)]
+        series = loop.run(instants, outputs=masters.RECORDED)
+    for master in masters.MASTERS[:2]:
+        if master.version() is None:
+            continue
+        rounds = []
+        for _ in range(1 if QUICK else 3):
+            begin = time.perf_counter()
+            found = master.run(system)
+            rounds.append(time.perf_counter() - begin)
+        rows.append((f"{master.name} {master.version()}", 1 / min(rounds)))
+        if master.name == "libcosim":
+            expected = np.column_stack([series[name][0, 1:] for name in masters.RECORDED])
+            np.testing.assert_array_equal(found, expected)
+    table((f"closed loop, {system.steps} steps", "runs per second"), *rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("fmu", type=Path)
+    parser.add_argument("--sources", type=Path, help="the FMU as C sources")
+    parser.add_argument("--profile", action="store_true")
+    options = parser.parse_args()
+    guid = prepare(options.fmu)
+    if options.profile:
+        return profile(guid)
+    steps(guid, options.sources)
+    many_runs()
+    instances(guid)
+    loops()
+    if not QUICK:
+        subprocess.run(["cargo", "bench", "--locked", "--bench", "parts"], cwd=ROOT, check=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,32 @@
+"""Programs that tests start and that are no Python packages."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+
+#: Programs and their Debian packages.
+PACKAGES = {
+    "x86_64-w64-mingw32-gcc": "gcc-mingw-w64-x86-64",
+    "aarch64-linux-gnu-gcc": "gcc-aarch64-linux-gnu libc6-dev-arm64-cross",
+    "qemu-aarch64": "qemu-user",
+    "arm-linux-gnueabihf-gcc": "gcc-arm-linux-gnueabihf libc6-dev-armhf-cross",
+    "qemu-arm": "qemu-user",
+    "clang": "clang",
+    "chromium": "chromium",
+    "firefox-esr": "firefox-esr",
+    "xvfb-run": "xvfb xauth",
+    "/usr/lib/x86_64-linux-gnu/webkit2gtk-4.1/MiniBrowser": "libwebkit2gtk-4.1-0",
+    "/usr/lib/wine/wine64": "wine64",
+}
+
+
+def need(*programs: str) -> None:
+    """Installs the Debian packages of missing programs. Exits if that fails, and names the packages."""
+    missing = " ".join(sorted({PACKAGES[program] for program in programs if not shutil.which(program)}))
+    if missing:
+        apt = f"apt-get update -qq && apt-get install -y -qq --no-install-recommends {missing}"
+        root = [] if os.geteuid() == 0 else ["sudo", "-n"]
+        if subprocess.run([*root, "sh", "-c", apt], env={**os.environ, "DEBIAN_FRONTEND": "noninteractive"}).returncode:
+            raise SystemExit(f"error: programs are missing; on Debian, apt install {missing}")
