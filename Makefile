@@ -50,7 +50,7 @@ HAS_PAGE = $(PYTHON) -c 'import sys, zipfile; sys.exit(b".catch(withoutIt)" not 
 stop = { echo '$(1)' >&2; exit 1; }
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-fmu check check-release test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
+.PHONY: help demo demo-fmu check check-release test test-rust test-python test-fmu test-newest-fmpy test-page fmu bench profile figures docs reference experiments validation closed-loop closed-loop-fmus test-closed-loop importer-fmus test-importers examples test-examples test-faults release source-fmu test-source-fmu test-platforms test-reproducible study monte-carlo headers fuzz sanitize clean need-rust need-python need-nightly
 
 help:
 	@echo 'make demo                    simulate the experiment of Fig. 4      -> out/fig4.csv, out/fig4.png'
@@ -71,6 +71,7 @@ help:
 	@echo 'make profile                 count the instructions of a step, with callgrind'
 	@echo 'make figures                 reproduce the figures of the paper     -> out/*.svg, out/*.png'
 	@echo 'make docs                    write the documentation in the FMUs and docs/examples.md anew'
+	@echo 'make reference               write the reference of the Python packages -> target/reference/index.html'
 	@echo 'make examples                set up the examples                    (see docs/examples.md)'
 	@echo 'make experiments             write the reference experiments in the FMU anew'
 	@echo 'make validation              the FMUs against them, under every importer here -> out/validation.html, .json'
@@ -167,6 +168,10 @@ docs: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
 	@$(BUILD_CONTROLLER) --describe
 	@$(PY) -m tools docs
 	@$(PY) -m tools examples
+
+# Sphinx reads the docstrings; an unresolved name or a missing section is an error.
+reference: $(VENV)/test.stamp
+	@$(PY) -m sphinx --quiet --fail-on-warning --keep-going docs/reference target/reference
 
 # What the FMU is to do in them comes from the oracle of the tests, not from the FMU.
 experiments: $(VENV)/test.stamp

@@ -1,4 +1,4 @@
-"""Runs FMUs fast: batches of one to millions of runs, and one or thousands of stateful instances.
+"""Runs FMUs fast: batches of one to millions of runs, and one or thousands of stateful instances::
 
     with fmu_run.Fmu("model.fmu") as fmu:
         runs = fmu.run(time, inputs={"u": u}, start={"k": k_of_each_run}, outputs=["y"])
@@ -48,9 +48,16 @@ Course = ArrayLike | tuple[ArrayLike, str]
 class Variable:
     """A variable of the model description.
 
-    type: Real, Integer, Boolean, String, Enumeration, or one of FMI 3.0's other types. causality: input, output, parameter,
-    local and so on. variability, start, unit, min, max: None if not declared; start as a string, unit,
-    min and max also from the declared type.
+    Attributes
+    ----------
+    name, description
+        As in the model description.
+    type
+        Real, Integer, Boolean, String, Enumeration, or one of FMI 3.0's other types.
+    causality
+        input, output, parameter, local and so on.
+    variability, start, unit, min, max
+        None if not declared. `start` is a string. `unit`, `min` and `max` may come from the declared type.
     """
 
     name: str
@@ -101,25 +108,55 @@ class _Model:
     ) -> Runs:
         """Run the FMU, once for each run that has values, or once if all values are for all runs.
 
-        time: (times,), the communication points, s. At each the inputs are set, the outputs read, and the step to the next
-        is taken.
-        outputs: the variables to read, any that are numbers.
-        inputs: by name; (times,) for all runs, (runs, times) for each run, or a constant number; with a unit or without,
-        {"theta1": (angles, "deg")}. Inputs that are not named keep their start values.
-        input_derivatives: d/dt of inputs, in the same shapes, for FMUs of FMI 2.0 that can interpolate inputs.
-        start: start values of parameters, states and so on by name: one for all runs or (runs,) for each run; numbers,
-        strings, enumeration items, or numbers with a unit, {"k1": (1.9, "N.m/deg")}.
-        every: keep the outputs at the first time and each `every` times after it. Default: all, or none if there are
-        measures.
-        measures: statistics of each output over all times: min, max, peak (of the magnitude),
-        time_of_peak, mean and rms (of the samples), end.
-        threads: default one for each processor; FMUs with at most one instance per process get one.
-        read_before_set: read outputs before the inputs of their time are set, as FMPy does.
-        progress: called with the numbers of finished runs and of all runs, ten times per second.
-
         A run that the FMU rejects or ends does not stop the others, see `Runs.errors` and `Runs.check`. A run that fails
-        without a message is repeated with logging on, after all others, only to get the message. Raises ValueError for
-        invalid arguments, FmuError if the FMU is closed. Ctrl-C stops all runs after the step that each is in.
+        without a message is repeated with logging on, after all others, only to get the message. Ctrl-C stops all runs
+        after the step that each is in.
+
+        Parameters
+        ----------
+        time
+            (times,), the communication points, s. At each the inputs are set, the outputs read, and the step to the next
+            is taken.
+        outputs
+            The variables to read, any that are numbers.
+        inputs
+            By name: (times,) for all runs, (runs, times) for each run, or a constant number; with a unit or without,
+            {"theta1": (angles, "deg")}. Inputs that are not named keep their start values.
+        input_derivatives
+            d/dt of inputs, in the same shapes, for FMUs of FMI 2.0 that can interpolate inputs.
+        start
+            Start values of parameters, states and so on by name: one for all runs or (runs,) for each run; numbers,
+            strings, enumeration items, or numbers with a unit, {"k1": (1.9, "N.m/deg")}.
+        every
+            Keep the outputs at the first time and each `every` times after it. Default: all, or none if there are
+            measures.
+        measures
+            Statistics of each output over all times: min, max, peak (of the magnitude), time_of_peak, mean and rms (of
+            the samples), end.
+        threads
+            Default: one for each processor. FMUs with at most one instance per process get one.
+        read_before_set
+            Read outputs before the inputs of their time are set, as FMPy does.
+        progress
+            Called with the numbers of finished runs and of all runs, ten times per second.
+
+        Returns
+        -------
+        Runs
+            The results, with the errors of failed runs.
+
+        Raises
+        ------
+        ValueError
+            For invalid arguments.
+        FmuError
+            If the FMU is closed.
+
+        Examples
+        --------
+        >>> runs = fmu.run(np.arange(0, 1, 1e-3), outputs=["y"], start={"k": [1.0, 2.0]})
+        >>> runs["y"].shape
+        (2, 1000)
         """
         times = _array("time", time)
         if times.ndim != 1:
@@ -143,8 +180,27 @@ class _Model:
         return Runs(kept_times, names, courses, wanted, measured, dict(errors), dict(notes), starts)
 
     def converted(self, name: str, values: ArrayLike, unit: str) -> float | _Array:
-        """Values in another unit, which the FMU must have among its display units, in the unit of the variable. Raises ValueError
-        for a variable or a unit that it does not have."""
+        """Convert values to the unit of a variable.
+
+        Parameters
+        ----------
+        name
+            The variable.
+        values
+            Numbers in `unit`.
+        unit
+            One of the FMU's display units.
+
+        Returns
+        -------
+        float or array
+            The numbers in the variable's unit, in the shape of `values`.
+
+        Raises
+        ------
+        ValueError
+            If the FMU has no such variable, or the variable no such unit.
+        """
         factor, offset = self._loaded.display_unit(name, unit)
         found = (_array(name, values) - offset) / factor
         return float(found) if found.ndim == 0 else found
@@ -181,6 +237,11 @@ class _Model:
             More than one is faster if a call takes much longer than waking a thread, about 0.01 ms: with hundreds of instances,
             or for slow models. None takes one for each processor.
 
+        Returns
+        -------
+        Instances
+            The initialized instances.
+
         Raises
         ------
         ValueError
@@ -197,10 +258,19 @@ class _Model:
 class Fmu(_Model):
     """An FMU, unpacked and loaded once. A context manager: leaving it unloads the FMU after all instances are freed.
 
-    Its library runs in this process: a crash ends the process. Raises FmuError if the file is no FMU, or has
-    no library for this platform.
+    The library of the FMU runs in this process: a crash ends the process.
 
-    execution_tool: run it also if its library starts another program (needsExecutionTool), which must be installed.
+    Parameters
+    ----------
+    path
+        The file.
+    execution_tool
+        Run the FMU also if its library starts another program (needsExecutionTool), which must be installed.
+
+    Raises
+    ------
+    FmuError
+        If the file is no FMU, or has no library for this platform.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, execution_tool: bool = False):

@@ -1,4 +1,4 @@
-"""Gymnasium's environments of any FMU: one (`Env`), or thousands in parallel (`VectorEnv`), both of one `Task`.
+"""Gymnasium's environments of any FMU: one (`Env`), or thousands in parallel (`VectorEnv`), both of one `Task`::
 
     task = Task(fmu="model.fmu", actions={"u": (-1, 1)}, observations=("y",), step=0.01, length=500,
                 reward=lambda before, action, after: -abs(after[:, 0]), failed_reward=-500.0)

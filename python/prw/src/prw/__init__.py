@@ -1,12 +1,12 @@
 """The pitch-roll wrist testbed in Python: simulate it, read recordings of it, find its parameters in them, linearize it,
-run it with thousands of parameter sets, animate it, compare results of other tools with a reference.
+run it with thousands of parameter sets, animate it, compare results of other tools with a reference::
 
     import prw
 
     run = prw.simulate("motors.csv", {"k1": 100.0})  # or a prw.Motion; by default the paper's experiment
     run["roll"]  # (n,) rad, at run.time
 
-The public functions; the modules of this package are internal:
+The public functions; the modules of this package are internal::
 
     simulate, read, animate, sweep     runs and recordings
     identify, excite                   parameters from measurements, and motions to measure with

@@ -36,6 +36,8 @@ def animate(
 
     Parameters
     ----------
+    path
+        The file (default: none is written).
     run
         From `prw.simulate`, with the outputs theta3, theta4, pitch, roll, tau1 and tau2.
     speed

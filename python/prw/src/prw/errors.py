@@ -6,7 +6,14 @@ from typing import Any
 class UserError(ValueError):
     """An error that the user can fix. The message is one line; `prw` exits with `status`.
 
-    argument: the argument of the function that the message concerns; `prw` names its option instead. given: its value.
+    Parameters
+    ----------
+    message
+        The cause and the remedy.
+    argument
+        The argument of the function that the message concerns; `prw` names its option instead.
+    given
+        The value of the argument.
     """
 
     status = 1
@@ -18,7 +25,7 @@ class UserError(ValueError):
 
 
 class MissingPackage(UserError, ImportError):
-    """An optional package is not installed."""
+    """An optional package is not installed. Parameters as for `UserError`."""
 
 
 class DoesNotFit(UserError):

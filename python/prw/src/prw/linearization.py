@@ -64,9 +64,21 @@ class Linearizer:
     """Linear models of one FMU, from one instance: call `at(parameters)` as often as needed. A context
     manager; leaving it unloads the FMU.
 
-    outputs: names of y, outputs or states (default: the FMU's continuous outputs). fmi_type: "CoSimulation" or
-    "ModelExchange" (default: the first of them that has directional derivatives). The testbed's `use_omega` and
-    `start_at_rest` are set as for `linearize`. Raises UserError as `linearize` does.
+    The testbed's `use_omega` and `start_at_rest` are set as for `linearize`.
+
+    Parameters
+    ----------
+    fmu
+        The FMU (default: the testbed's).
+    outputs
+        Names of y, outputs or states (default: the FMU's continuous outputs).
+    fmi_type
+        "CoSimulation" or "ModelExchange" (default: the first of them that has directional derivatives).
+
+    Raises
+    ------
+    UserError
+        As for `linearize`.
     """
 
     states: tuple[str, ...]

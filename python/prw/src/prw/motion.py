@@ -23,10 +23,23 @@ FIG4_DURATION = 2.0
 class Motion:
     """Motor motion at the communication points.
 
-    time: (n,) s, strictly increasing. theta: (n, 2) rad, motor angles theta1, theta2. omega: (n, 2) rad/s, their
-    rates at the same instants, or None if only angles are known. name: for files and titles. notes: lines for the user.
+    Parameters
+    ----------
+    time
+        (n,) s, strictly increasing.
+    theta
+        (n, 2) rad, the motor angles theta1 and theta2.
+    omega
+        (n, 2) rad/s, their rates at the same instants, or None if only angles are known.
+    name
+        Name for files and titles.
+    notes
+        Lines for the user.
 
-    Raises UserError if the shapes do not fit or time does not increase.
+    Raises
+    ------
+    UserError
+        The shapes do not fit, or time does not increase.
     """
 
     time: Array
@@ -55,11 +68,22 @@ class Motion:
 
 
 def fig4(step: float = 1e-3, opposite: bool = True) -> Motion:
-    """The paper's experiment (Sec. 4, Fig. 4), sampled every `step` seconds: theta1' = sin(10 pi t) = -theta2'.
-    With `opposite` false its counterpart, in which theta2' equals theta1'.
+    """The paper's experiment (Sec. 4, Fig. 4): theta1' = sin(10 pi t) = -theta2'.
 
     The angles are the integrals from zero, (1 - cos(10 pi t)) / (10 pi). Angle and rate are both the true values at the
     communication point: the torque there is then the true one, and the path in between is second-order accurate.
+
+    Parameters
+    ----------
+    step
+        Time between samples, s.
+    opposite
+        If false, theta2' equals theta1'.
+
+    Returns
+    -------
+    Motion
+        The motors' angles and rates, from 0 to 2 s.
     """
     time: Array = np.arange(round(FIG4_DURATION / step) + 1, dtype=np.float64) * step
     # 1 - cos as 2 sin^2, which does not cancel near t = 0

@@ -40,10 +40,18 @@ IN_MEMORY = Path("recording")
 
 @dataclass(frozen=True)
 class Recording:
-    """One recorded experiment, in SI. recording["tau1"]: (n,), and likewise time, motors and all measured outputs.
+    """One recorded experiment, in SI: a mapping from the names of time, motors and measured outputs to values, (n,).
 
-    motion: of the motors, (n,) times. measured: (n,) by name, of `prw.channels.MEASURED`; NaN where a cell is
-    empty. units: the unit in the file, by column. source: the file, or "recording" if there is none.
+    Attributes
+    ----------
+    motion
+        The motion of the motors.
+    measured
+        (n,) by name of the output; NaN where a cell is empty.
+    units
+        The unit in the file, by column.
+    source
+        The file, or "recording" if there is none.
     """
 
     source: Path
@@ -107,6 +115,8 @@ def read(
 
     Parameters
     ----------
+    path
+        The file or table.
     units
         Unit by column, if the header has none (`pitch [deg]` has one). Default: SI. An encoder's counts are
         `rev/10000`.

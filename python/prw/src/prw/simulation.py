@@ -32,11 +32,17 @@ if TYPE_CHECKING:
 
 
 class Run(Mapping[str, Array]):
-    """The response of the testbed. run["roll"]: (n,), in SI, at the times `time`; likewise each of its outputs.
+    """The response of the testbed: a mapping from the name of an output to its values, (n,), in SI, at the times `time`.
 
-    time: (n,) s. motion: of the motors. parameters: the value of every parameter of the FMU in this run, in SI.
-    sampling_errors: by output the largest error due to sampling of the motors, as a fraction of the output's peak; estimated
-    from a run with every other time.
+    Attributes
+    ----------
+    motion
+        The motion of the motors.
+    parameters
+        The value of every parameter of the FMU in this run, in SI.
+    sampling_errors
+        By output the largest error due to sampling of the motors, as a fraction of the output's peak. The errors are
+        estimated from a run with every other time.
     """
 
     def __init__(

@@ -24,8 +24,14 @@ Complex = NDArray[np.complex128]
 class StateSpace:
     """x' = A x + B u, y = C x + D u.
 
-    A: (n, n), B: (n, m), C: (p, n), D: (p, m), in the FMU's units. states, inputs, outputs: the names of x (n), u (m)
-    and y (p). units: unit by name, "" where there is none.
+    Attributes
+    ----------
+    A, B, C, D
+        (n, n), (n, m), (p, n) and (p, m), in the FMU's units.
+    states, inputs, outputs
+        The names of x (n), u (m) and y (p).
+    units
+        Unit by name; "" if there is none.
     """
 
     A: Array

@@ -84,8 +84,8 @@ def identify(
         Resolution of the motors' encoders, rad (default: found in the data).
     offsets
         Whether sensors may have offsets.
-    starts
-        Number of starting points, random with `seed`.
+    starts, seed
+        Number of starting points, and the seed of their random generator.
     delay, lag, gain
         Channels with an unknown delay, first-order lag or gain, which are then estimated, too.
     fmu

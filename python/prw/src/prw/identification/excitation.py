@@ -20,9 +20,21 @@ MOST_SAMPLES, SLOWEST = 2_000_000, 50.0
 
 
 class Excitation(NamedTuple):
-    """A motion, and the expected result of one experiment with it. typical_error: root mean square of the expected standard
-    errors, as a fraction; infinite if a combination is undetermined. expected_errors: by parameter. undetermined:
-    combinations that are not determined. noise: assumed noise by channel, SI."""
+    """A motion, and the expected result of one experiment with it.
+
+    Attributes
+    ----------
+    motion
+        The motion.
+    typical_error
+        Root mean square of the expected standard errors, as a fraction; infinite if a combination is undetermined.
+    expected_errors
+        Expected standard errors by parameter, as fractions.
+    undetermined
+        Combinations of parameters that the experiment does not determine.
+    noise
+        Assumed noise by channel, SI.
+    """
 
     motion: Motion
     typical_error: float
@@ -66,6 +78,11 @@ def excite(
         Samples per second.
     estimate, parameters, noise, fmu
         As for `prw.identify`.
+
+    Returns
+    -------
+    list of Excitation
+        The motions with their expected standard errors, the best one first.
 
     Raises
     ------

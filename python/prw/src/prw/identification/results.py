@@ -68,8 +68,19 @@ class ChannelFit(NamedTuple):
 class Identification:
     """Result of identifying the parameters of the FMU `fmu` from `files`.
 
-    known: the FMU's parameters. solution, sure: the fit itself and its statistics. verdict: whether the model explains
-    the data. diagnosis: possible causes if it does not. advice: experiments that would determine undetermined combinations."""
+    Attributes
+    ----------
+    known
+        The FMU's parameters.
+    solution, sure
+        The fit and its statistics.
+    verdict
+        Whether the model explains the data.
+    diagnosis
+        Possible causes if the model does not explain the data.
+    advice
+        Experiments that would determine undetermined combinations.
+    """
 
     fmu: Path
     known: Parameters

@@ -64,11 +64,13 @@ def sweep(
     random
         By parameter ("uniform", low, high), ("normal", mean, standard deviation) or ("lognormal", median, relative standard
         deviation), in SI; for the last also only the relative standard deviation (0.1 is 10 %), about the start value, or
-        (median, relative). `runs` draws for each combination of the grid, from the seed `seed`.
+        (median, relative).
     parameters
         Values that are the same in all runs, as for `prw.simulate`.
-    motion
-        As for `prw.simulate`, as is `fmu`.
+    runs, seed
+        Number of random draws for each combination of the grid, and their seed.
+    motion, fmu
+        As for `prw.simulate`.
     threads
         Number of threads (default: one for each processor).
     scheduler
@@ -80,7 +82,7 @@ def sweep(
     Returns
     -------
     pyarrow.Table
-        An Arrow table (`.to_pandas()` makes a DataFrame of it), a row for each run: `run`; `status`, "done" or
+        An Arrow table (its method to_pandas makes a DataFrame), a row for each run: `run`; `status`, "done" or
         "failed"; `message`, the cause of a failure, for example that the FMU rejects a value; the parameters; and of each
         output the peak (of its magnitude), rms and value at the end, such as `roll_peak`, in SI.
 
