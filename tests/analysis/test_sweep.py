@@ -1,11 +1,6 @@
-"""`prw sweep`: the same numbers as single runs, whoever makes them, and after a kill."""
+"""`prw sweep`: the numbers of single runs, on this machine and on a cluster."""
 
 from __future__ import annotations
-
-import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -39,34 +34,7 @@ def test_grid_random_and_failures(prw, tmp_path, fmu):
             assert row[f"{name}_rms"] == pytest.approx(np.sqrt(np.mean(response[name] ** 2)), rel=1e-12)
             assert row[f"{name}_end"] == response[name][-1]
     assert all(value is None for key, value in table[0].items() if key.endswith(("_peak", "_rms", "_end")))
-    assert sorted(p.name for p in (tmp_path / "out" / "sweep").iterdir()) == ["runs.parquet", "study.json"]
-
-
-def test_goes_on_after_a_kill(prw, tmp_path, fmu):
-    # So many that they take longer than it takes to see the first and to kill.
-    count = 2000
-    arguments = ["sweep", "--random", "k1=10%", "--runs", str(count), "--threads", "1", "--seed", "3", "--out", "study"]
-    command = [sys.executable, "-m", "prw", *arguments, "--fmu", str(fmu)]
-    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    parts, patience = tmp_path / "study" / "parts", time.monotonic() + 120
-    while not list(parts.glob("[0-9]*.parquet")):
-        assert process.poll() is None and time.monotonic() < patience
-        time.sleep(0.02)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    kept = sum(pq.read_table(part).num_rows for part in parts.glob("[0-9]*.parquet"))
-    assert 0 < kept < count
-    # As if it had been killed while it wrote.
-    (parts / ".000001990-000001999-abcdefgh.parquet").touch()
-    result = prw(*arguments)
-    assert result.returncode == 0, result.stderr
-    assert "were there already" in result.stdout
-    again = prw("sweep", "--random", "k1=10%", "--runs", count, "--seed", 3, "--out", "other")
-    assert again.returncode == 0
-    assert rows(tmp_path / "study") == rows(tmp_path / "other"), "as if nothing had happened"
-    assert f"nothing: all {count} runs were there already" in prw(*arguments).stdout
-    result = prw(*arguments[:3], "--runs", count + 1, "--out", "study")
-    assert result.returncode == 1 and "holds another study" in result.stderr
+    assert sorted(p.name for p in (tmp_path / "out" / "sweep").iterdir()) == ["runs.parquet"]
 
 
 def test_dask_cluster(prw, tmp_path):

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from built import ROOT
 from fmpy import simulate_fmu
+from lagrange import OUTPUTS
 from lxml import etree
 from reference import integrate
-from test_model_exchange import END, OUTPUTS, angle, rate
 
 from prw.errors import UserError
 from prw.motion import Motion
@@ -31,6 +31,8 @@ from tools.figures.icon import draw_controller, draw_testbed
 from tools.figures.results import numbers, results
 from tools.figures.writing import write_for_page, write_json, write_png, write_small_png, write_svg
 
+#: Two sines from rest.
+END, AMPLITUDE, FREQUENCY = 0.5, np.array([0.3, -0.2]), np.array([14.0, 23.0])
 EPSILON = np.finfo(float).eps
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 
@@ -158,6 +160,14 @@ def test_the_libcosim_program(page, fmu, model, tmp_path):
     pytest.importorskip("libcosimpy")
     pitch, roll = run(program(page, "run_in_libcosim"), fmu, tmp_path)[-2:]
     assert abs(pitch) < 1e-12 and roll == pytest.approx(roll_at_2(model), rel=1e-4)
+
+
+def angle(t):
+    return AMPLITUDE * (1 - np.cos(FREQUENCY * t))
+
+
+def rate(t):
+    return AMPLITUDE * FREQUENCY * np.sin(FREQUENCY * t)
 
 
 def test_what_is_said_of_model_exchange_in_fmpy(fmu, model):

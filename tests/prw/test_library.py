@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas
 import pyarrow.parquet as pq
 import pytest
 from built import ROOT
@@ -20,7 +19,7 @@ from lagrange import linear_model, table_1
 from reference import follow
 
 import prw
-from prw.output import write_motion
+from prw.files import write_table
 
 MOTION = ROOT / "examples" / "point_to_point.csv"
 
@@ -115,74 +114,11 @@ def test_numbers_are_read_back_unchanged(tmp_path: Path) -> None:
     )
     numbers = np.concatenate([near, -near, np.exp(draws.uniform(-300, 300, 9_000)), [0.0, 7.0, 70.0]])
     motion = prw.Motion(1e-3 * np.arange(len(numbers), dtype=np.float64), np.column_stack([numbers, numbers[::-1]]))
-    write_motion(path, motion)
+    write_table(path, motion.columns)
     lines = path.read_text().splitlines()
     assert lines[0] == "time,theta1,theta2" and lines[-1].startswith(f"{(len(numbers) - 1) * 1e-3!r},70.0,")
     found = [[float(cell) for cell in line.split(",")] for line in lines[1:]]
     assert np.array_equal(found, np.column_stack([motion.time, motion.theta]))
-
-
-def test_a_recording_with_measurements(tmp_path: Path) -> None:
-    path = tmp_path / "rig.csv"
-    path.write_text("time [ms],theta1,theta2,tau1 [mN.m],pitch,site\n0,1,2,3,90,a\n5,1,2,,90,b\n10,1,2,5,90,c\n")
-    recording = prw.read(path, units={"pitch": "deg"})
-    assert set(recording.measured) == {"tau1", "pitch"} and recording.omega is None and recording.name == "rig"
-    np.testing.assert_allclose(recording["time"], [0, 5e-3, 1e-2], rtol=1e-15)
-    np.testing.assert_allclose(recording["tau1"], [3e-3, np.nan, 5e-3])
-    np.testing.assert_allclose(recording["pitch"], np.pi / 2, rtol=1e-15)
-    np.testing.assert_array_equal(recording["theta2"], 2)
-    assert recording.units == {"time": "ms", "theta1": "rad", "theta2": "rad", "tau1": "mN.m", "pitch": "deg"}
-    assert any("columns ignored: site" in note for note in recording.notes) and "rig" in repr(recording)
-    np.testing.assert_allclose(prw.read(path, degrees=True).theta, np.deg2rad([[1, 2]] * 3), rtol=1e-15)
-    with pytest.raises(KeyError, match="roll: was not recorded; there are time, theta1, theta2, "):
-        recording["roll"]
-    with pytest.raises(prw.UserError, match="units: yaw is not known; there are time, theta1"):
-        prw.read(path, units={"yaw": "deg"})
-    # What was measured does not stop a simulation of the motors.
-    path.write_text(path.read_text().replace(",3,", ",broken,"))
-    assert prw.simulate(path)["roll"].shape == (3,)
-    with pytest.raises(prw.UserError, match="rig.csv, row 2, column tau1: 'broken' is not a number"):
-        prw.read(path)
-
-
-def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
-    """A dict, a DataFrame and the CSV file that it writes are one recording, also with the time as index."""
-    time = np.arange(4) * 1e-3
-    table: dict[str, Any] = {
-        "time": time,
-        "theta1 [deg]": time * 90,
-        "theta2": -time,
-        "tau1": [1, None, 2, 3],
-        "x": "abcd",
-    }
-    frame = pandas.DataFrame({**table, "x": list("abcd")})
-    frame.to_csv(tmp_path / "recording.csv", index=False)
-    from_file = prw.read(tmp_path / "recording.csv")
-    for source in (table, frame, frame.set_index("time")):
-        recording = prw.read(source)
-        for name in ("time", "theta1", "theta2", "tau1"):
-            np.testing.assert_array_equal(recording[name], from_file[name])
-        assert (recording.units, recording.notes) == (from_file.units, from_file.notes)
-        assert prw.simulate(source, fmu=testbed)["roll"][-1] == prw.simulate(from_file, fmu=testbed)["roll"][-1]
-    run = prw.simulate(frame, fmu=testbed)
-    for again in (prw.simulate(run, fmu=testbed), prw.simulate(run.to_pandas(), fmu=testbed)):
-        np.testing.assert_array_equal(again["tau1"], run["tau1"])
-    good = {"time": [0.0, 1.0], "theta1": [0.0, 1.0], "theta2": [0.0, 1.0]}
-    wrong: list[tuple[Any, str]] = [
-        ({"time": [0.0, 1.0]}, "recording: column theta1 is missing; the header has time"),
-        ({**good, "theta2": [0.0, None]}, "recording, column theta2: nan at place 1 is not finite"),
-        ({**good, "theta2": ["a", "b"]}, "recording, column theta2: is not made of numbers"),
-        ({**good, "theta2": [0.0]}, "recording, column theta2: has 1 rows, but time has 2"),
-        ({**good, "theta2": [[0.0], [1.0]]}, r"recording, column theta2: has the shape \(2, 1\)"),
-        ({**good, "time": pandas.to_datetime(["2026-01-01", "2026-01-02"])}, "column time: has dates"),
-        ({**good, "time": [1.0, 0.0]}, "recording, column time: time must increase"),
-        (dict.fromkeys(good, [0.0]), "recording: has 1 rows; at least two are needed"),
-        ({**good, "theta1 [deg]": [0.0, 1.0]}, "recording, column theta1: appears twice"),
-        (None, "None is no recording: neither a file nor a DataFrame"),
-    ]
-    for source, complaint in wrong:
-        with pytest.raises(prw.UserError, match=complaint):
-            prw.read(source)
 
 
 def test_errors_are_those_of_python_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from prw.channels import MEASURED
 from prw.checking import check
 from prw.checking.agreement import Agreement, compare
 from prw.checking.experiments import Experiment, find, read_experiments
 from prw.checking.result import Result
+from prw.columns import MEASURED
 from prw.motion import Array
 from prw.testbed import existing_fmu
 from tools.validation import masters, system

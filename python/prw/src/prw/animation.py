@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from prw.errors import UserError
-from prw.extras import need
+from prw.errors import UserError, need
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation

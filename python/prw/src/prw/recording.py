@@ -12,11 +12,9 @@ from typing import Any
 import numpy as np
 
 from prw.arguments import Table, columns_of, is_path, is_table, numbers_of
-from prw.channels import MEASURED, QUANTITIES, factor
-from prw.columns import ANGLES, RATES, Columns, columns, shown
+from prw.columns import ANGLES, MEASURED, QUANTITIES, RATES, Columns, columns, factor, shown
 from prw.errors import UserError
 from prw.motion import Array, Motion
-from prw.output import inputs_of
 from prw.table import Choice, read_table
 
 #: Faster than the testbed's motors will turn on any wrist move, in rad/s; degrees taken for radians are beyond it.
@@ -77,7 +75,7 @@ class Recording:
         return self.motion.notes
 
     def __getitem__(self, column: str) -> Array:
-        columns = {**inputs_of(self.motion), **self.measured}
+        columns = {**self.motion.columns, **self.measured}
         if column not in columns:
             raise KeyError(f"{column}: was not recorded; there are {', '.join(columns)}")
         return columns[column]

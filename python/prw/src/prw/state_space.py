@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from prw.errors import UserError
-from prw.extras import need
+from prw.errors import UserError, need
 from prw.motion import Array
 
 if TYPE_CHECKING:

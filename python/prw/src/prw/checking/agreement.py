@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from prw.channels import MOTORS, si_unit
 from prw.checking.experiments import Experiment
 from prw.checking.result import Result
-from prw.errors import UserError
-from prw.extras import need
+from prw.columns import MOTORS, si_unit
+from prw.errors import UserError, need
 from prw.files import write_text
 from prw.motion import Array
 

@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from prw.channels import QUANTITIES, factor, si_unit
-from prw.columns import NAMES, column, shown
-from prw.errors import UserError
-from prw.extras import need
+from prw.columns import NAMES, QUANTITIES, column, factor, shown, si_unit
+from prw.errors import UserError, need
 from prw.motion import Array
 from prw.table import read_table
 

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from prw.checking import check
-from prw.commands.assignments import FORMATTER, Named
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT, FORMATTER, Named
 from prw.commands.simulate import write_png
 from prw.errors import MissingPackage, UserError
 

@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 
 from prw.arguments import positive
-from prw.commands.assignments import FORMATTER, add_task_options, listed
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
-from prw.extras import need
-from prw.files import write_text
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT, FORMATTER, add_task_options, listed
+from prw.errors import need
+from prw.files import write_table, write_text
 from prw.identification.excitation import excite
-from prw.output import write_motion
 
 DESCRIPTION = """\
 Proposes motor motions within the motors' limits and ranks them by the standard errors of the parameters that are
@@ -92,7 +90,7 @@ def run(arguments: argparse.Namespace) -> None:
         fmu=arguments.fmu,
     )
     for entry in ranking:
-        write_motion(arguments.out / f"{entry.name}.csv", entry.motion)
+        write_table(arguments.out / f"{entry.name}.csv", entry.motion.columns)
     best = ranking[0]
     content = {
         "measured": dict(best.noise),

@@ -7,8 +7,10 @@ import re
 from pathlib import Path
 from typing import Any
 
-from prw.channels import factor
-from prw.commands.assignments import (
+from prw.columns import factor
+from prw.commands.options import (
+    DEFAULT_FMU,
+    DEFAULT_OUT,
     FORMATTER,
     Named,
     add_reading_options,
@@ -19,9 +21,7 @@ from prw.commands.assignments import (
     reading_options,
     spread,
 )
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
-from prw.errors import DoesNotFit, UserError
-from prw.extras import need
+from prw.errors import DoesNotFit, UserError, need
 from prw.identification import identify
 
 DESCRIPTION = """\

@@ -7,8 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from prw.commands.assignments import add_parameter_options, parameters_of
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT, add_parameter_options, parameters_of
 from prw.files import replacing
 from prw.linearization import linearize
 from prw.state_space import StateSpace

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from prw.animation import animate, suffix_of
-from prw.commands.assignments import (
+from prw.commands.options import (
+    DEFAULT_FMU,
+    DEFAULT_OUT,
     add_parameter_options,
     add_reading_options,
     parameters_of,
     reading_options,
 )
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import MissingPackage, UserError
 from prw.files import replacing
 from prw.motion import fig4

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from prw.channels import QUANTITIES
+from prw.columns import QUANTITIES
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Distortion, Fitter, Solution, settled
 from prw.identification.statistics import covariance_of, information_of

@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from prw.arguments import names_of, positive
-from prw.channels import MEASURED
-from prw.errors import UserError
-from prw.extras import need
+from prw.columns import MEASURED
+from prw.errors import UserError, need
 from prw.identification import DEFAULT_ESTIMATE, task_of
 from prw.motion import Motion
 

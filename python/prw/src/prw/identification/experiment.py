@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from prw.channels import MEASURED
+from prw.columns import MEASURED
 from prw.errors import UserError
 from prw.identification.path import Path, quantum_of, rough_noise, smooth
 from prw.motion import Array, Motion

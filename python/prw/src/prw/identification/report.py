@@ -13,12 +13,12 @@ from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from prw.channels import si_unit
+from prw.columns import si_unit
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Solution
 from prw.identification.model import Parameters
-from prw.motion import Array, envelope
-from prw.plots import BLUE, PAGE_STYLE, VERMILION
+from prw.motion import Array
+from prw.plots import BLUE, PAGE_STYLE, VERMILION, envelope
 
 #: Size of a figure, inches.
 SIZE = (6.7, 3.75)

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from prw.channels import MOTORS, si_unit
-from prw.extras import need
+from prw.columns import MOTORS, si_unit
+from prw.errors import need
 from prw.files import write_text
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Prior, Solution
