@@ -11,8 +11,6 @@ than 92 % of the repetitions, or if the verdict is "fits" in less than 97 %. The
 number of repetitions. With --faulty, exit status 1 if the verdict is "fits" although an interval misses by more than two
 of its widths, in more than 1 %.
 
-A campaign that was interrupted continues where it was: finished repetitions of the same commit are read from the file
-beside --out that ends in .jsonl.
 """
 
 from __future__ import annotations
@@ -21,11 +19,9 @@ import argparse
 import itertools
 import json
 import multiprocessing
-import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -117,22 +113,6 @@ def commit() -> str:
     return git("rev-parse", "--short", "HEAD") + "-dirty" * bool(git("status", "--porcelain", "--", *SOURCES))
 
 
-def results(pool: ProcessPoolExecutor, jobs: list[tuple], out: Path | None) -> Iterator[tuple]:
-    """Results of `repetition` with each of the arguments `jobs`, in their order."""
-    log = out.with_suffix(".jsonl") if out else Path(os.devnull)
-    log.parent.mkdir(parents=True, exist_ok=True)
-    version, done = commit(), {}
-    if log.is_file() and not version.endswith("dirty"):
-        done = dict(json.loads(line) for line in log.read_text().splitlines())
-    keys = [json.dumps([version, *job]) for job in jobs]
-    waiting = {key: pool.submit(repetition, *job) for key, job in zip(keys, jobs) if key not in done}
-    with log.open("a") as file:
-        for key in keys:
-            if key in waiting:
-                print(json.dumps([key, waiting[key].result()]), file=file, flush=True)
-            yield waiting[key].result() if key in waiting else done[key]
-
-
 def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[dict, bool]:
     """What the verdict is on rigs with faults, by fault and size; and whether it is never "fits" where an interval
     misses by more than two of its widths, but in 1 %."""
@@ -146,7 +126,7 @@ def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[di
         for case in cases
         for i in range(rigs)
     ]
-    everything = results(pool, jobs, options.out)
+    everything = iter(pool.map(repetition, *zip(*jobs)))
     grossly = missed = 0
     for fault, size in cases:
         found = list(itertools.islice(everything, rigs))
@@ -186,6 +166,13 @@ def draw(rows: dict, path: Path) -> None:
         drawn.savefig(path, metadata={"Date": None})
 
 
+def write(found: dict, path: Path | None) -> None:
+    """Write the results as JSON, if a path is given."""
+    if path:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(found, indent=2) + "\n")
+
+
 def is_too_rare(hits: np.ndarray, least: float, expected: float) -> bool:
     """Whether the share of hits is less than `least`, and so small only once in twenty times at the expected share."""
     return bool(hits.mean() < least and binom.cdf(hits.sum(), hits.size, expected) < 0.05)
@@ -210,10 +197,9 @@ def main() -> int:
     with ProcessPoolExecutor(options.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         if options.faulty:
             rows, good = campaign(pool, options)
-            if options.out:
-                options.out.write_text(json.dumps(rows, indent=2) + "\n")
+            write(rows, options.out)
             return 0 if good else 1
-        found = list(results(pool, jobs, options.out))
+        found = list(pool.map(repetition, *zip(*jobs)))
     errors, sigmas, inside, seconds, fits = (np.array([entry[i] for entry in found]) for i in range(5))
     print(
         f"{options.repetitions} repetitions, {', '.join(SENSORS[options.sensors])}, {options.counts} counts a turn, "
@@ -232,9 +218,8 @@ def main() -> int:
             f"{cover:>22.1%}"
         )
     print(f"  the verdict is that it fits in {fits.mean():.1%}")
-    if options.out:
-        whole = {"commit": commit(), "fits": float(fits.mean()), "repetitions": options.repetitions, "parameters": rows}
-        options.out.write_text(json.dumps(whole, indent=2) + "\n")
+    whole = {"commit": commit(), "fits": float(fits.mean()), "repetitions": options.repetitions, "parameters": rows}
+    write(whole, options.out)
     print("unbiased, intervals honest" if good else "BIASED, intervals too narrow, or false alarms")
     return 0 if good else 1
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -135,24 +133,10 @@ def test_what_cannot_be_shown_is_said(
     assert not list(tmp_path.iterdir())
 
 
-def test_command(fmu: Path, tmp_path: Path) -> None:
-    recording = tmp_path / "motors.csv"
-    recording.write_text("time,theta1,theta2\n" + "".join(f"{k / 10},{k / 100},{k / 100}\n" for k in range(5)))
-    command: list[Any] = [
-        sys.executable,
-        "-m",
-        "prw",
-        "simulate",
-        "--fmu",
-        fmu,
-        "--input",
-        recording,
-        "--out",
-        tmp_path / "out",
-    ]
-    done = subprocess.run([*command, "--animate", tmp_path / "wrist.gif"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert f"{tmp_path / 'wrist.gif'}" in done.stdout
+def test_command(prw: Any, tmp_path: Path) -> None:
+    (tmp_path / "motors.csv").write_text("time,theta1,theta2\n" + "".join(f"{k / 10},{k / 9},0\n" for k in range(5)))
+    done = prw("simulate", "motors.csv", "--animate", "wrist.gif")
+    assert done.returncode == 0 and "wrist.gif" in done.stdout, done.stderr
     assert len(pictures_of(tmp_path / "wrist.gif")) > 1
 
 

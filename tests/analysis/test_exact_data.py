@@ -48,17 +48,12 @@ def test_a_run_of_a_recording(fmu):
     check(prw.identify(run, starts=1, fmu=fmu), K1, 1e-5)
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2, 1e-1])
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-1])
 def test_any_relative_noise(run, fmu, noise):
     random, table = np.random.default_rng(1), columns(run)
     for name in run:
         table[name] = table[name] + random.normal(0, 1, len(run.time)) * noise * np.std(table[name])
     check(prw.identify(table, starts=1, fmu=fmu), K1, max(1e-6, 0.15 * noise))
-
-
-def test_columns_with_six_decimals(run, fmu):
-    table = {name: column if name == "time" else np.round(column, 6) for name, column in columns(run).items()}
-    check(prw.identify(table, starts=1, fmu=fmu), K1, 1e-5)
 
 
 def test_an_encoder_that_sees_two_steps(run, fmu):

@@ -1,4 +1,4 @@
-"""The campaign of simulated rigs runs, continues after an interruption, and draws the same figure again."""
+"""The campaign of simulated rigs runs, and draws the same figure again."""
 
 from __future__ import annotations
 
@@ -27,7 +27,4 @@ def test_one_rig_without_a_fault_and_one_with(fmu, tmp_path, monkeypatch, capsys
         run("--faulty", 1, "--figure", figure, "--out", out)
         figures.append(figure.read_bytes())
         assert json.loads(out.read_text())["faults"]["gain"][0]["does_not_fit"] == 1
-        assert len(out.with_suffix(".jsonl").read_text().splitlines()) == 1, (
-            "the second run reads the first one's results"
-        )
     assert figures[0] == figures[1]

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Model
 from fmpy.simulation import instantiate_fmu
-from fmpy.sundials import CVodeSolver
 
 from tools.validation import coupling
 from tools.validation.system import System
@@ -125,42 +124,6 @@ def runge_kutta(steps: int):
     return advance
 
 
-def cvode(loop: Loop):
-    """FMPy's CVode, restarted at every sample, because there the motors' acceleration jumps."""
-    fmi = loop.testbed.fmi
-
-    class NoInput:
-        def apply(self, time: float) -> None:
-            """The inputs come with the time."""
-
-    solver = CVodeSolver(
-        nx=STATES,
-        nz=0,
-        get_x=fmi.getContinuousStates,
-        set_x=fmi.setContinuousStates,
-        get_dx=fmi.getDerivatives,
-        get_z=lambda z, nz: None,
-        get_nominals=fmi.getNominalsOfContinuousStates,
-        set_time=loop.move,
-        input=NoInput(),
-        startTime=0.0,
-        relativeTolerance=1e-10,
-    )
-
-    def advance(_: Loop, start: float, end: float) -> None:
-        solver.reset(start)
-        solver.step(start, end)
-
-    return advance
-
-
-@pytest.fixture
-def loop(fmu, controller_fmu, closed_loop: System):
-    made = Loop(fmu, controller_fmu, {end.split(".")[1]: value for end, value in closed_loop.inputs.values()})
-    yield made
-    made.close()
-
-
 @pytest.fixture(scope="module")
 def exact(fmu, controller_fmu, closed_loop: System) -> np.ndarray:
     """By Runge and Kutta with steps so small that halving them changes nothing to speak of."""
@@ -188,8 +151,3 @@ def test_co_simulation_tends_to_it(exact, closed_loop: System):
     assert np.all(fine[angles] < 1e-7), fine
     order = np.log2(coarse / fine)
     assert np.all((order[angles] > 1.9) & (order[angles] < 2.1)), (coarse, fine)
-
-
-def test_cvode_gives_the_same(loop: Loop, exact):
-    found = loop.run(cvode(loop))
-    assert np.abs(found - exact).max(axis=0) == pytest.approx(0, abs=1e-6)

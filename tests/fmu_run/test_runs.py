@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 import warnings
@@ -10,6 +11,7 @@ import fmpy
 import fmu_run
 import numpy as np
 import pytest
+from built import ROOT
 from fmpy.simulation import instantiate_fmu
 
 OUTPUTS = ["tau1", "pitch", "roll", "pitch_rate", "theta3", "M"]
@@ -221,3 +223,18 @@ def test_many_short_runs_leave_nothing_behind(testbed, tmp_path, monkeypatch):
         # No run knows of the one before it in its instance.
         np.testing.assert_array_equal(np.ptp(peaks["tau1", "peak"].reshape(-1, 3), axis=0), 0.0)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_programs_run(fmu, monkeypatch):
+    page = "crates/fmu-run/README.md"
+    programs = re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), flags=re.S | re.M)
+    text = "\n".join(program for program in programs if "fmu_run" in program)
+    monkeypatch.chdir(ROOT)
+    names: dict = {}
+    exec(compile(text, page, "exec"), names)
+    runs = names["runs"].check()
+    assert runs["roll"].shape == (1000, 2001) and abs(runs["roll"]).max() > 0.01
+    assert names["torques"].shape == (1000, 2) and names["wrists"].errors == {}
+    assert len({*names["wrists"].time}) == 2, "some have gone back"
+    assert names["peaks"]["tau1", "peak"].max() == abs(runs["tau1"]).max()
+    assert names["rewards"].shape == (1024,) and (names["envs"].steps == 100).all()

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from built import ROOT
 from lagrange import linear_model, table_1
@@ -216,17 +215,6 @@ def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
         with pytest.raises(prw.UserError, match=complaint) as caught:
             prw.simulate(**{"fmu": testbed, **dict(arguments)})  # type: ignore[call-overload]
         assert "\n" not in str(caught.value)
-
-
-def test_sweep_is_many_simulations(testbed: Path, tmp_path: Path) -> None:
-    table = prw.sweep({"k1": [-1.0, 90.0], "c3": np.linspace(0.1, 0.4, 3)}, fmu=testbed, out=tmp_path)
-    assert table.column("status").to_pylist() == ["failed"] * 3 + ["done"] * 3
-    assert "k1 must not be below 1e-300" in table.column("message")[0].as_py()
-    for row in table.to_pylist()[3:]:
-        run = prw.simulate(parameters={name: row[name] for name in ("k1", "c3")}, fmu=testbed)
-        assert row["roll_peak"] == np.abs(run["roll"]).max() and row["tau1_end"] == run["tau1"][-1]
-    assert pq.read_table(tmp_path / "runs.parquet").to_pylist() == table.to_pylist()
-    assert len(table.to_pandas()) == 6
 
 
 def test_sweep_draws(testbed: Path) -> None:

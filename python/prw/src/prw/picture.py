@@ -88,8 +88,7 @@ def write_page(path: Path, title: str, courses: Mapping[str, Array], speed: floa
 
 
 def write_movie(path: Path, pictures: Iterable[Image.Image], rate: int) -> None:
-    """Write an MP4 of `rate` frames per second. Raises UserError if a package is missing."""
-    need("imageio_ffmpeg")
+    """Write an MP4 of `rate` frames per second. Raises UserError if there is no ffmpeg."""
     import imageio_ffmpeg
 
     try:
@@ -98,18 +97,13 @@ def write_movie(path: Path, pictures: Iterable[Image.Image], rate: int) -> None:
         raise UserError(
             f"{path.suffix}: imageio-ffmpeg has no ffmpeg for this machine; install ffmpeg, or write a .gif"
         ) from None
-    writer = None
     # Players need even widths and heights.
-    options = ["-vf", "crop=floor(iw/2)*2:floor(ih/2)*2", "-crf", "20"]
+    options = {"output_params": ["-vf", "crop=floor(iw/2)*2:floor(ih/2)*2", "-crf", "20"], "macro_block_size": 1}
+    writer = imageio_ffmpeg.write_frames(str(path), SIZE, fps=rate, quality=None, **options)
+    writer.send(None)
     for one in pictures:
-        if writer is None:
-            writer = imageio_ffmpeg.write_frames(
-                str(path), one.size, fps=rate, quality=None, macro_block_size=1, output_params=options
-            )
-            writer.send(None)
         writer.send(one.convert("RGB").tobytes())
-    if writer is not None:
-        writer.close()
+    writer.close()
 
 
 #: The outputs of a run that are shown.

@@ -9,10 +9,9 @@ from typing import Any
 
 from prw.columns import factor
 from prw.commands.options import (
-    DEFAULT_FMU,
-    DEFAULT_OUT,
     FORMATTER,
     Named,
+    add_paths,
     add_reading_options,
     add_task_options,
     bounds,
@@ -95,14 +94,7 @@ def add_parser(subparsers: Any) -> None:
         "--starts", type=int, default=6, metavar="N", help="starting points of the search (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random starting points (default: %(default)s)")
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=DEFAULT_OUT / "identified",
-        metavar="DIR",
-        help="where report.html, report.json, identified.json and identified.ssv go (default: %(default)s)",
-    )
+    add_paths(parser, "where report.html, report.json, identified.json and identified.ssv go", "identified")
     parser.set_defaults(run=run, options={"parameters": "--set", "priors": "--prior", "skip": "--skip-lines"})
 
 

@@ -23,6 +23,13 @@ except UserError:
 DEFAULT_OUT = Path("out")
 
 
+def add_paths(parser: argparse.ArgumentParser, out: str = "where to write", directory: str = "") -> None:
+    """The options --fmu and --out. out: the help; directory: the default within DEFAULT_OUT."""
+    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
+    default = DEFAULT_OUT / directory
+    parser.add_argument("--out", type=Path, default=default, metavar="DIR", help=f"{out} (default: %(default)s)")
+
+
 class FORMATTER(argparse.RawDescriptionHelpFormatter):
     """Keeps the line breaks of descriptions and examples, at a width of 110 characters."""
 

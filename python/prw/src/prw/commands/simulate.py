@@ -11,9 +11,8 @@ import numpy as np
 
 from prw.animation import animate, suffix_of
 from prw.commands.options import (
-    DEFAULT_FMU,
-    DEFAULT_OUT,
     add_parameter_options,
+    add_paths,
     add_reading_options,
     parameters_of,
     reading_options,
@@ -47,10 +46,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--input", type=Path, metavar="FILE", help="the same")
     add_parameter_options(parser, "SI")
     add_reading_options(parser)
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
-    )
+    add_paths(parser)
     parser.add_argument(
         "--animate",
         type=Path,

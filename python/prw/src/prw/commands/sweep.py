@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT, FORMATTER, Named, spread
+from prw.commands.options import FORMATTER, Named, add_paths, spread
 from prw.errors import UserError, need
 from prw.motion import Array, fig4
 from prw.recording import read_motion
@@ -75,10 +75,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--threads", type=int, metavar="N", help="on this machine (default: one per core)")
     parser.add_argument("--workers", type=int, dest="threads", help=argparse.SUPPRESS)  # its name in 0.2.0
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, like tcp://head:8786")
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT / "sweep", metavar="DIR", help="where to write (default: %(default)s)"
-    )
+    add_paths(parser, directory="sweep")
     parser.set_defaults(run=run)
 
 

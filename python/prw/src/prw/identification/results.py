@@ -221,10 +221,7 @@ class Identification:
         need("jinja2", "matplotlib")
         from prw.identification.report import page
 
-        residuals = [self.residual(i) for i in range(len(self.experiments))]
-        channels = [channel._asdict() for channel in self.channels]
-        fitted = (self.known, self.experiments, self.solution, residuals, channels, self.parameters)
-        write_text(Path(path), page(*fitted, found=self, sure=self.sure))
+        write_text(Path(path), page(self))
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """All numbers as JSON, also written to `path` if it is given."""
