@@ -1,4 +1,4 @@
-"""Fixtures that several folders of tests share: the packed FMUs. pyproject.toml says where tests find modules."""
+"""Fixtures that several directories of tests share: the packed FMUs. pyproject.toml lists where tests find modules."""
 
 from __future__ import annotations
 

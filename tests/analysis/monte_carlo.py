@@ -57,42 +57,42 @@ FAULTS = {
 }
 
 
-def spoilt(truth: rig.Truth, fault: str, size: float) -> rig.Truth:
+def spoilt(simulated: rig.Rig, fault: str, size: float) -> rig.Rig:
     """The rig with a fault of FAULTS."""
     if fault == "late":
-        return rig.late(truth, 1e-3 * size)
+        return rig.late(simulated, 1e-3 * size)
     if fault == "lag":
-        return rig.lagging(truth, 1e-3 * size)
+        return rig.lagging(simulated, 1e-3 * size)
     if fault == "backlash":
-        return rig.nonlinear(truth, backlash=1e-3 * size)
+        return rig.nonlinear(simulated, backlash=1e-3 * size)
     if fault == "friction":
-        return rig.nonlinear(truth, friction=size)
-    outputs = dict(truth.outputs)
+        return rig.nonlinear(simulated, friction=size)
+    outputs = dict(simulated.outputs)
     if fault == "gain":
         outputs["tau1"] = (1 + size / 100) * outputs["tau1"]
     for name in ("tau1", "tau2"):
         if fault == "clipped":
             peak = size * np.abs(outputs[name]).max()
             outputs[name] = np.clip(outputs[name], -peak, peak)
-    return truth._replace(outputs=outputs)
+    return simulated._replace(outputs=outputs)
 
 
 def repetition(fmu: str, seed: int, channels, counts: int, motion: str, fault: str = "", size: float = 0.0) -> tuple:
-    """Logarithms of estimate over truth, their standard errors, whether the 95 % intervals hold the truth, all (5,),
+    """Logarithms of estimate over true value, their standard errors, whether the 95 % intervals contain the true values, all (5,),
     the seconds it took, whether the verdict is that it fits, and the worst miss of an interval in its widths."""
-    truth = rig.experiment(seed, 6.0 if fault else 10.0, pattern=motion)
+    simulated = rig.experiment(seed, 6.0 if fault else 10.0, pattern=motion)
     if fault:
-        truth = spoilt(truth, fault, size)
-    columns = rig.measure(truth, seed + 1_000_000, channels, counts)
+        simulated = spoilt(simulated, fault, size)
+    columns = rig.measure(simulated, seed + 1_000_000, channels, counts)
     theta = np.column_stack([columns["theta1"], columns["theta2"]])
-    measured = Recording(Path("rig.csv"), Motion(truth.time, theta), {name: columns[name] for name in channels}, {})
+    measured = Recording(Path("rig.csv"), Motion(simulated.time, theta), {name: columns[name] for name in channels}, {})
     with Model(fmu) as model, threadpool_limits(1):
         begin = time.perf_counter()
         solution = fit(model, [prepare(measured)], task_of(model.known, rig.NAMES), starts=1)
         verdict = judge(solution)
         sure = certainty(solution, verdict.widening)
         seconds = time.perf_counter() - begin
-    true = np.log([truth.parameters[name] for name in rig.NAMES])
+    true = np.log([simulated.parameters[name] for name in rig.NAMES])
     low, high = np.log(sure.low), np.log(sure.high)
     missed = float((np.maximum(low - true, true - high) / (high - low)).max())
     inside = (low < true) & (true < high)
@@ -106,15 +106,15 @@ SOURCES = ("python/prw/src", "tests/analysis", "tests/oracle", "src", "modelDesc
 def commit() -> str:
     """Short hash of the commit, with "-dirty" if SOURCES differ from it."""
 
-    def git(*words: str) -> str:
-        command = ["git", "-C", str(Path(__file__).resolve().parents[2]), *words]
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(Path(__file__).resolve().parents[2]), *arguments]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
     return git("rev-parse", "--short", "HEAD") + "-dirty" * bool(git("status", "--porcelain", "--", *SOURCES))
 
 
 def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[dict, bool]:
-    """What the verdict is on rigs with faults, by fault and size; and whether it is never "fits" where an interval
+    """The verdicts on rigs with faults, by fault and size; and whether the verdict is never "fits" if an interval
     misses by more than two of its widths, but in 1 %."""
     rows, rigs = {}, options.faulty
     print(

@@ -51,17 +51,17 @@ def test_the_result(found, experiment, tmp_path):
 
 
 def test_priors_fixed_values_and_bounds(recording, fmu, experiment):
-    truth = {name: experiment.parameters[name] for name in ("k2", "c1", "c2", "c3")}
+    simulated = {name: experiment.parameters[name] for name in ("k2", "c1", "c2", "c3")}
     found = prw.identify(
         recording,
         estimate=["k1"],
-        parameters=truth,
+        parameters=simulated,
         priors={"J2": (0.004, 0.02)},
         bounds={"k1": (50, 200)},
         starts=1,
         fmu=fmu,
     )
-    assert list(found.parameters) == ["J2", "k1"] and found.values["c3"] == truth["c3"]
+    assert list(found.parameters) == ["J2", "k1"] and found.values["c3"] == simulated["c3"]
     assert found.parameters["J2"].relative <= 0.0201 and found.parameters["J2"].prior == (0.004, 0.02)
 
 

@@ -19,52 +19,54 @@ from prw.recording import Recording
 OTHER = {"k1": 90.0, "k2": 61.0, "c1": 0.2, "c2": 0.9, "c3": 0.1, "J2": 0.006, "J3": 0.02, "H3": 0.03}
 
 
-def recording(truth: rig.Truth, rows=slice(None), **columns) -> Recording:
-    """What perfect sensors record, and `columns` instead of some of it."""
-    measured = {name: columns.get(name, truth.outputs[name])[rows] for name in rig.ALL}
-    return Recording(Path("run.csv"), Motion(truth.time[rows], truth.theta[rows], truth.omega[rows]), measured, {})
+def recording(simulated: rig.Rig, rows=slice(None), **columns) -> Recording:
+    """The recording of perfect sensors, with some columns replaced by `columns`."""
+    measured = {name: columns.get(name, simulated.outputs[name])[rows] for name in rig.ALL}
+    return Recording(
+        Path("run.csv"), Motion(simulated.time[rows], simulated.theta[rows], simulated.omega[rows]), measured, {}
+    )
 
 
 @pytest.fixture(scope="module")
-def truth():
+def simulated():
     return rig.experiment(seed=4, duration=4)
 
 
-def fixed(truth: rig.Truth, model) -> dict[str, float]:
-    return {name: truth.parameters[name] for name in model.known.real}
+def fixed(simulated: rig.Rig, model) -> dict[str, float]:
+    return {name: simulated.parameters[name] for name in model.known.real}
 
 
 @pytest.mark.parametrize("rows", [slice(None), slice(1234, 3235)], ids=["from rest", "in motion"])
-def test_perfect_sensors_leave_nothing(model, truth, rows):
+def test_perfect_sensors_leave_nothing(model, simulated, rows):
     """A recording that starts and ends anywhere is explained to one part in a million."""
-    task = task_of(model.known, rig.NAMES, parameters=fixed(truth, model), offsets=False)
-    fitter = Fitter(model, [prepare(recording(truth, rows))], task, dict.fromkeys(rig.ALL, 1.0))
+    task = task_of(model.known, rig.NAMES, parameters=fixed(simulated, model), offsets=False)
+    fitter = Fitter(model, [prepare(recording(simulated, rows))], task, dict.fromkeys(rig.ALL, 1.0))
     modelled = fitter.modelled(task.first())[0]
     for i, name in enumerate(rig.ALL):
-        expected = truth.outputs[name][rows]
+        expected = simulated.outputs[name][rows]
         assert np.abs(modelled[:, i] - expected).max() < 2e-5 * np.abs(expected).max(), name
         assert np.sqrt(np.mean((modelled[:, i] - expected) ** 2)) < 1e-6 * np.abs(expected).max(), name
 
 
-def test_missing_and_uneven_rows_change_nothing(model, truth):
-    keep = np.sort(np.random.default_rng(0).choice(len(truth.time), 3000, replace=False))
-    slow = np.where(np.arange(len(truth.time)) % 10 == 0, truth.outputs["pitch"], np.nan)
-    task = task_of(model.known, rig.NAMES, parameters=fixed(truth, model), offsets=False)
-    for measured in (recording(truth, pitch=slow), recording(truth, keep)):
+def test_missing_and_uneven_rows_change_nothing(model, simulated):
+    keep = np.sort(np.random.default_rng(0).choice(len(simulated.time), 3000, replace=False))
+    slow = np.where(np.arange(len(simulated.time)) % 10 == 0, simulated.outputs["pitch"], np.nan)
+    task = task_of(model.known, rig.NAMES, parameters=fixed(simulated, model), offsets=False)
+    for measured in (recording(simulated, pitch=slow), recording(simulated, keep)):
         fitter = Fitter(model, [prepare(measured)], task, dict.fromkeys(rig.ALL, 1.0))
-        comparison, at = fitter.compare(task.first())[0], np.searchsorted(truth.time, measured.time)
+        comparison, at = fitter.compare(task.first())[0], np.searchsorted(simulated.time, measured.time)
         left, there = np.abs(comparison.residual).max(axis=(0, 1)), np.abs(comparison.experiment.measured).max(axis=0)
         assert (left < 2e-5 * there).all(), left / there
         modelled = fitter.modelled(task.first())[0]
-        np.testing.assert_allclose(modelled[20:-20, 0], truth.outputs["tau1"][at][20:-20], atol=1e-2)
+        np.testing.assert_allclose(modelled[20:-20, 0], simulated.outputs["tau1"][at][20:-20], atol=1e-2)
 
 
-def test_derivatives_by_the_parameters(model, truth):
-    """Those that the search uses, against differences, encoders' errors included."""
-    columns = rig.measure(truth, 5, counts=2000)
-    motion = Motion(truth.time, np.column_stack([columns["theta1"], columns["theta2"]]))
+def test_derivatives_by_the_parameters(model, simulated):
+    """The derivatives that the search uses equal differences, encoders' errors included."""
+    columns = rig.measure(simulated, 5, counts=2000)
+    motion = Motion(simulated.time, np.column_stack([columns["theta1"], columns["theta2"]]))
     measured = Recording(Path("run.csv"), motion, {name: columns[name] for name in rig.ALL}, {})
-    task = task_of(model.known, rig.NAMES, parameters=fixed(truth, model))
+    task = task_of(model.known, rig.NAMES, parameters=fixed(simulated, model))
     noise = {"tau1": 0.02, "tau2": 0.02, "theta3": 1e-3, "theta4": 1e-3, "pitch": 1e-3, "roll": 1e-3}
     fitter, at = Fitter(model, [prepare(measured)], task, noise), task.first()
     found = fitter.slopes(at)

@@ -85,12 +85,12 @@ def test_spreads_fixed_values_and_units(fmu):
     assert run.parameters["c2"] == pytest.approx(0.007 * 180 / np.pi)
     grid = prw.sweep({"k1": ([1.5, 1.9], "N.m/deg")}, fmu=fmu)["k1"].to_numpy()
     np.testing.assert_allclose(grid, np.array([1.5, 1.9]) * 180 / np.pi)
-    for arguments, words in [
+    for arguments, message_part in [
         ({"random": {"k1": ("even", 1.0, 2.0)}}, r'random: k1 \(.even., 1.0, 2.0\): write \("uniform", low, high\)'),
         ({"random": {"k1": ("uniform", 2.0, 1.0)}}, "uniform"),
         ({"grid": {"k1": 1.0}, "parameters": {"k1": 2.0}}, "k1 is in more than one of grid, random and parameters"),
         ({"grid": {"k1": 1.0}, "parameters": {"k9": 2.0}}, "parameters: k9 is not known"),
         ({"grid": {"k1": ([1.0], "N")}}, "k1 can be given in N.m/rad or N.m/deg"),
     ]:
-        with pytest.raises(prw.UserError, match=words):
+        with pytest.raises(prw.UserError, match=message_part):
             prw.sweep(fmu=fmu, **arguments)

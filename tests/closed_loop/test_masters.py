@@ -15,7 +15,7 @@ from tools.validation.closed_loop import settling_time
 
 
 def by_fmu_run(closed_loop, starts_late: bool) -> np.ndarray:
-    """What masters record, (steps, RECORDED), of fmu_run in their order."""
+    """The variables that masters record, (steps, RECORDED), from fmu_run in the masters' order of calls."""
     with fmu_run.System(closed_loop.ssp, order="jacobi") as loop:
         if not starts_late:
             # libcosim counts nanoseconds, and makes seconds of them for each step.

@@ -1,4 +1,4 @@
-"""The closed loop as the documentation says it: its programs run as printed."""
+"""The closed loop in the documentation: its programs run as printed."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_the_programs(closed_loop, tmp_path, master, package):
 
 
 def test_the_script_for_omsimulator(closed_loop):
-    """Where it is not installed, a stand-in writes down what the script asks of it: what the SSP says."""
+    """OMSimulator is replaced by a mock that records the calls of the script; they are the content of the SSP."""
     page = (ROOT / TESTBED.path).read_text(encoding="utf-8")
     (script,) = re.findall(r'<pre data-wires="oms" tabindex="0"><code>(.*?)</code></pre>', page, flags=re.S)
     library = Mock(CRef=lambda system, *names: ".".join(names))

@@ -90,7 +90,7 @@ def test_the_report(validate, fmu, closed_loop):
     text = html.unescape(re.sub(r"<[^>]*>", " ", page))
     for row in found["rows"]:
         assert row["importer"] in text and f"{row['share']:.1%}" in text
-    # Every experiment tells 1 % of a stiffness.
+    # Every experiment detects 1 % of a stiffness.
     for name, shares in found["sensitivity"].items():
         assert shares["k1"] > 1.4 and shares["k2"] > 1.4, name
         assert f"{shares['c3']:.1f}" in text

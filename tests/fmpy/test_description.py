@@ -56,9 +56,13 @@ def test_what_importers_need(description):
 
 
 def test_units_and_nominal_values_are_in_the_types(fmu3):
-    """fmi-sim 0.7 refuses to read FMUs with variables that have them themselves."""
+    """fmi-sim 0.7 rejects FMUs whose variables have these attributes themselves."""
     root = etree.fromstring(ZipFile(fmu3).read("modelDescription.xml"))
-    units = {of.get("name") for of in root.find("TypeDefinitions") if of.get("unit") and of.get("nominal")}
+    units = {
+        by_name.get("name")
+        for by_name in root.find("TypeDefinitions")
+        if by_name.get("unit") and by_name.get("nominal")
+    }
     for variable in root.find("ModelVariables"):
         assert not {"quantity", "unit", "displayUnit", "nominal"} & set(variable.keys()), variable.get("name")
         is_real = variable.tag == "Float64" and variable.get("causality") != "independent"
@@ -130,7 +134,7 @@ def test_results_are_the_same_bits(fmu, fmu3, options):
 
 
 def test_dependencies_are_the_sparsity_of_the_equations(description, model):
-    """Each output and derivative depends on the states and inputs that enter it, and says so."""
+    """Each output and derivative lists the states and inputs that enter it."""
     knowns = (*STATES, *INPUTS)
     rows = dict(zip((f"der({s})" for s in STATES), np.hstack([model.a, model.b_angle, model.b_rate])))
     zeros = np.zeros(4)

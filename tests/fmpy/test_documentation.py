@@ -135,8 +135,8 @@ def rate(t):
 
 def test_what_is_said_of_model_exchange_in_fmpy(fmu, model):
     """The percentages in docs/compatibility.md and on the page: FMPy holds inputs over a step."""
-    said = (ROOT / "docs/compatibility.md").read_text(encoding="utf-8").split("For two sines")[1].split("\n* ")[0]
-    percents = [float(number) for number in re.findall(r"([\d.]+) %", said)]
+    reported = (ROOT / "docs/compatibility.md").read_text(encoding="utf-8").split("For two sines")[1].split("\n* ")[0]
+    percents = [float(number) for number in re.findall(r"([\d.]+) %", reported)]
     seen = []
     for kind, step in (("ModelExchange", 1e-3), ("ModelExchange", 1e-4), ("CoSimulation", 1e-3)):
         t = np.linspace(0, END, round(END / step) + 1)
@@ -188,7 +188,7 @@ def test_figures_are_up_to_date(found, tmp_path):
 
 
 def in_the_last_digit(value, random):
-    """The same results as another processor finds them; times and steps are quotients, the same on all."""
+    """The results of another processor. Times and steps are quotients, which are equal on all."""
     if isinstance(value, np.ndarray):
         return value * (1 + EPSILON * random.integers(-2, 3, value.shape))
     if isinstance(value, dict):

@@ -36,8 +36,8 @@ def exact(parameters, t, theta, slope):
 def check(instance, parameters, t, theta, slope, expected):
     instance.start(theta[0], time=t[0], **parameters)
     found = instance.run(t, theta, derivative=slope)
-    for values, truth in zip(found, expected):
-        assert_close(values, truth, 1e-11)
+    for values, true_values in zip(found, expected):
+        assert_close(values, true_values, 1e-11)
     assert not instance.complaints()
 
 
@@ -72,13 +72,13 @@ def test_hard_parameters(instance, change):
 
 
 def test_rates_from_omega(instance, model):
-    """With use_omega the path follows the given rates, whatever the angles do next."""
+    """With use_omega the path follows the given rates, regardless of the next angles."""
     rng = np.random.default_rng(6)
     t = np.cumsum(10 ** rng.uniform(-3, -1, 100))
     theta, omega = rng.normal(0, 0.1, (100, 2)), rng.normal(0, 1, (100, 2))
     instance.start(theta[0], rate=omega[0], time=t[0])
-    for values, truth in zip(instance.run(t, theta, rate=omega), follow(model, t, theta, omega)):
-        assert_close(values, truth, 1e-11)
+    for values, true_values in zip(instance.run(t, theta, rate=omega), follow(model, t, theta, omega)):
+        assert_close(values, true_values, 1e-11)
 
 
 def test_rates_from_angles(instance, model):

@@ -1,4 +1,4 @@
-"""What Sec. 4 says of Figs. 4 and 5, of the FMU: of its linear model and of stepped sines measured on it."""
+"""The statements of Sec. 4 on Figs. 4 and 5 hold for the FMU: for its linear model, and for stepped sines measured on it."""
 
 from __future__ import annotations
 

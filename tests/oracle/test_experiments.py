@@ -35,16 +35,16 @@ def numbers(text: str) -> np.ndarray:
 
 def test_the_committed_files_are_up_to_date(texts):
     kept = {path.relative_to(COMMITTED) for path in (COMMITTED / FILES).iterdir()}
-    assert kept == {place for place in texts if FILES in place.parents}, HINT
-    for place, text in texts.items():
-        committed = (COMMITTED / place).read_text(encoding="utf-8")
-        if place.suffix == ".csv":
+    assert kept == {path for path in texts if FILES in path.parents}, HINT
+    for path, text in texts.items():
+        committed = (COMMITTED / path).read_text(encoding="utf-8")
+        if path.suffix == ".csv":
             # Another processor may round the last digit differently.
-            assert committed.splitlines()[0] == text.splitlines()[0], f"{place}: {HINT}"
+            assert committed.splitlines()[0] == text.splitlines()[0], f"{path}: {HINT}"
             last_digit = 1.01 * 10.0**-DECIMALS
             np.testing.assert_allclose(numbers(committed), numbers(text), rtol=0, atol=last_digit, err_msg=HINT)
         else:
-            assert committed == text, f"{place}: {HINT}"
+            assert committed == text, f"{path}: {HINT}"
 
 
 def test_both_oracles_agree(found):
@@ -70,8 +70,8 @@ def test_the_parameter_sets_are_valid_and_complete(texts):
     valid = etree.XMLSchema(etree.parse(schema))
     variables = etree.parse(COMMITTED / "modelDescription.xml").iter("ScalarVariable")
     parameters = {v.get("name"): v[0].tag for v in variables if v.get("causality") == "parameter"}
-    for place, text in texts.items():
-        if place.suffix == ".ssv":
+    for path, text in texts.items():
+        if path.suffix == ".ssv":
             root = etree.fromstring(text.encode())
             valid.assertValid(root)
             assert {p.get("name"): etree.QName(p[0]).localname for p in root.iter("{*}Parameter")} == parameters

@@ -1,4 +1,4 @@
-"""`import prw`: what a notebook does with it, and what it is told where it errs."""
+"""`import prw`: its functions as a notebook calls them, and their errors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOTION = ROOT / "examples" / "point_to_point.csv"
 
 
 def python(program: str, folder: Path) -> str:
-    """What a Python of its own prints."""
+    """The output of a program in a separate Python."""
     result = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr
     assert result.stderr == ""
@@ -41,7 +41,7 @@ def test_import_loads_nothing(tmp_path: Path) -> None:
 
 
 def test_all_names_are_there(tmp_path: Path) -> None:
-    """Whatever was imported before: no module of the package takes the place of a function."""
+    """After any imports, no module of the package replaces a function."""
     program = (
         "import prw, pkgutil, importlib\n"
         "for module in pkgutil.walk_packages(prw.__path__, 'prw.'):\n"
@@ -164,19 +164,21 @@ def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("rates", [False, True])
 def test_coarse_sampling_is_told(testbed: Path, rates: bool) -> None:
-    """A sine of 3 Hz; the truth is that of 20 kHz."""
+    """A sine of 3 Hz, compared with its samples at 20 kHz."""
 
     def motion(rate: int, with_rates: bool) -> prw.Motion:
         time = np.arange(rate + 1) / rate
         angle, omega = 0.3 * (1 - np.cos(6 * np.pi * time)), 1.8 * np.pi * np.sin(6 * np.pi * time)
         return prw.Motion(time, np.outer(angle, [1, -1]), np.outer(omega, [1, -1]) if with_rates else None)
 
-    truth = prw.simulate(motion(20_000, True), fmu=testbed)["tau1"]
+    true_values = prw.simulate(motion(20_000, True), fmu=testbed)["tau1"]
     for rate in (100, 200):
-        with pytest.warns(UserWarning, match=rf"tau1 may be off by .* sampled with {rate} Hz: with some .* Hz") as told:
+        with pytest.warns(
+            UserWarning, match=rf"tau1 may be off by .* sampled with {rate} Hz: with some .* Hz"
+        ) as noted:
             run = prw.simulate(motion(rate, rates), fmu=testbed)
-        assert ("give the motors' rates" in str(told[0].message)) != rates and run.notes[-1] in repr(run)
-        error = np.abs(run["tau1"] - truth[:: 20_000 // rate]).max() / np.abs(truth).max()
+        assert ("give the motors' rates" in str(noted[0].message)) != rates and run.notes[-1] in repr(run)
+        error = np.abs(run["tau1"] - true_values[:: 20_000 // rate]).max() / np.abs(true_values).max()
         assert 0.9 * error < run.sampling_errors["tau1"] < 1.4 * error
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -40,8 +40,10 @@ def test_matrices(testbed: Path, fmi_type: Any, change: Any) -> None:
     found = prw.linearize(change, fmu=testbed, outputs=outputs, fmi_type=fmi_type)
     p = {**table_1(), **change}
     assert (found.states, found.inputs) == (STATES, INPUTS)
-    for name, truth in zip("ABCD", expected(linear_model(p), p["N"] / (2 * p["M"]))):
-        np.testing.assert_allclose(getattr(found, name), truth, rtol=1e-12, atol=1e-12 * np.abs(truth).max())
+    for name, true_values in zip("ABCD", expected(linear_model(p), p["N"] / (2 * p["M"]))):
+        np.testing.assert_allclose(
+            getattr(found, name), true_values, rtol=1e-12, atol=1e-12 * np.abs(true_values).max()
+        )
 
 
 def test_names_and_units(testbed: Path) -> None:
@@ -79,10 +81,13 @@ def test_transfer_matrices(testbed: Path) -> None:
     found = prw.linearize(fmu=testbed, outputs=MEASURED)
     s = 2j * np.pi * np.array([0.1, 3.0, 5.6, 80.0])
     a, b, c, d = expected(linear_model(table_1()))
-    truth = np.array([c[:6] @ np.linalg.inv(si * np.eye(6) - a) @ b + d[:6] for si in s])
-    np.testing.assert_allclose(found.transfer(s), truth, rtol=1e-10)
+    true_values = np.array([c[:6] @ np.linalg.inv(si * np.eye(6) - a) @ b + d[:6] for si in s])
+    np.testing.assert_allclose(found.transfer(s), true_values, rtol=1e-10)
     np.testing.assert_allclose(
-        found.transfer(s, RATES), truth[:, :, :2] + s[:, None, None] * truth[:, :, 2:], rtol=1e-9, atol=1e-12
+        found.transfer(s, RATES),
+        true_values[:, :, :2] + s[:, None, None] * true_values[:, :, 2:],
+        rtol=1e-9,
+        atol=1e-12,
     )
     np.testing.assert_array_equal(found.response_at_hz(s.imag / (2 * np.pi), RATES), found.transfer(s, RATES))
     assert found.moved(RATES) == ("theta1", "theta2")
@@ -126,7 +131,7 @@ def test_the_response_to_sines(pendulum: Path) -> None:
 
 
 def test_one_instance_for_many(pendulum: Path) -> None:
-    """Also after a refusal, and back at the start values where none are given."""
+    """An instance is also used after an error, and returns to the start values if none are given."""
     with prw.Linearizer(pendulum, outputs=["rate"]) as linearizer:
         for k in (1.0, 16.0):
             assert linearizer.at({"stiffness": k, "angle": 0.0}).A[1, 0] == -k
@@ -143,7 +148,7 @@ def test_one_instance_for_many(pendulum: Path) -> None:
 
 
 def test_a_controller_that_samples(controller: Path) -> None:
-    """It has no continuous states; its outputs stay between samples, whatever its inputs do."""
+    """The controller has no continuous states, and between samples its outputs do not depend on its inputs."""
     for interface in ("CoSimulation", "ModelExchange"):
         model = prw.linearize(fmu=controller, fmi_type=interface)
         assert (model.A.shape, model.B.shape) == ((0, 0), (0, 8)) and model.D.shape == (len(model.outputs), 8)

@@ -298,7 +298,7 @@ def test_a_recording_with_measurements(tmp_path: Path) -> None:
         recording["roll"]
     with pytest.raises(UserError, match="units: yaw is not known; there are time, theta1"):
         read(path, units={"yaw": "deg"})
-    # What was measured does not stop a simulation of the motors.
+    # A damaged measurement does not stop a simulation of the motors.
     path.write_text(path.read_text().replace(",3,", ",broken,"))
     assert prw.simulate(path)["roll"].shape == (3,)
     with pytest.raises(UserError, match="rig.csv, row 2, column tau1: 'broken' is not a number"):
@@ -330,7 +330,7 @@ def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
     good = {"time": [0.0, 1.0], "theta1": [0.0, 1.0], "theta2": [0.0, 1.0]}
     wrong: list[tuple[Any, str]] = [
         ({"time": [0.0, 1.0]}, "recording: column theta1 is missing; the header has time"),
-        ({**good, "theta2": [0.0, None]}, "recording, column theta2: nan at place 1 is not finite"),
+        ({**good, "theta2": [0.0, None]}, "recording, column theta2: nan at index 1 is not finite"),
         ({**good, "theta2": ["a", "b"]}, "recording, column theta2: is not made of numbers"),
         ({**good, "theta2": [0.0]}, "recording, column theta2: has 1 rows, but time has 2"),
         ({**good, "theta2": [[0.0], [1.0]]}, r"recording, column theta2: has the shape \(2, 1\)"),

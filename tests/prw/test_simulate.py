@@ -116,7 +116,7 @@ def test_other_parameters(prw: Any, tmp_path: Path) -> None:
 
 
 def test_without_matplotlib(tmp_path: Path, fmu: Path) -> Any:
-    """The table is written all the same, and one line says what brings the figure."""
+    """The table is written, and one line names the package that the figure needs."""
     program = "import sys; sys.modules['matplotlib'] = None; from prw.cli import main; sys.exit(main(sys.argv[1:]))"
 
     def run(*arguments: Any) -> Any:
@@ -135,12 +135,12 @@ def test_without_matplotlib(tmp_path: Path, fmu: Path) -> Any:
 
 
 def test_no_hint_leads_to_a_clone(prw: Any) -> None:
-    """Who has the wheel has no make, no cargo and no examples."""
+    """Users of the wheel have no make, no cargo and no examples."""
     commands = ["simulate", "check", "linearize", "identify", "excite", "sweep"]
     for arguments in (["simulate"], *([command, "--help"] for command in commands)):
-        said = prw(*arguments).stdout
-        assert "next  " in said or "usage" in said
-        assert not re.search(r"\bmake (demo|fmu|study)|cargo|README|examples/", said), said
+        reported = prw(*arguments).stdout
+        assert "next  " in reported or "usage" in reported
+        assert not re.search(r"\bmake (demo|fmu|study)|cargo|README|examples/", reported), reported
     assert re.fullmatch(r"prw \d+\.\d+\.\d+\n", prw("--version", with_fmu=False).stdout)
 
 

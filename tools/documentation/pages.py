@@ -125,10 +125,10 @@ def _program(name: str, text: str) -> str:
 
 def _roots(roots: Iterable[Sequence[float]]) -> str:
     """Real and conjugate complex numbers as text: -174.873 and -9.68 ± 34.68 i."""
-    words = []
+    parts = []
     for real, imaginary in roots:
-        words.append(f"{real:.2f}" + (f" ± {imaginary:.2f} i" if imaginary else ""))
-    return _minus(" and ".join(words))
+        parts.append(f"{real:.2f}" + (f" ± {imaginary:.2f} i" if imaginary else ""))
+    return _minus(" and ".join(parts))
 
 
 def _minus(number: object) -> str:

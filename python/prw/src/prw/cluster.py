@@ -86,7 +86,7 @@ def _connect(address: str) -> Any:
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
-        reason = f"no Dask scheduler answers there ({error or 'timeout'})"
+        reason = f"no Dask scheduler responds there ({error or 'timeout'})"
         raise UserError(reason, argument="scheduler", given=address) from None
     if not client.scheduler_info()["workers"]:
         client.close()

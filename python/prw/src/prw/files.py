@@ -32,8 +32,8 @@ PAGE_FOLDERS = ("crates/fmu-package/page", "docs/fmu-page/wrist")
 
 def page_file(name: str) -> Path:
     """A script, style sheet or table of the pages that show the wrist."""
-    places = [PACKAGE / "page" / name, *(CLONE / folder / name for folder in PAGE_FOLDERS)]
-    return next((path for path in places if path.is_file()), places[0])
+    locations = [PACKAGE / "page" / name, *(CLONE / folder / name for folder in PAGE_FOLDERS)]
+    return next((path for path in locations if path.is_file()), locations[0])
 
 
 @contextlib.contextmanager
@@ -65,10 +65,13 @@ def _umask() -> int:
     return mask
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a string as UTF-8 with line feeds, atomically. Raises UserError if the file cannot be written."""
-    with replacing(path) as temporary:
-        temporary.write_bytes(text.encode("utf-8"))
+def write_text(path: str | os.PathLike[str] | None, text: str) -> str:
+    """Return the string, and write it to `path`, if that is given, as UTF-8 with line feeds, atomically. Raises UserError if the
+    file cannot be written."""
+    if path is not None:
+        with replacing(Path(path)) as temporary:
+            temporary.write_bytes(text.encode("utf-8"))
+    return text
 
 
 def write_table(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> None:

@@ -54,9 +54,9 @@ def read_description(fmu: Path) -> Description:
         else ("valueReference", "Output", "ContinuousStateDerivative")
     )
     variables, typed = {}, {}
-    for place, element in enumerate(root.iterfind("ModelVariables/*"), start=1):
+    for index, element in enumerate(root.iterfind("ModelVariables/*"), start=1):
         attributes = element[0] if fmi2 else element
-        variables[str(place) if fmi2 else element.get("valueReference")] = element
+        variables[str(index) if fmi2 else element.get("valueReference")] = element
         typed[element.get("name", "")] = attributes.tag, attributes
     types = {kind.get("name"): kind[0] if fmi2 else kind for kind in root.iterfind("TypeDefinitions/*")}
 
@@ -92,12 +92,8 @@ def _unit(element: ElementTree.Element) -> Unit:
 #: Start values of the testbed with which its states and inputs are independent of each other in Co-Simulation. With
 #: others a motor angle also changes the rate that is estimated from it and, before the first step, the states.
 INDEPENDENT = {"use_omega": True, "start_at_rest": False}
+Interface = Literal["co-simulation", "model-exchange"]
 INTERFACES = {"CoSimulation": "Co-Simulation", "ModelExchange": "Model Exchange"}
-#: The names of the interface types in `fmu_run`.
-HELD: dict[str, Literal["co-simulation", "model-exchange"]] = {
-    "CoSimulation": "co-simulation",
-    "ModelExchange": "model-exchange",
-}
 
 
 def linearize(
@@ -163,7 +159,8 @@ class Linearizer:
     def _look(self, outputs: str | Iterable[str] | None, fmi_type: str | None) -> None:
         """Find states, inputs and outputs. Raises UserError."""
         description, variables = read_description(self.fmu), self.loaded.variables
-        self._interface = HELD[self._chosen(fmi_type, description.directional, description.attribute)]
+        chosen = self._chosen(fmi_type, description.directional, description.attribute)
+        self._interface: Interface = "co-simulation" if chosen == "CoSimulation" else "model-exchange"
         self.states = tuple(description.derivatives)
         self.inputs = tuple(v.name for v in variables.values() if v.causality == "input" and v.type in CONTINUOUS)
         self.outputs = description.outputs if outputs is None else names_of("outputs", outputs)

@@ -194,7 +194,7 @@ def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array
             raise UserError(f"{IN_MEMORY}, column {name}: has {len(column)} rows, but time has {len(found[0])}")
         bad = ~np.isfinite(column) if name not in may_be_empty else np.isinf(column)
         if bad.any():
-            raise UserError(f"{IN_MEMORY}, column {name}: {column[bad][0]} at place {int(bad.argmax())} is not finite")
+            raise UserError(f"{IN_MEMORY}, column {name}: {column[bad][0]} at index {int(bad.argmax())} is not finite")
         found.append(column)
     if len(found[0]) < 2:
         raise UserError(f"{IN_MEMORY}: has {len(found[0])} rows; at least two are needed")
@@ -219,12 +219,12 @@ def _gaps(path: Path, time: Array, theta: Array) -> list[str]:
         worst = int(max(long, key=lambda k: float(steps[k])))
         raise UserError(
             f"{path}: no rows from {time[worst]:.6g} to {time[worst + 1]:.6g} s, {steps[worst]:.3g} s where {usual:.3g} s is usual, while "
-            "the motors move; what they did is not known. Cut the recording there, into files of their own"
+            "the motors move; their motion is not known. Cut the recording there, into files of their own"
         )
     if not len(gaps):
         return []
     k = int(gaps[np.argmax(steps[gaps])])
-    count = "rows are missing once" if len(gaps) == 1 else f"rows are missing in {len(gaps)} places"
+    count = "rows are missing once" if len(gaps) == 1 else f"rows are missing {len(gaps)} times"
     return [f"{count}, for up to {steps[k]:.3g} s after {time[k]:.6g} s; a smooth path bridges that"]
 
 

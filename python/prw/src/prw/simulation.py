@@ -181,7 +181,7 @@ def simulated(
     outputs: Sequence[str] = OUTPUTS,
 ) -> Run:
     """Simulate as `simulate` does, without its warning."""
-    course = motion_of(motion)
+    moved = motion_of(motion)
     names = names_of("outputs", outputs)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
         given = values_of(parameters, testbed.loaded)
@@ -191,11 +191,11 @@ def simulated(
                 raise UserError(
                     f"{name} is not known; there are {', '.join(testbed.loaded.variables)}", argument="outputs"
                 )
-        found = testbed.respond(course, names, given)
-        coarse = Motion(course.time[::2], course.theta[::2], None if course.omega is None else course.omega[::2])
+        found = testbed.respond(moved, names, given)
+        coarse = Motion(moved.time[::2], moved.theta[::2], None if moved.omega is None else moved.omega[::2])
         other = testbed.respond(coarse, names, given) if len(coarse.time) >= FEWEST else {}
     errors = {name: _sampling_error(found[name], other[name]) for name in other}
-    return Run(course, found, values, errors)
+    return Run(moved, found, values, errors)
 
 
 def _sampling_error(fine: Array, coarse: Array) -> float:

@@ -76,7 +76,7 @@ def _choose(
         if any(not np.array_equal(other[2], same[0][2]) for other in same[1:]):
             owners = ", ".join(owner or "none" for owner, _, _ in same)
             raise UserError(
-                f"there are several {name} in {path}, of the components {owners}; say which", argument="component"
+                f"there are several {name} in {path}, of the components {owners}; name one", argument="component"
             )
         _, unit, values = same[0]
         try:

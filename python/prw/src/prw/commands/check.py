@@ -61,10 +61,10 @@ def run(arguments: argparse.Namespace) -> None:
     if found.agrees:
         print("agrees      with the reference")
         return
-    picture = arguments.out / f"{arguments.file.stem}_check.png"
+    figure_path = arguments.out / f"{arguments.file.stem}_check.png"
     try:
-        write_png(picture, found.plot())
-        shown = f"{picture} shows both"
+        write_png(figure_path, found.plot())
+        shown = f"{figure_path} shows both"
     except MissingPackage as error:
         shown = f"for a figure of both, {error}"
     far = [name for name, difference in found.variables.items() if not difference.agrees]

@@ -79,12 +79,16 @@ def add_parser(subparsers: Any) -> None:
         metavar="ANGLE",
         help="resolution of the motors' encoders, as in 0.036deg or 0.000628rad (default: found in the data)",
     )
-    for kind, said in (("delay", "come late"), ("lag", "lag, to first order"), ("gain", "read too much or too little")):
+    for kind, effect in (
+        ("delay", "come late"),
+        ("lag", "lag, to first order"),
+        ("gain", "read too much or too little"),
+    ):
         parser.add_argument(
             f"--{kind}",
             default="",
             metavar="NAMES",
-            help=f"channels that may {said}, with commas; this is then estimated, too",
+            help=f"channels that may {effect}, with commas; this is then estimated, too",
         )
     parser.add_argument(
         "--write-anyway", action="store_true", help="write parameters even if the FMU does not explain the data"

@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> None:
         if arguments.degrees:
             raise UserError("--degrees belongs to a recording; the paper's experiment is in radians")
         motion, title = fig4(), "Fig. 4: equal and opposite motor velocities"
-    table, picture = (arguments.out / f"{motion.name}{suffix}" for suffix in (".csv", ".png"))
+    table, figure_path = (arguments.out / f"{motion.name}{suffix}" for suffix in (".csv", ".png"))
     if recorded and table.exists() and table.samefile(arguments.input):
         raise UserError(
             f"{table}: is the recording itself and would be overwritten; choose another directory with --out"
@@ -81,8 +81,8 @@ def run(arguments: argparse.Namespace) -> None:
     response.to_csv(table)
     written, missing = [table], ""
     try:
-        write_png(picture, response.plot(title, angles=recorded))
-        written.append(picture)
+        write_png(figure_path, response.plot(title, angles=recorded))
+        written.append(figure_path)
     except MissingPackage as error:
         missing = str(error)
     if arguments.animate is not None:

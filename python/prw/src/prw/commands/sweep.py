@@ -100,7 +100,7 @@ def _summary(arguments: argparse.Namespace, swept: Swept, threads: int) -> list[
     """The number of runs, failures and files, one line each."""
     where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
     total = swept.table.num_rows
-    pace = f"{swept.seconds:.1f} s ({total / swept.seconds:.0f} a second)"
+    pace = f"{swept.seconds:.1f} s ({total / swept.seconds:.0f} per second)"
     lines = [f"ran         {total} runs on {where} in {pace}"]
     status = swept.table.column("status").to_pylist()
     if failed := status.count("failed"):

@@ -167,8 +167,8 @@ def identify(
 
             hints = advice(model, experiments, solution)
         sources = tuple(str(each.source) for each in measured)
-        said = verdict, tuple(diagnosis), tuple(hints)
-        return Identification(model.fmu, model.known, sources, tuple(experiments), solution, sure, *said)
+        judged = verdict, tuple(diagnosis), tuple(hints)
+        return Identification(model.fmu, model.known, sources, tuple(experiments), solution, sure, *judged)
 
 
 def task_of(

@@ -28,6 +28,8 @@ MOST_LINES = 60
 SLOW, WIDEST = 4.0, 40.0
 #: Condition of an information matrix from which its weakest combination is rounding error.
 SINGULAR = 1e12
+#: The default noise by channel, in SI.
+DEFAULT_NOISE = {name: channel.noise for name, channel in MEASURED.items()}
 #: Rounds of the multiplicative algorithm for the D-optimal spectrum.
 ROUNDS = 300
 
@@ -80,11 +82,6 @@ def information(
     fitter = Fitter(model, unmeasured, task, {name: noise[name] for name in channels})
     jacobians, of_noise = fitter.jacobians(np.asarray(logarithms, dtype=float))
     return noise_corrected(information_of(jacobians), of_noise)
-
-
-def default_noise() -> dict[str, float]:
-    """The default noise by channel, in SI."""
-    return {name: channel.noise for name, channel in MEASURED.items()}
 
 
 def _lines(duration: float, top: float) -> Array:
@@ -196,11 +193,6 @@ def typical_error(information: Array) -> float:
     return float(np.sqrt(np.mean(np.diag(covariance_of(information)))))
 
 
-def with_priors(information: Array, task: Task) -> Array:
-    """Information (p, p) with the priors'."""
-    return information + task.prior_information()
-
-
 #: Sensors that come in pairs.
 SENSORS = {
     "tau1 and tau2": ("tau1", "tau2"),
@@ -211,7 +203,7 @@ SENSORS = {
 REACH = 10.0
 DURATION, RATE = 10.0, 1000.0
 #: The patterns of a motion in messages.
-SAID = {
+DESCRIBED = {
     "equal": "equal motors",
     "opposite": "opposite motors",
     "single": "one motor alone",
@@ -226,8 +218,9 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
     first = np.log([task.start[name] for name in task.names])
     point = np.clip(solution.logarithms[: len(first)], first - np.log(REACH), first + np.log(REACH))
     task = replace(task, start=task.values(point))
-    noise = {**default_noise(), **solution.noise}
-    have = with_priors(information(model, experiments, task, point, noise), task)
+    noise = {**DEFAULT_NOISE, **solution.noise}
+    prior = task.prior_information()
+    have = prior + information(model, experiments, task, point, noise)
     channels = tuple(dict.fromkeys(name for experiment in experiments for name in experiment.channels))
     limits = _limits(experiments)
     trials = []
@@ -239,9 +232,9 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
     for error, name in sorted(trials)[:1]:
         if error < UNDETERMINED:
             pattern = name.rsplit("_", 1)[1]
-            said = SAID.get(pattern, "a spectrum made for it")
+            described = DESCRIBED.get(pattern, "a spectrum made for it")
             sentences.append(
-                f"an experiment with {said} (worst standard error then {error:.1%}; "
+                f"an experiment with {described} (worst standard error then {error:.1%}; "
                 f"`excite` proposes it for {','.join(channels)} as {name})"
             )
     trials = []
@@ -249,8 +242,7 @@ def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) 
         if set(pair) <= set(channels):
             continue
         wider = [_measured_wholly(e, (*e.channels, *(c for c in pair if c not in e.channels))) for e in experiments]
-        found = with_priors(information(model, wider, task, point, noise), task)
-        trials.append((_worst(found), name))
+        trials.append((_worst(prior + information(model, wider, task, point, noise)), name))
     for error, name in sorted(trials)[:1]:
         if error < UNDETERMINED:
             sentences.append(f"measuring {name} as well in the same motion (worst standard error then {error:.1%})")

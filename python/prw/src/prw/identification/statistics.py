@@ -79,12 +79,14 @@ class Combination(NamedTuple):
         if len(self.shares) == 1:
             return f"{next(iter(self.shares))} has hardly any effect on what was measured"
         names = list(self.shares)
-        return f"{', '.join(names[:-1])} and {names[-1]} cannot be told apart: {moves} together change next to nothing"
+        return (
+            f"{', '.join(names[:-1])} and {names[-1]} cannot be distinguished: {moves} together change next to nothing"
+        )
 
 
 class Certainty(NamedTuple):
     """names: of the parameters (p). relative: (p,) standard errors as fractions. low, high: (p,) ends of the 95 %
-    intervals, SI. covariance, correlation: (p, p). information: (p, p), of the logarithms, priors included, without
+    intervals, SI. correlation: (p, p). information: (p, p), of the logarithms, priors included, without
     the encoders' contribution. condition: of its unit-diagonal form. whiteness: by how much the noise's correlation
     widens the errors beyond what sensors explain, (p,). undetermined: combinations that the data leave open."""
 
@@ -92,7 +94,6 @@ class Certainty(NamedTuple):
     relative: Array
     low: Array
     high: Array
-    covariance: Array
     correlation: Array
     information: Array
     condition: float
@@ -115,7 +116,6 @@ def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 
     scale = np.sqrt(np.maximum(np.diag(expected), np.finfo(float).tiny))
     errors = np.maximum(np.sqrt(np.maximum(np.diag(shown), 0.0)), scale)
     whiteness = errors / scale
-    covariance = expected * np.outer(whiteness, whiteness)
     corrected = noise_corrected(squares, solution.noise_information)
     open_ones = undetermined(names, corrected)
     # An undetermined combination keeps its full uncertainty.
@@ -129,7 +129,6 @@ def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 
         errors,
         np.exp(np.maximum(low, solution.logarithms - WIDEST)),
         np.exp(np.minimum(high, solution.logarithms + WIDEST)),
-        covariance,
         np.clip(np.divide(expected, unit, out=np.eye(len(names)), where=unit > 0), -1, 1),
         corrected,
         condition(corrected),
