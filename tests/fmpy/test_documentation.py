@@ -171,17 +171,33 @@ def test_numbers_are_up_to_date(found):
     compare(committed, fresh, "numbers.json")
 
 
-def test_figures_are_up_to_date(found, tmp_path):
-    """The committed figures show what the FMU does now: the same drawing, to a fiftieth of a point."""
+def write(folder: Path, found) -> dict[str, bytes]:
+    """The files that `make figures` keeps with the sources, by name."""
+    write_json(folder / "numbers.json", numbers(found))
+    for name, drawn in figures(found).items():
+        if drawn.for_page:
+            write_for_page(folder / f"{name}.svg", drawn.figure)
+        if drawn.for_readme:
+            write_small_png(folder / f"{name}.png", drawn.figure)
+    for name, draw in (("testbed", draw_testbed), ("controller", draw_controller)):
+        write_svg(folder / f"icon_{name}.svg", draw())
+        write_png(folder / f"icon_{name}.png", draw(), dpi=128)
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def written(found, tmp_path_factory):
+    return write(tmp_path_factory.mktemp("figures"), found)
+
+
+def test_figures_are_up_to_date(written):
+    """The committed figures show the present results of the FMU: the same drawing, to a fiftieth of a point."""
     made_with = json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8"))["made_with"]
     if made_with != f"matplotlib {matplotlib.__version__}":
         pytest.skip(f"the figures were drawn by {made_with}")
-    for name, drawn in figures(found).items():
-        if not drawn.for_page:
-            continue
-        write_for_page(tmp_path / f"{name}.svg", drawn.figure)
-        fresh, kept = ((folder / f"{name}.svg").read_text(encoding="utf-8") for folder in (tmp_path, ROOT / COMMITTED))
-        message = f"{COMMITTED}/{name}.svg is out of date; `make figures docs` renews it"
+    for name in (name for name in written if name.endswith(".svg") and not name.startswith("icon_")):
+        fresh, kept = written[name].decode(), (ROOT / COMMITTED / name).read_text(encoding="utf-8")
+        message = f"{COMMITTED}/{name} is out of date; `make figures docs` renews it"
         assert NUMBER.sub("#", fresh) == NUMBER.sub("#", kept), message
         values = (np.array(NUMBER.findall(text), dtype=float) for text in (fresh, kept))
         np.testing.assert_allclose(*values, atol=0.021, err_msg=message)
@@ -203,29 +219,14 @@ def in_the_last_digit(value, random):
     return value
 
 
-def test_another_processor_writes_the_same_files(found, tmp_path, monkeypatch):
+def test_another_processor_writes_the_same_files(found, written, tmp_path, monkeypatch):
     """`make figures` on another machine changes no file that is kept with the sources."""
-
-    def write(folder: Path, found) -> dict[str, bytes]:
-        folder.mkdir()
-        write_json(folder / "numbers.json", numbers(found))
-        for name, drawn in figures(found).items():
-            if drawn.for_page:
-                write_for_page(folder / f"{name}.svg", drawn.figure)
-            if drawn.for_readme:
-                write_small_png(folder / f"{name}.png", drawn.figure)
-        for name, draw in (("testbed", draw_testbed), ("controller", draw_controller)):
-            write_svg(folder / f"icon_{name}.svg", draw())
-            write_png(folder / f"icon_{name}.png", draw(), dpi=128)
-        return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-    here = write(tmp_path / "here", found)
     random = np.random.default_rng(1)
     monkeypatch.setattr(gallery, "COLUMN", gallery.COLUMN * (1 + EPSILON))
     monkeypatch.setattr(bode, "CURVE", in_the_last_digit(bode.CURVE, random))
-    there = write(tmp_path / "there", in_the_last_digit(found, random))
-    assert here.keys() == there.keys()
-    assert [name for name in here if here[name] != there[name]] == []
+    there = write(tmp_path, in_the_last_digit(found, random))
+    assert written.keys() == there.keys()
+    assert [name for name in written if written[name] != there[name]] == []
 
 
 def test_the_command(fmu, tmp_path):

@@ -170,7 +170,7 @@ def test_one_that_fails_ends_its_own_episode(task, mode, count) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mood", "slope", "words"),
+    ("mood", "slope", "message"),
     [
         (1, 1.0, "fmi2DoStep"),
         (8, 1.0, "ended by the FMU at t = 0.525 s"),
@@ -231,7 +231,7 @@ def test_actions_that_make_inputs(task) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "words"),
+    ("changed", "message"),
     [
         ({"actions": {"pitch": (-1, 1)}}, "pitch is no input, its causality is output"),
         ({"actions": "theta9"}, "theta9"),
