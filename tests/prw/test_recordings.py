@@ -166,6 +166,16 @@ def test_units_of_the_header_and_of_the_option(file: Any) -> None:
     assert read(path, degrees=True)["pitch"][6] == pytest.approx(np.deg2rad(0.6))
 
 
+def test_units_of_time_angles_and_rates(file: Any) -> None:
+    motion = read_motion(
+        file("time [ms],theta1 [deg],theta2 [deg],omega1_rpm,omega2_rpm,tau1 [N.m]\n0,180,90,30,0,1\n5,180,90,30,0,1\n")
+    )
+    assert motion.omega is not None and "columns ignored: tau1 [N.m]" in motion.notes
+    np.testing.assert_allclose(motion.time, [0, 5e-3], rtol=1e-15)
+    np.testing.assert_allclose(motion.theta, [[np.pi, np.pi / 2]] * 2, rtol=1e-15)
+    np.testing.assert_allclose(motion.omega, [[np.pi, 0]] * 2, rtol=1e-15)
+
+
 @pytest.mark.parametrize("unit, factor", [("N.m", 1), ("Nm", 1), ("N·m", 1), ("mN.m", 1e-3), ("N cm", 1e-2)])
 def test_torque_units(file: Any, unit: Any, factor: Any) -> None:
     measured = read(file(lines(f"time,theta1,theta2,tau1 [{unit}]")))

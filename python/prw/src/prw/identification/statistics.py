@@ -124,12 +124,15 @@ def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 
         errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(corrected))))
     low, high = ends(solution, inverse, errors, float(ndtri(0.5 + level / 2)))
     unit = np.outer(scale, scale)
+    # An undetermined combination may have no variance but rounding errors, whose quotients are clipped.
+    with np.errstate(over="ignore"):
+        correlation = np.clip(np.divide(expected, unit, out=np.eye(len(names)), where=unit > 0), -1, 1)
     return Certainty(
         names,
         errors,
         np.exp(np.maximum(low, solution.logarithms - WIDEST)),
         np.exp(np.minimum(high, solution.logarithms + WIDEST)),
-        np.clip(np.divide(expected, unit, out=np.eye(len(names)), where=unit > 0), -1, 1),
+        correlation,
         corrected,
         condition(corrected),
         whiteness,
