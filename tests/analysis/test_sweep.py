@@ -38,13 +38,15 @@ def test_grid_random_and_failures(prw, tmp_path, fmu):
 
 
 def test_dask_cluster(prw, tmp_path):
+    """Several tasks, the last ones with runs that fail."""
+    arguments = ["sweep", "--grid", "k1=150:-50:3", "--random", "c3=20%", "--runs", 20]
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         address = cluster.scheduler_address
-        result = prw("sweep", "--random", "k1=10%", "--runs", 60, "--scheduler", address, "--out", "remote")
+        result = prw(*arguments, "--scheduler", address, "--out", "remote")
     assert result.returncode == 0, result.stderr
     assert f"60 runs on {address}" in result.stdout
-    assert prw("sweep", "--random", "k1=10%", "--runs", 60, "--out", "local").returncode == 0
+    assert prw(*arguments, "--out", "local").returncode == 0
     assert rows(tmp_path / "remote") == rows(tmp_path / "local")
 
 

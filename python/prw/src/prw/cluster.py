@@ -19,8 +19,8 @@ from prw.testbed import OUTPUTS, Testbed
 
 #: Timeout of a connection to the scheduler, s.
 PATIENCE = 15
-#: Runs in a task.
-TASK = 64
+#: Number of tasks, each with at least and at most so many runs.
+TASKS, SHORTEST, LONGEST = 16, 16, 256
 
 
 def on_cluster(
@@ -41,7 +41,8 @@ def on_cluster(
     try:
         shared = client.scatter((fmu.read_bytes(), motion, dict(fixed)), broadcast=True, hash=False)
         executor = client.get_executor(retries=2)
-        parts = [slice(first, min(first + TASK, total)) for first in range(0, total, TASK)]
+        size = min(max(-(-total // TASKS), SHORTEST), LONGEST)
+        parts = [slice(first, min(first + size, total)) for first in range(0, total, size)]
         futures = {executor.submit(_on_worker, shared, {n: v[part] for n, v in values.items()}): part for part in parts}
         for future in as_completed(futures):
             part, error = futures[future], future.exception()
