@@ -1,16 +1,20 @@
-"""Fixtures that several folders of tests share: the packed FMUs. pyproject.toml says where tests find modules."""
+"""Fixtures that several directories of tests share: the packed FMUs. pyproject.toml lists where tests find modules."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import shutil
 import subprocess
-import sys
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import fmpy
 import pytest
 from built import built
+
+from prw.cli import main
 
 
 @pytest.fixture(scope="session")
@@ -52,11 +56,21 @@ def unpack() -> Iterator[Callable[[Path], str]]:
 
 
 @pytest.fixture
-def prw(tmp_path: Path, fmu: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Runs `prw` with arguments in a folder of its own."""
+def prw(tmp_path: Path, fmu: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Runs `prw` with arguments in this process, in a directory of its own. A warning is an error."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("prw.progress._wanted", False)
 
     def run(*arguments: object, with_fmu: bool = True) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "prw", *map(str, arguments), *(["--fmu", str(fmu)] if with_fmu else [])]
-        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=300)
+        line = [*map(str, arguments), *(["--fmu", str(fmu)] if with_fmu else [])]
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), warnings.catch_warnings():
+            for category in (UserWarning, RuntimeWarning):
+                warnings.simplefilter("error", category)
+            try:
+                status = main(line)
+            except SystemExit as end:
+                status = int(end.code or 0)
+        return subprocess.CompletedProcess(line, status, out.getvalue(), err.getvalue())
 
     return run

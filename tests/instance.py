@@ -38,7 +38,7 @@ class Instance:
         self.fmi.freeInstance()
 
     def complaints(self) -> list:
-        """What it logged other than the course of events."""
+        """Messages other than events."""
         return [message for message in self.messages if message[0] > 0 or message[1] != "logEvents"]
 
     def set(self, **values) -> None:

@@ -19,7 +19,7 @@ QUICK = ("--lib", "--test", "paper", "--test", "stepping", "--test", "fmu")
 OF_THE_FMU = {"build_fmu", "prw_testbed", "fmi-abi", "fmu-export", "fmu-package"}
 #: Packages without unit tests in Rust.
 UNTESTED = {"build_fmu", "fmu-run-python"}
-CORE = [f"tests/fmpy/test_{name}.py" for name in ("fig4", "exactness", "description")]
+CORE = [f"tests/fmpy/test_{name}.py" for name in ("exactness", "description", "references")]
 
 
 def changed_files() -> list[str]:

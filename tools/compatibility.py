@@ -35,8 +35,8 @@ def run(_: argparse.Namespace) -> None:
     text = PAGE.read_text(encoding="utf-8")
     lines = [f"| {' | '.join(TITLES)} |", "|" + "---|" * len(TITLES)]
     lines += [f"| {' | '.join(row[head] for head in HEADS)} |" for row in rows]
-    place = rf"(^## {HEADING}\n\n(?:[^|\n][^\n]*\n)*\n?)(?:\|.*\n)*\n*"
-    found, count = re.subn(place, lambda match: match[1] + "\n".join(lines) + "\n\n", text, count=1, flags=re.M)
+    pattern = rf"(^## {HEADING}\n\n(?:[^|\n][^\n]*\n)*\n?)(?:\|.*\n)*\n*"
+    found, count = re.subn(pattern, lambda match: match[1] + "\n".join(lines) + "\n\n", text, count=1, flags=re.M)
     if not count:
         raise UserError(f"{PAGE}: there is no heading “{HEADING}”")
     write_text(PAGE, found)

@@ -53,14 +53,14 @@ def without_times(page: str) -> str:
 def section(name: str) -> str:
     """Runs one example, writes its figure, and returns its section of the page."""
     path = Path("examples", f"{name}.py")
-    example, said = runpy.run_path(str(path)), io.StringIO()
+    example, printed = runpy.run_path(str(path)), io.StringIO()
     title, _, about = example["__doc__"].strip().partition("\n\n")
     about = about.rpartition("\n\n    ")[0]
-    with contextlib.redirect_stdout(said):
+    with contextlib.redirect_stdout(printed):
         found = example["main"]()
     parts = [f"## {title}", about]
     if isinstance(found, tuple):
         write_small_png(FIGURES / f"{name}.png", found[0])
         parts.append(f"![{title}](examples/{name}.png)")
-    parts.append(f"[{path.name}](../{path.as_posix()}) prints\n\n```text\n{said.getvalue().strip()}\n```")
+    parts.append(f"[{path.name}](../{path.as_posix()}) prints\n\n```text\n{printed.getvalue().strip()}\n```")
     return "\n\n".join(parts)

@@ -70,9 +70,3 @@ def decibels(response: ArrayLike) -> Array:
 def degrees(response: ArrayLike, axis: int = 0) -> Array:
     """The phase in degrees, unwrapped along the frequencies, which are on `axis`."""
     return np.asarray(np.rad2deg(np.unwrap(np.angle(np.asarray(response)), axis=axis)))
-
-
-def slope(frequency: ArrayLike, response: ArrayLike) -> Array:
-    """The slope of |response| (k, ...) between neighbouring frequencies (k,), dB per decade, (k - 1, ...)."""
-    decades = np.diff(np.log10(frequency))
-    return np.asarray(np.diff(decibels(response), axis=0) / decades.reshape(-1, *[1] * (np.ndim(response) - 1)))

@@ -11,7 +11,7 @@ from setuptools import setup
 from setuptools.command.build_py import build_py
 
 CLONE = Path(__file__).resolve().parents[2]
-#: Directories as in prw.files, and the files that prw.moving needs.
+#: Directories as in prw.files, and the files that prw.frames needs.
 PAGE_FOLDERS = ("crates/fmu-package/page", "docs/fmu-page/wrist")
 PAGE_FILES = ("live.css", "player.js", "plot.js", "animation.js", "wrist.js", "wrist.json")
 

@@ -11,8 +11,6 @@ than 92 % of the repetitions, or if the verdict is "fits" in less than 97 %. The
 number of repetitions. With --faulty, exit status 1 if the verdict is "fits" although an interval misses by more than two
 of its widths, in more than 1 %.
 
-A campaign that was interrupted continues where it was: finished repetitions of the same commit are read from the file
-beside --out that ends in .jsonl.
 """
 
 from __future__ import annotations
@@ -21,11 +19,9 @@ import argparse
 import itertools
 import json
 import multiprocessing
-import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -61,42 +57,42 @@ FAULTS = {
 }
 
 
-def spoilt(truth: rig.Truth, fault: str, size: float) -> rig.Truth:
+def spoilt(simulated: rig.Rig, fault: str, size: float) -> rig.Rig:
     """The rig with a fault of FAULTS."""
     if fault == "late":
-        return rig.late(truth, 1e-3 * size)
+        return rig.late(simulated, 1e-3 * size)
     if fault == "lag":
-        return rig.lagging(truth, 1e-3 * size)
+        return rig.lagging(simulated, 1e-3 * size)
     if fault == "backlash":
-        return rig.nonlinear(truth, backlash=1e-3 * size)
+        return rig.nonlinear(simulated, backlash=1e-3 * size)
     if fault == "friction":
-        return rig.nonlinear(truth, friction=size)
-    outputs = dict(truth.outputs)
+        return rig.nonlinear(simulated, friction=size)
+    outputs = dict(simulated.outputs)
     if fault == "gain":
         outputs["tau1"] = (1 + size / 100) * outputs["tau1"]
     for name in ("tau1", "tau2"):
         if fault == "clipped":
             peak = size * np.abs(outputs[name]).max()
             outputs[name] = np.clip(outputs[name], -peak, peak)
-    return truth._replace(outputs=outputs)
+    return simulated._replace(outputs=outputs)
 
 
 def repetition(fmu: str, seed: int, channels, counts: int, motion: str, fault: str = "", size: float = 0.0) -> tuple:
-    """Logarithms of estimate over truth, their standard errors, whether the 95 % intervals hold the truth, all (5,),
+    """Logarithms of estimate over true value, their standard errors, whether the 95 % intervals contain the true values, all (5,),
     the seconds it took, whether the verdict is that it fits, and the worst miss of an interval in its widths."""
-    truth = rig.experiment(seed, 6.0 if fault else 10.0, pattern=motion)
+    simulated = rig.experiment(seed, 6.0 if fault else 10.0, pattern=motion)
     if fault:
-        truth = spoilt(truth, fault, size)
-    columns = rig.measure(truth, seed + 1_000_000, channels, counts)
+        simulated = spoilt(simulated, fault, size)
+    columns = rig.measure(simulated, seed + 1_000_000, channels, counts)
     theta = np.column_stack([columns["theta1"], columns["theta2"]])
-    measured = Recording(Path("rig.csv"), Motion(truth.time, theta), {name: columns[name] for name in channels}, {})
+    measured = Recording(Path("rig.csv"), Motion(simulated.time, theta), {name: columns[name] for name in channels}, {})
     with Model(fmu) as model, threadpool_limits(1):
         begin = time.perf_counter()
         solution = fit(model, [prepare(measured)], task_of(model.known, rig.NAMES), starts=1)
         verdict = judge(solution)
         sure = certainty(solution, verdict.widening)
         seconds = time.perf_counter() - begin
-    true = np.log([truth.parameters[name] for name in rig.NAMES])
+    true = np.log([simulated.parameters[name] for name in rig.NAMES])
     low, high = np.log(sure.low), np.log(sure.high)
     missed = float((np.maximum(low - true, true - high) / (high - low)).max())
     inside = (low < true) & (true < high)
@@ -110,31 +106,15 @@ SOURCES = ("python/prw/src", "tests/analysis", "tests/oracle", "src", "modelDesc
 def commit() -> str:
     """Short hash of the commit, with "-dirty" if SOURCES differ from it."""
 
-    def git(*words: str) -> str:
-        command = ["git", "-C", str(Path(__file__).resolve().parents[2]), *words]
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(Path(__file__).resolve().parents[2]), *arguments]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
     return git("rev-parse", "--short", "HEAD") + "-dirty" * bool(git("status", "--porcelain", "--", *SOURCES))
 
 
-def results(pool: ProcessPoolExecutor, jobs: list[tuple], out: Path | None) -> Iterator[tuple]:
-    """Results of `repetition` with each of the arguments `jobs`, in their order."""
-    log = out.with_suffix(".jsonl") if out else Path(os.devnull)
-    log.parent.mkdir(parents=True, exist_ok=True)
-    version, done = commit(), {}
-    if log.is_file() and not version.endswith("dirty"):
-        done = dict(json.loads(line) for line in log.read_text().splitlines())
-    keys = [json.dumps([version, *job]) for job in jobs]
-    waiting = {key: pool.submit(repetition, *job) for key, job in zip(keys, jobs) if key not in done}
-    with log.open("a") as file:
-        for key in keys:
-            if key in waiting:
-                print(json.dumps([key, waiting[key].result()]), file=file, flush=True)
-            yield waiting[key].result() if key in waiting else done[key]
-
-
 def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[dict, bool]:
-    """What the verdict is on rigs with faults, by fault and size; and whether it is never "fits" where an interval
+    """The verdicts on rigs with faults, by fault and size; and whether the verdict is never "fits" if an interval
     misses by more than two of its widths, but in 1 %."""
     rows, rigs = {}, options.faulty
     print(
@@ -146,7 +126,7 @@ def campaign(pool: ProcessPoolExecutor, options: argparse.Namespace) -> tuple[di
         for case in cases
         for i in range(rigs)
     ]
-    everything = results(pool, jobs, options.out)
+    everything = iter(pool.map(repetition, *zip(*jobs)))
     grossly = missed = 0
     for fault, size in cases:
         found = list(itertools.islice(everything, rigs))
@@ -186,6 +166,13 @@ def draw(rows: dict, path: Path) -> None:
         drawn.savefig(path, metadata={"Date": None})
 
 
+def write(found: dict, path: Path | None) -> None:
+    """Write the results as JSON, if a path is given."""
+    if path:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(found, indent=2) + "\n")
+
+
 def is_too_rare(hits: np.ndarray, least: float, expected: float) -> bool:
     """Whether the share of hits is less than `least`, and so small only once in twenty times at the expected share."""
     return bool(hits.mean() < least and binom.cdf(hits.sum(), hits.size, expected) < 0.05)
@@ -210,10 +197,9 @@ def main() -> int:
     with ProcessPoolExecutor(options.workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         if options.faulty:
             rows, good = campaign(pool, options)
-            if options.out:
-                options.out.write_text(json.dumps(rows, indent=2) + "\n")
+            write(rows, options.out)
             return 0 if good else 1
-        found = list(results(pool, jobs, options.out))
+        found = list(pool.map(repetition, *zip(*jobs)))
     errors, sigmas, inside, seconds, fits = (np.array([entry[i] for entry in found]) for i in range(5))
     print(
         f"{options.repetitions} repetitions, {', '.join(SENSORS[options.sensors])}, {options.counts} counts a turn, "
@@ -232,9 +218,8 @@ def main() -> int:
             f"{cover:>22.1%}"
         )
     print(f"  the verdict is that it fits in {fits.mean():.1%}")
-    if options.out:
-        whole = {"commit": commit(), "fits": float(fits.mean()), "repetitions": options.repetitions, "parameters": rows}
-        options.out.write_text(json.dumps(whole, indent=2) + "\n")
+    whole = {"commit": commit(), "fits": float(fits.mean()), "repetitions": options.repetitions, "parameters": rows}
+    write(whole, options.out)
     print("unbiased, intervals honest" if good else "BIASED, intervals too narrow, or false alarms")
     return 0 if good else 1
 

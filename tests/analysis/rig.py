@@ -21,7 +21,7 @@ NAMES = ("k1", "k2", "c1", "c2", "c3")
 COUNTS = 10_000
 
 
-class Truth(NamedTuple):
+class Rig(NamedTuple):
     """parameters: SI. time (n,) s. theta, omega: (n, 2) rad, rad/s. outputs: (n,) each, SI."""
 
     parameters: dict[str, float]
@@ -34,7 +34,7 @@ class Truth(NamedTuple):
 
 def experiment(
     seed: int, duration: float = 10.0, rate: float = 1000.0, pattern: str = "independent", spread: float = 0.3
-) -> Truth:
+) -> Rig:
     """A random rig in a random motion: NAMES up to `spread` off Table 1, 40 sines from 0.1 to 20 Hz a motor, 30 deg.
     Both motors in the same motion or in opposite ones, or each in its own; "fig4": the paper's, over and over; "slow":
     slow smooth moves with small vibrations of 2 to 22 Hz on top; "moves": from point to point with rests between, and
@@ -70,21 +70,21 @@ def _moves(random: np.random.Generator, duration: float) -> tuple[np.ndarray, np
     when, lines = np.linspace(0, period, 4096, endpoint=False), int(15 * period)
     waves = np.zeros((2, lines + 6), dtype=complex)
     for i in (0, 1):
-        course, at, begin = np.zeros(4096), 0.0, random.uniform(0, 0.5)
+        signal, at, begin = np.zeros(4096), 0.0, random.uniform(0, 0.5)
         while begin < duration + 2:
             # The last move returns to the first angle: a jump would ring.
             to, takes = random.uniform(-1, 1) if begin < duration else 0.0, random.uniform(0.3, 1.2)
             x = np.clip((when - begin) / takes, 0, 1)
-            course += (to - at) * x**3 * (10 - 15 * x + 6 * x**2)
+            signal += (to - at) * x**3 * (10 - 15 * x + 6 * x**2)
             at, begin = to, begin + takes + random.uniform(0, 0.6) if begin < duration else np.inf
-        waves[i, :lines] = 2 * np.fft.rfft(course)[:lines] / 4096
+        waves[i, :lines] = 2 * np.fft.rfft(signal)[:lines] / 4096
         waves[i, 0] /= 2
         waves[i, lines + 3 * i :][:3] = random.uniform(0.005, 0.05, 3) * np.exp(1j * random.uniform(0, 2 * np.pi, 3))
     return np.concatenate([np.arange(lines) / period, random.uniform(0.5, 15, 6)]), waves
 
 
-def respond(parameters, time: np.ndarray, frequency: np.ndarray, waves: np.ndarray, reach: float = 0.52) -> Truth:
-    """What the rig does when motor i follows the real part of the sum of waves[i] exp(2 pi i f t), scaled to `reach`
+def respond(parameters, time: np.ndarray, frequency: np.ndarray, waves: np.ndarray, reach: float = 0.52) -> Rig:
+    """The response of the rig if motor i follows the real part of the sum of waves[i] exp(2 pi i f t), scaled to `reach`
     rad, from rest at its first angle."""
     s = 2j * np.pi * frequency
     turning = np.exp(np.outer(time, s))
@@ -114,7 +114,7 @@ def respond(parameters, time: np.ndarray, frequency: np.ndarray, waves: np.ndarr
         return {"theta": theta, "omega": omega, **_outputs(x, tau, parameters)}
 
     found = at(time)
-    return Truth(parameters, time, found.pop("theta"), found.pop("omega"), found, at)
+    return Rig(parameters, time, found.pop("theta"), found.pop("omega"), found, at)
 
 
 def _outputs(x: np.ndarray, tau: np.ndarray, parameters) -> dict[str, np.ndarray]:
@@ -133,14 +133,14 @@ def _outputs(x: np.ndarray, tau: np.ndarray, parameters) -> dict[str, np.ndarray
 FINE = 16
 
 
-def nonlinear(truth: Truth, backlash: float = 0.0, friction: float = 0.0) -> Truth:
-    """The same rig with a play of `backlash` rad between each motor and its shaft, and dry friction of `friction` N.m
+def nonlinear(simulated: Rig, backlash: float = 0.0, friction: float = 0.0) -> Rig:
+    """The rig with a play of `backlash` rad between each motor and its shaft, and dry friction of `friction` N.m
     about pitch and roll; Heun's rule in fine steps."""
-    p, model = truth.parameters, linear_model(truth.parameters)
-    count = (len(truth.time) - 1) * FINE + 1
-    fine = np.interp(np.arange(count) / FINE, np.arange(len(truth.time)), truth.time)
+    p, model = simulated.parameters, linear_model(simulated.parameters)
+    count = (len(simulated.time) - 1) * FINE + 1
+    fine = np.interp(np.arange(count) / FINE, np.arange(len(simulated.time)), simulated.time)
     step = fine[1] - fine[0]
-    motors = truth.at(fine)
+    motors = simulated.at(fine)
     theta, omega = motors["theta"], motors["omega"]
     if backlash:
         played = np.empty_like(theta)
@@ -166,37 +166,39 @@ def nonlinear(truth: Truth, backlash: float = 0.0, friction: float = 0.0) -> Tru
         x[k + 1] = x[k] + step / 2 * (slope + rate(x[k] + step * slope, k + 1))
     tau = x @ model.c.T + theta @ model.d_angle.T + omega @ model.d_rate.T
     outputs = {name: y[::FINE] for name, y in _outputs(x, tau, p).items()}
-    return truth._replace(outputs=outputs)
+    return simulated._replace(outputs=outputs)
 
 
-def lagging(truth: Truth, seconds: float) -> Truth:
-    """The same behind sensors with a first-order lag, from their steady state."""
-    fine = np.interp(np.arange((len(truth.time) - 1) * FINE + 1) / FINE, np.arange(len(truth.time)), truth.time)
+def lagging(simulated: Rig, seconds: float) -> Rig:
+    """The rig with sensors that have a first-order lag, from their steady state."""
+    fine = np.interp(
+        np.arange((len(simulated.time) - 1) * FINE + 1) / FINE, np.arange(len(simulated.time)), simulated.time
+    )
     step, outputs = fine[1] - fine[0], {}
-    decay, exact = np.exp(-step / seconds), truth.at(fine)
+    decay, exact = np.exp(-step / seconds), simulated.at(fine)
     rise = 1 - seconds / step * (1 - decay)
-    for name in truth.outputs:
+    for name in simulated.outputs:
         y = exact[name]
         slow = lfilter([rise, 1 - rise - decay], [1, -decay], y - y[0]) + y[0]
         outputs[name] = slow[::FINE]
-    return truth._replace(outputs=outputs)
+    return simulated._replace(outputs=outputs)
 
 
-def late(truth: Truth, seconds: float, channels: Sequence[str] = ("tau1", "tau2")) -> Truth:
-    """The same with some channels late."""
-    delayed = truth.at(truth.time - seconds)
-    return truth._replace(outputs={**truth.outputs, **{name: delayed[name] for name in channels}})
+def late(simulated: Rig, seconds: float, channels: Sequence[str] = ("tau1", "tau2")) -> Rig:
+    """The rig with some channels late."""
+    delayed = simulated.at(simulated.time - seconds)
+    return simulated._replace(outputs={**simulated.outputs, **{name: delayed[name] for name in channels}})
 
 
 def measure(
-    truth: Truth,
+    simulated: Rig,
     seed: int,
     channels: Sequence[str] = ALL,
     counts: int = COUNTS,
     log_rates: bool = False,
     noise: float = 0.02,
 ):
-    """What the sensors say, by column in SI: encoders on motors and shafts, each with its own zero; torques with `noise`
+    """The columns that the sensors record, in SI: encoders on motors and shafts, each with its own zero; torques with `noise`
     N.m, steps of a quarter of that and an offset; an inertial sensor with 1 mrad of noise and an offset on pitch and
     roll."""
     random = np.random.default_rng(seed)
@@ -205,13 +207,13 @@ def measure(
     def encoder(angle: np.ndarray, zero: float) -> np.ndarray:
         return np.round(angle / quantum + random.uniform(-0.5, 0.5)) * quantum + zero
 
-    found = {"time": truth.time}
+    found = {"time": simulated.time}
     for i in (0, 1):
-        found[f"theta{i + 1}"] = encoder(truth.theta[:, i], 0.0)
+        found[f"theta{i + 1}"] = encoder(simulated.theta[:, i], 0.0)
         if log_rates:
-            found[f"omega{i + 1}"] = truth.omega[:, i] + random.normal(0, 0.02, len(truth.time))
+            found[f"omega{i + 1}"] = simulated.omega[:, i] + random.normal(0, 0.02, len(simulated.time))
     for name in channels:
-        y = truth.outputs[name]
+        y = simulated.outputs[name]
         if name.startswith("tau"):
             noisy = y + random.normal(0, noise, len(y)) + random.uniform(-0.2, 0.2)
             found[name] = np.round(noisy / (noise / 4)) * (noise / 4)

@@ -1,12 +1,10 @@
-"""The animation: bodies turn as eq. (1) says, files are what they are called, the film loops and is small."""
+"""The animation: bodies turn as in eq. (1), files have the format of their suffix, the film loops and is small."""
 
 from __future__ import annotations
 
 import base64
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +16,8 @@ from PIL import Image, ImageSequence
 
 from prw import UserError, animate, simulate
 from prw.animation import RATES
+from prw.frames import MEASURED, angles_and_torques, still
 from prw.motion import Motion
-from prw.picture import MEASURED, angles_and_torques, still
 from prw.plots import GREEN, PURPLE
 from prw.simulation import Run
 from prw.wrist import Wrist, about_x, about_y
@@ -30,7 +28,7 @@ def swing(**changed: np.ndarray | None) -> Run:
     time = np.linspace(0, 0.5, 51)
     angle = 0.3 * np.sin(2 * np.pi * time) ** 2
     outputs = {name: angle if name not in ("tau1", "tau2", "roll") else 0 * angle for name in MEASURED} | changed
-    kept = {name: course for name, course in outputs.items() if course is not None}
+    kept = {name: signal for name, signal in outputs.items() if signal is not None}
     return Run(Motion(time, np.column_stack([angle, angle])), kept, {"M": 4, "N": 7})
 
 
@@ -44,7 +42,7 @@ def corners(at: dict[str, float], colour: str) -> np.ndarray:
 def pictures_of(path: Path) -> list[np.ndarray]:
     """The pictures of a GIF, (height, width, 3) each."""
     with Image.open(path) as film:
-        return [np.asarray(picture.convert("RGB")).astype(int) for picture in ImageSequence.Iterator(film)]
+        return [np.asarray(image.convert("RGB")).astype(int) for image in ImageSequence.Iterator(film)]
 
 
 def test_pitch_swings_ring_and_gripper_from_up_to_the_viewer() -> None:
@@ -62,7 +60,7 @@ def test_roll_turns_the_gripper_in_the_ring() -> None:
 
 @pytest.mark.parametrize("carrier, side, roll", [("theta5", -1, 1), ("theta6", 1, -1)])
 def test_cam_moves_with_the_rollers_that_touch_it(carrier: str, side: int, roll: int) -> None:
-    """Where they touch, above the input shaft of a side, both go to the viewer when eq. (1) says so."""
+    """At the contact above the input shaft of a side, both move to the viewer, as in eq. (1)."""
     contact, small = np.array([side * 0.6, 0.6, 0.0]), 1e-3
     assert (about_x(small) @ contact)[2] > 0, carrier
     assert (about_y(roll * small) @ contact)[2] > 0, carrier
@@ -79,10 +77,10 @@ def test_gif_has_its_pictures_and_ends_as_it_began(tmp_path: Path) -> None:
     animate(swing(), tmp_path / "run.gif", speed=1.0)
     with Image.open(tmp_path / "run.gif") as film:
         assert film.info["duration"] == 1000 / RATES[".gif"]
-    pictures = pictures_of(tmp_path / "run.gif")
-    assert len(pictures) == round(0.5 * RATES[".gif"]) + 1
-    height = pictures[0].shape[0]
-    scene = [picture[int(0.08 * height) : int(0.66 * height)] for picture in pictures]
+    images = pictures_of(tmp_path / "run.gif")
+    assert len(images) == round(0.5 * RATES[".gif"]) + 1
+    height = images[0].shape[0]
+    scene = [image[int(0.08 * height) : int(0.66 * height)] for image in images]
     assert np.array_equal(scene[0], scene[-1])
     assert np.abs(scene[0] - scene[2]).max() > 100
 
@@ -99,12 +97,12 @@ def test_page_has_the_run_and_needs_nothing_else(tmp_path: Path) -> None:
     page = (tmp_path / "run.html").read_text()
     assert len(page) < 100_000 and page.count("</script>") == 1
     assert not re.search(r"https?:|<link|@import| src=", page)
-    told = json.loads(re.findall(r"^animation\((.*)\);$", page, flags=re.M)[0])
-    assert told["speed"] == 0.5 and told["captions"] == [[0.0, "</script>"]]
-    columns = {name: np.frombuffer(base64.b64decode(text)) for name, text in told["columns"].items()}
+    noted = json.loads(re.findall(r"^animation\((.*)\);$", page, flags=re.M)[0])
+    assert noted["speed"] == 0.5 and noted["captions"] == [[0.0, "</script>"]]
+    columns = {name: np.frombuffer(base64.b64decode(text)) for name, text in noted["columns"].items()}
     np.testing.assert_array_equal(columns["time"], run.time)
-    for name, course in angles_and_torques(run).items():
-        np.testing.assert_array_equal(columns[name], course)
+    for name, signal in angles_and_torques(run).items():
+        np.testing.assert_array_equal(columns[name], signal)
 
 
 def test_movie(tmp_path: Path) -> None:
@@ -135,24 +133,10 @@ def test_what_cannot_be_shown_is_said(
     assert not list(tmp_path.iterdir())
 
 
-def test_command(fmu: Path, tmp_path: Path) -> None:
-    recording = tmp_path / "motors.csv"
-    recording.write_text("time,theta1,theta2\n" + "".join(f"{k / 10},{k / 100},{k / 100}\n" for k in range(5)))
-    command: list[Any] = [
-        sys.executable,
-        "-m",
-        "prw",
-        "simulate",
-        "--fmu",
-        fmu,
-        "--input",
-        recording,
-        "--out",
-        tmp_path / "out",
-    ]
-    done = subprocess.run([*command, "--animate", tmp_path / "wrist.gif"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert f"{tmp_path / 'wrist.gif'}" in done.stdout
+def test_command(prw: Any, tmp_path: Path) -> None:
+    (tmp_path / "motors.csv").write_text("time,theta1,theta2\n" + "".join(f"{k / 10},{k / 9},0\n" for k in range(5)))
+    done = prw("simulate", "motors.csv", "--animate", "wrist.gif")
+    assert done.returncode == 0 and "wrist.gif" in done.stdout, done.stderr
     assert len(pictures_of(tmp_path / "wrist.gif")) > 1
 
 
@@ -160,9 +144,9 @@ def test_film_of_the_readme() -> None:
     """Small enough for a README; begins where it ends; panels stand still."""
     path = ROOT / "docs" / "wrist.gif"
     assert path.stat().st_size < 500_000
-    pictures = pictures_of(path)
-    height, width, _ = pictures[0].shape
+    images = pictures_of(path)
+    height, width, _ = images[0].shape
     scene = slice(int(0.08 * height), int(0.66 * height))
-    assert np.mean(np.abs(pictures[0][scene] - pictures[-1][scene]).max(axis=2) > 40) < 0.002
+    assert np.mean(np.abs(images[0][scene] - images[-1][scene]).max(axis=2) > 40) < 0.002
     axis_below = (slice(int(0.94 * height), height), slice(0, width))
-    assert all(np.array_equal(picture[axis_below], pictures[0][axis_below]) for picture in pictures)
+    assert all(np.array_equal(image[axis_below], images[0][axis_below]) for image in images)

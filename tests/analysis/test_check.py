@@ -56,7 +56,7 @@ def text_matrix(texts, across):
 
 
 def write_modelica(path, columns, units=False, across=True):
-    """As OpenModelica does: MATLAB 4; constants in data_1, trajectories in data_2, aliases by index and sign."""
+    """Writes a file in OpenModelica's format: MATLAB 4; constants in data_1, trajectories in data_2, aliases by index and sign."""
     time = columns["time"]
     names, infos, texts = ["time", "testbed.k1"], [(0, 1, 0, -1), (1, 2, 0, 0)], ["Simulation time [s]", "Stiffness"]
     table = [time]
@@ -121,7 +121,7 @@ def simulink_structure(columns):
 
 
 def simulink_outports(columns):
-    """The same for a model's outports whose signals have no names."""
+    """The structure of a model's outports whose signals have no names."""
     logged = simulink_structure(columns)["out"]
     return {"yout": {**logged, "signals": np.array([{**signal, "label": ""} for signal in logged["signals"]])}}
 
@@ -151,7 +151,7 @@ def test_names_units_and_separators_of_others(right, fmu, tmp_path):
     spoken.write_text("\n".join([f"# a tool's\nmode,{header}", "# begins", *(f"true,{row}," for row in rows)]))
     assert prw.check(spoken, units=dict.fromkeys(DEGREES, "deg"), fmu=fmu).agrees
     assert prw.check(plain, units=dict.fromkeys(DEGREES, "deg"), fmu=fmu).agrees
-    assert "roll looks like degrees; say so by the units: roll=deg" in prw.check(plain, fmu=fmu).notes
+    assert "roll looks like degrees; give its unit: roll=deg" in prw.check(plain, fmu=fmu).notes
 
 
 def test_of_two_rows_at_one_time_the_last_counts(right, fmu, tmp_path):
@@ -164,7 +164,7 @@ def test_of_two_rows_at_one_time_the_last_counts(right, fmu, tmp_path):
 
 
 def test_uneven_rows_are_interpolated(fmu, tmp_path):
-    """As a solver with variable steps leaves them: off the reference's times, up to 5 ms apart."""
+    """A solver with variable steps writes rows off the reference's times, up to 5 ms apart."""
     full, rng = fig4(), np.random.default_rng(1)
     rows = np.unique(np.append(np.cumsum(rng.integers(1, 6, 400)), [0, 1000]))
     rows = rows[(rows <= 1000) & ((rows % 10 != 0) | (rows % 1000 == 0))]
@@ -179,7 +179,7 @@ def test_two_components_with_one_name(right, soft, fmu, tmp_path):
     assert not prw.check(path, component="other", fmu=fmu).agrees
     path = write_csv(tmp_path / "either.csv", {"time": right["time"], "a.roll": right["roll"], "b.roll": soft["roll"]})
     with pytest.raises(
-        prw.UserError, match="component: there are several roll in .*, of the components a, b; say which"
+        prw.UserError, match="component: there are several roll in .*, of the components a, b; name one"
     ):
         prw.check(path, fmu=fmu)
 

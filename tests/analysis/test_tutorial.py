@@ -1,4 +1,4 @@
-"""Every command of python/prw/tutorial.md, run in order, and what it promises."""
+"""Every command of python/prw/tutorial.md, run in order, and its results."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ def test_the_commands_do_what_the_page_says(tmp_path, fmu):
     shutil.copytree(ROOT / "examples", tmp_path / "examples", ignore=shutil.ignore_patterns("*-fmu"))
     folders = [str(Path(sys.executable).parent), os.environ["PATH"]]
     environment = {**os.environ, "PATH": os.pathsep.join(folders)}
-    said = ""
+    reported = ""
     for language, block in BLOCK.findall(TUTORIAL.read_text(encoding="utf-8")):
         if language == "python":
-            said += run([sys.executable, "-c", block], tmp_path, environment)
+            reported += run([sys.executable, "-c", block], tmp_path, environment)
             continue
         for line in block.strip().splitlines():
             if line.startswith("make "):
                 continue  # `make test` has run them to get here
-            words = line.split()
-            if words[0] == "cargo":
+            command = line.split()
+            if command[0] == "cargo":
                 # The description shows that the parameters arrive; tests/packaging.rs compiles such FMUs.
-                words = [*words[:2], "--quiet", "--locked", *words[2:], "--describe"]
-                words = [str(tmp_path / w) if w.startswith("out/") or w == "mine" else w for w in words]
-                said += run(words, ROOT, environment)
-            elif "--fmu" in words:
-                words[words.index("--fmu") + 1] = "target/fmu/prw_testbed.fmu"
-                said += run([sys.executable, "-m", *words], tmp_path, environment)
+                command = [*command[:2], "--quiet", "--locked", *command[2:], "--describe"]
+                command = [str(tmp_path / w) if w.startswith("out/") or w == "mine" else w for w in command]
+                reported += run(command, ROOT, environment)
+            elif "--fmu" in command:
+                command[command.index("--fmu") + 1] = "target/fmu/prw_testbed.fmu"
+                reported += run([sys.executable, "-m", *command], tmp_path, environment)
             else:
-                start = [sys.executable] if words[0] == "python" else [sys.executable, "-m", "prw"]
-                said += run([*start, *words[1:]], tmp_path, environment)
-    rig = dict(re.findall(r"(\w\d) ([\d.e+-]+) N\.m", said))
+                start = [sys.executable] if command[0] == "python" else [sys.executable, "-m", "prw"]
+                reported += run([*start, *command[1:]], tmp_path, environment)
+    rig = dict(re.findall(r"(\w\d) ([\d.e+-]+) N\.m", reported))
     found = json.loads((tmp_path / "out" / "identified" / "report.json").read_text())["parameters"]
     for name in ("k1", "k2", "c1", "c2", "c3"):
         off = np.log(found[name]["shown"]["value"] / float(rig[name]))
@@ -56,7 +56,7 @@ def test_the_commands_do_what_the_page_says(tmp_path, fmu):
     assert (tmp_path / "out" / "sweep" / "runs.parquet").is_file()
 
 
-def run(words, folder, environment) -> str:
-    result = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=600)
-    assert result.returncode == 0, f"{' '.join(words)}\n{result.stdout}{result.stderr}"
+def run(command, folder, environment) -> str:
+    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=600)
+    assert result.returncode == 0, f"{' '.join(command)}\n{result.stdout}{result.stderr}"
     return result.stdout

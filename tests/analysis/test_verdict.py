@@ -1,4 +1,4 @@
-"""Data that the model does not explain are told from those that it does, and what is wrong with them is named."""
+"""Data that the model does not explain are detected, and their faults are named."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import prw
 
 
 def late(seconds):
-    return lambda truth: rig.late(truth, seconds)
+    return lambda simulated: rig.late(simulated, seconds)
 
 
-def recording(truth, channels=rig.ALL, spoil=None, counts=rig.COUNTS, **sensors) -> prw.Recording:
-    columns = rig.measure(truth, 5, channels, counts, **sensors)
+def recording(simulated, channels=rig.ALL, spoil=None, counts=rig.COUNTS, **sensors) -> prw.Recording:
+    columns = rig.measure(simulated, 5, channels, counts, **sensors)
     if spoil:
         spoil(columns)
     theta = np.column_stack([columns["theta1"], columns["theta2"]])
@@ -57,9 +57,17 @@ def too_strong(columns):
 SPOILT_MOTIONS = {
     "late by 1 ms": (late(1e-3), ["tau1", "tau2"], "ms late"),
     "late by 0.1 ms": (late(1e-4), ["tau1", "tau2"], "ms late"),
-    "lag of 2 ms": (lambda truth: rig.lagging(truth, 2e-3), list(rig.ALL), "lags with a time constant of 2 +-"),
-    "backlash": (lambda truth: rig.nonlinear(truth, backlash=2e-3), ["theta3"], "backlash at the motors of 0.002 +-"),
-    "friction": (lambda truth: rig.nonlinear(truth, friction=0.15), ["pitch"], "friction about pitch and roll of 0.15"),
+    "lag of 2 ms": (lambda simulated: rig.lagging(simulated, 2e-3), list(rig.ALL), "lags with a time constant of 2 +-"),
+    "backlash": (
+        lambda simulated: rig.nonlinear(simulated, backlash=2e-3),
+        ["theta3"],
+        "backlash at the motors of 0.002 +-",
+    ),
+    "friction": (
+        lambda simulated: rig.nonlinear(simulated, friction=0.15),
+        ["pitch"],
+        "friction about pitch and roll of 0.15",
+    ),
 }
 SPOILT_SENSORS = {
     clipped: ("tau1", "tau1 is cut off at 3"),
@@ -74,39 +82,41 @@ SPOILT_SENSORS = {
 
 @pytest.mark.parametrize("fault", SPOILT_MOTIONS)
 def test_a_rig_with_a_fault_does_not_fit(experiment, fmu, fault):
-    spoil, channels, said = SPOILT_MOTIONS[fault]
+    spoil, channels, reported = SPOILT_MOTIONS[fault]
     found = prw.identify(recording(spoil(experiment)), starts=1, fmu=fmu)
     assert not found.fits
     assert set(channels) <= {misfit.channel for misfit in found.verdict.misfits}, found.misfits
-    assert any(said in text for text in found.diagnosis), found.diagnosis
+    assert any(reported in text for text in found.diagnosis), found.diagnosis
 
 
 def test_two_faults_are_both_named(experiment, fmu):
     """Friction leaves most, and torques 1 ms late the rest."""
-    truth = rig.nonlinear(experiment, friction=0.15)
-    late = {name: np.interp(truth.time - 1e-3, truth.time, truth.outputs[name]) for name in ("tau1", "tau2")}
-    found = prw.identify(recording(truth._replace(outputs={**truth.outputs, **late})), starts=1, fmu=fmu)
+    simulated = rig.nonlinear(experiment, friction=0.15)
+    late = {
+        name: np.interp(simulated.time - 1e-3, simulated.time, simulated.outputs[name]) for name in ("tau1", "tau2")
+    }
+    found = prw.identify(recording(simulated._replace(outputs={**simulated.outputs, **late})), starts=1, fmu=fmu)
     first, second = found.diagnosis
     assert first.startswith("friction about pitch and roll of 0.1")
     assert second.startswith("besides, tau1") and "ms late" in second and "(delay tau1,tau2" in second
-    one = prw.identify(recording(truth), starts=1, fmu=fmu)
+    one = prw.identify(recording(simulated), starts=1, fmu=fmu)
     assert len(one.diagnosis) == 1, "one fault is one"
 
 
 def test_what_two_channels_have_in_common_is_seen_where_parameters_make_up_for_each_alone(fmu):
     # Torques 0.7 ms late, without encoders on the shafts: c1 is off by half, and the residuals look like noise.
-    truth = rig.late(rig.experiment(400004, 6, pattern="slow"), 7e-4)
-    found = prw.identify(recording(truth, ("tau1", "tau2", "pitch", "roll")), starts=1, fmu=fmu)
+    simulated = rig.late(rig.experiment(400004, 6, pattern="slow"), 7e-4)
+    found = prw.identify(recording(simulated, ("tau1", "tau2", "pitch", "roll")), starts=1, fmu=fmu)
     assert {misfit.channel for misfit in found.verdict.misfits} == {"tau1", "tau2"}, found.misfits
     assert "(delay tau1,tau2 estimates it along)" in found.diagnosis[0], found.diagnosis
 
 
 @pytest.mark.parametrize("spoil", SPOILT_SENSORS, ids=lambda spoil: spoil.__name__)
 def test_a_sensor_with_a_fault_is_named(experiment, fmu, spoil):
-    channel, said = SPOILT_SENSORS[spoil]
+    channel, reported = SPOILT_SENSORS[spoil]
     found = prw.identify(recording(experiment, spoil=spoil), starts=1, fmu=fmu)
     assert channel in {misfit.channel for misfit in found.verdict.misfits}, found.misfits
-    assert said in found.diagnosis[0], found.diagnosis
+    assert reported in found.diagnosis[0], found.diagnosis
 
 
 @pytest.mark.parametrize("pattern", ["independent", "equal", "slow", "fig4", "moves"])
@@ -121,8 +131,8 @@ def test_a_rig_without_faults_fits(fmu, pattern):
 
 def test_coarse_encoders_on_the_motors_are_no_fault(fmu):
     # A step of 0.8 mrad is 0.1 N.m of torque, behind which 3 mN.m of noise vanish.
-    truth = rig.experiment(151, 6, 250, "moves")
-    found = prw.identify(recording(truth, counts=8000, noise=0.003), starts=1, fmu=fmu)
+    simulated = rig.experiment(151, 6, 250, "moves")
+    found = prw.identify(recording(simulated, counts=8000, noise=0.003), starts=1, fmu=fmu)
     assert found.fits, found.misfits
 
 
@@ -130,9 +140,11 @@ def test_coarse_encoders_on_the_motors_are_no_fault(fmu):
     "spoil, option, channels, size",
     [
         (late(1e-3), "delay", ("tau1", "tau2"), 1e-3),
-        (lambda truth: rig.lagging(truth, 2e-3), "lag", rig.ALL, 2e-3),
+        (lambda simulated: rig.lagging(simulated, 2e-3), "lag", rig.ALL, 2e-3),
         (
-            lambda truth: truth._replace(outputs={**truth.outputs, "tau1": 1.02 * truth.outputs["tau1"]}),
+            lambda simulated: simulated._replace(
+                outputs={**simulated.outputs, "tau1": 1.02 * simulated.outputs["tau1"]}
+            ),
             "gain",
             ("tau1",),
             1.02,
@@ -153,8 +165,8 @@ def test_the_command_tells_and_writes_no_parameters(prw, tmp_path, experiment):
     rig.write(tmp_path / "run.csv", rig.measure(rig.late(experiment, 1e-3), 5))
     out = tmp_path / "out" / "identified"
     result = prw("identify", "run.csv", "--starts", 1)
-    said = [line for line in result.stderr.splitlines() if not line.startswith("looking for ")]  # progress
-    assert result.returncode == 3 and len(said) == 1, result.stderr
+    reported = [line for line in result.stderr.splitlines() if not line.startswith("looking for ")]  # progress
+    assert result.returncode == 3 and len(reported) == 1, result.stderr
     assert "tau1, tau2" in result.stderr and "(delay tau1,tau2 " in result.stderr and "--write-anyway" in result.stderr
     assert result.stdout.index("DOES NOT EXPLAIN") < result.stdout.index("k1 ")
     assert not (out / "identified.json").exists()

@@ -1,17 +1,21 @@
-"""The closed loop under masters of others: it tracks, it keeps its limits, and all masters agree."""
+"""The closed loop under third-party masters: settling, limits, agreement, and the order of the coupling's error."""
 
 from __future__ import annotations
+
+import subprocess
+import sys
 
 import fmu_run
 import numpy as np
 import pytest
+from built import ROOT
 
-from tools.validation import coupling, masters
+from tools.validation import coupling, masters, system
 from tools.validation.closed_loop import settling_time
 
 
 def by_fmu_run(closed_loop, starts_late: bool) -> np.ndarray:
-    """What masters record, (steps, RECORDED), of fmu_run in their order."""
+    """The variables that masters record, (steps, RECORDED), from fmu_run in the masters' order of calls."""
     with fmu_run.System(closed_loop.ssp, order="jacobi") as loop:
         if not starts_late:
             # libcosim counts nanoseconds, and makes seconds of them for each step.
@@ -76,3 +80,59 @@ def test_masters_agree_to_rounding(response, closed_loop):
         # An omega is the difference of angles over a step: it loses three digits.
         tolerance = 1e-10 if "omega" in name else 1e-13
         assert np.max(np.abs(response[name] - column)) < tolerance, name
+
+
+@pytest.fixture(scope="module")
+def python_loop(tmp_path_factory, fmu):
+    pytest.importorskip("pythonfmu")
+    folder = tmp_path_factory.mktemp("python")
+    source = ROOT / "examples" / "python_controller.py"
+    subprocess.run(
+        [sys.executable, "-m", "pythonfmu", "build", "-f", source, "-d", folder], check=True, capture_output=True
+    )
+    build = ["cargo", "run", "--quiet", "--release", "-p", "prw_controller", "--bin", "build_closed_loop", "--"]
+    options = ["--testbed", fmu, "--controller", folder / "PythonController.fmu", "--out", folder]
+    subprocess.run([*build, *options], check=True, cwd=ROOT, capture_output=True)
+    return system.read(folder / "prw_closed_loop.ssp", folder / "prw_closed_loop")
+
+
+@pytest.fixture(scope="module")
+def python_response(master, python_loop):
+    return masters.run_apart(master, python_loop)
+
+
+def test_the_python_controller_settles(python_response, python_loop):
+    for axis in ("pitch", "roll"):
+        goal = python_loop.inputs[f"{axis}_ref"][1]
+        assert settling_time(python_response["time"], python_response[f"testbed.{axis}"], goal) < 0.8
+
+
+def test_masters_agree_on_the_python_controller(python_response, python_loop):
+    reference = masters.run_apart(masters.MASTERS[0], python_loop)
+    for name in ("testbed.pitch", "testbed.roll", "controller.theta1", "controller.theta2"):
+        assert np.max(np.abs(python_response[name] - reference[name])) < 1e-12, name
+
+
+@pytest.fixture(scope="module")
+def study(closed_loop):
+    return coupling.study(closed_loop)
+
+
+def test_up_to_the_sample_time_derivatives_change_nothing_and_the_order_is_two(study):
+    """The controller sees every sample as it is; what is left is the testbed's line for the motors' parabola."""
+    fine = study.step <= 1.001e-3
+    np.testing.assert_allclose(study.held[fine], study.derivatives[fine], rtol=1e-6)
+    order = np.diff(np.log(study.held[fine])) / np.diff(np.log(study.step[fine]))
+    assert np.all((order > 1.9) & (order < 2.1)), order
+    assert study.held[fine][-1] < 1e-3
+
+
+def test_beyond_it_derivatives_keep_the_order(study):
+    coarse = (study.step >= 0.999e-3) & (study.step <= 8.001e-3)
+    step, held, derivatives = study.step[coarse], study.held[coarse], study.derivatives[coarse]
+    order = np.diff(np.log(derivatives)) / np.diff(np.log(step))
+    assert np.all((order > 1.8) & (order < 2.2)), order
+    # Held inputs reach the samples inside a step late: of first order.
+    assert np.all(held[1:] > 1.5 * derivatives[1:])
+    order = np.diff(np.log(held[1:])) / np.diff(np.log(step[1:]))
+    assert np.all(order < 1.8), order

@@ -1,19 +1,13 @@
-"""The closed loop with both FMUs in Model Exchange: the controller's samples are time events, an integrator takes the testbed
-from one to the next. It must be what the Co-Simulation loop tends to as its steps become small."""
+"""The closed loop with both FMUs in Model Exchange: the controller's samples are time events, and Runge and Kutta's method takes the
+testbed from one to the next. The Co-Simulation loop must tend to it as its steps become small."""
 
 from __future__ import annotations
 
-import ctypes
-import shutil
-from collections.abc import Callable
-from pathlib import Path
+from contextlib import ExitStack
 
-import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Model
-from fmpy.simulation import instantiate_fmu
-from fmpy.sundials import CVodeSolver
+from fmu_run import Fmu
 
 from tools.validation import coupling
 from tools.validation.system import System
@@ -22,162 +16,61 @@ SAMPLE, SAMPLES = 1e-3, 480
 MEASURED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
 MOTORS = ("theta1", "theta2", "omega1", "omega2")
 WATCHED = ("testbed.pitch", "testbed.roll", "testbed.tau1", "controller.theta1")
-STATES = 6
 
 
-class Component:
-    """An instance for Model Exchange, with Real variables by name."""
+def run(system: System, steps: int) -> np.ndarray:
+    """The watched variables at every sample, (SAMPLES + 1, WATCHED), with `steps` of the integrator between two samples.
 
-    def __init__(self, fmu: Path, name: str):
-        description = fmpy.read_model_description(str(fmu))
-        self.references = {variable.name: variable.valueReference for variable in description.modelVariables}
-        self.folder = fmpy.extract(str(fmu))
-        self.fmi: FMU2Model = instantiate_fmu(self.folder, description, fmi_type="ModelExchange")
-        self.fmi.setupExperiment(startTime=0.0)
+    Between samples the motors' motion depends only on time, so there is no algebraic loop."""
+    references = {end.split(".")[1]: value for end, value in system.inputs.values()}
+    with ExitStack() as stack:
+        fmus = {name: stack.enter_context(Fmu(system.osp / file)) for name, file in system.fmus.items()}
+        testbed = fmus["testbed"].instances(interface="model-exchange")
+        controller = fmus["controller"].instances(interface="model-exchange", start=references)
+        instances = {"testbed": testbed, "controller": controller}
 
-    def get(self, *names: str) -> list[float]:
-        return self.fmi.getReal([self.references[name] for name in names])
-
-    def set(self, names, values) -> None:
-        self.fmi.setReal([self.references[name] for name in names], list(values))
-
-    def close(self) -> None:
-        self.fmi.terminate()
-        self.fmi.freeInstance()
-        shutil.rmtree(self.folder, ignore_errors=True)
-
-
-class Loop:
-    """Both FMUs, wired. The motors' motion depends on the time alone between samples, so there is no algebraic loop."""
-
-    def __init__(self, testbed: Path, controller: Path, references: dict[str, float]):
-        self.testbed, self.controller = Component(testbed, "testbed"), Component(controller, "controller")
-        self.controller.set(references, references.values())
-        for component in (self.testbed, self.controller):
-            component.fmi.enterInitializationMode()
-            component.fmi.exitInitializationMode()
-        self.move(0.0)
-        self.testbed.fmi.newDiscreteStates()
-        self.testbed.fmi.enterContinuousTimeMode()
-        self.sample()
-
-    def move(self, time: float) -> None:
-        """Sets the time, and the motors to where they are then."""
-        for component in (self.testbed, self.controller):
-            component.fmi.setTime(time)
-        self.testbed.set(MOTORS, self.controller.get(*MOTORS))
-
-    def sample(self) -> None:
-        """The controller, in event mode, takes a sample of the testbed as it is. Remembers when it wants the next one."""
-        self.controller.set(MEASURED, self.testbed.get(*MEASURED))
-        _, _, _, _, due, self.next_sample = self.controller.fmi.newDiscreteStates()
-        assert due
-        self.controller.fmi.enterContinuousTimeMode()
-
-    def row(self) -> list[float]:
-        components = {"testbed": self.testbed, "controller": self.controller}
-        return [components[component].get(name)[0] for component, name in (end.split(".") for end in WATCHED)]
-
-    def run(self, advance: Callable[[Loop, float, float], None]) -> np.ndarray:
-        """What is watched at every sample, (SAMPLES + 1, WATCHED). `advance(loop, from, to)` integrates between two."""
-        rows, time = [self.row()], 0.0
-        for k in range(1, SAMPLES + 1):
-            assert self.next_sample == pytest.approx(k * SAMPLE, rel=1e-12)
-            advance(self, time, self.next_sample)
-            time = self.next_sample
-            self.move(time)
-            rows.append(self.row())
-            self.controller.fmi.enterEventMode()
-            self.sample()
-        return np.array(rows)
-
-    def close(self) -> None:
-        self.testbed.close()
-        self.controller.close()
-
-
-def runge_kutta(steps: int):
-    """The classical method with this many steps between two samples."""
-
-    def advance(loop: Loop, start: float, end: float) -> None:
-        fmi, h = loop.testbed.fmi, (end - start) / steps
-        array = (ctypes.c_double * STATES)()
+        def move(time: float) -> None:
+            testbed.set_time(time)
+            controller.set_time(time)
+            testbed.set(MOTORS, controller.get(MOTORS))
 
         def slope(time: float, x: np.ndarray) -> np.ndarray:
-            loop.move(time)
-            array[:] = x
-            fmi.setContinuousStates(array, STATES)
-            fmi.getDerivatives(array, STATES)
-            return np.array(array)
+            move(time)
+            testbed.set_continuous_states(x)
+            return testbed.get_derivatives()
 
-        fmi.getContinuousStates(array, STATES)
-        x = np.array(array)
-        for time in start + h * np.arange(steps):
-            k1 = slope(time, x)
-            k2 = slope(time + h / 2, x + h / 2 * k1)
-            k3 = slope(time + h / 2, x + h / 2 * k2)
-            k4 = slope(time + h, x + h * k3)
-            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        array[:] = x
-        fmi.setContinuousStates(array, STATES)
-        fmi.completedIntegratorStep()
-
-    return advance
-
-
-def cvode(loop: Loop):
-    """FMPy's CVode, restarted at every sample, because there the motors' acceleration jumps."""
-    fmi = loop.testbed.fmi
-
-    class NoInput:
-        def apply(self, time: float) -> None:
-            """The inputs come with the time."""
-
-    solver = CVodeSolver(
-        nx=STATES,
-        nz=0,
-        get_x=fmi.getContinuousStates,
-        set_x=fmi.setContinuousStates,
-        get_dx=fmi.getDerivatives,
-        get_z=lambda z, nz: None,
-        get_nominals=fmi.getNominalsOfContinuousStates,
-        set_time=loop.move,
-        input=NoInput(),
-        startTime=0.0,
-        relativeTolerance=1e-10,
-    )
-
-    def advance(_: Loop, start: float, end: float) -> None:
-        solver.reset(start)
-        solver.step(start, end)
-
-    return advance
-
-
-@pytest.fixture
-def loop(fmu, controller_fmu, closed_loop: System):
-    made = Loop(fmu, controller_fmu, {end.split(".")[1]: value for end, value in closed_loop.inputs.values()})
-    yield made
-    made.close()
+        rows, time, h = [], 0.0, SAMPLE / steps
+        for k in range(SAMPLES + 1):
+            move(time)
+            rows.append([instances[end.split(".")[0]].get(end.split(".")[1])[0] for end in WATCHED])
+            if k:
+                controller.handle_events(MEASURED, testbed.get(MEASURED))
+            assert controller.next_event_time[0] == pytest.approx((k + 1) * SAMPLE, rel=1e-12)
+            x = testbed.get_continuous_states()
+            for t in time + h * np.arange(steps):
+                k1 = slope(t, x)
+                k2 = slope(t + h / 2, x + h / 2 * k1)
+                k3 = slope(t + h / 2, x + h / 2 * k2)
+                k4 = slope(t + h, x + h * k3)
+                x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            testbed.set_continuous_states(x)
+            testbed.completed_integrator_step()
+            time = controller.next_event_time[0]
+        return np.array(rows)
 
 
 @pytest.fixture(scope="module")
-def exact(fmu, controller_fmu, closed_loop: System) -> np.ndarray:
-    """By Runge and Kutta with steps so small that halving them changes nothing to speak of."""
-    references = {end.split(".")[1]: value for end, value in closed_loop.inputs.values()}
-    found = []
-    for steps in (8, 16):
-        loop = Loop(fmu, controller_fmu, references)
-        found.append(loop.run(runge_kutta(steps)))
-        loop.close()
-    assert np.abs(found[1] - found[0]).max() < 1e-9
-    pitch, roll, torque, motor = np.abs(found[1]).max(axis=0)
+def exact(closed_loop: System) -> np.ndarray:
+    """The response with steps so small that half of them change it by less than 1e-9."""
+    coarse, fine = run(closed_loop, 8), run(closed_loop, 16)
+    assert np.abs(fine - coarse).max() < 1e-9
+    pitch, roll, torque, motor = np.abs(fine).max(axis=0)
     assert pitch > 0.5 and roll > 1.0 and torque > 0.5 and motor > 1.0, "it moves"
-    return found[1]
+    return fine
 
 
 def test_co_simulation_tends_to_it(exact, closed_loop: System):
-    """Angles, of second order in the communication step, of which there are whole numbers in a sample."""
+    """Angles, of second order in the communication step, which divides a sample evenly."""
 
     def error(steps: int) -> np.ndarray:
         rows = coupling.couple(closed_loop, SAMPLE / steps, SAMPLE * SAMPLES, False, WATCHED)[::steps]
@@ -188,8 +81,3 @@ def test_co_simulation_tends_to_it(exact, closed_loop: System):
     assert np.all(fine[angles] < 1e-7), fine
     order = np.log2(coarse / fine)
     assert np.all((order[angles] > 1.9) & (order[angles] < 2.1)), (coarse, fine)
-
-
-def test_cvode_gives_the_same(loop: Loop, exact):
-    found = loop.run(cvode(loop))
-    assert np.abs(found - exact).max(axis=0) == pytest.approx(0, abs=1e-6)

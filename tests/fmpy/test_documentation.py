@@ -16,21 +16,22 @@ import numpy as np
 import pytest
 from built import ROOT
 from fmpy import simulate_fmu
+from lagrange import OUTPUTS
 from lxml import etree
 from reference import integrate
-from test_model_exchange import END, OUTPUTS, angle, rate
 
 from prw.errors import UserError
 from prw.motion import Motion
-from tools.documentation.formulas import typeset
-from tools.documentation.pages import CONTROLLER, PAGES, TESTBED, render
-from tools.documentation.sources import read_description, read_table
+from tools.documentation.pages import PAGES, TESTBED, render
+from tools.documentation.sources import read_table
 from tools.figures import COMMITTED, ICON, ICON_SVG, bode, gallery
 from tools.figures.gallery import figures
 from tools.figures.icon import draw_controller, draw_testbed
 from tools.figures.results import numbers, results
 from tools.figures.writing import write_for_page, write_json, write_png, write_small_png, write_svg
 
+#: Two sines from rest.
+END, AMPLITUDE, FREQUENCY = 0.5, np.array([0.3, -0.2]), np.array([14.0, 23.0])
 EPSILON = np.finfo(float).eps
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 
@@ -70,52 +71,16 @@ def test_the_fmu_contains_page_and_icons(fmu, page):
 
 
 @both
-def test_nothing_is_loaded_and_nothing_runs(page):
+def test_the_page_is_well_formed_and_loads_nothing(page):
+    etree.fromstring(re.sub(r"<!DOCTYPE html>|<meta [^>]*>", "", page))
+    ids = re.findall(r'\sid="([^"]+)"', page)
+    assert len(ids) == len(set(ids)) and {*re.findall(r'(?:href="|url\()#([^")]+)', page)} <= {*ids}
     assert len(page.encode()) < 400e3
     assert "<script" not in page and "@import" not in page and "javascript:" not in page
     links = re.findall(r'(?:href|src)\s*=\s*"([^"]*)"', page)
     # A picture is part of the page itself.
     assert links and all(link.startswith(("#", "data:image/png;base64,")) for link in links)
     assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", page))
-
-
-@both
-def test_links_inside_the_page(page):
-    ids = re.findall(r'\sid="([^"]+)"', page)
-    assert len(ids) == len(set(ids))
-    targets = re.findall(r'href="#([^"]+)"', page) + re.findall(r"url\(#([^)]+)\)", page)
-    assert set(targets) <= set(ids)
-
-
-@both
-def test_the_page_is_well_formed(page):
-    etree.fromstring(re.sub(r"<!DOCTYPE html>|<meta [^>]*>", "", page))
-
-
-@pytest.mark.parametrize("which", PAGES, ids=lambda page: page.text)
-def test_every_variable_is_in_its_page(which):
-    page, description = text_of(which), read_description(ROOT / which.description)
-    for variable in description.modelVariables:
-        assert f"<code>{variable.name}</code>" in page and html.escape(variable.description) in page
-    assert description.guid not in page and description.guid.strip("{}") not in page
-
-
-@pytest.mark.parametrize(
-    "which, formulas", [(TESTBED, 30), (CONTROLLER, 7)], ids=lambda value: getattr(value, "text", "")
-)
-def test_no_equation_is_left_untyped(which, formulas):
-    page = text_of(which)
-    text = re.sub(r"<pre.*?</pre>", "", page, flags=re.S)
-    assert "\\" not in text and "$" not in text
-    assert page.count("<math") > formulas
-
-
-def test_typeset():
-    block = typeset(r"\[ \begin{bmatrix} a & b \end{bmatrix} < 1 \tag{8} \]")
-    assert block.startswith('<div class="equation" tabindex="0"><math display="block">') and block.endswith(
-        "(8)</span></div>"
-    )
-    assert '<mtable class="matrix">' in block and "<mo>&lt;</mo>" in block
 
 
 def test_a_table_that_is_missing_or_has_gaps_is_named(tmp_path):
@@ -160,10 +125,18 @@ def test_the_libcosim_program(page, fmu, model, tmp_path):
     assert abs(pitch) < 1e-12 and roll == pytest.approx(roll_at_2(model), rel=1e-4)
 
 
+def angle(t):
+    return AMPLITUDE * (1 - np.cos(FREQUENCY * t))
+
+
+def rate(t):
+    return AMPLITUDE * FREQUENCY * np.sin(FREQUENCY * t)
+
+
 def test_what_is_said_of_model_exchange_in_fmpy(fmu, model):
     """The percentages in docs/compatibility.md and on the page: FMPy holds inputs over a step."""
-    said = (ROOT / "docs/compatibility.md").read_text(encoding="utf-8").split("For two sines")[1].split("\n* ")[0]
-    percents = [float(number) for number in re.findall(r"([\d.]+) %", said)]
+    reported = (ROOT / "docs/compatibility.md").read_text(encoding="utf-8").split("For two sines")[1].split("\n* ")[0]
+    percents = [float(number) for number in re.findall(r"([\d.]+) %", reported)]
     seen = []
     for kind, step in (("ModelExchange", 1e-3), ("ModelExchange", 1e-4), ("CoSimulation", 1e-3)):
         t = np.linspace(0, END, round(END / step) + 1)
@@ -198,40 +171,40 @@ def test_numbers_are_up_to_date(found):
     compare(committed, fresh, "numbers.json")
 
 
-def test_figures_are_up_to_date(found, tmp_path):
-    """The committed figures show what the FMU does now: the same drawing, to a fiftieth of a point."""
+def write(folder: Path, found) -> dict[str, bytes]:
+    """The files that `make figures` keeps with the sources, by name."""
+    write_json(folder / "numbers.json", numbers(found))
+    for name, drawn in figures(found).items():
+        if drawn.for_page:
+            write_for_page(folder / f"{name}.svg", drawn.figure)
+        if drawn.for_readme:
+            write_small_png(folder / f"{name}.png", drawn.figure)
+    for name, draw in (("testbed", draw_testbed), ("controller", draw_controller)):
+        write_svg(folder / f"icon_{name}.svg", draw())
+        write_png(folder / f"icon_{name}.png", draw(), dpi=128)
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def written(found, tmp_path_factory):
+    return write(tmp_path_factory.mktemp("figures"), found)
+
+
+def test_figures_are_up_to_date(written):
+    """The committed figures show the present results of the FMU: the same drawing, to a fiftieth of a point."""
     made_with = json.loads((ROOT / COMMITTED / "numbers.json").read_text(encoding="utf-8"))["made_with"]
     if made_with != f"matplotlib {matplotlib.__version__}":
         pytest.skip(f"the figures were drawn by {made_with}")
-    for name, drawn in figures(found).items():
-        if not drawn.for_page:
-            continue
-        write_for_page(tmp_path / f"{name}.svg", drawn.figure)
-        fresh, kept = ((folder / f"{name}.svg").read_text(encoding="utf-8") for folder in (tmp_path, ROOT / COMMITTED))
-        message = f"{COMMITTED}/{name}.svg is out of date; `make figures docs` renews it"
+    for name in (name for name in written if name.endswith(".svg") and not name.startswith("icon_")):
+        fresh, kept = written[name].decode(), (ROOT / COMMITTED / name).read_text(encoding="utf-8")
+        message = f"{COMMITTED}/{name} is out of date; `make figures docs` renews it"
         assert NUMBER.sub("#", fresh) == NUMBER.sub("#", kept), message
         values = (np.array(NUMBER.findall(text), dtype=float) for text in (fresh, kept))
         np.testing.assert_allclose(*values, atol=0.021, err_msg=message)
 
 
-def test_all_text_in_figures_follows_light_and_dark():
-    figures = sorted((ROOT / COMMITTED).glob("*.svg"))
-    assert figures
-    for path in figures:
-        text = path.read_text(encoding="utf-8")
-        for element in re.findall(r"<text\b[^>]*>", text):
-            assert "fill:currentColor" in element, f"{path.name}: {element}"
-
-
-def test_the_same_figure_is_the_same_file(found, tmp_path):
-    for attempt in "12":
-        write_svg(tmp_path / f"{attempt}.svg", figures(found)["fig5_b"].figure)
-    assert (tmp_path / "1.svg").read_bytes() == (tmp_path / "2.svg").read_bytes()
-    assert b"<dc:date>" not in (tmp_path / "1.svg").read_bytes()
-
-
 def in_the_last_digit(value, random):
-    """The same results as another processor finds them; times and steps are quotients, the same on all."""
+    """The results of another processor. Times and steps are quotients, which are equal on all."""
     if isinstance(value, np.ndarray):
         return value * (1 + EPSILON * random.integers(-2, 3, value.shape))
     if isinstance(value, dict):
@@ -246,29 +219,14 @@ def in_the_last_digit(value, random):
     return value
 
 
-def test_another_processor_writes_the_same_files(found, tmp_path, monkeypatch):
+def test_another_processor_writes_the_same_files(found, written, tmp_path, monkeypatch):
     """`make figures` on another machine changes no file that is kept with the sources."""
-
-    def write(folder: Path, found) -> dict[str, bytes]:
-        folder.mkdir()
-        write_json(folder / "numbers.json", numbers(found))
-        for name, drawn in figures(found).items():
-            if drawn.for_page:
-                write_for_page(folder / f"{name}.svg", drawn.figure)
-            if drawn.for_readme:
-                write_small_png(folder / f"{name}.png", drawn.figure)
-        for name, draw in (("testbed", draw_testbed), ("controller", draw_controller)):
-            write_svg(folder / f"icon_{name}.svg", draw())
-            write_png(folder / f"icon_{name}.png", draw(), dpi=128)
-        return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-    here = write(tmp_path / "here", found)
     random = np.random.default_rng(1)
     monkeypatch.setattr(gallery, "COLUMN", gallery.COLUMN * (1 + EPSILON))
     monkeypatch.setattr(bode, "CURVE", in_the_last_digit(bode.CURVE, random))
-    there = write(tmp_path / "there", in_the_last_digit(found, random))
-    assert here.keys() == there.keys()
-    assert [name for name in here if here[name] != there[name]] == []
+    there = write(tmp_path, in_the_last_digit(found, random))
+    assert written.keys() == there.keys()
+    assert [name for name in written if written[name] != there[name]] == []
 
 
 def test_the_command(fmu, tmp_path):

@@ -16,7 +16,7 @@ from reference import augmented, exponential
 
 STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 CASES = int(os.environ.get("PRW_EXTREME_CASES", "12"))
-#: Of the largest of these systems only 1 digit in 10^25 is left after scaling and squaring with as many.
+#: Scaling and squaring of the largest of these systems loses more than 25 digits.
 DIGITS = 120
 
 many = np.vectorize(mpmath.mpf, otypes=[object])
@@ -81,11 +81,11 @@ def check(instance, parameters, h, seed, steps=3):
         instance.fmi.setReal(angles, theta)
         instance.fmi.setRealInputDerivatives(angles, [1, 1], slope)
         instance.step(k * h, h)
-        truth, size = exact.step(x, theta, slope, None if path is None else many(theta) - path)
+        true_values, size = exact.step(x, theta, slope, None if path is None else many(theta) - path)
         path = many(theta) + many(slope) * exact.h
         found = instance.get(*STATES, *OUTPUTS)
         assert np.all(np.isfinite(found))
-        worst = max(worst, float(max(abs(many(found) - truth) / size)))
+        worst = max(worst, float(max(abs(many(found) - true_values) / size)))
     assert not instance.complaints()
     return worst
 
@@ -137,11 +137,11 @@ def test_a_million_steps(instance, factors):
     assert not instance.complaints()
     with mpmath.workdps(DIGITS):
         exact = Exact(parameters, steps * h)
-        truth, size = exact.step(np.zeros(6), np.zeros(2), slope)
+        true_values, size = exact.step(np.zeros(6), np.zeros(2), slope)
         # Each of the steps rounds the angles, and the springs make velocities of that.
         rate = mpmath.sqrt(abs(exact.model.a[4:, :4]).max())
         for velocity, angle in (4, 2), (5, 3), (10, 8), (11, 9):
             size[velocity] += rate * size[angle]
-        error = abs(many(found) - truth) / size
+        error = abs(many(found) - true_values) / size
     print([f"{float(e):.1e}" for e in error])
     assert max(error) < 1e-11

@@ -1,4 +1,4 @@
-"""What the page in the FMU runs, without a browser: the same model, with the same bits in its answers, and no more than that."""
+"""The page in the FMU without a browser: its module is the model, with bit-identical results, and the page loads nothing else."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ class WebAssembly:
     def call(self, name: str, *values: float) -> int:
         return self.functions[name](self.store, *values)
 
-    def write(self, place: int, *parts: bytes) -> None:
-        self.functions["memory"].write(self.store, b"".join(parts), self.room + place)
+    def write(self, offset: int, *parts: bytes) -> None:
+        self.functions["memory"].write(self.store, b"".join(parts), self.room + offset)
 
     def does(self, name: str, *values: float) -> None:
         assert self.call(name, self.component, *values) == 0, name
@@ -84,11 +84,11 @@ def test_the_page_is_that_of_the_sources_and_the_fmus(testbed, page, packed):
     """Nothing else is changed in it; the FMU for 3.0 has that for 2.0, whose functions the modules have."""
     assert LIVE.sub("", page) == (ROOT / TESTBED.path).read_text(encoding="utf-8")
     folder = testbed.parents[testbed.parent.name == "fmi3"]
-    for place, name in enumerate([testbed.name, "prw_controller.fmu"]):
+    for offset, name in enumerate([testbed.name, "prw_controller.fmu"]):
         with zipfile.ZipFile(folder / name) as archive:
-            assert archive.read("modelDescription.xml") == packed[2 * place]
+            assert archive.read("modelDescription.xml") == packed[2 * offset]
         guid = read_model_description(str(folder / name)).guid
-        assert guid.encode() in packed[2 * place + 1]
+        assert guid.encode() in packed[2 * offset + 1]
 
 
 def test_it_is_small_and_loads_nothing(testbed, page):
@@ -118,10 +118,10 @@ def test_the_module_has_the_librarys_bits(fmu, packed, name):
     module.does("fmi2ExitInitializationMode")
     inputs = ("theta1", "theta2", "omega1", "omega2")
     times = 1e-3 * np.arange(round(experiment.stop_time / 1e-3) + 1)
-    courses = np.column_stack([np.interp(times, experiment.inputs["time"], experiment.inputs[name]) for name in inputs])
+    signals = np.column_stack([np.interp(times, experiment.inputs["time"], experiment.inputs[name]) for name in inputs])
     with Fmu(fmu) as loaded:
         library = loaded.instances(start=dict(experiment.parameters))
-        for k, row in enumerate(courses):
+        for k, row in enumerate(signals):
             module.set("Real", "d", {variables[name].valueReference: value for name, value in zip(inputs, row)})
             library.set(inputs, row)
             there = module.get([variables[name].valueReference for name in OUTPUTS])

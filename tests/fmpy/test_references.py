@@ -1,5 +1,5 @@
 """The packed FMUs against the reference experiments inside them, under several importers, with a margin; and the
-tolerances tell a testbed apart whose stiffness is off by 1 %."""
+tolerances detect a testbed whose stiffness is off by 1 %."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from prw.checking.agreement import compare
 from prw.checking.experiments import FOLDER, read_experiments
 from tools.validation.importers import IMPORTERS
 
-#: Of the tolerance: what the FMU takes at most, and what 1 % of k1 takes at least.
+#: Shares of the tolerance: the largest of the FMU, and the smallest of a change of k1 by 1 %.
 PASSES, FAILS = 0.5, 1.4
 NAMES = ["fig4_opposite", "fig4_equal", "rate_step", "from_40_degrees", "other_parameters", "closed_loop"]
 
@@ -50,7 +50,7 @@ def test_the_tolerances_are_honest(testbed, known, importer, name):
 
 
 def test_the_folders_for_other_vendors(fmu, tmp_path):
-    """As the rules of the FMI Cross-Check want them, and the same bytes when made twice."""
+    """The directories follow the rules of the FMI Cross-Check, and packing twice gives the same bytes."""
     for name in ("one.zip", "other.zip"):
         cross_check.pack(fmu, tmp_path / name)
     assert (tmp_path / "one.zip").read_bytes() == (tmp_path / "other.zip").read_bytes()

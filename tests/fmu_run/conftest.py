@@ -1,4 +1,4 @@
-"""Fixtures: FMUs in C that do what FMUs should not."""
+"""Fixtures: FMUs in C that misbehave."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ def unruly(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def unruly3(tmp_path_factory) -> Path:
-    """The same for FMI 3.0, in what FMI 3.0 has of its own (unruly3.c)."""
+    """The FMU in C for FMI 3.0, for functions that FMI 2.0 does not have (unruly3.c)."""
     return build(tmp_path_factory.mktemp("unruly3"), name="unruly3", platform=f"{platform.machine()}-linux")

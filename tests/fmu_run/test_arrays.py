@@ -1,4 +1,4 @@
-"""A model with arrays, in FMI 2.0 a scalar for each element: the same program runs both FMUs, to the bit; FMPy has the values."""
+"""A model with arrays, in FMI 2.0 a scalar for each element: the same program runs both FMUs with bit-identical results, as FMPy does."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fmpy.validation import validate_fmu
 
 PIECES = range(1, 9)
 TEMPERATURES = [f"T[{piece}]" for piece in PIECES]
-#: Of everything that can be read as a number.
+#: One output of each kind that can be read as a number.
 OUTPUTS = [
     "mean",
     "means[2]",
@@ -32,7 +32,7 @@ OUTPUTS = [
 def rods(tmp_path_factory) -> tuple[Path, Path]:
     """The FMUs of crates/fmu-export/tests/toys/rod.rs, for FMI 2.0 and FMI 3.0."""
     folder = tmp_path_factory.mktemp("rods")
-    # Of the whole workspace, as the Rust tests have compiled them: with --package, cargo compiles other features.
+    # Built in the whole workspace, like the Rust tests: with --package, cargo compiles other features.
     build = ["cargo", "build", "--quiet", "--locked", "--workspace", "--example", "rod"]
     subprocess.run(build, cwd=ROOT, check=True)
     examples = ROOT / "target/debug/examples"
@@ -41,7 +41,7 @@ def rods(tmp_path_factory) -> tuple[Path, Path]:
 
 
 def both(rods, run):
-    """What it gives with either FMU."""
+    """The results of `run` with both FMUs."""
     found = []
     for path in rods:
         with fmu_run.Fmu(path) as fmu:

@@ -1,4 +1,4 @@
-"""Runs that end before their time: what is kept of them, and what is told."""
+"""Runs that end early: the rows that are kept, and the messages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 TIME = np.arange(11) / 10
 
-# By the number of the mood: how many of the 11 rows there are, what stands among the errors, and what among the notes.
+# By the number of the mood: the number of rows of 11, the error, and the note.
 MOODS = {
     "good": (11, None, None),
     "silent error": (6, "at 0.5 s: fmi2DoStep was answered with Error, without a message", None),
@@ -52,12 +52,12 @@ def test_moods(request, moods, fixture, first, read_before_set):
     assert runs.errors == thinned.errors == {run: why for run, why in errors.items() if why}
     assert runs.notes == thinned.notes == {run: why for run, why in notes.items() if why}
     for run, count in rows.items():
-        course = np.where(np.arange(11) < count, first + TIME, np.nan)
-        np.testing.assert_allclose(runs["y"][run], course, atol=1e-15)
-        np.testing.assert_allclose(thinned["y"][run], course[::2], atol=1e-15)
-        # Who ends the simulation has measures until then; who is refused has none.
+        signal = np.where(np.arange(11) < count, first + TIME, np.nan)
+        np.testing.assert_allclose(runs["y"][run], signal, atol=1e-15)
+        np.testing.assert_allclose(thinned["y"][run], signal[::2], atol=1e-15)
+        # If the FMU ends the simulation, there are statistics until then; a failed run has none.
         whole = runs.ok[run] or runs.errors[run].startswith("ended")
-        measures = [course[count - 1], course[:count].mean()] if whole else [np.nan, np.nan]
+        measures = [signal[count - 1], signal[:count].mean()] if whole else [np.nan, np.nan]
         np.testing.assert_allclose([runs["y", "end"][run], runs["y", "mean"][run]], measures, atol=1e-14)
 
 

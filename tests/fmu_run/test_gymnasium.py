@@ -1,4 +1,4 @@
-"""Gymnasium's environments of FMUs, beside instances that are stepped by hand."""
+"""Gymnasium's environments of FMUs, compared with instances that the test steps."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def task(testbed) -> Task:
 
 
 def played(envs, steps, seed=5):
-    """All that comes of actions drawn at random."""
+    """All results of random actions."""
     envs.action_space.seed(seed)
     found = [envs.reset(seed=seed)[0]]
     for _ in range(steps):
@@ -90,7 +90,7 @@ def test_a_system_is_an_environment_with_the_bounds_of_its_description(task) -> 
 
 @pytest.mark.parametrize("mode", AutoresetMode)
 def test_they_are_instances_stepped_by_hand(task, mode) -> None:
-    """To the bit, over the ends of episodes, with the parameters that the same generator draws."""
+    """Bit-identical over the ends of episodes, with the parameters that the same generator draws."""
     count, envs = 4, VectorEnv(task, 4, autoreset_mode=mode)
     rng, actions = np.random.default_rng(3), np.random.default_rng(4).uniform(-1, 1, (50, count, 2))
 
@@ -170,15 +170,15 @@ def test_one_that_fails_ends_its_own_episode(task, mode, count) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mood", "slope", "words"),
+    ("mood", "slope", "message"),
     [
         (1, 1.0, "fmi2DoStep"),
         (8, 1.0, "ended by the FMU at t = 0.525 s"),
         (0, np.inf, "an observation is no finite number"),
     ],
 )
-def test_an_fmu_that_ends_or_tells_no_numbers_ends_the_episode(unruly, mood, slope, words) -> None:
-    """It may be there once in a process, so closing one gives way to the next."""
+def test_an_fmu_that_ends_or_tells_no_numbers_ends_the_episode(unruly, mood, slope, message) -> None:
+    """The FMU may have one instance in a process, so each environment is closed before the next."""
     task = Task(
         fmu=unruly,
         actions="slope",
@@ -200,7 +200,7 @@ def test_an_fmu_that_ends_or_tells_no_numbers_ends_the_episode(unruly, mood, slo
         for _ in range(5):
             env.step([1.0])
         *_, terminated, truncated, info = env.step([slope])
-        assert terminated and not truncated and words in info["error"]
+        assert terminated and not truncated and message in info["error"]
 
 
 def test_actions_that_make_inputs(task) -> None:
@@ -231,7 +231,7 @@ def test_actions_that_make_inputs(task) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "words"),
+    ("changed", "message"),
     [
         ({"actions": {"pitch": (-1, 1)}}, "pitch is no input, its causality is output"),
         ({"actions": "theta9"}, "theta9"),
@@ -245,8 +245,8 @@ def test_actions_that_make_inputs(task) -> None:
         ({"start": {"k9": 1.0}}, "k9"),
     ],
 )
-def test_what_does_not_fit_is_refused(task, changed, words) -> None:
-    with pytest.raises(ValueError, match=words):
+def test_what_does_not_fit_is_refused(task, changed, message) -> None:
+    with pytest.raises(ValueError, match=message):
         VectorEnv(replace(task, **changed), 2)
 
 

@@ -1,4 +1,4 @@
-"""Instances in the hand, against `Fmu.run`, FMPy's bare calls and each other; to the bit."""
+"""Stateful instances are bit-identical to `Fmu.run`, to FMPy's bare calls and to each other."""
 
 from __future__ import annotations
 
@@ -77,10 +77,10 @@ def test_derivatives_of_inputs_and_outputs(fmu) -> None:
             assert wrist.get("tau1") == runs["tau1"][0, k]
             if k + 1 < len(time):
                 wrist.step(to=time[k + 1])
-        told, before = wrist.get_output_derivatives(("pitch", "roll"))[0], wrist.get(("pitch", "roll"))[0]
+        noted, before = wrist.get_output_derivatives(("pitch", "roll"))[0], wrist.get(("pitch", "roll"))[0]
         wrist.step(1e-7)
         found = (wrist.get(("pitch", "roll"))[0] - before) / 1e-7
-        assert np.allclose(told, found, rtol=1e-4)
+        assert np.allclose(noted, found, rtol=1e-4)
         with pytest.raises(ValueError, match="only Real"):
             wrist.get_output_derivatives("M")
 
@@ -154,7 +154,7 @@ def test_one_drops_out_and_the_others_go_on(testbed) -> None:
 def test_model_exchange_by_fmpys_calls(testbed) -> None:
     """Euler's rule, call by call."""
     description = fmpy.read_model_description(str(testbed))
-    of = {variable.name: variable for variable in description.modelVariables}
+    by_name = {variable.name: variable for variable in description.modelVariables}
     folder = fmpy.extract(str(testbed))
     theirs = instantiate_fmu(folder, description, fmi_type="ModelExchange")
     real = "Float64" if isinstance(theirs, FMU3Model) else "Real"
@@ -175,7 +175,7 @@ def test_model_exchange_by_fmpys_calls(testbed) -> None:
         assert ours.get_event_indicators().shape == (2, 0) and np.array_equal(ours.get_nominals(), np.ones((2, 6)))
         for k in range(20):
             move = [0.1 * k, -0.05 * k]
-            getattr(theirs, f"set{real}")([of[name].valueReference for name in MOTORS], move)
+            getattr(theirs, f"set{real}")([by_name[name].valueReference for name in MOTORS], move)
             theirs.getContinuousStates(pointer(x), 6)
             get = theirs.getDerivatives if isinstance(theirs, FMU2Model) else theirs.getContinuousStateDerivatives
             get(pointer(derivatives), 6)
@@ -189,12 +189,12 @@ def test_model_exchange_by_fmpys_calls(testbed) -> None:
             ours.set_continuous_states(x)
             theirs.completedIntegratorStep()
             assert np.array_equal(ours.completed_integrator_step(), np.zeros((2, 2)))
-        torque = getattr(theirs, f"get{real}")([of["tau1"].valueReference])[0]
+        torque = getattr(theirs, f"get{real}")([by_name["tau1"].valueReference])[0]
         assert np.array_equal(ours.get("tau1"), [torque, torque])
         seed = np.eye(6)
         found = np.transpose([ours.directional_derivative("tau1", STATES, row)[0] for row in seed])
         by_fmpy = [
-            theirs.getDirectionalDerivative([of["tau1"].valueReference], [of[name].valueReference], [1.0])[0]
+            theirs.getDirectionalDerivative([by_name["tau1"].valueReference], [by_name[name].valueReference], [1.0])[0]
             for name in STATES
         ]
         assert np.array_equal(found, by_fmpy)
@@ -217,7 +217,7 @@ def test_events_of_the_controller(controller) -> None:
 def test_what_does_not_fit_is_named(testbed) -> None:
     with fmu_run.Fmu(testbed) as fmu:
         wrists = fmu.instances(3)
-        for call, words in [
+        for call, message in [
             (lambda: wrists.set("theta", 0.0), r"no variable \"theta\"; did you mean \"theta1\""),
             (lambda: wrists.set(MOTORS, np.zeros((2, 2))), r"shape \[2, 2\]; it must be \[3, 2\], \[2\] or a number"),
             (lambda: wrists.set("theta1", [0.0, 1.0]), r"shape \[2\]; it must be \[3\] or a number"),
@@ -251,7 +251,7 @@ def test_what_does_not_fit_is_named(testbed) -> None:
             (lambda: fmu.instances(interface="model-exchange").step(1e-3), "only Co-Simulation steps"),
             (lambda: fmu.instances(interface="model-exchange").set_time(np.inf), "time is inf; it must be finite"),
         ]:
-            with pytest.raises(ValueError, match=words):
+            with pytest.raises(ValueError, match=message):
                 call()
         shared = np.zeros((3, 2))
         with pytest.raises(ValueError, match="shares memory"):
@@ -262,13 +262,13 @@ def test_what_does_not_fit_is_named(testbed) -> None:
 def test_what_an_fmu_does_not_offer_costs_no_instance(unruly) -> None:
     with fmu_run.Fmu(unruly) as fmu:
         one = fmu.instances()
-        for call, words in [
+        for call, message in [
             (one.save, "Unruly cannot save its state"),
             (lambda: one.deserialize([b"12345678"]), "Unruly cannot deserialize a state"),
             (lambda: one.directional_derivative("y", "slope", 1.0), "Unruly has no directional derivatives"),
             (lambda: one.set_input_derivatives("slope", 1.0), "Unruly takes no input derivatives"),
         ]:
-            with pytest.raises(ValueError, match=words):
+            with pytest.raises(ValueError, match=message):
                 call()
         one.step(0.1)
         assert one.errors == {}

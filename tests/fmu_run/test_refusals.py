@@ -1,4 +1,4 @@
-"""What does not fit, FMUs that cannot be loaded, and what stops runs."""
+"""Arguments that do not fit, FMUs that cannot be loaded, and causes that stop runs."""
 
 from __future__ import annotations
 
@@ -83,11 +83,11 @@ def test_refused_runs_leave_the_others_alone(fmu):
     np.testing.assert_array_equal(runs["roll"][0], runs["roll"][4])
     with pytest.raises(fmu_run.FmuError, match=r"run 1: .*k1 must not be below 1e-300.* \(2 of 5 runs failed\)"):
         runs.check()
-    # An input that is refused half way: the time is told.
+    # If an input is rejected during the run, the message has the time.
     angle = np.where(TIME > 0.45, np.inf, 0.0)
     one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"])
     assert re.match(r"at 0\.5 s: .*theta1", one.errors[0]), one.errors
-    # Or at the last time, when all outputs have been read.
+    # At the last time, all outputs have been read.
     angle = np.where(TIME > 0.95, np.inf, 0.0)
     one = fmu.run(TIME, inputs={"theta1": angle}, outputs=["roll"], read_before_set=True)
     assert re.match(r"at 1 s: .*theta1", one.errors[0]) and np.isfinite(one["roll"]).all()
@@ -168,7 +168,7 @@ def test_a_library_that_is_damaged(tmp_path, testbed):
         return content[:200] if name.startswith("binaries/") else content
 
     path = repacked(testbed, tmp_path / "damaged.fmu", change)
-    # In the words of the system.
+    # The message of the system.
     with pytest.raises(fmu_run.FmuError, match=r"its library cannot be loaded: dlopen failed: .*\.so: "):
         fmu_run.Fmu(path)
 
@@ -194,9 +194,9 @@ def test_an_fmu_that_is_closed(testbed):
 
 
 def test_units_of_declared_types(unruly, unruly3):
-    of = {"slope": "m/s", "y": "m", "gap": "mm", "count": None}
+    by_name = {"slope": "m/s", "y": "m", "gap": "mm", "count": None}
     of3 = {"y": "m", "gap": "mm", "number": None, "temper": None}
-    for path, units in ((unruly, of), (unruly3, of3)):
+    for path, units in ((unruly, by_name), (unruly3, of3)):
         with fmu_run.Fmu(path) as fmu:
             assert {name: fmu.variables[name].unit for name in units} == units
 
@@ -230,11 +230,11 @@ def test_start_values_with_units(fmu):
         fmu.run(time, inputs={"theta1": (0.0, "grad")}, outputs=["roll"])
     held = fmu.instances(2, start={"theta3_start": (30.0, "deg"), "start_at_rest": "false"})
     np.testing.assert_allclose(held.get("theta3"), np.pi / 6, rtol=1e-15)
-    for start, words in [
+    for start, message in [
         ({"k1": (1.9, "N/m")}, 'k1 can be given in N.m/rad or N.m/deg, not in "N/m"'),
         ({"M": (3, "kg")}, "M has no unit, its values cannot be in kg"),
     ]:
-        with pytest.raises(ValueError, match=re.escape(words)):
+        with pytest.raises(ValueError, match=re.escape(message)):
             fmu.run(time, start=start, outputs=outputs)
 
 
@@ -258,7 +258,7 @@ def test_other_types(unruly):
         assert list(labels["y"][:, 0]) == [3.0, 5.0] and list(labels.errors) == [1]
         one = fmu.instances(start={"label": "held", "mood": "Good", "flag": "true"})
         assert one.texts("label") == ["held"] and list(one.get(("mood", "flag"))[0]) == [0.0, 1.0]
-        for call, words in [
+        for call, message in [
             (lambda: fmu.run(TIME, outputs=["label"]), "label is no number"),
             (lambda: one.texts("y"), "y is a number, no text"),
             (
@@ -275,7 +275,7 @@ def test_other_types(unruly):
             (lambda: fmu.run(TIME, outputs=["y"], inputs={"slope": None}), "slope: None is no number"),
             (lambda: fmu.run(TIME, outputs=["y"], start={"slope": None}), "slope: None is no number"),
         ]:
-            with pytest.raises(ValueError, match=words):
+            with pytest.raises(ValueError, match=message):
                 call()
     np.testing.assert_array_equal(runs["count"][0], counts)
     np.testing.assert_array_equal(runs["flag"][0], counts > 0)
@@ -312,7 +312,7 @@ def test_ctrl_c_stops_runs(testbed, times):
 
 
 def test_progress(testbed):
-    told = []
+    noted = []
     time = np.linspace(0, 20, 20001)
     with fmu_run.Fmu(testbed) as fmu:
         start = {"k1": np.full(400, 90.0)}
@@ -321,16 +321,16 @@ def test_progress(testbed):
             start=start,
             outputs=["roll"],
             measures=["peak"],
-            progress=lambda done, all_: told.append((done, all_)),
+            progress=lambda done, all_: noted.append((done, all_)),
         )
-        assert told and all(all_ == 400 for _, all_ in told) and told == sorted(told)
+        assert noted and all(all_ == 400 for _, all_ in noted) and noted == sorted(noted)
 
         def stop(done, runs):
             raise RuntimeError("enough")
 
         with pytest.raises(RuntimeError, match="enough"):
             fmu.run(time, start=start, outputs=["roll"], measures=["peak"], progress=stop)
-        # It can go on.
+        # Further runs are possible.
         assert fmu.run(TIME, outputs=["roll"]).count == 1
 
 

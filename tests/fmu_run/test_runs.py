@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 import warnings
@@ -10,6 +11,7 @@ import fmpy
 import fmu_run
 import numpy as np
 import pytest
+from built import ROOT
 from fmpy.simulation import instantiate_fmu
 
 OUTPUTS = ["tau1", "pitch", "roll", "pitch_rate", "theta3", "M"]
@@ -27,7 +29,7 @@ def motion(samples: int = 400, scale: float = 1.0) -> tuple[np.ndarray, dict[str
 def by_fmpy(path, time, inputs, start, outputs, slopes=None, read_before_set=False) -> dict[str, np.ndarray]:
     """One run, call by call, with FMPy's classes for the C functions."""
     description = fmpy.read_model_description(str(path))
-    of = {v.name: v for v in description.modelVariables}
+    by_name = {v.name: v for v in description.modelVariables}
     folder = fmpy.extract(str(path))
     slave = instantiate_fmu(folder, description, fmi_type="CoSimulation")
     is_fmi2 = description.fmiVersion == "2.0"
@@ -36,10 +38,10 @@ def by_fmpy(path, time, inputs, start, outputs, slopes=None, read_before_set=Fal
 
     def put(values):
         for name, value in values.items():
-            getattr(slave, getters[of[name].type].replace("get", "set"))([of[name].valueReference], [value])
+            getattr(slave, getters[by_name[name].type].replace("get", "set"))([by_name[name].valueReference], [value])
 
     def get(name):
-        return getattr(slave, getters[of[name].type])([of[name].valueReference])[0]
+        return getattr(slave, getters[by_name[name].type])([by_name[name].valueReference])[0]
 
     if is_fmi2:
         slave.setupExperiment(startTime=time[0], stopTime=time[-1])
@@ -53,7 +55,7 @@ def by_fmpy(path, time, inputs, start, outputs, slopes=None, read_before_set=Fal
             rows.append([get(name) for name in outputs])
         put({name: values[k] for name, values in inputs.items()})
         for name, values in (slopes or {}).items():
-            slave.setRealInputDerivatives([of[name].valueReference], [1], [values[k]])
+            slave.setRealInputDerivatives([by_name[name].valueReference], [1], [values[k]])
         if not read_before_set:
             rows.append([get(name) for name in outputs])
         if k + 1 < len(time):
@@ -66,9 +68,9 @@ def by_fmpy(path, time, inputs, start, outputs, slopes=None, read_before_set=Fal
 
 def same(runs, expected, run=0):
     assert list(runs) == list(expected)
-    for name, course in expected.items():
-        assert np.abs(course).max() > 0, name
-        np.testing.assert_array_equal(runs[name][run], course, err_msg=name)
+    for name, signal in expected.items():
+        assert np.abs(signal).max() > 0, name
+        np.testing.assert_array_equal(runs[name][run], signal, err_msg=name)
 
 
 @pytest.mark.parametrize("read_before_set", [False, True])
@@ -104,15 +106,15 @@ def test_each_run_has_its_own_values(testbed, threads):
     scales = np.linspace(0.5, 1.5, 20)
     stiffness = np.linspace(60.0, 200.0, 20)
     time, _ = motion()
-    courses = [motion(scale=scale)[1] for scale in scales]
-    inputs = {name: np.stack([course[name] for course in courses]) for name in INPUTS}
-    inputs["omega2"] = courses[0]["omega2"]
+    signals = [motion(scale=scale)[1] for scale in scales]
+    inputs = {name: np.stack([signal[name] for signal in signals]) for name in INPUTS}
+    inputs["omega2"] = signals[0]["omega2"]
     with fmu_run.Fmu(testbed) as fmu:
         start = {"k1": stiffness, "k2": 100, "use_omega": True}
         runs = fmu.run(time, inputs=inputs, start=start, outputs=OUTPUTS, threads=threads)
     assert runs["roll"].shape == (20, len(time)) and runs.count == 20 and runs.ok.all()
     for run in (0, 7, 19):
-        one = courses[run] | {"omega2": courses[0]["omega2"]}
+        one = signals[run] | {"omega2": signals[0]["omega2"]}
         start = {"k1": stiffness[run], "k2": 100.0, "use_omega": True}
         same(runs, by_fmpy(testbed, time, one, start, OUTPUTS), run)
 
@@ -132,14 +134,14 @@ def test_measures_and_what_is_kept(testbed):
         measured = fmu.run(time, inputs=inputs, start={"k1": [80.0, 90.0]}, outputs=["roll"], measures=["peak"])
     np.testing.assert_array_equal(runs.time, time[::7])
     np.testing.assert_array_equal(runs["roll"], whole["roll"][:, ::7])
-    course = whole["roll"]
-    np.testing.assert_array_equal(runs["roll", "min"], course.min(axis=1))
-    np.testing.assert_array_equal(runs["roll", "max"], course.max(axis=1))
-    np.testing.assert_array_equal(runs["roll", "peak"], np.abs(course).max(axis=1))
-    np.testing.assert_array_equal(runs["roll", "time_of_peak"], time[np.abs(course).argmax(axis=1)])
-    np.testing.assert_allclose(runs["roll", "mean"], course.mean(axis=1), rtol=1e-13)
-    np.testing.assert_allclose(runs["roll", "rms"], np.sqrt((course**2).mean(axis=1)), rtol=1e-13)
-    np.testing.assert_array_equal(runs["roll", "end"], course[:, -1])
+    signal = whole["roll"]
+    np.testing.assert_array_equal(runs["roll", "min"], signal.min(axis=1))
+    np.testing.assert_array_equal(runs["roll", "max"], signal.max(axis=1))
+    np.testing.assert_array_equal(runs["roll", "peak"], np.abs(signal).max(axis=1))
+    np.testing.assert_array_equal(runs["roll", "time_of_peak"], time[np.abs(signal).argmax(axis=1)])
+    np.testing.assert_allclose(runs["roll", "mean"], signal.mean(axis=1), rtol=1e-13)
+    np.testing.assert_allclose(runs["roll", "rms"], np.sqrt((signal**2).mean(axis=1)), rtol=1e-13)
+    np.testing.assert_array_equal(runs["roll", "end"], signal[:, -1])
     np.testing.assert_array_equal(runs["M", "mean"], [4, 4])
     np.testing.assert_array_equal(measured["roll", "peak"], runs["roll", "peak"])
     assert measured and len(measured) == 0 and len(measured.time) == 0
@@ -148,7 +150,7 @@ def test_measures_and_what_is_kept(testbed):
 
 
 def test_frames_and_datasets(testbed, monkeypatch):
-    """Every number at its run, its time and the start values of its run; those that the FMU refuses are not numbers."""
+    """Every number at its run, its time and the start values of its run; rejected runs have NaN."""
     time, inputs = motion(5)
     start = {"k1": [80.0, -1.0, 90.0], "use_omega": True, "theta1": 0.25}
     with fmu_run.Fmu(testbed) as fmu:
@@ -160,11 +162,11 @@ def test_frames_and_datasets(testbed, monkeypatch):
     assert frame.index.names == ["run", "time"] and list(frame) == names and len(frame) == 9
     assert dict(dataset.sizes) == {"run": 3, "time": 3} and set(dataset.coords) == {"run", "time", *names[:3]}
     for run in (0, 2):
-        for place, t in enumerate(time[::2]):
+        for position, t in enumerate(time[::2]):
             row = frame.loc[(run, t)]
-            assert row["roll"] == runs["roll"][run, place] == dataset["roll"].sel(run=run, time=t)
+            assert row["roll"] == runs["roll"][run, position] == dataset["roll"].sel(run=run, time=t)
             assert row["roll_peak"] == runs["roll", "peak"][run] == dataset["roll_peak"].sel(run=run)
-            assert row["theta1"] == inputs["theta1"][::2][place] and row["theta1 at start"] == 0.25
+            assert row["theta1"] == inputs["theta1"][::2][position] and row["theta1 at start"] == 0.25
             assert row["k1"] == start["k1"][run] == dataset["k1"].sel(run=run) and row["use_omega"] == 1
     assert frame.loc[1]["roll"].isna().all() and dataset["roll_peak"].isnull().values.tolist() == [False, True, False]
     frame = measured.to_pandas()
@@ -180,11 +182,11 @@ def test_frames_and_datasets(testbed, monkeypatch):
 def test_names_that_were_not_asked_for(testbed):
     with fmu_run.Fmu(testbed) as fmu:
         runs = fmu.run([0.0, 1e-3], outputs=["roll", "tau1"], every=1, measures=["peak"])
-    for key, words in [
+    for key, message in [
         ("nix", "no output 'nix' was asked for; there are roll, tau1"),
         (("roll", "rms"), "no measure 'rms' was asked for; there are peak"),
     ]:
-        with pytest.raises(KeyError, match=words):
+        with pytest.raises(KeyError, match=message):
             runs[key]
 
 
@@ -221,3 +223,18 @@ def test_many_short_runs_leave_nothing_behind(testbed, tmp_path, monkeypatch):
         # No run knows of the one before it in its instance.
         np.testing.assert_array_equal(np.ptp(peaks["tau1", "peak"].reshape(-1, 3), axis=0), 0.0)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_programs_run(fmu, monkeypatch):
+    page = "crates/fmu-run/README.md"
+    programs = re.findall(r"^```python\n(.*?)^```", (ROOT / page).read_text(encoding="utf-8"), flags=re.S | re.M)
+    text = "\n".join(program for program in programs if "fmu_run" in program)
+    monkeypatch.chdir(ROOT)
+    names: dict = {}
+    exec(compile(text, page, "exec"), names)
+    runs = names["runs"].check()
+    assert runs["roll"].shape == (1000, 2001) and abs(runs["roll"]).max() > 0.01
+    assert names["torques"].shape == (1000, 2) and names["wrists"].errors == {}
+    assert len({*names["wrists"].time}) == 2, "some have gone back"
+    assert names["peaks"]["tau1", "peak"].max() == abs(runs["tau1"]).max()
+    assert names["rewards"].shape == (1024,) and (names["envs"].steps == 100).all()

@@ -1,4 +1,4 @@
-"""Systems of testbed and controller, against instances that are wired by hand; to the bit."""
+"""Systems of testbed and controller are bit-identical to instances that the test connects."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def by_hand(fmus, order: str, steps: int, k1: float) -> np.ndarray:
             # Torques depend on the motors at once, nothing else does.
             wrist.set(MOVED, law.get(MOVED))
             law.set(SENSED, wrist.get(SENSED))
-        of = {"testbed": wrist, "controller": law}
-        rows.append([of[name.split(".")[0]].get(name.split(".")[1])[0] for name in SHOWN])
+        by_name = {"testbed": wrist, "controller": law}
+        rows.append([by_name[name.split(".")[0]].get(name.split(".")[1])[0] for name in SHOWN])
         if order == "jacobi":
             wrist.set(MOVED, moved)
             law.set(SENSED, sensed)
@@ -141,13 +141,13 @@ def test_what_is_fed_cannot_be_set() -> None:
             pair.directional_derivative("testbed.tau1", "controller.roll_ref", 1.0)
         with pytest.raises(fmu_run.FmuError, match="system is a system, which has Co-Simulation only"):
             loop.instances(interface="model-exchange")
-        # What an FMU refuses is told with the name of its component.
+        # The error of an FMU has the name of its component.
         runs = loop.run([0, 1e-3], start={"testbed.k1": [-1.0, 90.0]}, outputs=["testbed.roll"])
         assert list(runs.errors) == [0] and "testbed: " in runs.errors[0] and "k1" in runs.errors[0]
 
 
 def test_algebraic_loops_are_named(unruly) -> None:
-    """Its outputs may depend on anything, as far as its description tells."""
+    """By its description, each output may depend on every input."""
     with fmu_run.Fmu(unruly) as fmu:
         with pytest.raises(ValueError, match="an algebraic loop: a.instances -> a.count; .* Order Jacobi"):
             fmu_run.System({"a": fmu}, {"a.instances": "a.count"})
@@ -189,7 +189,7 @@ def test_an_ssp_is_the_same_system(order, tmp_path) -> None:
     other = ssp.run(time, start={"pitch_ref": (10.0, "deg")}, inputs={"roll_ref": 0.0}, outputs=["pitch", "roll"])
     assert abs(np.rad2deg(other["pitch"][0, -1]) - 10.0) < 0.2 and np.abs(other["roll"][0, -1]) < 1e-3
 
-    # The same in a system of its own within the system.
+    # The controller in a nested system.
     def nested(text: str) -> str:
         begin, end = text.index('<ssd:Component name="controller"'), text.index('<ssd:Component name="testbed"')
         connectors = re.search(r"<ssd:Connectors>.*?</ssd:Connectors>", text[begin:end], re.S)

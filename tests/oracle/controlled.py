@@ -1,4 +1,4 @@
-"""The closed loop of testbed and controller, from the energies and from the controller's law as its documentation words it.
+"""The closed loop of testbed and controller, from the energies and from the controller's law in its documentation.
 
 Shares nothing with the FMUs: the wrist is the linear model of lagrange.py, propagated exactly while the motors follow
 their parabolas from sample to sample; how fast a motor may go is looked up on the curve of its braking distance, which
@@ -100,7 +100,7 @@ class Controller:
 
 
 def control(model: LinearModel, law: Law, reference: Any, samples: int) -> dict[str, Any]:
-    """The closed loop from rest at 0 with pitch and roll told to go to `reference` (2,) rad at once.
+    """The closed loop from rest at 0 with the constant reference `reference` (2,) rad for pitch and roll.
 
     Returns MOTORS and the testbed's outputs by name, each (samples + 1,): at every sample of the controller, what the
     two do continuously, without the delay of an importer's communication points.

@@ -1,6 +1,6 @@
-"""The reference experiments: what the motors do, with which parameters, and what the testbed then does.
+"""The reference experiments: motion of the motors, parameters, and response of the testbed.
 
-The truth is the oracle's. Motors that turn at constant rates are exact in both interface types and at any step size;
+The oracle calculates the response. Motors that turn at constant rates are exact in both interface types and at any step size;
 of other motions the samples are exact, and what an importer makes of the time between them costs what the tolerances
 allow.
 """
@@ -146,13 +146,13 @@ def moved(
     t, fine = times(STOP, INTERVAL), times(STOP, SAMPLE)
     motion = np.array([(*angle(s), *rate(s)) for s in fine])
     # Motions here are smooth but where a move ends; the solver restarts there.
-    truth = integrate(model, t, angle, rate, breaks=(MOVE,))
+    true_values = integrate(model, t, angle, rate, breaks=(MOVE,))
     return Experiment(
         name,
         description,
         {**parameters, "use_omega": True},
         {"time": fine, **dict(zip(MOTORS, motion.T))},
-        {"time": t, **truth},
+        {"time": t, **true_values},
         tolerances,
     )
 
@@ -162,7 +162,7 @@ def rate_step() -> Experiment:
     t, speed = times(0.5, INTERVAL), np.array([0.5, 0.0])
     parameters = with_counts(table_1())
     model = linear_model({key: float(value) for key, value in parameters.items()})
-    truth, _ = follow(model, t, np.outer(t, speed), np.tile(speed, (len(t), 1)))
+    true_values, _ = follow(model, t, np.outer(t, speed), np.tile(speed, (len(t), 1)))
     ends = t[[0, -1]]
     motors = np.column_stack([np.outer(ends, speed), np.tile(speed, (2, 1))])
     return Experiment(
@@ -170,7 +170,7 @@ def rate_step() -> Experiment:
         "The rate of motor 1 steps from 0 to 0.5 rad/s at the first instant, motor 2 stands; exact at any step size",
         {**parameters, "use_omega": True},
         {"time": ends, **dict(zip(MOTORS, motors.T))},
-        {"time": t, **truth},
+        {"time": t, **true_values},
         EXACT,
     )
 

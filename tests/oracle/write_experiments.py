@@ -25,7 +25,7 @@ LS = "http://fmi-standard.org/fmi-ls-manifest"
 SSV, SSC = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("ParameterValues", "Common"))
 #: Decimals of all numbers: a hundredth of the smallest tolerance and less.
 DECIMALS = 8
-#: What every experiment starts with: rest, wherever the motors are. The states that are then of no use are the FMU's.
+#: The start of every experiment: at rest at any motor angles. Start values of states, which are then ignored, are the FMU's.
 START = {"start_at_rest": True} | {
     f"{state}_start": 0.0 for state in ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
 }
@@ -71,7 +71,7 @@ def parameter_set(experiment: Experiment) -> str:
 
 
 def entry(experiment: Experiment) -> dict[str, Any]:
-    """What experiments.json says of one."""
+    """The entry of one experiment in experiments.json."""
     t = experiment.reference["time"]
     return {
         "name": experiment.name,
@@ -93,8 +93,8 @@ def manifest(found: list[Experiment]) -> str:
     root = etree.Element("fmiReferences", nsmap={"fmi-ls": LS})
     root.set(f"{{{LS}}}fmi-ls-name", LAYER)
     root.set(f"{{{LS}}}fmi-ls-version", "1.0.0-alpha.1")
-    said = "Layered Standard providing information on related files included in an FMU."
-    root.set(f"{{{LS}}}fmi-ls-description", said)
+    description = "Layered Standard providing information on related files included in an FMU."
+    root.set(f"{{{LS}}}fmi-ls-description", description)
 
     def related(source: str, kind: str, role: str, description: str, label: str = "") -> None:
         element = etree.SubElement(root, "Related", type=kind, source=source, role=role, description=description)
@@ -151,9 +151,9 @@ def xml(root: Any) -> str:
 def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "modelDescription"
     texts = files(experiments())
-    for place, text in texts.items():
-        (folder / place).parent.mkdir(parents=True, exist_ok=True)
-        (folder / place).write_text(text, encoding="utf-8", newline="\n")
+    for path, text in texts.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, encoding="utf-8", newline="\n")
     print(f"wrote {len(texts)} files, {sum(map(len, texts.values())) // 1000} kB, into {folder}")
 
 

@@ -33,8 +33,8 @@ def pendulum(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     version = ["-DFMI3"] if request.param == "3" else []
     subprocess.run(["cc", *flags, *version, str(HERE / "pendulum.c"), "-o", str(library), "-lm"], check=True)
     processor = subprocess.run(["uname", "-m"], check=True, capture_output=True, text=True).stdout.strip()
-    place = f"{processor}-linux" if request.param == "3" else "linux64"
+    platform = f"{processor}-linux" if request.param == "3" else "linux64"
     with zipfile.ZipFile(fmu, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.write(HERE / f"pendulum{request.param}.xml", "modelDescription.xml")
-        archive.write(library, f"binaries/{place}/pendulum.so")
+        archive.write(library, f"binaries/{platform}/pendulum.so")
     return fmu

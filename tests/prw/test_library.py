@@ -1,4 +1,4 @@
-"""`import prw`: what a notebook does with it, and what it is told where it errs."""
+"""`import prw`: its functions as a notebook calls them, and their errors."""
 
 from __future__ import annotations
 
@@ -12,21 +12,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas
-import pyarrow.parquet as pq
 import pytest
 from built import ROOT
 from lagrange import linear_model, table_1
 from reference import follow
 
 import prw
-from prw.output import write_motion
+from prw.files import write_table
 
 MOTION = ROOT / "examples" / "point_to_point.csv"
 
 
 def python(program: str, folder: Path) -> str:
-    """What a Python of its own prints."""
+    """The output of a program in a separate Python."""
     result = subprocess.run([sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr
     assert result.stderr == ""
@@ -43,7 +41,7 @@ def test_import_loads_nothing(tmp_path: Path) -> None:
 
 
 def test_all_names_are_there(tmp_path: Path) -> None:
-    """Whatever was imported before: no module of the package takes the place of a function."""
+    """After any imports, no module of the package replaces a function."""
     program = (
         "import prw, pkgutil, importlib\n"
         "for module in pkgutil.walk_packages(prw.__path__, 'prw.'):\n"
@@ -115,74 +113,11 @@ def test_numbers_are_read_back_unchanged(tmp_path: Path) -> None:
     )
     numbers = np.concatenate([near, -near, np.exp(draws.uniform(-300, 300, 9_000)), [0.0, 7.0, 70.0]])
     motion = prw.Motion(1e-3 * np.arange(len(numbers), dtype=np.float64), np.column_stack([numbers, numbers[::-1]]))
-    write_motion(path, motion)
+    write_table(path, motion.columns)
     lines = path.read_text().splitlines()
     assert lines[0] == "time,theta1,theta2" and lines[-1].startswith(f"{(len(numbers) - 1) * 1e-3!r},70.0,")
     found = [[float(cell) for cell in line.split(",")] for line in lines[1:]]
     assert np.array_equal(found, np.column_stack([motion.time, motion.theta]))
-
-
-def test_a_recording_with_measurements(tmp_path: Path) -> None:
-    path = tmp_path / "rig.csv"
-    path.write_text("time [ms],theta1,theta2,tau1 [mN.m],pitch,site\n0,1,2,3,90,a\n5,1,2,,90,b\n10,1,2,5,90,c\n")
-    recording = prw.read(path, units={"pitch": "deg"})
-    assert set(recording.measured) == {"tau1", "pitch"} and recording.omega is None and recording.name == "rig"
-    np.testing.assert_allclose(recording["time"], [0, 5e-3, 1e-2], rtol=1e-15)
-    np.testing.assert_allclose(recording["tau1"], [3e-3, np.nan, 5e-3])
-    np.testing.assert_allclose(recording["pitch"], np.pi / 2, rtol=1e-15)
-    np.testing.assert_array_equal(recording["theta2"], 2)
-    assert recording.units == {"time": "ms", "theta1": "rad", "theta2": "rad", "tau1": "mN.m", "pitch": "deg"}
-    assert any("columns ignored: site" in note for note in recording.notes) and "rig" in repr(recording)
-    np.testing.assert_allclose(prw.read(path, degrees=True).theta, np.deg2rad([[1, 2]] * 3), rtol=1e-15)
-    with pytest.raises(KeyError, match="roll: was not recorded; there are time, theta1, theta2, "):
-        recording["roll"]
-    with pytest.raises(prw.UserError, match="units: yaw is not known; there are time, theta1"):
-        prw.read(path, units={"yaw": "deg"})
-    # What was measured does not stop a simulation of the motors.
-    path.write_text(path.read_text().replace(",3,", ",broken,"))
-    assert prw.simulate(path)["roll"].shape == (3,)
-    with pytest.raises(prw.UserError, match="rig.csv, row 2, column tau1: 'broken' is not a number"):
-        prw.read(path)
-
-
-def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
-    """A dict, a DataFrame and the CSV file that it writes are one recording, also with the time as index."""
-    time = np.arange(4) * 1e-3
-    table: dict[str, Any] = {
-        "time": time,
-        "theta1 [deg]": time * 90,
-        "theta2": -time,
-        "tau1": [1, None, 2, 3],
-        "x": "abcd",
-    }
-    frame = pandas.DataFrame({**table, "x": list("abcd")})
-    frame.to_csv(tmp_path / "recording.csv", index=False)
-    from_file = prw.read(tmp_path / "recording.csv")
-    for source in (table, frame, frame.set_index("time")):
-        recording = prw.read(source)
-        for name in ("time", "theta1", "theta2", "tau1"):
-            np.testing.assert_array_equal(recording[name], from_file[name])
-        assert (recording.units, recording.notes) == (from_file.units, from_file.notes)
-        assert prw.simulate(source, fmu=testbed)["roll"][-1] == prw.simulate(from_file, fmu=testbed)["roll"][-1]
-    run = prw.simulate(frame, fmu=testbed)
-    for again in (prw.simulate(run, fmu=testbed), prw.simulate(run.to_pandas(), fmu=testbed)):
-        np.testing.assert_array_equal(again["tau1"], run["tau1"])
-    good = {"time": [0.0, 1.0], "theta1": [0.0, 1.0], "theta2": [0.0, 1.0]}
-    wrong: list[tuple[Any, str]] = [
-        ({"time": [0.0, 1.0]}, "recording: column theta1 is missing; the header has time"),
-        ({**good, "theta2": [0.0, None]}, "recording, column theta2: nan at place 1 is not finite"),
-        ({**good, "theta2": ["a", "b"]}, "recording, column theta2: is not made of numbers"),
-        ({**good, "theta2": [0.0]}, "recording, column theta2: has 1 rows, but time has 2"),
-        ({**good, "theta2": [[0.0], [1.0]]}, r"recording, column theta2: has the shape \(2, 1\)"),
-        ({**good, "time": pandas.to_datetime(["2026-01-01", "2026-01-02"])}, "column time: has dates"),
-        ({**good, "time": [1.0, 0.0]}, "recording, column time: time must increase"),
-        (dict.fromkeys(good, [0.0]), "recording: has 1 rows; at least two are needed"),
-        ({**good, "theta1 [deg]": [0.0, 1.0]}, "recording, column theta1: appears twice"),
-        (None, "None is no recording: neither a file nor a DataFrame"),
-    ]
-    for source, complaint in wrong:
-        with pytest.raises(prw.UserError, match=complaint):
-            prw.read(source)
 
 
 def test_errors_are_those_of_python_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -229,19 +164,21 @@ def test_where_the_fmu_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 @pytest.mark.parametrize("rates", [False, True])
 def test_coarse_sampling_is_told(testbed: Path, rates: bool) -> None:
-    """A sine of 3 Hz; the truth is that of 20 kHz."""
+    """A sine of 3 Hz, compared with its samples at 20 kHz."""
 
     def motion(rate: int, with_rates: bool) -> prw.Motion:
         time = np.arange(rate + 1) / rate
         angle, omega = 0.3 * (1 - np.cos(6 * np.pi * time)), 1.8 * np.pi * np.sin(6 * np.pi * time)
         return prw.Motion(time, np.outer(angle, [1, -1]), np.outer(omega, [1, -1]) if with_rates else None)
 
-    truth = prw.simulate(motion(20_000, True), fmu=testbed)["tau1"]
+    true_values = prw.simulate(motion(20_000, True), fmu=testbed)["tau1"]
     for rate in (100, 200):
-        with pytest.warns(UserWarning, match=rf"tau1 may be off by .* sampled with {rate} Hz: with some .* Hz") as told:
+        with pytest.warns(
+            UserWarning, match=rf"tau1 may be off by .* sampled with {rate} Hz: with some .* Hz"
+        ) as noted:
             run = prw.simulate(motion(rate, rates), fmu=testbed)
-        assert ("give the motors' rates" in str(told[0].message)) != rates and run.notes[-1] in repr(run)
-        error = np.abs(run["tau1"] - truth[:: 20_000 // rate]).max() / np.abs(truth).max()
+        assert ("give the motors' rates" in str(noted[0].message)) != rates and run.notes[-1] in repr(run)
+        error = np.abs(run["tau1"] - true_values[:: 20_000 // rate]).max() / np.abs(true_values).max()
         assert 0.9 * error < run.sampling_errors["tau1"] < 1.4 * error
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -280,17 +217,6 @@ def test_wrong_simulations(testbed: Path, tmp_path: Path) -> None:
         with pytest.raises(prw.UserError, match=complaint) as caught:
             prw.simulate(**{"fmu": testbed, **dict(arguments)})  # type: ignore[call-overload]
         assert "\n" not in str(caught.value)
-
-
-def test_sweep_is_many_simulations(testbed: Path, tmp_path: Path) -> None:
-    table = prw.sweep({"k1": [-1.0, 90.0], "c3": np.linspace(0.1, 0.4, 3)}, fmu=testbed, out=tmp_path)
-    assert table.column("status").to_pylist() == ["failed"] * 3 + ["done"] * 3
-    assert "k1 must not be below 1e-300" in table.column("message")[0].as_py()
-    for row in table.to_pylist()[3:]:
-        run = prw.simulate(parameters={name: row[name] for name in ("k1", "c3")}, fmu=testbed)
-        assert row["roll_peak"] == np.abs(run["roll"]).max() and row["tau1_end"] == run["tau1"][-1]
-    assert pq.read_table(tmp_path / "runs.parquet").to_pylist() == table.to_pylist()
-    assert len(table.to_pandas()) == 6
 
 
 def test_sweep_draws(testbed: Path) -> None:

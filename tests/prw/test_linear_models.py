@@ -1,4 +1,4 @@
-"""`prw.linearize` on FMUs of every kind: beside what pen and paper say of a pendulum, a controller and the testbed."""
+"""`prw.linearize` on FMUs of every kind, compared with the oracle, and with pen and paper for a pendulum."""
 
 from __future__ import annotations
 
@@ -6,12 +6,110 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from lagrange import linear_model, table_1
 
 import prw
+from tools.modes import pitch_and_roll
+
+STATES = ("theta3", "theta4", "theta5", "theta6", "omega5", "omega6")
+INPUTS = ("theta1", "theta2", "omega1", "omega2")
+RATES = {"omega1": "theta1", "omega2": "theta2"}
+#: q of H(s), and the torques.
+MEASURED = ("theta3", "theta4", "theta5", "theta6", "tau1", "tau2")
+
+
+def expected(model: Any, n_over_2m: Any = 7 / 8) -> Any:
+    """A, B, C, D of the oracle, for the outputs MEASURED + pitch ... roll_rate."""
+    mean, ratio = [0.5, 0.5], [n_over_2m, -n_over_2m]
+    pitch_roll = np.zeros((4, 6))
+    pitch_roll[0, 2:4], pitch_roll[1, 2:4], pitch_roll[2, 4:], pitch_roll[3, 4:] = mean, ratio, mean, ratio
+    c = np.vstack([np.eye(6)[:4], model.c, pitch_roll])
+    d = np.zeros((10, 4))
+    d[4:6] = np.hstack([model.d_angle, model.d_rate])
+    return model.a, np.hstack([model.b_angle, model.b_rate]), c, d
+
+
+@pytest.mark.parametrize("fmi_type", ["CoSimulation", "ModelExchange"])
+@pytest.mark.parametrize("change", [{}, {"J3": 0.05, "k2": 100.0, "c1": 0.1, "N": 9, "M": 2}])
+def test_matrices(testbed: Path, fmi_type: Any, change: Any) -> None:
+    outputs = (*MEASURED, "pitch", "roll", "pitch_rate", "roll_rate")
+    found = prw.linearize(change, fmu=testbed, outputs=outputs, fmi_type=fmi_type)
+    p = {**table_1(), **change}
+    assert (found.states, found.inputs) == (STATES, INPUTS)
+    for name, true_values in zip("ABCD", expected(linear_model(p), p["N"] / (2 * p["M"]))):
+        np.testing.assert_allclose(
+            getattr(found, name), true_values, rtol=1e-12, atol=1e-12 * np.abs(true_values).max()
+        )
+
+
+def test_names_and_units(testbed: Path) -> None:
+    model = prw.linearize(fmu=testbed)
+    assert (model.A.shape, model.B.shape, model.C.shape, model.D.shape) == ((6, 6), (6, 4), (8, 6), (8, 4))
+    assert set(model.outputs) == {"tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4"}
+    units = {
+        "theta1": "rad",
+        "omega1": "rad/s",
+        "theta5": "rad",
+        "omega6": "rad/s",
+        "tau2": "N.m",
+        "roll_rate": "rad/s",
+    }
+    assert {name: model.units[name] for name in units} == units
+
+
+def test_the_point_of_operation_does_not_matter(testbed: Path) -> None:
+    start = {"theta3_start": 1.0, "omega6_start": -30.0, "theta1": 0.5}
+    here, there = prw.linearize(fmu=testbed), prw.linearize(start, fmu=testbed)
+    for name in "ABCD":
+        np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
+
+
+def test_given_flags_count(testbed: Path) -> None:
+    """On the first sample the estimated rates are 0, and at rest the states follow the motors."""
+    model = prw.linearize(
+        {"use_omega": False, "start_at_rest": True}, fmu=testbed, fmi_type="CoSimulation", outputs=["pitch"]
+    )
+    np.testing.assert_array_equal(model.D, [[0.5, 0.5, 0.0, 0.0]])
+
+
+def test_transfer_matrices(testbed: Path) -> None:
+    """G(s) of eq. (13) entry by entry from the oracle, and the motors' rates folded in."""
+    found = prw.linearize(fmu=testbed, outputs=MEASURED)
+    s = 2j * np.pi * np.array([0.1, 3.0, 5.6, 80.0])
+    a, b, c, d = expected(linear_model(table_1()))
+    true_values = np.array([c[:6] @ np.linalg.inv(si * np.eye(6) - a) @ b + d[:6] for si in s])
+    np.testing.assert_allclose(found.transfer(s), true_values, rtol=1e-10)
+    np.testing.assert_allclose(
+        found.transfer(s, RATES),
+        true_values[:, :, :2] + s[:, None, None] * true_values[:, :, 2:],
+        rtol=1e-9,
+        atol=1e-12,
+    )
+    np.testing.assert_array_equal(found.response_at_hz(s.imag / (2 * np.pi), RATES), found.transfer(s, RATES))
+    assert found.moved(RATES) == ("theta1", "theta2")
+    with pytest.raises(prw.UserError, match="rates: omega9 is no input; there are theta1, theta2"):
+        found.transfer(1j, {"omega9": "theta1"})
+
+
+def test_pitch_and_roll_are_apart(testbed: Path) -> None:
+    p = table_1()
+    for mode, inertia, load, gain in zip(
+        pitch_and_roll(prw.linearize(fmu=testbed)),
+        (p["J2"] + p["H3"] / 2, p["J2"] + p["J3"] * 49 / 32),
+        (p["c3"] / 2, p["c3"] * 49 / 32),
+        (1, 7 / 4),
+    ):
+        assert mode.mixing < 1e-10 * np.abs(mode.A).max()
+        # det of [c1 + c2, -c2; -c2, c2 + load] s + [k1 + k2, -k2; -k2, k2] with inertia s^2 in the last place
+        first, second = np.poly1d([p["c1"] + p["c2"], p["k1"] + p["k2"]]), np.poly1d([p["c2"], p["k2"]])
+        poles = (first * (np.poly1d([inertia, p["c2"] + load, p["k2"]])) - second * second).roots
+        np.testing.assert_allclose(np.sort_complex(mode.poles()), np.sort_complex(poles), rtol=1e-10)
+        np.testing.assert_allclose(np.sort(mode.zeros()), [-p["k1"] / p["c1"], -p["k2"] / p["c2"]], rtol=1e-8)
+        assert -mode.c @ np.linalg.solve(mode.A, mode.b) == pytest.approx(gain, rel=1e-12)
 
 
 def test_a_pendulum_where_it_hangs(pendulum: Path) -> None:
@@ -33,7 +131,7 @@ def test_the_response_to_sines(pendulum: Path) -> None:
 
 
 def test_one_instance_for_many(pendulum: Path) -> None:
-    """Also after a refusal, and back at the start values where none are given."""
+    """An instance is also used after an error, and returns to the start values if none are given."""
     with prw.Linearizer(pendulum, outputs=["rate"]) as linearizer:
         for k in (1.0, 16.0):
             assert linearizer.at({"stiffness": k, "angle": 0.0}).A[1, 0] == -k
@@ -50,29 +148,11 @@ def test_one_instance_for_many(pendulum: Path) -> None:
 
 
 def test_a_controller_that_samples(controller: Path) -> None:
-    """It has no continuous states; its outputs stay between samples, whatever its inputs do."""
+    """The controller has no continuous states, and between samples its outputs do not depend on its inputs."""
     for interface in ("CoSimulation", "ModelExchange"):
         model = prw.linearize(fmu=controller, fmi_type=interface)
         assert (model.A.shape, model.B.shape) == ((0, 0), (0, 8)) and model.D.shape == (len(model.outputs), 8)
         np.testing.assert_array_equal(model.D, 0)
-
-
-def test_the_testbed_of_either_version(testbed: Path) -> None:
-    parameters = {"k1": 90.0, "c2": 0.3}
-    truth = linear_model({**table_1(), **parameters})
-    for interface in ("CoSimulation", "ModelExchange"):
-        model = prw.linearize(parameters, fmu=testbed, fmi_type=interface)
-        np.testing.assert_allclose(model.A, truth.a, rtol=1e-12, atol=1e-10)
-        np.testing.assert_allclose(model.B, np.hstack([truth.b_angle, truth.b_rate]), rtol=1e-12, atol=1e-10)
-
-
-def test_the_rates_move_along(testbed: Path) -> None:
-    model, rates = prw.linearize(fmu=testbed), {"omega1": "theta1", "omega2": "theta2"}
-    assert model.moved(rates) == ("theta1", "theta2")
-    # A motor that stands at 1 rad is followed by its shaft.
-    np.testing.assert_allclose(model.response_at_hz(1e-9, rates)[0, model.outputs.index("theta3")], [1, 0], atol=1e-7)
-    with pytest.raises(prw.UserError, match="rates: omega9 is no input; there are theta1, theta2"):
-        model.transfer(1j, {"omega9": "theta1"})
 
 
 def test_handed_to_others(testbed: Path) -> None:
@@ -95,6 +175,11 @@ def test_what_lacks_derivatives_says_so(lag: Path, pendulum: Path) -> None:
         prw.linearize(fmu=pendulum, fmi_type=lacks)
 
 
+def _description(fmu: Path) -> str:
+    with zipfile.ZipFile(fmu) as archive:
+        return archive.read("modelDescription.xml").decode()
+
+
 def test_unknown_names(pendulum: Path) -> None:
     with pytest.raises(prw.UserError, match="no start value length; there are torque, stiffness, angle, rate"):
         prw.linearize({"length": 1.0}, fmu=pendulum)
@@ -102,16 +187,33 @@ def test_unknown_names(pendulum: Path) -> None:
         prw.linearize(fmu=pendulum, outputs=["yaw"])
 
 
+@pytest.mark.parametrize(
+    "arguments, complaint",
+    [
+        ({"outputs": ["yaw"]}, "yaw is neither a continuous output nor a state; there are "),
+        ({"parameters": {"k9": 1.0}}, "no start value k9"),
+        ({"parameters": {"J2": -1.0}}, "J2"),
+        ({"fmi_type": "ScheduledExecution"}, "offers no directional derivatives for ScheduledExecution"),
+    ],
+)
+def test_complaints(testbed: Path, arguments: Any, complaint: Any) -> None:
+    with pytest.raises(prw.UserError) as caught:
+        prw.linearize(fmu=testbed, **arguments)
+    assert complaint in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_no_fmu(tmp_path: Path) -> None:
+    (tmp_path / "no.fmu").write_text("not a zip")
+    for name, complaint in (("absent.fmu", "no such FMU"), ("no.fmu", "cannot be loaded")):
+        with pytest.raises(prw.UserError, match=complaint):
+            prw.linearize(fmu=tmp_path / name)
+
+
 def test_an_fmu_in_place_of_the_parameters(testbed: Path) -> None:
     with pytest.raises(
         prw.UserError, match="parameters: .* is no JSON file with values by name; an FMU is named by `fmu`"
     ):
         prw.linearize(testbed)
-
-
-def _description(fmu: Path) -> str:
-    with zipfile.ZipFile(fmu) as archive:
-        return archive.read("modelDescription.xml").decode()
 
 
 def test_each_one_hears_its_own_fmu(testbed: Path, tmp_path: Path) -> None:

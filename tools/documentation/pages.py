@@ -13,7 +13,6 @@ from typing import Any
 
 from prw.errors import UserError
 from tools.documentation import tables
-from tools.documentation.formulas import typeset
 from tools.documentation.sources import PROGRAMS, SOURCES, read, read_description, read_table
 
 #: Table 1 as the paper prints it.
@@ -125,12 +124,40 @@ def _program(name: str, text: str) -> str:
 
 def _roots(roots: Iterable[Sequence[float]]) -> str:
     """Real and conjugate complex numbers as text: -174.873 and -9.68 ± 34.68 i."""
-    words = []
+    parts = []
     for real, imaginary in roots:
-        words.append(f"{real:.2f}" + (f" ± {imaginary:.2f} i" if imaginary else ""))
-    return _minus(" and ".join(words))
+        parts.append(f"{real:.2f}" + (f" ± {imaginary:.2f} i" if imaginary else ""))
+    return _minus(" and ".join(parts))
 
 
 def _minus(number: object) -> str:
     """A number, or text with numbers, with the mathematical minus sign."""
     return str(number).replace("-", "\N{MINUS SIGN}")
+
+
+def typeset(text: str) -> str:
+    r"""Formulas as MathML; \tag{8} between \[ \] puts the paper's number next to the equation."""
+    try:
+        from latex2mathml.converter import convert
+    except ImportError:
+        raise UserError("the package latex2mathml is missing; `make docs` installs it") from None
+
+    def inline(match: re.Match[str]) -> str:
+        return _tidy(convert(html.unescape(match[1]), display="inline"))
+
+    def block(match: re.Match[str]) -> str:
+        tag = re.search(r"\\tag\{(.*?)\}", match[1])
+        formula = _tidy(convert(re.sub(r"\\tag\{.*?\}", "", match[1]).strip(), display="block"))
+        number = f'<span class="number">({tag[1]})</span>' if tag else ""
+        return f'<div class="equation" tabindex="0">{formula}{number}</div>'
+
+    return re.sub(r"\\\((.+?)\\\)", inline, re.sub(r"\\\[(.+?)\\\]", block, text, flags=re.S), flags=re.S)
+
+
+def _tidy(mathml: str) -> str:
+    """Remove parts that HTML does not need. Matrices get brackets from the style sheet, because brackets that are characters
+    grow with the matrix only with a font for mathematics."""
+    mathml = mathml.replace(' xmlns="http://www.w3.org/1998/Math/MathML"', "")
+    special = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
+    mathml = re.sub(r"&#x([0-9A-Fa-f]+);", lambda m: special.get(chr(int(m[1], 16)), chr(int(m[1], 16))), mathml)
+    return re.sub(r"<mo>\[</mo><mtable>(.*?)</mtable><mo>\]</mo>", r'<mtable class="matrix">\1</mtable>', mathml)

@@ -10,7 +10,6 @@ from prw.errors import UserError
 
 #: Within the project.
 SOURCES = Path("docs/fmu-page")
-ERRATA = SOURCES / "errata.md"
 PROGRAMS = SOURCES / "programs"
 
 

@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> None:
             write_png(page.content / ICON, draw(), dpi=128)
             write_svg(page.content / ICON_SVG, draw())
         from prw.animation import animate
-        from prw.picture import still
+        from prw.frames import still
         from tools.figures import visit
         from tools.figures.film import POSE, SPEED, story
 

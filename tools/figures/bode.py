@@ -58,8 +58,8 @@ def draw_bode(figure: Any, panel: Transfer) -> None:
     """Draw magnitude and phase, one above the other, into a figure or subfigure."""
     magnitude, phase = figure.subplots(2, sharex=True, height_ratios=[1.25, 1])
     magnitude.set_title(panel.title)
-    for axis, of in ((magnitude, decibels), (phase, degrees)):
-        curve, points = of(panel.curve), of(panel.points)
+    for axis, convert in ((magnitude, decibels), (phase, degrees)):
+        curve, points = convert(panel.curve), convert(panel.points)
         if axis is phase:
             # Both unwrapped; the points may have begun on another turn.
             points = points + 360 * np.round((curve[0] - points[0]) / 360)

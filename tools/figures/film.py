@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from fmu_run import Fmu
 
+from prw.frames import MEASURED
 from prw.motion import Array, Motion
-from prw.picture import MEASURED
 from prw.simulation import Run
 
 #: Communication step, s.
@@ -30,16 +30,16 @@ def story(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[floa
     """Run the testbed, first with motors that are led, then with the controller: it begins and ends at rest at zero.
     Returns the run and its captions, each with the time (s) from which it is shown."""
     led = _there_and_back()
-    with Fmu(testbed_fmu) as of_testbed, Fmu(controller_fmu) as of_controller:
-        testbed, controller = of_testbed.instances(start={"use_omega": True}), of_controller.instances()
+    with Fmu(testbed_fmu) as loaded_testbed, Fmu(controller_fmu) as loaded_controller:
+        testbed, controller = loaded_testbed.instances(start={"use_omega": True}), loaded_controller.instances()
         rows, captions = [], []
 
         def motors(theta: Sequence[float], omega: Sequence[float]) -> None:
             testbed.set(MOTORS, (*theta, *omega))
             rows.append(testbed.get((*MOTORS, *MEASURED))[0])
 
-        for words, second in (("Equal motors: the wrist pitches", 1), ("Opposite motors: the wrist rolls", -1)):
-            captions.append((testbed.time[0], words))
+        for caption, second in (("Equal motors: the wrist pitches", 1), ("Opposite motors: the wrist rolls", -1)):
+            captions.append((testbed.time[0], caption))
             for theta, omega in led:
                 motors((theta, second * theta), (omega, second * omega))
                 testbed.step(STEP)
@@ -61,8 +61,8 @@ def story(testbed_fmu: Path, controller_fmu: Path) -> tuple[Run, list[tuple[floa
 
 def _there_and_back() -> Array:
     """Angle (rad) and rate (rad/s) of a motor that goes to SWING, to its opposite and back, with minimal jerk."""
-    places, parts = (0, SWING, -SWING, 0), []
-    for begin, end, duration in zip(places, places[1:], LEGS):
+    angles, parts = (0, SWING, -SWING, 0), []
+    for begin, end, duration in zip(angles, angles[1:], LEGS):
         s = np.arange(round(duration / STEP)) * STEP / duration
         way, slope = s**3 * (10 - 15 * s + 6 * s**2), 30 * s**2 * (1 - s) ** 2 / duration
         parts.append(np.column_stack([begin + (end - begin) * way, (end - begin) * slope]))

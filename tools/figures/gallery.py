@@ -39,9 +39,9 @@ def figures(found: Results) -> dict[str, Drawn]:
         of_shafts, of_torques = transfers(found)
         for plate, panels in (("fig5", of_shafts), ("torques", of_torques)):
             whole = Figure(figsize=(2 * COLUMN, 2.75 * len(panels) / 2), layout="constrained")
-            places = np.asarray(whole.subfigures(len(panels) // 2, 2)).T.flat
-            for panel, place in zip(panels, places):
-                draw_bode(place, panel)
+            subfigures = np.asarray(whole.subfigures(len(panels) // 2, 2)).T.flat
+            for panel, subfigure in zip(panels, subfigures):
+                draw_bode(subfigure, panel)
                 single = Figure(figsize=(COLUMN, 2.9), layout="constrained")
                 draw_bode(single, panel)
                 drawn[f"{plate}_{panel.key}"] = Drawn(single)
@@ -77,12 +77,12 @@ def _fig4_plate(found: Results) -> Figure:
     """Fig. 4 next to its counterpart."""
     figure = Figure(figsize=(2 * COLUMN, 4.8), layout="constrained")
     left, right = np.asarray(figure.subfigures(1, 2, wspace=0.04))
-    for place, title, run in (
+    for subfigure, title, run in (
         (left, "Opposite motors: the wrist rolls (Fig. 4)", found.fig4),
         (right, "Equal motors: the wrist pitches", found.fig4_equal),
     ):
-        place.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight="bold")
-        _draw_velocities(place, run)
+        subfigure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight="bold")
+        _draw_velocities(subfigure, run)
     return figure
 
 
@@ -136,8 +136,8 @@ def _convergence(found: Results) -> Figure:
     figure = Figure(figsize=(COLUMN, 3.4), layout="constrained")
     axis = figure.subplots()
     milliseconds = 1e3 * step
-    for words, marker, name in (("torque", "s", "tau1"), ("roll rate", "^", "roll_rate"), ("roll", "o", "roll")):
-        axis.loglog(milliseconds, angles[name], f"{marker}-", color=BLUE, markersize=4, label=f"{words}, angles alone")
+    for label, marker, name in (("torque", "s", "tau1"), ("roll rate", "^", "roll_rate"), ("roll", "o", "roll")):
+        axis.loglog(milliseconds, angles[name], f"{marker}-", color=BLUE, markersize=4, label=f"{label}, angles alone")
     # Below ROUNDING the values are chance, and not the same on every machine.
     rounding = np.maximum(np.max(list(broken.values()), axis=0), ROUNDING)
     label = f"all, broken line with its slopes (below {ROUNDING:g})"

@@ -52,10 +52,10 @@ def write_small_png(path: Path, figure: Figure) -> None:
         few.save(temporary, format="PNG", optimize=True)
 
 
-def write_picture(path: Path, picture: Image.Image) -> None:
+def write_picture(path: Path, image: Image.Image) -> None:
     """Write an image, with transparency, as PNG of 255 colours."""
     with replacing(path) as temporary:
-        few = picture.quantize(255, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        few = image.quantize(255, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
         few.save(temporary, format="PNG", optimize=True)
 
 
@@ -113,8 +113,8 @@ def for_page(svg: bytes, name: str) -> bytes:
         elif len(element) == 0:
             parent.remove(element)
         elif element.tag == f"{SVG}g" and not element.attrib:  # carried an id only
-            place = parent.index(element)
-            parent[place : place + 1] = list(element)
+            position = parent.index(element)
+            parent[position : position + 1] = list(element)
     _join_ticks(root)
     etree.cleanup_namespaces(root)
     return bytes(etree.tostring(root, encoding="utf-8", pretty_print=True))

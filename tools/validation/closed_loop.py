@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from prw.commands.options import DEFAULT_OUT
 from prw.errors import UserError
-from prw.files import replacing
+from prw.files import write_table
 from tools.validation import DEFAULT_FMUS
 
 if TYPE_CHECKING:
@@ -61,11 +60,11 @@ def run(arguments: argparse.Namespace) -> None:
     study = coupling.study(system)
 
     out = arguments.out
-    write_columns(out / "closed_loop.csv", first)
+    write_table(out / "closed_loop.csv", first)
     plots.plot_response(out / "closed_loop.png", system, first)
     written = ["closed_loop.csv", "closed_loop.png"]
     if study is not None:
-        write_columns(out / "coupling.csv", study.columns())
+        write_table(out / "coupling.csv", study.columns())
         plots.plot_coupling(out / "coupling.png", study)
         written += ["coupling.csv", "coupling.png"]
     lines = [f"experiment  {_experiment(system)}, communication step {system.step * 1e3:g} ms"]
@@ -82,13 +81,6 @@ def run(arguments: argparse.Namespace) -> None:
         ]
     lines.append(f"wrote       {', '.join(str(out / name) for name in written)}")
     print("\n".join(lines))
-
-
-def write_columns(path: Path, columns: Mapping[str, np.ndarray]) -> None:
-    """Write columns, each (n,), as CSV with a line of names; twelve digits."""
-    with replacing(path) as temporary:
-        rows = np.column_stack(list(columns.values())) + 0.0
-        np.savetxt(temporary, rows, fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
 
 
 def _experiment(system: System) -> str:

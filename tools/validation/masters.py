@@ -65,7 +65,7 @@ def libcosim(system: System) -> np.ndarray:
     for row in rows:
         if not execution.step():
             raise RuntimeError("libcosim stopped")
-        row[:] = np.concatenate([observer.last_real_values(*of_slave) for of_slave in wanted])
+        row[:] = np.concatenate([observer.last_real_values(*slave) for slave in wanted])
     return rows
 
 
@@ -118,10 +118,10 @@ def run_apart(master: Tool, system: System) -> dict[str, np.ndarray]:
             process = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, cwd=ROOT)
         except subprocess.TimeoutExpired:
             raise UserError(f"{master.name} did not finish within {TIMEOUT:g} s") from None
-        said = [line for line in (process.stdout + process.stderr).splitlines() if line.strip()]
+        output = [line for line in (process.stdout + process.stderr).splitlines() if line.strip()]
         if process.returncode:
-            raise UserError(f"{master.name} failed: {said[-1] if said else f'status {process.returncode}'}")
-        complaints = [line for line in said if any(word in line.lower() for word in ("error", "warn", "fatal"))]
+            raise UserError(f"{master.name} failed: {output[-1] if output else f'status {process.returncode}'}")
+        complaints = [line for line in output if any(word in line.lower() for word in ("error", "warn", "fatal"))]
         if complaints:
             raise UserError(f"{master.name} complains: {complaints[0]}")
         rows = np.load(result)

@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from prw.channels import MEASURED
 from prw.checking import check
 from prw.checking.agreement import Agreement, compare
 from prw.checking.experiments import Experiment, find, read_experiments
 from prw.checking.result import Result
+from prw.columns import MEASURED
 from prw.motion import Array
 from prw.testbed import existing_fmu
 from tools.validation import masters, system
@@ -94,8 +94,8 @@ def validate(fmus: Path, results: Sequence[tuple[str, Path]] = ()) -> Validation
         agreement = compare(found, find(known, "closed_loop"), master.interface)
         rows.append(row(f"{master.name}, with the controller's FMU", str(master.version()), "2.0", agreement))
     for tool, file in results:
-        told = row(f"{tool}, from the file {file.name}", "", "", check(file, fmu=paths["2.0"]))
-        rows.append(replace(told, interface=""))
+        result_row = row(f"{tool}, from the file {file.name}", "", "", check(file, fmu=paths["2.0"]))
+        rows.append(replace(result_row, interface=""))
     return Validation(
         guid=str(read_model_description(str(paths["2.0"])).guid),
         date=datetime.date.today().isoformat(),

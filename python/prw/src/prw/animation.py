@@ -1,4 +1,4 @@
-"""`animate`: a run as an animation. prw.picture draws it with matplotlib."""
+"""`animate`: a run as an animation. prw.frames draws it with matplotlib."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from prw.errors import UserError
-from prw.extras import need
+from prw.errors import UserError, need
 
 if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
@@ -69,7 +68,7 @@ def animate(
         raise UserError(
             f"an animation of {count / rate:.0f} s is too long; choose a speed of {1.1 * speed * count / MOST:.2g}"
         )
-    from prw.picture import drawn
+    from prw.frames import drawn
 
     return drawn(run, speed, count, rate, None if path is None else Path(path), captions)
 

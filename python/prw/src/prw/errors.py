@@ -1,5 +1,8 @@
 """Exceptions with a message for the user."""
 
+from __future__ import annotations
+
+import importlib.util
 from typing import Any
 
 
@@ -32,3 +35,10 @@ class DoesNotFit(UserError):
     """The model does not explain the data with any parameters."""
 
     status = 3
+
+
+def need(*packages: str) -> None:
+    """Raise MissingPackage unless the packages are installed."""
+    missing = [name for name in packages if importlib.util.find_spec(name) is None]
+    if missing:
+        raise MissingPackage(f"{', '.join(missing)} missing; install with: pip install {' '.join(missing)}")

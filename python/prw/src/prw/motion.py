@@ -7,12 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from prw.columns import ANGLES, RATES
 from prw.errors import UserError
 
 Array = NDArray[np.float64]
-
-#: Time intervals a long curve is reduced to, each drawn by its extremes; more than the figure has pixels.
-INTERVALS = 4000
 
 #: Frequency (rad/s) and length (s) of the excitation behind Fig. 4 (Sec. 4).
 FIG4_FREQUENCY = 10 * np.pi
@@ -66,6 +64,12 @@ class Motion:
         if not (np.diff(self.time) > 0).all():
             raise UserError("motion: time must increase from sample to sample")
 
+    @property
+    def columns(self) -> dict[str, Array]:
+        """Time (s), motor angles (rad) and, if they are known, rates (rad/s), (n,) each by name."""
+        rates = () if self.omega is None else zip(RATES, self.omega.T)
+        return {"time": self.time, **dict(zip(ANGLES, self.theta.T)), **dict(rates)}
+
 
 def fig4(step: float = 1e-3, opposite: bool = True) -> Motion:
     """The paper's experiment (Sec. 4, Fig. 4): theta1' = sin(10 pi t) = -theta2'.
@@ -91,18 +95,6 @@ def fig4(step: float = 1e-3, opposite: bool = True) -> Motion:
     omega1 = np.sin(FIG4_FREQUENCY * time)
     sides = np.array([1, -1 if opposite else 1])
     return Motion(time, np.outer(theta1, sides), np.outer(omega1, sides), "fig4" if opposite else "fig4_equal")
-
-
-def envelope(time: Array, y: Array, intervals: int = INTERVALS) -> tuple[Array, Array]:
-    """The curve y (n,) over time (n,) in at most 2 * intervals points that draw the same: each interval's extremes."""
-    if len(time) <= 2 * intervals:
-        return time, y
-    starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], intervals, endpoint=False)))
-    keep: set[int] = set()
-    for start, stop in zip(starts, [*starts[1:], len(time)]):
-        keep.update((start + int(y[start:stop].argmin()), start + int(y[start:stop].argmax())))
-    kept = sorted(keep)
-    return time[kept], y[kept]
 
 
 def _numbers(name: str, value: object) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from prw.motion import INTERVALS, Array, Motion, envelope
+from prw.motion import Array, Motion
 
 BLUE, VERMILION = "#0072B2", "#D55E00"
 #: Colours of pitch and roll if the sides have the other two.
@@ -42,6 +42,8 @@ PAGE_STYLE: Any = {
     "xtick.labelsize": 8,
     "ytick.labelsize": 8,
 }
+#: Time intervals that a long curve is reduced to, each drawn by its extremes; more than the figure has pixels.
+INTERVALS = 4000
 #: A panel whose curves all stay below this shows zero, not rounding errors blown up to its full height.
 ROUNDING = 1e-9
 
@@ -129,3 +131,15 @@ def draw_panel(axis: Axes, time: Array, panel: Panel) -> None:
     axis.margins(x=0, y=0.08)
     if max(np.abs(y).max() for _, y in panel.curves) < ROUNDING:
         axis.set_ylim(-1, 1)
+
+
+def envelope(time: Array, y: Array, intervals: int = INTERVALS) -> tuple[Array, Array]:
+    """The curve y (n,) over time (n,) in at most 2 * intervals points that draw the same: each interval's extremes."""
+    if len(time) <= 2 * intervals:
+        return time, y
+    starts = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], intervals, endpoint=False)))
+    keep: set[int] = set()
+    for start, stop in zip(starts, [*starts[1:], len(time)]):
+        keep.update((start + int(y[start:stop].argmin()), start + int(y[start:stop].argmax())))
+    kept = sorted(keep)
+    return time[kept], y[kept]

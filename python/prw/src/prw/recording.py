@@ -12,11 +12,9 @@ from typing import Any
 import numpy as np
 
 from prw.arguments import Table, columns_of, is_path, is_table, numbers_of
-from prw.channels import MEASURED, QUANTITIES, factor
-from prw.columns import ANGLES, RATES, Columns, columns, shown
+from prw.columns import ANGLES, MEASURED, QUANTITIES, RATES, Columns, columns, factor, shown
 from prw.errors import UserError
 from prw.motion import Array, Motion
-from prw.output import inputs_of
 from prw.table import Choice, read_table
 
 #: Faster than the testbed's motors will turn on any wrist move, in rad/s; degrees taken for radians are beyond it.
@@ -85,7 +83,7 @@ class Recording:
         return self.motion.notes
 
     def __getitem__(self, column: str) -> Array:
-        columns = {**inputs_of(self.motion), **self.measured}
+        columns = {**self.motion.columns, **self.measured}
         if column not in columns:
             raise KeyError(f"{column}: was not recorded; there are {', '.join(columns)}")
         return columns[column]
@@ -206,7 +204,7 @@ def _gathered(table: Any, choose: Choice, may_be_empty: Container[str]) -> Array
             raise UserError(f"{IN_MEMORY}, column {name}: has {len(column)} rows, but time has {len(found[0])}")
         bad = ~np.isfinite(column) if name not in may_be_empty else np.isinf(column)
         if bad.any():
-            raise UserError(f"{IN_MEMORY}, column {name}: {column[bad][0]} at place {int(bad.argmax())} is not finite")
+            raise UserError(f"{IN_MEMORY}, column {name}: {column[bad][0]} at index {int(bad.argmax())} is not finite")
         found.append(column)
     if len(found[0]) < 2:
         raise UserError(f"{IN_MEMORY}: has {len(found[0])} rows; at least two are needed")
@@ -231,12 +229,12 @@ def _gaps(path: Path, time: Array, theta: Array) -> list[str]:
         worst = int(max(long, key=lambda k: float(steps[k])))
         raise UserError(
             f"{path}: no rows from {time[worst]:.6g} to {time[worst + 1]:.6g} s, {steps[worst]:.3g} s where {usual:.3g} s is usual, while "
-            "the motors move; what they did is not known. Cut the recording there, into files of their own"
+            "the motors move; their motion is not known. Cut the recording there, into files of their own"
         )
     if not len(gaps):
         return []
     k = int(gaps[np.argmax(steps[gaps])])
-    count = "rows are missing once" if len(gaps) == 1 else f"rows are missing in {len(gaps)} places"
+    count = "rows are missing once" if len(gaps) == 1 else f"rows are missing {len(gaps)} times"
     return [f"{count}, for up to {steps[k]:.3g} s after {time[k]:.6g} s; a smooth path bridges that"]
 
 

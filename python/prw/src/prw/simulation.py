@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from prw.arguments import Table, names_of
-from prw.channels import MEASURED, QUANTITIES, si_unit
-from prw.errors import UserError
-from prw.extras import need
+from prw.arguments import Given, Table, names_of, values_of
+from prw.columns import MEASURED, QUANTITIES, si_unit
+from prw.errors import UserError, need
+from prw.files import write_table
 from prw.motion import Array, Motion, fig4
-from prw.parameters import Given, values_of
 from prw.recording import Recording, read_motion
 from prw.testbed import OUTPUTS, Testbed
 
@@ -99,18 +98,14 @@ class Run(Mapping[str, Array]):
         """Write time (s), the motors' angles (rad) and, where given, rates (rad/s), and the outputs (SI) to `path`, a
         row each time. Time and motors keep all their digits; outputs have twelve. Raises UserError if the
         file cannot be written."""
-        from prw.output import write_table
-
-        write_table(Path(path), self.motion, self._outputs, tuple(self))
+        write_table(Path(path), {**self.motion.columns, **self._outputs})
 
     def to_pandas(self) -> pandas.DataFrame:
         """The columns of `to_csv` as a DataFrame, with the time as index. Raises UserError without pandas."""
         need("pandas")
         import pandas
 
-        from prw.output import inputs_of
-
-        columns = {**inputs_of(self.motion), **self._outputs}
+        columns = {**self.motion.columns, **self._outputs}
         return pandas.DataFrame(columns, index=pandas.Index(columns.pop("time"), name="time"))
 
     def plot(self, title: str | None = None, *, angles: bool = True) -> Figure:
@@ -192,7 +187,7 @@ def simulated(
     outputs: Sequence[str] = OUTPUTS,
 ) -> Run:
     """Simulate as `simulate` does, without its warning."""
-    course = motion_of(motion)
+    moved = motion_of(motion)
     names = names_of("outputs", outputs)
     with Testbed(None if fmu is None else Path(fmu)) as testbed:
         given = values_of(parameters, testbed.loaded)
@@ -202,11 +197,11 @@ def simulated(
                 raise UserError(
                     f"{name} is not known; there are {', '.join(testbed.loaded.variables)}", argument="outputs"
                 )
-        found = testbed.respond(course, names, given)
-        coarse = Motion(course.time[::2], course.theta[::2], None if course.omega is None else course.omega[::2])
+        found = testbed.respond(moved, names, given)
+        coarse = Motion(moved.time[::2], moved.theta[::2], None if moved.omega is None else moved.omega[::2])
         other = testbed.respond(coarse, names, given) if len(coarse.time) >= FEWEST else {}
     errors = {name: _sampling_error(found[name], other[name]) for name in other}
-    return Run(course, found, values, errors)
+    return Run(moved, found, values, errors)
 
 
 def _sampling_error(fine: Array, coarse: Array) -> float:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from prw.errors import UserError
-from prw.extras import need
+from prw.errors import UserError, need
 from prw.motion import Array
 
 if TYPE_CHECKING:
@@ -56,10 +55,10 @@ class StateSpace:
         """
         s = np.atleast_1d(np.asarray(s, dtype=np.complex128))
         kept = [self.inputs.index(name) for name in self.moved(rates or {})]
-        places = {self.inputs.index(rate): self.inputs.index(angle) for rate, angle in (rates or {}).items()}
+        columns = {self.inputs.index(rate): self.inputs.index(angle) for rate, angle in (rates or {}).items()}
         pencil = s[:, None, None] * np.eye(len(self.states)) - self.A
         whole = self.C @ np.linalg.solve(pencil, np.broadcast_to(self.B, (len(s), *self.B.shape))) + self.D
-        for rate, angle in places.items():
+        for rate, angle in columns.items():
             whole[:, :, angle] += s[:, None] * whole[:, :, rate]
         return np.ascontiguousarray(whole[:, :, kept], dtype=np.complex128)
 

@@ -11,7 +11,7 @@ from array import array
 from collections.abc import Callable, Container, Sequence
 from itertools import repeat
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,18 @@ BLOCK = 1 << 22
 
 #: The columns to read, (name, index), of a header in the line with this number.
 Choice = Callable[[Sequence[str], int], Sequence[tuple[str, int]]]
+
+
+class _Layout(NamedTuple):
+    """The file and its layout. width: cells of the header. columns, may_be_empty, increasing: as in `read_table`. size: bytes."""
+
+    path: Path
+    delimiter: str
+    width: int
+    columns: Sequence[tuple[str, int]]
+    may_be_empty: Container[str]
+    increasing: bool
+    size: int
 
 
 def read_table(
@@ -77,12 +89,13 @@ def _parse(
         header[0] = header[0].lstrip("# ")
         columns = choose(header, table.line_num)
         size = os.fstat(file.fileno()).st_size
-        quick = _plain_rows(path, file, table.line_num, len(header), columns, delimiter, size, may_be_empty, increasing)
+        layout = _Layout(path, delimiter, len(header), columns, may_be_empty, increasing, size)
+        quick = _plain_rows(file, table.line_num, layout)
         if quick is not None:
             return quick
         table = _reader(file, delimiter)
         _header(table, begin)
-        values = _rows(path, table, len(header), columns, delimiter == ";", size, may_be_empty, increasing)
+        values = _rows(table, layout)
     except csv.Error as error:
         raise UserError(f"{_where(path, table.line_num)}: not a readable CSV row ({error})") from None
     if len(values) < 2:
@@ -114,18 +127,9 @@ def _header(table: Any, begin: int) -> list[str]:
     return next(row for row in table if row and table.line_num > begin)
 
 
-def _plain_rows(
-    path: Path,
-    file: IO[str],
-    begin: int,
-    width: int,
-    columns: Sequence[tuple[str, int]],
-    delimiter: str,
-    size: int,
-    may_be_empty: Container[str],
-    increasing: bool,
-) -> Array | None:
+def _plain_rows(file: IO[str], begin: int, layout: _Layout) -> Array | None:
     """The result of `_rows` for the lines below `begin`, in blocks; None if a line needs `_rows`."""
+    path, delimiter, width, columns, may_be_empty, increasing, size = layout
     file.seek(0)
     for _ in range(begin):
         file.readline()
@@ -159,17 +163,9 @@ def _plain_rows(
     return None if increasing and not (np.diff(values[:, 0]) > 0).all() else values
 
 
-def _rows(
-    path: Path,
-    table: Any,
-    width: int,
-    columns: Sequence[tuple[str, int]],
-    decimal_comma: bool,
-    size: int,
-    may_be_empty: Container[str],
-    increasing: bool,
-) -> Array:
+def _rows(table: Any, layout: _Layout) -> Array:
     """All rows below the header, (rows, columns), checked cell by cell."""
+    path, delimiter, width, columns, may_be_empty, increasing, size = layout
     cells, previous, bytes_read = array("d"), -math.inf, 0
     with Progress(f"reading {path}", size) as progress:
         for count, row in enumerate(table):
@@ -182,7 +178,7 @@ def _rows(
             for name, index in columns:
                 text = row[index]
                 try:
-                    value = float(text.replace(",", ".") if decimal_comma else text)
+                    value = float(text.replace(",", ".") if delimiter == ";" else text)
                 except ValueError:
                     value = None
                 # float() would take 1_000 for a thousand

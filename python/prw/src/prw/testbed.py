@@ -131,7 +131,7 @@ class Testbed:
             raise UserError(str(error)) from None
         if runs.errors:
             raise UserError(stopped(runs.errors[0]))
-        return {name: course[0] for name, course in runs.items()}
+        return {name: trajectory[0] for name, trajectory in runs.items()}
 
 
 def stopped(why: str) -> str:

@@ -175,12 +175,12 @@ def _lathe(profile: Sequence[tuple[float, float]], colours: Sequence[str], lobes
 
 def _roller(side: int, angle: float) -> list[Face]:
     """A conical roller on the carrier of a side, pointing at the centre of the wrist."""
-    of = PARTS["rollers"]
-    axis = np.array([side * of["axis"][0], of["axis"][1], 0.0])
+    rollers = PARTS["rollers"]
+    axis = np.array([side * rollers["axis"][0], rollers["axis"][1], 0.0])
     across = np.array([axis[1], -axis[0], 0.0]) / np.linalg.norm(axis)
     turn = np.linspace(0, 2 * np.pi, 7)
     circle = np.outer(np.cos(turn), across) + np.outer(np.sin(turn), [0, 0, 1])
-    outer, inner = axis + of["radius"][0] * circle, of["inner"] * axis + of["radius"][1] * circle
+    outer, inner = axis + rollers["radius"][0] * circle, rollers["inner"] * axis + rollers["radius"][1] * circle
     faces = [np.array([outer[k], outer[k + 1], inner[k + 1], inner[k]]) for k in range(6)] + [inner[:-1]]
     return [Face(face @ about_x(angle).T, to_rgb(STEEL)) for face in faces]
 

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from prw.channels import MOTORS, si_unit
 from prw.checking.experiments import Experiment
 from prw.checking.result import Result
-from prw.errors import UserError
-from prw.extras import need
+from prw.columns import MOTORS, si_unit
+from prw.errors import UserError, need
 from prw.files import write_text
 from prw.motion import Array
 
@@ -105,10 +104,7 @@ class Agreement:
             },
             "notes": list(self.notes),
         }
-        text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
-        if path is not None:
-            write_text(Path(path), text)
-        return text
+        return write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
     def plot(self) -> Figure:
         """Result and reference of the outputs that do not agree, or of all if they do; save it with `.savefig(path)`.
@@ -236,7 +232,7 @@ def _notes(bare: Agreement, result: Result) -> list[str]:
             continue
         ratio = float(found @ expected / power)
         if abs(ratio / np.rad2deg(1) - 1) < NEAR:
-            notes.append(f"{name} looks like degrees; say so by the units: {name}=deg{'/s' * name.endswith('rate')}")
+            notes.append(f"{name} looks like degrees; give its unit: {name}=deg{'/s' * name.endswith('rate')}")
         elif abs(ratio + 1) < NEAR:
             notes.append(f"{name} has the other sign")
     late = _late_by(bare, result)

@@ -10,10 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from prw.channels import QUANTITIES, factor, si_unit
-from prw.columns import NAMES, column, shown
-from prw.errors import UserError
-from prw.extras import need
+from prw.columns import NAMES, QUANTITIES, column, factor, shown, si_unit
+from prw.errors import UserError, need
 from prw.motion import Array
 from prw.table import read_table
 
@@ -78,7 +76,7 @@ def _choose(
         if any(not np.array_equal(other[2], same[0][2]) for other in same[1:]):
             owners = ", ".join(owner or "none" for owner, _, _ in same)
             raise UserError(
-                f"there are several {name} in {path}, of the components {owners}; say which", argument="component"
+                f"there are several {name} in {path}, of the components {owners}; name one", argument="component"
             )
         _, unit, values = same[0]
         try:

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from prw.checking import check
-from prw.commands.assignments import FORMATTER, Named
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
+from prw.commands.options import FORMATTER, Named, add_paths
 from prw.commands.simulate import write_png
 from prw.errors import MissingPackage, UserError
 
@@ -44,10 +43,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--model-exchange", action="store_true", help="take the tolerances for Model Exchange")
     parser.add_argument("--component", metavar="NAME", help="if several have a column of one name (default: testbed)")
     parser.add_argument("--units", action=Named, metavar="NAME=UNIT,...", help="units of columns whose header has none")
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where the figure goes (default: %(default)s)"
-    )
+    add_paths(parser, "where the figure goes")
     parser.set_defaults(run=run)
 
 
@@ -65,10 +61,10 @@ def run(arguments: argparse.Namespace) -> None:
     if found.agrees:
         print("agrees      with the reference")
         return
-    picture = arguments.out / f"{arguments.file.stem}_check.png"
+    figure_path = arguments.out / f"{arguments.file.stem}_check.png"
     try:
-        write_png(picture, found.plot())
-        shown = f"{picture} shows both"
+        write_png(figure_path, found.plot())
+        shown = f"{figure_path} shows both"
     except MissingPackage as error:
         shown = f"for a figure of both, {error}"
     far = [name for name, difference in found.variables.items() if not difference.agrees]

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from prw.arguments import positive
-from prw.commands.assignments import FORMATTER, add_task_options, listed
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
-from prw.extras import need
-from prw.files import write_text
+from prw.commands.options import FORMATTER, add_paths, add_task_options, listed
+from prw.errors import need
+from prw.files import write_table, write_text
 from prw.identification.excitation import excite
-from prw.output import write_motion
 
 DESCRIPTION = """\
 Proposes motor motions within the motors' limits and ranks them by the standard errors of the parameters that are
@@ -63,14 +60,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--duration", type=float, default=10.0, metavar="S", help="of a motion (default: %(default)g)")
     parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="of sampling (default: %(default)g)")
     add_task_options(parser)
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=DEFAULT_OUT / "excite",
-        metavar="DIR",
-        help="where the motions and ranking.json go (default: %(default)s)",
-    )
+    add_paths(parser, "where the motions and ranking.json go", "excite")
     parser.set_defaults(run=run, options={"parameters": "--set"})
 
 
@@ -92,7 +82,7 @@ def run(arguments: argparse.Namespace) -> None:
         fmu=arguments.fmu,
     )
     for entry in ranking:
-        write_motion(arguments.out / f"{entry.name}.csv", entry.motion)
+        write_table(arguments.out / f"{entry.name}.csv", entry.motion.columns)
     best = ranking[0]
     content = {
         "measured": dict(best.noise),

@@ -7,10 +7,11 @@ import re
 from pathlib import Path
 from typing import Any
 
-from prw.channels import factor
-from prw.commands.assignments import (
+from prw.columns import factor
+from prw.commands.options import (
     FORMATTER,
     Named,
+    add_paths,
     add_reading_options,
     add_task_options,
     bounds,
@@ -19,9 +20,7 @@ from prw.commands.assignments import (
     reading_options,
     spread,
 )
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
-from prw.errors import DoesNotFit, UserError
-from prw.extras import need
+from prw.errors import DoesNotFit, UserError, need
 from prw.identification import identify
 
 DESCRIPTION = """\
@@ -80,12 +79,16 @@ def add_parser(subparsers: Any) -> None:
         metavar="ANGLE",
         help="resolution of the motors' encoders, as in 0.036deg or 0.000628rad (default: found in the data)",
     )
-    for kind, said in (("delay", "come late"), ("lag", "lag, to first order"), ("gain", "read too much or too little")):
+    for kind, effect in (
+        ("delay", "come late"),
+        ("lag", "lag, to first order"),
+        ("gain", "read too much or too little"),
+    ):
         parser.add_argument(
             f"--{kind}",
             default="",
             metavar="NAMES",
-            help=f"channels that may {said}, with commas; this is then estimated, too",
+            help=f"channels that may {effect}, with commas; this is then estimated, too",
         )
     parser.add_argument(
         "--write-anyway", action="store_true", help="write parameters even if the FMU does not explain the data"
@@ -95,14 +98,7 @@ def add_parser(subparsers: Any) -> None:
         "--starts", type=int, default=6, metavar="N", help="starting points of the search (default: %(default)s)"
     )
     parser.add_argument("--seed", type=int, default=0, help="of the random starting points (default: %(default)s)")
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=DEFAULT_OUT / "identified",
-        metavar="DIR",
-        help="where report.html, report.json, identified.json and identified.ssv go (default: %(default)s)",
-    )
+    add_paths(parser, "where report.html, report.json, identified.json and identified.ssv go", "identified")
     parser.set_defaults(run=run, options={"parameters": "--set", "priors": "--prior", "skip": "--skip-lines"})
 
 

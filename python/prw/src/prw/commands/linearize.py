@@ -7,9 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from prw.commands.assignments import add_parameter_options, parameters_of
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
-from prw.files import replacing
+from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT, add_parameter_options, parameters_of
+from prw.files import write_text
 from prw.linearization import linearize
 from prw.state_space import StateSpace
 
@@ -37,8 +36,7 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Carry out `prw linearize`. Raises UserError with a message of one line."""
     model = linearize(parameters_of(arguments, arguments.fmu), fmu=arguments.fmu)
-    with replacing(arguments.out) as temporary:
-        temporary.write_text(json.dumps(content(model), indent=2) + "\n", encoding="utf-8")
+    write_text(arguments.out, json.dumps(content(model), indent=2) + "\n")
     for kind in ("states", "inputs", "outputs"):
         print(f"{kind:<11} {', '.join(getattr(model, kind)) or 'none'}")
     print(f"poles       {', '.join(f'{pole:.6g}' for pole in model.poles()) or 'none'} (1/s)")

@@ -1,11 +1,18 @@
-"""Defaults that several subcommands share."""
+"""Options that several subcommands share, and options like --set k1=120."""
 
 from __future__ import annotations
 
+import argparse
+import math
+import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+from prw.arguments import values_of
 from prw.errors import UserError
-from prw.testbed import default_fmu
+from prw.identification import DEFAULT_ESTIMATE
+from prw.testbed import default_fmu, existing_fmu, loaded
 
 #: None if there is none: a command that needs an FMU then reports where it was searched for.
 DEFAULT_FMU: Path | None
@@ -14,3 +21,176 @@ try:
 except UserError:
     DEFAULT_FMU = None
 DEFAULT_OUT = Path("out")
+
+
+def add_paths(parser: argparse.ArgumentParser, out: str = "where to write", directory: str = "") -> None:
+    """The options --fmu and --out. out: the help; directory: the default within DEFAULT_OUT."""
+    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
+    default = DEFAULT_OUT / directory
+    parser.add_argument("--out", type=Path, default=default, metavar="DIR", help=f"{out} (default: %(default)s)")
+
+
+class FORMATTER(argparse.RawDescriptionHelpFormatter):
+    """Keeps the line breaks of descriptions and examples, at a width of 110 characters."""
+
+    def __init__(self, prog: str):
+        super().__init__(prog, max_help_position=30, width=110)
+
+
+def add_task_options(parser: argparse.ArgumentParser) -> None:
+    """Options on parameters and noise that identification and experiment design share."""
+    parser.add_argument(
+        "--estimate",
+        default=",".join(DEFAULT_ESTIMATE),
+        metavar="NAMES",
+        help="parameters to estimate, with commas; all others stay fixed (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--set",
+        action=Named,
+        read=positive,
+        metavar="NAME=VALUE",
+        help="start value, or value of a fixed parameter, in SI (default: the FMU's). May be repeated",
+    )
+    parser.add_argument(
+        "--noise",
+        action=Named,
+        read=positive,
+        metavar="NAME=VALUE",
+        help="standard deviation of a channel's noise in SI, where it is known. May be repeated",
+    )
+
+
+def add_reading_options(parser: argparse.ArgumentParser) -> None:
+    """Options on the format of recordings."""
+    parser.add_argument(
+        "--units",
+        action=Named,
+        metavar="NAME=UNIT,...",
+        help="units of columns whose header has none; an encoder's counts are theta1=rev/10000",
+    )
+    parser.add_argument("--degrees", action="store_true", help="columns without a unit are in deg and deg/s, not SI")
+    parser.add_argument(
+        "--names",
+        action=Named,
+        metavar="NAME=HEADER",
+        help="name of a column in the file, as in 'theta1=Motor 1'. May be repeated",
+    )
+    parser.add_argument(
+        "--skip-lines", type=int, default=0, metavar="N", help="lines above the header, as dSPACE writes them"
+    )
+    parser.add_argument(
+        "--encoding", default="", help="of the file (default: UTF-8, or UTF-16 where the file begins with its mark)"
+    )
+
+
+def reading_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Arguments of `prw.read` from these options."""
+    return {
+        "units": arguments.units,
+        "degrees": arguments.degrees,
+        "names": arguments.names,
+        "skip": arguments.skip_lines,
+        "encoding": arguments.encoding,
+    }
+
+
+class Named(argparse.Action):
+    """Collects NAME=VALUE, with commas or by repetition, as a dict of `read(name, string)` by name."""
+
+    def __init__(self, read: Callable[[str, str], Any] = lambda _, text: text, **options: Any):
+        super().__init__(default={}, **options)
+        self.read = read
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
+    ) -> None:
+        """Add the pairs in the string `values`. Raises UserError naming the option."""
+        option, found = str(option), dict(getattr(namespace, self.dest))
+        for part in filter(None, (part.strip() for part in values.split(","))):
+            name, _, text = (word.strip() for word in part.partition("="))
+            if not name or not text:
+                raise UserError("write NAME=VALUE", argument=option, given=part)
+            if name in found:
+                raise UserError(f"{name} is given twice", argument=option)
+            try:
+                found[name] = self.read(name, text)
+            except ValueError as error:
+                raise UserError(str(error), argument=option, given=part) from None
+        setattr(namespace, self.dest, found)
+
+
+def number(text: str) -> float:
+    """A positive number. Raises ValueError."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise ValueError(f"{text!r} is not a positive number")
+    return value
+
+
+def listed(text: str) -> tuple[str, ...]:
+    """Names with commas, each once."""
+    return tuple(dict.fromkeys(filter(None, (part.strip() for part in text.split(",")))))
+
+
+def add_parameter_options(parser: argparse.ArgumentParser, unit: str) -> None:
+    """Options on the parameters of a run or a model."""
+    parser.add_argument(
+        "--set",
+        action=Named,
+        read=value,
+        metavar="NAME=VALUE",
+        help=f"start value in {unit} (default: the FMU's). May be repeated",
+    )
+    parser.add_argument(
+        "--parameters",
+        type=Path,
+        metavar="FILE",
+        help="parameters in JSON, as `prw identify` writes; --set has precedence",
+    )
+
+
+def parameters_of(arguments: argparse.Namespace, fmu: Path | None) -> dict[str, Any]:
+    """The values by name that these options give."""
+    found: dict[str, Any] = {}
+    if arguments.parameters is not None:
+        with loaded(existing_fmu(fmu)) as inside:
+            found = values_of(arguments.parameters, inside)
+    if arguments.set:
+        arguments.options = {"parameters": "--set"}
+    return {**found, **arguments.set}
+
+
+def positive(_: str, text: str) -> float:
+    """A positive number. Raises ValueError."""
+    return number(text)
+
+
+def value(_: str, text: str) -> float | bool:
+    """A number, or `true` or `false`. Raises ValueError."""
+    try:
+        return text == "true" if text in ("true", "false") else float(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a number") from None
+
+
+def spread(name: str, text: str) -> float | tuple[float, float]:
+    """[VALUE:]PERCENT% as a fraction, or (value, fraction). Raises ValueError."""
+    match = re.fullmatch(r"(?:([^:]+):)?\s*([^:%]+)%", text)
+    if not match:
+        raise ValueError(f"write {name}=10%, or {name}=VALUE:10%")
+    fraction = number(match[2]) / 100
+    return (number(match[1]), fraction) if match[1] else fraction
+
+
+def bounds(name: str, text: str) -> tuple[float, float]:
+    """LOW:HIGH. Raises ValueError."""
+    low, colon, high = text.partition(":")
+    if not colon:
+        raise ValueError(f"write {name}=LOW:HIGH")
+    if number(low) >= number(high):
+        raise ValueError("the first must be below the second")
+    return number(low), number(high)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from prw.animation import animate, suffix_of
-from prw.commands.assignments import (
+from prw.commands.options import (
     add_parameter_options,
+    add_paths,
     add_reading_options,
     parameters_of,
     reading_options,
 )
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 from prw.errors import MissingPackage, UserError
 from prw.files import replacing
 from prw.motion import fig4
@@ -46,10 +46,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--input", type=Path, metavar="FILE", help="the same")
     add_parameter_options(parser, "SI")
     add_reading_options(parser)
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT, metavar="DIR", help="where to write (default: %(default)s)"
-    )
+    add_paths(parser)
     parser.add_argument(
         "--animate",
         type=Path,
@@ -74,7 +71,7 @@ def run(arguments: argparse.Namespace) -> None:
         if arguments.degrees:
             raise UserError("--degrees belongs to a recording; the paper's experiment is in radians")
         motion, title = fig4(), "Fig. 4: equal and opposite motor velocities"
-    table, picture = (arguments.out / f"{motion.name}{suffix}" for suffix in (".csv", ".png"))
+    table, figure_path = (arguments.out / f"{motion.name}{suffix}" for suffix in (".csv", ".png"))
     if recorded and table.exists() and table.samefile(arguments.input):
         raise UserError(
             f"{table}: is the recording itself and would be overwritten; choose another directory with --out"
@@ -84,8 +81,8 @@ def run(arguments: argparse.Namespace) -> None:
     response.to_csv(table)
     written, missing = [table], ""
     try:
-        write_png(picture, response.plot(title, angles=recorded))
-        written.append(picture)
+        write_png(figure_path, response.plot(title, angles=recorded))
+        written.append(figure_path)
     except MissingPackage as error:
         missing = str(error)
     if arguments.animate is not None:

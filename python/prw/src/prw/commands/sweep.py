@@ -9,22 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from prw.commands.assignments import FORMATTER, Named, spread
-from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
-from prw.errors import UserError
-from prw.extras import need
+from prw.commands.options import FORMATTER, Named, add_paths, spread
+from prw.errors import UserError, need
 from prw.motion import Array, fig4
 from prw.recording import read_motion
 from prw.sweeps import Swept, carry_out, layout
-from prw.sweeps.study import Study
 from prw.testbed import Testbed
 
 DESCRIPTION = """\
 Runs the FMU many times with different parameters, on all cores of this machine or on a Dask cluster, and writes one row
 for each run into runs.parquet: its parameters and each output's peak, rms and value at the end (SI).
 
---grid parameters make all combinations; --random ones are drawn for each of --runs runs (per combination). Finished
-chunks are kept: the same command continues after an interruption. A run that fails is recorded with its message.
+--grid parameters make all combinations; --random ones are drawn for each of --runs runs (per combination). A run that
+fails is recorded with its message.
 """
 
 EXAMPLES = """\
@@ -78,10 +75,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--threads", type=int, metavar="N", help="on this machine (default: one per core)")
     parser.add_argument("--workers", type=int, dest="threads", help=argparse.SUPPRESS)  # its name in 0.2.0
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, like tcp://head:8786")
-    parser.add_argument("--fmu", type=Path, default=DEFAULT_FMU, help="the testbed FMU (default: %(default)s)")
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT_OUT / "sweep", metavar="DIR", help="where to write (default: %(default)s)"
-    )
+    add_paths(parser, directory="sweep")
     parser.set_defaults(run=run)
 
 
@@ -98,8 +92,7 @@ def run(arguments: argparse.Namespace) -> None:
         raise UserError("nothing varies; add --grid NAME=LOW:HIGH:N or --random NAME=PERCENT% (see --help)")
     with Testbed(arguments.fmu) as testbed:
         values = layout(grid, random, arguments.runs, arguments.seed, testbed)
-        study = Study.of(testbed, motion, values, None)
-        swept = carry_out(study, testbed, arguments.out, threads, arguments.scheduler)
+        swept = carry_out(testbed, motion, values, {}, threads, arguments.scheduler, arguments.out)
     print("\n".join(_summary(arguments, swept, threads)))
 
 
@@ -107,11 +100,8 @@ def _summary(arguments: argparse.Namespace, swept: Swept, threads: int) -> list[
     """The number of runs, failures and files, one line each."""
     where = arguments.scheduler or f"{threads} thread{'s' if threads > 1 else ''}"
     total = swept.table.num_rows
-    lines = [f"ran         nothing: all {total} runs were there already"]
-    if swept.runs:
-        again = f", {total - swept.runs} were there already" if swept.runs < total else ""
-        pace = f"{swept.seconds:.1f} s ({swept.runs / swept.seconds:.0f} a second)"
-        lines = [f"ran         {swept.runs} runs on {where} in {pace}{again}"]
+    pace = f"{swept.seconds:.1f} s ({total / swept.seconds:.0f} per second)"
+    lines = [f"ran         {total} runs on {where} in {pace}"]
     status = swept.table.column("status").to_pylist()
     if failed := status.count("failed"):
         first = status.index("failed")

@@ -2,8 +2,8 @@
 
 In the order of dependence: path (smoothed motor angles), experiment (spectra of inputs, measurements and their errors),
 model (the FMU's equations), response (the model's outputs), fit (least squares), verdict (whether the model explains the
-data), diagnosis (possible causes if not), statistics and profile (standard errors and intervals), design and advice
-(more informative experiments), results and report. `identify` below combines them.
+data), diagnosis (possible causes if not), statistics (standard errors and intervals), design (more informative
+experiments), results and report. `identify` below combines them.
 """
 
 from __future__ import annotations
@@ -14,15 +14,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 from prw.arguments import Table, counted, is_path, is_table, names_of, positive, spread_of
-from prw.errors import UserError
-from prw.extras import need
+from prw.errors import UserError, need
 
 if TYPE_CHECKING:
+    from prw.arguments import Given
     from prw.identification.experiment import Rates
     from prw.identification.fit import Task
     from prw.identification.model import Parameters
     from prw.identification.results import Identification
-    from prw.parameters import Given
     from prw.recording import Recording
     from prw.simulation import Run
 
@@ -106,13 +105,13 @@ def identify(
     # These imports are slow.
     from threadpoolctl import threadpool_limits
 
+    from prw.arguments import values_of
     from prw.identification.experiment import may_be_simulated, prepare
     from prw.identification.fit import Distortion, fit
     from prw.identification.model import Model
     from prw.identification.results import Identification
     from prw.identification.statistics import certainty
     from prw.identification.verdict import judge
-    from prw.parameters import values_of
     from prw.recording import Recording, read
     from prw.simulation import Run
 
@@ -164,12 +163,12 @@ def identify(
 
             diagnosis = diagnose(solution, verdict)
         if sure.undetermined:
-            from prw.identification.advice import advice
+            from prw.identification.design import advice
 
             hints = advice(model, experiments, solution)
         sources = tuple(str(each.source) for each in measured)
-        said = verdict, tuple(diagnosis), tuple(hints)
-        return Identification(model.fmu, model.known, sources, tuple(experiments), solution, sure, *said)
+        judged = verdict, tuple(diagnosis), tuple(hints)
+        return Identification(model.fmu, model.known, sources, tuple(experiments), solution, sure, *judged)
 
 
 def task_of(
@@ -182,7 +181,7 @@ def task_of(
     offsets: bool = True,
 ) -> Task:
     """The task that these arguments of `identify` describe, for an FMU with the parameters `known`."""
-    from prw.channels import MEASURED
+    from prw.columns import MEASURED
     from prw.identification.fit import Prior, Task
 
     estimate = names_of("estimate", estimate)

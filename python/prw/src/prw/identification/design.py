@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from prw.channels import MEASURED
-from prw.identification.experiment import Experiment
-from prw.identification.fit import Fitter, Task
+from prw.columns import MEASURED
+from prw.identification.experiment import Experiment, planned
+from prw.identification.fit import Fitter, Solution, Task
 from prw.identification.model import Model
-from prw.identification.statistics import condition, covariance_of, information_of, noise_corrected
+from prw.identification.statistics import UNDETERMINED, condition, covariance_of, information_of, noise_corrected
 from prw.motion import Array, Motion
 from prw.testbed import ANGLE_OF, OUTPUTS
 
@@ -28,6 +28,8 @@ MOST_LINES = 60
 SLOW, WIDEST = 4.0, 40.0
 #: Condition of an information matrix from which its weakest combination is rounding error.
 SINGULAR = 1e12
+#: The default noise by channel, in SI.
+DEFAULT_NOISE = {name: channel.noise for name, channel in MEASURED.items()}
 #: Rounds of the multiplicative algorithm for the D-optimal spectrum.
 ROUNDS = 300
 
@@ -80,11 +82,6 @@ def information(
     fitter = Fitter(model, unmeasured, task, {name: noise[name] for name in channels})
     jacobians, of_noise = fitter.jacobians(np.asarray(logarithms, dtype=float))
     return noise_corrected(information_of(jacobians), of_noise)
-
-
-def default_noise() -> dict[str, float]:
-    """The default noise by channel, in SI."""
-    return {name: channel.noise for name, channel in MEASURED.items()}
 
 
 def _lines(duration: float, top: float) -> Array:
@@ -196,6 +193,77 @@ def typical_error(information: Array) -> float:
     return float(np.sqrt(np.mean(np.diag(covariance_of(information)))))
 
 
-def with_priors(information: Array, task: Task) -> Array:
-    """Information (p, p) with the priors'."""
-    return information + task.prior_information()
+#: Sensors that come in pairs.
+SENSORS = {
+    "tau1 and tau2": ("tau1", "tau2"),
+    "theta3 and theta4": ("theta3", "theta4"),
+    "pitch and roll": ("pitch", "roll"),
+}
+#: Estimates are limited to this factor about their start values.
+REACH = 10.0
+DURATION, RATE = 10.0, 1000.0
+#: The patterns of a motion in messages.
+DESCRIBED = {
+    "equal": "equal motors",
+    "opposite": "opposite motors",
+    "single": "one motor alone",
+    "independent": "motors that move independently",
+}
+
+
+def advice(model: Model, experiments: Sequence[Experiment], solution: Solution) -> list[str]:
+    """Experiments that would determine all parameters, each with the largest expected standard error: the best motion with
+    the same sensors, and the best pair of sensors with the same motions. Experiments that do not help are not named."""
+    task = replace(solution.task, distortions=())
+    first = np.log([task.start[name] for name in task.names])
+    point = np.clip(solution.logarithms[: len(first)], first - np.log(REACH), first + np.log(REACH))
+    task = replace(task, start=task.values(point))
+    noise = {**DEFAULT_NOISE, **solution.noise}
+    prior = task.prior_information()
+    have = prior + information(model, experiments, task, point, noise)
+    channels = tuple(dict.fromkeys(name for experiment in experiments for name in experiment.channels))
+    limits = _limits(experiments)
+    trials = []
+    candidates = motions(model, task, limits, DURATION, RATE, {name: noise[name] for name in channels})
+    for motion in candidates:
+        more = information(model, [planned(motion, channels)], task, point, noise)
+        trials.append((_worst(have + more), motion.name))
+    sentences: list[str] = []
+    for error, name in sorted(trials)[:1]:
+        if error < UNDETERMINED:
+            pattern = name.rsplit("_", 1)[1]
+            described = DESCRIBED.get(pattern, "a spectrum made for it")
+            sentences.append(
+                f"an experiment with {described} (worst standard error then {error:.1%}; "
+                f"`excite` proposes it for {','.join(channels)} as {name})"
+            )
+    trials = []
+    for name, pair in SENSORS.items():
+        if set(pair) <= set(channels):
+            continue
+        wider = [_measured_wholly(e, (*e.channels, *(c for c in pair if c not in e.channels))) for e in experiments]
+        trials.append((_worst(prior + information(model, wider, task, point, noise)), name))
+    for error, name in sorted(trials)[:1]:
+        if error < UNDETERMINED:
+            sentences.append(f"measuring {name} as well in the same motion (worst standard error then {error:.1%})")
+    if not sentences:
+        sentences.append("no single motion or pair of sensors; fix one of them or give it a prior")
+    return sentences
+
+
+def _measured_wholly(experiment: Experiment, channels: tuple[str, ...]) -> Experiment:
+    """The experiment with these channels, each sampled at all times and without encoder steps."""
+    exact = np.zeros((1, experiment.bins, len(channels)), dtype=np.complex128)
+    return replace(experiment, channels=channels, values=None, samplers=None, channel_errors=exact)
+
+
+def _worst(information: Array) -> float:
+    return float(np.sqrt(np.diag(covariance_of(information)).max()))
+
+
+def _limits(experiments: Sequence[Experiment]) -> Limits:
+    """Limits of the motors: the largest values in the experiments, and at least small ones."""
+    angle = max(np.abs(e.theta - e.theta.mean(axis=0)).max() for e in experiments)
+    rate = max(np.abs(e.omega).max() for e in experiments)
+    least = Limits(0.1, 1.0, 50.0)
+    return Limits(max(angle, least.angle), max(rate, least.rate), max(40 * rate, least.acceleration))

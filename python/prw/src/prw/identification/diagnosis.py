@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from prw.channels import QUANTITIES
+from prw.columns import QUANTITIES
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Distortion, Fitter, Solution, settled
 from prw.identification.statistics import covariance_of, information_of
@@ -41,15 +41,15 @@ def diagnose(solution: Solution, verdict: Verdict) -> list[str]:
     if found:
         return list(dict.fromkeys(found))
     causes = _causes(solution, verdict)
-    said = [cause.text for cause in causes[:2] if cause.gain > SHARE * causes[0].gain]
+    reported = [cause.text for cause in causes[:2] if cause.gain > SHARE * causes[0].gain]
     if causes and not causes[0].explains:
         # Causes that remain with the first one included.
         after = causes[0].after()
         left = judge(after)
         others = [] if left.fits else _causes(after, left)
         others = [c for c in others if c.name != causes[0].name and c.gain > SECOND * causes[0].gain]
-        said = [causes[0].text, *(f"besides, {other.text}" for other in others[:1])] if others else said
-    return said
+        reported = [causes[0].text, *(f"besides, {other.text}" for other in others[:1])] if others else reported
+    return reported
 
 
 class _Cause(NamedTuple):
@@ -136,10 +136,10 @@ def _flat(name: str, time: Array, column: Array, moving: NDArray[np.bool_]) -> I
     usual = float(np.median(long))
     if usual > 2:
         return
-    for level, said in ((column.max(), "above"), (column.min(), "below")):
+    for level, side in ((column.max(), "above"), (column.min(), "below")):
         flats = (column[first] == level) & (long >= FLAT)
         if flats.sum() >= FLATS:
-            yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, and what lies {said} is lost"
+            yield f"{name} is cut off at {level:.4g} (SI), {flats.sum()} times: it saturates, and what lies {side} is lost"
             return
     longest = int(np.argmax(long))
     if moving[first[longest] : last[longest] + 1].mean() > 0.5 and time[last[longest]] - time[first[longest]] > STUCK:
@@ -160,8 +160,8 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
             parts = sum(fault.gain for name in group if (fault := clear.get(named(like, (name,)))))
             whole = clear.get(named(like, group))
             # A set that explains no more than its parts ranks below them.
-            promise = max(parts, whole.gain if whole else 0.0) - 10 * len(group)
-            trials.append((promise, kind, group, new))
+            expected_gain = max(parts, whole.gain if whole else 0.0) - 10 * len(group)
+            trials.append((expected_gain, kind, group, new))
     trials.sort(key=lambda trial: -trial[0])
     tried = [t for kind in ("delay", "lag", "gain") for t in [t for t in trials if t[1] == kind][:TRIED]]
     best = -np.inf
@@ -174,12 +174,12 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
             results.append((gain, kind, group, found))
             best = max(best, gain)
     results.sort(key=lambda result: -result[0])
-    said: set[str] = set()
+    reported: set[str] = set()
     for gain, kind, group, found in results:
         # Only the best set of a kind is reported.
-        if gain < SHARE * best or gain < CLEAR**2 or kind in said:
+        if gain < SHARE * best or gain < CLEAR**2 or kind in reported:
             continue
-        said.add(kind)
+        reported.add(kind)
         errors = np.sqrt(np.diag(covariance_of(information_of(found.jacobians) + found.task.prior_information())))
         sizes: dict[str, list[str]] = {}
         for k, distortion in enumerate(found.task.distortions[-len(group) :]):
@@ -189,8 +189,8 @@ def _refits(solution: Solution, verdict: Verdict) -> Iterator[_Cause]:
         options = ",".join(group)
         good = judge(found).fits
         then = "with that, the data fit" if good else "that explains a part of it"
-        said_of = "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
-        text = f"{said_of}: {then} ({kind} {options} estimates it along)"
+        description = "; ".join(f"{', '.join(names)} {size}" for size, names in sizes.items())
+        text = f"{description}: {then} ({kind} {options} estimates it along)"
         yield _Cause(
             gain, kind, text, good, partial(settled, solution, found.task.distortions[-len(group) :], rounds=ROUNDS)
         )

@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from prw.arguments import names_of, positive
-from prw.channels import MEASURED
-from prw.errors import UserError
-from prw.extras import need
+from prw.columns import MEASURED
+from prw.errors import UserError, need
 from prw.identification import DEFAULT_ESTIMATE, task_of
 from prw.motion import Motion
 
@@ -122,13 +121,13 @@ def excite(
     ranking = []
     with Model(fmu) as model, threadpool_limits(1):
         task = task_of(model.known, estimate, parameters=parameters, noise=noise)
-        known = {**design.default_noise(), **noise}
+        known = {**design.DEFAULT_NOISE, **noise}
         assumed = {name: known[name] for name in channels}
         limits = design.Limits(angle, speed, acceleration)
         for motion in design.motions(model, task, limits, duration, rate, assumed):
-            told = design.information(model, [planned(motion, channels)], task, task.first(), assumed)
-            errors = dict(zip(task.names, np.sqrt(np.diag(covariance_of(told))).tolist()))
-            left = [str(combination) for combination in undetermined(task.names, told)]
-            ranking.append(Excitation(motion, design.typical_error(told), errors, left, assumed))
+            found = design.information(model, [planned(motion, channels)], task, task.first(), assumed)
+            errors = dict(zip(task.names, np.sqrt(np.diag(covariance_of(found))).tolist()))
+            left = [str(combination) for combination in undetermined(task.names, found)]
+            ranking.append(Excitation(motion, design.typical_error(found), errors, left, assumed))
     # If all motions leave a combination open, the mean error of the parameters decides.
     return sorted(ranking, key=lambda e: (e.typical_error, float(np.mean(np.log(list(e.expected_errors.values()))))))

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 
-from prw.channels import MEASURED
+from prw.columns import MEASURED
 from prw.errors import UserError
 from prw.identification.path import Path, quantum_of, rough_noise, smooth
 from prw.motion import Array, Motion
@@ -65,12 +65,12 @@ class Experiment:
     omega: Array
     channels: tuple[str, ...]
     sampled: Array
-    values: Array | None
-    between: csr_matrix | None
-    samplers: tuple[csr_matrix, ...] | None
     bins: int
     motor_errors: Complex
     channel_errors: Complex
+    values: Array | None = None
+    between: csr_matrix | None = None
+    samplers: tuple[csr_matrix, ...] | None = None
     paths: tuple[Path, Path] | None = None
     notes: tuple[str, ...] = ()
     jumps: Array | None = None
@@ -116,8 +116,8 @@ class Experiment:
         if self.samplers is None:
             return spectra(self.values)[: self.bins]
         known = np.nan_to_num(self.values)
-        courses = np.column_stack([s.T @ column for s, column in zip(self.samplers, known.T)])
-        return spectra(courses)[: self.bins]
+        signals = np.column_stack([s.T @ column for s, column in zip(self.samplers, known.T)])
+        return spectra(signals)[: self.bins]
 
     @cached_property
     def shares(self) -> Array:
@@ -140,21 +140,21 @@ class Experiment:
         """Spectra (bins, c, ...) as in `measured`, from a model's spectra (needed_bins, c, ...)."""
         if self.samplers is None:
             return modelled
-        courses = np.fft.irfft(modelled, len(self.time), axis=0, norm="ortho")
-        flat = courses.reshape(len(self.time), len(self.channels), -1)
+        signals = np.fft.irfft(modelled, len(self.time), axis=0, norm="ortho")
+        flat = signals.reshape(len(self.time), len(self.channels), -1)
         for i, sampler in enumerate(self.samplers):
             flat[:, i] = sampler.T @ (sampler @ flat[:, i])
-        return spectra(flat.reshape(courses.shape))[: self.bins]
+        return spectra(flat.reshape(signals.shape))[: self.bins]
 
-    def courses(self, modelled: Complex) -> Array:
+    def signals(self, modelled: Complex) -> Array:
         """The channels (s, c) at `sampled` of spectra (all_bins, c)."""
         found = np.fft.irfft(modelled, len(self.time), axis=0, norm="ortho")
         return found if self.between is None else np.asarray(self.between @ found)
 
 
-def spectra(courses: Array) -> Complex:
+def spectra(signals: Array) -> Complex:
     """The unitary Fourier transform over the first axis, frequencies from 0."""
-    return np.fft.rfft(courses, axis=0, norm="ortho")
+    return np.fft.rfft(signals, axis=0, norm="ortho")
 
 
 def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motors", exact: bool = False) -> Experiment:
@@ -194,22 +194,15 @@ def prepare(recording: Recording, quantum: float = 0.0, rates_of: Rates = "motor
             channel = smooth(sampled[there], column[there])
             channel_errors[:, :, i] = spectra(_drawn(channel, inside, sampled[there]).T)[:bins].T
     between = None if even else _interpolation(time, sampled)
+    motor_errors = np.stack([_with_rates(e, p.rate_noise, spacing)[:, :bins] for e, p in zip(errors, paths)], axis=2)
     return Experiment(
-        recording.name,
-        time,
-        theta,
-        rates,
-        channels,
-        sampled,
-        values,
-        between,
-        _samplers(between, values),
-        bins,
-        np.stack([_with_rates(e, path.rate_noise, spacing)[:, :bins] for e, path in zip(errors, paths)], axis=2),
-        channel_errors,
-        (paths[0], paths[1]),
-        notes,
-        jumps,
+        *(recording.name, time, theta, rates, channels, sampled, bins, motor_errors, channel_errors),
+        values=values,
+        between=between,
+        samplers=_samplers(between, values),
+        paths=(paths[0], paths[1]),
+        notes=notes,
+        jumps=jumps,
     )
 
 
@@ -262,23 +255,12 @@ def planned(motion: Motion, channels: Sequence[str]) -> Experiment:
     """A planned experiment: the motors' motion is known and evenly sampled, and the channels have no values."""
     assert motion.omega is not None
     step = float(motion.time[-1] - motion.time[0]) / (len(motion.time) - 1)
-    exact = np.full((1, len(motion.time)), 0.0)
+    exact = np.zeros((1, len(motion.time)))
     bins = max(FEWEST, *(_clear(theta, exact, None, step) for theta in motion.theta.T))
     bins = min(bins, len(motion.time) // 2 + 1)
-    return Experiment(
-        motion.name,
-        motion.time,
-        motion.theta,
-        motion.omega,
-        tuple(channels),
-        motion.time,
-        None,
-        None,
-        None,
-        bins,
-        np.zeros((1, bins, 2), dtype=np.complex128),
-        np.zeros((1, bins, len(channels)), dtype=np.complex128),
-    )
+    known, none = (np.zeros((1, bins, count), dtype=np.complex128) for count in (2, len(channels)))
+    motors = motion.name, motion.time, motion.theta, motion.omega
+    return Experiment(*motors, tuple(channels), motion.time, bins, known, none)
 
 
 def _drawn(path: Path, time: Array, sampled: Array) -> Array:
@@ -315,14 +297,14 @@ def _clear(theta: Array, errors: Array, rate_noise: float | None, step: float) -
     n = len(theta)
     window = np.hanning(n - 1)
 
-    def power(course: Array) -> Array:
-        increments = np.diff(course) / step
+    def power(signal: Array) -> Array:
+        increments = np.diff(signal) / step
         found = np.abs(np.fft.rfft((increments - increments.mean()) * window)) ** 2 / (window @ window)
         return np.convolve(found, np.ones(NEIGHBOURS) / NEIGHBOURS, mode="same")
 
     # In a periodic motion an encoder's errors are lines at multiples of its frequency, which differ much between draws.
     # Half of the strongest counts, which for white noise is less than the mean.
-    drawn = [power(course) for course in errors]
+    drawn = [power(signal) for signal in errors]
     noise = np.maximum(np.mean(drawn, axis=0), np.max(drawn, axis=0) / 2)
     if rate_noise is not None:
         noise = 1 / (1 / np.maximum(noise, 1e-300) + 1 / max(rate_noise, 1e-150) ** 2)

@@ -246,8 +246,8 @@ class Comparison:
         inverse = self._whiten.conj().swapaxes(-1, -2) @ self._whiten
         weighted = (inverse @ self._rest[:, :, None])[..., 0]
         expected, share = np.einsum("fcc->c", inverse).real, self.experiment.shares
-        told = share * np.einsum("fcc,fcc->c", inverse, inverse).real
-        sums: Array = share * np.array([np.sum(np.abs(weighted) ** 2, axis=0), expected, told])
+        information = share * np.einsum("fcc,fcc->c", inverse, inverse).real
+        sums: Array = share * np.array([np.sum(np.abs(weighted) ** 2, axis=0), expected, information])
         return sums
 
 
@@ -360,7 +360,7 @@ class Fitter:
         found = []
         for experiment, comparison in zip(self.experiments, self.compare(logarithms)):
             whole = self._response(logarithms, experiment, experiment.all_bins)
-            found.append(experiment.courses(whole.outputs + whole.transients @ comparison.initial) + comparison.offsets)
+            found.append(experiment.signals(whole.outputs + whole.transients @ comparison.initial) + comparison.offsets)
         return found
 
     def residuals(self, logarithms: Array) -> Array:
@@ -509,13 +509,13 @@ def settled(
     """Repeat the fit with further distortions as unknowns, or faults of each experiment. It starts from the solution and, if
     it diverges, from the start values. rounds: of fitting and estimating the noise; few suffice for a comparison."""
     task = replace(solution.task, distortions=(*solution.task.distortions, *distortions))
-    places = [np.append(solution.logarithms, np.zeros(len(distortions))), task.first()]
+    starts = [np.append(solution.logarithms, np.zeros(len(distortions))), task.first()]
     found = []
-    for place in places:
+    for start_point in starts:
         fitter = Fitter(
             solution.fitter.model, solution.fitter.experiments, task, solution.noise, faults or solution.fitter.faults
         )
-        point = fitter.settle(fitter.search(place, COARSE).x, rounds, FINE if rounds == ROUNDS else COARSE)
+        point = fitter.settle(fitter.search(start_point, COARSE).x, rounds, FINE if rounds == ROUNDS else COARSE)
         misfit = float(np.sum(fitter.residuals(point) ** 2))
         found.append(_solution(fitter, point, misfit, [], 1))
         if np.abs(point[: len(task.names)] - task.first()[: len(task.names)]).max() < 1:
@@ -530,11 +530,11 @@ def _other_starts(task: Task, point: Array, count: int, seed: int) -> list[Array
     exchanged; only theta3 and theta4 distinguish the couplings. So the mirror image is tried first.
     """
     starts = []
-    place = {name: i for i, name in enumerate(task.names)}
-    if {"k1", "k2", "c1", "c2"} <= set(place) and count > 0:
+    index = {name: i for i, name in enumerate(task.names)}
+    if {"k1", "k2", "c1", "c2"} <= set(index) and count > 0:
         mirrored = point.copy()
         for a, b in (("k1", "k2"), ("c1", "c2")):
-            mirrored[[place[a], place[b]]] = point[[place[b], place[a]]]
+            mirrored[[index[a], index[b]]] = point[[index[b], index[a]]]
         starts.append(mirrored)
     random = np.random.default_rng(seed)
     (low, high), first = task.span(), task.first()

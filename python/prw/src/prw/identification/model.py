@@ -10,8 +10,7 @@ from xml.etree import ElementTree
 
 import fmu_run
 
-from prw.description import CONTINUOUS, Description, read_description
-from prw.linearization import Linearizer
+from prw.linearization import CONTINUOUS, Description, Linearizer, read_description
 from prw.testbed import OUTPUTS
 
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"

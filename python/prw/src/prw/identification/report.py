@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -13,12 +12,12 @@ from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from prw.channels import si_unit
-from prw.identification.experiment import Experiment
-from prw.identification.fit import Solution
-from prw.identification.model import Parameters
-from prw.motion import Array, envelope
-from prw.plots import BLUE, PAGE_STYLE, VERMILION
+from prw.columns import si_unit
+from prw.motion import Array
+from prw.plots import BLUE, PAGE_STYLE, VERMILION, envelope
+
+if TYPE_CHECKING:
+    from prw.identification.results import ChannelFit, Identification
 
 #: Size of a figure, inches.
 SIZE = (6.7, 3.75)
@@ -38,51 +37,44 @@ CLOSE = 1.0
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def page(
-    known: Parameters,
-    experiments: Sequence[Experiment],
-    solution: Solution,
-    residuals: Sequence[Array],
-    channels: Sequence[Mapping[str, Any]],
-    estimates: Mapping[str, Any],
-    **shown: Any,
-) -> str:
-    """The page as HTML. residuals: (s, c) of each experiment. channels: the fields of each ChannelFit. estimates: by
-    name. shown: further variables of the template."""
+def page(found: Identification) -> str:
+    """The page as HTML."""
     environment = Environment(
         loader=PackageLoader("prw.identification", "."), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters.update(digits=_digits, percent=_percent, shade=_shade)
-    rows = []
-    for name, parameter in known.real.items():
-        rows.append(
-            {
-                "name": name,
-                "meaning": parameter.meaning.split(";")[0],
-                "factor": parameter.factor,
-                "unit": parameter.shown,
-                "start": solution.task.start[name],
-                "found": estimates.get(name),
-            }
-        )
+    estimates = found.parameters
+    rows = [
+        {
+            "name": name,
+            "meaning": parameter.meaning.split(";")[0],
+            "factor": parameter.factor,
+            "unit": parameter.shown,
+            "start": found.solution.task.start[name],
+            "found": estimates.get(name),
+        }
+        for name, parameter in found.known.real.items()
+    ]
     return environment.get_template("report.html.j2").render(
-        solution=solution,
+        found=found,
+        sure=found.sure,
+        solution=found.solution,
         rows=rows,
-        channels=[_shown(channel) for channel in channels],
-        figures=figures(experiments, solution, residuals),
-        **shown,
+        channels=[_shown(channel) for channel in found.channels],
+        figures=figures(found),
     )
 
 
-def figures(experiments: Sequence[Experiment], solution: Solution, residuals: Sequence[Array]) -> list[dict[str, str]]:
+def figures(found: Identification) -> list[dict[str, str]]:
     """A figure for every channel of every experiment: a close-up of measured and modelled, and the residual."""
     drawn = []
-    for experiment, residual, modelled in zip(experiments, residuals, solution.modelled):
+    for i, (experiment, modelled) in enumerate(zip(found.experiments, found.solution.modelled)):
+        residual = found.residual(i)
         for j, name in enumerate(experiment.channels):
             unit, factor = SHOWN.get(si_unit(name), (si_unit(name), 1.0))
             keep = np.isfinite(residual[:, j])
             svg = _curves(experiment.sampled[keep], factor * modelled[keep, j], factor * residual[keep, j], unit)
-            title = f"{experiment.name}: {name}" if len(experiments) > 1 else name
+            title = f"{experiment.name}: {name}" if len(found.experiments) > 1 else name
             drawn.append({"title": title, "svg": Markup(svg)})
     return drawn
 
@@ -115,10 +107,10 @@ def _curves(time: Array, modelled: Array, residual: Array, unit: str) -> str:
     return f'<svg role="img" fill="currentColor" {svg}'
 
 
-def _shown(channel: Mapping[str, Any]) -> dict[str, Any]:
-    unit, factor = SHOWN.get(channel["unit"], (channel["unit"], 1.0))
-    scaled = {name: channel[name] * factor for name in ("noise", "residual", "offset")}
-    return {**channel, **scaled, "unit": unit}
+def _shown(channel: ChannelFit) -> ChannelFit:
+    unit, factor = SHOWN.get(channel.unit, (channel.unit, 1.0))
+    scaled = {name: getattr(channel, name) * factor for name in ("noise", "residual", "offset")}
+    return channel._replace(unit=unit, **scaled)
 
 
 def _digits(value: float, count: int = 4) -> str:

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from prw.channels import MOTORS, si_unit
-from prw.extras import need
+from prw.columns import MOTORS, si_unit
+from prw.errors import need
 from prw.files import write_text
 from prw.identification.experiment import Experiment
 from prw.identification.fit import Prior, Solution
@@ -179,7 +179,7 @@ class Identification:
             swapped = " (the couplings exchanged)" if self._exchanged(point) else ""
             lines.append(
                 f"the data fit as well with {values}{swapped}; given is what is nearest to the start values. "
-                "theta3 and theta4 would tell"
+                "theta3 and theta4 would distinguish them"
             )
         if self.fits and self.verdict.widening.any() and not sure.undetermined:
             first = self.verdict.faults[0]
@@ -212,7 +212,7 @@ class Identification:
         else:
             lines.append("verdict     THE FMU DOES NOT EXPLAIN THE DATA; the values below are not to be trusted")
             lines += [f"  {misfit}" for misfit in self.misfits]
-            lines += [f"perhaps     {text}" for text in self.diagnosis or ["nothing that is known by its looks"]]
+            lines += [f"perhaps     {text}" for text in self.diagnosis or ["no known cause"]]
         for name, found in self.parameters.items():
             factor, unit = (found.factor, found.shown) if shown else (1.0, found.unit)
             value, low, high = (v / factor for v in (found.value, *found.interval))
@@ -232,22 +232,19 @@ class Identification:
         need("jinja2", "matplotlib")
         from prw.identification.report import page
 
-        residuals = [self.residual(i) for i in range(len(self.experiments))]
-        channels = [channel._asdict() for channel in self.channels]
-        fitted = (self.known, self.experiments, self.solution, residuals, channels, self.parameters)
-        write_text(Path(path), page(*fitted, found=self, sure=self.sure))
+        write_text(path, page(self))
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """All numbers as JSON, also written to `path` if it is given."""
-        return _written(path, json.dumps(self._numbers(), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+        return write_text(path, json.dumps(self._numbers(), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
     def to_parameters(self, path: str | os.PathLike[str] | None = None) -> str:
         """All parameters as `build_fmu --parameters` reads them, in display units."""
-        return _written(path, self.known.for_building(self.values))
+        return write_text(path, self.known.for_building(self.values))
 
     def to_ssv(self, path: str | os.PathLike[str] | None = None, name: str = "identified") -> str:
         """All parameters as a parameter set of SSP 1.0, in SI, that other tools read. name: of the set."""
-        return _written(path, self.known.ssv(self.values, name))
+        return write_text(path, self.known.ssv(self.values, name))
 
     def __repr__(self) -> str:
         return self.summary()
@@ -275,11 +272,11 @@ class Identification:
         return float(np.sqrt(np.mean(np.concatenate(columns) ** 2)))
 
     def _exchanged(self, point: Array) -> bool:
-        place = {name: i for i, name in enumerate(self.solution.task.names)}
+        index = {name: i for i, name in enumerate(self.solution.task.names)}
         return all(
-            abs(point[place[a]] - self.solution.logarithms[place[b]]) < 0.05
+            abs(point[index[a]] - self.solution.logarithms[index[b]]) < 0.05
             for a, b in (("k1", "k2"), ("k2", "k1"), ("c1", "c2"), ("c2", "c1"))
-            if a in place and b in place
+            if a in index and b in index
         )
 
     def _numbers(self) -> dict[str, Any]:
@@ -348,9 +345,3 @@ class Identification:
             "evaluations": solution.evaluations,
             "notes": self.notes,
         }
-
-
-def _written(path: str | os.PathLike[str] | None, text: str) -> str:
-    if path is not None:
-        write_text(Path(path), text)
-    return text

@@ -16,8 +16,42 @@ import numpy as np
 from scipy.special import ndtri
 
 from prw.identification.fit import Comparison, Solution
-from prw.identification.profile import ends
 from prw.motion import Array
+
+#: Standard errors (of the logarithm) below which the model counts as linear, and above which there is no interval.
+LINEAR, HOPELESS = 0.01, 1.0
+#: Most trials for an end, tolerance of the rise of the misfit's root, and longest step relative to the trial before.
+TRIALS, CLOSE, LONGEST = 8, 0.02, 2.0
+#: Tolerances of the search over the other parameters.
+FOLLOWED = {"ftol": 1e-5, "xtol": 1e-5}
+
+
+def ends(solution: Solution, white: Array, errors: Array, quantile: float) -> tuple[Array, Array]:
+    """Lower and upper ends (p,) of the logarithms' intervals. white: (p, p), the covariance for white noise. errors:
+    (p,) standard errors. quantile: of the normal distribution, 1.96 for 95 %."""
+    low, high = solution.logarithms - quantile * errors, solution.logarithms + quantile * errors
+    for i, error in enumerate(errors):
+        if LINEAR < error < HOPELESS:
+            # The direction in which the misfit rises least with parameter i.
+            step = quantile * error * white[:, i] / white[i, i]
+            rise = (quantile * error) ** 2 / white[i, i]
+            low[i], high[i] = _end(solution, i, -step, rise), _end(solution, i, step, rise)
+    return low, high
+
+
+def _end(solution: Solution, i: int, step: Array, wanted: float) -> float:
+    """Logarithm of parameter i at which the least misfit has risen by `wanted`. step: (p,), the first trial."""
+    centre, (low, high) = solution.logarithms, solution.task.span()
+    for _ in range(TRIALS):
+        point = np.clip(centre + step, low, high)
+        found = solution.fitter.search(point, FOLLOWED, held=i)
+        point, rise = found.x, 2 * found.cost - solution.misfit
+        further = np.sqrt(wanted / rise) if rise > wanted / LONGEST**2 else LONGEST
+        if abs(further - 1) < CLOSE or (point[i] in (low[i], high[i]) and further > 1):
+            break
+        step = (point - centre) * max(further, 1 / LONGEST)
+    return float(point[i])
+
 
 #: Larger condition numbers are rounding errors.
 WORST_CONDITION = 1e15
@@ -45,12 +79,14 @@ class Combination(NamedTuple):
         if len(self.shares) == 1:
             return f"{next(iter(self.shares))} has hardly any effect on what was measured"
         names = list(self.shares)
-        return f"{', '.join(names[:-1])} and {names[-1]} cannot be told apart: {moves} together change next to nothing"
+        return (
+            f"{', '.join(names[:-1])} and {names[-1]} cannot be distinguished: {moves} together change next to nothing"
+        )
 
 
 class Certainty(NamedTuple):
     """names: of the parameters (p). relative: (p,) standard errors as fractions. low, high: (p,) ends of the 95 %
-    intervals, SI. covariance, correlation: (p, p). information: (p, p), of the logarithms, priors included, without
+    intervals, SI. correlation: (p, p). information: (p, p), of the logarithms, priors included, without
     the encoders' contribution. condition: of its unit-diagonal form. whiteness: by how much the noise's correlation
     widens the errors beyond what sensors explain, (p,). undetermined: combinations that the data leave open."""
 
@@ -58,7 +94,6 @@ class Certainty(NamedTuple):
     relative: Array
     low: Array
     high: Array
-    covariance: Array
     correlation: Array
     information: Array
     condition: float
@@ -81,7 +116,6 @@ def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 
     scale = np.sqrt(np.maximum(np.diag(expected), np.finfo(float).tiny))
     errors = np.maximum(np.sqrt(np.maximum(np.diag(shown), 0.0)), scale)
     whiteness = errors / scale
-    covariance = expected * np.outer(whiteness, whiteness)
     corrected = noise_corrected(squares, solution.noise_information)
     open_ones = undetermined(names, corrected)
     # An undetermined combination keeps its full uncertainty.
@@ -90,13 +124,15 @@ def certainty(solution: Solution, widening: Array | float = 0.0, level: float = 
         errors = np.maximum(errors, np.sqrt(np.diag(covariance_of(corrected))))
     low, high = ends(solution, inverse, errors, float(ndtri(0.5 + level / 2)))
     unit = np.outer(scale, scale)
+    # An undetermined combination may have no variance but rounding errors, whose quotients are clipped.
+    with np.errstate(over="ignore"):
+        correlation = np.clip(np.divide(expected, unit, out=np.eye(len(names)), where=unit > 0), -1, 1)
     return Certainty(
         names,
         errors,
         np.exp(np.maximum(low, solution.logarithms - WIDEST)),
         np.exp(np.minimum(high, solution.logarithms + WIDEST)),
-        covariance,
-        np.clip(np.divide(expected, unit, out=np.eye(len(names)), where=unit > 0), -1, 1),
+        correlation,
         corrected,
         condition(corrected),
         whiteness,

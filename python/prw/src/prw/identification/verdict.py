@@ -200,16 +200,16 @@ def _following(experiment: Experiment, comparison: Comparison, j: int) -> Comple
     frequencies with large encoders' errors, because the residual contains the same errors."""
     bins, response = experiment.bins, comparison.response
     pieces = int(np.clip(bins // PIECE, 1, MOST_PIECES))
-    place = np.linspace(0, pieces - 1 + 1e-9, bins)
-    hats = np.maximum(0, 1 - np.abs(place - np.arange(pieces)[:, None]))
+    position = np.linspace(0, pieces - 1 + 1e-9, bins)
+    hats = np.maximum(0, 1 - np.abs(position - np.arange(pieces)[:, None]))
     own = response.outputs[:, j] + response.transients[:, j] @ comparison.initial
     motors = [(experiment.motors[:, i], np.eye(2)[i]) for i in (0, 1)]
     columns = []
-    for course, gains in [*motors, (own, response.transfer[:bins, j])]:
+    for signal, gains in [*motors, (own, response.transfer[:bins, j])]:
         errors = np.sum(np.abs(gains) ** 2 * experiment.motor_power, axis=1)
-        clear = hats @ (np.abs(course[:bins]) ** 2 - CLEARLY_MOVING * errors) > 0
+        clear = hats @ (np.abs(signal[:bins]) ** 2 - CLEARLY_MOVING * errors) > 0
         there = np.zeros((pieces, experiment.needed_bins, len(experiment.channels)), dtype=complex)
-        there[clear, :bins, j] = hats[clear] * course[:bins]
+        there[clear, :bins, j] = hats[clear] * signal[:bins]
         columns += [there, 1j * there]
     return np.concatenate(columns)
 
@@ -228,9 +228,9 @@ def single_faults(
             distortions = {Distortion(kind, name) for name in group}
             if distortions & set(solution.task.distortions) or (kind == "gain" and len(group) > 2):
                 continue
-            places = [experiment.channels.index(name) for name in group]
+            indices = [experiment.channels.index(name) for name in group]
             column = np.zeros_like(there)
-            column[:, places] = Distortion(kind, group[0]).response(0.0, s)[1][:, None] * there[:, places]
+            column[:, indices] = Distortion(kind, group[0]).response(0.0, s)[1][:, None] * there[:, indices]
             yield named(kind, group), unit, column
     turning = [_sign(experiment.omega[:, i]) for i in (0, 1)]
     signs = spectra(np.column_stack(turning))[:count]
@@ -262,10 +262,10 @@ def _strength(solution: Solution, i: int) -> tuple[Array, Array]:
     experiment, comparison, found = solution.fitter.experiments[i], solution.comparisons[i], []
     values = experiment.values
     assert values is not None
-    there, expected, told = comparison.noise_ratios()
+    there, expected, information = comparison.noise_ratios()
     noise = np.array([solution.noise[name] for name in experiment.channels])
     inside = noise**2 * there / expected + np.mean(experiment.channel_power, axis=0)
-    luck = 1 / (2 * inside * np.sqrt(told))
+    luck = 1 / (2 * inside * np.sqrt(information))
     for j, name in enumerate(experiment.channels):
         column = (values[:, j] - solution.modelled[i][:, j])[np.isfinite(values[:, j])]
         # Missing values are skipped: above the band there is only noise, in any order.

@@ -7,24 +7,23 @@ import math
 import os
 import time
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Mapping
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import fmu_run
 import numpy as np
 from numpy.typing import ArrayLike
 
-from prw.arguments import Table, counted, spread_of
-from prw.errors import UserError
-from prw.extras import need
+from prw.arguments import Given, Table, counted, in_own_unit, spread_of, values_of
+from prw.errors import UserError, need
+from prw.files import replacing
 from prw.motion import Array, Motion
-from prw.parameters import Given, in_own_unit, values_of
 from prw.progress import Progress
 from prw.recording import Recording
 from prw.simulation import Run, motion_of
-from prw.sweeps.study import Chunk, Study, run_chunk
-from prw.testbed import Testbed, existing_fmu
+from prw.testbed import OUTPUTS, Testbed, driven_by, existing_fmu, stopped
 
 if TYPE_CHECKING:
     import pyarrow
@@ -34,11 +33,16 @@ MOST_RUNS = 10_000_000
 Spread = float | tuple[float, float] | tuple[str, float, float]
 
 
+#: The statistics of each output in a result.
+MEASURES: tuple[fmu_run.Measure, ...] = ("peak", "rms", "end")
+#: Statistics of runs, (runs,) each, by the name of the column; and the messages of those that failed, by run.
+Statistics = tuple[dict[str, Array], dict[int, str]]
+
+
 class Swept(NamedTuple):
-    """table: a row for each run. runs: the number made now; others were there already. seconds: the time they took."""
+    """table: a row for each run. seconds: the time that the runs took."""
 
     table: pyarrow.Table
-    runs: int
     seconds: float
 
 
@@ -76,8 +80,7 @@ def sweep(
     scheduler
         The address of a Dask cluster that makes the runs instead.
     out
-        A directory in which finished chunks of runs are kept, so that the same call continues after an interruption, and
-        at the end the table.
+        A directory for the table, as runs.parquet.
 
     Returns
     -------
@@ -99,37 +102,72 @@ def sweep(
     need("pyarrow")
     if scheduler:
         need("distributed")
-    path = existing_fmu(fmu)
-    with Testbed(path) as testbed:
+    with Testbed(existing_fmu(fmu)) as testbed:
         values = layout(grid or {}, random or {}, runs, seed, testbed, parameters)
-        study = Study.of(testbed, motion_of(motion), values, parameters)
-        table = carry_out(study, testbed, None if out is None else Path(out), threads, scheduler).table
+        fixed = values_of(parameters, testbed.loaded)
+        table = carry_out(testbed, motion_of(motion), values, fixed, threads, scheduler, out).table
     if "done" not in table["status"].to_pylist():
         warnings.warn(f"all {table.num_rows} runs failed; run 0: {table['message'][0]}", RuntimeWarning, stacklevel=2)
     return table
 
 
-def carry_out(study: Study, testbed: Testbed, out: Path | None, threads: int | None, scheduler: str | None) -> Swept:
-    """Make the runs of the study that are missing in the directory `out`. testbed: for runs on this machine. Other arguments
-    as for `sweep`."""
-    from prw.sweeps.store import Store
+def carry_out(
+    testbed: Testbed,
+    motion: Motion,
+    values: Mapping[str, Array],
+    fixed: Mapping[str, Any],
+    threads: int | None,
+    scheduler: str | None,
+    out: str | os.PathLike[str] | None,
+) -> Swept:
+    """Make the runs with the `values` (runs,) by parameter, and with the values `fixed` in all of them. Other arguments as for
+    `sweep`."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
 
     threads = counted("threads", threads) if threads is not None else os.cpu_count() or 1
-    store, start = Store(out, study), time.monotonic()
-    missing, total = store.missing, len(study.table)
-    runs = sum(last - first for first, last in missing)
-    results: Iterable[tuple[Chunk, Any]] = ((chunk, run_chunk(study, testbed, chunk, threads)) for chunk in missing)
-    if scheduler and missing:
-        from prw.sweeps.cluster import on_cluster
+    start, total, begin = {**fixed, **values}, len(next(iter(values.values()))), time.monotonic()
 
-        results = on_cluster(study, missing, scheduler)
-    with Progress(f"{total} runs", total) as progress:
-        finished = total - runs
-        for chunk, table in results:
-            store.add(chunk, table)
-            finished += len(table)
-            progress(finished)
-    return Swept(store.finish(), runs, time.monotonic() - start)
+    def made() -> pa.Table:
+        with Progress(f"{total} runs", total) as progress:
+            if scheduler:
+                from prw.cluster import on_cluster
+
+                measured, errors = on_cluster(testbed.fmu, motion, fixed, values, scheduler, progress)
+            else:
+                measured, errors = statistics(testbed, motion, start, threads, lambda done, _: progress(done))
+        failed = np.isin(np.arange(total), list(errors))
+        columns = {
+            "run": pa.array(range(total), pa.int64()),
+            "status": np.where(failed, "failed", "done").tolist(),
+            "message": [errors.get(run, "") for run in range(total)],
+            **values,
+            **{name: pa.array(column, mask=failed) for name, column in measured.items()},
+        }
+        return pa.table(columns)
+
+    if out is None:
+        return Swept(made(), time.monotonic() - begin)
+    # The file is created first, so that a directory that cannot be written costs no runs.
+    with replacing(Path(out) / "runs.parquet") as temporary:
+        swept = Swept(made(), time.monotonic() - begin)
+        pq.write_table(swept.table, temporary)
+    return swept
+
+
+def statistics(
+    testbed: Testbed,
+    motion: Motion,
+    start: Mapping[str, Any],
+    threads: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> Statistics:
+    """The statistics of runs with the start values `start`, a value for all runs or one for each."""
+    runs = testbed.loaded.run(
+        motion.time, outputs=OUTPUTS, measures=MEASURES, threads=threads, progress=progress, **driven_by(motion, start)
+    )
+    errors = {run: stopped(message) for run, message in runs.errors.items()}
+    return {f"{name}_{measure}": runs[name, measure] for name in OUTPUTS for measure in MEASURES}, errors
 
 
 def layout(

@@ -1,8 +1,12 @@
-"""Draws the frames of an animation: the testbed in 3D, and plots of its angles and torques below."""
+"""The frames of an animation, the testbed in 3D and plots of its angles and torques below; and its files: GIF, MP4, or an HTML
+page that loads no other file."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import base64
+import html
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,14 +23,88 @@ from numpy.typing import ArrayLike
 from PIL import Image
 
 from prw.errors import UserError
-from prw.files import replacing
+from prw.files import page_file, replacing
 from prw.motion import Array
-from prw.moving import write_gif, write_movie, write_page
 from prw.plots import BLUE, GREEN, PURPLE, STYLE, VERMILION
 from prw.wrist import DARK, PALE, STEEL, Wrist
 
 if TYPE_CHECKING:
     from prw.simulation import Run
+
+#: The scripts of the page, in this order.
+SCRIPTS = ("plot.js", "player.js", "wrist.js", "animation.js")
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+:root {{ color-scheme: light dark; }}
+body {{ margin: 0 auto; padding: 0 1rem; max-width: 90rem; background: Canvas; color: CanvasText; font: 1rem/1.5 system-ui, sans-serif; }}
+{style}</style>
+</head>
+<body>
+<script>
+(() => {{
+"use strict";
+{scripts}WRIST = {parts};
+animation({run});
+}})();
+</script>
+</body>
+</html>
+"""
+
+
+def write_gif(path: Path, frames: Iterable[Image.Image], rate: int, colours: Iterable[ArrayLike]) -> None:
+    """Write a GIF of `rate` frames per second in the colours (red, green, blue: 0 ... 1).
+
+    All frames share the colours, without dithering, so that unchanged areas do not flicker and compress well.
+    """
+    table = Image.new("P", (1, 1))
+    table.putpalette(np.rint(255 * np.array(list(colours))).astype(int).ravel().tolist())
+    reduced = [one.convert("RGB").quantize(palette=table, dither=Image.Dither.NONE) for one in frames]
+    first, *others = reduced
+    first.save(
+        path, format="GIF", save_all=True, append_images=others, duration=round(1000 / rate), loop=0, optimize=True
+    )
+
+
+def write_page(path: Path, title: str, signals: Mapping[str, Array], speed: float, captions: Sequence[Any]) -> None:
+    """Write an HTML page with plots of the columns, among them `time`, and the wrist in 3D, which the reader can turn."""
+    files = {name: page_file(name).read_text(encoding="utf-8") for name in (*SCRIPTS, "live.css", "wrist.json")}
+    columns = {name: base64.b64encode(np.asarray(one, "<f8").tobytes()).decode() for name, one in signals.items()}
+    run = {"title": title, "columns": columns, "speed": speed, "captions": [list(one) for one in captions]}
+    page = PAGE.format(
+        title=html.escape(title),
+        style=files["live.css"],
+        scripts="".join(files[name] for name in SCRIPTS),
+        parts=files["wrist.json"].strip(),
+        # A caption must not end the script.
+        run=json.dumps(run).replace("<", "\\u003c"),
+    )
+    path.write_text(page, encoding="utf-8")
+
+
+def write_movie(path: Path, frames: Iterable[Image.Image], rate: int) -> None:
+    """Write an MP4 of `rate` frames per second. Raises UserError if there is no ffmpeg."""
+    import imageio_ffmpeg
+
+    try:
+        imageio_ffmpeg.get_ffmpeg_exe()
+    except RuntimeError:
+        raise UserError(
+            f"{path.suffix}: imageio-ffmpeg has no ffmpeg for this machine; install ffmpeg, or write a .gif"
+        ) from None
+    # Players need even widths and heights.
+    options = {"output_params": ["-vf", "crop=floor(iw/2)*2:floor(ih/2)*2", "-crf", "20"], "macro_block_size": 1}
+    writer = imageio_ffmpeg.write_frames(str(path), SIZE, fps=rate, quality=None, **options)
+    writer.send(None)
+    for one in frames:
+        writer.send(one.convert("RGB").tobytes())
+    writer.close()
+
 
 #: The outputs of a run that are shown.
 MEASURED = ("theta3", "theta4", "pitch", "roll", "tau1", "tau2")
@@ -94,37 +172,37 @@ def drawn(
     """The animation of `count` frames, `rate` per second, `speed` times as fast as the run, written to `target`; see
     `prw.animate`."""
     time = run.time
-    courses = angles_and_torques(run)
-    picture = _Picture(time, courses, speed, captions)
+    signals = angles_and_torques(run)
+    frame = _Frame(time, signals, speed, captions)
     instants = np.linspace(time[0], time[-1], max(count, 2))
 
     def draw(number: int) -> list[Any]:
-        picture.draw(float(instants[number]))
+        frame.draw(float(instants[number]))
         return []
 
-    animation = _Animation(picture.figure, draw, frames=len(instants), interval=1000 / rate, init_func=list)
+    animation = _Animation(frame.figure, draw, frames=len(instants), interval=1000 / rate, init_func=list)
     if target is not None:
         with matplotlib.rc_context(STYLE), replacing(target) as temporary:
-            pictures = (picture.at(float(instant)) for instant in instants)
+            frames = (frame.at(float(instant)) for instant in instants)
             if target.suffix.lower() == ".gif":
-                write_gif(temporary, pictures, rate, _colours())
+                write_gif(temporary, frames, rate, _colours())
             elif target.suffix.lower() == ".html":
-                write_page(temporary, "The pitch-roll wrist testbed", {"time": time} | courses, speed, captions)
+                write_page(temporary, "The pitch-roll wrist testbed", {"time": time} | signals, speed, captions)
             else:
-                write_movie(temporary, pictures, rate)
+                write_movie(temporary, frames, rate)
     return animation
 
 
 def still(run: Run, instant: float) -> Image.Image:
     """The testbed at an instant (s) as a still image with a transparent background, for light and dark pages."""
-    picture = _Picture(run.time, angles_and_torques(run), 1.0, ())
-    picture.figure.set_dpi(STILL_DPI)
-    for ground in (picture.figure, picture.scene):
+    frame = _Frame(run.time, angles_and_torques(run), 1.0, ())
+    frame.figure.set_dpi(STILL_DPI)
+    for ground in (frame.figure, frame.scene):
         ground.set_facecolor("none")
     # The page adds the labels in its own font and colours.
-    for words in picture.figure.texts:
-        words.set_text("")
-    pixels = picture.at(instant)
+    for label in frame.figure.texts:
+        label.set_text("")
+    pixels = frame.at(instant)
     return pixels.crop((0, 0, pixels.width, round(SCENE * pixels.height)))
 
 
@@ -133,28 +211,28 @@ def angles_and_torques(run: Run) -> dict[str, Array]:
     for name in MEASURED:
         if name not in run:
             raise UserError(f"the run has no {name}, which an animation shows; ask for it with `outputs=`")
-    courses = dict(zip(("theta1", "theta2"), run.motion.theta.T)) | {name: run[name] for name in MEASURED}
-    for name, course in courses.items():
-        if not np.isfinite(course).all():
+    signals = dict(zip(("theta1", "theta2"), run.motion.theta.T)) | {name: run[name] for name in MEASURED}
+    for name, signal in signals.items():
+        if not np.isfinite(signal).all():
             raise UserError(f"{name} of the run has values that are not finite and cannot be shown")
     turned = run.parameters["M"] / run.parameters["N"] * run["roll"]  # eq. (1), solved for the carriers
-    return courses | {"theta5": run["pitch"] + turned, "theta6": run["pitch"] - turned}
+    return signals | {"theta5": run["pitch"] + turned, "theta6": run["pitch"] - turned}
 
 
-class _Picture:
+class _Frame:
     """The figure of one run, drawn for one instant after the other."""
 
     def __init__(
         self,
         time: Array,
-        courses: Mapping[str, Array],
+        signals: Mapping[str, Array],
         speed: float,
         captions: Sequence[tuple[float, str]],
     ):
-        self.time, self.courses, self.captions = time, courses, captions
+        self.time, self.signals, self.captions = time, signals, captions
         self._ground: Any = None
         pairs = (("theta1", "theta3"), ("theta3", "theta5"), ("theta2", "theta4"), ("theta4", "theta6"))
-        twist = max(float(np.abs(courses[a] - courses[b]).max()) for a, b in pairs)
+        twist = max(float(np.abs(signals[a] - signals[b]).max()) for a, b in pairs)
         factor = _round_below(min(SHOWN_TWIST / max(twist, 1e-6), MOST_TWISTED))
         self.wrist = Wrist(factor)
         with matplotlib.rc_context({**STYLE, "font.size": 9, "axes.titlesize": 9}):
@@ -182,23 +260,23 @@ class _Picture:
             note = f"{speed:.2g} × real time, {note}"
         self.note = self.figure.text(0.98, 0.955, note, fontsize=8, color="0.35", ha="right", va="center")
         self.labels = [
-            self.figure.text(x, y, words, color=colour, ha="center", va="center") for x, y, words, colour in LABELS
+            self.figure.text(x, y, label, color=colour, ha="center", va="center") for x, y, label, colour in LABELS
         ]
 
     def _panel(self, number: int, panel: Panel) -> list[Moving]:
         """Axes with the whole curves in pale colours, and the moving parts on them."""
         axis = self.figure.add_axes((0.055 + 0.328 * number, 0.105, 0.265, 0.18))
         axis.set_title(panel.title)
-        values = {name: panel.factor * self.courses[name] for name in panel.curves}
+        values = {name: panel.factor * self.signals[name] for name in panel.curves}
         moving = []
-        for (name, (label, colour)), place, style in zip(panel.curves.items(), (0.71, 1.03), ("-", (0, (3, 1.5)))):
+        for (name, (label, colour)), position, style in zip(panel.curves.items(), (0.71, 1.03), ("-", (0, (3, 1.5)))):
             axis.plot(self.time, values[name], color=colour, alpha=FAINT, linewidth=1)
             (line,) = axis.plot([], [], color=colour, linewidth=1.8, linestyle=style)
             (dot,) = axis.plot([], [], "o", color=colour, markersize=5)
-            axis.text(place - 0.19, 1.07, label, color=colour, ha="right", transform=axis.transAxes)
-            number_shown = axis.text(place, 1.07, "", color=colour, ha="right", transform=axis.transAxes)
+            axis.text(position - 0.19, 1.07, label, color=colour, ha="right", transform=axis.transAxes)
+            number_shown = axis.text(position, 1.07, "", color=colour, ha="right", transform=axis.transAxes)
             moving.append(Moving(name, panel, line, dot, number_shown))
-        peak = max(10.0**-panel.digits, *(float(np.abs(course).max()) for course in values.values()))
+        peak = max(10.0**-panel.digits, *(float(np.abs(signal).max()) for signal in values.values()))
         axis.set(xlim=(self.time[0], self.time[-1]), ylim=(-1.15 * peak, 1.15 * peak))
         axis.locator_params(axis="y", nbins=4)
         axis.tick_params(labelsize=8, length=2)
@@ -207,7 +285,7 @@ class _Picture:
 
     def draw(self, instant: float) -> None:
         """Show the instant (s)."""
-        at = {name: float(np.interp(instant, self.time, course)) for name, course in self.courses.items()}
+        at = {name: float(np.interp(instant, self.time, signal)) for name, signal in self.signals.items()}
         if self.bodies is not None:
             self.bodies.remove()
         # matplotlib's axes have the depth second and the height third: Y, the roll axis, is up.
@@ -222,7 +300,7 @@ class _Picture:
         for name, panel, line, dot, shown in self.moving:
             value = panel.factor * at[name]
             line.set_data(
-                np.append(self.time[before], instant), np.append(panel.factor * self.courses[name][before], value)
+                np.append(self.time[before], instant), np.append(panel.factor * self.signals[name][before], value)
             )
             dot.set_data([instant], [value])
             # Adding 0 turns -0.0 into 0.0.

@@ -1,0 +1,96 @@
+"""Runs of a sweep on a Dask cluster. A worker that dies loses only its own runs."""
+
+from __future__ import annotations
+
+import atexit
+import tempfile
+from collections.abc import Callable, Mapping
+from concurrent.futures import as_completed
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from prw.errors import UserError
+from prw.motion import Array, Motion
+from prw.sweeps import MEASURES, Statistics, statistics
+from prw.testbed import OUTPUTS, Testbed
+
+#: Timeout of a connection to the scheduler, s.
+PATIENCE = 15
+#: Number of tasks, each with at least and at most so many runs.
+TASKS, SHORTEST, LONGEST = 16, 16, 256
+
+
+def on_cluster(
+    fmu: Path,
+    motion: Motion,
+    fixed: Mapping[str, Any],
+    values: Mapping[str, Array],
+    address: str,
+    progress: Callable[[int], None],
+) -> Statistics:
+    """The statistics of runs on the Dask cluster at `address`. The runs of a task whose worker died again and again are
+    recorded as failed."""
+    total = len(next(iter(values.values())))
+    measured = {f"{name}_{measure}": np.full(total, np.nan) for name in OUTPUTS for measure in MEASURES}
+    errors: dict[int, str] = {}
+    done = 0
+    client = _connect(address)
+    try:
+        shared = client.scatter((fmu.read_bytes(), motion, dict(fixed)), broadcast=True, hash=False)
+        executor = client.get_executor(retries=2)
+        size = min(max(-(-total // TASKS), SHORTEST), LONGEST)
+        parts = [slice(first, min(first + size, total)) for first in range(0, total, size)]
+        futures = {executor.submit(_on_worker, shared, {n: v[part] for n, v in values.items()}): part for part in parts}
+        for future in as_completed(futures):
+            part, error = futures[future], future.exception()
+            if isinstance(error, ImportError):
+                raise UserError(f"{address}: its workers lack a package ({error}); install prw on them")
+            if error is None:
+                found, failed = future.result()
+                errors |= {part.start + run: message for run, message in failed.items()}
+                for name, column in found.items():
+                    measured[name][part] = column
+            else:
+                errors |= dict.fromkeys(range(part.start, part.stop), f"lost on the cluster: {error}")
+            done += part.stop - part.start
+            progress(done)
+    finally:
+        client.close()
+    return measured, errors
+
+
+def _on_worker(shared: tuple[bytes, Motion, Mapping[str, Any]], values: Mapping[str, Array]) -> Statistics:
+    fmu, motion, fixed = shared
+    # A worker makes as many tasks at a time as it has threads.
+    return statistics(_loaded(fmu), motion, {**fixed, **values}, threads=1)
+
+
+@lru_cache(maxsize=1)
+def _loaded(fmu: bytes) -> Testbed:
+    """The FMU, which a worker loads once."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "study.fmu"
+        path.write_bytes(fmu)
+        return Testbed(path)
+
+
+# Removes the unpacked files at exit.
+atexit.register(_loaded.cache_clear)
+
+
+def _connect(address: str) -> Any:
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        reason = f"no Dask scheduler responds there ({error or 'timeout'})"
+        raise UserError(reason, argument="scheduler", given=address) from None
+    if not client.scheduler_info()["workers"]:
+        client.close()
+        reason = f"the cluster has no workers; start some with `dask worker {address}`"
+        raise UserError(reason, argument="scheduler", given=address)
+    return client

@@ -1,0 +1,355 @@
+"""Reading recordings: units, formats, notes, and one clear line for each mistake."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+import pytest
+
+import prw
+from prw.errors import UserError
+from prw.identification.experiment import prepare
+from prw.recording import read, read_motion
+
+GOOD = "time,theta1,theta2\n0,0.1,0.2\n0.001,0.1,0.2\n0.002,0.1,0.2\n"
+
+
+def lines(header: str, rows: int = 30, row: str = "{t},0.1,0.2,{x}") -> str:
+    return header + "\n" + "".join(row.format(t=k / 100, x=k % 7 / 10) + "\n" for k in range(rows))
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Any:
+    def write(content: str | bytes) -> Any:
+        path = tmp_path / "run.csv"
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        return path
+
+    return write
+
+
+BAD = {
+    "empty": (b"", "the file is empty"),
+    "blank": (b"\n\n", "the file is empty"),
+    "header only": (b"time,theta1,theta2\n", "row 1: no rows below the header"),
+    "one row": (b"time,theta1,theta2\n0,1,1\n", "row 2: only one row below the header"),
+    "missing column": (
+        b"time,theta1,omega1\n0,1,1\n1,1,1\n",
+        "row 1: column theta2 is missing; the header has time, theta1, omega1",
+    ),
+    "no header": (b"0,1,1\n1,1,1\n", "row 1: column time is missing"),
+    "half the rates": (
+        b"time,theta1,theta2,omega2\n0,1,1,1\n1,1,1,1\n",
+        "row 1: column omega1 is missing; give both omega1 and omega2, or neither",
+    ),
+    "spaces": (b"time theta1 theta2\n0 1 1\n1 1 1\n", "separate columns by comma, semicolon or tab"),
+    "wrong unit": (
+        b"time,theta1 [m],theta2\n0,1,1\n1,1,1\n",
+        "row 1, column theta1: theta1 cannot be in 'm'; use rad, mrad",
+    ),
+    "duplicate column": (b"time,theta1,theta2,theta1\n0,1,1,1\n1,1,1,1\n", "row 1, column theta1: appears twice"),
+    "short row": (b"time,theta1,theta2\n0,1,1\n1,1\n2,1,1\n", "row 3: 2 cells, but the header has 3"),
+    "long row": (b"time,theta1,theta2\n0,1,1\n1,1,1,1\n", "row 3: 4 cells, but the header has 3"),
+    "word": (b"time,theta1,theta2\n0,1,1\n1,1,fast\n", "row 3, column theta2: 'fast' is not a number"),
+    "underscore": (b"time,theta1,theta2\n0,1,1\n1,1_0,1\n", "row 3, column theta1: '1_0' is not a number"),
+    "empty cell": (b"time,theta1,theta2\n0,1,1\n1,,1\n", "row 3, column theta1: empty cell"),
+    "nan": (b"time,theta1,theta2\n0,1,1\n1,NaN,1\n", "row 3, column theta1: NaN is not finite"),
+    "infinite time": (b"time,theta1,theta2\n0,1,1\ninf,1,1\n", "row 3, column time: inf is not finite"),
+    "time backwards": (
+        b"time,theta1,theta2\n0,1,1\n2,1,1\n\n1.5,1,1\n",
+        "row 5, column time: 1.5 runs backwards (after 2.0)",
+    ),
+    "time repeated": (
+        b"time,theta1,theta2\n0,1,1\n0,1,1\n",
+        "row 3, column time: 0 is the time of the row before again",
+    ),
+    "latin-1": ("time,theta1,theta2,größe\n0,1,1,1\n".encode("latin-1"), "row 1: not UTF-8 text"),
+    "latin-1 later": ("time,theta1,theta2,x\n0,1,1,1\n1,1,1,ß\n".encode("latin-1"), "row 3: not UTF-8 text"),
+    "utf-16 without its mark": ("time,theta1,ö\n0,1,1\n".encode("utf-16-le"), "row 1: not UTF-8 text"),
+    "nul": (b"time,theta1,theta2\n0,1,1\n1,\0,1\n", "row 3"),
+    "decimal comma": (b"time\ttheta1\ttheta2\n0\t1\t1\n0,1\t1\t1\n", "row 3, column time: '0,1' is not a number"),
+    "wrong unit of torque": (
+        b"time,theta1,theta2,tau1 [deg]\n0,1,1,1\n1,1,1,1\n",
+        "column tau1: tau1 cannot be in 'deg'; use N.m, mN.m",
+    ),
+    "wrong unit of time": (
+        b"time [h],theta1,theta2\n0,1,1\n1,1,1\n",
+        "row 1, column time: time cannot be in 'h'; use s, ms",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_recordings_that_cannot_be_read(file: Any, case: Any) -> None:
+    content, complaint = BAD[case]
+    path = file(content)
+    with pytest.raises(UserError) as error:
+        read(path)
+    assert str(error.value).startswith(str(path)) and complaint in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"\xef\xbb\xbf" + GOOD.encode(),
+        GOOD.replace("\n", "\r\n").encode(),
+        GOOD.replace(",", ";").encode(),
+        GOOD.replace(",", ";").replace(".", ",").encode(),
+        GOOD.replace(",", "\t").encode(),
+        GOOD.replace(",", " , ").encode(),
+        b'"time","theta1","theta2"\n0,"0.1",0.2\n0.001,0.1,0.2\n0.002,0.1,0.2',
+        b"\n" + GOOD.encode() + b"\n\n",
+        b"note,theta2,time,theta1\nstart,0.2,0,0.1\n,0.2,0.001,0.1\n,0.2,0.002,0.1\n",
+    ],
+    ids=["bom", "crlf", "semicolons", "decimal commas", "tabs", "spaces", "quotes", "blank lines", "other columns"],
+)
+def test_spellings_of_one_recording(file: Any, content: Any) -> None:
+    motion = read_motion(file(content))
+    np.testing.assert_array_equal(motion.time, [0, 0.001, 0.002])
+    np.testing.assert_array_equal(motion.theta, [[0.1, 0.2]] * 3)
+    assert any("columns ignored: note" in note for note in motion.notes) == (b"note" in content)
+
+
+@pytest.mark.parametrize("delimiter, end", [(",", "\n"), (";", "\r\n"), ("\t", "\n")])
+def test_many_rows_at_a_time_are_the_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, delimiter: Any, end: Any
+) -> None:
+    """To the bit what Python makes of each cell, empty or not, in columns of text too; and with the same complaints."""
+    draws = np.random.default_rng(6)
+    numbers = draws.standard_normal((500, 5)) * 10.0 ** draws.integers(-310, 300, (500, 5))
+    cells = [[repr(k * 1e-3), "up", *map(repr, row.tolist())] for k, row in enumerate(numbers)]
+    for row in cells[::3]:
+        row[5:] = ["", "nan"]
+    if delimiter == ";":
+        cells = [[cell.replace(".", ",") for cell in row] for row in cells]
+    header = ["time", "state", "theta1", "theta2", "x", "tau1", "pitch"]
+    path = tmp_path / "run.csv"
+
+    def write() -> None:
+        path.write_bytes(end.join(delimiter.join(row) for row in [header, *cells, []]).encode())
+
+    write()
+    monkeypatch.setattr("prw.table.BLOCK", 1000)
+    monkeypatch.setattr("prw.table._rows", None)  # is not asked
+    recording = read(path)
+    expected = np.array([[float(cell.replace(",", ".") or "nan") for cell in row[2:]] for row in cells])
+    np.testing.assert_array_equal(recording["theta1"], expected[:, 0])
+    np.testing.assert_array_equal(recording["tau1"], expected[:, 3])
+    np.testing.assert_array_equal(recording["pitch"], expected[:, 4])
+    monkeypatch.undo()
+    for column, cell, complaint in [
+        (2, "", "row 402, column theta1: empty cell"),
+        (2, "1_0", "row 402, column theta1: '1_0' is not a number"),
+        (3, "inf", "row 402, column theta2: inf is not finite"),
+        (0, "0", "row 402, column time: 0 runs backwards"),
+        (1, f"up{delimiter}", "row 402: 8 cells, but the header has 7"),
+    ]:
+        before, cells[400][column] = cells[400][column], cell
+        write()
+        with pytest.raises(UserError, match=re.escape(complaint)):
+            read(path)
+        cells[400][column] = before
+
+
+def test_units_of_the_header_and_of_the_option(file: Any) -> None:
+    path = file(lines("time [ms],theta1 (deg),theta2 [rev],pitch"))
+    measured = read(path, units={"pitch": "mrad"})
+    assert measured.time[-1] == pytest.approx(0.29e-3)
+    np.testing.assert_allclose(measured.theta[0], [np.deg2rad(0.1), 0.4 * np.pi])
+    assert measured["pitch"][6] == pytest.approx(0.6e-3)
+    assert list(measured.measured) == ["pitch"]
+    assert read(path)["pitch"][6] == pytest.approx(0.6)
+    assert read(path, degrees=True)["pitch"][6] == pytest.approx(np.deg2rad(0.6))
+
+
+def test_units_of_time_angles_and_rates(file: Any) -> None:
+    motion = read_motion(
+        file("time [ms],theta1 [deg],theta2 [deg],omega1_rpm,omega2_rpm,tau1 [N.m]\n0,180,90,30,0,1\n5,180,90,30,0,1\n")
+    )
+    assert motion.omega is not None and "columns ignored: tau1 [N.m]" in motion.notes
+    np.testing.assert_allclose(motion.time, [0, 5e-3], rtol=1e-15)
+    np.testing.assert_allclose(motion.theta, [[np.pi, np.pi / 2]] * 2, rtol=1e-15)
+    np.testing.assert_allclose(motion.omega, [[np.pi, 0]] * 2, rtol=1e-15)
+
+
+@pytest.mark.parametrize("unit, factor", [("N.m", 1), ("Nm", 1), ("N·m", 1), ("mN.m", 1e-3), ("N cm", 1e-2)])
+def test_torque_units(file: Any, unit: Any, factor: Any) -> None:
+    measured = read(file(lines(f"time,theta1,theta2,tau1 [{unit}]")))
+    assert measured["tau1"][6] == pytest.approx(0.6 * factor)
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["t_ms,theta1_deg,theta2/deg,tau1_Nm,pitch_rate_wanted", "# Time (ms),THETA1 deg,theta2 [°],Tau1/N.m,tau1_raw"],
+)
+def test_headers_as_others_write_them(file: Any, header: Any) -> None:
+    """Units after `_`, `/` or a space, capitals, numpy's `#` before the header; what is no unit is another thing."""
+    path = file("# rig 2; 13 May\n\n" + lines(header, row="{t},0.1,0.2,{x},0"))
+    measured = read(path)
+    assert measured.time[-1] == pytest.approx(0.29e-3)
+    np.testing.assert_allclose(measured.theta[0], np.deg2rad([0.1, 0.2]))
+    assert list(measured.measured) == ["tau1"] and measured["tau1"][6] == pytest.approx(0.6)
+    assert measured.notes[0] == f"columns ignored: {header.rsplit(',', 1)[1]}"
+    path.write_text(path.read_text().replace("0.29,", "oops,"))
+    with pytest.raises(UserError, match="row 33, column time: 'oops' is not a number"):
+        read(path)
+
+
+def test_headers_of_other_tools(tmp_path: Path) -> None:
+    """A preamble, other names with units, an encoder's counts, and the encoding that Excel writes."""
+    rows = "".join(f"{k / 100};{k};{2 * k};{k % 7}\n" for k in range(30))
+    path = tmp_path / "run.csv"
+    path.write_text("type;float\ncapture;2026\n\nX;Motor 1;Motor 2;T [mNm]\n" + rows, encoding="utf-16")
+    names = {"time": "X", "theta1": "Motor 1", "theta2": "Motor 2", "tau1": "T"}
+    counted = {"theta1": "rev/10000", "theta2": "rev/10000"}
+    measured = read(path, counted, names=names, skip=2)
+    np.testing.assert_allclose(measured.theta[29], np.array([29, 58]) * 2 * np.pi / 10000)
+    assert measured["tau1"][6] == pytest.approx(6e-3) and measured.time[-1] == pytest.approx(0.29)
+    path.write_text(path.read_text(encoding="utf-16"), encoding="latin-1")
+    assert read(path, counted, names=names, skip=2, encoding="latin-1").time[-1] == pytest.approx(0.29)
+    with pytest.raises(UserError, match="row 4: no column 'Motor 3'; the header has X, Motor 1"):
+        read(path, names={"theta1": "Motor 3"}, skip=2)
+    with pytest.raises(UserError, match="names: tau3 is not known"):
+        read(path, names={"tau3": "X"})
+    with pytest.raises(UserError, match="encoding: 'utf-7000' is not known"):
+        read(path, encoding="utf-7000")
+
+
+def test_degrees(file: Any) -> None:
+    path = file("time,theta1,theta2,omega1,omega2\n0,40,-10,0,0\n0.1,43,-10,60,0\n")
+    motion = read_motion(path, degrees=True)
+    np.testing.assert_allclose(motion.theta, np.deg2rad([[40, -10], [43, -10]]), rtol=1e-15)
+    assert motion.omega is not None
+    np.testing.assert_allclose(motion.omega, np.deg2rad([[0, 0], [60, 0]]), rtol=1e-15)
+    assert motion.notes == []
+    assert any("if it is in degrees, call it theta1 [deg]" in note for note in read_motion(path).notes)
+
+
+def test_units_that_contradict(file: Any) -> None:
+    with pytest.raises(UserError, match="column pitch: in deg by its header, but in rad by the units given"):
+        read(file(lines("time,theta1,theta2,pitch [deg]")), units={"pitch": "rad"})
+
+
+def test_a_slow_sensor_leaves_cells_empty(file: Any) -> None:
+    text = lines("time,theta1,theta2,pitch,tau1", 60, "{t},0.1,0.2,,{x}").splitlines()
+    for k in range(1, 61, 2):
+        text[k] = text[k].replace(",,", f",{k / 100},")
+    measured = read(file("\n".join(text)))
+    assert {name: np.isfinite(column).sum() for name, column in measured.measured.items()} == {"tau1": 60, "pitch": 30}
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        (lines("time,theta1,theta2,x"), "run.csv: nothing measured; at least one column of tau1, tau2"),
+        (lines("time,theta1,theta2,tau1", 10), "column tau1: 10 values; at least 20 are needed"),
+    ],
+)
+def test_too_few_measurements(file: Any, text: Any, message: Any) -> None:
+    with pytest.raises(UserError, match=message):
+        prepare(read(file(text)))
+
+
+T = np.arange(0, 1, 0.01)
+ROWS = "\n".join(f"{t},{1 - np.cos(3 * t)},{np.rad2deg(3 * np.sin(3 * t))},0,0" for t in T)
+
+
+@pytest.mark.parametrize(
+    "text, note",
+    [
+        (
+            "theta2\n0,3.1,0\n0.01,3.14,0\n0.02,-3.13,0\n0.03,-3.1,0\n",
+            "theta1 jumps by 6.27 rad after 0.01 s; angles must run on",
+        ),
+        ("theta2\n0,0,0\n10,0.1,0\n20,0.2,0\n", "a sample every 10 s; if time is in ms, call its column time [ms]"),
+        ("omega1,theta2,omega2\n" + ROWS, "omega1 adds up to 57.3 times the motion of theta1"),
+        (
+            "omega1,theta2,omega2\n0,0,1,0,0\n0.1,0.1,1,0,0\n",
+            "the motors turn already in the first row; the testbed starts at rest",
+        ),
+    ],
+)
+def test_probable_mistakes_are_noted(file: Any, text: Any, note: Any) -> None:
+    assert any(note in found for found in read(file("time,theta1," + text)).notes)
+
+
+def moving(rows: Any) -> str:
+    return "time,theta1,theta2,tau1\n" + "".join(f"{k / 1000},{np.sin(k / 100)},0.1,{k % 7}\n" for k in rows)
+
+
+def test_a_gap_is_refused_or_told(file: Any) -> None:
+    """By all that read recordings. The motors may have done anything in 0.2 s; a path goes through 20 ms."""
+    with pytest.raises(UserError, match=r"no rows from 0.299 to 0.5 s, 0.201 s where 0.001 s is usual"):
+        read_motion(file(moving([*range(300), *range(500, 900)])))
+    measured = read(file(moving([*range(300), *range(320, 900)])))
+    assert measured.notes[0] == "rows are missing once, for up to 0.021 s after 0.299 s; a smooth path bridges that"
+    assert not any("missing" in note for note in read(file(moving(range(0, 900, 3)))).notes)
+    still = [f"{k / 1000},0.1,0.1,{k % 7}" for k in [*range(300), *range(500, 900)]]
+    assert "rows are missing once" in read(file("\n".join(["time,theta1,theta2,tau1", *still]))).notes[0]
+
+
+def test_a_recording_with_measurements(tmp_path: Path) -> None:
+    path = tmp_path / "rig.csv"
+    path.write_text("time [ms],theta1,theta2,tau1 [mN.m],pitch,site\n0,1,2,3,90,a\n5,1,2,,90,b\n10,1,2,5,90,c\n")
+    recording = read(path, units={"pitch": "deg"})
+    assert set(recording.measured) == {"tau1", "pitch"} and recording.omega is None and recording.name == "rig"
+    np.testing.assert_allclose(recording["time"], [0, 5e-3, 1e-2], rtol=1e-15)
+    np.testing.assert_allclose(recording["tau1"], [3e-3, np.nan, 5e-3])
+    np.testing.assert_allclose(recording["pitch"], np.pi / 2, rtol=1e-15)
+    np.testing.assert_array_equal(recording["theta2"], 2)
+    assert recording.units == {"time": "ms", "theta1": "rad", "theta2": "rad", "tau1": "mN.m", "pitch": "deg"}
+    assert any("columns ignored: site" in note for note in recording.notes) and "rig" in repr(recording)
+    np.testing.assert_allclose(read(path, degrees=True).theta, np.deg2rad([[1, 2]] * 3), rtol=1e-15)
+    with pytest.raises(KeyError, match="roll: was not recorded; there are time, theta1, theta2, "):
+        recording["roll"]
+    with pytest.raises(UserError, match="units: yaw is not known; there are time, theta1"):
+        read(path, units={"yaw": "deg"})
+    # A damaged measurement does not stop a simulation of the motors.
+    path.write_text(path.read_text().replace(",3,", ",broken,"))
+    assert prw.simulate(path)["roll"].shape == (3,)
+    with pytest.raises(UserError, match="rig.csv, row 2, column tau1: 'broken' is not a number"):
+        read(path)
+
+
+def test_columns_in_memory(testbed: Path, tmp_path: Path) -> None:
+    """A dict, a DataFrame and the CSV file that it writes are one recording, also with the time as index."""
+    time = np.arange(4) * 1e-3
+    table: dict[str, Any] = {
+        "time": time,
+        "theta1 [deg]": time * 90,
+        "theta2": -time,
+        "tau1": [1, None, 2, 3],
+        "x": "abcd",
+    }
+    frame = pandas.DataFrame({**table, "x": list("abcd")})
+    frame.to_csv(tmp_path / "recording.csv", index=False)
+    from_file = read(tmp_path / "recording.csv")
+    for source in (table, frame, frame.set_index("time")):
+        recording = read(source)
+        for name in ("time", "theta1", "theta2", "tau1"):
+            np.testing.assert_array_equal(recording[name], from_file[name])
+        assert (recording.units, recording.notes) == (from_file.units, from_file.notes)
+        assert prw.simulate(source, fmu=testbed)["roll"][-1] == prw.simulate(from_file, fmu=testbed)["roll"][-1]
+    run = prw.simulate(frame, fmu=testbed)
+    for again in (prw.simulate(run, fmu=testbed), prw.simulate(run.to_pandas(), fmu=testbed)):
+        np.testing.assert_array_equal(again["tau1"], run["tau1"])
+    good = {"time": [0.0, 1.0], "theta1": [0.0, 1.0], "theta2": [0.0, 1.0]}
+    wrong: list[tuple[Any, str]] = [
+        ({"time": [0.0, 1.0]}, "recording: column theta1 is missing; the header has time"),
+        ({**good, "theta2": [0.0, None]}, "recording, column theta2: nan at index 1 is not finite"),
+        ({**good, "theta2": ["a", "b"]}, "recording, column theta2: is not made of numbers"),
+        ({**good, "theta2": [0.0]}, "recording, column theta2: has 1 rows, but time has 2"),
+        ({**good, "theta2": [[0.0], [1.0]]}, r"recording, column theta2: has the shape \(2, 1\)"),
+        ({**good, "time": pandas.to_datetime(["2026-01-01", "2026-01-02"])}, "column time: has dates"),
+        ({**good, "time": [1.0, 0.0]}, "recording, column time: time must increase"),
+        (dict.fromkeys(good, [0.0]), "recording: has 1 rows; at least two are needed"),
+        ({**good, "theta1 [deg]": [0.0, 1.0]}, "recording, column theta1: appears twice"),
+        (None, "None is no recording: neither a file nor a DataFrame"),
+    ]
+    for source, complaint in wrong:
+        with pytest.raises(UserError, match=complaint):
+            read(source)

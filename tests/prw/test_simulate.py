@@ -1,0 +1,216 @@
+"""The command `prw simulate`: its files, and one clear line for each mistake."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from built import ROOT
+from instance import assert_close
+from lagrange import OUTPUTS, linear_model, table_1
+from reference import backward_slope, follow
+
+from prw.recording import read_motion as read
+
+EXAMPLES = ROOT / "examples"
+#: A recording.
+GOOD = "time,theta1,theta2\n0,0.1,0.2\n0.001,0.1,0.2\n0.002,0.1,0.2\n"
+#: Bytes per file: enough for the unpacked FMU, too few for the table.
+LIMIT = 4_000_000
+ROWS = 40_000
+
+
+def table(path: Any) -> Any:
+    with open(path, newline="") as file:
+        rows = list(csv.reader(file))
+    return dict(zip(rows[0], np.array(rows[1:], dtype=float).T))
+
+
+def is_png(path: Any) -> Any:
+    return path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def test_fig4(prw: Any, tmp_path: Path) -> None:
+    result = prw("simulate")
+    assert result.returncode == 0 and result.stderr == ""
+    assert "out/fig4.csv" in result.stdout and "next" in result.stdout
+    columns = table(tmp_path / "out" / "fig4.csv")
+    assert list(columns) == ["time", "theta1", "theta2", "omega1", "omega2", *OUTPUTS]
+    t = columns["time"]
+    assert len(t) == 2001 and t[-1] == 2.0
+    np.testing.assert_allclose(columns["omega1"], np.sin(10 * np.pi * t), atol=1e-15)
+    np.testing.assert_array_equal(columns["omega2"], -columns["omega1"])
+    np.testing.assert_allclose(columns["theta1"], (1 - np.cos(10 * np.pi * t)) / (10 * np.pi), atol=1e-15)
+    assert np.max(np.abs(columns["pitch"])) <= 1e-14
+    assert is_png(tmp_path / "out" / "fig4.png")
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["fig4.csv", "fig4.png"]
+
+
+@pytest.mark.parametrize("name", ["point_to_point", "point_to_point_polled"])
+def test_examples(prw: Any, tmp_path: Path, name: Any) -> None:
+    motion = read(EXAMPLES / f"{name}.csv")
+    result = prw("simulate", "--input", EXAMPLES / f"{name}.csv", "--out", "here")
+    assert result.returncode == 0 and result.stderr == ""
+    assert ("record omega1 and omega2" in result.stdout) == (motion.omega is None)
+    assert is_png(tmp_path / "here" / f"{name}.png")
+    columns = table(tmp_path / "here" / f"{name}.csv")
+    np.testing.assert_array_equal(columns["time"], motion.time)
+    np.testing.assert_array_equal(columns["theta2"], motion.theta[:, 1])
+    assert ("omega1" in columns) == (motion.omega is not None)
+    slope = backward_slope(motion.time, motion.theta) if motion.omega is None else motion.omega
+    expected, _ = follow(linear_model(table_1()), motion.time, motion.theta, slope)
+    # The table has twelve digits.
+    assert_close(columns, expected, 1e-10)
+    for output in ("tau1", "tau2", "pitch_rate"):
+        assert abs(columns[output][0]) < 1e-12, "starts with a bang"
+
+
+def test_other_parameters(prw: Any, tmp_path: Path) -> None:
+    """In units of the FMU's choice in the file that identification writes, in SI by --set, which is stronger."""
+    entries = {"k1": {"value": 2.0, "unit": "N.m/deg"}, "c3": {"value": 0.2, "unit": "N.m.s/rad"}, "N": 9, "k2": 77.0}
+    (tmp_path / "mine.json").write_text(json.dumps(entries))
+    (tmp_path / "report.json").write_text(json.dumps({"fmu": {}, "parameters": entries}))
+    (tmp_path / "good.csv").write_text(GOOD.replace("0.002,0.1", "0.002,0.3") + "0.01,0.3,0.2\n")
+    found = {}
+    for name, arguments in {
+        "file": ["--parameters", "mine.json"],
+        "report": ["--parameters", "report.json"],
+        "set": ["--set", f"k1={360 / np.pi!r},c3=0.2", "--set", "N=9", "--set", "k2=77"],
+        "both": ["--parameters", "mine.json", "--set", "k2=50"],
+        "none": [],
+    }.items():
+        result = prw("simulate", "good.csv", "--out", name, *arguments)
+        assert result.returncode == 0 and ("k2 " in result.stdout) == (name != "none"), result
+        found[name] = table(tmp_path / name / "good.csv")["tau1"][-1]
+    assert found["file"] == found["report"] == pytest.approx(found["set"], rel=1e-11)
+    assert len({found[name] for name in ("file", "both", "none")}) == 3
+    for entry, complaint in [
+        ({"k9": 1.0}, "--parameters: k9 is not known; there are J2"),
+        (
+            {"k1": {"value": 1.0, "unit": "N.m/rev"}},
+            'mine.json: k1 can be given in N.m/rad or N.m/deg, not in "N.m/rev"',
+        ),
+        ({"k1": {"unit": "N.m/rad"}}, "mine.json: k1 is None, not a number"),
+        ([1.0], "--parameters: mine.json is no JSON file with values by name"),
+    ]:
+        (tmp_path / "mine.json").write_text(json.dumps(entry))
+        result = prw("simulate", "--parameters", "mine.json")
+        assert result.returncode == 1 and complaint in result.stderr and result.stderr.count("\n") == 1
+    for arguments, complaint in [
+        (["--set", "k9=1"], "--set: k9 is not known; there are J2"),
+        (["--set", "k1=stiff"], "--set k1=stiff: 'stiff' is not a number"),
+        (["--parameters", "absent.json"], "--parameters: absent.json cannot be read (No such file"),
+        (["good.csv", "--input", "good.csv"], "give one recording"),
+    ]:
+        result = prw("simulate", *arguments)
+        assert result.returncode == 1 and complaint in result.stderr and result.stderr.count("\n") == 1, result
+
+
+def test_without_matplotlib(tmp_path: Path, fmu: Path) -> Any:
+    """The table is written, and one line names the package that the figure needs."""
+    program = "import sys; sys.modules['matplotlib'] = None; from prw.cli import main; sys.exit(main(sys.argv[1:]))"
+
+    def run(*arguments: Any) -> Any:
+        line = [sys.executable, "-c", program, *arguments, "--fmu", str(fmu)]
+        return subprocess.run(line, capture_output=True, text=True, cwd=tmp_path)
+
+    result = run("simulate")
+    assert result.returncode == 0 and result.stderr == "", result.stderr
+    assert "no figure   matplotlib missing; install with: pip install matplotlib" in result.stdout
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["fig4.csv"] and "next        look at out" in result.stdout
+    result = run("check", "out/fig4.csv", "--experiment", "closed_loop")
+    assert result.returncode == 1 and "for a figure of both, matplotlib missing; install" in result.stderr
+    result = run("simulate", "--animate", "fig4.gif", "--out", "other")
+    assert result.returncode == 1 and "prw simulate: matplotlib missing; install" in result.stderr
+    assert result.stderr.count("\n") == 1 and not (tmp_path / "other").exists()
+
+
+def test_no_hint_leads_to_a_clone(prw: Any) -> None:
+    """Users of the wheel have no make, no cargo and no examples."""
+    commands = ["simulate", "check", "linearize", "identify", "excite", "sweep"]
+    for arguments in (["simulate"], *([command, "--help"] for command in commands)):
+        reported = prw(*arguments).stdout
+        assert "next  " in reported or "usage" in reported
+        assert not re.search(r"\bmake (demo|fmu|study)|cargo|README|examples/", reported), reported
+    assert re.fullmatch(r"prw \d+\.\d+\.\d+\n", prw("--version", with_fmu=False).stdout)
+
+
+def test_examples_are_what_their_script_writes(tmp_path: Path) -> None:
+    script = tmp_path / "make_recordings.py"
+    script.write_bytes((EXAMPLES / "make_recordings.py").read_bytes())
+    subprocess.run([sys.executable, str(script)], check=True)
+    for path in sorted(EXAMPLES.glob("*.csv")):
+        assert (tmp_path / path.name).read_bytes() == path.read_bytes()
+
+
+def test_other_complaints(prw: Any, tmp_path: Path) -> None:
+    (tmp_path / "good.csv").write_text(GOOD)
+    (tmp_path / "no.fmu").write_text("not a zip")
+    (tmp_path / "taken").write_text("a file where a directory should be")
+    for arguments, complaint in [
+        (["--input", "absent.csv"], "absent.csv: cannot be read (No such file or directory)"),
+        (["--input", "."], "cannot be read (Is a directory)"),
+        (["--input", "good.csv", "--fmu", "absent.fmu"], "absent.fmu: no such FMU\n"),
+        (["--input", "good.csv", "--fmu", "no.fmu"], "no.fmu: cannot be loaded"),
+        (["--degrees"], "--degrees belongs to a recording"),
+    ]:
+        result = prw("simulate", *arguments, with_fmu=False)
+        assert result.returncode == 1 and complaint in result.stderr, result.stderr
+        assert result.stderr.count("\n") == 1 and result.stdout == ""
+    (tmp_path / "huge.csv").write_text("time,theta1,theta2\n0,0,0\n1e-3,1e308,0\n2e-3,-1e308,0\n")
+    result = prw("simulate", "--input", "huge.csv")
+    assert result.returncode == 1 and "the FMU stopped at 0.001 s: " in result.stderr
+    assert result.stderr.count("\n") == 1 and not (tmp_path / "out").exists()
+    result = prw("simulate", "--input", "good.csv", "--out", "taken")
+    assert result.returncode == 1 and "taken" in result.stderr and result.stderr.count("\n") == 1
+
+
+def test_the_recording_is_never_overwritten(prw: Any, tmp_path: Path) -> None:
+    (tmp_path / "good.csv").write_text(GOOD)
+    result = prw("simulate", "--input", "good.csv", "--out", ".")
+    assert result.returncode == 1 and "would be overwritten" in result.stderr
+    assert (tmp_path / "good.csv").read_text() == GOOD
+
+
+def test_results_have_usual_permissions(prw: Any, tmp_path: Path) -> None:
+    (tmp_path / "good.csv").write_text(GOOD)
+    assert prw("simulate", "--input", "good.csv").returncode == 0
+    mask = os.umask(0)
+    os.umask(mask)
+    assert (tmp_path / "out" / "good.csv").stat().st_mode & 0o777 == 0o666 & ~mask
+
+
+@pytest.mark.parametrize("ended", [False, True], ids=["disk full", "killed"])
+def test_the_old_result_stays(tmp_path: Path, fmu: Path, ended: Any) -> None:
+    """A result that cannot be written completely is not written."""
+    resource = pytest.importorskip("resource", reason="POSIX has limits on the size of files")
+    recording = "".join(f"{k / 1000},{k / 7e6!r},{k / 3e6!r}\n" for k in range(ROWS))
+    (tmp_path / "long.csv").write_text("time,theta1,theta2\n" + recording)
+    old = tmp_path / "out" / "long.csv"
+    old.parent.mkdir()
+    old.write_text("old")
+
+    # The signal that a file has become too large ends a process that does not ignore it, as Python does.
+    handler = "signal.signal(signal.SIGXFSZ, signal.SIG_DFL); " if ended else ""
+    start = f"import signal, sys, prw.cli; {handler}sys.exit(prw.cli.main(sys.argv[1:]))"
+    command = [sys.executable, "-c", start, "simulate", "--input", "long.csv", "--fmu", str(fmu)]
+    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (LIMIT, LIMIT))  # noqa: E731
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, preexec_fn=limit, timeout=120)
+
+    assert old.read_text() == "old"
+    left = [path.name for path in old.parent.iterdir() if path != old]
+    if ended:
+        assert result.returncode == -signal.SIGXFSZ
+        assert all(name.startswith(".long-") for name in left)
+    else:
+        assert result.returncode == 1 and left == []
+        assert "long.csv: cannot be written" in result.stderr and result.stderr.count("\n") == 1
