@@ -84,10 +84,7 @@ def _pack(model: str, fmi: int, folders: Folders, libraries: dict[Target, Path],
     for folder, targets in folders.items():
         # It joins those for macOS itself.
         options += (f"--binary={folder}={libraries[targets[0]]}",)
-    environment: Mapping[str, str] = os.environ
-    if model == MODEL:
-        _, environment, _ = prepare(WEBASSEMBLY)
-        options += ("--live-page",)
+    _, environment, _ = prepare(WEBASSEMBLY)
     command = (_program(PACKERS[model][0]), f"--fmi={fmi}", f"--out={scratch}", *options)
     _run(*command, what=f"the FMU {model}", environment=environment)
     return scratch / ("fmi3" if fmi == 3 else "") / f"{model}.fmu"

@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 import sys
-import zipfile
 from unittest.mock import Mock, call, patch
 
 import pytest
@@ -15,7 +14,6 @@ from built import ROOT
 
 from tools.documentation.pages import CONTROLLER, TESTBED
 from tools.documentation.sources import read_description
-from tools.figures import ICON, ICON_SVG
 
 
 @pytest.mark.parametrize("master, package", [("fmpy", "fmpy"), ("libcosim", "libcosimpy")])
@@ -52,13 +50,6 @@ def test_the_script_for_omsimulator(closed_loop):
     values = {**closed_loop.start, **dict(closed_loop.inputs.values())}
     assert dict(value.args for value in wrist.setValue.mock_calls) == pytest.approx(values)
     wrist.setFixedStepSize.assert_called_once_with(closed_loop.step)
-
-
-def test_the_page_and_the_icons_travel_in_the_controller(controller_fmu):
-    with zipfile.ZipFile(controller_fmu) as archive:
-        assert archive.read("documentation/index.html") == (ROOT / CONTROLLER.path).read_bytes()
-        for icon in (ICON, ICON_SVG):
-            assert archive.read(icon.as_posix()) == (ROOT / CONTROLLER.content / icon).read_bytes()
 
 
 def test_the_model_for_openmodelica_has_the_wires_of_the_ssp(closed_loop):

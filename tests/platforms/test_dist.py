@@ -63,7 +63,7 @@ def test_it_is_one_version():
 
 def test_the_page_runs_the_fmu():
     page = (DIST / f"{MODEL}.html").read_bytes()
-    assert b"\nlive([\n{ description: " in page
+    assert b".catch(withoutIt);" in page
     for name in (f"{MODEL}.fmu", ARM, FMI3):
         with zipfile.ZipFile(DIST / name) as archive:
             assert archive.read("documentation/index.html") == page, name

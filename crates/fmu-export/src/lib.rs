@@ -41,7 +41,7 @@ pub use fmi_abi::{
 };
 pub use info::{DefaultExperiment, Info};
 pub use log::Log;
-pub use model::{Error, Experiment, Model, Setup};
+pub use model::{Error, Experiment, Model, Setup, read_resource};
 pub use saved::{Saved, StateVisitor};
 pub use simulation::Simulation;
 pub use table::Variables;

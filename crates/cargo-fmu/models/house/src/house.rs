@@ -82,7 +82,8 @@ impl House {
         if name.contains(['/', '\\', ':']) || name.starts_with('.') {
             return Err(fault("name a file in the FMU's folder resources".to_owned()));
         }
-        let text = std::fs::read_to_string(folder.join(name)).map_err(|error| fault(error.to_string()))?;
+        let bytes = read_resource(folder.join(name)).map_err(|error| fault(error.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|error| fault(error.to_string()))?;
         let number = |text: &str| text.trim().parse().ok().filter(|number: &f64| number.is_finite());
         let row = |line: &str| {
             let (hour, temperature) = line.split_once(',')?;
