@@ -26,6 +26,8 @@ COLOURS = {
 }
 #: Prefixes of matplotlib's ids, and their replacements.
 ID_WORDS = {"p": "clip", "m": "mark", "h": "hatch"}
+#: Size of the numbers at the ticks, which are most of the text.
+TICK_SIZE = "8px"
 SVG = "{http://www.w3.org/2000/svg}"
 XLINK = "{http://www.w3.org/1999/xlink}"
 
@@ -111,7 +113,8 @@ def for_page(svg: bytes, name: str) -> bytes:
             parent[place : place + 1] = list(element)
     _join_paths(root)
     etree.cleanup_namespaces(root)
-    return bytes(etree.tostring(root, encoding="utf-8", pretty_print=True))
+    root.attrib["style"] = f"font-size:{TICK_SIZE}"
+    return re.sub(rb"\n +", b"\n", bytes(etree.tostring(root, encoding="utf-8", pretty_print=True)))
 
 
 def _name_apart(element: Any, name: str, used: set[str]) -> None:
@@ -147,6 +150,8 @@ def _restyle(element: Any) -> None:
             rules["font-weight"] = "bold"
     if element.tag == f"{SVG}text":
         rules["fill"] = "currentColor"
+    if rules.get("font-size") == TICK_SIZE:
+        del rules["font-size"]
     for key in ("fill", "stroke"):
         if key in rules:
             rules[key] = COLOURS.get(rules[key].lower(), rules[key])

@@ -382,7 +382,7 @@ impl Builder {
             eprintln!("note: no page runs the FMU in a browser; that needs: rustup target add {WEBASSEMBLY}");
             return Ok(None);
         }
-        let small = format!("profile.{}.opt-level=\"s\"", self.profile);
+        let small = format!("profile.{}.opt-level=\"z\"", self.profile);
         let settings: Vec<_> = self.settings.iter().copied().chain([small.as_str()]).collect();
         let runnable = |description, path: PathBuf, guid: &str| {
             let module = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
