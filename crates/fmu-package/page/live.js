@@ -181,7 +181,7 @@ function plain({ description }) {
   });
   /** @type {Panel[]} */
   const panels = [];
-  for (const [title, causality] of [["Inputs", "input"], ["Outputs", "output"]]) {
+  for (const [title, causality] of [["Outputs", "output"], ["Inputs", "input"]]) {
     const numbers = description.numbers(causality);
     for (const unit of new Set(numbers.map((one) => one.unit))) {
       const curves = numbers.filter((one) => one.unit === unit).map(({ name, factor, offset, type }, place) => ({ name, label: name, colour: `curve-${(place % 6) + 1}`, factor, offset, isWhole: type !== "Real" }));
