@@ -96,11 +96,11 @@ demo: need-rust need-python
 	@$(VENV)/bin/prw simulate --fmu $(FMU) $(if $(INPUT),--input "$(INPUT)") $(ARGS)
 
 demo-fmu: need-rust
-	@$(BUILD_FMU) $$($(HAS_PAGE) && $(HAS_WEBASSEMBLY) && echo --live-page)
+	@$(BUILD_FMU) $$($(HAS_PAGE) || echo --no-page)
 
 fmu: need-rust
-	@$(ADD_WEBASSEMBLY) || echo 'note: the page in the FMU goes in without *Try it*, which needs: rustup target add $(WEBASSEMBLY)'
-	@$(BUILD_FMU) $$($(HAS_WEBASSEMBLY) && echo --live-page)
+	@$(ADD_WEBASSEMBLY) || true
+	@$(BUILD_FMU)
 
 # Takes about a minute after a small change.
 check: $(VENV)/test.stamp need-rust

@@ -45,8 +45,7 @@ def _pack(
     """An FMU for this version of FMI with a library in each of these folders of `binaries/`."""
     # The program joins the libraries for macOS.
     binaries = [f"--binary={folder}={libraries[targets[0]]}" for folder, targets in folders.items()]
-    page = ("--live-page",) if model == MODEL else ()
-    _run(PACKERS[model][0], f"--fmi={fmi}", f"--out={scratch}", *binaries, *page, *options)
+    _run(PACKERS[model][0], f"--fmi={fmi}", f"--out={scratch}", *binaries, *options)
     return scratch / ("fmi3" if fmi == 3 else "") / f"{model}.fmu"
 
 

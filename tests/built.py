@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import base64
 import importlib.util
+import re
+import zlib
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FMUS = ROOT / "target" / "fmu"
+#: The script that a page decompresses and runs.
+SCRIPT = re.compile(r'\nbegin\("([^"]*)"\)\.catch\(withoutIt\);\n')
 
 
 def built(name: str, target: str = "closed-loop-fmus") -> Path:
@@ -23,3 +28,9 @@ def needed(module: str, package: str) -> None:
     """Skip the tests of a file where the package is not installed."""
     if importlib.util.find_spec(module) is None:
         pytest.skip(f"{package} is not installed; `make test-importers` installs it", allow_module_level=True)
+
+
+def script_of(page: str) -> str:
+    """The script that the page of an FMU decompresses."""
+    (packed,) = SCRIPT.findall(page)
+    return zlib.decompress(base64.b64decode(packed), wbits=-15).decode()

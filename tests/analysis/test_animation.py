@@ -16,7 +16,7 @@ from PIL import Image, ImageSequence
 
 from prw import UserError, animate, simulate
 from prw.animation import RATES
-from prw.frames import MEASURED, angles_and_torques, still
+from prw.frames import MEASURED, angles_and_torques
 from prw.motion import Motion
 from prw.plots import GREEN, PURPLE
 from prw.simulation import Run
@@ -83,12 +83,6 @@ def test_gif_has_its_pictures_and_ends_as_it_began(tmp_path: Path) -> None:
     scene = [image[int(0.08 * height) : int(0.66 * height)] for image in images]
     assert np.array_equal(scene[0], scene[-1])
     assert np.abs(scene[0] - scene[2]).max() > 100
-
-
-def test_still_stands_on_no_ground() -> None:
-    pixels = np.asarray(still(swing(), 0.25))
-    assert (pixels[0, :, 3] == 0).all()
-    assert 0.15 < np.mean(pixels[:, :, 3] == 255) < 0.6
 
 
 def test_page_has_the_run_and_needs_nothing_else(tmp_path: Path) -> None:

@@ -18,7 +18,6 @@ from lxml import etree
 
 from tools.documentation.pages import CONTROLLER, TESTBED
 from tools.documentation.sources import read_description
-from tools.figures import ICON, ICON_SVG
 
 
 @pytest.mark.parametrize("master, package", [("fmpy", "fmpy"), ("libcosim", "libcosimpy")])
@@ -55,13 +54,6 @@ def test_the_script_for_omsimulator(closed_loop):
     values = {**closed_loop.start, **dict(closed_loop.inputs.values())}
     assert dict(value.args for value in wrist.setValue.mock_calls) == pytest.approx(values)
     wrist.setFixedStepSize.assert_called_once_with(closed_loop.step)
-
-
-def test_the_page_and_the_icons_travel_in_the_controller(controller_fmu):
-    with zipfile.ZipFile(controller_fmu) as archive:
-        assert archive.read("documentation/index.html") == (ROOT / CONTROLLER.path).read_bytes()
-        for icon in (ICON, ICON_SVG):
-            assert archive.read(icon.as_posix()) == (ROOT / CONTROLLER.content / icon).read_bytes()
 
 
 def test_the_model_for_openmodelica_has_the_wires_of_the_ssp(closed_loop):

@@ -8,17 +8,18 @@ import re
 import struct
 import zipfile
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
-from built import ROOT
+from built import ROOT, script_of
 from fmpy import read_model_description
 from fmu_run import Fmu
 from test_references import NAMES
 from wasmtime import Engine, FuncType, Linker, Module, Store, ValType
 
 from prw.checking.experiments import read_experiments
-from tools.documentation.pages import TESTBED
+from tools.documentation.pages import CONTROLLER, TESTBED
 
 PAGE = "documentation/index.html"
 #: The parts of the page that build_fmu adds: policy, note for browsers without scripts, styles and scripts.
@@ -29,9 +30,8 @@ PACKED = re.compile(r'\{ description: "([^"]*)", module: "([^"]*)" \},')
 OUTPUTS = ("tau1", "tau2", "pitch", "roll", "pitch_rate", "roll_rate", "theta3", "theta4")
 
 
-@pytest.fixture(scope="module")
-def page(testbed) -> str:
-    with zipfile.ZipFile(testbed) as archive:
+def page_of(fmu: Path) -> str:
+    with zipfile.ZipFile(fmu) as archive:
         page = archive.read(PAGE).decode()
     if "<script" not in page:
         pytest.skip("the page does not run the FMU: rustup target add wasm32-unknown-unknown, then make fmu")
@@ -39,9 +39,15 @@ def page(testbed) -> str:
 
 
 @pytest.fixture(scope="module")
+def page(testbed) -> str:
+    return page_of(testbed)
+
+
+@pytest.fixture(scope="module")
 def packed(page) -> list[bytes]:
     """The descriptions and the modules in the page: the testbed's, the controller's."""
-    return [zlib.decompress(base64.b64decode(part), wbits=-15) for pair in PACKED.findall(page) for part in pair]
+    pairs = PACKED.findall(script_of(page))
+    return [zlib.decompress(base64.b64decode(part), wbits=-15) for pair in pairs for part in pair]
 
 
 class WebAssembly:
@@ -91,10 +97,17 @@ def test_the_page_is_that_of_the_sources_and_the_fmus(testbed, page, packed):
         assert guid.encode() in packed[2 * offset + 1]
 
 
-def test_it_is_small_and_loads_nothing(testbed, page):
-    live = page[page.index("<style>\n.live,") :]
-    assert len(live) < 500e3 and len(zlib.compress(live.encode(), 9)) < 250e3
-    assert not re.search(r"https?:|fetch\(|XMLHttp|import\(|@import|url\(|WebSocket| src=", PACKED.sub("", live))
+def test_the_controllers_page_runs_it(controller):
+    page = page_of(controller)
+    assert LIVE.sub("", page) == (ROOT / CONTROLLER.path).read_text(encoding="utf-8")
+    script = script_of(page)
+    assert len(PACKED.findall(script)) == 1 and "\n], ...[{},[]]).catch(" in script
+
+
+def test_it_is_small_and_loads_nothing(page):
+    live = page[page.index("<style>\n.live,") :] + PACKED.sub("", script_of(page))
+    assert len(page.encode()) < 420e3 and len(zlib.compress(page.encode(), 9)) < 220e3
+    assert not re.search(r"https?:|fetch\(|XMLHttp|import\(|@import|url\(|WebSocket| src=", live)
 
 
 def test_the_shaper_knows_the_pole_of_pitch():

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import pytest
 import toolchain
-from built import built
+from built import SCRIPT, built, script_of
 from fmpy import read_model_description
 from fmu_run import Fmu
 
@@ -115,11 +115,14 @@ def with_visitor(fmu: Path, report: str) -> str:
         "inputs: (time, inputs) => [inputs.theta1, inputs.theta2, inputs.omega1, inputs.omega2] = "
         "rows[Math.round(time / 1e-3)]})));\n"
     )
-    begin, end = page.index("live([\n{ description"), page.rindex("</body>")
+    script = script_of(page)
+    begin = script.index("live([\n{ description")
+    page = SCRIPT.sub(lambda _: f"\n{script[:begin]}{given}{script[begin:]}", page)
+    end = page.rindex("</body>")
     settings = {one.name: {name: float(value) for name, value in one.parameters.items()} for one in experiments}
     values = f"window.settings = {json.dumps(settings)}; window.report = {json.dumps(report)};"
     visitor = Path(__file__).with_name("inside.js").read_text(encoding="utf-8")
-    return f"{page[:begin]}{given}{page[begin:end]}<script>{values}\n{visitor}</script>{page[end:]}"
+    return f"{page[:end]}<script>{values}\n{visitor}</script>{page[end:]}"
 
 
 def test_the_browser_has_the_librarys_bits(fmu: Path, told: Any) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import base64
 import csv
 import io
+import os
 import re
 import shutil
+import subprocess
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 import toolchain
+from built import ROOT
+from fmu_run import Fmu
 from PIL import Image
 from playwright.sync_api import Browser, CDPSession, Locator, Page, expect, sync_playwright
 
@@ -116,7 +120,7 @@ def test_with_a_mouse(visit: Any, tmp_path: Path) -> None:
     assert box
     page.mouse.click(box["x"] + 0.75 * box["width"], box["y"] + box["height"] / 2)
     assert clock(page) == pytest.approx(0.75, abs=0.03)
-    page.mouse.click(*middle(page.locator(".live-plots canvas").first))
+    page.mouse.click(*middle(page.locator(".live-plots canvas:visible").first))
     assert clock(page) == pytest.approx(0.48, abs=0.03)
     expect(button(page, "Play")).to_be_visible()
     with page.expect_download() as download:
@@ -226,7 +230,7 @@ def test_with_the_keyboard_alone(visit: Any) -> None:
         page.keyboard.press("Tab")
     there = page.evaluate(
         "[...document.querySelectorAll('.live :is(a, button, input, select, summary, [tabindex])')]"
-        ".filter(e => e.checkVisibility()).map(e => e.id || e.getAttribute('aria-labelledby') || e.getAttribute('aria-label') || e.textContent)"
+        ".filter(e => e.checkVisibility({visibilityProperty: true})).map(e => e.id || e.getAttribute('aria-labelledby') || e.getAttribute('aria-label') || e.textContent)"
     )
     assert list(reached) == list(dict.fromkeys(there))
     page.get_by_label("Motion", exact=True).focus()
@@ -291,7 +295,7 @@ def test_a_field_can_be_filled_in_while_a_motion_plays(visit: Any) -> None:
     expect(field(page, "theta1")).to_have_value("30")
     field(page, "theta1").press("Enter")
     expect(page.get_by_label("Motion", exact=True)).to_have_value("hand")
-    until(page, "document.querySelector('.live-number').textContent > 29")
+    until(page, "document.querySelector('.live-player > .live-plots > figure .live-number').textContent > 29")
 
 
 def test_a_value_that_the_fmu_rejects(visit: Any) -> None:
@@ -378,6 +382,42 @@ WebAssembly.Instance = function (...all) {
 """
 
 
+def test_the_guide(visit: Any, tmp_path: Path) -> None:
+    """Each paragraph shows its run. Its numbers are dragged, or changed by keys, and are in the link."""
+    page = visit("#try", reduced_motion="reduce")
+    response = page.locator(".live-plots .live-plots .live-number")
+    for name, motion in [("1. Pitch", "pitch"), ("2. Roll", "roll"), ("4. Shape", "shaped"), ("3. Shake", "shake")]:
+        button(page, name).click()
+        expect(page.get_by_label("Motion", exact=True)).to_have_value(motion)
+        expect(page.locator("[aria-pressed=true]")).to_have_text(name)
+        assert response.is_visible() == (motion == "shake")
+    frequency = page.get_by_role("slider", name="Frequency")
+    for key, value in [("Home", 0.5), ("ArrowRight", 0.6), ("PageUp", 1.6), ("ArrowDown", 1.5), ("End", 15)]:
+        frequency.press(key)
+        assert float(frequency.get_attribute("aria-valuenow") or "") == value, key
+    place = middle(frequency)
+    drag(page, place, (place[0] - 200, place[1]))
+    expect(frequency).to_have_text("3.4\u00a0Hz")
+    stiffness = page.get_by_role("slider", name="Stiffness k2").and_(page.locator(".live-dial:visible"))
+    stiffness.press("PageUp")
+    expect(field(page, "k2")).to_have_value("0.5")
+    # The response at the cursor is that of the run, whose motors move by 4 degrees.
+    with page.expect_download() as download:
+        button(page, "Save as CSV").click()
+    download.value.save_as(tmp_path / "run.csv")
+    run = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True, skip_header=2)
+    swing = np.ptp(run["pitch"][run["time"] > 2]) / np.deg2rad(4)
+    assert float(response.inner_text()) == pytest.approx(swing, rel=5e-3)
+    # A place of the response chooses its frequency.
+    page.mouse.click(*middle(page.locator(".live-plots .live-plots canvas")))
+    assert 7 < float(frequency.get_attribute("aria-valuenow") or "") < 8.5
+    button(page, "Link to this").click()
+    expect(page.locator(".live-status")).to_contain_text("carries these settings")
+    again = visit(page.evaluate("location.hash"), reduced_motion="reduce")
+    expect(again.get_by_role("slider", name="Frequency")).to_have_text(frequency.inner_text())
+    expect(field(again, "k2")).to_have_value("0.5")
+
+
 def test_a_run_that_the_fmu_ends(visit: Any) -> None:
     """It is no refusal, and the time stays where there is something to be seen."""
     page = visit("#try&motion=tour&speed=2", script=ENDING)
@@ -385,6 +425,33 @@ def test_a_run_that_the_fmu_ends(visit: Any) -> None:
     expect(page.locator(".live-error")).to_have_count(0)
     expect(button(page, "Play")).to_be_visible()
     assert clock(page) == 0.5
+
+
+def test_a_model_reads_its_resources(browser: Browser, tmp_path: Path) -> None:
+    """The page of `cargo fmu build` has the files, and the model the values of the library."""
+    cargo_fmu = [ROOT / "target/debug/cargo-fmu", "fmu"]
+    subprocess.run([*cargo_fmu, "new", "house", "--from", "house"], cwd=tmp_path, check=True, capture_output=True)
+    environment = {**os.environ, "CARGO_TARGET_DIR": str(ROOT / "target/models")}
+    subprocess.run([*cargo_fmu, "build"], cwd=tmp_path / "house", env=environment, check=True, capture_output=True)
+    fmu = tmp_path / "house/target/fmu/house.fmu"
+    with zipfile.ZipFile(fmu) as archive:
+        path = archive.extract("documentation/index.html", tmp_path)
+    page = browser.new_page(viewport=PHONE)
+    page.goto(f"{Path(path).as_uri()}#try&motion=run")
+    with page.expect_download() as download:
+        button(page, "Save as CSV").click()
+    assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+    download.value.save_as(tmp_path / "run.csv")
+    page.close()
+    run = np.genfromtxt(
+        tmp_path / "run.csv", delimiter=",", names=True, skip_header=2, usecols=("time", "room", "outside")
+    )
+    with Fmu(fmu) as loaded:
+        house = loaded.instances()
+        for row in run:
+            assert tuple(house.get(("room", "outside"))[0]) == (row["room"], row["outside"])
+            house.step(to=row["time"] + 60)
+    assert np.ptp(run["outside"]) == pytest.approx(8.5)
 
 
 def test_a_link_in_the_page_leads_there(visit: Any) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import html
 import json
 import re
@@ -55,7 +54,6 @@ def render(project: Path, page: Page) -> str:
         "n": numbers,
         "drawing": read(sources / "testbed.svg"),
         "figure": lambda name, meaning: _figure(sources / "figures" / f"{name}.svg", meaning),
-        "picture": lambda name, meaning: _picture(sources / "figures" / f"{name}.png", meaning),
         "program": lambda name: _program(name, read(project / PROGRAMS / f"{name}.py")),
         "table_of": lambda path, heading: tables.text_table(read_table(project / path, heading)),
         "variable_table": lambda causality, title: tables.variable_table(description, causality, title),
@@ -107,14 +105,6 @@ def _figure(path: Path, meaning: str) -> str:
         raise UserError(f"{path}: missing; `make figures` makes it")
     start = f'<svg class="plot" role="img" aria-label="{html.escape(meaning)}"'
     return read(path).strip().replace('<svg xmlns="http://www.w3.org/2000/svg"', start, 1)
-
-
-def _picture(path: Path, meaning: str) -> str:
-    """A PNG within the page, with a description."""
-    if not path.is_file():
-        raise UserError(f"{path}: missing; `make figures` makes it")
-    content = base64.b64encode(path.read_bytes()).decode()
-    return f'<img alt="{html.escape(meaning)}" src="data:image/png;base64,{content}"/>'
 
 
 def _program(name: str, text: str) -> str:

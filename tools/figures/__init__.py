@@ -10,11 +10,10 @@ from prw.commands.options import DEFAULT_FMU, DEFAULT_OUT
 
 #: The copies that are kept with the sources, for the documentation and the README.
 COMMITTED = Path("docs/fmu-page/figures")
-#: README's first image, and a still for the page in the FMU, whose size the film would double.
+#: README's first image.
 FILM = Path("docs/wrist.gif")
 #: README's second image, of the page in the FMU.
 VISIT = Path("docs/try-it.gif")
-STILL = Path("wrist.png")
 #: Within the directory of an FMU's files: its icon for importers, and the scalable icon.
 ICON = Path("model.png")
 ICON_SVG = Path("documentation/model.svg")
@@ -48,7 +47,7 @@ def run(arguments: argparse.Namespace) -> None:
     from tools.figures.gallery import figures
     from tools.figures.icon import draw_controller, draw_testbed
     from tools.figures.results import numbers, results
-    from tools.figures.writing import write_for_page, write_json, write_picture, write_png, write_small_png, write_svg
+    from tools.figures.writing import write_for_page, write_json, write_png, write_small_png, write_svg
 
     found = results(arguments.fmu)
     drawn = figures(found)
@@ -68,12 +67,10 @@ def run(arguments: argparse.Namespace) -> None:
             write_png(page.content / ICON, draw(), dpi=128)
             write_svg(page.content / ICON_SVG, draw())
         from prw.animation import animate
-        from prw.frames import still
         from tools.figures import visit
-        from tools.figures.film import POSE, SPEED, story
+        from tools.figures.film import SPEED, story
 
         run, captions = story(arguments.fmu, arguments.fmu.with_name("prw_controller.fmu"))
-        write_picture(COMMITTED / STILL, still(run, POSE))
         animate(run, FILM, speed=SPEED, captions=captions)
         visit.film(arguments.fmu, VISIT)
         print(f"renewed {COMMITTED}, the icons, {FILM} and {VISIT}")

@@ -20,8 +20,6 @@ SPEED = 0.8
 SWING, LEGS = np.deg2rad(35), (0.45, 0.7, 0.45)
 #: Goals of the controller in sequence, pitch and roll in rad, and the time for each, s.
 GOALS, STAY = (np.deg2rad((30, 60)), np.zeros(2)), 0.8
-#: When the controller has reached the first of them, s.
-POSE = 2 * sum(LEGS) + 0.95 * STAY
 MOTORS = ("theta1", "theta2", "omega1", "omega2")
 CONTROLLED = ("pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2")
 

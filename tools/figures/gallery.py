@@ -14,6 +14,8 @@ from tools.figures.bode import draw_bode, transfers
 from tools.figures.results import Results, Run
 
 COLUMN = 4.5  # inches
+#: The Bode plots of motor 1. By symmetry, those of motor 2 are equal to them.
+OF_MOTOR_1 = "abcdij"
 #: Relative errors up to this value are rounding errors.
 ROUNDING = 1e-13
 #: Seconds of the two of Fig. 4 that fit into a column.
@@ -44,7 +46,7 @@ def figures(found: Results) -> dict[str, Drawn]:
                 draw_bode(subfigure, panel)
                 single = Figure(figsize=(COLUMN, 2.9), layout="constrained")
                 draw_bode(single, panel)
-                drawn[f"{plate}_{panel.key}"] = Drawn(single)
+                drawn[f"{plate}_{panel.key}"] = Drawn(single, for_page=panel.key in OF_MOTOR_1)
             drawn[plate] = Drawn(whole, for_page=False)
         drawn["poles"] = Drawn(_poles(found))
         drawn["steps"] = Drawn(_steps(found))

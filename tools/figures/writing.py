@@ -26,6 +26,8 @@ COLOURS = {
 }
 #: Prefixes of matplotlib's ids, and their replacements.
 ID_WORDS = {"p": "clip", "m": "mark", "h": "hatch"}
+#: Size of the numbers at the ticks, which are most of the text.
+TICK_SIZE = "8px"
 SVG = "{http://www.w3.org/2000/svg}"
 XLINK = "{http://www.w3.org/1999/xlink}"
 
@@ -52,13 +54,6 @@ def write_small_png(path: Path, figure: Figure) -> None:
         few.save(temporary, format="PNG", optimize=True)
 
 
-def write_picture(path: Path, image: Image.Image) -> None:
-    """Write an image, with transparency, as PNG of 255 colours."""
-    with replacing(path) as temporary:
-        few = image.quantize(255, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-        few.save(temporary, format="PNG", optimize=True)
-
-
 def write_json(path: Path, content: object) -> None:
     """Write JSON, indented and in order."""
     with replacing(path) as temporary:
@@ -73,7 +68,8 @@ def write_for_page(path: Path, figure: Figure) -> None:
 
 def _svg(figure: Figure, transparent: bool = False) -> bytes:
     file = io.BytesIO()
-    with matplotlib.rc_context(PAGE_STYLE):
+    # A fifth of a point is less than a pixel of the page.
+    with matplotlib.rc_context({**PAGE_STYLE, "path.simplify_threshold": 0.2}):
         figure.savefig(file, format="svg", metadata={"Date": None}, transparent=transparent)
     return _with_counted_ids(file.getvalue().decode()).encode()
 
@@ -115,9 +111,10 @@ def for_page(svg: bytes, name: str) -> bytes:
         elif element.tag == f"{SVG}g" and not element.attrib:  # carried an id only
             position = parent.index(element)
             parent[position : position + 1] = list(element)
-    _join_ticks(root)
+    _join_paths(root)
     etree.cleanup_namespaces(root)
-    return bytes(etree.tostring(root, encoding="utf-8", pretty_print=True))
+    root.attrib["style"] = f"font-size:{TICK_SIZE}"
+    return re.sub(rb"\n +", b"\n", bytes(etree.tostring(root, encoding="utf-8", pretty_print=True)))
 
 
 def _name_apart(element: Any, name: str, used: set[str]) -> None:
@@ -153,6 +150,8 @@ def _restyle(element: Any) -> None:
             rules["font-weight"] = "bold"
     if element.tag == f"{SVG}text":
         rules["fill"] = "currentColor"
+    if rules.get("font-size") == TICK_SIZE:
+        del rules["font-size"]
     for key in ("fill", "stroke"):
         if key in rules:
             rules[key] = COLOURS.get(rules[key].lower(), rules[key])
@@ -179,11 +178,27 @@ def _draw_ticks(root: Any) -> None:
             path.getparent().remove(path)
 
 
-def _join_ticks(root: Any) -> None:
-    """Join neighbouring paths with the same style and no other attributes."""
-    for path in reversed(list(root.iter(f"{SVG}path"))):
-        before = path.getprevious()
-        alike = before is not None and before.tag == path.tag and before.get("style") == path.get("style")
-        if alike and set(path.attrib) == {"d", "style"} == set(before.attrib):
-            before.attrib["d"] += path.get("d")
+def _join_paths(root: Any) -> None:
+    """Join the paths of a parent that differ in their points only, such as grid lines, ticks and curves of one colour."""
+    known: dict[Any, Any] = {}
+    for path in list(root.iter(f"{SVG}path")):
+        attributes = {name: value for name, value in path.attrib.items() if name != "d"}
+        first = known.setdefault((path.getparent(), *sorted(attributes.items())), path)
+        if first is not path and "id" not in attributes:
+            first.attrib["d"] += path.get("d")
             path.getparent().remove(path)
+    for path in known.values():
+        path.attrib["d"] = _relative(path.get("d"))
+
+
+def _relative(points: str) -> str:
+    """The points of straight lines, all but the first of each line relative to the point before them."""
+    found = re.findall(r"([ML])(-?[\d.]+) (-?[\d.]+)", points)
+    if "".join(f"{command}{x} {y}" for command, x, y in found) != points:
+        return points
+    text, drawn, before = "", "", ("0", "0")
+    for command, *point in found:
+        numbers = point if command == "M" else [f"{float(b) - float(a):.2f}" for a, b in zip(before, point)]
+        text += f"{'M' if command == 'M' else 'l' if drawn == 'M' else ' '}{' '.join(numbers)}"
+        drawn, before = command, (point[0], point[1])
+    return _shorter(text)

@@ -26,7 +26,15 @@ fn build_fmu(out: &Path) -> Command {
     let library = LIBRARY.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
         let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
-        assert!(command.args(["--fmi", "2", "--out"]).arg(folder.path()).output().unwrap().status.success());
+        assert!(
+            command
+                .args(["--no-page", "--fmi", "2", "--out"])
+                .arg(folder.path())
+                .output()
+                .unwrap()
+                .status
+                .success()
+        );
         let fmu = fs::File::open(folder.path().join("prw_testbed.fmu")).unwrap();
         let mut fmu = ZipArchive::new(fmu).unwrap();
         let name = format!("binaries/{platform}/prw_testbed{DLL_SUFFIX}");
@@ -37,7 +45,7 @@ fn build_fmu(out: &Path) -> Command {
     let path = out.with_extension("library");
     fs::write(&path, library).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_build_fmu"));
-    command.args(["--fmi", "2", "--out"]).arg(out);
+    command.args(["--no-page", "--fmi", "2", "--out"]).arg(out);
     command.arg("--binary").arg(format!("{platform}={}", path.display()));
     command
 }

@@ -118,9 +118,14 @@ pub fn check(place: &Place, given: &[PathBuf], options: &fmu_check::Options) -> 
 fn once(options: &Options) -> Result<bool> {
     let project = Project::find(&options.place)?;
     let folder = project.workspace.join("target/fmu");
-    let build = BuildOptions { fmi: options.fmi, out: Some(folder.clone()), ..BuildOptions::default() };
+    let build = BuildOptions {
+        fmi: options.fmi,
+        out: Some(folder.clone()),
+        no_page: true,
+        ..BuildOptions::default()
+    };
     let begin = SystemTime::now();
-    let mut words = vec!["--out".into(), folder.clone().into()];
+    let mut words = vec!["--no-page".into(), "--out".into(), folder.clone().into()];
     if let Some(fmi) = options.fmi {
         words.extend(["--fmi".into(), if fmi == Fmi::V2 { "2" } else { "3" }.into()]);
     }

@@ -151,6 +151,16 @@ fn house() {
     let read = "logEvents: read 9 temperatures from winter.csv";
     assert!(folder.says("my-house", &["run", "--log"]).contains(read));
     assert!(!folder.says("my-house", &["run"]).contains(read));
+    // A run needs no page. A build makes it, with the resources that the model reads.
+    let page = || {
+        let fmu = fs::File::open(folder.path("my-house/target/fmu/my_house.fmu")).unwrap();
+        let mut fmu = zip::ZipArchive::new(fmu).unwrap();
+        fmu.by_name("documentation/index.html").ok().map(|file| std::io::read_to_string(file).unwrap())
+    };
+    assert_eq!(page(), None);
+    folder.says("my-house", &["build"]);
+    let page = page().unwrap();
+    assert!(page.contains("<h1>House</h1>") && page.contains(".catch(withoutIt);"));
 }
 
 /// The reason comes first, and no file of values that are none.
@@ -201,7 +211,8 @@ fn inputs_come_from_a_table(folder: &Folder) {
 /// Options of `build_fmu`, with the package named from elsewhere.
 fn options_reach_the_program_that_packs(folder: &Folder) {
     let manifest = "my-lag/Cargo.toml";
-    let said = folder.says("", &["build", "--manifest-path", manifest, "--fmi", "3", "--out", "made"]);
+    let said =
+        folder.says("", &["build", "--manifest-path", manifest, "--no-page", "--fmi", "3", "--out", "made"]);
     assert!(said.contains("made/fmi3/my_lag.fmu") && said.contains("guid {"), "{said}");
     assert!(folder.path("made/fmi3/my_lag.fmu").is_file());
     assert!(!folder.path("made/my_lag.fmu").exists());
@@ -347,7 +358,7 @@ fn the_guide_leads_to_a_checked_fmu() {
     }
     let output = folder.run("tank", env!("CARGO"), &["test", "--quiet"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let output = folder.fmu("tank", &["build"]);
+    let output = folder.fmu("tank", &["build", "--no-page"]);
     let why = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success(), "{why}");
     if cfg!(all(target_os = "linux", target_env = "gnu")) {

@@ -45,7 +45,7 @@ pub use info::{DefaultExperiment, Info};
 pub use integrate::{Crossing, find_event, rk4};
 pub use log::Log;
 pub use lookup::{LookupTable, interpolate};
-pub use model::{Error, Experiment, Model, Setup};
+pub use model::{Error, Experiment, Model, Setup, read_resource};
 pub use saved::{Saved, StateVisitor};
 pub use simulation::Simulation;
 pub use table::Variables;

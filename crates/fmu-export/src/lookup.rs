@@ -1,6 +1,6 @@
 //! [`LookupTable`]: a characteristic or a time series that a model reads from a file.
 
-use crate::model::Error;
+use crate::model::{Error, read_resource};
 use crate::saved::{Saved, StateVisitor};
 use std::path::Path;
 
@@ -38,7 +38,8 @@ impl LookupTable {
     /// column.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let error = |reason: &dyn std::fmt::Display| Error::new(format!("{}{reason}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|reason| error(&format_args!(": {reason}")))?;
+        let bytes = read_resource(path).map_err(|reason| error(&format_args!(": {reason}")))?;
+        let text = String::from_utf8(bytes).map_err(|reason| error(&format_args!(": {reason}")))?;
         Self::parse(&text).map_err(|reason| error(&reason))
     }
 

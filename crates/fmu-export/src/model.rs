@@ -6,7 +6,7 @@ use crate::log::Log;
 use crate::table::Variables;
 use fmi_abi::Interface;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A model that can be exported as an FMU.
 ///
@@ -144,6 +144,19 @@ impl Setup {
         })?;
         Ok(directory.join(name))
     }
+}
+
+/// Reads a file in the directory of [`Setup::resources`]. Unlike `std::fs`, this also works in the page that runs the FMU in a
+/// browser, which contains the files.
+///
+/// # Errors
+/// The errors of [`std::fs::read`].
+pub fn read_resource(path: impl AsRef<Path>) -> std::io::Result<Vec<u8>> {
+    #[cfg(target_family = "wasm")]
+    let content = crate::boundary::webassembly::read(path.as_ref());
+    #[cfg(not(target_family = "wasm"))]
+    let content = std::fs::read(path);
+    content
 }
 
 fn resources(location: &str, windows: bool) -> Option<PathBuf> {

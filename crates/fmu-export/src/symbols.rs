@@ -60,6 +60,14 @@ macro_rules! symbols {
                 $crate::fmi2::room(size)
             }
 
+            /// See `fmu_export::fmi2::add_file`.
+            #[cfg(target_family = "wasm")]
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn fmu_file(path: fmi2String, content: fmi2Component, size: usize) {
+                // SAFETY: the code around the module guarantees the contract of this function.
+                unsafe { $crate::fmi2::add_file(path, content, size) }
+            }
+
             /// See `fmu_export::fmi2::broken`.
             #[cfg(target_family = "wasm")]
             #[unsafe(no_mangle)]

@@ -16,6 +16,11 @@
  */
 
 /**
+ * An FMU as the page contains it: files are its resources by name.
+ * @typedef {{description: Description, module: WebAssembly.Module, files: Map<string, Uint8Array>}} Package
+ */
+
+/**
  * What the module exports, besides the functions of FMI.
  * @typedef {Record<string, (...values: number[]) => number> & {memory: WebAssembly.Memory}} Exports
  */
@@ -113,8 +118,8 @@ function baseOf(one) {
 
 /** An instance for Co-Simulation, in a module with a memory of its own. */
 class Fmu {
-  /** @param {Description} description @param {WebAssembly.Module} module */
-  constructor(description, module) {
+  /** @param {Package} own */
+  constructor({ description, module, files }) {
     this.description = description;
     this.module = module;
     this.time = description.startTime;
@@ -124,9 +129,16 @@ class Fmu {
     const log = (_status, _category, message) => void this.messages.push(this.text(message));
     const instance = new WebAssembly.Instance(module, { fmu: { fmu_log: log } });
     this.functions = /** @type {Exports} */ (/** @type {unknown} */ (instance.exports));
+    for (const [name, content] of files) {
+      this.next = this.functions.fmu_room(content.length + 4 * name.length + 64);
+      const [path, place] = [this.put(`/resources/${name}`), this.take(content.length)];
+      new Uint8Array(this.functions.memory.buffer, place, content.length).set(content);
+      this.functions.fmu_file(path, place, content.length);
+    }
     // Room for each variable in a few groups, and for texts.
     this.next = this.functions.fmu_room(8192 + 128 * description.variables.length);
-    const [name, guid, resources] = [description.identifier, description.guid, ""].map((text) => this.put(text));
+    const texts = [description.identifier, description.guid, files.size ? "file:///resources" : ""];
+    const [name, guid, resources] = texts.map((text) => this.put(text));
     const callbacks = this.take(20);
     new Uint8Array(this.functions.memory.buffer, callbacks, 20).fill(0);
     /** The instance, as the module knows it; 0 if there is none. */
@@ -261,11 +273,4 @@ class Fmu {
     const bytes = new Uint8Array(this.functions.memory.buffer, place);
     return new TextDecoder().decode(bytes.slice(0, bytes.indexOf(0)));
   }
-}
-
-/** What was compressed and written in base 64, as bytes. @param {string} text */
-async function unpacked(text) {
-  const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
 }

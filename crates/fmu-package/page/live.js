@@ -2,22 +2,24 @@
 
 /**
  * Inputs over time, by name; `table` has what was so far. With the next row, a motion may write into it what it knows besides.
- * @typedef {{id: string, title: string, length: number, begin?(): void, inputs(time: number, inputs: Record<string, number>, table: Table): void}} Motion
+ * The motion `before` is drawn in grey, for comparison. `frequency` (Hz) is for motions that shake.
+ * @typedef {{id: string, title: string, length: number, before?: string, frequency?(time: number): number, begin?(): void, inputs(time: number, inputs: Record<string, number>, table: Table): void}} Motion
  */
 
 /**
- * What a model has beside sliders and courses. `word` is for its motions. Besides outputs, variables that are `recorded` are in the table, and columns that are
- * `written` by motions. `follow` leads inputs to where the sliders are; `move` of a view moves a slider.
- * `buttons` start motions; the parameters that are `near`, each with a short description, stand with the sliders.
+ * The view of a model besides sliders and plots. `word` is the label of its motions. Besides outputs, variables that are `recorded` are in the table, and columns
+ * that are `written` by motions. `follow` leads inputs to the sliders; `move` of a view moves a slider. `numbers` are those that motions read and that paragraphs
+ * of the guide change. The parameters that are `near`, each with a short description, are next to the sliders; `beside` is drawn above the plots.
  * @typedef {{
  *   word: string, start: Record<string, number>, sliders: {name: string, label: string, reach: number}[], recorded: string[], written: string[], motions: Motion[],
- *   lead: string, buttons: {label: string, motion: string}[], near: Record<string, string>, panels: Panel[], isMinor(name: string): boolean,
+ *   lead: string, guide: Chapter[], numbers: Record<string, number>, near: Record<string, string>, panels: Panel[], isMinor(name: string): boolean,
  *   follow(inputs: Record<string, number>, targets: Map<string, number>, size: number): void,
  *   view(move: (name: string, by: number) => void): View & {controls?: HTMLElement[], settings?: Map<string, HTMLInputElement | HTMLSelectElement>},
+ *   beside?(change: (name: string, value: number) => void): {element: HTMLElement, draw(motion: Motion | null, time: number, start: Map<Variable, number | string>): void},
  * }} AddOn
  */
 
-/** By the model's identifier. @type {Record<string, (description: Description, others: {description: Description, module: WebAssembly.Module}[]) => AddOn>} */
+/** By the model's identifier. @type {Record<string, (own: Package, others: Package[]) => AddOn>} */
 const addOns = {};
 
 /** Seconds by hand, and rows, that are kept at most. */
@@ -28,10 +30,11 @@ const BY_HAND = "hand";
 
 /** A run of the FMU, calculated as far as it is asked for, and anew when something changes. */
 class Session {
-  /** @param {Description} description @param {WebAssembly.Module} module @param {AddOn} addOn */
-  constructor(description, module, { recorded, written }) {
+  /** @param {Package} own @param {AddOn} addOn */
+  constructor(own, { recorded, written }) {
+    const { description } = own;
+    this.own = own;
     this.description = description;
-    this.module = module;
     this.inputs = description.numbers("input");
     const outputs = description.variables.filter((one) => (one.causality === "output" || recorded.includes(one.name)) && one.type !== "String");
     this.outputs = outputs.filter((one) => !this.inputs.includes(one));
@@ -57,7 +60,7 @@ class Session {
 
   /** An instance, and where its inputs and outputs are. */
   connected() {
-    const fmu = new Fmu(this.description, this.module);
+    const fmu = new Fmu(this.own);
     return { fmu, inputs: fmu.group(this.inputs), outputs: fmu.group(this.outputs) };
   }
 
@@ -100,6 +103,11 @@ class Session {
       this.isBegun = false;
     }
     return this.error ? time : this.table.end;
+  }
+
+  /** Calculates until a time, however long that takes. @param {number} time @param {(inputs: Record<string, number>) => void} follow */
+  finish(time, follow) {
+    while (this.advance(time, follow) < time - this.description.step) {}
   }
 
   /** One more row: inputs, what the FMU answers, and before it the step there. @param {(inputs: Record<string, number>) => void} follow */
@@ -157,8 +165,8 @@ class Session {
   }
 }
 
-/** For a model of which nothing more is known. @param {Description} description @returns {AddOn} */
-function plain(description) {
+/** For a model of which nothing more is known. @param {Package} own @returns {AddOn} */
+function plain({ description }) {
   const real = description.numbers("input");
   const length = description.stopTime - description.startTime;
   /** @param {Variable} one */
@@ -173,7 +181,7 @@ function plain(description) {
   });
   /** @type {Panel[]} */
   const panels = [];
-  for (const [title, causality] of [["Inputs", "input"], ["Outputs", "output"]]) {
+  for (const [title, causality] of [["Outputs", "output"], ["Inputs", "input"]]) {
     const numbers = description.numbers(causality);
     for (const unit of new Set(numbers.map((one) => one.unit))) {
       const curves = numbers.filter((one) => one.unit === unit).map(({ name, factor, offset, type }, place) => ({ name, label: name, colour: `curve-${(place % 6) + 1}`, factor, offset, isWhole: type !== "Real" }));
@@ -185,7 +193,8 @@ function plain(description) {
   const free = { id: "run", title: "At their start values", length, inputs: () => {} };
   return {
     lead: "This page runs the FMU: move its inputs, or change its parameters.",
-    buttons: [],
+    guide: [],
+    numbers: {},
     near: {},
     word: "Inputs",
     start: {},
@@ -321,56 +330,117 @@ class Fields {
   }
 }
 
-/** Why there is no section, at its place. @param {Error} error */
-function withoutIt(error) {
-  const text = `Here this page would run the FMU for you to try, but that is not possible: ${error.message}. The rest of the page is complete.`;
-  (document.querySelector("main") || document.body).prepend(element("p", { class: "note" }, text));
-}
-
-/**
- * The section, put at the top of the page.
- * @param {{description: string, module: string}[]} packed the FMU of this page, and those that are beside it
- * @param {string[]} resources files of the FMU that are not in the page
- */
-async function live(packed, resources) {
-  const lacking = ["WebAssembly", "DecompressionStream"].find((name) => !(name in window));
-  if (lacking) {
-    throw new Error(`this browser has no ${lacking}`);
+/** The section *Try it*: a run of the FMU, and all that changes it. */
+class Trial {
+  /** @param {Package} own @param {Package[]} others FMUs that the add-on runs @param {string[]} missing resources that are not in the page */
+  constructor(own, others, missing) {
+    const { description } = own;
+    this.description = description;
+    this.missing = missing;
+    this.addOn = (addOns[description.identifier] || plain)(own, others);
+    this.session = new Session(own, this.addOn);
+    this.motions = new Map(this.addOn.motions.map((motion) => [motion.id, motion]));
+    /** The numbers that motions read, at first. */
+    this.numbers = { ...this.addOn.numbers };
+    this.settable = description.variables.filter((one) => one.causality === "parameter" && one.variability !== "constant" && one.start !== null);
+    /** The last change, to be undone if the FMU rejects it: its fields, and by hand the rows and targets before it. @type {{fields: Fields, one: Variable, rows: number, targets: Map<string, number>} | null} */
+    this.latest = null;
+    /** The run before the last change, and when that was, ms. @type {Table | null} */
+    this.earlier = null;
+    this.changedAt = -Infinity;
+    this.isTouched = false;
+    this.said = "";
+    this.status = element("p", { class: "live-status", role: "status" });
+    this.choice = element("select", { id: "live-motion" }, ...this.addOn.motions.map(({ id, title }) => element("option", { value: id }, title)));
+    if (this.addOn.sliders.length) {
+      this.choice.append(element("option", { value: BY_HAND }, "By hand"));
+    }
+    this.choice.addEventListener("change", () => this.choose(this.choice.value));
+    this.sliders = new Fields((one, value) => this.byHand(one.name, Number(value)));
+    this.parameters = new Fields((one, value) => {
+      this.latest = { fields: this.parameters, one, rows: 0, targets: this.session.targets };
+      this.session.start.set(one, value);
+      this.recalculate();
+    });
+    this.guide = new Guide(this.addOn.lead, this.addOn.guide, ({ settings }) => this.apply(new URLSearchParams(settings)), (name, value) => this.change(name, value));
+    this.view = this.addOn.view((name, by) => this.drag(name, by));
+    this.beside = this.addOn.beside?.((name, value) => this.change(name, value));
+    this.player = this.played();
+    this.follow = (/** @type {Record<string, number>} */ inputs) => this.addOn.follow(inputs, this.session.targets, description.step);
   }
-  const [own, ...others] = await Promise.all(
-    packed.map(async (one) => {
-      const [description, module] = await Promise.all([unpacked(one.description), unpacked(one.module).then((bytes) => WebAssembly.compile(bytes))]);
-      return { description: new Description(new TextDecoder().decode(description)), module };
-    }),
-  );
-  const { description } = own;
-  const addOn = (addOns[description.identifier] || plain)(description, others);
-  const session = new Session(description, own.module, addOn);
-  const find = (/** @type {string} */ name) => /** @type {Variable} */ (description.byName.get(name));
-  const settable = description.variables.filter((one) => one.causality === "parameter" && one.variability !== "constant" && one.start !== null);
-  const status = element("p", { class: "live-status", role: "status" });
 
-  const motions = new Map(addOn.motions.map((motion) => [motion.id, motion]));
-  const choice = element("select", { id: "live-motion" }, ...addOn.motions.map(({ id, title }) => element("option", { value: id }, title)));
-  if (addOn.sliders.length) {
-    choice.append(element("option", { value: BY_HAND }, "By hand"));
+  /** @param {string} name */
+  find(name) {
+    return /** @type {Variable} */ (this.description.byName.get(name));
   }
-  const begin = description.startTime;
-  const follow = (/** @type {Record<string, number>} */ inputs) => addOn.follow(inputs, session.targets, description.step);
-  const end = () => Math.min(session.ended, begin + (session.motion ? Math.min(session.motion.length, MOST_ROWS * description.step) : Math.min(MOST_BY_HAND, MOST_ROWS * description.step)));
-  const recorded = () => Math.max(session.table.end, session.timeOf(session.known - 1));
-  const isWide = () => session.motion || !(description.step < 0.1);
 
-  /** The last change, to be undone if the FMU rejects it: its fields, and by hand the rows and targets before it. @type {{fields: Fields, one: Variable, rows: number, targets: Map<string, number>} | null} */
-  let latest = null;
-  /** The run before the parameters changed, and when they did, ms. @type {Table | null} */
-  let earlier = null;
-  let changedAt = -Infinity;
-  let isTouched = false;
+  /** When the run ends, s. */
+  get end() {
+    const { session, description } = this;
+    return Math.min(session.ended, description.startTime + Math.min(session.motion ? session.motion.length : MOST_BY_HAND, MOST_ROWS * description.step));
+  }
 
-  const sliders = new Fields((one, value) => byHand(one.name, Number(value)));
+  /** Until when there are inputs, s. */
+  get recorded() {
+    return this.session.motion ? this.end : Math.max(this.session.table.end, this.session.timeOf(this.session.known - 1));
+  }
+
+  played() {
+    const { session, addOn, description, view } = this;
+    const begin = description.startTime;
+    return new Player({
+      plots: (seek) => new Plots(addOn.panels, seek),
+      view: {
+        element: view.element,
+        draw: (table, time) => {
+          view.draw(table, time);
+          this.beside?.draw(session.motion, time - begin, session.start);
+        },
+      },
+      begin,
+      isLooping: () => !this.isTouched && session.motion === addOn.motions[0],
+      earlier: () => this.earlier,
+      table: session.table,
+      span: (now) => (session.motion || !(description.step < 0.1) ? [begin, this.end] : [Math.max(begin, now - WINDOW), Math.max(begin + WINDOW, now)]),
+      recorded: () => this.recorded,
+      limit: () => this.end,
+      advance: (now) => {
+        const reached = session.advance(session.motion ? this.end : Math.max(now, session.timeOf(session.known - 1)), this.follow);
+        this.say(session.error);
+        if (session.motion) {
+          addOn.sliders.forEach(({ name }) => session.table.count && this.sliders.show.get(name)?.(session.table.at(name, now)));
+        }
+        if (session.motion && reached < this.end - description.step) {
+          // The part that is still to come is drawn, too.
+          this.player.ask();
+        }
+        return session.error ? now : reached;
+      },
+    });
+  }
+
+  /** Shows why a run has ended. One that the FMU has rejected stands still and is grey until something else is tried. @param {string} error */
+  say(error) {
+    const { isRejected } = this.session;
+    if (isRejected) {
+      this.player.setPlaying(false);
+    }
+    if (error === this.said) {
+      return;
+    }
+    this.said = this.status.textContent = error;
+    this.status.classList.toggle("live-error", isRejected);
+    this.player.element.classList.toggle("live-rejected", isRejected);
+    if (isRejected) {
+      this.latest?.fields.mark.get(this.latest.one.name)?.(`The FMU rejects this value of ${this.latest.one.name}.`);
+    } else {
+      [this.sliders, this.parameters].forEach((fields) => fields.mark.forEach((mark) => mark("")));
+    }
+  }
+
   /** From here on by hand. @param {string} name @param {number} value */
-  const byHand = (name, value) => {
+  byHand(name, value) {
+    const { session, latest, player } = this;
     const { isRejected } = session;
     if (isRejected && latest && !session.motion) {
       session.targets = latest.targets;
@@ -379,132 +449,119 @@ async function live(packed, resources) {
     }
     const row = isRejected && session.table.count === 0 ? session.known - 1 : session.table.row(player.now);
     if (session.motion) {
-      session.targets = new Map(addOn.sliders.map((slider) => [slider.name, session.table.at(slider.name, player.now)]));
+      session.targets = new Map(this.addOn.sliders.map((slider) => [slider.name, session.table.at(slider.name, player.now)]));
     }
     if (session.motion || row < session.table.count - 1) {
       session.restart(row + 1);
     }
     session.motion = null;
-    choice.value = BY_HAND;
-    earlier = null;
-    latest = { fields: sliders, one: find(name), rows: row + 1, targets: new Map(session.targets) };
+    this.choice.value = BY_HAND;
+    this.guide.read(BY_HAND);
+    this.earlier = null;
+    this.latest = { fields: this.sliders, one: this.find(name), rows: row + 1, targets: new Map(session.targets) };
     session.targets.set(name, value);
     player.setPlaying(true);
-  };
-  const view = addOn.view((name, by) => {
-    isTouched = true;
-    const from = session.motion ? session.table.at(name, player.now) : (session.targets.get(name) ?? 0);
-    const slider = addOn.sliders.find((one) => one.name === name);
-    const value = Math.max(-(slider?.reach ?? 1), Math.min(slider?.reach ?? 1, from + by));
-    sliders.show.get(name)?.(value);
-    byHand(name, value);
-  });
+  }
 
-  const player = new Player({
-    plots: (seek) => new Plots(addOn.panels, seek),
-    view,
-    begin,
-    isLooping: () => !isTouched && session.motion === addOn.motions[0],
-    earlier: () => earlier,
-    table: session.table,
-    span: (now) => (isWide() ? [begin, end()] : [Math.max(begin, now - WINDOW), Math.max(begin + WINDOW, now)]),
-    recorded: () => (session.motion ? end() : recorded()),
-    limit: end,
-    advance: (now) => {
-      const until = session.motion ? end() : Math.max(now, session.timeOf(session.known - 1));
-      const reached = session.advance(until, follow);
-      say(session.error);
-      if (session.motion) {
-        addOn.sliders.forEach(({ name }) => session.table.count && sliders.show.get(name)?.(session.table.at(name, now)));
-      }
-      return session.error ? now : reached;
-    },
-  });
+  /** Moves a slider from the view. @param {string} name @param {number} by */
+  drag(name, by) {
+    const { session } = this;
+    this.isTouched = true;
+    const from = session.motion ? session.table.at(name, this.player.now) : (session.targets.get(name) ?? 0);
+    const reach = this.addOn.sliders.find((one) => one.name === name)?.reach ?? 1;
+    const value = Math.max(-reach, Math.min(reach, from + by));
+    this.sliders.show.get(name)?.(value);
+    this.byHand(name, value);
+  }
 
-  let said = "";
-  /** Shows why a run has ended. One that the FMU has rejected stands still and is grey until something else is tried. @param {string} error */
-  const say = (error) => {
-    const { isRejected } = session;
-    if (isRejected) {
-      player.setPlaying(false);
-    }
-    if (error === said) {
-      return;
-    }
-    said = status.textContent = error;
-    status.classList.toggle("live-error", isRejected);
-    player.element.classList.toggle("live-rejected", isRejected);
-    if (isRejected) {
-      latest?.fields.mark.get(latest.one.name)?.(`The FMU rejects this value of ${latest.one.name}.`);
-    } else {
-      [sliders, parameters].forEach((fields) => fields.mark.forEach((mark) => mark("")));
-    }
-  };
+  /** @param {Motion | null} motion */
+  begin(motion) {
+    this.session.motion = motion;
+    this.session.known = 0;
+    this.session.restart(0);
+  }
 
-  /** @param {string} id */
-  const choose = (id) => {
-    const motion = motions.get(id);
-    session.motion = motion || null;
+  /** Plays a motion, or begins a run by hand. @param {string} id */
+  choose(id) {
+    const { session, player } = this;
+    const motion = this.motions.get(id);
     if (!motion) {
-      session.targets = new Map(addOn.sliders.map((slider) => [slider.name, startOf(find(slider.name))]));
-      addOn.sliders.forEach((slider) => sliders.show.get(slider.name)?.(startOf(find(slider.name))));
+      const starts = this.addOn.sliders.map(({ name }) => /** @type {[string, number]} */ ([name, startOf(this.find(name))]));
+      session.targets = new Map(starts);
+      starts.forEach(([name, value]) => this.sliders.show.get(name)?.(value));
     }
-    choice.value = motion ? id : BY_HAND;
-    earlier = null;
-    session.known = 0;
-    session.restart(0);
+    this.choice.value = motion ? id : BY_HAND;
+    this.guide.read(this.choice.value);
+    this.earlier = null;
+    this.changedAt = -Infinity;
+    const before = motion?.before && this.motions.get(motion.before);
+    if (before) {
+      this.begin(before);
+      session.finish(this.end, this.follow);
+      this.earlier = session.error ? null : session.table.copy();
+    }
+    this.begin(motion || null);
     player.setPlaying(false);
-    player.now = begin;
+    player.now = this.description.startTime;
     player.setPlaying(motion !== undefined && allowsMotion());
-  };
-  choice.addEventListener("change", () => choose(choice.value));
+  }
 
-  /** Calculates the run again with other parameters, and keeps the one before for comparison. */
-  const recalculate = () => {
+  /** Calculates the run again after a change, and keeps the one before for comparison. */
+  recalculate() {
+    const { session } = this;
     const now = performance.now();
-    if (now - changedAt > 1000 && session.motion && !session.error && session.table.end >= end() - 0.5 * description.step) {
-      earlier = session.table.copy();
+    if (now - this.changedAt > 1000 && session.motion && !session.error && session.table.end >= this.end - 0.5 * this.description.step) {
+      this.earlier = session.table.copy();
     }
-    changedAt = now;
+    this.changedAt = now;
     const { isRejected } = session;
     session.restart(session.motion ? 0 : Infinity);
-    view.set?.((name) => Number(session.parameter(find(name))));
+    this.view.set?.((name) => Number(session.parameter(this.find(name))));
+    this.showNumbers();
     if (isRejected && session.motion) {
-      player.setPlaying(allowsMotion());
+      this.player.setPlaying(allowsMotion());
     }
-    player.ask();
-  };
-  const parameters = new Fields((one, value) => {
-    latest = { fields: parameters, one, rows: 0, targets: session.targets };
-    session.start.set(one, value);
-    recalculate();
-  });
-  /** @param {Record<string, number>} start the start values that are not the FMU's */
-  const reset = (start) => {
-    session.start = new Map(Object.entries(start).map(([name, value]) => [find(name), value]));
-    settable.forEach((one) => parameters.show.get(one.name)?.(session.parameter(one)));
-    parameters.mark.forEach((mark) => mark(""));
-    recalculate();
-  };
-  const near = Object.entries(addOn.near).map(([name, about]) => parameters.row(find(name), name, null, about));
-  const rows = (/** @type {boolean} */ isMinor) =>
-    settable.filter((one) => addOn.isMinor(one.name) === isMinor && !(one.name in addOn.near)).map((one) => parameters.row(one, one.name, null));
-  const minor = rows(true);
+    this.player.ask();
+  }
 
-  const button = (/** @type {string} */ text, /** @type {() => void} */ action) => {
-    const made = element("button", { type: "button" }, text);
-    made.addEventListener("click", action);
-    return made;
-  };
-  const save = () => {
-    const until = session.motion ? end() : recorded();
-    while (session.advance(until, follow) < until - description.step) {}
-    const link = element("a", { href: URL.createObjectURL(new Blob([session.csv()], { type: "text/csv" })), download: `${description.identifier}.csv` });
+  /** Changes a number in a paragraph: one of the motions, or a parameter. @param {string} name @param {number} value as it is shown */
+  change(name, value) {
+    const one = this.description.byName.get(name);
+    if (one) {
+      this.parameters.show.get(name)?.((value - one.offset) / one.factor);
+      this.parameters.change(one, (value - one.offset) / one.factor);
+    } else {
+      this.addOn.numbers[name] = value;
+      this.recalculate();
+    }
+  }
+
+  showNumbers() {
+    for (const [name, shown] of this.guide.show) {
+      const one = this.description.byName.get(name);
+      shown.forEach((show) => show(one ? Number(this.session.parameter(one)) * one.factor + one.offset : this.addOn.numbers[name]));
+    }
+  }
+
+  /** Sets all parameters. @param {Record<string, number>} start the start values that are not the FMU's */
+  reset(start) {
+    this.session.start = new Map(Object.entries(start).map(([name, value]) => [this.find(name), value]));
+    this.settable.forEach((one) => this.parameters.show.get(one.name)?.(this.session.parameter(one)));
+    this.parameters.mark.forEach((mark) => mark(""));
+    this.recalculate();
+  }
+
+  save() {
+    this.session.finish(this.recorded, this.follow);
+    const link = element("a", { href: URL.createObjectURL(new Blob([this.session.csv()], { type: "text/csv" })), download: `${this.description.identifier}.csv` });
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-  };
-  const share = () => {
-    const settings = new URLSearchParams({ motion: choice.value });
+  }
+
+  /** What differs from the page as it opens, for a link. */
+  settings() {
+    const { session, addOn, player } = this;
+    const settings = new URLSearchParams({ motion: this.choice.value });
     if (player.speed !== 1) {
       settings.set("speed", String(player.speed));
     }
@@ -514,108 +571,172 @@ async function live(packed, resources) {
       }
     }
     for (const name of Object.keys(addOn.start)) {
-      if (!session.start.has(find(name))) {
-        settings.set(name, String(startOf(find(name))));
+      if (!session.start.has(this.find(name))) {
+        settings.set(name, String(startOf(this.find(name))));
+      }
+    }
+    for (const [name, value] of Object.entries(addOn.numbers)) {
+      if (value !== this.numbers[name]) {
+        settings.set(name, String(value));
       }
     }
     if (!session.motion) {
       session.targets.forEach((value, name) => settings.set(name, String(value)));
     }
-    view.settings?.forEach(({ value }, name) => value !== "0" && settings.set(name, value));
-    location.hash = `try&${settings}`;
-    status.classList.remove("live-error");
-    status.textContent = "The address of this page now carries these settings.";
+    this.view.settings?.forEach(({ value }, name) => value !== "0" && settings.set(name, value));
+    return settings;
+  }
+
+  share() {
+    location.hash = `try&${this.settings()}`;
+    this.status.classList.remove("live-error");
+    this.status.textContent = "The address of this page now carries these settings.";
     if (location.protocol === "file:") {
-      status.textContent += " It leads here on this computer only: to share it, put this file on a web server.";
+      this.status.textContent += " It leads here on this computer only: to share it, put this file on a web server.";
     }
-    navigator.clipboard?.writeText(location.href).then(() => (status.textContent += " It is copied."), () => {});
-  };
-  /** What a link has set. */
-  const settle = () => {
-    const settings = new URLSearchParams(location.hash.replace(/^#try&?/, ""));
-    reset(addOn.start);
-    const wanted = settings.get("motion") || choice.value;
-    choose(motions.has(wanted) || wanted === BY_HAND ? wanted : addOn.motions[0].id);
+    navigator.clipboard?.writeText(location.href).then(() => (this.status.textContent += " It is copied."), () => {});
+  }
+
+  /** Sets what a link or a paragraph asks for, and all else as the page opens. @param {URLSearchParams} settings */
+  apply(settings) {
+    const { session, addOn, parameters } = this;
+    Object.assign(addOn.numbers, this.numbers);
+    this.reset(addOn.start);
+    const wanted = settings.get("motion") || this.choice.value;
     for (const [name, value] of settings) {
-      const one = description.byName.get(name);
+      const one = this.description.byName.get(name);
       if (one?.causality === "parameter") {
         const given = one.type === "String" ? value : Number(value);
         const why = complaint(one, given);
         parameters.mark.get(name)?.(why && `The link asks for ${name} = ${value}; it ${why}`);
         if (!why) {
-          latest = { fields: parameters, one, rows: 0, targets: session.targets };
+          this.latest = { fields: parameters, one, rows: 0, targets: session.targets };
           session.start.set(one, given);
           parameters.show.get(name)?.(given);
         }
-      } else if (one?.causality === "input" && wanted === BY_HAND) {
-        session.targets.set(name, Number(value));
-        sliders.show.get(name)?.(Number(value));
+      } else if (name in addOn.numbers && Number.isFinite(Number(value))) {
+        addOn.numbers[name] = Number(value);
       }
-      const control = view.settings?.get(name);
+      const control = this.view.settings?.get(name);
       if (control) {
         control.value = value;
         control.dispatchEvent(new Event("change"));
       }
     }
-    view.set?.((name) => Number(session.parameter(find(name))));
-    isTouched ||= settings.size > 0;
+    this.choose(this.motions.has(wanted) || wanted === BY_HAND ? wanted : addOn.motions[0].id);
+    for (const { name } of wanted === BY_HAND ? addOn.sliders.filter((slider) => settings.has(slider.name)) : []) {
+      session.targets.set(name, Number(settings.get(name)));
+      this.sliders.show.get(name)?.(Number(settings.get(name)));
+    }
+    this.view.set?.((name) => Number(session.parameter(this.find(name))));
+    this.showNumbers();
+    this.isTouched ||= settings.size > 0;
     const speed = Number(settings.get("speed"));
     if (speed > 0) {
-      player.setSpeed(speed);
+      this.player.setSpeed(speed);
     } else if (wanted === BY_HAND && settings.size > 1) {
-      player.setPlaying(true);
+      this.player.setPlaying(true);
     }
-  };
+  }
 
-  const inputs = addOn.sliders.map(({ name, label, reach }) => {
-    const one = find(name);
-    const [low, high] = [Math.max(one.min, startOf(one) - reach), Math.min(one.max, startOf(one) + reach)];
-    return sliders.row(one, label, one.type === "Real" ? [low * one.factor + one.offset, high * one.factor + one.offset] : null, "");
-  });
-  const controls = element(
-    "div",
-    { class: "live-controls" },
-    ...(choice.length > 1 ? [element("div", { class: "live-row" }, element("label", { for: "live-motion" }, element("b", {}, addOn.word)), choice)] : []),
-    ...inputs,
-    ...near,
-    element("div", { class: "live-buttons" }, ...(view.controls || []), button("Start again", () => choose(choice.value)), button("Save as CSV", save), button("Link to this", share)),
-    status,
-  );
-  if (addOn.buttons.length) {
-    player.bar.before(element("div", { class: "live-buttons" }, ...addOn.buttons.map(({ label, motion }) => button(label, () => choose(motion)))));
+  /** @param {string} text @param {() => void} action */
+  button(text, action) {
+    const made = element("button", { type: "button" }, text);
+    made.addEventListener("click", action);
+    return made;
   }
-  player.side.append(controls);
-  player.plots.element.append(element("p", { class: "live-legend" }, "Pale: the part of the run that is still to come. Grey: the run before the parameters changed."));
-  const about = element(
-    "p",
-    {},
-    `This is the FMU itself: every number below is what ${description.identifier} ${description.version} calculates, here, in your browser. Nothing is loaded and nothing leaves this page. The FMU\u2019s guid is `,
-    element("code", {}, description.guid),
-    `.${resources.length ? ` A page has no files: whatever the FMU reads from ${resources.join(", ")} is missing here, and what depends on it differs from what other tools show.` : ""}`,
-  );
-  const fields = element(
-    "details",
-    { class: "live-parameters" },
-    element("summary", {}, "Parameters"),
-    element("div", { class: "live-rows" }, ...rows(false)),
-    ...(minor.length ? [element("details", {}, element("summary", {}, "Start values"), element("div", { class: "live-rows" }, ...minor))] : []),
-    button("Parameters as built in", () => reset({})),
-  );
-  fields.open = matchMedia("(min-width: 60rem)").matches;
-  const section = element("section", { class: "live", "aria-labelledby": "try" }, element("h2", { id: "try" }, "Try it"), element("p", {}, addOn.lead), player.element, ...(settable.length ? [fields] : []), about);
-  for (const kind of ["pointerdown", "keydown"]) {
-    section.addEventListener(kind, () => (isTouched = true), { capture: true });
+
+  /** Motions, sliders, parameters near them, and buttons. */
+  controls() {
+    const { addOn } = this;
+    const motion = element("div", { class: "live-row" }, element("label", { for: "live-motion" }, element("b", {}, addOn.word)), this.choice);
+    const sliders = addOn.sliders.map(({ name, label, reach }) => {
+      const one = this.find(name);
+      const [low, high] = [Math.max(one.min, startOf(one) - reach), Math.min(one.max, startOf(one) + reach)];
+      return this.sliders.row(one, label, one.type === "Real" ? [low * one.factor + one.offset, high * one.factor + one.offset] : null, "");
+    });
+    const near = Object.entries(addOn.near).map(([name, about]) => this.parameters.row(this.find(name), name, null, about));
+    const again = this.button("Start again", () => this.choose(this.choice.value));
+    const buttons = [again, this.button("Save as CSV", () => this.save()), this.button("Link to this", () => this.share())];
+    return element(
+      "div",
+      { class: "live-controls" },
+      ...(this.choice.length > 1 ? [motion] : []),
+      ...sliders,
+      ...near,
+      element("div", { class: "live-buttons" }, ...(this.view.controls || []), ...buttons),
+      this.status,
+    );
   }
+
+  /** All other parameters. */
+  fields() {
+    const rows = (/** @type {boolean} */ isMinor) =>
+      this.settable.filter(({ name }) => this.addOn.isMinor(name) === isMinor && !(name in this.addOn.near)).map((one) => this.parameters.row(one, one.name, null));
+    const [major, minor] = [rows(false), rows(true)];
+    const fields = element(
+      "details",
+      { class: "live-parameters" },
+      element("summary", {}, "Parameters"),
+      element("div", { class: "live-rows" }, ...major),
+      ...(minor.length ? [element("details", {}, element("summary", {}, "Start values"), element("div", { class: "live-rows" }, ...minor))] : []),
+      this.button("Parameters as built in", () => this.reset({})),
+    );
+    fields.open = matchMedia("(min-width: 60rem)").matches;
+    return fields;
+  }
+
+  /** The section, for the top of the page. */
+  section() {
+    const { description, player, missing } = this;
+    player.side.append(this.controls());
+    player.plots.element.prepend(...(this.beside ? [this.beside.element] : []));
+    player.plots.element.append(element("p", { class: "live-legend" }, "Pale: the part of the run that is still to come. Grey: the run before the last change."));
+    const about = element(
+      "p",
+      {},
+      `This is the FMU itself: every number above is what ${description.identifier} ${description.version} calculates, here, in your browser. Nothing is loaded and nothing leaves this page. The FMU\u2019s guid is `,
+      element("code", {}, description.guid),
+      `.${missing.length ? ` Too large for this page are ${missing.join(", ")}: what depends on them differs from what other tools show.` : ""}`,
+    );
+    const section = element("section", { class: "live", "aria-labelledby": "try" }, element("h2", { id: "try" }, "Try it"), this.guide.element, player.element, ...(this.settable.length ? [this.fields()] : []), about);
+    for (const kind of ["pointerdown", "keydown"]) {
+      section.addEventListener(kind, () => (this.isTouched = true), { capture: true });
+    }
+    return section;
+  }
+}
+
+/** An FMU from the page. @param {{description: string, module: string}} packed @param {Record<string, string>} resources @returns {Promise<Package>} */
+async function opened(packed, resources) {
+  const [description, module, ...contents] = await Promise.all([packed.description, packed.module, ...Object.values(resources)].map(unpacked));
+  return {
+    description: new Description(new TextDecoder().decode(description)),
+    module: await WebAssembly.compile(module),
+    files: new Map(Object.keys(resources).map((name, place) => [name, contents[place]])),
+  };
+}
+
+/**
+ * Puts the section at the top of the page.
+ * @param {{description: string, module: string}[]} packed the FMU of this page, and those that its add-on runs
+ * @param {Record<string, string>} resources of the FMU of this page @param {string[]} missing resources that are not in the page
+ */
+async function live(packed, resources, missing) {
+  const [own, ...others] = await Promise.all(packed.map((one, place) => opened(one, place ? {} : resources)));
+  const trial = new Trial(own, others, missing);
+  const section = trial.section();
   (document.querySelector("main") || document.body).prepend(section);
   const contents = document.querySelector("header nav");
   if (contents) {
     section.append(contents);
   }
   document.querySelector("nav ul")?.prepend(element("li", {}, element("a", { href: "#try" }, "Try it")));
-  const long = description.stopTime - begin;
-  if (addOns[description.identifier] === undefined && !(long < 60 && long > 1)) {
-    player.setSpeed(long / 10);
+  const { stopTime, startTime, identifier } = own.description;
+  if (addOns[identifier] === undefined && !(stopTime - startTime < 60 && stopTime - startTime > 1)) {
+    trial.player.setSpeed((stopTime - startTime) / 10);
   }
+  const settle = () => trial.apply(new URLSearchParams(location.hash.replace(/^#try&?/, "")));
   settle();
   addEventListener("hashchange", () => location.hash.startsWith("#try&") && settle());
   if (location.hash.startsWith("#try")) {

@@ -146,8 +146,9 @@ function colourAt(place, name) {
 
 /** Panels of courses, one below the other, with the time on the last. */
 class Plots {
-  /** @param {Panel[]} panels @param {(time: number) => void} seek called where a panel is touched */
-  constructor(panels, seek) {
+  /** @param {Panel[]} panels @param {(time: number) => void} seek called where a panel is touched @param {string} axis label of the abscissa */
+  constructor(panels, seek, axis = "time (s)") {
+    this.axis = axis;
     this.panels = panels.map((panel) => this.panel(panel, seek));
     this.element = element("div", { class: "live-plots" }, ...this.panels.map((panel) => panel.figure));
     this.span = { begin: 0, end: 1 };
@@ -167,7 +168,7 @@ class Plots {
     const unit = panel.unit ? ` (${panel.unit})` : "";
     const caption = element("figcaption", {}, element("b", {}, panel.title + unit), " ", ...keys.map(({ key }) => key));
     const names = panel.curves.map((curve) => curve.label).join(", ");
-    const canvas = element("canvas", { role: "img", "aria-label": `${panel.title}${unit}: ${names} over time` });
+    const canvas = element("canvas", { role: "img", "aria-label": `${panel.title}${unit}: ${names} over ${this.axis}` });
     canvas.addEventListener("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
       seek(this.timeAt(event.offsetX, sizeOf(canvas).width));
@@ -237,7 +238,11 @@ class Plots {
       pen.fillText(tick.text, x(tick.place), bottom + 5);
     }
     if (isLast) {
-      pen.fillText("time (s)", (left + width - RIGHT) / 2, bottom + 20);
+      pen.fillText(this.axis, (left + width - RIGHT) / 2, bottom + 20);
+    }
+    if (table.count) {
+      pen.strokeStyle = colour("soft");
+      line(pen, [x(now), 6], [x(now), bottom]);
     }
     pen.lineJoin = "round";
     for (const curve of earlier ? panel.curves : []) {

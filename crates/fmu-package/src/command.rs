@@ -5,7 +5,7 @@ use crate::cargo::LibraryBuild;
 use crate::changes::Changes;
 use crate::connectors::{Terminal, terminals};
 use crate::content::ContentFile;
-use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets};
+use crate::cross::{GLIBC, TARGETS, ZIGBUILD, check_targets, has_std};
 use crate::files::write_atomically;
 use crate::library::{check_platform, needed_glibc};
 use crate::live::{self, Runnable};
@@ -59,9 +59,9 @@ pub struct BuildOptions {
     /// Make the FMU of C sources instead, for targets with no Rust (FMI 2.0, in the folder source; needs wasm2c)
     #[arg(long, conflicts_with_all = ["target", "binary", "describe"])]
     pub c_sources: bool,
-    /// Let the page in the FMU run it: put the library as WebAssembly into documentation/index.html
-    #[arg(long, conflicts_with = "describe")]
-    pub live_page: bool,
+    /// Leave out what lets documentation/index.html run the FMU in a browser (as with --c-sources)
+    #[arg(long)]
+    pub no_page: bool,
     /// Accept a library for another processor than its platform names (with FMI 2.0, importers on ARM look in linux64)
     #[arg(long, requires = "binary")]
     pub any_processor: bool,
@@ -200,17 +200,11 @@ impl Builder {
         if versions.contains(&Fmi::V2) {
             join_for_macos(&mut libraries)?;
         }
-        let with_page = match options.live_page {
-            true => {
-                // The page runs the FMU for FMI 2.0.
-                let known = descriptions.iter().find(|(fmi, _)| *fmi == Fmi::V2);
-                let description = match known {
-                    Some((_, description)) => description.clone(),
-                    None => describe(Fmi::V2, &guid)?,
-                };
-                Some(self.live_page(options.tunable, &guid, &model, description, &content)?)
-            }
-            false => None,
+        // The page runs the FMU for FMI 2.0.
+        let can_have_page = model.table.variables.iter().all(|variable| variable.base().is_in_fmi2());
+        let with_page = match options.no_page || options.c_sources || !can_have_page {
+            true => None,
+            false => self.live_page(options.tunable, &guid, &model, describe(Fmi::V2, &guid)?, &content)?,
         };
         let content = with_page.as_ref().map_or(&content, |(_, content)| content);
         let folder = options.out.clone().unwrap_or_else(|| workspace.join("target/fmu"));
@@ -377,7 +371,8 @@ impl Builder {
         c_sources(&wasm2c(), &module, identifier)
     }
 
-    /// The content with the page that runs the FMU; the folder has it.
+    /// The content with the page that runs the FMU, and the directory of that page. `None`, with a note, if the model cannot be
+    /// compiled for WebAssembly.
     fn live_page(
         &self,
         tunable: bool,
@@ -385,15 +380,25 @@ impl Builder {
         model: &LoadedModel,
         description: String,
         content: &[ContentFile],
-    ) -> Result<(TempDir, Vec<ContentFile>)> {
-        check_targets(&[WEBASSEMBLY.to_owned()], false)
-            .context("a page that runs the FMU is made with Rust's WebAssembly")?;
+    ) -> Result<Option<(TempDir, Vec<ContentFile>)>> {
+        if !has_std(WEBASSEMBLY) {
+            eprintln!("note: no page runs the FMU in a browser; that needs: rustup target add {WEBASSEMBLY}");
+            return Ok(None);
+        }
+        let small = format!("profile.{}.opt-level=\"z\"", self.profile);
+        let settings: Vec<_> = self.settings.iter().copied().chain([small.as_str()]).collect();
         let runnable = |description, path: PathBuf, guid: &str| {
             let module = fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
             check_guid(&module, guid, &path)?;
             anyhow::Ok(Runnable { description, module })
         };
-        let path = self.compile(self.profile, tunable, Some(WEBASSEMBLY), &LINKING)?;
+        let path = match self.build(self.profile, tunable, Some(WEBASSEMBLY), &settings, &LINKING) {
+            Ok(path) => path,
+            Err(error) => {
+                eprintln!("note: no page runs the FMU in a browser (--no-page does not try that): {error:#}");
+                return Ok(None);
+            }
+        };
         let mut runnables = vec![runnable(description, path, guid)?];
         for (package, sources) in &self.page_fmus {
             let guid = Variant { sources: sources.fingerprint()?, start: Vec::new(), tunable: false }.guid();
@@ -405,14 +410,14 @@ impl Builder {
                 package,
                 profile: self.profile,
                 target: Some(WEBASSEMBLY),
-                settings: &self.settings,
+                settings: &settings,
                 arguments: &LINKING,
                 environment: vec![("FMU_GUID", Some(guid.clone().into()))],
             };
             runnables.push(runnable(kept.replace(NO_GUID, &guid), build.run()?, &guid)?);
         }
         let info = &model.table.info;
-        live::with_page(content, (&info.name, &info.description), &runnables, &self.page_scripts)
+        live::with_page(content, (&info.name, &info.description), &runnables, &self.page_scripts).map(Some)
     }
 
     fn compile(
@@ -422,6 +427,17 @@ impl Builder {
         target: Option<&str>,
         arguments: &[&str],
     ) -> Result<PathBuf> {
+        self.build(profile, tunable, target, &self.settings, arguments)
+    }
+
+    fn build(
+        &self,
+        profile: &str,
+        tunable: bool,
+        target: Option<&str>,
+        settings: &[&str],
+        arguments: &[&str],
+    ) -> Result<PathBuf> {
         let mut environment = self.environment.clone();
         environment.push(("FMU_GUID", Some(self.variant(tunable)?.guid().into())));
         let build = LibraryBuild {
@@ -429,7 +445,7 @@ impl Builder {
             package: &self.package,
             profile,
             target,
-            settings: &self.settings,
+            settings,
             arguments,
             environment,
         };

@@ -68,7 +68,7 @@ fn needs_zigbuild(target: &str) -> bool {
 }
 
 /// Whether the compiler has the standard library of a target. Where that cannot be asked, cargo will say it.
-fn has_std(target: &str) -> bool {
+pub fn has_std(target: &str) -> bool {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let asked = Command::new(rustc).args(["--print", "target-libdir", "--target", target]).output();
     let Ok(asked) = asked else { return true };

@@ -7,6 +7,7 @@ use flate2::Compression;
 use flate2::write::DeflateEncoder;
 use quick_xml::escape::escape;
 use sha2::{Digest as _, Sha256};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
@@ -19,13 +20,18 @@ const PAGE: &str = "documentation/index.html";
 const PLAIN: &str = include_str!("../page/page.html");
 /// Stands where the scripts put the section that runs the FMU.
 const WITHOUT_SCRIPTS: &str = "<noscript><p class=\"note\">With scripts, this page runs the FMU here. All else on it is complete.</p></noscript>";
+const BEGIN: &str = include_str!("../page/begin.js");
 const STYLE: &str = include_str!("../page/live.css");
-const SCRIPTS: [&str; 4] = [
+const SCRIPTS: [&str; 5] = [
     include_str!("../page/plot.js"),
     include_str!("../page/player.js"),
     include_str!("../page/fmu.js"),
+    include_str!("../page/guide.js"),
     include_str!("../page/live.js"),
 ];
+
+/// Largest sum of the sizes of the resources that a page contains, bytes.
+const MOST_OF_RESOURCES: u64 = 4 << 20;
 
 /// What a browser needs to run an FMU.
 pub(crate) struct Runnable {
@@ -51,16 +57,52 @@ pub(crate) fn with_page(
     };
     let folder = tempfile::tempdir().context("cannot make a temporary folder")?;
     let path = folder.path().join("index.html");
-    let resources: Vec<_> = content.iter().filter_map(|file| file.name.strip_prefix("resources/")).collect();
-    fs::write(&path, live(&page, runnables, &resources, scripts)?).context("cannot write the page")?;
+    let script = script(runnables, &Resources::of(content)?, scripts)?;
+    fs::write(&path, live(&page, &script)?).context("cannot write the page")?;
     let mut content: Vec<_> = content.iter().filter(|file| file.name != PAGE).cloned().collect();
     content.push(ContentFile { name: PAGE.to_owned(), path });
     Ok((folder, content))
 }
 
-/// The page with the FMU, which its scripts show at its top, and those that they run beside it.
-fn live(page: &str, runnables: &[Runnable], resources: &[&str], scripts: &[&str]) -> Result<String> {
-    let mut text = format!("<style>\n{STYLE}</style>\n<script>\n(() => {{\n\"use strict\";\n");
+/// The files in the FMU's directory `resources`.
+#[derive(Default)]
+struct Resources {
+    /// Names and contents of the files that the page contains, for the model to read.
+    packed: BTreeMap<String, String>,
+    /// Names of the files that are too large for the page.
+    missing: Vec<String>,
+}
+
+impl Resources {
+    /// Reads the files, the smallest first, as long as there is room for them.
+    fn of(content: &[ContentFile]) -> Result<Self> {
+        let mut files = Vec::new();
+        for file in content {
+            if let Some(name) = file.name.strip_prefix("resources/") {
+                let read = || format!("cannot read {}", file.path.display());
+                files.push((fs::metadata(&file.path).with_context(read)?.len(), name.to_owned(), &file.path));
+            }
+        }
+        files.sort();
+        let mut resources = Self::default();
+        let mut room = MOST_OF_RESOURCES;
+        for (size, name, path) in files {
+            match room.checked_sub(size) {
+                Some(left) => {
+                    let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+                    resources.packed.insert(name, base64(&deflated(&bytes)?));
+                    room = left;
+                }
+                None => resources.missing.push(name),
+            }
+        }
+        Ok(resources)
+    }
+}
+
+/// The script that runs the FMU, and those that the model's scripts run beside it.
+fn script(runnables: &[Runnable], resources: &Resources, scripts: &[&str]) -> Result<String> {
+    let mut text = "(() => {\n\"use strict\";\n".to_owned();
     for script in SCRIPTS.iter().chain(scripts) {
         text += script;
     }
@@ -69,21 +111,31 @@ fn live(page: &str, runnables: &[Runnable], resources: &[&str], scripts: &[&str]
         let description = base64(&deflated(description.as_bytes())?);
         writeln!(text, "{{ description: \"{description}\", module: \"{}\" }},", base64(&deflated(module)?))?;
     }
-    // In JSON, `<` occurs in strings only: a name must not end the script.
-    let resources = serde_json::to_string(resources)?.replace('<', "\\u003c");
-    writeln!(text, "], {resources}).catch(withoutIt);\n}})();\n</script>")?;
+    let resources = serde_json::to_string(&(&resources.packed, &resources.missing))?;
+    writeln!(text, "], ...{resources}).catch(withoutIt);\n}})();")?;
+    // Browsers do not normalize the line ends of a script that another script adds.
+    Ok(text.replace("\r\n", "\n"))
+}
+
+/// The page with a script, which runs compressed.
+fn live(page: &str, script: &str) -> Result<String> {
+    let packed = base64(&deflated(script.as_bytes())?);
+    let text = format!(
+        "<style>\n{STYLE}</style>\n<script>\n{BEGIN}begin(\"{packed}\").catch(withoutIt);\n</script>\n"
+    );
     // At the end, when the elements exist that the scripts change.
     let end = page.rfind("</body>").unwrap_or(page.len());
     let begin = ["<main>", "<body>"].iter().find_map(|tag| Some(page.find(tag)? + tag.len())).unwrap_or(end);
     let (head, content, tail) = (&page[..begin], &page[begin..end], &page[end..]);
-    Ok(with_policy(&format!("{head}{WITHOUT_SCRIPTS}{content}{text}{tail}")))
+    Ok(with_policy(&format!("{head}{WITHOUT_SCRIPTS}{content}{text}{tail}"), script))
 }
 
-/// The page with a Content-Security-Policy: the scripts and the style sheets of the page run, by their hashes, and nothing is
-/// loaded but images from beside the page.
-fn with_policy(page: &str) -> String {
-    let hashes = |tag: &str| {
-        let contents = elements(page, tag).into_iter();
+/// The page with a Content-Security-Policy: the scripts and the style sheets of the page run, by their hashes, and so does the
+/// script that is compressed. Nothing is loaded but images from beside the page.
+fn with_policy(page: &str, compressed: &str) -> String {
+    let hashes = |tag: &str, others: &[&str]| {
+        let elements = elements(page, tag);
+        let contents = elements.iter().chain(others);
         // Browsers read line ends so.
         let hash = |content: &str| base64(&Sha256::digest(content.replace("\r\n", "\n")));
         contents.map(|content| format!(" 'sha256-{}'", hash(content))).collect::<String>()
@@ -91,8 +143,8 @@ fn with_policy(page: &str) -> String {
     let policy = format!(
         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src 'self' file: data:; \
          script-src 'wasm-unsafe-eval'{}; style-src-elem{}; style-src-attr 'unsafe-inline'\">\n",
-        hashes("script"),
-        hashes("style"),
+        hashes("script", &[compressed]),
+        hashes("style", &[]),
     );
     let place = ["<meta charset=\"utf-8\">\n", "<head>\n", "<head>"].iter();
     let place = place.filter_map(|tag| Some(page.find(tag)? + tag.len())).next().unwrap_or(0);
@@ -164,26 +216,27 @@ mod tests {
     fn scripts_come_last_in_a_page() {
         let runnable =
             || Runnable { description: "<fmiModelDescription/>".to_owned(), module: b"\0asm".to_vec() };
-        let page = live(
-            "<body><p>text</p></body></html>",
-            &[runnable(), runnable()],
-            &["a.csv"],
-            &["const ownScript = 1;\n"],
-        )
-        .unwrap();
-        assert!(page.contains(&format!("<body>{WITHOUT_SCRIPTS}<p>text</p><style>")));
-        assert!(page.ends_with("</script>\n</body></html>"));
+        let resources = Resources {
+            packed: [("a.csv".to_owned(), "AA".to_owned())].into(),
+            missing: vec!["b".to_owned()],
+        };
+        let script = script(&[runnable(), runnable()], &resources, &["const ownScript = 1;\n"]).unwrap();
         let places = ["async function live(", "const ownScript", "live([\n{ description: \""];
-        assert!(places.map(|part| page.find(part).unwrap()).is_sorted());
-        assert_eq!(page.matches("\n{ description: \"").count(), 2);
-        assert!(page.contains("\n], [\"a.csv\"]).catch("));
+        assert!(places.map(|part| script.find(part).unwrap()).is_sorted());
+        assert_eq!(script.matches("\n{ description: \"").count(), 2);
+        assert!(script.contains("\n], ...[{\"a.csv\":\"AA\"},[\"b\"]]).catch("));
+
+        let page = live("<body><p>text</p></body></html>", &script).unwrap();
+        assert!(page.contains(&format!("<body>{WITHOUT_SCRIPTS}<p>text</p><style>")));
+        assert!(page.ends_with(".catch(withoutIt);\n</script>\n</body></html>"));
     }
 
     #[test]
     fn names_of_files_end_no_script() {
-        let page = live("<body></body>", &[], &["</script><img src=x onerror=alert(8)>"], &[]).unwrap();
+        let missing = vec!["</script><img src=x onerror=alert(8)>".to_owned()];
+        let script = script(&[], &Resources { missing, ..Default::default() }, &[]).unwrap();
+        let page = live("<body></body>", &script).unwrap();
         assert_eq!(page.matches("</script").count(), 1);
-        assert!(page.contains("[\"\\u003c/script>\\u003cimg src=x onerror=alert(8)>\"]"));
     }
 
     /// Each block by the hash of its bytes (Content Security Policy Level 3, section 2.3.1).
@@ -191,8 +244,8 @@ mod tests {
     fn the_policy_has_a_hash_for_each_block() {
         let page =
             "<head>\n<style>a</style></head><svg><style type=\"text/css\">b</style></svg><styled>c</styled>";
-        let page = with_policy(&format!("{page}<script></script>"));
-        assert_eq!(page.matches("'sha256-").count(), 3);
+        let page = with_policy(&format!("{page}<script></script>"), "a");
+        assert_eq!(page.matches("'sha256-").count(), 4);
         assert!(page.starts_with(
             "<head>\n<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none';"
         ));
@@ -200,8 +253,27 @@ mod tests {
         assert!(page.contains("style-src-elem 'sha256-ypeBEsobvcr6wjGzmiPcTaeG7/gUfE5yuYB3ha/uSLs=' "));
         // The same of nothing.
         assert!(page.contains(
-            "script-src 'wasm-unsafe-eval' 'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=';"
+            "script-src 'wasm-unsafe-eval' 'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=' \
+             'sha256-ypeBEsobvcr6wjGzmiPcTaeG7/gUfE5yuYB3ha/uSLs=';"
         ));
+    }
+
+    #[test]
+    fn the_page_contains_the_resources_that_are_small() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, size: u64| {
+            let path = folder.path().join(name.replace('/', "-"));
+            fs::File::create(&path).unwrap().set_len(size).unwrap();
+            ContentFile { name: name.to_owned(), path }
+        };
+        let content = [
+            file("resources/large", MOST_OF_RESOURCES),
+            file("resources/deep/small", 1),
+            file("documentation/other", 1),
+        ];
+        let resources = Resources::of(&content).unwrap();
+        assert_eq!(resources.packed.into_keys().collect::<Vec<_>>(), ["deep/small"]);
+        assert_eq!(resources.missing, ["large"]);
     }
 
     #[test]

@@ -2,6 +2,10 @@
 
 /** Of pitch, with the parameters of Table 1, 1/s: what the shaper of the last motion knows. */
 const PITCH_POLE = { real: -9.683, imaginary: 34.678 };
+/** Numbers that the guide changes: angle of the motors (deg), and frequency at which they shake (Hz). */
+const NUMBERS = { angle: 40, frequency: 4 };
+/** Lowest and highest frequency that is shown, Hz. */
+const BAND = [0.5, 15];
 /** Motors follow the sliders like this, 1/s: critically damped. */
 const FOLLOW = 25;
 
@@ -30,7 +34,7 @@ function both([theta, omega], second = 1) {
 /** There and back, to both sides. @param {number} time */
 function swing(time) {
   const [there, across, back] = [quintic(time, 0.7), quintic(time - 0.7, 1), quintic(time - 1.7, 0.7)];
-  return [0, 1].map((k) => 40 * (there[k] - 2 * across[k] + back[k]));
+  return [0, 1].map((k) => NUMBERS.angle * (there[k] - 2 * across[k] + back[k]));
 }
 
 /** The course of Fig. 4 (Sec. 4): sin(10 pi t) rad/s. @param {number} time */
@@ -39,11 +43,10 @@ function sine(time) {
   return [(2 * Math.sin((frequency * time) / 2) ** 2) / frequency / DEGREE, Math.sin(frequency * time) / DEGREE];
 }
 
-/** A sine whose frequency rises from 0.5 to 15 Hz within 8 s, from rest. @param {number} time */
-function chirp(time) {
-  const [low, rise, size] = [0.5, 14.5 / 8, 2];
+/** From rest to 4 degrees and back, at a frequency that begins at `low` Hz and increases by `rise` Hz/s. @param {number} time @param {number} low @param {number} rise */
+function shaken(time, low, rise) {
   const phase = 2 * Math.PI * (low * time + (rise * time * time) / 2);
-  return [size * (1 - Math.cos(phase)), size * 2 * Math.PI * (low + rise * time) * Math.sin(phase)];
+  return [2 * (1 - Math.cos(phase)), 4 * Math.PI * (low + rise * time) * Math.sin(phase)];
 }
 
 /** 20 degrees in 0.1 s, as fast; or half of it at first and half of it later, so that no vibration is left. @param {number} time @param {boolean} isShaped */
@@ -65,13 +68,95 @@ const MOTIONS = [
     const [theta, omega] = quintic(time - 0.1, 0.02);
     return [20 * theta, 0, 20 * omega, 0];
   }),
-  led("chirp", "A chirp: 0.5 to 15 Hz", 8, (time) => both(chirp(time))),
+  { ...led("shake", "Shaking at one frequency, both motors alike", 3, (time) => both(shaken(time, NUMBERS.frequency, 0))), frequency: () => NUMBERS.frequency },
+  { ...led("chirp", "A chirp: 0.5 to 15 Hz", 8, (time) => both(shaken(time, BAND[0], (BAND[1] - BAND[0]) / 8))), frequency: (time) => BAND[0] + ((BAND[1] - BAND[0]) * time) / 8 },
   led("move", "A move by 20\u00b0 in 0.1 s", 1, (time) => both(move(time, false))),
-  led("shaped", "The same move with an input shaper, for the k\u2081 and k\u2082 that are built in", 1, (time) => both(move(time, true))),
+  { ...led("shaped", "The same move with an input shaper, for the k\u2081 and k\u2082 that are built in", 1, (time) => both(move(time, true))), before: "move" },
 ];
 
-/** What the controller is told, and what it says. */
+/** The numbers in the paragraphs of the guide. */
+const [ANGLE, FREQUENCY, SOFTNESS] = [
+  { name: "angle", label: "Angle of the motors", low: 5, high: 60, step: 1, unit: "\u00b0" },
+  { name: "frequency", label: "Frequency", low: 0.5, high: 15, step: 0.1, unit: "Hz" },
+  { name: "k2", label: "Stiffness k2", low: 0.1, high: 2, step: 0.02, unit: "N\u00b7m/deg" },
+];
+/** @type {Chapter[]} */
+const GUIDE = [
+  { title: "Pitch", settings: { motion: "pitch" }, words: ["Both motors turn by ", ANGLE, " to either side. The ring turns with them, so the wrist pitches by the same angle. Drag the underlined number."] },
+  { title: "Roll", settings: { motion: "roll" }, words: ["The motors turn by ", ANGLE, " against each other. The ring stays, and the gripper rolls by N/M times that angle: 7/4 of it."] },
+  { title: "Shake", settings: { motion: "shake", k2: String(0.3 / DEGREE) }, words: ["Both motors shake at ", FREQUENCY, ", and k\u2082 is only ", SOFTNESS, ". The first plot is the response at all frequencies, in grey with the k\u2082 that is built in. Drag the frequency to the peak."] },
+  { title: "Shape", settings: { motion: "shaped" }, words: ["A move in 0.1\u00a0s makes the wrist vibrate: the grey curve. Two half moves, half a period apart, end without vibration. Drag k\u2082 away from ", SOFTNESS, ", and the shaper no longer fits."] },
+];
+
+/** Inputs and outputs of the controller. */
 const [SET_POINTS, MEASURED, MOTORS] = [["pitch_ref", "roll_ref"], ["pitch", "roll", "pitch_rate", "roll_rate", "tau1", "tau2"], ["theta1", "theta2", "omega1", "omega2"]];
+
+/** The pitch for each degree of both motors over frequency, measured with a pulse on another instance of the FMU. */
+class Resonance {
+  /** @param {Package} own @param {(frequency: number) => void} choose */
+  constructor(own, choose) {
+    this.fmu = new Fmu(own);
+    const find = (/** @type {string} */ name) => /** @type {Variable} */ (own.description.byName.get(name));
+    this.motors = this.fmu.group(MOTORS.map(find));
+    this.pitch = this.fmu.group([find("pitch")]);
+    this.plots = new Plots([{ title: "Response: pitch for 1\u00b0 of both motors", unit: "", curves: [{ name: "gain", label: "at the cursor", colour: "curve-3", factor: 1 }] }], choose, "frequency (Hz)");
+    this.element = this.plots.element;
+    this.key = "";
+    /** With the parameters that are built in, and as they are. @type {(Table | undefined)[]} */
+    this.measured = [];
+    this.builtIn = new Map([[find("use_omega"), 1]]);
+  }
+
+  /** @param {Motion | null} motion @param {number} time @param {Map<Variable, number | string>} start */
+  draw(motion, time, start) {
+    this.element.hidden = !motion?.frequency;
+    if (!motion?.frequency) {
+      return;
+    }
+    const key = [...start].map(([{ name }, value]) => `${name}=${value}`).join();
+    if (key !== this.key) {
+      this.key = key;
+      try {
+        this.measured = [this.measured[0] ?? this.measure(this.builtIn), this.measure(start)];
+      } catch {
+        // The run itself shows why the FMU rejects this.
+        this.measured.length = 1;
+      }
+    }
+    const [usual, measured] = this.measured;
+    if (measured) {
+      this.plots.draw(measured, motion.frequency(time), BAND[0], BAND[1], usual);
+    }
+  }
+
+  /** Runs a pulse, and divides its Fourier transforms. @param {Map<Variable, number | string>} start */
+  measure(start) {
+    const [size, steps, rate] = [0.004, 600, 1];
+    const pitch = new Float64Array(steps);
+    this.fmu.begin(start);
+    for (let step = 0; step < steps; step++) {
+      const [theta, omega] = [step === 1 ? rate * size : 0, [rate, -rate][step] ?? 0];
+      this.fmu.set(this.motors, [theta, theta, omega, omega]);
+      this.fmu.get(this.pitch, pitch.subarray(step, step + 1));
+      this.fmu.stepTo((step + 1) * size);
+    }
+    const table = new Table(["gain"]);
+    for (let frequency = BAND[0]; frequency <= BAND[1] + 1e-9; frequency += 0.1) {
+      const turn = 2 * Math.PI * frequency * size;
+      let [real, imaginary] = [0, 0];
+      for (let step = 0; step < steps; step++) {
+        real += pitch[step] * Math.cos(turn * step);
+        imaginary += pitch[step] * Math.sin(turn * step);
+      }
+      // The transform of the triangle, over the size of a step.
+      const pulse = rate * size * (Math.sin(turn / 2) / (turn / 2)) ** 2;
+      table.grow();
+      table.column("time")[table.count] = frequency;
+      table.column("gain")[table.count++] = Math.hypot(real, imaginary) / pulse;
+    }
+    return table;
+  }
+}
 
 /**
  * The controller's FMU drives the testbed's: at each communication point, either is told what the other says there. The wrist is
@@ -100,13 +185,15 @@ function looped(fmu, id, title, off) {
   };
 }
 
-addOns.prw_testbed = (_, others) => {
+addOns.prw_testbed = (own, others) => {
   const goals = SET_POINTS.map((name) => ({ name, label: name.replace("_", " "), colour: "soft", factor: 1 / DEGREE }));
   /** @type {HTMLSelectElement} */
   const twist = element("select", { "aria-label": "Enlargement of the couplings\u2019 twist" }, element("option", { value: "0" }, "twist: automatic"), ...["1", "5", "20", "50", "100"].map((value) => element("option", { value }, `twist \u00d7 ${value}`)));
   return {
-    lead: "Two motors move a robotic wrist: drag a motor, or press a button.",
-    buttons: [{ label: "Pitch", motion: "pitch" }, { label: "Roll", motion: "roll" }, { label: "Shake it", motion: "chirp" }],
+    lead: "Two motors move a robotic wrist. Drag a motor, or follow the four steps above.",
+    guide: GUIDE,
+    numbers: NUMBERS,
+    beside: (change) => new Resonance(own, (frequency) => change("frequency", Math.round(10 * frequency) / 10)),
     near: { k1: "stiffness, motor side", k2: "stiffness, wrist side", c1: "damping, motor side", c2: "damping, wrist side" },
     word: "Motion",
     start: { use_omega: 1 },
@@ -118,7 +205,7 @@ addOns.prw_testbed = (_, others) => {
     written: SET_POINTS,
     motions: [
       ...MOTIONS,
-      ...others.map(({ description, module }) => new Fmu(description, module)).flatMap((controller) => [
+      ...others.map((one) => new Fmu(one)).flatMap((controller) => [
         looped(controller, "closed-loop", "The controller FMU closes the loop (grey: set points)", []),
         looped(controller, "open-loop", "The same with its gains at 0: nothing is fed back", ["Kp", "Ki", "Kd"]),
       ]),

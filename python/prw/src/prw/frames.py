@@ -110,8 +110,6 @@ def write_movie(path: Path, frames: Iterable[Image.Image], rate: int) -> None:
 MEASURED = ("theta3", "theta4", "pitch", "roll", "tau1", "tau2")
 #: Size of a frame in pixels, and in inches at DPI.
 SIZE, DPI = (720, 405), 92
-#: Size of a still, and the upper share of a frame that shows the testbed.
-STILL_DPI, SCENE = 138, 0.66
 #: Twist at which the largest coupling twist of a run is drawn, rad.
 SHOWN_TWIST = 0.9
 #: Largest factor on the twist.
@@ -191,19 +189,6 @@ def drawn(
             else:
                 write_movie(temporary, frames, rate)
     return animation
-
-
-def still(run: Run, instant: float) -> Image.Image:
-    """The testbed at an instant (s) as a still image with a transparent background, for light and dark pages."""
-    frame = _Frame(run.time, angles_and_torques(run), 1.0, ())
-    frame.figure.set_dpi(STILL_DPI)
-    for ground in (frame.figure, frame.scene):
-        ground.set_facecolor("none")
-    # The page adds the labels in its own font and colours.
-    for label in frame.figure.texts:
-        label.set_text("")
-    pixels = frame.at(instant)
-    return pixels.crop((0, 0, pixels.width, round(SCENE * pixels.height)))
 
 
 def angles_and_torques(run: Run) -> dict[str, Array]:

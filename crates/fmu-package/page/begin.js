@@ -1,0 +1,27 @@
+"use strict";
+
+/** Why there is no section, at its place. @param {Error} error */
+function withoutIt(error) {
+  const paragraph = document.createElement("p");
+  paragraph.className = "note";
+  paragraph.textContent = `Here this page would run the FMU for you to try, but that is not possible: ${error.message}. The rest of the page is complete.`;
+  (document.querySelector("main") || document.body).prepend(paragraph);
+}
+
+/** The bytes of base 64, decompressed. @param {string} text */
+async function unpacked(text) {
+  const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** Runs the other scripts of the page. @param {string} packed */
+async function begin(packed) {
+  const lacking = ["WebAssembly", "DecompressionStream"].find((name) => !(name in window));
+  if (lacking) {
+    throw new Error(`this browser has no ${lacking}`);
+  }
+  const script = document.createElement("script");
+  script.textContent = new TextDecoder().decode(await unpacked(packed));
+  document.body.append(script);
+}
