@@ -11,7 +11,6 @@ import fmu_run
 import numpy as np
 
 from prw.arguments import names_of
-from prw.description import CONTINUOUS, read_description
 from prw.errors import UserError
 from prw.parameters import Given, values_of
 from prw.state_space import StateSpace
@@ -20,6 +19,8 @@ from prw.testbed import existing_fmu, loaded
 #: Start values of the testbed with which its states and inputs are independent of each other in Co-Simulation. With
 #: others a motor angle also changes the rate that is estimated from it and, before the first step, the states.
 INDEPENDENT = {"use_omega": True, "start_at_rest": False}
+#: Types of continuous variables in `fmu_run`.
+CONTINUOUS = ("Real", "Float32")
 INTERFACES = {"CoSimulation": "Co-Simulation", "ModelExchange": "Model Exchange"}
 #: The names of the interface types in `fmu_run`.
 HELD: dict[str, Literal["co-simulation", "model-exchange"]] = {
@@ -90,22 +91,19 @@ class Linearizer:
 
     def _look(self, outputs: str | Iterable[str] | None, fmi_type: str | None) -> None:
         """Find states, inputs and outputs. Raises UserError."""
-        description, variables = read_description(self.fmu), self.loaded.variables
-        self._interface = HELD[self._chosen(fmi_type, description.directional, description.attribute)]
-        self.states = tuple(description.derivatives)
+        loaded, variables = self.loaded, self.loaded.variables
+        self._interface = HELD[self._chosen(fmi_type)]
+        self.states = tuple(loaded.derivatives)
         self.inputs = tuple(v.name for v in variables.values() if v.causality == "input" and v.type in CONTINUOUS)
-        self.outputs = description.outputs if outputs is None else names_of("outputs", outputs)
+        self.outputs = loaded.outputs if outputs is None else names_of("outputs", outputs)
         for name in self.outputs:
-            if name not in description.outputs and name not in self.states:
-                choice = ", ".join(dict.fromkeys([*description.outputs, *self.states]))
+            if name not in loaded.outputs and name not in self.states:
+                choice = ", ".join(dict.fromkeys([*loaded.outputs, *self.states]))
                 raise UserError(f"{self.fmu}: {name} is neither a continuous output nor a state; there are {choice}")
         # A state is no unknown of FMI's directional derivatives, and its row of C needs none.
         self._calculated = [row for row, name in enumerate(self.outputs) if name not in self.states]
-        self._unknowns = (*description.derivatives.values(), *(self.outputs[row] for row in self._calculated))
+        self._unknowns = (*loaded.derivatives.values(), *(self.outputs[row] for row in self._calculated))
         self._knowns = (*self.states, *self.inputs)
-        for name in (*self._knowns, *self._unknowns):
-            if name not in variables:
-                raise UserError(f"{self.fmu}: {name} is an array; only scalar variables can be linearized")
         self._units = {name: variables[name].unit or "" for name in (*self._knowns, *self.outputs)}
         self._instance: fmu_run.Instances | None = None
         self._given: set[str] = set()
@@ -149,8 +147,11 @@ class Linearizer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _chosen(self, wanted: str | None, directional: Mapping[str, bool], attribute: str) -> str:
+    def _chosen(self, wanted: str | None) -> str:
         """The interface type to use."""
+        offers = self.loaded.directional
+        directional = {name: offers[held] for name, held in HELD.items() if held in offers}
+        attribute = "providesDirectionalDerivative" + ("" if self.loaded.fmi_version == "2.0" else "s")
         able = [name for name, offered in directional.items() if offered]
         if wanted is None and able:
             return able[0]
