@@ -90,39 +90,29 @@ impl Description {
                 tell("description.references", why);
             }
             if output && !listed && !variable.clocked {
-                tell(
-                    "description.structure",
-                    format!("output {name} is not among the outputs of ModelStructure"),
-                );
+                let why = format!("output {name} is not among the outputs of ModelStructure");
+                tell("description.structure", why);
             }
             if !output && listed {
-                tell(
-                    "description.structure",
-                    format!("{name} is no output, and is among those of ModelStructure"),
-                );
+                let why = format!("{name} is no output, and is among those of ModelStructure");
+                tell("description.structure", why);
             }
             if let Some(unit) = variable.unit.as_ref().filter(|unit| !self.units.contains_key(*unit)) {
-                tell(
-                    "description.units",
-                    format!("{name} is in {unit:?}, which is no unit of UnitDefinitions"),
-                );
+                let why = format!("{name} is in {unit:?}, which is no unit of UnitDefinitions");
+                tell("description.units", why);
             }
             if let Some(of) = variable.declared_type.as_ref().filter(|of| !self.types.contains(*of)) {
-                tell(
-                    "description.types",
-                    format!("{name} is of type {of:?}, which is none of TypeDefinitions"),
-                );
+                let why = format!("{name} is of type {of:?}, which is none of TypeDefinitions");
+                tell("description.types", why);
             }
             wrong.extend(faults(variable));
         }
         // A derivative that is not listed may be one that is no state's (section 2.2.8 of FMI 2.0).
         for unknown in &self.derivatives {
-            if self.variables[unknown.variable].derivative_of.is_none() {
-                let name = &self.variables[unknown.variable].name;
-                wrong.push((
-                    "description.structure",
-                    format!("{name} is among the derivatives, and is not declared to be one"),
-                ));
+            let of = &self.variables[unknown.variable];
+            if of.derivative_of.is_none() {
+                let why = format!("{} is among the derivatives, and is not declared to be one", of.name);
+                wrong.push(("description.structure", why));
             }
         }
         if self.stop_time.is_some_and(|stop| stop <= self.start_time) {

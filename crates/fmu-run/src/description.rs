@@ -75,11 +75,11 @@ impl Description {
     /// The message names the fault.
     pub fn parse(text: &str) -> Result<Self, String> {
         let written = ModelDescription::parse(text)?;
-        if let Some((_, why)) = written.faults.iter().find(|(fault, _)| *fault != Fault::Structure) {
-            return Err(format!("modelDescription.xml: {why}"));
-        }
         if written.co_simulation.is_none() && written.model_exchange.is_none() {
             return Err("it has neither Co-Simulation nor Model Exchange".to_owned());
+        }
+        if let Some((_, why)) = written.faults.iter().find(|(fault, _)| *fault != Fault::Structure) {
+            return Err(format!("modelDescription.xml: {why}"));
         }
         let event_indicators = match (written.standard, written.event_indicators) {
             (Standard::Fmi2, None) => {
