@@ -1,5 +1,6 @@
 //! Base types of values.
 
+use crate::Standard;
 use std::fmt;
 
 /// Base types of variables. FMI 2.0 has only Real, Integer, Boolean, String and Enumeration. FMI 3.0 has all
@@ -58,6 +59,29 @@ impl BaseType {
     /// Returns whether FMI 2.0 has this type.
     pub const fn is_in_fmi2(self) -> bool {
         matches!(self, Self::Real | Self::Integer | Self::Boolean | Self::String | Self::Enumeration)
+    }
+
+    /// Returns the name of the XML element in model descriptions, if the FMI version has this type.
+    pub const fn element(self, standard: Standard) -> Option<&'static str> {
+        Some(match (standard, self) {
+            (_, Self::Boolean) => "Boolean",
+            (_, Self::String) => "String",
+            (_, Self::Enumeration) => "Enumeration",
+            (Standard::Fmi2, Self::Real) => "Real",
+            (Standard::Fmi2, Self::Integer) => "Integer",
+            (Standard::Fmi2, _) => return None,
+            (Standard::Fmi3, Self::Real) => "Float64",
+            (Standard::Fmi3, Self::Float32) => "Float32",
+            (Standard::Fmi3, Self::Int8) => "Int8",
+            (Standard::Fmi3, Self::UInt8) => "UInt8",
+            (Standard::Fmi3, Self::Int16) => "Int16",
+            (Standard::Fmi3, Self::UInt16) => "UInt16",
+            (Standard::Fmi3, Self::Integer) => "Int32",
+            (Standard::Fmi3, Self::UInt32) => "UInt32",
+            (Standard::Fmi3, Self::Int64) => "Int64",
+            (Standard::Fmi3, Self::UInt64) => "UInt64",
+            (Standard::Fmi3, Self::Binary) => "Binary",
+        })
     }
 
     /// Returns whether values are floating-point numbers.

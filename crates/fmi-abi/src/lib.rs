@@ -6,6 +6,8 @@ pub mod c_types;
 #[allow(unsafe_code, reason = "a function is called at an address")]
 pub mod calls;
 mod causality;
+#[cfg(feature = "description")]
+pub mod description;
 pub mod fmi2;
 pub mod fmi3;
 mod log_category;

@@ -1,6 +1,8 @@
 //! FMI versions and interface types.
 
+use std::ffi::CString;
 use std::fmt;
+use std::path::Path;
 
 /// FMI version of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +18,16 @@ impl Standard {
     /// It is the index in FMI 2.0, and the index plus 1 in FMI 3.0.
     pub const fn reference(self, place: u32) -> u32 {
         place.wrapping_add(self as u32)
+    }
+
+    /// Returns the location of the resources as importers write it: a URI in FMI 2.0 (section 2.1.5), a path
+    /// with a final separator in FMI 3.0 (section 2.3.1).
+    pub fn resources(self, directory: &Path) -> CString {
+        let text = match self {
+            Self::Fmi2 => uri(&directory.to_string_lossy()),
+            Self::Fmi3 => format!("{}{}", directory.display(), std::path::MAIN_SEPARATOR),
+        };
+        CString::new(text).unwrap_or_default()
     }
 }
 
@@ -43,5 +55,30 @@ impl fmt::Display for Interface {
             Self::ModelExchange => "Model Exchange",
             Self::CoSimulation => "Co-Simulation",
         })
+    }
+}
+
+fn uri(path: &str) -> String {
+    let mut uri = "file://".to_owned();
+    let path = path.replace('\\', "/");
+    if !path.starts_with('/') {
+        uri.push('/');
+    }
+    for byte in path.bytes() {
+        match byte {
+            b'/' | b':' | b'-' | b'.' | b'_' | b'~' => uri.push(byte.into()),
+            byte if byte.is_ascii_alphanumeric() => uri.push(byte.into()),
+            byte => uri.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    uri
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn locations() {
+        assert_eq!(super::uri("/tmp/a b/%"), "file:///tmp/a%20b/%25");
+        assert_eq!(super::uri(r"C:\temp\r"), "file:///C:/temp/r");
     }
 }

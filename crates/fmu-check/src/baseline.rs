@@ -50,7 +50,7 @@ impl Baseline {
                 let reason = reason.strip_prefix(':').map(str::trim).filter(|reason| !reason.is_empty());
                 let known = crate::rules::find(name).is_some()
                     || crate::INTERFACES.contains(&name)
-                    || crate::checks::TOPICS.contains(&name);
+                    || crate::rules::TOPICS.contains(&name);
                 match reason {
                     Some(reason) if known => {
                         Ok(Accepted { name: name.to_owned(), text, reason: reason.to_owned() })

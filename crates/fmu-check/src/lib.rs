@@ -47,11 +47,11 @@ use trajectory::{NoTrajectory, find_trajectory};
 pub struct Options {
     /// Checks these topics alone, with commas between: description, package, functions, start_values, life_cycle,
     /// states, derivatives, dependencies, results, reset, refusals, logs, resources, hostile.
-    #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(checks::TOPICS))]
+    #[arg(long, value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(rules::TOPICS))]
     pub only: Vec<String>,
     /// Succeeds without these topics and interfaces (co-simulation, model-exchange, scheduled-execution), with commas between.
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = clap::builder::PossibleValuesParser::new(
-        checks::TOPICS.iter().chain(&INTERFACES)))]
+        rules::TOPICS.iter().chain(&INTERFACES)))]
     pub allow_unchecked: Vec<String>,
     /// Seconds for all of it.
     #[arg(long, default_value_t = 120.0)]
@@ -254,7 +254,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     let mut report = Report::new(path, &checker, findings);
     report.seconds = begin.elapsed().as_secs_f64();
     let why = if options.only.is_empty() { "left out (--quick)" } else { "not asked for (--only)" };
-    let unwanted = checks::TOPICS.iter().filter(|topic| !wanted(topic));
+    let unwanted = rules::TOPICS.iter().filter(|topic| !wanted(topic));
     report.unreached.extend(unwanted.map(|topic| Unchecked {
         name: (*topic).to_owned(),
         why: why.to_owned(),

@@ -4,7 +4,6 @@
 //! others look for `#r1#` in it. So each message is complete, contains neither `%` nor `#`, and is passed
 //! without further arguments.
 
-use crate::model::Model;
 use fmi_abi::{Category, Standard, Status};
 use std::ffi::{CStr, CString};
 
@@ -133,8 +132,8 @@ impl Logger {
 
     /// Takes the messages of a model. Returns whether there were any.
     #[inline]
-    pub fn listen(&mut self, model: &mut impl Model) -> bool {
-        let Some(log) = model.log().filter(|log| !log.is_empty()) else { return false };
+    pub fn listen(&mut self, log: Option<&mut Log>) -> bool {
+        let Some(log) = log.filter(|log| !log.is_empty()) else { return false };
         std::mem::take(&mut log.0).into_iter().for_each(|message| self.add(message));
         true
     }

@@ -3,6 +3,7 @@
 use crate::saved::StateVisitor;
 use crate::variable::{Index, Variable, refuse};
 use std::fmt::Debug;
+use std::mem::MaybeUninit;
 
 /// The variables of a model. [`variables!`](crate::variables) implements it.
 ///
@@ -68,6 +69,48 @@ pub unsafe trait Variables: Sized + 'static {
             variable.visit(self, visitor);
         }
         self.visit_memory(visitor);
+    }
+}
+
+impl<M: Variables> Variable<M> {
+    /// Returns the variables in [`depends_on`](Self::depends_on) as indices in the table, without
+    /// [`Index::TIME`]; of an array all elements.
+    pub fn dependencies(&self) -> Option<impl Iterator<Item = u32> + use<M>> {
+        let places = |known: &Index| {
+            let line = known.0;
+            (0..).zip(M::TABLE).filter(move |(_, of)| of.line == line).map(|(place, _)| place)
+        };
+        self.depends_on.map(|knowns| knowns.iter().flat_map(places))
+    }
+
+    /// Returns the value of a Real; `None` for the time.
+    #[inline]
+    pub(crate) fn real(&self, model: &M) -> Option<f64> {
+        if M::ARRAYS && self.read_at.is_some() {
+            return self.value(model).map(|value| value.real());
+        }
+        self.read.as_ref().map(|read| (read.real)(model))
+    }
+
+    /// Reads the scalar, or elements of the array from this element on, as many as `values` holds. Returns 0
+    /// if all values are finite.
+    pub(crate) fn reals(&self, model: &M, time: f64, values: &mut [MaybeUninit<f64>]) -> f64 {
+        if let Some(read) = &self.read_at {
+            return (read.reals)(model, self.element(), values);
+        }
+        values.iter_mut().map(|value| *value.write(self.real(model).unwrap_or(time)) * 0.0).sum()
+    }
+
+    #[inline]
+    pub(crate) fn set_real(&self, model: &mut M, value: f64) {
+        if M::ARRAYS
+            && let Some(store) = &self.store_at
+        {
+            return (store.real)(model, self.element(), value);
+        }
+        if let Some(store) = &self.store {
+            (store.real)(model, value);
+        }
     }
 }
 

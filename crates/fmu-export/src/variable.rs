@@ -2,7 +2,6 @@
 
 use crate::saved::StateVisitor;
 use crate::settable::settable;
-use crate::table::Variables;
 use crate::types::Type;
 use crate::value::{Dimensions, Place, Scalar};
 use fmi_abi::BaseType;
@@ -29,7 +28,7 @@ pub struct Variable<M> {
     /// Name of the array for an element of an array; otherwise equal to `name`.
     name_of_line: &'static str,
     /// Line of the variable. `element` is the number of the element in an array.
-    line: u32,
+    pub(crate) line: u32,
     element: u32,
     dimensions: Dimensions,
     description: &'static str,
@@ -41,7 +40,7 @@ pub struct Variable<M> {
     base: BaseType,
     /// Line of the state; in the table, the index of the state.
     derivative_of: Option<Index>,
-    depends_on: Option<&'static [Index]>,
+    pub(crate) depends_on: Option<&'static [Index]>,
     state: bool,
     reinit: bool,
     /// Modes in which the importer may set this variable; derived from the other fields.
@@ -52,11 +51,11 @@ pub struct Variable<M> {
     pub(crate) takes_at_once: Situations,
     /// Whether setting it has no side effect except the `bool` after `then`.
     plain: bool,
-    read: Option<Read<M>>,
-    store: Option<Store<M>>,
+    pub(crate) read: Option<Read<M>>,
+    pub(crate) store: Option<Store<M>>,
     /// Access to elements of arrays; `None` for scalars.
-    read_at: Option<ReadAt<M>>,
-    store_at: Option<StoreAt<M>>,
+    pub(crate) read_at: Option<ReadAt<M>>,
+    pub(crate) store_at: Option<StoreAt<M>>,
     /// A fault that is known before the line is complete.
     refused: Option<&'static str>,
 }
@@ -526,19 +525,6 @@ impl<M> Variable<M> {
         }
     }
 
-    /// Returns the variables in [`depends_on`](Self::depends_on) as indices in the table, without
-    /// [`Index::TIME`]; of an array all elements.
-    pub fn dependencies(&self) -> Option<impl Iterator<Item = u32> + use<M>>
-    where
-        M: Variables,
-    {
-        let places = |known: &Index| {
-            let line = known.0;
-            (0..).zip(M::TABLE).filter(move |(_, of)| of.line == line).map(|(place, _)| place)
-        };
-        self.depends_on.map(|knowns| knowns.iter().flat_map(places))
-    }
-
     /// Returns whether [`depends_on`](Self::depends_on) contains [`Index::TIME`]; `None` without
     /// `depends_on`.
     pub fn depends_on_time(&self) -> Option<bool> {
@@ -588,38 +574,6 @@ impl<M> Variable<M> {
             && self.element == 0
         {
             (store.visit)(model, visitor);
-        }
-    }
-}
-
-impl<M: Variables> Variable<M> {
-    /// Returns the value of a Real; `None` for the time.
-    #[inline]
-    pub(crate) fn real(&self, model: &M) -> Option<f64> {
-        if M::ARRAYS && self.read_at.is_some() {
-            return self.value(model).map(|value| value.real());
-        }
-        self.read.as_ref().map(|read| (read.real)(model))
-    }
-
-    /// Reads the scalar, or elements of the array from this element on, as many as `values` holds. Returns 0
-    /// if all values are finite.
-    pub(crate) fn reals(&self, model: &M, time: f64, values: &mut [MaybeUninit<f64>]) -> f64 {
-        if let Some(read) = &self.read_at {
-            return (read.reals)(model, self.element(), values);
-        }
-        values.iter_mut().map(|value| *value.write(self.real(model).unwrap_or(time)) * 0.0).sum()
-    }
-
-    #[inline]
-    pub(crate) fn set_real(&self, model: &mut M, value: f64) {
-        if M::ARRAYS
-            && let Some(store) = &self.store_at
-        {
-            return (store.real)(model, self.element(), value);
-        }
-        if let Some(store) = &self.store {
-            (store.real)(model, value);
         }
     }
 }

@@ -2,11 +2,9 @@
 //! reference. A call of the FMU gets or sets all values of an array (section 2.2.7.2).
 
 use fmi_abi::BaseType;
+use fmi_abi::description::{MOST_ELEMENTS, Variable};
 use std::collections::HashMap;
 use std::ops::Range;
-
-/// Limit of the total number of array elements.
-const MOST: usize = 1 << 20;
 
 /// The arrays of an FMU. Their elements have numbers that serve as value references; they are larger than all
 /// value references of the FMU.
@@ -30,24 +28,20 @@ pub(crate) struct Array {
 }
 
 impl Array {
-    /// Creates an array with its sizes and start values: one for each element, or one for all (section
-    /// 2.4.7.5.1).
-    pub fn new(reference: u32, base: BaseType, sizes: Vec<usize>, start: &[&str]) -> Self {
-        let start = start.iter().map(|start| (*start).to_owned()).collect();
-        Self { reference, base, sizes, start }
+    /// Creates an array of the model description.
+    pub fn new(of: &Variable, base: BaseType) -> Self {
+        let (reference, start) = (of.reference, of.start.clone());
+        Self { reference, base, sizes: of.dimensions.clone().unwrap_or_default(), start }
     }
 
     fn length(&self) -> Option<usize> {
         let length = self.sizes.iter().try_fold(1_usize, |length, size| length.checked_mul(*size));
-        length.filter(|length| *length <= MOST)
+        length.filter(|length| *length <= MOST_ELEMENTS)
     }
 
     /// Returns the start value of an element.
     pub fn start(&self, number: usize) -> Option<&str> {
-        match &self.start[..] {
-            [one] => Some(one),
-            all => all.get(number).map(String::as_str),
-        }
+        self.start.get(number).map(String::as_str)
     }
 
     /// Returns the name of an element as in FMI 2.0 (section 2.2.9 there): indices count from 1 and follow
@@ -107,7 +101,7 @@ impl Arrays {
         let length = array.length()?;
         let begin = u32::try_from(self.elements.len()).ok()?.checked_add(self.first)?;
         let end = begin.checked_add(u32::try_from(length).ok()?)?;
-        if self.elements.len() + length > MOST {
+        if self.elements.len() + length > MOST_ELEMENTS {
             return None;
         }
         let place = self.all.len();
@@ -120,15 +114,6 @@ impl Arrays {
     /// Returns the number of values of a variable of the FMU.
     pub fn length(&self, reference: u32) -> usize {
         self.by_reference.get(&reference).and_then(|place| self.all[*place].length()).unwrap_or(1)
-    }
-
-    /// Returns the numbers of the elements of an array of the FMU; for a scalar, its value reference.
-    pub fn elements(&self, reference: u32) -> Range<u32> {
-        let Some(place) = self.by_reference.get(&reference) else {
-            return reference..reference.saturating_add(1);
-        };
-        let begin = self.elements.partition_point(|(array, _)| array < place) as u32 + self.first;
-        begin..begin + self.length(reference) as u32
     }
 
     /// Returns the index of the array to which an element belongs, and its number in the array.

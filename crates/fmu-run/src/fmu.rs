@@ -1,76 +1,17 @@
 //! An unpacked and loaded FMU.
 
-use crate::description::{Description, Offer};
+use crate::description::Description;
 use crate::error::Error;
 use crate::library::Library;
 use crate::machine;
-use crate::system::System;
+use fmi_abi::description::Offer;
 use fmi_abi::{Interface, Standard};
 use std::env::consts::{ARCH, DLL_SUFFIX, OS};
 use std::error::Error as _;
-use std::ffi::{CString, OsStr};
 use std::fs::File;
-use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
-
-/// An FMU, unpacked and loaded once for any number of runs and instances, which keep it loaded. It is a
-/// [`System`] with one component.
-#[derive(Clone, Debug)]
-pub struct Fmu(System);
-
-impl Fmu {
-    /// Unpacks an FMU and loads its library. It is `unsafe` because it runs code of the FMU.
-    ///
-    /// ```compile_fail,E0133
-    /// let fmu = fmu_run::Fmu::open("model.fmu".as_ref());
-    /// ```
-    ///
-    /// # Safety
-    /// The functions of the library have the types of the FMI standard, and the library is sound when it is
-    /// loaded and called.
-    ///
-    /// # Errors
-    /// Returns [`Error::Fmu`] if the file is no FMU, has no library for this platform, or needs another
-    /// program.
-    pub unsafe fn open(path: &Path) -> Result<Self, Error> {
-        // SAFETY: the caller guarantees that the library is sound.
-        unsafe { Loaded::open(path, false) }.map(|loaded| Self(System::of_one(loaded)))
-    }
-
-    /// Opens an FMU as [`open`](Self::open) does, and permits libraries that start another program
-    /// (`needsExecutionTool`), which must be installed. If the program is missing, the FMU reports it when it
-    /// runs.
-    ///
-    /// # Safety
-    /// The requirement of [`open`](Self::open), and the program may be started.
-    ///
-    /// # Errors
-    /// Same errors as [`open`](Self::open).
-    pub unsafe fn open_with_execution_tool(path: &Path) -> Result<Self, Error> {
-        // SAFETY: the caller guarantees that the library is sound and that the program may be started.
-        unsafe { Loaded::open(path, true) }.map(|loaded| Self(System::of_one(loaded)))
-    }
-
-    /// Returns the model description.
-    pub fn description(&self) -> &Description {
-        &self.loaded().description
-    }
-
-    pub(crate) fn loaded(&self) -> &Arc<Loaded> {
-        &self.0.parts()[0].fmu
-    }
-}
-
-/// An FMU has the functions of its [`System`]: variables, runs, instances.
-impl Deref for Fmu {
-    type Target = System;
-
-    fn deref(&self) -> &System {
-        &self.0
-    }
-}
 
 /// An unpacked and loaded FMU.
 #[derive(Debug)]
@@ -86,7 +27,7 @@ impl Loaded {
     /// Opens an FMU.
     ///
     /// # Safety
-    /// The requirement of [`Fmu::open`]; if `execution_tool` is true, the program may be started.
+    /// The requirement of [`Fmu::open`](crate::Fmu::open); if `execution_tool` is true, the program may be started.
     pub unsafe fn open(path: &Path, execution_tool: bool) -> Result<Self, Error> {
         let fail = |why: String| Error::Fmu(format!("{}: {why}", path.display()));
         let folder = unpacked(path).map_err(fail)?;
@@ -137,7 +78,7 @@ impl Loaded {
 /// Loads the library for an interface type.
 ///
 /// # Safety
-/// The requirement of [`Fmu::open`].
+/// The requirement of [`Fmu::open`](crate::Fmu::open).
 unsafe fn load(
     folder: &Arc<TempDir>,
     standard: Standard,
@@ -150,7 +91,7 @@ unsafe fn load(
         return Err(why.to_owned());
     }
     let file = library_of(folder.path(), standard, offer)?;
-    let resources = location(&folder.path().join("resources"), standard);
+    let resources = standard.resources(&folder.path().join("resources"));
     // SAFETY: the caller guarantees that the library is sound.
     let loaded = unsafe { Library::load(&file, standard, resources, Arc::clone(folder)) };
     loaded.map(Arc::new).map_err(|error| {
@@ -209,39 +150,4 @@ fn library_of(folder: &Path, standard: Standard, offer: &Offer) -> Result<PathBu
     others.sort();
     let others = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
     Err(format!("has no library for this platform (binaries/{}/{name}); it has: {others}", folders[0]))
-}
-
-/// Returns the location of the directory as importers write it: a URI in FMI 2.0 (section 2.1.5), a path with
-/// a final separator in FMI 3.0 (section 2.3.1).
-fn location(resources: &Path, standard: Standard) -> CString {
-    let text = match standard {
-        Standard::Fmi2 => uri(resources.as_os_str()),
-        Standard::Fmi3 => format!("{}{}", resources.display(), std::path::MAIN_SEPARATOR),
-    };
-    CString::new(text).unwrap_or_default()
-}
-
-fn uri(path: &OsStr) -> String {
-    let mut uri = "file://".to_owned();
-    let path = path.to_string_lossy().replace('\\', "/");
-    if !path.starts_with('/') {
-        uri.push('/');
-    }
-    for byte in path.bytes() {
-        match byte {
-            b'/' | b':' | b'-' | b'.' | b'_' | b'~' => uri.push(byte.into()),
-            byte if byte.is_ascii_alphanumeric() => uri.push(byte.into()),
-            byte => uri.push_str(&format!("%{byte:02X}")),
-        }
-    }
-    uri
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn locations() {
-        assert_eq!(super::uri("/tmp/a b/%".as_ref()), "file:///tmp/a%20b/%25");
-        assert_eq!(super::uri(r"C:\temp\r".as_ref()), "file:///C:/temp/r");
-    }
 }

@@ -3,7 +3,7 @@
 //! ## Structure of the crate
 //!
 //! [`Fmu`] is an unpacked and loaded FMU of FMI 2.0 or 3.0. A [`Batch`] runs it many times on all processors;
-//! [`Instances`] are stateful and controlled by the caller. `description` reads `modelDescription.xml`,
+//! [`Instances`] are stateful and controlled by the caller. `description` makes array elements variables,
 //! `library` loads the functions, `instance` calls them, and `log` collects their messages. Only the last
 //! three contain `unsafe` code. A caller needs `unsafe` only to [open](Fmu::open) an FMU.
 
@@ -12,6 +12,7 @@ mod batch;
 mod description;
 mod error;
 mod fmu;
+mod found;
 mod instance;
 mod instances;
 mod library;
@@ -24,13 +25,13 @@ mod start;
 mod system;
 
 pub use batch::{Batch, Course, Measure, Planned, Runs, Size, Watch};
-pub use description::{Description, Offer, Variable};
+pub use description::{Description, Variable};
 pub use error::Error;
+pub use fmi_abi::description::{ModelDescription, Offer, Unknown};
 pub use fmi_abi::{BaseType, Interface, Standard, Status};
-pub use fmu::Fmu;
 pub use instance::{Continuous, Event};
 pub use instances::{Instances, Mask, Setup, States};
 pub use refusal::Message;
 pub use selection::Selection;
 pub use start::Start;
-pub use system::{Order, StartValue, System, Wiring, nearest};
+pub use system::{Fmu, Order, StartValue, System, Wiring, nearest};

@@ -1,9 +1,9 @@
 //! Groups of variables that are set or read together.
 
 use crate::error::{Error, request};
+use crate::found::Found;
 use crate::instance::Instance;
 use crate::refusal::Refusal;
-use crate::system::{Found, System};
 use fmi_abi::BaseType;
 
 /// Numeric variables, looked up once by name. A row of values has one value for each, in this order; 0 and 1
@@ -161,20 +161,6 @@ impl Selection {
             }
         }
         Ok(())
-    }
-}
-
-impl System {
-    /// Finds variables by their names.
-    ///
-    /// # Errors
-    /// Returns [`Error::Request`] if a name is unknown, or a variable is not numeric.
-    pub fn select(&self, names: &[impl AsRef<str>]) -> Result<Selection, Error> {
-        let mut selection = Selection::default();
-        for name in names.iter().map(AsRef::as_ref) {
-            selection.push(name, &self.find_numbers(name)?);
-        }
-        Ok(selection)
     }
 }
 

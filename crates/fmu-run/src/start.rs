@@ -1,8 +1,9 @@
 //! Start values: from names to value references.
 
 use crate::error::{Error, request};
+use crate::found::Found;
 use crate::selection::{Place, fits};
-use crate::system::{Found, StartValue, System};
+use crate::system::{StartValue, System};
 use fmi_abi::BaseType;
 use std::borrow::Cow;
 use std::ffi::{CStr, CString};

@@ -18,7 +18,7 @@ fn undeclared(checker: &Checker, unknowns: &[crate::description::Unknown], known
             unknown
                 .dependencies
                 .as_ref()
-                .is_some_and(|list| !list.iter().any(|(index, _)| aliases.contains(index)))
+                .is_some_and(|list| !list.iter().any(|index| aliases.contains(index)))
         })
         .map(|unknown| unknown.variable)
         .filter(|index| !aliases.contains(index))

@@ -15,9 +15,7 @@ pub fn pair(description: &Description, interface: Interface) -> Option<(usize, u
     let knowns = knowns(description, interface);
     let mut listed = description.outputs.iter().chain(&description.derivatives);
     listed.find_map(|unknown| {
-        let depends = |known: &&usize| {
-            unknown.dependencies.as_ref().is_none_or(|list| list.iter().any(|(index, _)| index == *known))
-        };
+        let depends = |known: &&usize| unknown.dependencies.as_ref().is_none_or(|list| list.contains(known));
         let known = knowns.iter().find(depends).filter(|_| unknowns.contains(&unknown.variable))?;
         Some((unknown.variable, *known))
     })

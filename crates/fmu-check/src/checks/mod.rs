@@ -52,24 +52,6 @@ pub const ALL: &[Check] = &[
     ("hostile", hostile::bytes),
 ];
 
-/// The topics that can be asked for.
-pub const TOPICS: [&str; 14] = [
-    "description",
-    "package",
-    "functions",
-    "start_values",
-    "life_cycle",
-    "states",
-    "derivatives",
-    "dependencies",
-    "results",
-    "reset",
-    "refusals",
-    "logs",
-    "resources",
-    "hostile",
-];
-
 /// The sources of the checks, whose rules are to be in the table.
 #[cfg(test)]
 pub const SOURCES: &[&str] = &[

@@ -15,6 +15,7 @@ pub use contain::end_group;
 #[cfg(target_os = "linux")]
 pub use contain::readable;
 pub use contain::{interrupted, listen_for_interrupts};
+use fmi_abi::Standard;
 use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmi_abi::calls;
 use fmi_abi::fmi2::types::{fmi2CallbackFunctions, fmi2CallbackLogger};
@@ -315,15 +316,19 @@ unsafe extern "C" fn log_of_fmi3(
     unsafe { remember(environment, status, category, text) }
 }
 
-/// Values that live until a call returns.
-enum Kept {
-    /// An array for reading.
-    In(Guarded),
-    /// An array that is written.
-    Out(Guarded, Kind, usize),
-    State(Guarded, usize),
-    Size(Guarded, usize),
-    Saved(Guarded, usize),
+/// An array that lives until a call returns.
+struct Kept {
+    array: Guarded,
+    of: Content,
+}
+
+/// Content of an array: one that the FMU reads, or one that it writes, with the index that receives the content.
+enum Content {
+    Input,
+    Output(Kind, usize),
+    State(usize),
+    Size(usize),
+    Saved(usize),
 }
 
 impl Player {
@@ -484,7 +489,9 @@ impl Player {
             text.as_ref().map(|text| Guarded::new(&bytes(text)))
         };
         let (name, token) = (text(&make.name), text(&make.token));
-        let resources = make.resources.then(|| Guarded::new(location(&self.setting).as_bytes_with_nul()));
+        let standard = if self.setting.fmi3 { Standard::Fmi3 } else { Standard::Fmi2 };
+        let location = standard.resources(&self.setting.resources);
+        let resources = make.resources.then(|| Guarded::new(location.as_bytes_with_nul()));
         let word =
             |text: &Option<Guarded>| text.as_ref().map_or(0, Guarded::address) as usize as *const c_char;
         // No two are the same; nobody may look at what is there.
@@ -588,43 +595,35 @@ impl Player {
         INSIDE.leave();
         outcome.status = Some(status);
         let succeeded = status == 0 || status == 1;
-        for kept in &kept {
-            match kept {
-                Kept::In(array) => outcome.damage.extend(array.damage(true)),
-                Kept::Out(array, kind, count) => {
-                    outcome.damage.extend(array.damage(false));
-                    outcome.written.push(read(array, *kind, *count, succeeded));
-                }
-                Kept::State(array, slot) => {
-                    outcome.damage.extend(array.damage(false));
+        for Kept { array, of } in &kept {
+            outcome.damage.extend(array.damage(matches!(of, Content::Input)));
+            outcome.written.extend(match of {
+                Content::Input => None,
+                Content::Output(kind, count) => Some(read(array, *kind, *count, succeeded)),
+                Content::State(slot) => {
                     let handle = word_of(array);
-                    outcome.written.push(Written::Numbers(Kind::U8, vec![u64::from(handle != 0)]));
                     locked(&self.states).insert(*slot, handle as usize);
+                    Some(Written::Numbers(Kind::U8, vec![u64::from(handle != 0)]))
                 }
-                Kept::Size(array, slot) => {
-                    outcome.damage.extend(array.damage(false));
+                Content::Size(slot) => {
                     let size = word_of(array);
-                    outcome.written.push(Written::Numbers(Kind::Size, vec![size]));
                     if succeeded {
                         locked(&self.sizes).insert(*slot, (size as usize).min(1 << 30));
                     }
+                    Some(Written::Numbers(Kind::Size, vec![size]))
                 }
-                Kept::Saved(array, slot) => {
-                    outcome.damage.extend(array.damage(false));
-                    let bytes = array.bytes().to_vec();
-                    outcome.written.push(Written::Numbers(
-                        Kind::U8,
-                        bytes.iter().map(|byte| u64::from(*byte)).collect(),
-                    ));
-                    locked(&self.bytes).insert(*slot, bytes);
+                Content::Saved(slot) => {
+                    locked(&self.bytes).insert(*slot, array.bytes().to_vec());
+                    Some(read(array, Kind::U8, usize::MAX, succeeded))
                 }
-            }
+            });
         }
         if function == "fmi3GetBinary" && succeeded {
             // Pointers and sizes, to be read together.
             let arrays: Vec<_> = kept
                 .iter()
-                .filter_map(|kept| if let Kept::Out(array, ..) = kept { Some(array) } else { None })
+                .filter(|kept| matches!(kept.of, Content::Output(..)))
+                .map(|kept| &kept.array)
                 .collect();
             if let [sizes, pointers] = arrays[..] {
                 let words = |array: &Guarded| -> Vec<usize> {
@@ -646,11 +645,14 @@ impl Player {
     }
 
     fn word(&self, arg: &Arg, kept: &mut Vec<Kept>) -> u64 {
-        let mut input = |bytes: &[u8]| {
-            let array = Guarded::new(bytes);
+        let mut keep = |array: Guarded, of: Content| {
             let address = array.address();
-            kept.push(Kept::In(array));
+            kept.push(Kept { array, of });
             address
+        };
+        let mut input = |bytes: &[u8]| keep(Guarded::new(bytes), Content::Input);
+        let words = |words: Vec<u64>| -> Vec<u8> {
+            words.into_iter().flat_map(|word| (word as usize).to_ne_bytes()).collect()
         };
         match arg {
             Arg::Real(bits) => *bits,
@@ -663,19 +665,13 @@ impl Player {
                 input(&bytes)
             }
             Arg::Texts(texts) => {
-                let pointers: Vec<u64> = texts
-                    .iter()
-                    .map(|text| text.as_ref().map_or(0, |text| input(&[text.as_slice(), &[0]].concat())))
-                    .collect();
-                let bytes: Vec<u8> =
-                    pointers.iter().flat_map(|word| (*word as usize).to_ne_bytes()).collect();
-                input(&bytes)
+                let mut with_end = |text: &Vec<u8>| input(&[text.as_slice(), &[0]].concat());
+                let pointers = texts.iter().map(|text| text.as_ref().map_or(0, &mut with_end)).collect();
+                input(&words(pointers))
             }
             Arg::Blobs(blobs) => {
-                let pointers: Vec<u64> = blobs.iter().map(|blob| input(blob)).collect();
-                let bytes: Vec<u8> =
-                    pointers.iter().flat_map(|word| (*word as usize).to_ne_bytes()).collect();
-                input(&bytes)
+                let pointers = blobs.iter().map(|blob| input(blob)).collect();
+                input(&words(pointers))
             }
             Arg::Saved(slot) => input(&locked(&self.bytes).get(slot).cloned().unwrap_or_default()),
             Arg::SavedSize(slot) => {
@@ -683,31 +679,15 @@ impl Player {
                 size.unwrap_or_else(|| locked(&self.bytes).get(slot).map_or(0, Vec::len)) as u64
             }
             Arg::State(slot) => locked(&self.states).get(slot).copied().unwrap_or(0) as u64,
-            Arg::Out(kind, count) => {
-                let array = Guarded::room(kind.size() * count);
-                let address = array.address();
-                kept.push(Kept::Out(array, *kind, *count));
-                address
-            }
+            Arg::Out(kind, count) => keep(Guarded::room(kind.size() * count), Content::Output(*kind, *count)),
             Arg::StateOut(slot) => {
                 let handle = locked(&self.states).get(slot).copied().unwrap_or(0);
-                let array = Guarded::new(&handle.to_ne_bytes());
-                let address = array.address();
-                kept.push(Kept::State(array, *slot));
-                address
+                keep(Guarded::new(&handle.to_ne_bytes()), Content::State(*slot))
             }
-            Arg::SizeOut(slot) => {
-                let array = Guarded::new(&0_usize.to_ne_bytes());
-                let address = array.address();
-                kept.push(Kept::Size(array, *slot));
-                address
-            }
+            Arg::SizeOut(slot) => keep(Guarded::new(&0_usize.to_ne_bytes()), Content::Size(*slot)),
             Arg::SavedOut(slot) => {
                 let size = locked(&self.sizes).get(slot).copied().unwrap_or(0);
-                let array = Guarded::room(size);
-                let address = array.address();
-                kept.push(Kept::Saved(array, *slot));
-                address
+                keep(Guarded::room(size), Content::Saved(*slot))
             }
         }
     }
@@ -753,18 +733,6 @@ fn messages(environment: usize) -> Vec<Message> {
         *from != environment
     });
     own
-}
-
-/// The directory as importers write it: a URI in FMI 2.0 (section 2.1.5), a path with an end in FMI 3.0 (section 2.3.1).
-fn location(setting: &Setting) -> CString {
-    let path = setting.resources.display().to_string();
-    let text = if setting.fmi3 {
-        format!("{path}{}", std::path::MAIN_SEPARATOR)
-    } else {
-        let path = path.replace('\\', "/");
-        format!("file://{}{path}", if path.starts_with('/') { "" } else { "/" })
-    };
-    CString::new(text).unwrap_or_default()
 }
 
 /// A text that a function returns or passes, NULL or not.

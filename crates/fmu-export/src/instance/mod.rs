@@ -240,7 +240,7 @@ impl<M: Exported> Instance<M> {
     /// Takes the messages of the model. Returns whether there were any.
     #[inline]
     pub fn listen(&mut self) -> bool {
-        self.logger.listen(&mut *self.state.model)
+        self.logger.listen(self.state.model.log())
     }
 
     pub fn setup_experiment(&mut self, experiment: Experiment) -> Outcome {
@@ -322,7 +322,7 @@ impl<M: Exported> Instance<M> {
         self.listen();
         let mut draft = M::clone(&self.state.model);
         let changed = change(&mut draft);
-        self.logger.listen(&mut draft);
+        self.logger.listen(draft.log());
         let changed = changed.map_err(Into::into)?;
         *self.state.model = draft;
         self.state.stale = true;

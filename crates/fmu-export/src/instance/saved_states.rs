@@ -79,7 +79,7 @@ impl<M: Exported> Instance<M> {
         }
         let mut state = self.state.clone();
         let read = serialized::read(bytes, self.origin(), &mut state);
-        self.logger.listen(&mut *state.model);
+        self.logger.listen(state.model.log());
         read?;
         self.check_event_mode(&state)?;
         if handle == NULL {

@@ -56,8 +56,8 @@ class Variable:
         Real, Integer, Boolean, String, Enumeration, or one of FMI 3.0's other types.
     causality
         input, output, parameter, local and so on.
-    variability, start, unit, min, max
-        None if not declared. `start` is a string. `unit`, `min` and `max` may come from the declared type.
+    variability, start, unit, min, max, display_unit
+        None if not declared. `start` is a string. `unit`, `min`, `max` and `display_unit` may come from the declared type.
     """
 
     name: str
@@ -69,6 +69,7 @@ class Variable:
     description: str
     min: float | None
     max: float | None
+    display_unit: str | None
 
 
 class _Model:
@@ -276,7 +277,14 @@ class Fmu(_Model):
     def __init__(self, path: str | os.PathLike[str], *, execution_tool: bool = False):
         super().__init__(_Loaded(os.fspath(path), execution_tool))
         #: "2.0" or "3.0"; the name of the model; guid or instantiation token.
-        self.fmi_version, self.model_name, self.token, self._once = self._loaded.about()
+        self.fmi_version, self.model_name, self.token, derivatives, outputs, directional, units = self._loaded.about()
+        #: Name of each continuous state's derivative by state; names of the continuous outputs; both in the order of the
+        #: model structure.
+        self.derivatives, self.outputs = dict(derivatives), tuple(outputs)
+        #: By interface type, whether the FMU has directional derivatives.
+        self.directional = dict(directional)
+        #: By unit, the attributes of its base unit: exponents, factor and offset, as strings.
+        self.units = {name: dict(attributes) for name, attributes in units.items()}
 
     def __repr__(self) -> str:
         closed = ", closed" if self._loaded.is_closed() else ""

@@ -12,6 +12,7 @@ use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError}
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use start::Start;
+use std::collections::BTreeMap;
 use std::ops::Deref;
 use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -44,20 +45,16 @@ impl Deref for Model {
     }
 }
 
-/// Name, type, causality, variability, start value, unit, description, smallest and largest value.
-type Described = (
-    String,
-    String,
-    String,
-    Option<String>,
-    Option<String>,
-    Option<String>,
-    String,
-    Option<f64>,
-    Option<f64>,
-);
+/// Name, type, causality, variability, start value, unit, description, smallest and largest value, display
+/// unit.
+type Described = (String, String, String, Text, Text, Text, String, Option<f64>, Option<f64>, Text);
+type Text = Option<String>;
+/// FMI version, model name, token, derivative of each state, continuous outputs, interface types with and
+/// without directional derivatives, attributes of units.
+type About = (String, String, String, Pairs, Vec<String>, Vec<(&'static str, bool)>, BTreeMap<String, Pairs>);
+type Pairs = Vec<(String, String)>;
 /// Outputs and connected inputs, by stage.
-type Stages = Vec<Vec<(String, String)>>;
+type Stages = Vec<Pairs>;
 /// Messages by run.
 type Told = Vec<(usize, String)>;
 /// Trajectories and statistics, (runs, outputs, times or statistics) each, errors, notes and start values.
@@ -133,8 +130,7 @@ impl Loaded {
         self.model()?.display_unit(name, unit).map_err(python)
     }
 
-    /// Returns, for an FMU: FMI version, model name, token, and whether a process may have only one instance.
-    fn about(&self) -> PyResult<(String, String, String, bool)> {
+    fn about(&self) -> PyResult<About> {
         let Model::Fmu(fmu) = self.model()? else {
             return Err(PyValueError::new_err("a system has no model description"));
         };
@@ -143,8 +139,21 @@ impl Loaded {
             fmu_run::Standard::Fmi2 => "2.0",
             fmu_run::Standard::Fmi3 => "3.0",
         };
-        let once = about.co_simulation.as_ref().is_some_and(|offer| offer.once_per_process);
-        Ok((version.to_owned(), about.model_name.clone(), about.token.clone(), once))
+        let derivatives = about.elements(&about.derivatives);
+        let derivatives = derivatives.filter_map(|of| Some((of.derivative_of.clone()?, of.name.clone())));
+        let outputs = about.elements(&about.outputs).filter(|of| of.base.is_float());
+        let offers = [("co-simulation", &about.co_simulation), ("model-exchange", &about.model_exchange)];
+        let offers =
+            offers.into_iter().filter_map(|(name, of)| Some((name, of.as_ref()?.directional_derivatives)));
+        Ok((
+            version.to_owned(),
+            about.model_name.clone(),
+            about.token.clone(),
+            derivatives.collect(),
+            outputs.map(|of| of.name.clone()).collect(),
+            offers.collect(),
+            about.units.clone(),
+        ))
     }
 
     /// Returns, for a system: name, stages of its connections, and stop time.
@@ -159,10 +168,9 @@ impl Loaded {
 
     fn variables(&self) -> PyResult<Vec<Described>> {
         let describe = |(name, variable): (String, &fmu_run::Variable)| {
-            let fmu_run::Variable {
-                base, causality, variability, start, unit, description, min, max, ..
-            } = variable.clone();
-            (name, base.to_string(), causality, variability, start, unit, description, min, max)
+            let fmu_run::Variable { base, causality, variability, start, unit, .. } = variable.clone();
+            let fmu_run::Variable { description, min, max, display_unit, .. } = variable.clone();
+            (name, base.to_string(), causality, variability, start, unit, description, min, max, display_unit)
         };
         Ok(self.model()?.variables().map(describe).collect())
     }

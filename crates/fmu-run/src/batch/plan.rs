@@ -2,9 +2,10 @@
 
 use super::{Batch, Course, Measure};
 use crate::error::{Error, request};
+use crate::found::article;
 use crate::selection::{Selection, fits};
 use crate::start::StartValues;
-use crate::system::{System, article};
+use crate::system::System;
 use fmi_abi::{BaseType, Interface};
 
 /// A checked batch.

@@ -3,13 +3,18 @@
 mod order;
 mod ssp;
 
-use crate::description::{Description, Offer, Variable};
+use crate::description::{Description, Variable};
 use crate::error::{Error, request};
-use crate::fmu::{Fmu, Loaded};
+use crate::fmu::Loaded;
+use crate::found::Found;
 use crate::selection::Selection;
-use crate::start::StartValues;
+use fmi_abi::description::Offer;
 use fmi_abi::{BaseType, Interface};
+pub(crate) use order::Exchange;
+pub use order::Order;
 use std::collections::BTreeMap;
+use std::ops::Deref;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Connected FMUs in Co-Simulation. A system runs like one FMU, also in parallel in [batches](System::run)
@@ -41,19 +46,6 @@ pub(crate) struct Part {
     pub fmu: Arc<Loaded>,
 }
 
-/// Time at which outputs are passed to the connected inputs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Order {
-    /// At each communication point, until all values are consistent. An output is read after the inputs on
-    /// which it depends directly, according to the model description. Circular dependencies are an algebraic
-    /// loop, which is an error.
-    #[default]
-    Dependencies,
-    /// After a step, all outputs are read; before the next step, all inputs are set, as in FMPy and libcosim.
-    /// Outputs that depend directly on inputs lag by one step, so there are no algebraic loops.
-    Jacobi,
-}
-
 /// Specification of a system: components and connections.
 #[derive(Clone, Debug, Default)]
 pub struct Wiring<'a> {
@@ -67,21 +59,6 @@ pub struct Wiring<'a> {
     pub order: Order,
 }
 
-/// Sequence of the exchange: all outputs of a stage are read and all its inputs are set, then the next stage
-/// follows.
-#[derive(Debug, Default)]
-pub(crate) struct Exchange {
-    pub order: Order,
-    pub stages: Vec<Stage>,
-}
-
-/// Outputs and the connected inputs, in the same order.
-#[derive(Debug)]
-pub(crate) struct Stage {
-    pub outputs: Selection,
-    pub inputs: Selection,
-}
-
 /// A start value of a system.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StartValue {
@@ -89,17 +66,6 @@ pub enum StartValue {
     Number(f64),
     /// A string.
     Text(String),
-}
-
-/// A variable of a component.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Found<'a> {
-    /// Index of the component.
-    pub part: usize,
-    pub of: &'a Variable,
-    pub description: &'a Description,
-    /// Name of the output that feeds the variable.
-    pub fed_by: Option<&'a str>,
 }
 
 impl System {
@@ -144,7 +110,7 @@ impl System {
     /// inputs, by stage.
     pub fn stages(&self) -> Vec<Vec<(&str, &str)>> {
         let stages = self.0.exchange.stages.iter();
-        let pairs = stages.map(|Stage { outputs, inputs }| outputs.names().iter().zip(inputs.names()));
+        let pairs = stages.map(|stage| stage.outputs.names().iter().zip(stage.inputs.names()));
         pairs.map(|pairs| pairs.map(|(from, to)| (from.as_str(), to.as_str())).collect()).collect()
     }
 
@@ -156,6 +122,18 @@ impl System {
     /// Returns the stop time of the system's experiment, s, if given.
     pub fn stop_time(&self) -> Option<f64> {
         self.0.stop_time
+    }
+
+    /// Finds variables by their names.
+    ///
+    /// # Errors
+    /// Returns [`Error::Request`] if a name is unknown, or a variable is not numeric.
+    pub fn select(&self, names: &[impl AsRef<str>]) -> Result<Selection, Error> {
+        let mut selection = Selection::default();
+        for name in names.iter().map(AsRef::as_ref) {
+            selection.push(name, &self.find_numbers(name)?);
+        }
+        Ok(selection)
     }
 
     /// Returns the conversion between the unit of a variable and another unit, as factor and offset: value in
@@ -260,61 +238,60 @@ impl System {
     }
 }
 
-impl Found<'_> {
-    pub fn check_number(self, name: &str) -> Result<(), Error> {
-        match self.of.base {
-            BaseType::String | BaseType::Binary => request(format!("{name} is no number")),
-            _ => Ok(()),
-        }
+/// An FMU, unpacked and loaded once for any number of runs and instances, which keep it loaded. It is a
+/// [`System`] with one component.
+#[derive(Clone, Debug)]
+pub struct Fmu(System);
+
+impl Fmu {
+    /// Unpacks an FMU and loads its library. It is `unsafe` because it runs code of the FMU.
+    ///
+    /// ```compile_fail,E0133
+    /// let fmu = fmu_run::Fmu::open("model.fmu".as_ref());
+    /// ```
+    ///
+    /// # Safety
+    /// The functions of the library have the types of the FMI standard, and the library is sound when it is
+    /// loaded and called.
+    ///
+    /// # Errors
+    /// Returns [`Error::Fmu`] if the file is no FMU, has no library for this platform, or needs another
+    /// program.
+    pub unsafe fn open(path: &Path) -> Result<Self, Error> {
+        // SAFETY: the caller guarantees that the library is sound.
+        unsafe { Loaded::open(path, false) }.map(|loaded| Self(System::of_one(loaded)))
     }
 
-    /// Fails if an output feeds the variable.
-    pub fn check_own(self, name: &str) -> Result<(), Error> {
-        match self.fed_by {
-            Some(output) => request(format!("{name} is fed by {output}, it cannot be set")),
-            None => Ok(()),
-        }
+    /// Opens an FMU as [`open`](Self::open) does, and permits libraries that start another program
+    /// (`needsExecutionTool`), which must be installed. If the program is missing, the FMU reports it when it
+    /// runs.
+    ///
+    /// # Safety
+    /// The requirement of [`open`](Self::open), and the program may be started.
+    ///
+    /// # Errors
+    /// Same errors as [`open`](Self::open).
+    pub unsafe fn open_with_execution_tool(path: &Path) -> Result<Self, Error> {
+        // SAFETY: the caller guarantees that the library is sound and that the program may be started.
+        unsafe { Loaded::open(path, true) }.map(|loaded| Self(System::of_one(loaded)))
     }
 
-    /// Fails if the variable cannot be set after the initialization.
-    pub fn check_settable(self, name: &str) -> Result<(), Error> {
-        self.check_own(name)?;
-        if self.of.is_settable() {
-            return Ok(());
-        }
-        let kind = match self.of.causality.as_str() {
-            "output" => "an output".to_owned(),
-            other => format!("{} variable", article(other)),
-        };
-        request(format!("{name} is read-only: it is {kind}"))
+    /// Returns the model description.
+    pub fn description(&self) -> &Description {
+        &self.loaded().description
     }
 
-    /// Fails if the variable accepts no start value. Variables with a start value and variables set from
-    /// outside do (section 2.2.7 of FMI 2.0, 2.4.7.5 of FMI 3.0).
-    pub fn check_start(self, name: &str) -> Result<(), Error> {
-        self.check_own(name)?;
-        let constant = self.of.variability.as_deref() == Some("constant");
-        if !constant && (self.of.is_settable() || self.of.start.is_some()) {
-            return Ok(());
-        }
-        let kind = if constant { "a constant" } else { "calculated by the FMU and has no start value" };
-        request(format!("{name} is read-only: it is {kind}"))
+    pub(crate) fn loaded(&self) -> &Arc<Loaded> {
+        &self.0.parts()[0].fmu
     }
+}
 
-    fn display_unit(self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
-        let Some(own) = &self.of.unit else {
-            return request(format!("{name} has no unit, its values cannot be in {unit}"));
-        };
-        if own == unit {
-            return Ok((1.0, 0.0));
-        }
-        let others = self.description.display_units.get(own).map_or(&[][..], Vec::as_slice);
-        if let Some((_, factor, offset)) = others.iter().find(|(name, ..)| name == unit) {
-            return Ok((*factor, *offset));
-        }
-        let known: Vec<_> =
-            std::iter::once(own.as_str()).chain(others.iter().map(|(name, ..)| name.as_str())).collect();
-        request(format!("{name} can be given in {}, not in {unit:?}", known.join(" or ")))
+/// An FMU has the functions of its [`System`]: variables, runs, instances.
+impl Deref for Fmu {
+    type Target = System;
+
+    fn deref(&self) -> &System {
+        &self.0
     }
 }
 
@@ -354,6 +331,7 @@ impl Whole {
                 )));
             }
         }
+        let mut wires = Vec::new();
         for (place, (from, to)) in self.connections.iter().enumerate() {
             let (output, input) = (self.end(from, "output")?, self.end(to, "input")?);
             if let Err(why) = output.description.connects(output.of, input.description, input.of) {
@@ -365,11 +343,10 @@ impl Whole {
             if self.connections[..place].iter().any(|(_, other)| other == to) {
                 return request(format!("{to} is fed twice"));
             }
+            wires.push((output, input));
         }
-        self.exchange = Exchange { order, stages: order::stages(&self, order)? };
-        let system = System(Arc::new(self));
-        StartValues::of(&system, &[])?;
-        Ok(system)
+        self.exchange = Exchange { order, stages: order::stages(&self.connections, &wires, order)? };
+        Ok(System(Arc::new(self)))
     }
 
     fn end(&self, name: &str, wanted: &str) -> Result<Found<'_>, Error> {
@@ -431,11 +408,6 @@ pub fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String
     let names =
         names.map(|known| (similarity(&known), known)).filter(|(similarity, _)| *similarity > SIMILAR);
     names.reduce(|best, other| if other.0 > best.0 { other } else { best }).map(|(_, name)| name)
-}
-
-pub(crate) fn article(word: &str) -> String {
-    let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
-    format!("{} {word}", if vowel { "an" } else { "a" })
 }
 
 fn joined(component: &str, name: &str) -> String {

@@ -1,41 +1,60 @@
 //! Sequence in which values are passed at a communication point.
 
-use super::{Found, Order, Stage, Whole};
 use crate::error::{Error, request};
+use crate::found::Found;
 use crate::selection::Selection;
 
-/// A connection from an output of a component to an input.
-struct Wire<'a> {
-    from: Found<'a>,
-    to: Found<'a>,
+/// Time at which outputs are passed to the connected inputs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// At each communication point, until all values are consistent. An output is read after the inputs on
+    /// which it depends directly, according to the model description. Circular dependencies are an algebraic
+    /// loop, which is an error.
+    #[default]
+    Dependencies,
+    /// After a step, all outputs are read; before the next step, all inputs are set, as in FMPy and libcosim.
+    /// Outputs that depend directly on inputs lag by one step, so there are no algebraic loops.
+    Jacobi,
 }
 
-impl Wire<'_> {
-    /// Returns whether the output of this connection depends directly on the input of the other one.
-    fn follows(&self, other: &Wire) -> bool {
-        let depends_on = self.from.of.depends_on.as_ref();
-        other.to.part == self.from.part
-            && depends_on.is_none_or(|inputs| inputs.contains(&other.to.of.reference))
-    }
+/// Sequence of the exchange: all outputs of a stage are read and all its inputs are set, then the next stage
+/// follows.
+#[derive(Debug, Default)]
+pub(crate) struct Exchange {
+    pub order: Order,
+    pub stages: Vec<Stage>,
+}
+
+/// Outputs and the connected inputs, in the same order.
+#[derive(Debug)]
+pub(crate) struct Stage {
+    pub outputs: Selection,
+    pub inputs: Selection,
+}
+
+/// A connection: an output of a component and the connected input.
+type Wire<'a> = (Found<'a>, Found<'a>);
+
+/// Returns whether the output of a connection depends directly on the input of another one.
+fn follows((from, _): &Wire, (_, to): &Wire) -> bool {
+    let depends_on = from.of.depends_on.as_ref();
+    to.part == from.part && depends_on.is_none_or(|inputs| inputs.contains(&to.of.reference))
 }
 
 /// Returns the stages, each after the stages that it depends on.
-pub(super) fn stages(whole: &Whole, order: Order) -> Result<Vec<Stage>, Error> {
-    let end = |name: &str| whole.find(name).map(|found| found[0]);
-    let wires = whole.connections.iter().map(|(from, to)| Ok(Wire { from: end(from)?, to: end(to)? }));
-    let wires: Vec<Wire> = wires.collect::<Result<_, Error>>()?;
+pub(super) fn stages(names: &[(String, String)], wires: &[Wire], order: Order) -> Result<Vec<Stage>, Error> {
     let levels = match order {
         Order::Jacobi => vec![0; wires.len()],
-        Order::Dependencies => levels(whole, &wires)?,
+        Order::Dependencies => levels(names, wires)?,
     };
     let count = levels.iter().max().map_or(0, |last| last + 1);
     let stage = |number| {
         let mut stage = Stage { outputs: Selection::default(), inputs: Selection::default() };
         let of_stage = levels.iter().enumerate().filter(|(_, level)| **level == number);
         for (place, _) in of_stage {
-            let (from, to) = &whole.connections[place];
-            stage.outputs.push(from, &[wires[place].from]);
-            stage.inputs.push(to, &[wires[place].to]);
+            let ((from, to), (output, input)) = (&names[place], wires[place]);
+            stage.outputs.push(from, &[output]);
+            stage.inputs.push(to, &[input]);
         }
         stage
     };
@@ -43,16 +62,16 @@ pub(super) fn stages(whole: &Whole, order: Order) -> Result<Vec<Stage>, Error> {
 }
 
 /// Returns the level of each connection: the length of the longest chain of connections that must precede it.
-fn levels(whole: &Whole, wires: &[Wire]) -> Result<Vec<usize>, Error> {
+fn levels(names: &[(String, String)], wires: &[Wire]) -> Result<Vec<usize>, Error> {
     let mut levels: Vec<Option<usize>> = vec![None; wires.len()];
     for first in 0..wires.len() {
-        level(whole, wires, first, &mut levels, &mut Vec::new())?;
+        level(names, wires, first, &mut levels, &mut Vec::new())?;
     }
     Ok(levels.into_iter().map(Option::unwrap_or_default).collect())
 }
 
 fn level(
-    whole: &Whole,
+    names: &[(String, String)],
     wires: &[Wire],
     place: usize,
     levels: &mut [Option<usize>],
@@ -62,20 +81,20 @@ fn level(
         return Ok(level);
     }
     if let Some(begin) = path.iter().position(|before| *before == place) {
-        let names = path[begin..].iter().rev().map(|place| {
-            let (from, to) = &whole.connections[*place];
+        let circle = path[begin..].iter().rev().map(|place| {
+            let (from, to) = &names[*place];
             format!("{from} -> {to}")
         });
         return request(format!(
             "there is an algebraic loop: {}; each of these outputs depends on its FMU's input without a step (or its FMU does \
             not say on what it depends), so that no order passes all values on. Order Jacobi passes them on a step later",
-            names.collect::<Vec<_>>().join(", ")
+            circle.collect::<Vec<_>>().join(", ")
         ));
     }
     path.push(place);
     let mut own = 0;
-    for before in (0..wires.len()).filter(|before| wires[place].follows(&wires[*before])) {
-        own = own.max(1 + level(whole, wires, before, levels, path)?);
+    for before in (0..wires.len()).filter(|before| follows(&wires[place], &wires[*before])) {
+        own = own.max(1 + level(names, wires, before, levels, path)?);
     }
     path.pop();
     levels[place] = Some(own);

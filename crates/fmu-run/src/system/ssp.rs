@@ -3,6 +3,7 @@
 use super::{Order, Part, StartValue, System, Whole};
 use crate::error::Error;
 use crate::fmu::{Loaded, unpacked};
+use crate::start::StartValues;
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -74,7 +75,9 @@ impl System {
         let experiment = child(root, "DefaultExperiment");
         whole.stop_time =
             experiment.and_then(|of| of.attribute("stopTime")).and_then(|text| text.parse().ok());
-        whole.finish(order)
+        let system = whole.finish(order)?;
+        StartValues::of(&system, &[])?;
+        Ok(system)
     }
 }
 

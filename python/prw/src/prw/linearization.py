@@ -1,14 +1,11 @@
-"""The linear model of an FMU, from its directional derivatives; and the structure and units in its model description."""
+"""The linear model of an FMU, from its directional derivatives."""
 
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Iterable, Mapping
 from numbers import Real
-from pathlib import Path
-from typing import Any, Literal, NamedTuple, Self
-from xml.etree import ElementTree
+from typing import Any, Literal, Self
 
 import fmu_run
 import numpy as np
@@ -18,82 +15,15 @@ from prw.errors import UserError
 from prw.state_space import StateSpace
 from prw.testbed import existing_fmu, loaded
 
-#: Types of continuous variables in FMI 2.0 and 3.0.
-CONTINUOUS = ("Real", "Float64", "Float32")
-
-
-class Unit(NamedTuple):
-    """exponents: by base unit, as strings. displayed: by display unit, the factor from the display unit to this unit."""
-
-    exponents: Mapping[str, str]
-    displayed: Mapping[str, float]
-
-
-class Description(NamedTuple):
-    """Parts of a model description. derivatives: the name of each state's derivative, by state. outputs: the continuous
-    ones. directional: by interface type, whether it provides directional derivatives; attribute: the XML attribute that
-    declares them. display_units: by variable. units: by name."""
-
-    derivatives: dict[str, str]
-    outputs: tuple[str, ...]
-    directional: dict[str, bool]
-    attribute: str
-    display_units: dict[str, str]
-    units: dict[str, Unit]
-
-
-def read_description(fmu: Path) -> Description:
-    """Read the model description of an FMU of FMI 2.0 or 3.0. The caller has loaded it with `fmu_run`, which checks it."""
-    with zipfile.ZipFile(fmu) as archive:
-        root = ElementTree.fromstring(archive.read("modelDescription.xml"))
-    # An index in the list, from 1 (section 2.2.8 of FMI 2.0), or a value reference (section 2.4.8 of FMI 3.0).
-    fmi2 = str(root.get("fmiVersion")).startswith("2.")
-    reference, outputs, derivatives = (
-        ("index", "Outputs/Unknown", "Derivatives/Unknown")
-        if fmi2
-        else ("valueReference", "Output", "ContinuousStateDerivative")
-    )
-    variables, typed = {}, {}
-    for index, element in enumerate(root.iterfind("ModelVariables/*"), start=1):
-        attributes = element[0] if fmi2 else element
-        variables[str(index) if fmi2 else element.get("valueReference")] = element
-        typed[element.get("name", "")] = attributes.tag, attributes
-    types = {kind.get("name"): kind[0] if fmi2 else kind for kind in root.iterfind("TypeDefinitions/*")}
-
-    def display_unit(variable: ElementTree.Element) -> str:
-        declared = types.get(variable.get("declaredType"), variable)
-        return variable.get("displayUnit") or declared.get("displayUnit") or ""
-
-    def names(path: str) -> list[str]:
-        return [
-            variables[unknown.get(reference)].get("name", "") for unknown in root.iterfind(f"ModelStructure/{path}")
-        ]
-
-    attribute = "providesDirectionalDerivative" + ("" if fmi2 else "s")
-    offers = {name: found for name in INTERFACES if (found := root.find(name)) is not None}
-    return Description(
-        {str(variables[typed[name][1].get("derivative")].get("name")): name for name in names(derivatives)},
-        tuple(name for name in names(outputs) if typed[name][0] in CONTINUOUS),
-        {name: found.get(attribute) in ("true", "1") for name, found in offers.items()},
-        attribute,
-        {name: display_unit(element) for name, (_, element) in typed.items()},
-        {str(unit.get("name")): _unit(unit) for unit in root.iterfind("UnitDefinitions/Unit")},
-    )
-
-
-def _unit(element: ElementTree.Element) -> Unit:
-    base = element.find("BaseUnit")
-    exponents = {} if base is None else {n: v for n, v in base.items() if n not in ("factor", "offset")}
-    # factor: from this unit to the displayed one (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0).
-    displayed = {str(d.get("name")): 1 / float(d.get("factor", "1")) for d in element.iterfind("DisplayUnit")}
-    return Unit(exponents, displayed)
-
-
 #: Start values of the testbed with which its states and inputs are independent of each other in Co-Simulation. With
 #: others a motor angle also changes the rate that is estimated from it and, before the first step, the states.
 INDEPENDENT = {"use_omega": True, "start_at_rest": False}
 Interface = Literal["co-simulation", "model-exchange"]
+#: Types of continuous variables in `fmu_run`.
+CONTINUOUS = ("Real", "Float32")
 INTERFACES = {"CoSimulation": "Co-Simulation", "ModelExchange": "Model Exchange"}
+#: The names of the interface types in `fmu_run`.
+HELD: dict[str, Interface] = {"CoSimulation": "co-simulation", "ModelExchange": "model-exchange"}
 
 
 def linearize(
@@ -170,23 +100,19 @@ class Linearizer:
 
     def _look(self, outputs: str | Iterable[str] | None, fmi_type: str | None) -> None:
         """Find states, inputs and outputs. Raises UserError."""
-        description, variables = read_description(self.fmu), self.loaded.variables
-        chosen = self._chosen(fmi_type, description.directional, description.attribute)
-        self._interface: Interface = "co-simulation" if chosen == "CoSimulation" else "model-exchange"
-        self.states = tuple(description.derivatives)
+        loaded, variables = self.loaded, self.loaded.variables
+        self._interface = HELD[self._chosen(fmi_type)]
+        self.states = tuple(loaded.derivatives)
         self.inputs = tuple(v.name for v in variables.values() if v.causality == "input" and v.type in CONTINUOUS)
-        self.outputs = description.outputs if outputs is None else names_of("outputs", outputs)
+        self.outputs = loaded.outputs if outputs is None else names_of("outputs", outputs)
         for name in self.outputs:
-            if name not in description.outputs and name not in self.states:
-                choice = ", ".join(dict.fromkeys([*description.outputs, *self.states]))
+            if name not in loaded.outputs and name not in self.states:
+                choice = ", ".join(dict.fromkeys([*loaded.outputs, *self.states]))
                 raise UserError(f"{self.fmu}: {name} is neither a continuous output nor a state; there are {choice}")
         # A state is no unknown of FMI's directional derivatives, and its row of C needs none.
         self._calculated = [row for row, name in enumerate(self.outputs) if name not in self.states]
-        self._unknowns = (*description.derivatives.values(), *(self.outputs[row] for row in self._calculated))
+        self._unknowns = (*loaded.derivatives.values(), *(self.outputs[row] for row in self._calculated))
         self._knowns = (*self.states, *self.inputs)
-        for name in (*self._knowns, *self._unknowns):
-            if name not in variables:
-                raise UserError(f"{self.fmu}: {name} is an array; only scalar variables can be linearized")
         self._units = {name: variables[name].unit or "" for name in (*self._knowns, *self.outputs)}
         self._instance: fmu_run.Instances | None = None
         self._given: set[str] = set()
@@ -230,8 +156,11 @@ class Linearizer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _chosen(self, wanted: str | None, directional: Mapping[str, bool], attribute: str) -> str:
+    def _chosen(self, wanted: str | None) -> str:
         """The interface type to use."""
+        offers = self.loaded.directional
+        directional = {name: offers[held] for name, held in HELD.items() if held in offers}
+        attribute = "providesDirectionalDerivative" + ("" if self.loaded.fmi_version == "2.0" else "s")
         able = [name for name, offered in directional.items() if offered]
         if wanted is None and able:
             return able[0]

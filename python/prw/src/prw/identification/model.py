@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import fmu_run
 
-from prw.linearization import CONTINUOUS, Description, Linearizer, read_description
+from prw.linearization import CONTINUOUS, Linearizer
 from prw.testbed import OUTPUTS
 
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
@@ -32,17 +32,17 @@ class Parameters:
     """The parameters that the model description of the testbed declares. real: by name. counts: start values of the
     Integer parameters. guid: of the FMU, a hash of its sources and start values."""
 
-    def __init__(self, fmu: fmu_run.Fmu, description: Description):
+    def __init__(self, fmu: fmu_run.Fmu):
         self.guid: str = fmu.token
         self.real: dict[str, Parameter] = {}
         self.counts: dict[str, int] = {}
-        self._units, self._meanings = description.units, {}
+        self._units, self._meanings = fmu.units, {}
         for v in fmu.variables.values():
             unit, start = v.unit or "", v.start or "0"
             # Initial states of a run are no properties of the testbed.
             if v.causality == "parameter" and v.type in CONTINUOUS and not v.name.endswith("_start"):
-                shown = description.display_units[v.name] or unit
-                factor = description.units[unit].displayed.get(shown, 1.0) if unit in description.units else 1.0
+                shown = v.display_unit or unit
+                factor = float(fmu.converted(v.name, 1.0, shown)) if v.display_unit else 1.0
                 self.real[v.name] = Parameter(float(start), unit, shown, factor, v.description)
             elif v.causality == "parameter" and "Int" in v.type:
                 self.counts[v.name], self._meanings[v.name] = int(start), v.description
@@ -81,7 +81,8 @@ class Parameters:
         for name, unit in self._units.items():
             if name in used:
                 element = ElementTree.SubElement(units, f"{{{SSC}}}Unit", name=name)
-                ElementTree.SubElement(element, f"{{{SSC}}}BaseUnit", dict(unit.exponents))
+                exponents = {key: value for key, value in unit.items() if key not in ("factor", "offset")}
+                ElementTree.SubElement(element, f"{{{SSC}}}BaseUnit", exponents)
         ElementTree.indent(root)
         found: bytes = ElementTree.tostring(root, "UTF-8", xml_declaration=True)
         return found.decode("utf-8") + "\n"
@@ -96,4 +97,4 @@ class Model(Linearizer):
     def __init__(self, fmu: str | os.PathLike[str] | None = None):
         """Load and instantiate the FMU file `fmu` (default: see prw.testbed.default_fmu)."""
         super().__init__(fmu, outputs=OUTPUTS)
-        self.known = Parameters(self.loaded, read_description(self.fmu))
+        self.known = Parameters(self.loaded)

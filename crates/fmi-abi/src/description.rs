@@ -1,0 +1,488 @@
+//! Reads model descriptions as written. A description may have faults; the reader lists them.
+
+use crate::{BaseType, Interface, Standard};
+use roxmltree::{Document, Node};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+/// Largest array whose single start value is repeated for all elements.
+pub const MOST_ELEMENTS: usize = 1 << 20;
+
+/// A variable; an array of FMI 3.0 is one variable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// Name; empty if missing.
+    pub name: String,
+    /// Value reference.
+    pub reference: u32,
+    /// Base type; `None` for a clock. Int32 of FMI 3.0 is Integer, Float64 is Real.
+    pub base: Option<BaseType>,
+    /// `input`, `output` and so on; `local` by default.
+    pub causality: String,
+    /// `fixed`, `continuous` and so on, with the default of the standard.
+    pub variability: String,
+    /// Whether the variability is given.
+    pub has_variability: bool,
+    /// `exact`, `approx` or `calculated`, with the default of the standard; empty if there is no default.
+    pub initial: String,
+    /// Start values as written: one for each element, or none.
+    pub start: Vec<String>,
+    /// Sizes of the dimensions of an array; `None` if a size is unknown.
+    pub dimensions: Option<Vec<usize>>,
+    /// Number of values; `None` if it is unknown.
+    pub size: Option<usize>,
+    /// Smallest value of the variable or of its declared type, if given.
+    pub min: Option<f64>,
+    /// Largest value of the variable or of its declared type, if given.
+    pub max: Option<f64>,
+    /// Nominal value of the variable or of its declared type; 1 by default.
+    pub nominal: f64,
+    /// Unit of the variable or of its declared type, if given.
+    pub unit: Option<String>,
+    /// Display unit of the variable or of its declared type, if given.
+    pub display_unit: Option<String>,
+    /// Name of the declared type, if given.
+    pub declared_type: Option<String>,
+    /// Index of the variable of which this variable is the time derivative.
+    pub derivative_of: Option<usize>,
+    /// Whether clocks set the variable.
+    pub clocked: bool,
+    /// Whether the variable may be set only once per time instant.
+    pub once_per_instant: bool,
+    /// Description; empty if missing.
+    pub description: String,
+}
+
+impl Variable {
+    /// Returns the start values as numbers, up to the first that is no number.
+    pub fn starts(&self) -> Vec<f64> {
+        let number = |text: &String| match text.as_str() {
+            "true" => Some(1.0),
+            "false" => Some(0.0),
+            "INF" => Some(f64::INFINITY),
+            "-INF" => Some(f64::NEG_INFINITY),
+            other => other.parse().ok(),
+        };
+        self.start.iter().map_while(number).collect()
+    }
+
+    /// Returns whether the values are floating-point numbers.
+    pub fn is_float(&self) -> bool {
+        self.base.is_some_and(BaseType::is_float)
+    }
+
+    /// Returns whether the values are numbers or Booleans.
+    pub fn is_number(&self) -> bool {
+        !matches!(self.base, None | Some(BaseType::String | BaseType::Binary))
+    }
+}
+
+/// An unknown of the model structure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unknown {
+    /// Index of the variable.
+    pub variable: usize,
+    /// Indices of the variables on which it depends; `None` if the attribute is missing.
+    pub dependencies: Option<Vec<usize>>,
+}
+
+/// Capabilities of an FMU for one interface type.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Offer {
+    /// `modelIdentifier`, the name of the library; empty if missing.
+    pub identifier: String,
+    /// Whether a process may have only one instance.
+    pub once_per_process: bool,
+    /// Whether the library starts another program, which must be installed.
+    pub needs_execution_tool: bool,
+    /// Whether it accepts input derivatives (FMI 2.0, `canInterpolateInputs`).
+    pub input_derivatives: bool,
+    /// Whether it provides directional derivatives (`providesDirectionalDerivative`, in FMI 3.0 with a final
+    /// s).
+    pub directional_derivatives: bool,
+    /// Whether its state can be saved and restored (`canGetAndSetFMUstate`, in FMI 3.0
+    /// `canGetAndSetFMUState`).
+    pub saves_states: bool,
+    /// Whether saved states can be serialized (`canSerializeFMUstate`).
+    pub serializes_states: bool,
+    attributes: HashMap<String, String>,
+}
+
+impl Offer {
+    fn read(node: Node, standard: Standard) -> Self {
+        let is_true = |name| matches!(node.attribute(name), Some("true" | "1"));
+        Self {
+            identifier: text(node, "modelIdentifier"),
+            once_per_process: is_true("canBeInstantiatedOnlyOncePerProcess"),
+            needs_execution_tool: is_true("needsExecutionTool"),
+            input_derivatives: standard == Standard::Fmi2 && is_true("canInterpolateInputs"),
+            directional_derivatives: is_true("providesDirectionalDerivative")
+                || is_true("providesDirectionalDerivatives"),
+            saves_states: is_true("canGetAndSetFMUstate") || is_true("canGetAndSetFMUState"),
+            serializes_states: is_true("canSerializeFMUstate") || is_true("canSerializeFMUState"),
+            attributes: attributes(node).into_iter().collect(),
+        }
+    }
+
+    /// Returns whether one of these attributes is true.
+    pub fn can(&self, names: &[&str]) -> bool {
+        names.iter().any(|name| matches!(self.attributes.get(*name).map(String::as_str), Some("true" | "1")))
+    }
+
+    /// Returns an attribute that is a positive number.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        let number: Option<f64> = self.attributes.get(name)?.trim().parse().ok();
+        number.filter(|number| *number > 0.0 && number.is_finite())
+    }
+}
+
+/// Kinds of faults. The reader leaves out the faulty element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A required attribute is missing.
+    Attribute,
+    /// A variable has no value reference.
+    Reference,
+    /// A variable has no type.
+    Type,
+    /// The model structure refers to no variable.
+    Structure,
+}
+
+/// A model description as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelDescription {
+    /// FMI version.
+    pub standard: Standard,
+    /// `fmiVersion` as written.
+    pub version: String,
+    /// Name of the model.
+    pub model_name: String,
+    /// `guid` of FMI 2.0, `instantiationToken` of FMI 3.0.
+    pub token: String,
+    /// Capabilities in Co-Simulation, if the FMU supports it.
+    pub co_simulation: Option<Offer>,
+    /// Capabilities in Model Exchange, if the FMU supports it.
+    pub model_exchange: Option<Offer>,
+    /// Whether the FMU supports Scheduled Execution.
+    pub scheduled_execution: bool,
+    /// Start time, stop time and step size of the default experiment, s, if given.
+    pub default_experiment: [Option<f64>; 3],
+    /// Variables, in the order of the file.
+    pub variables: Vec<Variable>,
+    /// Outputs of the model structure.
+    pub outputs: Vec<Unknown>,
+    /// Derivatives of the continuous states.
+    pub derivatives: Vec<Unknown>,
+    /// Unknowns of the initialization.
+    pub initial_unknowns: Vec<Unknown>,
+    /// Number of event indicators; `None` if it is unknown.
+    pub event_indicators: Option<usize>,
+    /// Names of the log categories.
+    pub log_categories: Vec<String>,
+    /// Units by name, each with the exponents of SI base units, factor and offset as written in the file.
+    pub units: BTreeMap<String, Vec<(String, String)>>,
+    /// Display units by unit, each with name, factor and offset.
+    pub display_units: BTreeMap<String, Vec<(String, f64, f64)>>,
+    /// Names of the declared types.
+    pub types: BTreeSet<String>,
+    /// Enumerations by name, each with the names and numbers of its items.
+    pub enumerations: BTreeMap<String, Vec<(String, String)>>,
+    /// Faults, each with a message.
+    pub faults: Vec<(Fault, String)>,
+}
+
+impl ModelDescription {
+    /// Reads a `modelDescription.xml`.
+    ///
+    /// # Errors
+    /// Fails if the text is no XML, or for other FMI versions. The message names the fault.
+    pub fn parse(text_of_file: &str) -> Result<Self, String> {
+        let document = Document::parse(text_of_file)
+            .map_err(|error| format!("modelDescription.xml is no XML: {error}"))?;
+        let root = document.root_element();
+        let version = text(root, "fmiVersion");
+        let (standard, token) = match version.as_str() {
+            "2.0" => (Standard::Fmi2, "guid"),
+            version if version.starts_with("3.") => (Standard::Fmi3, "instantiationToken"),
+            other => return Err(format!("its fmiVersion is {other:?}; FMI 2.0 and 3.0 are supported")),
+        };
+        let mut faults = Vec::new();
+        let mut needs = |node: Node, name: &str| {
+            if node.attribute(name).is_none() {
+                faults.push((Fault::Attribute, format!("{} lacks {name}", node.tag_name().name())));
+            }
+        };
+        needs(root, "modelName");
+        needs(root, token);
+        let mut offer = |name: &str| {
+            let node = child(root, name)?;
+            needs(node, "modelIdentifier");
+            Some(Offer::read(node, standard))
+        };
+        let (co_simulation, model_exchange) = (offer("CoSimulation"), offer("ModelExchange"));
+        let experiment = child(root, "DefaultExperiment");
+        let time = |name: &str| experiment?.attribute(name)?.trim().parse().ok();
+        let named = |list| elements(root, list).filter_map(|node| Some(node.attribute("name")?.to_owned()));
+        let variables = variables(root, standard, &mut faults);
+        let mut description = Self {
+            standard,
+            version,
+            model_name: text(root, "modelName"),
+            token: text(root, token),
+            co_simulation,
+            model_exchange,
+            scheduled_execution: child(root, "ScheduledExecution").is_some(),
+            default_experiment: ["startTime", "stopTime", "stepSize"].map(time),
+            variables,
+            outputs: Vec::new(),
+            derivatives: Vec::new(),
+            initial_unknowns: Vec::new(),
+            event_indicators: None,
+            log_categories: named("LogCategories").collect(),
+            units: elements(root, "UnitDefinitions").map(unit).collect(),
+            display_units: elements(root, "UnitDefinitions").map(display_units).collect(),
+            types: named("TypeDefinitions").collect(),
+            enumerations: elements(root, "TypeDefinitions").filter_map(enumeration).collect(),
+            faults,
+        };
+        description.structure(root);
+        Ok(description)
+    }
+
+    /// Returns the capabilities for this interface type, if the FMU supports it.
+    pub fn offer(&self, interface: Interface) -> Option<&Offer> {
+        match interface {
+            Interface::CoSimulation => self.co_simulation.as_ref(),
+            Interface::ModelExchange => self.model_exchange.as_ref(),
+        }
+    }
+
+    /// Reads the model structure: indices in FMI 2.0, counted from 1; value references in FMI 3.0.
+    fn structure(&mut self, root: Node) {
+        let by_reference: HashMap<u32, usize> =
+            self.variables.iter().enumerate().rev().map(|(index, of)| (of.reference, index)).collect();
+        let (count, standard) = (self.variables.len(), self.standard);
+        let mut lost = Vec::new();
+        let mut find = |text: &str| {
+            let number: Option<u32> = text.parse().ok();
+            let found = match standard {
+                Standard::Fmi2 => number.and_then(from_one).filter(|index| *index < count),
+                Standard::Fmi3 => number.and_then(|number| by_reference.get(&number).copied()),
+            };
+            if found.is_none() {
+                lost.push(format!("ModelStructure refers to {text:?}, which is no variable"));
+            }
+            found
+        };
+        let attribute = if standard == Standard::Fmi2 { "index" } else { "valueReference" };
+        let mut unknown = |node: Node| {
+            let variable = find(node.attribute(attribute)?.trim())?;
+            let list = node.attribute("dependencies");
+            let dependencies = list.map(|list| list.split_whitespace().filter_map(&mut find).collect());
+            Some(Unknown { variable, dependencies })
+        };
+        let mut list = |group: &str, of_fmi3: &str| -> Vec<Unknown> {
+            let Some(structure) = child(root, "ModelStructure") else { return Vec::new() };
+            match standard {
+                Standard::Fmi2 => elements(structure, group).filter_map(&mut unknown).collect(),
+                Standard::Fmi3 => {
+                    let nodes = structure.children().filter(|node| node.has_tag_name(of_fmi3));
+                    nodes.filter_map(&mut unknown).collect()
+                }
+            }
+        };
+        self.outputs = list("Outputs", "Output");
+        self.derivatives = list("Derivatives", "ContinuousStateDerivative");
+        self.initial_unknowns = list("InitialUnknowns", "InitialUnknown");
+        let indicators = list("", "EventIndicator");
+        self.event_indicators = match standard {
+            Standard::Fmi2 => root.attribute("numberOfEventIndicators").map_or(Some(0), |n| n.parse().ok()),
+            Standard::Fmi3 => indicators.iter().map(|unknown| self.variables[unknown.variable].size).sum(),
+        };
+        self.faults.extend(lost.into_iter().map(|why| (Fault::Structure, why)));
+    }
+}
+
+fn variables(root: Node, standard: Standard, faults: &mut Vec<(Fault, String)>) -> Vec<Variable> {
+    let types: HashMap<&str, Node> =
+        elements(root, "TypeDefinitions").filter_map(|node| Some((node.attribute("name")?, node))).collect();
+    let nodes: Vec<Node> = elements(root, "ModelVariables").collect();
+    let indexed = nodes.iter().enumerate().rev();
+    let by_reference: HashMap<u32, usize> =
+        indexed.filter_map(|(index, node)| Some((number(*node, "valueReference")?, index))).collect();
+    let mut found = Vec::new();
+    for node in &nodes {
+        let Some(reference) = number(*node, "valueReference") else {
+            faults.push((Fault::Reference, format!("{} has no value reference", text(*node, "name"))));
+            continue;
+        };
+        let is_type = |child: &Node| base_of(standard, child.tag_name().name()).is_some();
+        let of_type = match standard {
+            Standard::Fmi2 => node.children().find(is_type),
+            Standard::Fmi3 => Some(*node),
+        };
+        let Some(of_type) = of_type else {
+            faults.push((Fault::Type, format!("{} has no type", text(*node, "name"))));
+            continue;
+        };
+        let declared = of_type.attribute("declaredType").and_then(|name| types.get(name)).copied();
+        let base = base_of(standard, of_type.tag_name().name());
+        // A size is a number, or the start value of a structural parameter (section 2.4.7.5.1 of FMI 3.0).
+        let size = |dimension: Node| {
+            let parameter = || nodes.get(*by_reference.get(&number(dimension, "valueReference")?)?).copied();
+            number(dimension, "start").or_else(|| number(parameter()?, "start"))
+        };
+        let dimensions = node.children().filter(|child| child.has_tag_name("Dimension")).map(size);
+        let derivative_of = number(of_type, "derivative").and_then(|of| match standard {
+            Standard::Fmi2 => from_one(of).filter(|index| *index < nodes.len()),
+            Standard::Fmi3 => by_reference.get(&of).copied(),
+        });
+        let mut variable = variable(*node, of_type, declared, (standard, base), dimensions.collect());
+        (variable.reference, variable.derivative_of) = (reference, derivative_of);
+        found.push(variable);
+    }
+    let count = found.len();
+    let exists = |index: &usize| *index < count;
+    found.iter_mut().for_each(|of| of.derivative_of = of.derivative_of.filter(exists));
+    found
+}
+
+/// Reads a variable whose attributes are in `of_type` and in the declared type.
+fn variable(
+    node: Node,
+    of_type: Node,
+    declared: Option<Node>,
+    (standard, base): (Standard, Option<BaseType>),
+    dimensions: Option<Vec<usize>>,
+) -> Variable {
+    let of_both = |name: &str| {
+        let of_declared = || {
+            let node = declared?;
+            node.attribute(name).or_else(|| node.children().find_map(|child| child.attribute(name)))
+        };
+        of_type.attribute(name).or_else(of_declared)
+    };
+    let limit = |name| of_both(name).and_then(|text| text.trim().parse().ok());
+    let causality = node.attribute("causality").unwrap_or("local");
+    let variability = node.attribute("variability");
+    let has_variability = variability.is_some();
+    let variability = variability.unwrap_or_else(|| default_variability(standard, causality, base));
+    let initial = node.attribute("initial").unwrap_or_else(|| default_initial(causality, variability));
+    let product = |sizes: &Vec<usize>| sizes.iter().try_fold(1_usize, |all, size| all.checked_mul(*size));
+    let size = dimensions.as_ref().and_then(product);
+    Variable {
+        name: text(node, "name"),
+        reference: 0,
+        base,
+        causality: causality.to_owned(),
+        variability: variability.to_owned(),
+        has_variability,
+        initial: initial.to_owned(),
+        start: start_values(node, of_type, base, size),
+        dimensions,
+        size,
+        min: limit("min"),
+        max: limit("max"),
+        nominal: limit("nominal").filter(|nominal| *nominal > 0.0).unwrap_or(1.0),
+        unit: of_both("unit").map(str::to_owned),
+        display_unit: of_both("displayUnit").map(str::to_owned),
+        declared_type: of_type.attribute("declaredType").map(str::to_owned),
+        derivative_of: None,
+        clocked: node.attribute("clocks").is_some(),
+        once_per_instant: node.attribute("canHandleMultipleSetPerTimeInstant") == Some("false"),
+        description: text(node, "description"),
+    }
+}
+
+/// Reads the start values; a single value of an array is repeated for all elements. Strings of FMI 3.0 are
+/// child elements (section 2.4.7.5).
+fn start_values(node: Node, of_type: Node, base: Option<BaseType>, size: Option<usize>) -> Vec<String> {
+    let list = of_type.attribute("start");
+    let mut start: Vec<String> = match base {
+        Some(BaseType::String | BaseType::Binary) | None => list.map(str::to_owned).into_iter().collect(),
+        Some(_) => list.unwrap_or_default().split_whitespace().map(str::to_owned).collect(),
+    };
+    if start.is_empty() {
+        let starts = node.children().filter(|child| child.has_tag_name("Start"));
+        start = starts.filter_map(|child| Some(child.attribute("value")?.to_owned())).collect();
+    }
+    let is_array = node.children().any(|child| child.has_tag_name("Dimension"));
+    match (size, &start[..]) {
+        (Some(size), [one]) if is_array && size <= MOST_ELEMENTS => vec![one.clone(); size],
+        _ => start,
+    }
+}
+
+/// Returns the default of `initial`: the table of section 2.2.7 of FMI 2.0, 2.4.7.4 of FMI 3.0.
+fn default_initial(causality: &str, variability: &str) -> &'static str {
+    match (causality, variability) {
+        ("parameter" | "structuralParameter", _) | ("local" | "output", "constant") => "exact",
+        ("calculatedParameter" | "output" | "local", _) => "calculated",
+        _ => "",
+    }
+}
+
+fn default_variability(standard: Standard, causality: &str, base: Option<BaseType>) -> &'static str {
+    match causality {
+        "parameter" | "calculatedParameter" | "structuralParameter" if standard == Standard::Fmi3 => "fixed",
+        _ if base.is_some_and(BaseType::is_float) => "continuous",
+        _ => "discrete",
+    }
+}
+
+/// Returns the base type of an XML element.
+fn base_of(standard: Standard, element: &str) -> Option<BaseType> {
+    BaseType::ALL.into_iter().find(|base| base.element(standard) == Some(element))
+}
+
+/// Reads a unit (section 2.2.2 of FMI 2.0, 2.4.3 of FMI 3.0).
+fn unit(node: Node) -> (String, Vec<(String, String)>) {
+    (text(node, "name"), child(node, "BaseUnit").map(attributes).unwrap_or_default())
+}
+
+/// Reads display units: value in the display unit = factor * value in the unit + offset. Skips inverse units
+/// of FMI 3.0.
+fn display_units(node: Node) -> (String, Vec<(String, f64, f64)>) {
+    let others = node.children().filter(|of| {
+        of.has_tag_name("DisplayUnit") && !matches!(of.attribute("inverse"), Some("true" | "1"))
+    });
+    let others = others.filter_map(|of| {
+        let number = |name, default| of.attribute(name).and_then(|text| text.parse().ok()).unwrap_or(default);
+        Some((of.attribute("name")?.to_owned(), number("factor", 1.0), number("offset", 0.0)))
+    });
+    (text(node, "name"), others.collect())
+}
+
+/// Reads an enumeration. In FMI 2.0 the type element contains an element for the base type (section 2.2.3);
+/// in FMI 3.0 they are one element (2.4.4).
+fn enumeration(node: Node) -> Option<(String, Vec<(String, String)>)> {
+    let items = node.descendants().filter(|item| item.has_tag_name("Item"));
+    let item = |item: Node| Some((item.attribute("name")?.to_owned(), item.attribute("value")?.to_owned()));
+    let items: Vec<_> = items.filter_map(item).collect();
+    (!items.is_empty()).then(|| Some((node.attribute("name")?.to_owned(), items)))?
+}
+
+/// Converts an index that counts from 1.
+fn from_one(number: u32) -> Option<usize> {
+    (number as usize).checked_sub(1)
+}
+
+fn text(node: Node, name: &str) -> String {
+    node.attribute(name).unwrap_or_default().to_owned()
+}
+
+fn number<T: std::str::FromStr>(node: Node, name: &str) -> Option<T> {
+    node.attribute(name)?.trim().parse().ok()
+}
+
+fn attributes(node: Node) -> Vec<(String, String)> {
+    node.attributes().map(|of| (of.name().to_owned(), of.value().to_owned())).collect()
+}
+
+fn child<'a>(node: Node<'a, 'a>, name: &str) -> Option<Node<'a, 'a>> {
+    node.children().find(|child| child.has_tag_name(name))
+}
+
+fn elements<'a>(node: Node<'a, 'a>, list: &str) -> impl Iterator<Item = Node<'a, 'a>> {
+    child(node, list).into_iter().flat_map(|list| list.children()).filter(Node::is_element)
+}

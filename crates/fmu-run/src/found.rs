@@ -1,0 +1,79 @@
+//! Variables of components, and whether a caller may set them.
+
+use crate::description::{Description, Variable};
+use crate::error::{Error, request};
+use fmi_abi::BaseType;
+
+/// A variable of a component.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Found<'a> {
+    /// Index of the component.
+    pub part: usize,
+    pub of: &'a Variable,
+    pub description: &'a Description,
+    /// Name of the output that feeds the variable.
+    pub fed_by: Option<&'a str>,
+}
+
+impl Found<'_> {
+    pub fn check_number(self, name: &str) -> Result<(), Error> {
+        match self.of.base {
+            BaseType::String | BaseType::Binary => request(format!("{name} is no number")),
+            _ => Ok(()),
+        }
+    }
+
+    /// Fails if an output feeds the variable.
+    pub fn check_own(self, name: &str) -> Result<(), Error> {
+        match self.fed_by {
+            Some(output) => request(format!("{name} is fed by {output}, it cannot be set")),
+            None => Ok(()),
+        }
+    }
+
+    /// Fails if the variable cannot be set after the initialization.
+    pub fn check_settable(self, name: &str) -> Result<(), Error> {
+        self.check_own(name)?;
+        if self.of.is_settable() {
+            return Ok(());
+        }
+        let kind = match self.of.causality.as_str() {
+            "output" => "an output".to_owned(),
+            other => format!("{} variable", article(other)),
+        };
+        request(format!("{name} is read-only: it is {kind}"))
+    }
+
+    /// Fails if the variable accepts no start value. Variables with a start value and variables set from
+    /// outside do (section 2.2.7 of FMI 2.0, 2.4.7.5 of FMI 3.0).
+    pub fn check_start(self, name: &str) -> Result<(), Error> {
+        self.check_own(name)?;
+        let constant = self.of.variability.as_deref() == Some("constant");
+        if !constant && (self.of.is_settable() || self.of.start.is_some()) {
+            return Ok(());
+        }
+        let kind = if constant { "a constant" } else { "calculated by the FMU and has no start value" };
+        request(format!("{name} is read-only: it is {kind}"))
+    }
+
+    pub fn display_unit(self, name: &str, unit: &str) -> Result<(f64, f64), Error> {
+        let Some(own) = &self.of.unit else {
+            return request(format!("{name} has no unit, its values cannot be in {unit}"));
+        };
+        if own == unit {
+            return Ok((1.0, 0.0));
+        }
+        let others = self.description.display_units.get(own).map_or(&[][..], Vec::as_slice);
+        if let Some((_, factor, offset)) = others.iter().find(|(name, ..)| name == unit) {
+            return Ok((*factor, *offset));
+        }
+        let known: Vec<_> =
+            std::iter::once(own.as_str()).chain(others.iter().map(|(name, ..)| name.as_str())).collect();
+        request(format!("{name} can be given in {}, not in {unit:?}", known.join(" or ")))
+    }
+}
+
+pub(crate) fn article(word: &str) -> String {
+    let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
+    format!("{} {word}", if vowel { "an" } else { "a" })
+}
