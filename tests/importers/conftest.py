@@ -42,7 +42,7 @@ def saw(request):
         (SEEN / f"{request.path.stem}-{name}.json").write_text(json.dumps(row), encoding="utf-8")
         written = [said[:4] for said in read_table(ROOT / PAGE, HEADING).rows]
         assert list(row.values())[:4] in written, (
-            f"{PAGE} is out of date; `python -m tools compatibility` writes it anew"
+            f"{PAGE} is out of date; `python dev/tools compatibility` writes it anew"
         )
         name, glance = re.split(r",| \(", tool)[0], read_table(ROOT / PAGE, "At a glance").rows
         assert any(name in said and row["version"] in said for said, *_ in glance), (

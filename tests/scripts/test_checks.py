@@ -24,7 +24,7 @@ def test_every_target_is_a_part_of_the_release_check() -> None:
 
 
 def test_an_unknown_part_is_named() -> None:
-    command = [sys.executable, "tools/release_check.py", "tests"]
+    command = [sys.executable, "dev/tools/release_check.py", "tests"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 2 and "no part has the target tests; choose from test," in done.stderr
 
@@ -34,7 +34,7 @@ def test_a_change_is_checked_where_it_is() -> None:
         return [" ".join(command[command[0] == sys.executable :]) for command in changed.commands(list(names))]
 
     assert lines("docs/checking.md") == []
-    assert lines("tools/changed.py")[0] == "-m ruff check tools/changed.py"
+    assert lines("dev/tools/changed.py")[0] == "-m ruff check dev/tools/changed.py"
     model = lines("src/pair.rs", "crates/fmu-run/src/fmu.rs")
     assert any("clippy" in line and "--package fmu-run --package prw_testbed" in line for line in model)
     assert any("--package fmu-run --lib" in line for line in model)

@@ -58,20 +58,20 @@ def test_the_benchmarks(fmu: Path) -> None:
     """One test, because the benchmarks share target/bench."""
     for name in ("prw_controller.fmu", "prw_closed_loop.ssp"):
         built(name)
-    found = rows(run(sys.executable, "benches/bench.py", fmu, BENCH_QUICK="1"))
+    found = rows(run(sys.executable, "dev/benches/bench.py", fmu, BENCH_QUICK="1"))
     some = {"with use_omega and rates set", "memory of an instance / 4 KiB", "testbed", "8", "fmu_run, 2 threads"}
     assert some <= found.keys() and len(found) > 22
     assert all(figure > 0 for figures in found.values() for figure in figures), found
     if shutil.which("valgrind"):
-        ((_, counts),) = rows(run(sys.executable, "benches/bench.py", fmu, "--profile", BENCH_QUICK="1")).items()
+        ((_, counts),) = rows(run(sys.executable, "dev/benches/bench.py", fmu, "--profile", BENCH_QUICK="1")).items()
         assert sum(counts[1:]) < counts[0] < 10_000
 
 
 def test_seeded_faults_are_found_or_escape(tmp_path: Path) -> None:
-    assert "34 faults fit the sources" in run(sys.executable, "tools/seeded_faults.py", "--check")
+    assert "34 faults fit the sources" in run(sys.executable, "dev/tools/seeded_faults.py", "--check")
     faults = tmp_path / "faults.toml"
     faults.write_text(FAULTS, encoding="utf-8")
-    command = [sys.executable, "tools/seeded_faults.py", str(faults)]
+    command = [sys.executable, "dev/tools/seeded_faults.py", str(faults)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 1 and done.stderr == ""
     assert done.stdout == "found    Pending is a status\nescaped  a number is hexadecimal\n1 of 2 faults found\n"
@@ -87,7 +87,7 @@ def test_docs_are_written(tmp_path: Path) -> None:
     for folder in ("docs", TESTBED.content, CONTROLLER.content):
         shutil.copytree(ROOT / folder, tmp_path / folder)
     (tmp_path / TESTBED.path).unlink()
-    run(sys.executable, "-m", "tools", "docs", "--project", tmp_path)
+    run(sys.executable, "dev/tools", "docs", "--project", tmp_path)
     assert (tmp_path / TESTBED.path).read_bytes() == (ROOT / TESTBED.path).read_bytes()
 
 

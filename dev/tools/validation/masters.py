@@ -26,8 +26,8 @@ RECORDED = (
     *(f"testbed.{name}" for name in ("pitch", "roll", "tau1", "tau2")),
 )
 TIMEOUT = 300.0
-#: Repository root.
-ROOT = Path(__file__).resolve().parents[2]
+#: The directory of the package tools.
+ABOVE = Path(__file__).resolve().parents[2]
 
 
 def fmpy_ssp(system: System) -> np.ndarray:
@@ -115,7 +115,7 @@ def run_apart(master: Tool, system: System) -> dict[str, np.ndarray]:
         result = Path(folder, "result.npy")
         command = [sys.executable, "-m", __name__, master.name, *map(os.path.abspath, (system.ssp, system.osp, result))]
         try:
-            process = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, cwd=ROOT)
+            process = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, cwd=ABOVE)
         except subprocess.TimeoutExpired:
             raise UserError(f"{master.name} did not finish within {TIMEOUT:g} s") from None
         output = [line for line in (process.stdout + process.stderr).splitlines() if line.strip()]

@@ -24,7 +24,7 @@ def main() -> None:
         os.umask(0o077)
         copy_sources(copy)
         others = {"CARGO_TARGET_DIR": str(Path(folder) / "target"), "TZ": "Asia/Kolkata", "LC_ALL": "C"}
-        command = [sys.executable, str(copy / "platforms" / "release.py")]
+        command = [sys.executable, str(copy / "dev" / "platforms" / "release.py")]
         subprocess.run(command, cwd=copy, env={**os.environ, **others}, check=True)
         ours, theirs = (set((path / SUMS).read_text(encoding="utf-8").splitlines()) for path in (DIST, copy / "dist"))
         if ours != theirs:

@@ -1,8 +1,8 @@
 """Makes dist/, all that a release has, or nothing: FMUs for all platforms and as C sources, the closed loop, reference
 experiments, wheels, bills of materials, release notes, and the checksums of all of them.
 
-    python platforms/release.py              makes dist/
-    python platforms/release.py --tag TAG    exits with an error unless TAG names the newest version in the changelog
+    python dev/platforms/release.py              makes dist/
+    python dev/platforms/release.py --tag TAG    exits with an error unless TAG names the newest version in the changelog
 """
 
 from __future__ import annotations

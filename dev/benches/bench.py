@@ -26,8 +26,8 @@ import fmu_run
 import numpy as np
 from fmpy.simulation import instantiate_fmu
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "fmu_run")]
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "dev"), str(ROOT / "tests" / "fmu_run")]
 from unruly import build  # noqa: E402
 
 from tools.validation import masters  # noqa: E402
@@ -79,7 +79,7 @@ def prepare(fmu: Path) -> str:
         (ROOT / "out" / "bench.md").unlink(missing_ok=True)
     with zipfile.ZipFile(fmu) as archive:
         (WORK / "fmu.so").write_bytes(archive.read("binaries/linux64/prw_testbed.so"))
-    strict, folder = ("-Wall", "-Wextra", "-Werror"), ROOT / "benches" / "c"
+    strict, folder = ("-Wall", "-Wextra", "-Werror"), ROOT / "dev" / "benches" / "c"
     for library in ("bare_exact", "euler", "empty"):
         compile_c(f"{library}.so", "-O3", *strict, "-shared", "-fPIC", folder / f"{library}.c")
     compile_c("bench", "-O2", *strict, folder / "bench.c")

@@ -1,4 +1,4 @@
 """Tools of this repository: documentation, figures, validation, and the closed loop under several masters.
 
-Run in the repository root as `python -m tools COMMAND`.
+Run in the repository root as `python dev/tools COMMAND`.
 """

@@ -12,7 +12,7 @@ import time
 import tomllib
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 #: Tests of the testbed that compile no FMU.
 QUICK = ("--lib", "--test", "paper", "--test", "stepping", "--test", "fmu")
 #: Crates that the FMU is made of or made with.

@@ -18,7 +18,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 LISTS = ROOT / "tests/faults"
 COPY = ROOT / "target/faults/sources"
 #: Seconds that compiling and one set of tests may take. A fault may make a test hang.

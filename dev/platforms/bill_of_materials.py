@@ -1,7 +1,7 @@
 """Lists the packages that are compiled into the libraries of the FMUs and of fmu-run for Python, with versions and licences.
 
-    python platforms/bill_of_materials.py            updates the lists
-    python platforms/bill_of_materials.py --check    fails if they are out of date
+    python dev/platforms/bill_of_materials.py            updates the lists
+    python dev/platforms/bill_of_materials.py --check    fails if they are out of date
 
 The FMUs contain the lists in modelDescription/licenses/, the wheels the lists in crates/fmu-run/python/: third-party.txt for
 people and bill-of-materials.cdx.json (CycloneDX 1.6) for tools.
@@ -166,7 +166,7 @@ def check(write: bool = False) -> None:
                 continue
             name = path.relative_to(ROOT).as_posix()
             if not write:
-                raise SystemExit(f"error: {name} is out of date; run python3 platforms/bill_of_materials.py")
+                raise SystemExit(f"error: {name} is out of date; run python3 dev/platforms/bill_of_materials.py")
             path.write_bytes(text.encode())
             print(f"{name} written")
 
