@@ -3,7 +3,7 @@
 #![cfg(unix)]
 #![allow(missing_docs)]
 
-mod toys;
+mod models;
 
 use fmu_export::Interface::ModelExchange;
 use fmu_export::Model;
@@ -15,7 +15,7 @@ use std::fmt::Write;
 use std::mem::offset_of;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use toys::{Oscillator, oscillator::Name};
+use models::{Oscillator, oscillator::Name};
 
 /// The functions that work on no instance, of both standards.
 const WITHOUT_INSTANCE: [&str; 9] = [
@@ -118,7 +118,7 @@ fn model_exchange() -> [f64; 4] {
 #[test]
 fn loggers() {
     let printed = run("loggers");
-    assert!(printed.contains("[toy] fmi2Instantiate: the guid {_n_s_d} _r0_ 100_ is not"), "{printed}");
+    assert!(printed.contains("[model] fmi2Instantiate: the guid {_n_s_d} _r0_ 100_ is not"), "{printed}");
     assert!(printed.contains("[a#b] instantiated"), "{printed}");
     assert!(printed.contains("there is no log category '_s_s_n'"), "{printed}");
 }

@@ -3,7 +3,7 @@
 
 use crate::offers;
 use crate::settable;
-use crate::toys::*;
+use crate::models::*;
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
 use fmu_export::fmi2::ALLOWED;
@@ -264,7 +264,7 @@ fn lacking<M: Exported>(function: &str) -> Option<&'static str> {
 
 #[test]
 fn every_function_in_every_state() {
-    for_every_toy!(check_every_function());
+    for_every_model!(check_every_function());
 }
 
 fn check_every_function<M: Exported>() {

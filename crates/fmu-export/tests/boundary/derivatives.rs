@@ -1,6 +1,6 @@
 //! Derivatives with respect to variables (section 2.1.9) and to time (4.2.1).
 
-use crate::toys::{Oscillator, oscillator::Name};
+use crate::models::{Oscillator, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Variables;
@@ -74,7 +74,7 @@ fn pair_by_pair() {
 /// variables that depend on it. Later it is a known.
 #[test]
 fn calculated_states() {
-    use crate::toys::balance::{Balance, Name::*};
+    use crate::models::balance::{Balance, Name::*};
     let derivative = |fmu: &Importer, unknown: u32, known: u32, value: &mut f64| {
         fmu.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, value)
     };

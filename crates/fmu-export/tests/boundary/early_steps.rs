@@ -1,7 +1,7 @@
 //! Steps that end early, and models that end the simulation (sections 4.2.1 and 4.2.3).
 
-use crate::toys::grumbler::{self, Trouble};
-use crate::toys::{Fuse, Grumbler, Ticker, fuse::Name, ticker};
+use crate::models::grumbler::{self, Trouble};
+use crate::models::{Fuse, Grumbler, Ticker, fuse::Name, ticker};
 use fmu_export::Interface::CoSimulation;
 use fmu_export::fmi2::types::*;
 use fmu_test_kit::{Either, Importer, fmi3};

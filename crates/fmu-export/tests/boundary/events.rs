@@ -1,7 +1,7 @@
 //! Model Exchange with events, called like an importer with an integrator (section 3.2.2, and the pseudocode
 //! in section 3.2.4).
 
-use crate::toys::{Ball, Counter, Oscillator, ball, counter};
+use crate::models::{Ball, Counter, Oscillator, ball, counter};
 use fmu_export::Exported;
 use fmu_export::Interface::ModelExchange;
 use fmu_export::Mode::*;

@@ -1,6 +1,6 @@
 //! Models with few capabilities: the FMU rejects missing ones with a message, and the rest works.
 
-use crate::toys::{Sum, sum::Name};
+use crate::models::{Sum, sum::Name};
 use fmu_export::Exported;
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_test_kit::{Arguments, Either, Importer};

@@ -1,7 +1,7 @@
 //! Content and times of log messages (sections 2.1.5 and 2.2.4).
 
-use crate::toys::grumbler::{self, Trouble};
-use crate::toys::{Grumbler, Oscillator, Talker, talker::Name};
+use crate::models::grumbler::{self, Trouble};
+use crate::models::{Grumbler, Oscillator, Talker, talker::Name};
 use crate::variables::say;
 use fmu_export::Exported;
 use fmu_export::Interface::{CoSimulation, ModelExchange};

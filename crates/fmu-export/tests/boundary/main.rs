@@ -2,24 +2,24 @@
 //! importers.
 #![allow(missing_docs)]
 
-#[path = "../toys/mod.rs"]
-mod toys;
+#[path = "../models/mod.rs"]
+mod models;
 
 use fmu_export::{Exported, Interface};
 
 /// Calls a function for every test model.
-macro_rules! for_every_toy {
+macro_rules! for_every_model {
     ($function:ident($($argument:expr),*)) => {{
-        $function::<crate::toys::Oscillator>($($argument),*);
-        $function::<crate::toys::Ball>($($argument),*);
-        $function::<crate::toys::Counter>($($argument),*);
-        $function::<crate::toys::Talker>($($argument),*);
-        $function::<crate::toys::Sum>($($argument),*);
-        $function::<crate::toys::Fuse>($($argument),*);
-        $function::<crate::toys::Motor>($($argument),*);
-        $function::<crate::toys::Lazy>($($argument),*);
-        $function::<crate::toys::Balance>($($argument),*);
-        $function::<crate::toys::Meter>($($argument),*);
+        $function::<crate::models::Oscillator>($($argument),*);
+        $function::<crate::models::Ball>($($argument),*);
+        $function::<crate::models::Counter>($($argument),*);
+        $function::<crate::models::Talker>($($argument),*);
+        $function::<crate::models::Sum>($($argument),*);
+        $function::<crate::models::Fuse>($($argument),*);
+        $function::<crate::models::Motor>($($argument),*);
+        $function::<crate::models::Lazy>($($argument),*);
+        $function::<crate::models::Balance>($($argument),*);
+        $function::<crate::models::Meter>($($argument),*);
     }};
 }
 
@@ -54,5 +54,5 @@ fn offers<M: Exported>(interface: Interface) -> bool {
 
 /// Tests for every FMU with all capabilities.
 mod every {
-    fmu_test_kit::every_check!(crate::toys::Oscillator);
+    fmu_test_kit::every_check!(crate::models::Oscillator);
 }

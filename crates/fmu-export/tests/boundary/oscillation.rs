@@ -1,7 +1,7 @@
 //! The motion of the oscillator in both interface types, compared with its formula.
 
 use crate::INTERFACES;
-use crate::toys::{Oscillator, oscillator::Name};
+use crate::models::{Oscillator, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_test_kit::{Either, Importer};

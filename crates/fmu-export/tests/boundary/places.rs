@@ -1,7 +1,7 @@
 //! Reals in every kind of field, accessed one at a time and in groups: fast paths agree with the general
 //! path.
 
-use crate::toys::{Meter, meter::Name};
+use crate::models::{Meter, meter::Name};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Status;
 use fmu_test_kit::{Either, Importer, fmi3};

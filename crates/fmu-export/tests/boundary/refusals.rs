@@ -2,7 +2,7 @@
 //! checks this; the tables here list the calls and parts of their messages.
 
 use crate::INTERFACES;
-use crate::toys::{Ball, Oscillator, Talker, oscillator::Name, talker};
+use crate::models::{Ball, Oscillator, Talker, oscillator::Name, talker};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::Status;

@@ -1,7 +1,7 @@
 //! Saved states (section 2.1.8): their content, and rejected states.
 
 use crate::INTERFACES;
-use crate::toys::{Counter, Grumbler, Oscillator, Talker, counter, grumbler, oscillator::Name, talker};
+use crate::models::{Counter, Grumbler, Oscillator, Talker, counter, grumbler, oscillator::Name, talker};
 use crate::variables::{say, texts};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;

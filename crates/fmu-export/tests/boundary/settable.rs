@@ -1,7 +1,7 @@
 //! Modes in which a variable can be set (footnotes 1, 3, 4, 5 and 6 of sections 3.2.3 and 4.2.4), for every
 //! variable in every state.
 
-use crate::toys::*;
+use crate::models::*;
 use crate::{INTERFACES, offers};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
@@ -116,7 +116,7 @@ fn is_set(fmu: &Importer, vr: u32, base: BaseType) -> bool {
 
 #[test]
 fn every_variable_in_every_state() {
-    for_every_toy!(check_every_variable());
+    for_every_model!(check_every_variable());
 }
 
 fn check_every_variable<M: Exported>() {
@@ -141,7 +141,7 @@ fn check_every_variable<M: Exported>() {
 /// Checks that set values are read back, including inputs, without a step in between.
 #[test]
 fn values_are_read_back() {
-    for_every_toy!(check_values());
+    for_every_model!(check_values());
 }
 
 fn check_values<M: Exported>() {

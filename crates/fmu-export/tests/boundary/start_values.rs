@@ -2,7 +2,7 @@
 //! error. The model may calculate start values of states.
 
 use crate::INTERFACES;
-use crate::toys::{Balance, Oscillator, Talker, balance, oscillator::Name, talker};
+use crate::models::{Balance, Oscillator, Talker, balance, oscillator::Name, talker};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
 use fmu_export::fmi2::types::Status;

@@ -1,7 +1,7 @@
 //! Unusual calls of real importers, outside the standard or at its limits, that must work.
 
 use crate::INTERFACES;
-use crate::toys::{Oscillator, Sum, oscillator::Name};
+use crate::models::{Oscillator, Sum, oscillator::Name};
 use fmu_export::Exported;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;

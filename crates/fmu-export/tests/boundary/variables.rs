@@ -1,7 +1,7 @@
 //! Strings, enumerations and rarer kinds of variables (section 2.2.7).
 
 use crate::INTERFACES;
-use crate::toys::{Talker, talker::Name};
+use crate::models::{Talker, talker::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::fmi2::types::Status;

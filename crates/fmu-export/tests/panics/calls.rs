@@ -1,7 +1,7 @@
 //! Every function that runs a model's code, with what breaks it.
 
-use crate::toys::Faulty;
-use crate::toys::faulty::{Fault, Name, while_all_break};
+use crate::models::Faulty;
+use crate::models::faulty::{Fault, Name, while_all_break};
 use crate::{FAULT, TEXT, TRUTH, U, X, Y};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Status;

@@ -1,8 +1,8 @@
-//! Toy models under abuse: any calls in any order, and threads.
+//! Test models: any calls in any order, and threads.
 #![allow(missing_docs)]
 
-#[path = "../toys/mod.rs"]
-mod toys;
+#[path = "../models/mod.rs"]
+mod models;
 
 mod sequences;
 mod threads;

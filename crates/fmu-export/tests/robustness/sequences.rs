@@ -1,12 +1,12 @@
 //! Random sequences of calls; `fuzz` lets libFuzzer look for others.
 
-use crate::toys::*;
+use crate::models::*;
 use fmu_test_kit::careless::{RunBytes, Tally, run, run_seeds};
 use fmu_test_kit::{FUNCTIONS, Importer, fmi3};
 use std::io::{Cursor, Read as _};
 
-/// All toys but the faulty one.
-const TOYS: [(&str, RunBytes); 10] = [
+/// All test models but the faulty one.
+const MODELS: [(&str, RunBytes); 10] = [
     ("oscillator", run::<Importer, Oscillator>),
     ("ball", run::<Importer, Ball>),
     ("counter", run::<Importer, Counter>),
@@ -20,7 +20,7 @@ const TOYS: [(&str, RunBytes); 10] = [
 ];
 
 /// The same in FMI 3.0, with those that have more than FMI 2.0.
-const TOYS_OF_FMI3: [(&str, RunBytes); 10] = [
+const MODELS_OF_FMI3: [(&str, RunBytes); 10] = [
     ("oscillator", run::<fmi3::Importer, Oscillator>),
     ("ball", run::<fmi3::Importer, Ball>),
     ("counter", run::<fmi3::Importer, Counter>),
@@ -56,14 +56,14 @@ fn check_counts(tally: &Tally, functions: &[&str]) {
 
 #[test]
 fn no_sequence_of_calls_breaks_a_promise() {
-    let tally = run_seeds(3, &TOYS);
+    let tally = run_seeds(3, &MODELS);
     assert_eq!(tally.len(), 44, "every function is called");
     check_counts(&tally, FUNCTIONS);
 }
 
 #[test]
 fn no_sequence_of_calls_of_fmi3_breaks_a_promise() {
-    let tally = run_seeds(3, &TOYS_OF_FMI3);
+    let tally = run_seeds(3, &MODELS_OF_FMI3);
     check_counts(&tally, fmi3::FUNCTIONS);
     check_counts(&tally, &["fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange"]);
 }
@@ -78,8 +78,8 @@ fn the_corpus_breaks_no_promise() {
         let mut file = archive.by_index(index).expect("a file of the archive");
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).expect("an intact file");
-        for (toy, session) in TOYS.iter().chain(&TOYS_OF_FMI3) {
-            println!("{toy}, {:?}", file.name());
+        for (model, session) in MODELS.iter().chain(&MODELS_OF_FMI3) {
+            println!("{model}, {:?}", file.name());
             session(&bytes, &mut tally);
         }
     }

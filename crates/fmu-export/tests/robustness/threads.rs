@@ -1,6 +1,6 @@
 //! Masters create, step and free instances on pools of threads.
 
-use crate::toys::{Oscillator, oscillator::Name};
+use crate::models::{Oscillator, oscillator::Name};
 use fmu_export::Interface::ModelExchange;
 use fmu_test_kit::{Either, Importer, fmi3};
 use std::sync::Mutex;

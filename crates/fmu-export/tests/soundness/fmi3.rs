@@ -1,6 +1,6 @@
 //! The same in FMI 3.0.
 
-use crate::toys::{Ball, Oscillator, Palette, Talker, oscillator::Name, palette, talker};
+use crate::models::{Ball, Oscillator, Palette, Talker, oscillator::Name, palette, talker};
 use crate::{serialized_into_memory_that_was_never_written, unwritten, writes, written};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Model;

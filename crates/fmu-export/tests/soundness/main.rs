@@ -4,8 +4,8 @@
 // Under Miri, the callback is variadic as in C.
 #![cfg_attr(miri, feature(c_variadic))]
 
-#[path = "../toys/mod.rs"]
-mod toys;
+#[path = "../models/mod.rs"]
+mod models;
 
 mod fmi3;
 
@@ -17,7 +17,7 @@ use std::cell::{Cell, RefCell};
 use std::ffi::CString;
 use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
-use toys::{Ball, Counter, Oscillator, Talker, oscillator::Name, talker};
+use models::{Ball, Counter, Oscillator, Talker, oscillator::Name, talker};
 
 #[cfg(miri)]
 type CallBack = fmi2CallbackLogger;

@@ -1,7 +1,7 @@
 //! Arrays: one variable in FMI 3.0, a scalar for each element in FMI 2.0.
 
-use crate::toys::Rod;
-use crate::toys::rod::{Name, PIECES};
+use crate::models::Rod;
+use crate::models::rod::{Name, PIECES};
 use fmu_export::fmi3::{reference, types::*};
 use fmu_export::*;
 use fmu_test_kit::Either;

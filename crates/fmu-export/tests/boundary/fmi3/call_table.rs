@@ -1,7 +1,7 @@
 //! Every function in every state, compared with the states of FMI 3.0 (sections 2.3, 3.2 and 4.2). The table
 //! is copied here independently from the text, state by state.
 
-use crate::toys::*;
+use crate::models::*;
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
 use fmu_export::fmi3::ALLOWED;

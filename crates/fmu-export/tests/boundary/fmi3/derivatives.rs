@@ -1,7 +1,7 @@
 //! Partial derivatives, derivatives of outputs, and dependencies.
 
-use crate::toys::oscillator::Name::{self, *};
-use crate::toys::{Oscillator, Sum};
+use crate::models::oscillator::Name::{self, *};
+use crate::models::{Oscillator, Sum};
 use fmu_export::Interface::*;
 use fmu_export::Variables;
 use fmu_export::fmi3::reference;

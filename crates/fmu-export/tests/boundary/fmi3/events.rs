@@ -1,8 +1,8 @@
 //! Events in Model Exchange and in Co-Simulation with and without Event Mode, and steps that end early.
 
-use crate::toys::grumbler::{self, Trouble};
-use crate::toys::ticker::Name;
-use crate::toys::*;
+use crate::models::grumbler::{self, Trouble};
+use crate::models::ticker::Name;
+use crate::models::*;
 use fmu_export::Interface::*;
 use fmu_export::fmi3::{indicator, reference, types::*};
 use fmu_test_kit::fmi3::{Importer, Stepped};

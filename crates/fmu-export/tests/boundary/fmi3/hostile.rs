@@ -1,7 +1,7 @@
 //! Invalid arguments. (`tests/soundness` covers loggers that call back; `tests/panics` covers models that
 //! panic.)
 
-use crate::toys::*;
+use crate::models::*;
 use fmu_export::Interface::*;
 use fmu_export::fmi3::types::*;
 use fmu_export::{Exported, Mode};

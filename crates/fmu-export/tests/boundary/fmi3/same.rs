@@ -1,6 +1,6 @@
 //! Equal inputs and steps give bit-identical results in both FMI versions.
 
-use crate::toys::*;
+use crate::models::*;
 use fmu_export::{Causality, Exported, Interface::*, Mode::ContinuousTime};
 use fmu_test_kit::checks::places;
 use fmu_test_kit::{Either, Importer, fmi3, serialized};

@@ -1,6 +1,6 @@
 //! Saved states, which are valid only in one FMI version.
 
-use crate::toys::{Palette, Ticker};
+use crate::models::{Palette, Ticker};
 use fmu_export::Interface::*;
 use fmu_export::Mode;
 use fmu_test_kit::Either;

@@ -1,8 +1,8 @@
 //! Values of every type.
 
-use crate::toys::grumbler::{self, Trouble};
-use crate::toys::palette::{Colour, Name};
-use crate::toys::{Counter, Grumbler, Oscillator, Palette, Talker, oscillator, talker};
+use crate::models::grumbler::{self, Trouble};
+use crate::models::palette::{Colour, Name};
+use crate::models::{Counter, Grumbler, Oscillator, Palette, Talker, oscillator, talker};
 use fmu_export::fmi3::{independent, reference, types::*};
 use fmu_export::{Causality, Enumeration, Exported, Interface::*, Variables};
 use fmu_test_kit::Either;

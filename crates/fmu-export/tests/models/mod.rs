@@ -1,6 +1,6 @@
-//! Toy models that together show all that FMI 2.0 allows, and `Palette` and `Ticker` what FMI 3.0
+//! Test models that together show all that FMI 2.0 allows, and `Palette` and `Ticker` what FMI 3.0
 //! has more. Each is short, and complete.
-#![allow(dead_code, missing_docs, unused_imports, reason = "not every test uses every toy")]
+#![allow(dead_code, missing_docs, unused_imports, reason = "not every test uses every test model")]
 
 pub mod balance;
 #[path = "../../../cargo-fmu/models/ball/src/ball.rs"]
