@@ -1,5 +1,4 @@
-//! Tests of the C functions of FMI 2.0 with test models, called as in the standard and by fault-injecting
-//! importers.
+//! Tests of the C functions of both FMI versions with test models.
 #![allow(missing_docs)]
 
 #[path = "../models/mod.rs"]
@@ -9,37 +8,35 @@ use fmu_export::{Exported, Interface};
 
 /// Calls a function for every test model.
 macro_rules! for_every_model {
-    ($function:ident($($argument:expr),*)) => {{
-        $function::<crate::models::Oscillator>($($argument),*);
-        $function::<crate::models::Ball>($($argument),*);
-        $function::<crate::models::Counter>($($argument),*);
-        $function::<crate::models::Talker>($($argument),*);
-        $function::<crate::models::Sum>($($argument),*);
-        $function::<crate::models::Fuse>($($argument),*);
-        $function::<crate::models::Motor>($($argument),*);
-        $function::<crate::models::Lazy>($($argument),*);
-        $function::<crate::models::Balance>($($argument),*);
-        $function::<crate::models::Meter>($($argument),*);
+    ($function:ident $(, $importer:ty)?) => {{
+        $function::<$($importer,)? crate::models::Oscillator>();
+        $function::<$($importer,)? crate::models::Ball>();
+        $function::<$($importer,)? crate::models::Counter>();
+        $function::<$($importer,)? crate::models::Talker>();
+        $function::<$($importer,)? crate::models::Sum>();
+        $function::<$($importer,)? crate::models::Fuse>();
+        $function::<$($importer,)? crate::models::Motor>();
+        $function::<$($importer,)? crate::models::Lazy>();
+        $function::<$($importer,)? crate::models::Meter>();
     }};
 }
 
+mod arrays;
 mod calculated;
 mod call_table;
 mod derivatives;
-mod early_steps;
 mod events;
 mod experiment;
-mod fmi3;
-mod less;
 mod logging;
-mod oscillation;
 mod places;
 mod refusals;
+mod runs;
 mod saved_states;
 mod settable;
 mod simulation;
 mod start_values;
 mod tolerances;
+mod valid_calls;
 mod variables;
 
 const INTERFACES: [Interface; 2] = [Interface::CoSimulation, Interface::ModelExchange];
