@@ -30,7 +30,7 @@ OUTPUTS = [
 
 @pytest.fixture(scope="session")
 def rods(tmp_path_factory) -> tuple[Path, Path]:
-    """The FMUs of crates/fmu-export/tests/toys/rod.rs, for FMI 2.0 and FMI 3.0."""
+    """The FMUs of crates/fmu-export/tests/models/rod.rs, for FMI 2.0 and FMI 3.0."""
     folder = tmp_path_factory.mktemp("rods")
     # Built in the whole workspace, like the Rust tests: with --package, cargo compiles other features.
     build = ["cargo", "build", "--quiet", "--locked", "--workspace", "--example", "rod"]

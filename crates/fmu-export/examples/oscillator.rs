@@ -1,6 +1,6 @@
 //! The oscillator of the tests as a shared library, for C programs.
 
-#[path = "../tests/toys/oscillator.rs"]
+#[path = "../tests/models/oscillator.rs"]
 mod oscillator;
 
 fmu_export::symbols!(oscillator::Oscillator);

@@ -1,6 +1,6 @@
 //! The rod of the tests as a shared library, for importers that read arrays.
 
-#[path = "../tests/toys/rod.rs"]
+#[path = "../tests/models/rod.rs"]
 #[allow(dead_code, missing_docs)]
 mod rod;
 

@@ -1,6 +1,6 @@
 //! The talker of the tests as a shared library: a second FMU in a process.
 
-#[path = "../tests/toys/talker.rs"]
+#[path = "../tests/models/talker.rs"]
 mod talker;
 
 fmu_export::symbols!(talker::Talker);

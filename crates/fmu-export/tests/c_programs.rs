@@ -3,19 +3,20 @@
 #![cfg(unix)]
 #![allow(missing_docs)]
 
-mod toys;
+mod models;
 
 use fmu_export::Interface::ModelExchange;
+use fmu_export::Mode::ContinuousTime;
 use fmu_export::Model;
 use fmu_export::fmi2::types::*;
 use fmu_test_kit::c_programs::{check_syntax, command, compile, headers, library, output, reload};
 use fmu_test_kit::{Either, FUNCTIONS, Importer, fmi3};
+use models::{Oscillator, oscillator::Name};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::mem::offset_of;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use toys::{Oscillator, oscillator::Name};
 
 /// The functions that work on no instance, of both standards.
 const WITHOUT_INSTANCE: [&str; 9] = [
@@ -41,19 +42,16 @@ fn run(name: &str) -> String {
     output(command.arg(library("oscillator")).arg(Oscillator::INFO.guid), "the compiled program does not run")
 }
 
-const OUTPUTS: [Name; 4] = [Name::position, Name::velocity, Name::spring_force, Name::energy];
+const OUTPUTS: [u32; 4] =
+    [Name::position as u32, Name::velocity as u32, Name::spring_force as u32, Name::energy as u32];
 
-/// The lines `name value` that a program prints.
-fn values(printed: &str) -> BTreeMap<&str, f64> {
-    let pairs = printed.lines().map(|line| line.split_once(' ').unwrap());
-    pairs.map(|(name, value)| (name, value.parse().unwrap())).collect()
-}
-
-/// What the FMU writes in C is what it writes in Rust, and the types have the same layout.
+/// Checks that the FMU writes equal values in C and in Rust, and that the types have equal layouts. `reload`
+/// drives the FMU in FMI 3.0.
 #[test]
 fn drive() {
     let printed = run("drive");
-    let mut values = values(&printed);
+    let pairs = printed.lines().map(|line| line.split_once(' ').unwrap());
+    let mut values: BTreeMap<&str, f64> = pairs.map(|(name, value)| (name, value.parse().unwrap())).collect();
     for (name, expected) in [
         ("sizeof_callbacks", size_of::<fmi2CallbackFunctions>()),
         ("offset_environment", offset_of!(fmi2CallbackFunctions, component_environment)),
@@ -69,19 +67,8 @@ fn drive() {
     ] {
         assert_eq!(values.remove(name), Some(expected as f64), "{name}");
     }
-    same_runs::<Importer>(values);
-}
-
-/// The same of FMI 3.0.
-#[test]
-fn drive3() {
-    same_runs::<fmi3::Importer>(values(&run("drive3")));
-}
-
-/// Both runs of a program come to the same ends as in Rust.
-fn same_runs<F: Either>(mut values: BTreeMap<&str, f64>) {
-    assert_eq!(OUTPUTS.map(|name| name as u32), [1, 2, 5, 6], "as the C programs have them");
-    for (prefix, expected) in [("cs", co_simulation::<F>()), ("me", model_exchange())] {
+    assert_eq!(OUTPUTS, [1, 2, 5, 6], "as in the C program");
+    for (prefix, expected) in [("cs", co_simulation()), ("me", model_exchange())] {
         for (i, expected) in expected.into_iter().enumerate() {
             assert_eq!(values.remove(format!("{prefix}{i}").as_str()), Some(expected), "{prefix}{i}");
         }
@@ -89,36 +76,34 @@ fn same_runs<F: Either>(mut values: BTreeMap<&str, f64>) {
     assert!(values.is_empty(), "{values:?}");
 }
 
-/// The Co-Simulation run of the programs.
-fn co_simulation<F: Either>() -> [f64; 4] {
-    let fmu = F::initialized_at::<Oscillator>(0.0);
+/// Makes the Co-Simulation run of the program.
+fn co_simulation() -> [f64; 4] {
+    let fmu = Importer::initialized_at::<Oscillator>(0.0);
     for i in (0..64).map(f64::from) {
         fmu.set(&[Name::force as u32], &[i / 64.0]);
         fmu.step(i / 64.0, 1.0 / 64.0);
     }
-    fmu.get(OUTPUTS.map(|name| name as u32))
+    fmu.get(OUTPUTS)
 }
 
-/// The Model Exchange run of the programs; FMI 3.0 has the same bits (`boundary/fmi3/same.rs`).
+/// Makes the Model Exchange run of the program.
 fn model_exchange() -> [f64; 4] {
-    let fmu = Importer::of::<Oscillator>(ModelExchange);
-    fmu.initialize(0.0);
-    fmu.ok(fmu.fmi2EnterContinuousTimeMode());
-    let (mut x, mut rates) = ([0.0; 2], [0.0; 2]);
+    let fmu = Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime);
+    let mut x = [0.0; 2];
     for i in (0..1024).map(f64::from) {
         fmu.set(&[Name::force as u32], &[i / 1024.0]);
-        fmu.ok(fmu.fmi2GetDerivatives(rates.as_mut_ptr(), 2));
+        let rates = fmu.derivatives::<2>();
         x = std::array::from_fn(|i| x[i] + rates[i] / 1024.0);
-        fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), 2));
+        fmu.ok(fmu.set_states(x.as_ptr(), 2));
     }
-    fmu.get(OUTPUTS.map(|name| name as u32))
+    fmu.get(OUTPUTS)
 }
 
 /// A variadic logger that formats and one that does not show the same texts.
 #[test]
 fn loggers() {
     let printed = run("loggers");
-    assert!(printed.contains("[toy] fmi2Instantiate: the guid {_n_s_d} _r0_ 100_ is not"), "{printed}");
+    assert!(printed.contains("[model] fmi2Instantiate: the guid {_n_s_d} _r0_ 100_ is not"), "{printed}");
     assert!(printed.contains("[a#b] instantiated"), "{printed}");
     assert!(printed.contains("there is no log category '_s_s_n'"), "{printed}");
 }

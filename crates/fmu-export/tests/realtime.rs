@@ -1,16 +1,16 @@
 //! The control loop of the oscillator.
 #![allow(missing_docs)]
 
-mod toys;
+mod models;
 
-fmu_test_kit::control_loop!(toys::Oscillator);
+fmu_test_kit::control_loop!(models::Oscillator);
 
 /// Arrays, whole in FMI 3.0 and by their elements in FMI 2.0.
 #[test]
 fn arrays_are_set_and_read_without_allocation() {
     use fmu_export::Variables;
     use fmu_test_kit::Either;
-    use toys::{Rod, rod::Name};
+    use models::{Rod, rod::Name};
     let [power, temperatures, rates] =
         [Name::power, Name::T, Name::der_T].map(|name| Rod::place(name) as u32);
     let whole = fmu_test_kit::fmi3::Importer::initialized_at::<Rod>(0.0);

@@ -10,7 +10,7 @@ use fmu_package::structure::DependencyKind::{Constant, Dependent, Fixed};
 use fmu_package::structure::{ModelStructure, Unknown};
 use fmu_package::{Changes, Terminal, terminals};
 
-#[path = "../../fmu-export/tests/toys/rod.rs"]
+#[path = "../../fmu-export/tests/models/rod.rs"]
 #[allow(dead_code)]
 mod rod;
 

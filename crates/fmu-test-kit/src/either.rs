@@ -1,10 +1,10 @@
 //! Operations on an instance of either FMI version, and assertions for tests.
 
-use crate::{Arguments, Message};
+use crate::{Arguments, Hook, Message};
 use fmu_export::Mode::{self, *};
-use fmu_export::{Exported, Interface, Status};
-use std::ffi::{c_char, c_void};
-use std::ptr::null_mut;
+use fmu_export::{Exported, Interface, Standard, Status};
+use std::ffi::{CStr, CString, c_char, c_void};
+use std::ptr::{null, null_mut};
 
 /// Result of an event: `fmi2EventInfo`, or the results of `fmi3UpdateDiscreteStates`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,6 +15,13 @@ pub struct Updated {
     pub nominals_changed: bool,
     pub states_changed: bool,
     pub next: Option<f64>,
+}
+
+/// Returns the value of a Boolean of C.
+#[track_caller]
+pub(crate) fn truth(flag: i32) -> bool {
+    assert!([0, 1].contains(&flag), "{flag} is no Boolean");
+    flag == 1
 }
 
 /// Declares the functions that differ only in their names.
@@ -40,6 +47,8 @@ macro_rules! same_functions {
             set_states fmi2SetContinuousStates fmi3SetContinuousStates (x: *const f64, count: usize);
             get_states fmi2GetContinuousStates fmi3GetContinuousStates (x: *mut f64, count: usize);
             get_derivatives fmi2GetDerivatives fmi3GetContinuousStateDerivatives (rates: *mut f64, count: usize);
+            get_nominals fmi2GetNominalsOfContinuousStates fmi3GetNominalsOfContinuousStates (nominals: *mut f64, count: usize);
+            get_indicators fmi2GetEventIndicators fmi3GetEventIndicators (indicators: *mut f64, count: usize);
         }
     };
 }
@@ -49,6 +58,16 @@ pub(crate) use same_functions;
 /// table.
 #[allow(clippy::missing_panics_doc, reason = "that is what the asserting ones are for")]
 pub trait Either: Send {
+    /// Returns the FMI version.
+    fn standard() -> Standard
+    where
+        Self: Sized;
+
+    /// Returns the names of the functions on an instance.
+    fn functions() -> &'static [&'static str]
+    where
+        Self: Sized;
+
     same_functions!(same);
 
     /// Makes an instance of a model in this program.
@@ -61,11 +80,6 @@ pub trait Either: Send {
 
     /// Returns a handle without an instance (NULL).
     fn nothing<M: Exported>() -> Self
-    where
-        Self: Sized;
-
-    /// Returns the names of the functions on an instance.
-    fn functions() -> &'static [&'static str]
     where
         Self: Sized;
 
@@ -95,6 +109,9 @@ pub trait Either: Send {
     /// Returns the messages since the last call of this function.
     fn take_log(&self) -> Vec<Message>;
 
+    /// Runs this code in the log callback, for every message.
+    fn on_message(&self, hook: Hook);
+
     /// Enters Initialization Mode.
     fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status;
 
@@ -113,6 +130,21 @@ pub trait Either: Send {
     /// Sets a String.
     fn set_text(&self, place: u32, value: *const c_char) -> Status;
 
+    /// Sets an Enumeration.
+    fn set_item(&self, place: u32, value: i32) -> Status;
+
+    /// Reads an Integer.
+    fn get_integer(&self, place: u32, value: &mut i32) -> Status;
+
+    /// Reads a Boolean.
+    fn get_boolean(&self, place: u32, value: &mut u8) -> Status;
+
+    /// Reads a String.
+    fn get_text(&self, place: u32, value: &mut *const c_char) -> Status;
+
+    /// Reads an Enumeration.
+    fn get_item(&self, place: u32, value: &mut i32) -> Status;
+
     /// Performs a step.
     fn try_step(&self, point: f64, step_size: f64) -> Status;
 
@@ -123,17 +155,24 @@ pub trait Either: Send {
     fn give_rates(&self, _places: &[u32], _values: &[f64]) {}
 
     /// Reads the time derivative of a variable.
-    fn rate(&self, place: u32) -> f64;
+    fn try_rate(&self, place: u32, order: i32, rate: &mut f64) -> Status;
 
-    /// Reads a partial derivative.
-    fn partial(&self, unknown: u32, known: u32) -> f64;
+    /// Reads the directional derivatives of up to 16 unknowns with respect to up to 16 knowns. FMI 3.0 reads
+    /// adjoint derivatives, too, and compares them.
+    fn try_directional(&self, unknowns: &[u32], knowns: &[u32], seed: &[f64], results: &mut [f64]) -> Status;
 
     /// Performs one iteration of the event handling.
-    fn update(&self) -> Updated;
+    ///
+    /// # Errors
+    /// Returns the status if it is not OK.
+    fn try_update(&self) -> Result<Updated, Status>;
 
     /// Reports a completed step of an integrator. Returns whether there is an event, and whether the
     /// simulation ends.
-    fn completed_step(&self) -> [bool; 2];
+    ///
+    /// # Errors
+    /// Returns the status if it is not OK.
+    fn try_completed_step(&self) -> Result<[bool; 2], Status>;
 
     /// Serializes a saved state.
     fn serialize_into(&self, state: *mut c_void, bytes: *mut u8, size: usize) -> Status;
@@ -319,6 +358,91 @@ pub trait Either: Send {
                 return all;
             }
         }
+    }
+
+    /// Returns the value of an Integer.
+    #[track_caller]
+    fn integer(&self, place: u32) -> i32 {
+        let mut value = i32::MIN;
+        self.ok(self.get_integer(place, &mut value));
+        value
+    }
+
+    /// Returns the value of an Enumeration.
+    #[track_caller]
+    fn item(&self, place: u32) -> i32 {
+        let mut value = i32::MIN;
+        self.ok(self.get_item(place, &mut value));
+        value
+    }
+
+    /// Returns the value of a Boolean.
+    #[track_caller]
+    fn boolean(&self, place: u32) -> bool {
+        let mut value = 7;
+        self.ok(self.get_boolean(place, &mut value));
+        truth(value.into())
+    }
+
+    /// Returns the value of a String.
+    #[track_caller]
+    fn text(&self, place: u32) -> String {
+        let mut value = null();
+        self.ok(self.get_text(place, &mut value));
+        // SAFETY: a string of the FMU, valid until the next call.
+        unsafe { CStr::from_ptr(value) }.to_str().expect("UTF-8").to_owned()
+    }
+
+    /// Sets a String.
+    #[track_caller]
+    fn say(&self, place: u32, text: &str) {
+        let text = CString::new(text).expect("no NUL");
+        self.ok(self.set_text(place, text.as_ptr()));
+    }
+
+    /// Returns the time derivative of a variable.
+    #[track_caller]
+    fn rate(&self, place: u32) -> f64 {
+        let mut rate = f64::NAN;
+        self.ok(self.try_rate(place, 1, &mut rate));
+        rate
+    }
+
+    /// Returns time derivatives.
+    #[track_caller]
+    fn rates<const COUNT: usize>(&self, places: [u32; COUNT]) -> [f64; COUNT]
+    where
+        Self: Sized,
+    {
+        places.map(|place| self.rate(place))
+    }
+
+    /// Returns a partial derivative.
+    #[track_caller]
+    fn partial(&self, unknown: u32, known: u32) -> f64 {
+        let mut partial = f64::NAN;
+        self.ok(self.try_directional(&[unknown], &[known], &[1.0], std::slice::from_mut(&mut partial)));
+        partial
+    }
+
+    /// Returns directional derivatives.
+    #[track_caller]
+    fn directional(&self, unknowns: &[u32], knowns: &[u32], seed: &[f64]) -> Vec<f64> {
+        let mut results = vec![f64::NAN; unknowns.len()];
+        self.ok(self.try_directional(unknowns, knowns, seed, &mut results));
+        results
+    }
+
+    /// Performs one iteration of the event handling; asserts success.
+    #[track_caller]
+    fn update(&self) -> Updated {
+        self.try_update().unwrap_or_else(|status| panic!("{status:?}, log: {:#?}", self.take_log()))
+    }
+
+    /// Reports a completed step of an integrator; asserts success.
+    #[track_caller]
+    fn completed_step(&self) -> [bool; 2] {
+        self.try_completed_step().unwrap_or_else(|status| panic!("{status:?}, log: {:#?}", self.take_log()))
     }
 
     /// Returns values of Reals as a vector.

@@ -1,12 +1,13 @@
 //! FMI 2.0: an instance as an importer uses it.
 
-use crate::importer::{Log, importer, remember};
-use crate::{Arguments, Borrowed, Either, Message, Updated, either, library::functions_of};
+use crate::either::{self, truth};
+use crate::importer::{Log, importer, lock, remember};
+use crate::{Arguments, Either, Hook, Message, Updated, library::functions_of};
 use fmi_abi::calls;
 pub use fmi_abi::fmi2::Functions;
 use fmi_abi::fmi2::types::*;
 use fmu_export::Mode::{self, *};
-use fmu_export::{Exported, Interface};
+use fmu_export::{Exported, Interface, Standard};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr::{null, null_mut};
 
@@ -78,37 +79,10 @@ impl Importer {
         [fmi2GetVersion, fmi2GetTypesPlatform].map(|text| unsafe { CStr::from_ptr(text()) })
     }
 
-    /// Returns output derivatives of order 1.
-    #[track_caller]
-    pub fn rates<const COUNT: usize>(&self, vr: [u32; COUNT]) -> [f64; COUNT] {
-        let mut values = [f64::NAN; COUNT];
-        let orders = [1; COUNT];
-        self.ok(self.fmi2GetRealOutputDerivatives(vr.as_ptr(), COUNT, orders.as_ptr(), values.as_mut_ptr()));
-        values
-    }
-
     /// Sets input derivatives of order 1.
     #[track_caller]
     pub fn set_rates<const COUNT: usize>(&self, vr: [u32; COUNT], values: [f64; COUNT]) {
         self.give_rates(&vr, &values);
-    }
-
-    /// Returns directional derivatives.
-    #[track_caller]
-    pub fn directional(&self, unknown: &[u32], known: &[u32], seed: &[f64]) -> Vec<f64> {
-        let mut result = vec![f64::NAN; unknown.len()];
-        let (unknowns, knowns) = (unknown.as_ptr(), known.as_ptr());
-        assert_eq!(seed.len(), known.len());
-        let (seed, wanted) = (seed.as_ptr(), result.as_mut_ptr());
-        self.ok(self.fmi2GetDirectionalDerivative(
-            unknowns,
-            unknown.len(),
-            knowns,
-            known.len(),
-            seed,
-            wanted,
-        ));
-        result
     }
 
     /// Calls `fmi2SetDebugLogging` with these categories.
@@ -127,16 +101,20 @@ macro_rules! same {
 impl Either for Importer {
     either::same_functions!(same);
 
+    fn standard() -> Standard {
+        Standard::Fmi2
+    }
+
+    fn functions() -> &'static [&'static str] {
+        FUNCTIONS
+    }
+
     fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
         Self::try_with::<M>(arguments)
     }
 
     fn nothing<M: Exported>() -> Self {
         Self::null::<M>()
-    }
-
-    fn functions() -> &'static [&'static str] {
-        FUNCTIONS
     }
 
     fn modes_of(interface: Interface) -> &'static [Mode] {
@@ -157,6 +135,10 @@ impl Either for Importer {
 
     fn take_log(&self) -> Vec<Message> {
         self.log.take()
+    }
+
+    fn on_message(&self, hook: Hook) {
+        *lock(&self.log.hook) = Some(hook);
     }
 
     fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status {
@@ -189,6 +171,29 @@ impl Either for Importer {
         self.fmi2SetString(&vr, 1, &value)
     }
 
+    fn set_item(&self, vr: u32, value: i32) -> Status {
+        self.set_integer(vr, value)
+    }
+
+    fn get_integer(&self, vr: u32, value: &mut i32) -> Status {
+        self.fmi2GetInteger(&vr, 1, value)
+    }
+
+    fn get_boolean(&self, vr: u32, value: &mut u8) -> Status {
+        let mut boolean = (*value).into();
+        let status = self.fmi2GetBoolean(&vr, 1, &mut boolean);
+        *value = boolean.try_into().expect("a Boolean is 0 or 1");
+        status
+    }
+
+    fn get_text(&self, vr: u32, value: &mut *const c_char) -> Status {
+        self.fmi2GetString(&vr, 1, value)
+    }
+
+    fn get_item(&self, vr: u32, value: &mut i32) -> Status {
+        self.get_integer(vr, value)
+    }
+
     fn try_step(&self, point: f64, step_size: f64) -> Status {
         self.fmi2DoStep(point, step_size, fmi2True)
     }
@@ -210,21 +215,18 @@ impl Either for Importer {
         self.ok(self.fmi2SetRealInputDerivatives(vr, count, orders.as_ptr(), values.as_ptr()));
     }
 
-    #[track_caller]
-    fn rate(&self, vr: u32) -> f64 {
-        let [rate] = self.rates([vr]);
-        rate
+    fn try_rate(&self, vr: u32, order: i32, rate: &mut f64) -> Status {
+        self.fmi2GetRealOutputDerivatives(&vr, 1, &order, rate)
     }
 
-    #[track_caller]
-    fn partial(&self, unknown: u32, known: u32) -> f64 {
-        let mut partial = f64::NAN;
-        self.ok(self.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, &mut partial));
-        partial
+    fn try_directional(&self, unknowns: &[u32], knowns: &[u32], seed: &[f64], results: &mut [f64]) -> Status {
+        assert_eq!([seed.len(), results.len()], [knowns.len(), unknowns.len()]);
+        let (unknown, known) = (unknowns.as_ptr(), knowns.as_ptr());
+        let (counts, results) = ([unknowns.len(), knowns.len()], results.as_mut_ptr());
+        self.fmi2GetDirectionalDerivative(unknown, counts[0], known, counts[1], seed.as_ptr(), results)
     }
 
-    #[track_caller]
-    fn update(&self) -> Updated {
+    fn try_update(&self) -> Result<Updated, Status> {
         let mut info = fmi2EventInfo {
             new_discrete_states_needed: 2,
             terminate_simulation: 2,
@@ -233,22 +235,24 @@ impl Either for Importer {
             next_event_time_defined: 2,
             next_event_time: f64::NAN,
         };
-        self.ok(self.fmi2NewDiscreteStates(&mut info));
-        let truth = |flag| [fmi2False, fmi2True].iter().position(|of| *of == flag).expect("0 or 1") == 1;
-        Updated {
-            again: truth(info.new_discrete_states_needed),
-            terminate: truth(info.terminate_simulation),
-            nominals_changed: truth(info.nominals_of_continuous_states_changed),
-            states_changed: truth(info.values_of_continuous_states_changed),
-            next: truth(info.next_event_time_defined).then_some(info.next_event_time),
+        match self.fmi2NewDiscreteStates(&mut info) {
+            Status::Ok => Ok(Updated {
+                again: truth(info.new_discrete_states_needed),
+                terminate: truth(info.terminate_simulation),
+                nominals_changed: truth(info.nominals_of_continuous_states_changed),
+                states_changed: truth(info.values_of_continuous_states_changed),
+                next: truth(info.next_event_time_defined).then_some(info.next_event_time),
+            }),
+            status => Err(status),
         }
     }
 
-    #[track_caller]
-    fn completed_step(&self) -> [bool; 2] {
+    fn try_completed_step(&self) -> Result<[bool; 2], Status> {
         let [mut event, mut terminate] = [2; 2];
-        self.ok(self.fmi2CompletedIntegratorStep(fmi2True, &mut event, &mut terminate));
-        [event, terminate].map(|flag| [fmi2False, fmi2True].iter().position(|of| *of == flag) == Some(1))
+        match self.fmi2CompletedIntegratorStep(fmi2True, &mut event, &mut terminate) {
+            Status::Ok => Ok([event, terminate].map(truth)),
+            status => Err(status),
+        }
     }
 
     fn serialize_into(&self, state: *mut c_void, bytes: *mut u8, size: usize) -> Status {

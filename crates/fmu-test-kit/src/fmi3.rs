@@ -1,13 +1,14 @@
 //! FMI 3.0: an instance as an importer uses it.
 
-use crate::importer::{Log, importer, remember};
-use crate::{Arguments, Borrowed, Either, Message, Updated, either};
+use crate::either::{self, truth};
+use crate::importer::{Log, importer, lock, remember};
+use crate::{Arguments, Either, Hook, Message, Updated};
 use fmi_abi::calls;
 pub use fmi_abi::fmi3::Functions;
 use fmi_abi::fmi3::types::*;
 use fmu_export::Mode::{self, *};
 use fmu_export::fmi3::{functions as functions_of, reference};
-use fmu_export::{Exported, Interface};
+use fmu_export::{Exported, Interface, Standard};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr::{null, null_mut};
 
@@ -23,7 +24,7 @@ unsafe extern "C" fn log_message(
     unsafe { remember(environment, null(), status, category, message) }
 }
 
-/// Calls `fmi3InstantiateModelExchange` or `fmi3InstantiateCoSimulation`.
+/// Calls the function that makes instances of the interface type.
 fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance {
     let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
     let name = pointer(arguments.instance_name);
@@ -52,6 +53,18 @@ fn make(functions: &Functions, arguments: &Arguments, log: &Log) -> fmi3Instance
                 logging_on,
                 environment,
                 callback,
+            ),
+            2 => (functions.fmi3InstantiateScheduledExecution)(
+                name,
+                token,
+                resources,
+                visible,
+                logging_on,
+                environment,
+                callback,
+                None,
+                None,
+                None,
             ),
             _ => (functions.fmi3InstantiateCoSimulation)(
                 name,
@@ -94,15 +107,10 @@ impl Importer {
         if status != Status::Ok {
             return Err(status);
         }
-        let [event_handling_needed, terminate, early_return] = [event, terminate, early].map(truth);
+        let [event_handling_needed, terminate, early_return] =
+            [event, terminate, early].map(|flag| truth(flag.into()));
         Ok(Stepped { event_handling_needed, terminate, early_return, last_successful_time: time })
     }
-}
-
-#[track_caller]
-fn truth(flag: fmi3Boolean) -> bool {
-    assert!(flag <= 1, "{flag} is no truth value");
-    flag == 1
 }
 
 /// Returns the value references of variables with these indices, up to 16. Allocates nothing, because tests
@@ -122,16 +130,20 @@ macro_rules! same {
 impl Either for Importer {
     either::same_functions!(same);
 
+    fn standard() -> Standard {
+        Standard::Fmi3
+    }
+
+    fn functions() -> &'static [&'static str] {
+        FUNCTIONS
+    }
+
     fn make<M: Exported>(arguments: &Arguments) -> Result<Self, Vec<Message>> {
         Self::try_with::<M>(arguments)
     }
 
     fn nothing<M: Exported>() -> Self {
         Self::null::<M>()
-    }
-
-    fn functions() -> &'static [&'static str] {
-        FUNCTIONS
     }
 
     fn modes_of(interface: Interface) -> &'static [Mode] {
@@ -148,6 +160,10 @@ impl Either for Importer {
 
     fn take_log(&self) -> Vec<Message> {
         self.log.take()
+    }
+
+    fn on_message(&self, hook: Hook) {
+        *lock(&self.log.hook) = Some(hook);
     }
 
     fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status {
@@ -181,6 +197,29 @@ impl Either for Importer {
         self.fmi3SetString(&reference(place), 1, &value, 1)
     }
 
+    fn set_item(&self, place: u32, value: i32) -> Status {
+        self.fmi3SetInt64(&reference(place), 1, &value.into(), 1)
+    }
+
+    fn get_integer(&self, place: u32, value: &mut i32) -> Status {
+        self.fmi3GetInt32(&reference(place), 1, value, 1)
+    }
+
+    fn get_boolean(&self, place: u32, value: &mut u8) -> Status {
+        self.fmi3GetBoolean(&reference(place), 1, value, 1)
+    }
+
+    fn get_text(&self, place: u32, value: &mut *const c_char) -> Status {
+        self.fmi3GetString(&reference(place), 1, value, 1)
+    }
+
+    fn get_item(&self, place: u32, value: &mut i32) -> Status {
+        let mut item = (*value).into();
+        let status = self.fmi3GetInt64(&reference(place), 1, &mut item, 1);
+        *value = item.try_into().expect("items are small");
+        status
+    }
+
     fn try_step(&self, point: f64, step_size: f64) -> Status {
         self.do_step(point, step_size).err().unwrap_or(Status::Ok)
     }
@@ -193,38 +232,54 @@ impl Either for Importer {
         assert_eq!(self.do_step(point, step_size), Ok(whole), "log: {:#?}", self.take_log());
     }
 
-    #[track_caller]
-    fn rate(&self, place: u32) -> f64 {
-        let mut rate = f64::NAN;
-        self.ok(self.fmi3GetOutputDerivatives(&reference(place), 1, &1, &mut rate, 1));
-        rate
+    fn try_rate(&self, place: u32, order: i32, rate: &mut f64) -> Status {
+        self.fmi3GetOutputDerivatives(&reference(place), 1, &order, rate, 1)
     }
 
-    /// Reads a directional and an adjoint derivative, which are equal for a single pair of variables.
-    #[track_caller]
-    fn partial(&self, unknown: u32, known: u32) -> f64 {
-        let [unknown, known] = [unknown, known].map(reference);
-        let (mut forward, mut adjoint) = (f64::NAN, f64::NAN);
-        self.ok(self.fmi3GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut forward, 1));
-        self.ok(self.fmi3GetAdjointDerivative(&unknown, 1, &known, 1, &1.0, 1, &mut adjoint, 1));
-        assert_eq!(forward.to_bits(), adjoint.to_bits());
-        forward
+    /// Also reads the adjoint derivatives of each unknown. By definition, their scalar product with the seed
+    /// is the directional derivative; for one known, both are bit-identical.
+    fn try_directional(&self, unknowns: &[u32], knowns: &[u32], seed: &[f64], results: &mut [f64]) -> Status {
+        assert_eq!([seed.len(), results.len()], [knowns.len(), unknowns.len()]);
+        let (unknown, known) = (references(unknowns), references(knowns));
+        let (u, k, [us, ks]) = (unknown.as_ptr(), known.as_ptr(), [unknowns.len(), knowns.len()]);
+        let status =
+            self.fmi3GetDirectionalDerivative(u, us, k, ks, seed.as_ptr(), ks, results.as_mut_ptr(), us);
+        for (unknown, forward) in unknown.iter().zip(results).filter(|_| status == Status::Ok) {
+            let mut adjoint = [f64::NAN; 16];
+            self.ok(self.fmi3GetAdjointDerivative(unknown, 1, k, ks, &1.0, 1, adjoint.as_mut_ptr(), ks));
+            let terms = || adjoint.iter().zip(seed).map(|(adjoint, seed)| adjoint * seed);
+            let (sum, scale) = (terms().sum::<f64>(), terms().map(f64::abs).sum::<f64>());
+            assert!(ks != 1 || sum.to_bits() == forward.to_bits() || sum == 0.0, "{adjoint:?} {forward}");
+            assert!((sum - *forward).abs() <= 1e-14 * scale, "{adjoint:?} {seed:?} {forward}");
+        }
+        status
     }
 
-    #[track_caller]
-    fn update(&self) -> Updated {
+    fn try_update(&self) -> Result<Updated, Status> {
         let (mut flags, mut next) = ([2; 5], f64::NAN);
         let [again, terminate, nominals, states, defined] = &mut flags;
-        self.ok(self.fmi3UpdateDiscreteStates(again, terminate, nominals, states, defined, &mut next));
-        let [again, terminate, nominals_changed, states_changed, defined] = flags.map(truth);
-        Updated { again, terminate, nominals_changed, states_changed, next: defined.then_some(next) }
+        match self.fmi3UpdateDiscreteStates(again, terminate, nominals, states, defined, &mut next) {
+            Status::Ok => {
+                let [again, terminate, nominals_changed, states_changed, defined] =
+                    flags.map(|flag| truth(flag.into()));
+                Ok(Updated {
+                    again,
+                    terminate,
+                    nominals_changed,
+                    states_changed,
+                    next: defined.then_some(next),
+                })
+            }
+            status => Err(status),
+        }
     }
 
-    #[track_caller]
-    fn completed_step(&self) -> [bool; 2] {
+    fn try_completed_step(&self) -> Result<[bool; 2], Status> {
         let [mut event, mut terminate] = [2; 2];
-        self.ok(self.fmi3CompletedIntegratorStep(fmi3True, &mut event, &mut terminate));
-        [event, terminate].map(truth)
+        match self.fmi3CompletedIntegratorStep(fmi3True, &mut event, &mut terminate) {
+            Status::Ok => Ok([event, terminate].map(|flag| truth(flag.into()))),
+            status => Err(status),
+        }
     }
 
     fn serialize_into(&self, state: *mut c_void, bytes: *mut u8, size: usize) -> Status {

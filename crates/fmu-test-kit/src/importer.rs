@@ -4,8 +4,7 @@
 use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmu_export::{Category, Exported, Interface, Status};
 use std::ffi::{CStr, CString};
-use std::ops::Deref;
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A log message that the importer received.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,13 +33,30 @@ impl Message {
     }
 }
 
+/// Code that runs in the log callback.
+pub type Hook = Box<dyn FnMut() + Send>;
+
 /// The importer's log; its address is the component environment.
-#[derive(Debug, Default)]
-pub(crate) struct Log(Mutex<Vec<Message>>);
+#[derive(Default)]
+pub(crate) struct Log {
+    messages: Mutex<Vec<Message>>,
+    /// Runs for every message, except for messages that it causes itself.
+    pub(crate) hook: Mutex<Option<Hook>>,
+}
+
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 impl Log {
     pub(crate) fn take(&self) -> Vec<Message> {
-        std::mem::take(&mut self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
+        std::mem::take(&mut lock(&self.messages))
+    }
+}
+
+impl std::fmt::Debug for Log {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        self.messages.fmt(f)
     }
 }
 
@@ -65,8 +81,12 @@ pub(crate) unsafe fn remember(
     let [instance_name, category, text] = [instance_name, category, message].map(text);
     // SAFETY: NULL, or the `Log` that was passed with the logger and lives as long as the instance.
     if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
-        let mut messages = log.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        messages.push(Message { instance_name, status, category, text });
+        lock(&log.messages).push(Message { instance_name, status, category, text });
+        let hook = lock(&log.hook).take();
+        if let Some(mut hook) = hook {
+            hook();
+            *lock(&log.hook) = Some(hook);
+        }
     }
 }
 
@@ -76,8 +96,8 @@ pub(crate) unsafe fn remember(
 #[allow(missing_docs, reason = "as in the standards: section 2.1.5 of FMI 2.0, 2.3.1 of FMI 3.0")]
 pub struct Arguments<'a> {
     pub instance_name: Option<&'a CStr>,
-    /// Interface type. FMI 3.0 has a function for each type; here 0 is Model Exchange and any other value
-    /// Co-Simulation.
+    /// Interface type. FMI 3.0 has a function for each type; here 0 is Model Exchange, 2 is Scheduled Execution
+    /// and any other value is Co-Simulation.
     pub fmu_type: i32,
     /// The guid, or the instantiation token.
     pub guid: Option<CString>,
@@ -116,27 +136,6 @@ impl Arguments<'static> {
     pub fn with_events<M: Exported>(interface: Interface) -> Self {
         let event_mode_used = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode()).into();
         Self { event_mode_used, early_return_allowed: 1, ..Self::of::<M>(interface) }
-    }
-}
-
-/// An instance of either FMI version that other code frees, see `Importer::borrowed`.
-pub struct Borrowed<F> {
-    pub(crate) importer: F,
-    /// Replaces the instance by NULL, which is safe to free.
-    pub(crate) forget: fn(&mut F),
-}
-
-impl<F> Deref for Borrowed<F> {
-    type Target = F;
-
-    fn deref(&self) -> &F {
-        &self.importer
-    }
-}
-
-impl<F> Drop for Borrowed<F> {
-    fn drop(&mut self) {
-        (self.forget)(&mut self.importer);
     }
 }
 
@@ -210,14 +209,13 @@ macro_rules! importer {
                 Self { functions: functions_of::<M>(), instance: null_mut(), log: std::sync::Arc::default() }
             }
 
-            /// Wraps an instance that other code owns, to call but not free it, for example in a log
-            /// callback.
+            /// Frees the instance, as an importer might do in a log callback.
             ///
             /// # Safety
-            /// The instance is NULL or was made by these functions, and lives as long as the result is used.
-            pub unsafe fn borrowed(functions: Functions, instance: $handle) -> Borrowed<Self> {
-                let importer = Self { functions, instance, log: std::sync::Arc::default() };
-                Borrowed { importer, forget: |importer| importer.instance = null_mut() }
+            /// The FMU ignores the call, because it is delivering a message.
+            pub unsafe fn free(&self) {
+                // SAFETY: the instance is NULL or alive, and stays alive.
+                unsafe { (self.functions.$free_instance)(self.instance) }
             }
 
             /// Returns the functions of the library.

@@ -22,7 +22,8 @@ pub mod realtime;
 pub mod serialized;
 
 pub use either::{Either, Updated};
+pub use fmi_abi::calls;
 pub use fmi2::{FUNCTIONS, Functions, Importer};
-pub use importer::{Arguments, Borrowed, Message};
+pub use importer::{Arguments, Hook, Message};
 pub use library::{functions_of, load};
 pub use random::Random;

@@ -9,9 +9,9 @@
 //! * In a build with `--cfg rtsan` and the RealtimeSanitizer, [`sanitizer`] marks the code in which blocking
 //!   calls are forbidden.
 
-use crate::checks::{inputs, outputs, parameters, start_of};
+use crate::checks::{boolean_parameters, inputs, outputs, start_of};
 use crate::{Either, Importer, fmi3};
-use fmu_export::{BaseType, Exported};
+use fmu_export::Exported;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::ffi::c_void;
@@ -121,7 +121,7 @@ impl<F: Either> Loop<F> {
             inputs,
             outputs,
             parameter: parameter.expect("a parameter"),
-            truths: parameters::<M>(BaseType::Boolean),
+            truths: boolean_parameters::<M>(),
         }
     }
 

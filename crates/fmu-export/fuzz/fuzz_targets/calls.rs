@@ -2,16 +2,16 @@
 //! the AddressSanitizer, the memory.
 #![no_main]
 
-#[path = "../../tests/toys/mod.rs"]
-mod toys;
+#[path = "../../tests/models/mod.rs"]
+mod models;
 
 use fmu_test_kit::careless::{RunBytes, Tally, run};
 use fmu_test_kit::{Importer, fmi3};
 use libfuzzer_sys::fuzz_target;
 use std::sync::atomic::{AtomicU64, Ordering};
-use toys::*;
+use models::*;
 
-/// The toys in FMI 2.0, then in FMI 3.0. What is new goes to the end: the committed bytes count on the places.
+/// The test models in FMI 2.0, then in FMI 3.0. What is new goes to the end: the committed bytes count on the places.
 ///
 /// Any exported model can stand here: `run::<Importer, prw_testbed::TestbedFmu>` with that crate among the dependencies.
 const MODELS: [RunBytes; 16] = [

@@ -1,6 +1,6 @@
 //! Tests of `Model::calculate`: it runs again after every change, before a value is read and before an event.
 
-use crate::toys::{Lazy, lazy::Name};
+use crate::models::{Lazy, lazy::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::fmi2::types::Status;
 use fmu_test_kit::{Either, Importer};

@@ -1,17 +1,14 @@
-//! Allowed calls: every function in every state of both state machines, compared with the tables of the
-//! standard. The tables are copied here independently from the text of FMI 2.0.5.
+//! Allowed calls: every function in every state of the state machines, compared with the standards. The
+//! tables are copied here independently from the text of FMI 2.0.5, and of FMI 3.0.2, sections 2.3, 3.2 and 4.2.
 
-use crate::offers;
-use crate::settable;
-use crate::toys::*;
+use crate::models::*;
+use crate::valid_calls::ValidCall;
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
-use fmu_export::fmi2::ALLOWED;
-use fmu_export::fmi2::types::*;
-use fmu_export::{BaseType, Causality, Exported, Variable};
+use fmu_export::{Exported, Standard, Status};
 use fmu_test_kit::checks::modes_of_model;
-use fmu_test_kit::{Either, FUNCTIONS, Importer, Random};
-use std::ptr::{null, null_mut};
+use fmu_test_kit::serialized::{MODE, with_mode};
+use fmu_test_kit::{Either, Importer, fmi3};
 
 /// Columns of the table in section 3.2.3: start/end, instantiated, Initialization Mode, Event Mode,
 /// Continuous-Time Mode, terminated, error, fatal.
@@ -90,8 +87,8 @@ const CO_SIMULATION: &str = "
     fmi2GetBooleanStatus         |  |  |  |x |x |x |  |x |  |
     fmi2GetStringStatus          |  |  |  |x |x |x |  |x |  |";
 
-/// Calls beyond the standard that real importers need: FMI Library terminates after an error, OpenModelica
-/// sets time and states in Event Mode. Other tests cover tolerances for single variables.
+/// Calls of FMI 2.0 beyond the standard that real importers need: FMI Library terminates after an error,
+/// OpenModelica sets time and states in Event Mode. Other tests cover tolerances for single variables.
 const TOLERATED: [(&str, Interface, Mode); 5] = [
     ("fmi2Terminate", CoSimulation, Error),
     ("fmi2Terminate", ModelExchange, Error),
@@ -100,8 +97,7 @@ const TOLERATED: [(&str, Interface, Mode); 5] = [
     ("fmi2SetContinuousStates", ModelExchange, Event),
 ];
 
-/// Returns whether the standard allows the call in one of our modes.
-fn standard(function: &str, interface: Interface, mode: Mode) -> bool {
+fn standard_of_fmi2(function: &str, interface: Interface, mode: Mode) -> bool {
     let (table, column) = match (interface, mode) {
         (ModelExchange, mode) => {
             let columns = [Instantiated, Initialization, Event, ContinuousTime, Terminated, Error, Fatal];
@@ -130,159 +126,164 @@ fn standard(function: &str, interface: Interface, mode: Mode) -> bool {
     }
 }
 
-fn accepted(function: &str, interface: Interface, mode: Mode) -> bool {
-    standard(function, interface, mode) || TOLERATED.contains(&(function, interface, mode))
-}
+/// Functions of the super state FMU State Settable, section 2.3.1.
+const EVERYWHERE: &str = "SetDebugLogging Reset GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize \
+    SerializeFMUState DeserializeFMUState";
 
-/// Returns the index of the first variable that satisfies `wanted`.
-fn first<M: Exported>(wanted: impl Fn(&Variable<M>) -> bool) -> Option<u32> {
-    M::TABLE.iter().position(wanted).map(|place| place as u32)
-}
+/// Functions of its states: common ones, further ones of Model Exchange, further ones of Co-Simulation.
+/// `Set*` and `Get*` represent the functions of all types.
+const STATES: [(Mode, &str, &str, &str); 6] = [
+    (
+        Instantiated,
+        "Set* Get* EnterConfigurationMode EnterInitializationMode GetNumberOfVariableDependencies \
+         GetVariableDependencies",
+        "GetNumberOfContinuousStates GetNumberOfEventIndicators",
+        "",
+    ),
+    (
+        Initialization,
+        "Set* Get* GetDirectionalDerivative GetAdjointDerivative GetShiftDecimal GetShiftFraction \
+         GetIntervalDecimal GetIntervalFraction SetShiftDecimal SetShiftFraction SetIntervalDecimal \
+         SetIntervalFraction ExitInitializationMode GetNumberOfVariableDependencies GetVariableDependencies",
+        "GetContinuousStateDerivatives GetContinuousStates GetNominalsOfContinuousStates GetEventIndicators",
+        "",
+    ),
+    (
+        Event,
+        "Set* Get* SetClock GetClock GetIntervalDecimal GetIntervalFraction GetDirectionalDerivative \
+         GetAdjointDerivative EvaluateDiscreteStates UpdateDiscreteStates GetNumberOfVariableDependencies \
+         GetVariableDependencies Terminate",
+        "GetContinuousStates GetContinuousStateDerivatives GetEventIndicators GetNumberOfContinuousStates \
+         GetNumberOfEventIndicators EnterConfigurationMode EnterContinuousTimeMode \
+         GetNominalsOfContinuousStates",
+        "EnterStepMode",
+    ),
+    (
+        ContinuousTime,
+        "SetFloat32 SetFloat64 Get* SetTime SetContinuousStates GetContinuousStates \
+         GetContinuousStateDerivatives GetEventIndicators CompletedIntegratorStep EnterEventMode \
+         GetDirectionalDerivative GetAdjointDerivative GetNumberOfVariableDependencies \
+         GetVariableDependencies GetNominalsOfContinuousStates Terminate",
+        "",
+        "",
+    ),
+    (
+        StepComplete,
+        "Set* Get* GetOutputDerivatives GetDirectionalDerivative GetAdjointDerivative DoStep EnterEventMode \
+         EnterConfigurationMode GetNumberOfVariableDependencies GetVariableDependencies Terminate",
+        "",
+        "",
+    ),
+    (
+        Terminated,
+        "Get* GetDirectionalDerivative GetAdjointDerivative GetNumberOfVariableDependencies \
+         GetVariableDependencies",
+        "GetContinuousStateDerivatives GetContinuousStates GetNominalsOfContinuousStates GetEventIndicators",
+        "GetOutputDerivatives",
+    ),
+];
 
-/// Makes one harmless call of the function, with arguments that are valid in this mode. If the model has no
-/// variable for it, passes an empty array.
-fn call<M: Exported>(fmu: &Importer, function: &str, interface: Interface, mode: Mode) -> Status {
-    let (mut real, mut integer, mut text) = (0.0, 0, null());
-    let (mut flags, mut array) = ([0; 2], [0.5; 8]);
-    let states = M::STATES.len();
-    let some = |vr: Option<u32>| (vr.unwrap_or(0), usize::from(vr.is_some()));
-    let of = |base: BaseType| some(first::<M>(|variable| variable.base() == base));
-    let settable = |base: BaseType| {
-        some(first::<M>(|variable| variable.base() == base && settable::accepted(variable, interface, mode)))
+/// Calls beyond the standard, in interface types that have the function.
+const TOLERATED_IN_FMI3: [(&str, &[Mode]); 6] = [
+    ("EnterEventMode", &[Event]),
+    ("SetTime", &[Initialization, Event]),
+    ("SetContinuousStates", &[Event]),
+    ("GetNominalsOfContinuousStates", &[Instantiated]),
+    ("GetNumberOfContinuousStates", &[Initialization, ContinuousTime, Terminated]),
+    ("GetNumberOfEventIndicators", &[Initialization, ContinuousTime, Terminated]),
+];
+
+const TYPES: [&str; 13] = [
+    "Float32", "Float64", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64",
+    "Boolean", "String", "Binary",
+];
+
+fn standard_of_fmi3(function: &str, interface: Interface, mode: Mode) -> bool {
+    let name = &function[4..];
+    let is_of_type = |prefix: &str| name.strip_prefix(prefix).is_some_and(|of| TYPES.contains(&of));
+    let fits = |entry: &str| match entry {
+        "Get*" => is_of_type("Get"),
+        "Set*" => is_of_type("Set"),
+        entry => entry == name,
     };
-    let unknown = first::<M>(|variable| variable.causality() == Causality::Output).unwrap_or(0);
-    let known =
-        first::<M>(|variable| variable.causality() == Causality::Input || variable.is_state()).unwrap_or(0);
-    match function {
-        "fmi2SetDebugLogging" => fmu.fmi2SetDebugLogging(fmi2False, 0, null()),
-        "fmi2SetupExperiment" => fmu.fmi2SetupExperiment(fmi2False, 0.0, 0.0, fmi2False, 0.0),
-        "fmi2EnterInitializationMode" => fmu.fmi2EnterInitializationMode(),
-        "fmi2ExitInitializationMode" => fmu.fmi2ExitInitializationMode(),
-        "fmi2Terminate" => fmu.fmi2Terminate(),
-        "fmi2Reset" => fmu.fmi2Reset(),
-        "fmi2GetReal" => {
-            let (vr, count) = of(BaseType::Real);
-            fmu.fmi2GetReal(&vr, count, &mut real)
-        }
-        "fmi2GetInteger" => {
-            let (vr, count) = of(BaseType::Integer);
-            fmu.fmi2GetInteger(&vr, count, &mut integer)
-        }
-        "fmi2GetBoolean" => {
-            let (vr, count) = of(BaseType::Boolean);
-            fmu.fmi2GetBoolean(&vr, count, &mut integer)
-        }
-        "fmi2GetString" => {
-            let (vr, count) = of(BaseType::String);
-            fmu.fmi2GetString(&vr, count, &mut text)
-        }
-        "fmi2SetReal" => {
-            let (vr, count) = settable(BaseType::Real);
-            fmu.fmi2SetReal(&vr, count, &1.0)
-        }
-        "fmi2SetInteger" => {
-            let (vr, count) = settable(BaseType::Integer);
-            fmu.fmi2SetInteger(&vr, count, &3)
-        }
-        "fmi2SetBoolean" => {
-            let (vr, count) = settable(BaseType::Boolean);
-            fmu.fmi2SetBoolean(&vr, count, &fmi2True)
-        }
-        "fmi2SetString" => {
-            let (vr, count) = settable(BaseType::String);
-            fmu.fmi2SetString(&vr, count, &c"text".as_ptr())
-        }
-        "fmi2GetDirectionalDerivative" => {
-            fmu.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, &mut real)
-        }
-        "fmi2SetRealInputDerivatives" => fmu.fmi2SetRealInputDerivatives(&known, 1, &1, &0.1),
-        "fmi2GetRealOutputDerivatives" => fmu.fmi2GetRealOutputDerivatives(&unknown, 1, &1, &mut real),
-        "fmi2DoStep" => {
-            let known = fmu.fmi2GetRealStatus(2, &mut real) == Status::Ok;
-            fmu.take_log();
-            fmu.fmi2DoStep(if known { real } else { 0.0 }, 0.01, fmi2True)
-        }
-        "fmi2CancelStep" => fmu.fmi2CancelStep(),
-        "fmi2GetStatus" => fmu.fmi2GetStatus(0, &mut integer),
-        "fmi2GetRealStatus" => fmu.fmi2GetRealStatus(2, &mut real),
-        "fmi2GetIntegerStatus" => fmu.fmi2GetIntegerStatus(0, &mut integer),
-        "fmi2GetBooleanStatus" => fmu.fmi2GetBooleanStatus(3, &mut integer),
-        "fmi2GetStringStatus" => fmu.fmi2GetStringStatus(1, &mut text),
-        "fmi2EnterEventMode" => fmu.fmi2EnterEventMode(),
-        "fmi2NewDiscreteStates" => fmu.fmi2NewDiscreteStates(&mut Default::default()),
-        "fmi2EnterContinuousTimeMode" => fmu.fmi2EnterContinuousTimeMode(),
-        "fmi2CompletedIntegratorStep" => {
-            let [enter_event_mode, terminate] = &mut flags;
-            fmu.fmi2CompletedIntegratorStep(fmi2True, enter_event_mode, terminate)
-        }
-        "fmi2SetTime" => fmu.fmi2SetTime(0.5),
-        "fmi2SetContinuousStates" => fmu.fmi2SetContinuousStates(array.as_ptr(), states),
-        "fmi2GetDerivatives" => fmu.fmi2GetDerivatives(array.as_mut_ptr(), states),
-        "fmi2GetEventIndicators" => {
-            let count = M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators);
-            fmu.fmi2GetEventIndicators(array.as_mut_ptr(), count)
-        }
-        "fmi2GetContinuousStates" => fmu.fmi2GetContinuousStates(array.as_mut_ptr(), states),
-        "fmi2GetNominalsOfContinuousStates" => {
-            fmu.fmi2GetNominalsOfContinuousStates(array.as_mut_ptr(), states)
-        }
-        state_function => call_state_function(fmu, state_function),
+    let (_, both, in_model_exchange, in_co_simulation) =
+        STATES.into_iter().find(|(state, ..)| *state == mode).unwrap();
+    let more = if interface == ModelExchange { in_model_exchange } else { in_co_simulation };
+    [EVERYWHERE, both, more].into_iter().flat_map(str::split_whitespace).any(fits)
+}
+
+/// Returns whether the standard allows the call in one of our modes.
+fn standard(function: &str, interface: Interface, mode: Mode) -> bool {
+    match function.starts_with("fmi2") {
+        true => standard_of_fmi2(function, interface, mode),
+        false => standard_of_fmi3(function, interface, mode),
     }
 }
 
-/// Calls a function of saved states with a state of this instance.
-fn call_state_function(fmu: &Importer, function: &str) -> Status {
-    let (mut state, mut second, mut size) = (fmu.save(), null_mut(), 0);
-    let mut bytes = fmu.bytes();
-    fmu.take_log();
-    let status = match function {
-        "fmi2GetFMUstate" => fmu.fmi2GetFMUstate(&mut second),
-        "fmi2SetFMUstate" => fmu.fmi2SetFMUstate(state),
-        "fmi2FreeFMUstate" => fmu.fmi2FreeFMUstate(&mut state),
-        "fmi2SerializedFMUstateSize" => fmu.fmi2SerializedFMUstateSize(state, &mut size),
-        "fmi2SerializeFMUstate" => fmu.fmi2SerializeFMUstate(state, bytes.as_mut_ptr().cast(), bytes.len()),
-        "fmi2DeSerializeFMUstate" => {
-            fmu.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut second)
-        }
-        other => panic!("{other} is no function of FMI 2.0"),
-    };
-    fmu.forget(state);
-    fmu.forget(second);
-    status
+fn tolerated(function: &str, interface: Interface, mode: Mode) -> bool {
+    let name = &function[4..];
+    TOLERATED.contains(&(function, interface, mode))
+        || function.starts_with("fmi3")
+            && (interface == ModelExchange || name == "EnterEventMode")
+            && TOLERATED_IN_FMI3.into_iter().any(|(of, modes)| of == name && modes.contains(&mode))
 }
 
-/// Returns the attribute by which the description tells importers not to call a function, if the model lacks
-/// the capability.
-fn lacking<M: Exported>(function: &str) -> Option<&'static str> {
-    match function {
-        "fmi2GetDirectionalDerivative" if !M::PARTIALS => Some("providesDirectionalDerivative"),
-        "fmi2SetRealInputDerivatives" if !M::INPUT_DERIVATIVES => Some("canInterpolateInputs"),
-        "fmi2GetRealOutputDerivatives" if M::OUTPUT_DERIVATIVES == 0 => Some("maxOutputDerivativeOrder"),
+pub fn accepted(function: &str, interface: Interface, mode: Mode) -> bool {
+    standard(function, interface, mode) || tolerated(function, interface, mode)
+}
+
+/// Returns a part of the message of a function that needs a capability that the model lacks.
+pub fn lacking<M: Exported>(function: &str, interface: Interface) -> Option<&'static str> {
+    let has_event_mode = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
+    match &function[4..] {
+        "EnterEventMode" if interface == CoSimulation && !has_event_mode => Some("eventModeUsed was false"),
+        "GetDirectionalDerivative" if !M::PARTIALS => Some("providesDirectionalDerivative"),
+        "GetAdjointDerivative" if !M::PARTIALS => Some("providesAdjointDerivatives is false"),
+        "SetRealInputDerivatives" if !M::INPUT_DERIVATIVES => Some("canInterpolateInputs"),
+        "GetRealOutputDerivatives" | "GetOutputDerivatives" if M::OUTPUT_DERIVATIVES == 0 => {
+            Some("maxOutputDerivativeOrder")
+        }
+        "EnterConfigurationMode" => Some("this FMU has no structural parameters"),
+        "EvaluateDiscreteStates" => Some("providesEvaluateDiscreteStates is false"),
+        name if name.ends_with("Dependencies") => Some("providesPerElementDependencies is false"),
+        name if ["Clock", "Interval", "Shift"].iter().any(|of| name[3..].starts_with(of)) => {
+            Some("this FMU has no clocks")
+        }
         _ => None,
     }
 }
 
-#[test]
-fn every_function_in_every_state() {
-    for_every_toy!(check_every_function());
+/// Returns the mode after an accepted call.
+fn next<M: Exported>(function: &str, interface: Interface, mode: Mode) -> Mode {
+    let has_event_mode =
+        function.starts_with("fmi3") && M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
+    match (&function[4..], interface) {
+        ("EnterInitializationMode", _) => Initialization,
+        ("ExitInitializationMode", CoSimulation) if !has_event_mode => StepComplete,
+        ("ExitInitializationMode" | "EnterEventMode", _) => Event,
+        ("EnterContinuousTimeMode", _) => ContinuousTime,
+        ("EnterStepMode", _) => StepComplete,
+        ("Terminate", _) => Terminated,
+        ("Reset", _) => Instantiated,
+        _ => mode,
+    }
 }
 
-fn check_every_function<M: Exported>() {
-    let mut allowed_calls = 0;
-    for (interface, mode) in modes_of_model::<Importer, M>() {
-        for function in FUNCTIONS {
+fn check_every_function<F: Either, M: Exported>() {
+    for (interface, mode) in modes_of_model::<F, M>() {
+        for function in F::functions() {
             let label = format!("{function} in state '{mode}' of {interface}, {}", M::INFO.name);
-            let fmu = Importer::in_mode::<M>(interface, mode);
-            let call = |fmu: &Importer| call::<M>(fmu, function, interface, mode);
+            let fmu = F::in_mode::<M>(interface, mode);
+            let valid = ValidCall::new::<F, M>(&fmu, function, interface, mode);
+            let call = |fmu: &F| valid.make(fmu, |_| ());
             if !accepted(function, interface, mode) {
                 let message = fmu.refused(&label, call);
-                assert!(message.starts_with(function), "{label}: {message}");
+                assert!(message.starts_with(&format!("{function}: not allowed in")), "{label}: {message}");
                 assert!(message.contains(&format!("'{mode}'")), "{label}: {message}");
-                assert!(message.contains("allowed in"), "{label}: {message}");
+                assert!(message.contains("; allowed in: "), "{label}: {message}");
                 continue;
             }
-            allowed_calls += 1;
-            if let Some(attribute) = lacking::<M>(function) {
+            if let Some(attribute) = lacking::<M>(function, interface) {
                 let message = fmu.refused(&label, call);
                 assert!(message.contains(attribute), "{label}: {message}");
                 continue;
@@ -293,108 +294,77 @@ fn check_every_function<M: Exported>() {
                 _ => Status::Ok,
             };
             assert_eq!(call(&fmu), expected, "{label}: {:?}", fmu.take_log());
+            let (end, bytes) = (next::<M>(function, interface, mode), fmu.bytes());
+            assert_eq!(bytes[MODE], with_mode(bytes.clone(), end)[MODE], "{label} does not lead to '{end}'");
         }
-    }
-    // Counted by hand in the two tables, plus the tolerated calls. Without the four functions that need no
-    // instance, stepInProgress and stepCanceled.
-    let cells = [(CoSimulation, CELLS_OF_CO_SIMULATION), (ModelExchange, CELLS_OF_MODEL_EXCHANGE)];
-    let offered = cells.into_iter().filter(|(interface, _)| offers::<M>(*interface));
-    let tolerated = TOLERATED.iter().filter(|(_, interface, _)| offers::<M>(*interface)).count();
-    assert_eq!(allowed_calls, offered.map(|(_, cells)| cells).sum::<usize>() + tolerated);
-}
-
-/// Returns the mode after an accepted call.
-fn next(function: &str, interface: Interface, mode: Mode) -> Mode {
-    match (function, interface) {
-        ("fmi2EnterInitializationMode", _) => Initialization,
-        ("fmi2ExitInitializationMode", CoSimulation) => StepComplete,
-        ("fmi2ExitInitializationMode", ModelExchange) => Event,
-        ("fmi2EnterContinuousTimeMode", _) => ContinuousTime,
-        ("fmi2EnterEventMode", _) => Event,
-        ("fmi2Terminate", _) => Terminated,
-        ("fmi2Reset", _) => Instantiated,
-        _ => mode,
-    }
-}
-
-/// Makes random calls: the rules always hold, and no call is ever fatal.
-#[test]
-fn random_walks() {
-    walk::<Oscillator>(CoSimulation);
-    walk::<Oscillator>(ModelExchange);
-    walk::<Counter>(CoSimulation);
-    walk::<Counter>(ModelExchange);
-    walk::<Talker>(CoSimulation);
-    walk::<Ball>(ModelExchange);
-}
-
-fn walk<M: Exported>(interface: Interface) {
-    let fmu = Importer::of::<M>(interface);
-    let (mut random, mut mode) = (Random(13), Instantiated);
-    let mut visits = std::collections::BTreeMap::new();
-    for _ in 0..20_000 {
-        let function = FUNCTIONS[random.bits() as usize % FUNCTIONS.len()];
-        // Resets are rare, because most other calls need an initialized instance.
-        if matches!(function, "fmi2Reset" | "fmi2Terminate") && random.bits() % 8 > 0 {
-            continue;
-        }
-        let status = call::<M>(&fmu, function, interface, mode);
-        let log = fmu.take_log();
-        if lacking::<M>(function).is_some() || !accepted(function, interface, mode) {
-            assert_eq!(status, Status::Error, "{function} in state '{mode}' of {interface}: {log:?}");
-        } else {
-            assert!(matches!(status, Status::Ok | Status::Discard), "{function}: {log:?}");
-            mode = next(function, interface, mode);
-        }
-        *visits.entry(mode.to_string()).or_insert(0) += 1;
-    }
-    let modes = if interface == CoSimulation { 4 } else { 5 };
-    assert!(visits.len() == modes && visits.values().all(|calls| *calls > 500), "{visits:?}");
-}
-
-const CELLS_OF_CO_SIMULATION: usize = 6 + 1 + 1 + 1 + 2 + 6 + 4 * 5 + 4 * 3 + 6 * 6 + 5 + 3 + 4 + 1 + 5 * 3;
-const CELLS_OF_MODEL_EXCHANGE: usize =
-    6 + 1 + 1 + 1 + 2 + 6 + 4 * 5 + (4 + 3 * 3) + 6 * 6 + 5 + 2 + 1 + 1 + 1 + 1 + 1 + 3 * 5 + 6;
-
-#[test]
-fn fmu_can_be_freed_in_every_state() {
-    for (interface, mode) in modes_of_model::<Importer, Oscillator>() {
-        assert!(standard("fmi2FreeInstance", interface, mode));
-        drop(Importer::in_mode::<Oscillator>(interface, mode));
     }
 }
 
 #[test]
-fn versions_need_no_instance() {
-    assert_eq!(Importer::null::<Sum>().version_and_platform(), [c"2.0", c"default"]);
+fn every_function_in_every_state() {
+    for_every_model!(check_every_function, Importer);
+    check_every_function::<fmi3::Importer, Oscillator>();
+    check_every_function::<fmi3::Importer, Ticker>();
+    check_every_function::<fmi3::Importer, Palette>();
+    check_every_function::<fmi3::Importer, Talker>();
+}
+
+/// Checks that NULL and zeros as arguments do no harm in any state, and without an instance.
+#[test]
+fn zeros() {
+    fn check<F: Either, M: Exported>() {
+        for (interface, mode) in modes_of_model::<F, M>() {
+            for function in F::functions() {
+                let fmu = F::in_mode::<M>(interface, mode);
+                if fmu.call_with_zeros(function) == Status::Error {
+                    F::in_mode::<M>(interface, mode).refused(function, |fmu| fmu.call_with_zeros(function));
+                }
+            }
+        }
+        assert!(F::nothing::<M>().call_all().iter().all(|(_, status)| *status == Status::Error));
+    }
+    check::<Importer, Oscillator>();
+    check::<fmi3::Importer, Oscillator>();
+    check::<fmi3::Importer, Ticker>();
+    check::<fmi3::Importer, Palette>();
 }
 
 /// Checks that the table in the code agrees, also about states that cannot be reached here, and that it
 /// distinguishes the standard from tolerated calls.
 #[test]
 fn table_in_the_code() {
-    assert_eq!(ALLOWED.len(), FUNCTIONS.len());
-    let broken = [(CoSimulation, Fatal), (ModelExchange, Fatal)];
-    for rule in ALLOWED {
-        assert!(FUNCTIONS.contains(&rule.name), "{}", rule.name);
-        for (interface, mode) in modes_of_model::<Importer, Oscillator>().into_iter().chain(broken) {
-            let label = format!("{} in state '{mode}' of {interface}", rule.name);
-            assert_eq!(
-                rule.standard.contain(fmu_export::Standard::Fmi2, interface, mode),
-                standard(rule.name, interface, mode),
-                "{label}"
-            );
-            let tolerated = TOLERATED.contains(&(rule.name, interface, mode));
-            assert_eq!(
-                rule.tolerated.contain(fmu_export::Standard::Fmi2, interface, mode),
-                tolerated,
-                "{label}, tolerated"
-            );
-            assert_eq!(
-                rule.accepted().contain(fmu_export::Standard::Fmi2, interface, mode),
-                accepted(rule.name, interface, mode),
-                "{label}"
-            );
+    fn check<F: Either>() {
+        let rules: Vec<_> =
+            fmu_test_kit::calls::signatures(F::standard()).iter().map(|signature| signature.rule).collect();
+        assert_eq!(rules.iter().map(|rule| rule.name).collect::<Vec<_>>(), F::functions());
+        for rule in rules {
+            for interface in [CoSimulation, ModelExchange] {
+                let fatal = (F::standard() == Standard::Fmi2).then_some(Fatal);
+                for mode in F::modes_of(interface).iter().copied().chain(fatal) {
+                    let label = format!("{} in state '{mode}' of {interface}", rule.name);
+                    for standard in [Standard::Fmi2, Standard::Fmi3] {
+                        let is_own = standard == F::standard();
+                        let contain = |set: fmu_export::Situations| set.contain(standard, interface, mode);
+                        assert_eq!(
+                            contain(rule.standard),
+                            is_own && self::standard(rule.name, interface, mode),
+                            "{label}"
+                        );
+                        assert_eq!(
+                            contain(rule.tolerated),
+                            is_own && tolerated(rule.name, interface, mode),
+                            "{label}"
+                        );
+                        assert_eq!(
+                            contain(rule.accepted()),
+                            is_own && accepted(rule.name, interface, mode),
+                            "{label}"
+                        );
+                    }
+                }
+            }
         }
     }
+    check::<Importer>();
+    check::<fmi3::Importer>();
 }

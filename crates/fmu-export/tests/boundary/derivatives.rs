@@ -1,11 +1,14 @@
-//! Derivatives with respect to variables (section 2.1.9) and to time (4.2.1).
+//! Derivatives with respect to variables (section 2.1.9 of FMI 2.0) and to time (4.2.1), in both FMI
+//! versions. [`Either::try_directional`] compares adjoint with directional derivatives.
 
-use crate::toys::{Oscillator, oscillator::Name};
+use crate::models::{Meter, Oscillator, Sum, meter, oscillator::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
 use fmu_export::Variables;
+use fmu_export::fmi3::reference;
+use fmu_test_kit::checks::output_derivatives_fit_steps;
 use fmu_test_kit::serialized::with_mode;
-use fmu_test_kit::{Either, Importer};
+use fmu_test_kit::{Either, Importer, fmi3};
 
 const UNKNOWNS: [u32; 5] = [
     Name::position as u32,
@@ -17,12 +20,8 @@ const UNKNOWNS: [u32; 5] = [
 const KNOWNS: [u32; 3] = [Name::force as u32, Name::position as u32, Name::velocity as u32];
 const PARAMETERS: [u32; 3] = [Name::mass as u32, Name::stiffness as u32, Name::damping as u32];
 
-fn name(vr: u32) -> &'static str {
-    Oscillator::TABLE[vr as usize].name()
-}
-
 /// Returns the central differences of all unknowns, which are quadratic functions of the knowns.
-fn differences(fmu: &Importer, known: u32) -> [f64; 5] {
+fn differences(fmu: &impl Either, known: u32) -> [f64; 5] {
     let [start] = fmu.get([known]);
     let width = 1e-5 * start.abs().max(1.0);
     let [above, below] = [start + width, start - width].map(|value| {
@@ -33,10 +32,9 @@ fn differences(fmu: &Importer, known: u32) -> [f64; 5] {
     std::array::from_fn(|i| (above[i] - below[i]) / (2.0 * width))
 }
 
-/// Checks single pairs in every mode that has directional derivatives; parameters are knowns in
-/// Initialization Mode.
-#[test]
-fn pair_by_pair() {
+/// Checks single pairs, and several unknowns and knowns in any order and repeated, in every mode that has
+/// directional derivatives. Parameters are knowns in Initialization Mode.
+fn fit_differences<F: Either>() {
     for (interface, mode) in [
         (CoSimulation, Initialization),
         (CoSimulation, StepComplete),
@@ -45,51 +43,117 @@ fn pair_by_pair() {
         (ModelExchange, Event),
         (ModelExchange, ContinuousTime),
     ] {
-        let fmu = Importer::in_mode::<Oscillator>(interface, Initialization);
+        let fmu = F::in_mode::<Oscillator>(interface, Initialization);
         fmu.set(&[KNOWNS, PARAMETERS].concat(), &[0.3, -0.2, 0.7, 3.0, 40.0, 0.4]);
         let parameters = if mode == Initialization { &PARAMETERS[..] } else { &[] };
         let expected: Vec<_> =
             KNOWNS.iter().chain(parameters).map(|known| (*known, differences(&fmu, *known))).collect();
         fmu.restore(&with_mode(fmu.bytes(), mode));
-        for (known, expected) in expected {
+        for (known, expected) in &expected {
             for (unknown, expected) in UNKNOWNS.into_iter().zip(expected) {
-                if unknown == Name::energy as u32 && PARAMETERS.contains(&known) {
+                if unknown == Name::energy as u32 && PARAMETERS.contains(known) {
                     fmu.refused_with(&["energy", "is not provided"], |fmu| {
-                        fmu.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, &mut 0.0)
+                        fmu.try_directional(&[unknown], &[*known], &[1.0], &mut [0.0])
                     });
                     continue;
                 }
-                let found = fmu.directional(&[unknown], &[known], &[1.0])[0];
-                let names = [unknown, known].map(name);
-                assert!(
-                    (found - expected).abs() <= 1e-8 * (1.0 + expected.abs()),
-                    "{names:?}: {found} {expected}"
-                );
+                let found = fmu.partial(unknown, *known);
+                let names = [unknown, *known].map(|vr| Oscillator::TABLE[vr as usize].name());
+                let fits = (found - expected).abs() <= 1e-8 * (1.0 + expected.abs());
+                assert!(fits, "{names:?}: {found} {expected}");
             }
         }
+        let [one, _, other] = KNOWNS;
+        let found =
+            fmu.directional(&[UNKNOWNS[2], UNKNOWNS[0], UNKNOWNS[2]], &[one, other, one], &[2.0, 3.0, -1.0]);
+        let sum = fmu.partial(UNKNOWNS[2], one) + 3.0 * fmu.partial(UNKNOWNS[2], other);
+        assert!((found[0] - sum).abs() < 1e-14 && found[0] == found[2] && found[1] == 0.0, "{found:?} {sum}");
+        assert_eq!(fmu.directional(&UNKNOWNS, &[], &[]), [0.0; 5], "without knowns the sum is empty");
     }
 }
 
 /// Checks that a calculated state is an unknown in Initialization Mode, where the chain rule applies to
 /// variables that depend on it. Later it is a known.
-#[test]
-fn calculated_states() {
-    use crate::toys::balance::{Balance, Name::*};
-    let derivative = |fmu: &Importer, unknown: u32, known: u32, value: &mut f64| {
-        fmu.fmi2GetDirectionalDerivative(&unknown, 1, &known, 1, &1.0, value)
-    };
+fn calculated_states<F: Either>() {
+    use meter::Name::{der_level, level, plain, stiffness};
     for interface in [CoSimulation, ModelExchange] {
-        let fmu = Importer::in_mode::<Balance>(interface, Initialization);
-        fmu.set(&[load as u32, stiffness as u32], &[6.0, 4.0]);
-        let rows = [stretch, der_stretch].map(|unknown| {
-            [load, stiffness].map(|known| fmu.directional(&[unknown as u32], &[known as u32], &[1.0])[0])
-        });
+        let fmu = F::in_mode::<Meter>(interface, Initialization);
+        fmu.set(&[plain as u32, stiffness as u32], &[6.0, 4.0]);
+        let rows = [level, der_level]
+            .map(|unknown| [plain, stiffness].map(|known| fmu.partial(unknown as u32, known as u32)));
         assert_eq!(rows, [[0.25, -0.375], [0.0, 0.0]]);
-        fmu.refused_with(&["stretch is no known in initialization mode"], |fmu| {
-            derivative(fmu, der_stretch as u32, stretch as u32, &mut 0.0)
+        fmu.refused_with(&["level is no known in initialization mode"], |fmu| {
+            fmu.try_directional(&[der_level as u32], &[level as u32], &[1.0], &mut [0.0])
         });
-        fmu.ok(fmu.fmi2ExitInitializationMode());
-        assert_eq!(fmu.directional(&[der_stretch as u32], &[stretch as u32], &[1.0]), [-4.0]);
-        assert_eq!(fmu.directional(&[der_stretch as u32], &[load as u32], &[1.0]), [1.0]);
+        fmu.ok(fmu.exit_initialization_mode());
+        assert_eq!(fmu.partial(der_level as u32, level as u32), -4.0);
+        assert_eq!(fmu.partial(der_level as u32, plain as u32), 1.0);
     }
+}
+
+/// Checks derivatives with respect to time: of every Real variable, in agreement with steps, and of no other
+/// order than 1, which is the highest of the models.
+fn output_derivatives<F: Either>() {
+    let fmu = F::in_mode::<Oscillator>(CoSimulation, Instantiated);
+    fmu.set(&KNOWNS[1..], &[0.25, -3.0]);
+    fmu.initialize(0.0);
+    let mut time = 0.0;
+    for size in [0.02, 0.005, 0.03] {
+        fmu.set(&KNOWNS[..1], &[0.5 - time]);
+        fmu.give_rates(&KNOWNS[..1], &[-2.0]);
+        let slope = fmu.rate(KNOWNS[0]);
+        output_derivatives_fit_steps::<Oscillator>(&fmu, time, "a step", |h| {
+            fmu.set(&KNOWNS[..1], &[0.5 - time + slope * h]);
+            fmu.give_rates(&KNOWNS[..1], &[-2.0]);
+        });
+        fmu.step(time, size);
+        time += size;
+    }
+    assert_eq!(fmu.rates(PARAMETERS), [0.0; 3]);
+    for order in [2, 3, i32::MAX, 0, -1, i32::MIN] {
+        let limit = if order > 0 { "at most 1 (maxOutputDerivativeOrder)" } else { "at least 1" };
+        let expected = format!("the derivative of position must be {limit}, it is {order}");
+        fmu.refused_with(&[&expected], |fmu| fmu.try_rate(KNOWNS[1], order, &mut 0.0));
+    }
+}
+
+#[test]
+fn in_both_versions() {
+    fn check<F: Either>() {
+        fit_differences::<F>();
+        calculated_states::<F>();
+        output_derivatives::<F>();
+    }
+    check::<Importer>();
+    check::<fmi3::Importer>();
+}
+
+/// Checks the derivative of time, which is a variable in FMI 3.0, and partial derivatives with respect to a
+/// parameter, which may be set at any time.
+#[test]
+fn only_in_fmi3() {
+    let fmu = fmi3::Importer::of::<Oscillator>(CoSimulation);
+    fmu.set(&KNOWNS[1..], &[0.25, -3.0]);
+    fmu.initialize(0.0);
+    assert_eq!(fmu.rates([Name::position as u32, Oscillator::TABLE.len() as u32]), [-3.0, 1.0]);
+    let (mut one, mut two) = ([f64::NAN], [f64::NAN; 2]);
+    let [force, stiffness] = [Name::spring_force, Name::stiffness].map(|name| name as u32);
+    fmu.ok(fmu.try_directional(&[force], &[stiffness], &[2.0], &mut one));
+    assert_eq!(one, [-0.5], "force = -stiffness springs position");
+    let springs = [Name::springs as u32];
+    fmu.refused("Int32", |fmu| fmu.try_directional(&[force], &springs, &[1.0], &mut [0.0]));
+    let (vr, orders) = ([reference(KNOWNS[1]), reference(KNOWNS[2])], [1, 2]);
+    fmu.refused_with(&["must be at most 1 (maxOutputDerivativeOrder)"], |fmu| {
+        fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 2, orders.as_ptr(), two.as_mut_ptr(), 2)
+    });
+    let (u, k, mut out) = (reference(force), reference(KNOWNS[1]), 0.0);
+    fmu.refused("seeds", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 0, &mut out, 1));
+    fmu.refused("results", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 1, &mut out, 0));
+    fmu.refused("seeds", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 0, &1.0, 0, &mut out, 0));
+    fmu.refused("no known", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &u, 1, &1.0, 1, &mut out, 1));
+    fmu.refused("no seed", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 1, &f64::NAN, 1, &mut out, 1));
+    let sum = fmi3::Importer::initialized_at::<Sum>(0.0);
+    sum.refused_with(&["providesAdjointDerivatives is false"], |fmu| {
+        fmu.fmi3GetAdjointDerivative(&1, 1, &0, 1, &1.0, 1, &mut out, 1)
+    });
 }

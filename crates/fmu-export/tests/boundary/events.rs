@@ -1,248 +1,448 @@
-//! Model Exchange with events, called like an importer with an integrator (section 3.2.2, and the pseudocode
-//! in section 3.2.4).
+//! Events, steps that end early, and models that end the simulation: sections 3.2.2, 4.2.1 and 4.2.3 of FMI
+//! 2.0; 2.3.5 and 4.2.1 of FMI 3.0.
 
-use crate::toys::{Ball, Counter, Oscillator, ball, counter};
-use fmu_export::Exported;
-use fmu_export::Interface::ModelExchange;
-use fmu_export::Mode::*;
-use fmu_export::fmi2::types::*;
-use fmu_test_kit::{Either, Importer, Updated};
+use crate::models::grumbler::{self, Trouble};
+use crate::models::*;
+use fmu_export::Interface::*;
+use fmu_export::fmi3::{indicator, types::*};
+use fmu_export::{Exported, Mode};
+use fmu_test_kit::fmi3::Stepped;
+use fmu_test_kit::{Arguments, Either, Importer, Updated, fmi3};
 
-/// A minimal importer: Euler steps, halved until they locate a state event.
-struct Master {
-    fmu: Importer,
-    states: usize,
-    indicators: usize,
-    time: f64,
-    /// Combined results of the last event iterations.
-    said: Updated,
-    /// Times and kinds of the events.
-    events: Vec<(f64, &'static str)>,
+const SUM: u32 = ticker::Name::sum as u32;
+const LAST: u32 = ticker::Name::last as u32;
+const TROUBLE: u32 = grumbler::Name::trouble as u32;
+const TEMPERATURE: u32 = fuse::Name::temperature as u32;
+
+/// Combinations of eventModeUsed and earlyReturnAllowed with which the FMU handles events within a step.
+const UNAWARE: [(fmi3Boolean, fmi3Boolean); 3] =
+    [(fmi3False, fmi3False), (fmi3False, fmi3True), (fmi3True, fmi3False)];
+
+fn of_fmi3<M: Exported>(
+    event_mode_used: fmi3Boolean,
+    early_return_allowed: fmi3Boolean,
+    prepare: impl FnOnce(&fmi3::Importer),
+) -> fmi3::Importer {
+    let arguments = Arguments { event_mode_used, early_return_allowed, ..Arguments::of::<M>(CoSimulation) };
+    let fmu = fmi3::Importer::with::<M>(&arguments);
+    prepare(&fmu);
+    fmu.initialize(0.0);
+    fmu
 }
 
-impl Master {
-    fn new<M: Exported>(prepare: impl FnOnce(&Importer)) -> Self {
-        let fmu = Importer::of::<M>(ModelExchange);
-        prepare(&fmu);
-        fmu.initialize(0.0);
-        let said = fmu.enter_continuous_time();
-        let indicators = M::MODEL_EXCHANGE.map_or(0, |offer| offer.indicators);
-        Self { fmu, states: M::STATES.len(), indicators, time: 0.0, said, events: Vec::new() }
-    }
+fn of_fmi2<M: Exported>(prepare: impl FnOnce(&Importer)) -> Importer {
+    let fmu = Importer::of::<M>(CoSimulation);
+    prepare(&fmu);
+    fmu.initialize(0.0);
+    fmu
+}
 
-    fn vector(&self, count: usize, get: impl FnOnce(*mut f64, usize) -> Status) -> Vec<f64> {
-        let mut values = vec![f64::NAN; count];
-        self.fmu.ok(get(values.as_mut_ptr(), count));
-        values
-    }
+const AT_ONCE: Stepped = Stepped {
+    event_handling_needed: false,
+    terminate: false,
+    early_return: false,
+    last_successful_time: 0.0,
+};
 
-    fn states(&self) -> Vec<f64> {
-        self.vector(self.states, |x, count| self.fmu.fmi2GetContinuousStates(x, count))
-    }
+/// Checks that a step of FMI 3.0 is rejected with this status and changes nothing. Returns the last message.
+#[track_caller]
+fn undone(fmu: &fmi3::Importer, expected: Status, point: f64, step_size: f64) -> String {
+    let before = fmu.bytes();
+    fmu.take_log();
+    assert_eq!(fmu.do_step(point, step_size), Err(expected));
+    let message = fmu.take_log().pop().unwrap();
+    assert_eq!((message.status, fmu.bytes()), (expected, before), "{message:?}");
+    message.text
+}
 
-    fn indicators(&self) -> Vec<f64> {
-        self.vector(self.indicators, |z, count| self.fmu.fmi2GetEventIndicators(z, count))
-    }
+/// Returns the time that an instance of FMI 2.0 has reached, and whether the model requests the end of the
+/// simulation.
+fn progress(fmu: &Importer) -> (f64, bool) {
+    const LAST_SUCCESSFUL_TIME: i32 = 2;
+    const TERMINATED: i32 = 3;
+    let (mut time, mut terminated) = (f64::NAN, -1);
+    fmu.ok(fmu.fmi2GetRealStatus(LAST_SUCCESSFUL_TIME, &mut time));
+    fmu.ok(fmu.fmi2GetBooleanStatus(TERMINATED, &mut terminated));
+    (time, terminated == 1)
+}
 
-    fn go_to(&self, time: f64, x: &[f64]) {
-        self.fmu.ok(self.fmu.fmi2SetTime(time));
-        self.fmu.ok(self.fmu.fmi2SetContinuousStates(x.as_ptr(), x.len()));
-    }
+/// Checks that a step of FMI 2.0 is discarded; returns the messages.
+fn discarded(fmu: &Importer, point: f64, step_size: f64) -> String {
+    fmu.ok(fmu.set_debug_logging(true, &[c"logStatusDiscard"]));
+    assert_eq!(fmu.try_step(point, step_size), Status::Discard);
+    let log = fmu.take_log();
+    assert_eq!(log.iter().filter(|message| message.category == "logStatusDiscard").count(), 1, "{log:?}");
+    log.into_iter().map(|message| message.text).collect::<Vec<_>>().join("; ")
+}
 
-    /// Integrates to this time or to an earlier event. Returns false when the model ends the simulation.
-    fn step(&mut self, h: f64) -> bool {
-        let (start, x) = (self.time, self.states());
-        let rates = self.vector(self.states, |rates, count| self.fmu.fmi2GetDerivatives(rates, count));
-        let before = self.indicators();
-        let time_event = self.said.next.filter(|next| *next <= start + h);
-        let end = time_event.unwrap_or(start + h);
-        // Exact for the ball's velocity; the height uses the mean of both velocities.
-        let at = |time: f64| -> Vec<f64> {
-            let h = time - start;
-            let bend = if self.states == 2 { 0.5 * h * h * rates[1] } else { 0.0 };
-            x.iter()
-                .zip(&rates)
-                .enumerate()
-                .map(|(i, (x, rate))| x + h * rate + if i == 0 { bend } else { 0.0 })
-                .collect()
-        };
-        let crossed = |time: f64| {
-            self.go_to(time, &at(time));
-            let after = self.indicators();
-            before.iter().zip(&after).any(|(before, after)| (*before > 0.0) != (*after > 0.0))
-        };
-        let mut reached = end;
-        let state_event = crossed(end);
-        if state_event {
-            let (mut low, mut high) = (start, end);
-            while high - low > 1e-12 {
-                let middle = 0.5 * (low + high);
-                if crossed(middle) { high = middle } else { low = middle }
-            }
-            reached = high;
-            self.go_to(reached, &at(reached));
-        }
-        self.time = reached;
-        let [asked, terminate] = self.fmu.completed_step();
-        if terminate {
-            return false;
-        }
-        let time_event = time_event == Some(reached);
-        if !state_event && !time_event && !asked {
-            return true;
-        }
-        self.fmu.ok(self.fmu.fmi2EnterEventMode());
-        self.said = self.fmu.enter_continuous_time();
-        // A ball that rises through the floor changes the sign of the indicator without a bounce.
-        let happened = time_event || self.said.states_changed;
-        if happened {
-            self.events.push((reached, if time_event { "time" } else { "state" }));
-        }
-        !self.said.terminate
+/// Checks a state event, its effects, and the information about completed steps.
+fn bounces<F: Either>() {
+    let fmu: F = F::in_mode::<Ball>(ModelExchange, Mode::Instantiated);
+    fmu.set(&[0, 1], &[0.0, -2.0]);
+    fmu.initialize(0.0);
+    let bounced = Updated { states_changed: true, nominals_changed: true, ..Updated::default() };
+    assert_eq!(fmu.update(), bounced);
+    assert_eq!(fmu.states::<2>(), [0.0, 1.4]);
+    fmu.ok(fmu.enter_continuous_time_mode());
+    fmu.ok(fmu.set_time(0.1));
+    let (mut z, mut nominals) = (f64::NAN, [f64::NAN; 2]);
+    fmu.ok(fmu.set_states([-0.1, -1.0].as_ptr(), 2));
+    assert_eq!(fmu.derivatives::<2>(), [-1.0, -9.81]);
+    fmu.ok(fmu.get_indicators(&mut z, 1));
+    assert_eq!(z, -0.1);
+    fmu.ok(fmu.get_nominals(nominals.as_mut_ptr(), 2));
+    assert!(
+        (nominals[0] - 1.4_f64.powi(2) / (2.0 * 9.81)).abs() < 1e-12 && nominals[1] > 0.0,
+        "{nominals:?}"
+    );
+    // The model detects a missed event, and a lost ball.
+    for (x, expected) in [
+        ([1.0, -1.0], [false, false]),
+        ([-0.5, -1.0], [true, false]),
+        ([-0.5, 1.0], [false, false]),
+        ([-200.0, -1.0], [true, true]),
+    ] {
+        fmu.ok(fmu.set_states(x.as_ptr(), 2));
+        assert_eq!(fmu.completed_step(), expected, "{x:?}");
+    }
+    fmu.ok(fmu.enter_event_mode());
+    assert!(fmu.update().states_changed);
+    assert_eq!(fmu.integer(ball::Name::bounces as u32), 2);
+    fmu.ok(fmu.terminate());
+    // Events of the importer, in any number, change nothing. The oscillator is not informed about steps.
+    let fmu: F = F::in_mode::<Oscillator>(ModelExchange, Mode::ContinuousTime);
+    assert_eq!(fmu.completed_step(), [false; 2]);
+    for _ in 0..3 {
+        fmu.ok(fmu.enter_event_mode());
+        fmu.ok(fmu.enter_event_mode());
+        assert_eq!([fmu.update(), fmu.enter_continuous_time()], [Updated::default(); 2]);
     }
 }
 
-/// Checks the times of the bounces: those of free fall, each flight shorter by the restitution. After enough
-/// bounces the ball ends the simulation.
-#[test]
-fn state_events() {
-    let mut master = Master::new::<Ball>(|_| ());
-    let mut nominals = [0.0; 2];
-    while master.step(0.05) {
-        if master.said.nominals_changed {
-            assert!(master.said.states_changed);
-            let before = nominals[0];
-            master.fmu.ok(master.fmu.fmi2GetNominalsOfContinuousStates(nominals.as_mut_ptr(), 2));
-            assert!(nominals[0] > 0.0 && (before == 0.0 || nominals[0] <= before), "{nominals:?}");
-            master.said.nominals_changed = false;
-        }
-    }
-    assert_eq!(master.events.len(), 5);
-    let fall = (2.0_f64 / 9.81).sqrt();
-    let mut expected = fall;
-    let mut flight = 2.0 * fall;
-    for (time, kind) in &master.events {
-        assert_eq!(*kind, "state");
-        assert!((time - expected).abs() < 1e-9, "{time} instead of {expected}");
-        flight *= 0.7;
-        expected += flight;
-    }
-    let mut bounces = 0;
-    master.fmu.ok(master.fmu.fmi2GetInteger(&(ball::Name::bounces as u32), 1, &mut bounces));
-    assert_eq!(bounces, 5);
-    // The height of each flight is the previous height times restitution^2.
-    assert!((nominals[0] - 0.49_f64.powi(4)).abs() < 1e-6, "{nominals:?}");
-}
-
-/// The model is informed after each step of the integrator. It detects a missed event, and a lost ball.
-#[test]
-fn completed_steps() {
-    let fmu = Importer::in_mode::<Ball>(ModelExchange, ContinuousTime);
-    for (x, expected) in
-        [([1.0, -1.0], [0, 0]), ([-0.5, -1.0], [1, 0]), ([-0.5, 1.0], [0, 0]), ([-200.0, -1.0], [1, 1])]
-    {
-        for no_set_state_prior in [0, 1] {
-            let mut found = [-1; 2];
-            let [event, terminate] = &mut found;
-            fmu.ok(fmu.fmi2SetContinuousStates(x.as_ptr(), 2));
-            fmu.ok(fmu.fmi2CompletedIntegratorStep(no_set_state_prior, event, terminate));
-            assert_eq!(found, expected, "{x:?}");
-        }
-    }
-    // A model without STEP_COMPLETED is not informed.
-    let fmu = Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime);
-    let mut found = [-1; 2];
-    let [event, terminate] = &mut found;
-    fmu.ok(fmu.fmi2CompletedIntegratorStep(1, event, terminate));
-    assert_eq!(found, [0, 0]);
-}
-
-fn integers<const N: usize>(fmu: &Importer, names: [counter::Name; N]) -> [i32; N] {
-    let mut values = [i32::MIN; N];
-    fmu.ok(fmu.fmi2GetInteger(names.map(|name| name as u32).as_ptr(), N, values.as_mut_ptr()));
-    values
-}
-
-fn prepare_counter(fmu: &Importer) {
-    let integers = [counter::Name::increment as u32, counter::Name::full as u32];
-    fmu.ok(fmu.fmi2SetInteger(integers.as_ptr(), 2, [7, 10].as_ptr()));
-    fmu.ok(fmu.fmi2SetBoolean(&(counter::Name::on as u32), 1, &fmi2True));
-    fmu.set(&[counter::Name::period as u32, counter::Name::weight as u32], &[0.25, 0.5]);
-}
-
-/// Checks that time events happen at the requested times for any integrator steps.
-#[test]
-fn time_events() {
+fn prepare_counter(fmu: &impl Either) {
     use counter::Name::*;
-    for h in [0.01, 0.1, 1.0] {
-        let mut master = Master::new::<Counter>(prepare_counter);
-        assert_eq!(master.said.next, Some(0.25));
-        while master.events.len() < 4 {
-            assert!(master.step(h));
-        }
-        assert_eq!(master.events, [0.25, 0.5, 0.75, 1.0].map(|time| (time, "time")), "steps of {h}");
-        // 4 times 7, with two carries.
-        assert_eq!(integers(&master.fmu, [count, carries]), [8, 2]);
-        assert_eq!(master.fmu.get([sum as u32]), [14.0]);
-        let mut is_odd = -1;
-        master.fmu.ok(master.fmu.fmi2GetBoolean(&(odd as u32), 1, &mut is_odd));
-        assert_eq!(is_odd, fmi2False);
-    }
+    fmu.ok(fmu.set_integer(increment as u32, 7));
+    fmu.ok(fmu.set_integer(full as u32, 10));
+    fmu.ok(fmu.set_boolean(on as u32, 1));
+    fmu.set(&[period as u32, weight as u32], &[0.25, 0.5]);
 }
 
-/// Checks that an event that causes another at the same time needs one more iteration, and that the full
-/// count is visible in between.
-#[test]
-fn event_iteration() {
-    let fmu = Importer::of::<Counter>(ModelExchange);
+/// Checks time events, and that an event that causes another at the same time needs one more iteration. The
+/// full count is visible in between.
+fn event_iteration<F: Either>() {
+    let fmu: F = F::in_mode::<Counter>(ModelExchange, Mode::Instantiated);
     prepare_counter(&fmu);
     fmu.initialize(0.0);
-    let round = || -> (u8, f64, i32) {
+    let round = || {
         let Updated { again, next, .. } = fmu.update();
-        (again.into(), next.unwrap(), integers(&fmu, [counter::Name::count])[0])
+        (again, next.unwrap(), fmu.integer(counter::Name::count as u32))
     };
-    assert_eq!(round(), (0, 0.25, 0), "nothing is due at the begin");
+    assert_eq!(round(), (false, 0.25, 0), "nothing is due at the begin");
     // After two periods, both counts are due, and the second one fills the count.
-    fmu.ok(fmu.fmi2EnterContinuousTimeMode());
-    fmu.ok(fmu.fmi2SetTime(0.5));
-    fmu.ok(fmu.fmi2EnterEventMode());
-    assert_eq!(round(), (1, 0.5, 7));
-    assert_eq!(round(), (1, 0.75, 14));
-    assert_eq!(round(), (0, 0.75, 4));
-    assert_eq!(round(), (0, 0.75, 4), "an importer may ask once more");
+    fmu.ok(fmu.enter_continuous_time_mode());
+    fmu.ok(fmu.set_time(0.5));
+    fmu.ok(fmu.enter_event_mode());
+    assert_eq!(round(), (true, 0.5, 7));
+    assert_eq!(round(), (true, 0.75, 14));
+    assert_eq!(round(), (false, 0.75, 4));
+    assert_eq!(round(), (false, 0.75, 4), "an importer may ask once more");
+    // A failed event is undone, and so is a failed step.
+    fmu.set(&[counter::Name::weight as u32], &[f64::MAX]);
+    fmu.ok(fmu.enter_continuous_time_mode());
+    fmu.ok(fmu.set_time(1.0));
+    fmu.ok(fmu.enter_event_mode());
+    fmu.refused_with(&["range of numbers"], |fmu| fmu.try_update().unwrap_err());
+    let fmu: F = F::in_mode::<Counter>(CoSimulation, Mode::Instantiated);
+    prepare_counter(&fmu);
+    fmu.initialize(0.0);
+    fmu.set(&[counter::Name::weight as u32], &[f64::MAX]);
+    fmu.refused_with(&["range of numbers"], |fmu| fmu.try_step(0.0, 1.0));
 }
 
-/// Checks that a failed step or event changes nothing: the model steps on a copy, and the crate undoes a
-/// failed event.
 #[test]
-fn failing_events_and_steps_change_nothing() {
-    use fmu_export::Interface::CoSimulation;
-    for interface in [CoSimulation, ModelExchange] {
-        let fmu = Importer::of::<Counter>(interface);
-        prepare_counter(&fmu);
-        fmu.set(&[counter::Name::weight as u32], &[f64::MAX]);
-        fmu.initialize(0.0);
-        let message = if interface == CoSimulation {
-            fmu.refused("step", |fmu| fmu.try_step(0.0, 1.0))
+fn in_model_exchange() {
+    bounces::<Importer>();
+    bounces::<fmi3::Importer>();
+    event_iteration::<Importer>();
+    event_iteration::<fmi3::Importer>();
+}
+
+/// Section 2.4.8 of FMI 3.0: a variable represents the event indicator. Section 2.3.5: states without reinit
+/// may be set in Event Mode.
+#[test]
+fn indicators_and_states_of_fmi3() {
+    let fmu = fmi3::Importer::in_mode::<Ball>(ModelExchange, Mode::ContinuousTime);
+    let index = indicator::<Ball>(0);
+    assert_eq!(fmu.get([index]), [1.0]);
+    fmu.refused("a calculated local", |fmu| fmu.try_set(&[index], &[1.0]));
+    fmu.refused("no variable", |fmu| fmu.try_get(&[index + 1], &mut [0.0]));
+    let (mut states, mut indicators) = (0, 0);
+    let fmu = fmi3::Importer::in_mode::<Ball>(ModelExchange, Mode::Event);
+    fmu.ok(fmu.fmi3GetNumberOfContinuousStates(&mut states));
+    fmu.ok(fmu.fmi3GetNumberOfEventIndicators(&mut indicators));
+    assert_eq!((states, indicators), (2, 1));
+    let fmu = fmi3::Importer::in_mode::<Oscillator>(ModelExchange, Mode::Event);
+    fmu.set(&[1], &[0.5]);
+    assert_eq!(fmu.get([1]), [0.5]);
+}
+
+#[test]
+fn the_importer_handles_them() {
+    let fmu = of_fmi3::<Ticker>(fmi3True, fmi3True, |_| ());
+    fmu.refused("no step in event mode", |fmu| fmu.try_step(0.0, 1.0));
+    assert_eq!(fmu.update(), Updated { next: Some(0.25), ..Updated::default() });
+    fmu.ok(fmu.fmi3EnterStepMode());
+    let at = |last_successful_time, early_return| {
+        Ok(Stepped { event_handling_needed: true, early_return, last_successful_time, ..AT_ONCE })
+    };
+    assert_eq!(fmu.do_step(0.0, 1.0), at(0.25, true));
+    assert_eq!(fmu.get([SUM]), [1.0], "nothing has happened yet");
+    fmu.ok(fmu.fmi3EnterEventMode());
+    fmu.set(&[ticker::Name::amount as u32], &[10.0]);
+    assert_eq!(fmu.update().next, Some(0.5));
+    assert_eq!(fmu.get([SUM]), [11.0]);
+    fmu.ok(fmu.fmi3EnterStepMode());
+    // An event at the end of a step is not early.
+    assert_eq!(fmu.do_step(0.25, 0.25), at(0.5, false));
+    // A model without events has no Event Mode.
+    let arguments = Arguments { event_mode_used: fmi3True, ..Arguments::of::<Fuse>(CoSimulation) };
+    let log = fmi3::Importer::try_with::<Fuse>(&arguments).unwrap_err();
+    assert!(log[0].text.contains("hasEventMode is false"), "{log:?}");
+}
+
+/// If the importer does not handle events, the library handles them within the step.
+#[test]
+fn the_library_handles_them() {
+    fn check(fmu: &impl Either) {
+        assert_eq!(fmu.get([SUM]), [1.0], "the tick at the begin");
+        fmu.step(0.0, 0.6);
+        assert_eq!(fmu.get([SUM]), [3.0]);
+    }
+    check(&of_fmi2::<Ticker>(|_| ()));
+    for (event_mode_used, early_return_allowed) in UNAWARE {
+        let fmu = of_fmi3::<Ticker>(event_mode_used, early_return_allowed, |_| ());
+        if event_mode_used == fmi3True {
+            fmu.update();
+            fmu.ok(fmu.fmi3EnterStepMode());
+        }
+        check(&fmu);
+        if event_mode_used == fmi3False {
+            fmu.refused("no event mode", |fmu| fmu.fmi3EnterEventMode());
         } else {
-            fmu.ok(fmu.fmi2SetTime(1.0));
-            fmu.refused("event", |fmu| fmu.fmi2NewDiscreteStates(&mut Default::default()))
-        };
-        assert!(message.contains("range of numbers"), "{message}");
+            assert!(fmu.do_step(0.6, 0.15).unwrap().event_handling_needed);
+        }
     }
 }
 
-/// Checks that Co-Simulation gives equal counts at the communication points for any step size.
 #[test]
-fn the_same_in_co_simulation() {
-    use counter::Name::*;
-    for steps in [1, 4, 16] {
-        let fmu = Importer::of::<Counter>(fmu_export::Interface::CoSimulation);
-        prepare_counter(&fmu);
-        fmu.initialize(0.0);
-        let h = 1.0 / f64::from(steps);
-        (0..steps).for_each(|step| fmu.step(f64::from(step) * h, h));
-        assert_eq!(integers(&fmu, [count, carries]), [8, 2], "{steps} steps");
-        assert_eq!(fmu.get([sum as u32]), [14.0]);
+fn an_event_ends_the_simulation() {
+    let fmu = of_fmi3::<Ticker>(fmi3False, fmi3False, |fmu| fmu.ok(fmu.set_integer(LAST, 3)));
+    let stepped = fmu.do_step(0.0, 1.0).unwrap();
+    assert_eq!((stepped.terminate, stepped.last_successful_time), (true, 0.5));
+    // A repeated step gives the same result if the importer ignored it.
+    assert_eq!(fmu.do_step(0.5, 1.0), Ok(stepped));
+    fmu.ok(fmu.fmi3Terminate());
+}
+
+fn trouble(fmu: &impl Either, trouble: Trouble) {
+    fmu.ok(fmu.set_item(TROUBLE, trouble as i32));
+}
+
+/// Section 4.2.3: the first step informs an importer of FMI 2.0. The step also informs an importer of FMI 3.0
+/// without Event Mode, and one that ignores the result of fmi3UpdateDiscreteStates (FMPy).
+#[test]
+fn the_initial_event_ends_the_simulation() {
+    let fmu = of_fmi2::<Grumbler>(|fmu| trouble(fmu, Trouble::End));
+    assert_eq!(fmu.try_step(0.0, 0.5), Status::Discard);
+    assert_eq!(progress(&fmu), (0.0, true));
+    fmu.refused("a step after the end", |fmu| fmu.try_step(0.0, 0.5));
+    fmu.ok(fmu.fmi2Terminate());
+    for (event_mode_used, early_return) in [(fmi3False, false), (fmi3True, false), (fmi3True, true)] {
+        let fmu = of_fmi3::<Grumbler>(event_mode_used, early_return.into(), |fmu| trouble(fmu, Trouble::End));
+        if event_mode_used == fmi3True {
+            assert!(fmu.update().terminate);
+            fmu.ok(fmu.fmi3EnterStepMode());
+        }
+        let before = fmu.bytes();
+        assert_eq!(fmu.do_step(0.0, 1.0), Ok(Stepped { terminate: true, early_return, ..AT_ONCE }));
+        assert_eq!(fmu.bytes(), before);
+        fmu.refused("a wrong point", |fmu| fmu.try_step(1.0, 1.0));
+        fmu.ok(fmu.fmi3Terminate());
     }
+}
+
+/// Section 4.2.1 of FMI 3.0: no earlyReturn for errors, and a discarded step changes nothing.
+#[test]
+fn a_step_that_fails_half_way() {
+    for (event_mode_used, early_return_allowed) in UNAWARE {
+        let fmu = of_fmi3::<Grumbler>(event_mode_used, early_return_allowed, |_| ());
+        if event_mode_used == fmi3True {
+            while fmu.update().again {}
+            fmu.ok(fmu.fmi3EnterStepMode());
+        }
+        for (at, failed) in [(Trouble::SecondRound, "SecondRound"), (Trouble::Step, "Step")] {
+            trouble(&fmu, at);
+            let text = undone(&fmu, Status::Error, 0.0, 1.5);
+            assert_eq!(text, format!("fmi3DoStep: the step cannot go on at 1: {failed} has failed"));
+        }
+        trouble(&fmu, Trouble::Nowhere);
+        fmu.step(0.0, 1.5);
+    }
+}
+
+/// Checks that in FMI 2.0 the first iteration of a failed event is undone, and the step ends at the event.
+#[test]
+fn an_event_that_fails_in_its_second_round() {
+    let fmu = Importer::of::<Grumbler>(CoSimulation);
+    trouble(&fmu, Trouble::SecondRound);
+    fmu.enter_initialization(0.0, None);
+    let before = fmu.bytes();
+    assert_eq!(fmu.fmi2ExitInitializationMode(), Status::Error);
+    assert_eq!(fmu.bytes(), before);
+    let fmu = of_fmi2::<Grumbler>(|_| ());
+    let rounds = || fmu.integer(grumbler::Name::rounds as u32);
+    assert_eq!(rounds(), 2);
+    trouble(&fmu, Trouble::SecondRound);
+    assert_eq!(fmu.try_step(0.0, 1.5), Status::Discard);
+    assert_eq!((progress(&fmu), rounds()), ((1.0, false), 2));
+}
+
+/// Checks that a shorter step succeeds.
+#[test]
+fn more_events_than_a_step_may_have() {
+    const EXPECTED: &str = "it has more than 10000 events; make shorter steps";
+    for (event_mode_used, early_return_allowed) in UNAWARE {
+        let last = |fmu: &fmi3::Importer| fmu.ok(fmu.set_integer(LAST, i32::MAX));
+        let fmu = of_fmi3::<Ticker>(event_mode_used, early_return_allowed, last);
+        if event_mode_used == fmi3True {
+            fmu.ok(fmu.fmi3EnterStepMode());
+        }
+        let text = undone(&fmu, Status::Discard, 0.0, 2501.0);
+        assert!(text.ends_with(EXPECTED), "{text}");
+        fmu.step(0.0, 2499.1);
+    }
+    let fmu = of_fmi2::<Ticker>(|fmu| fmu.ok(fmu.set_integer(LAST, i32::MAX)));
+    fmu.step(0.0, 2500.0);
+    let text = discarded(&fmu, 2500.0, 2500.25);
+    assert!(text.contains("at 5000.25: ") && text.contains(EXPECTED), "{text}");
+    assert_eq!(progress(&fmu), (5000.25, false));
+    // An endless event.
+    let fmu = Importer::of::<Grumbler>(CoSimulation);
+    trouble(&fmu, Trouble::Rounds);
+    fmu.enter_initialization(0.0, None);
+    assert_eq!(fmu.fmi2ExitInitializationMode(), Status::Error);
+    let log = fmu.take_log();
+    let words = "does not come to an end in 10000 rounds";
+    assert!(log.iter().any(|message| message.text.contains(words)), "{log:?}");
+}
+
+/// The fuse warms by 10 degrees per second from 20: hot after 8 s, melted after 18 s.
+#[test]
+fn early_return() {
+    let fmu = of_fmi3::<Fuse>(fmi3False, fmi3True, |_| ());
+    let early = Stepped { early_return: true, last_successful_time: 8.0, ..AT_ONCE };
+    assert_eq!(fmu.do_step(0.0, 10.0), Ok(early));
+    // The simulation continues from there until the fuse melts.
+    let stepped = fmu.do_step(8.0, 20.0).unwrap();
+    assert_eq!(stepped, Stepped { terminate: true, last_successful_time: 18.0, ..early });
+    assert_eq!(fmu.do_step(18.0, 1.0), Ok(stepped));
+    fmu.ok(fmu.fmi3Reset());
+    fmu.initialize(0.0);
+    fmu.step(0.0, 1.0);
+    // If it is not allowed, the step changes nothing, so that a shorter one is possible.
+    let fmu = of_fmi3::<Fuse>(fmi3False, fmi3False, |_| ());
+    let text = undone(&fmu, Status::Discard, 0.0, 10.0);
+    assert!(text.contains("ends early, at 8: the model stops there, and earlyReturnAllowed has"), "{text}");
+    fmu.step(0.0, 8.0);
+    // The end of the simulation is reported without early return.
+    let ended = Stepped { terminate: true, last_successful_time: 18.0, ..AT_ONCE };
+    assert_eq!(fmu.do_step(8.0, 20.0), Ok(ended));
+}
+
+/// An importer of FMI 2.0 reads the time reached, restores the state and makes a shorter step; or it ends the
+/// simulation there, or resets the instance.
+#[test]
+fn an_early_end_and_a_shorter_step() {
+    let fmu = of_fmi2::<Fuse>(|_| ());
+    fmu.step(0.0, 5.0);
+    let state = fmu.save();
+    let message = discarded(&fmu, 5.0, 5.0);
+    assert!(message.contains("10") && message.contains("early, at 8"), "{message}");
+    assert_eq!(progress(&fmu), (8.0, false));
+    assert_eq!(fmu.get([TEMPERATURE]), [100.0], "readable where it ended");
+    fmu.refused("a step after it", |fmu| fmu.try_step(8.0, 1.0));
+    fmu.refused("an input after it", |fmu| fmu.try_set(&[fuse::Name::load as u32], &[0.0]));
+    fmu.ok(fmu.fmi2Terminate());
+    assert_eq!(progress(&fmu), (8.0, false));
+    fmu.ok(fmu.fmi2SetFMUstate(state));
+    assert_eq!(progress(&fmu), (5.0, false));
+    fmu.step(5.0, 3.0);
+    fmu.step(8.0, 1.0);
+    assert_eq!(fmu.get([TEMPERATURE]), [110.0]);
+    let message = discarded(&fmu, 9.0, 20.0);
+    assert!(message.contains("ends the simulation at 18"), "{message}");
+    assert_eq!(progress(&fmu), (18.0, true));
+    let bytes = fmu.bytes();
+    fmu.ok(fmu.fmi2Terminate());
+    assert_eq!(progress(&fmu), (18.0, true));
+    // The state includes the end of the simulation.
+    let other = Importer::of::<Fuse>(CoSimulation);
+    other.restore(&bytes);
+    assert_eq!(progress(&other), (18.0, true));
+    fmu.ok(fmu.fmi2SetFMUstate(state));
+    discarded(&fmu, 5.0, 5.0);
+    fmu.ok(fmu.fmi2Reset());
+    fmu.initialize(0.0);
+    assert_eq!(fmu.get([TEMPERATURE]), [20.0]);
+}
+
+/// A model that ends every step early, or at an event if its input is 1, and declares neither.
+mod hasty {
+    use fmu_export::*;
+
+    #[derive(Clone)]
+    pub struct Hasty {
+        u: f64,
+    }
+
+    variables! { for Hasty;
+        /// Input
+        u = input(&NUMBER) in u;
+    }
+
+    impl Model for Hasty {
+        const INFO: Info = Info::new("Hasty", "hasty", "{hasty}");
+
+        fn new(_: &Setup) -> Result<Self, Error> {
+            Ok(Self { u: 0.0 })
+        }
+    }
+
+    impl CoSimulation for Hasty {
+        fn step(&mut self, step: Step) -> Result<Stepped, Error> {
+            Ok(if self.u == 1.0 { Stepped::Event(step.time) } else { Stepped::Early(step.time) })
+        }
+    }
+
+    offer!(Hasty: CoSimulation);
+}
+
+/// Checks that the FMU does not contradict its description: the step is fatal.
+#[test]
+fn an_early_end_that_the_model_has_not_announced() {
+    fn check<F: Either>() {
+        let fmu = F::initialized_at::<hasty::Hasty>(0.0);
+        assert_eq!(fmu.try_step(0.0, 1.0), Status::Fatal);
+        let log = fmu.take_log();
+        assert!(log.len() == 1 && log[0].text.contains("const ENDS_EARLY: bool = true"), "{log:?}");
+    }
+    check::<Importer>();
+    check::<fmi3::Importer>();
+}
+
+/// The message names the declaration that an event needs, which an early end does not.
+#[test]
+#[should_panic(expected = "add `const EVENTS: Events = Events::Stop;` to its impl CoSimulation")]
+fn an_event_that_the_model_has_not_declared() {
+    let _ = fmu_export::Simulation::<hasty::Hasty>::new().unwrap().set("u", 1.0).unwrap().run(1.0);
 }

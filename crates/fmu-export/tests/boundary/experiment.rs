@@ -1,7 +1,7 @@
 //! Data that the importer passes about itself and its experiment (sections 2.1.5 and 2.1.6), and their effect
 //! on the model.
 
-use crate::toys::{Talker, talker::Name};
+use crate::models::{Talker, talker::Name};
 use crate::variables::texts;
 use fmu_export::Interface::CoSimulation;
 use fmu_test_kit::{Arguments, Either, Importer};

@@ -1,13 +1,12 @@
 //! Content and times of log messages (sections 2.1.5 and 2.2.4).
 
-use crate::toys::grumbler::{self, Trouble};
-use crate::toys::{Grumbler, Oscillator, Talker, talker::Name};
-use crate::variables::say;
+use crate::models::grumbler::{self, Trouble};
+use crate::models::{Grumbler, Oscillator, Talker, talker::Name};
 use fmu_export::Exported;
 use fmu_export::Interface::{CoSimulation, ModelExchange};
-use fmu_export::fmi2::types::Status;
+use fmu_export::Status;
 use fmu_test_kit::serialized::{VALUES, with};
-use fmu_test_kit::{Arguments, Either, Importer, Message};
+use fmu_test_kit::{Arguments, Either, Importer, Message, fmi3};
 use std::ffi::CStr;
 use std::ptr::{null, null_mut};
 
@@ -21,7 +20,7 @@ fn shown(fmu: &Importer) -> String {
     fmu.take_log();
     fmu.ok(fmu.fmi2Reset());
     fmu.initialize(0.0);
-    say(fmu, Name::heard, "%s#r1#\n");
+    fmu.say(Name::heard as u32, "%s#r1#\n");
     fmu.step(0.0, 0.1);
     fmu.set(&[Name::volume as u32], &[10.5]);
     assert_eq!(fmu.fmi2GetStatus(0, &mut 0), Status::Discard);
@@ -91,6 +90,23 @@ fn categories_that_do_not_exist() {
     assert_eq!(shown(&fmu), "WE", "nothing was switched");
 }
 
+/// Section 2.3.1 of FMI 3.0: without logging there are only errors, which cannot be disabled.
+#[test]
+fn logging_of_fmi3() {
+    let fmu = fmi3::Importer::of::<Talker>(CoSimulation);
+    let volume = Name::volume as u32;
+    fmu.set(&[volume], &[10.5]);
+    assert_eq!(fmu.take_log(), [], "a warning is no error");
+    fmu.ok(fmu.fmi3SetDebugLogging(1, 1, &c"logStatusWarning".as_ptr()));
+    fmu.set(&[volume], &[10.6]);
+    assert_eq!(fmu.take_log().len(), 1);
+    fmu.ok(fmu.fmi3SetDebugLogging(1, 0, null()));
+    fmu.initialize(0.0);
+    assert!(fmu.take_log().iter().any(|message| message.text == "initialized"));
+    fmu.ok(fmu.fmi3SetDebugLogging(0, 1, &c"logAll".as_ptr()));
+    fmu.refused("no category", |fmu| fmu.fmi3SetDebugLogging(1, 1, &c"logNothing".as_ptr()));
+}
+
 /// Checks the messages of a run.
 #[test]
 fn events() {
@@ -112,7 +128,7 @@ fn events() {
 fn messages_of_the_model() {
     let fmu = logging::<Talker>(true);
     fmu.initialize(0.0);
-    say(&fmu, Name::heard, "Ping");
+    fmu.say(Name::heard as u32, "Ping");
     fmu.take_log();
     fmu.step(0.0, 1.0);
     assert_eq!(fmu.take_log().iter().map(|message| message.text.as_str()).collect::<Vec<_>>(), ["says Ping"]);

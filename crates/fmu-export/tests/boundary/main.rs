@@ -1,45 +1,42 @@
-//! Tests of the C functions of FMI 2.0 with test models, called as in the standard and by fault-injecting
-//! importers.
+//! Tests of the C functions of both FMI versions with test models.
 #![allow(missing_docs)]
 
-#[path = "../toys/mod.rs"]
-mod toys;
+#[path = "../models/mod.rs"]
+mod models;
 
 use fmu_export::{Exported, Interface};
 
 /// Calls a function for every test model.
-macro_rules! for_every_toy {
-    ($function:ident($($argument:expr),*)) => {{
-        $function::<crate::toys::Oscillator>($($argument),*);
-        $function::<crate::toys::Ball>($($argument),*);
-        $function::<crate::toys::Counter>($($argument),*);
-        $function::<crate::toys::Talker>($($argument),*);
-        $function::<crate::toys::Sum>($($argument),*);
-        $function::<crate::toys::Fuse>($($argument),*);
-        $function::<crate::toys::Motor>($($argument),*);
-        $function::<crate::toys::Lazy>($($argument),*);
-        $function::<crate::toys::Balance>($($argument),*);
-        $function::<crate::toys::Meter>($($argument),*);
+macro_rules! for_every_model {
+    ($function:ident $(, $importer:ty)?) => {{
+        $function::<$($importer,)? crate::models::Oscillator>();
+        $function::<$($importer,)? crate::models::Ball>();
+        $function::<$($importer,)? crate::models::Counter>();
+        $function::<$($importer,)? crate::models::Talker>();
+        $function::<$($importer,)? crate::models::Sum>();
+        $function::<$($importer,)? crate::models::Fuse>();
+        $function::<$($importer,)? crate::models::Motor>();
+        $function::<$($importer,)? crate::models::Lazy>();
+        $function::<$($importer,)? crate::models::Meter>();
     }};
 }
 
+mod arrays;
 mod calculated;
 mod call_table;
 mod derivatives;
-mod early_steps;
 mod events;
 mod experiment;
-mod fmi3;
-mod less;
 mod logging;
-mod oscillation;
 mod places;
 mod refusals;
+mod runs;
 mod saved_states;
 mod settable;
 mod simulation;
 mod start_values;
 mod tolerances;
+mod valid_calls;
 mod variables;
 
 const INTERFACES: [Interface; 2] = [Interface::CoSimulation, Interface::ModelExchange];
@@ -54,5 +51,5 @@ fn offers<M: Exported>(interface: Interface) -> bool {
 
 /// Tests for every FMU with all capabilities.
 mod every {
-    fmu_test_kit::every_check!(crate::toys::Oscillator);
+    fmu_test_kit::every_check!(crate::models::Oscillator);
 }

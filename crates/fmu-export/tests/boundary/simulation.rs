@@ -1,6 +1,6 @@
 //! Tests of [`Simulation`], the test driver for authors.
 
-use crate::toys::{Rod, Ticker};
+use crate::models::{Rod, Ticker};
 use fmu_export::{Simulation, Value};
 
 /// Checks a variable that follows arrays, array elements, and whole arrays.

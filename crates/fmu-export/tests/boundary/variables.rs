@@ -1,139 +1,244 @@
-//! Strings, enumerations and rarer kinds of variables (section 2.2.7).
+//! Values of Strings, Booleans, Enumerations and rarer kinds of variables: section 2.2.7 of FMI 2.0, 2.2.6 of
+//! FMI 3.0.
 
 use crate::INTERFACES;
-use crate::toys::{Talker, talker::Name};
+use crate::models::grumbler::{self, Trouble};
+use crate::models::*;
+use crate::models::{palette::Name as Kind, talker::Name};
 use fmu_export::Interface::{CoSimulation, ModelExchange};
 use fmu_export::Mode::*;
-use fmu_export::fmi2::types::Status;
-use fmu_test_kit::{Either, Importer};
-use std::ffi::{CStr, CString};
+use fmu_export::fmi3::{independent, reference};
+use fmu_export::{Causality, Exported, Status, Variables};
+use fmu_test_kit::{Either, Importer, fmi3};
+use std::ffi::CStr;
 use std::ptr::null;
 
-pub fn texts<const N: usize>(fmu: &Importer, names: [Name; N]) -> [String; N] {
-    let mut texts = [null(); N];
-    fmu.ok(fmu.fmi2GetString(names.map(|name| name as u32).as_ptr(), N, texts.as_mut_ptr()));
-    // SAFETY: strings of the instance, valid until the next call (section 2.1.7).
-    texts.map(|text| unsafe { CStr::from_ptr(text) }.to_str().unwrap().to_owned())
-}
-
-pub fn try_say(fmu: &Importer, name: Name, text: &str) -> Status {
-    let text = CString::new(text).unwrap();
-    fmu.fmi2SetString(&(name as u32), 1, &text.as_ptr())
-}
-
-pub fn say(fmu: &Importer, name: Name, text: &str) {
-    fmu.ok(try_say(fmu, name, text));
-}
-
-fn integer(fmu: &Importer, name: Name) -> i32 {
-    let mut value = i32::MIN;
-    fmu.ok(fmu.fmi2GetInteger(&(name as u32), 1, &mut value));
-    value
-}
-
-fn set_mood(fmu: &Importer, mood: i32) -> Status {
-    fmu.fmi2SetInteger(&(Name::mood as u32), 1, &mood)
+pub fn texts<F: Either, const N: usize>(fmu: &F, names: [Name; N]) -> [String; N] {
+    names.map(|name| fmu.text(name as u32))
 }
 
 /// Checks strings in both directions, several at once and repeated, of any length and script.
-#[test]
-fn texts_in_and_out() {
+fn texts_in_and_out<F: Either>() {
     let long = "long ".repeat(10_000);
     for interface in INTERFACES {
-        let fmu = Importer::in_mode::<Talker>(interface, Initialization);
+        let fmu = F::in_mode::<Talker>(interface, Initialization);
         assert_eq!(texts(&fmu, [Name::heard, Name::greeting]), ["", "Hello"]);
         for text in ["", "Hi", "Gödel said: ∀x ∃y 🙂", "100%s #r1# \n\t", &long] {
-            say(&fmu, Name::heard, text);
+            fmu.say(Name::heard as u32, text);
             assert_eq!(texts(&fmu, [Name::reply, Name::heard, Name::reply]), [text; 3]);
         }
-        let (heard, greeting) = (Name::heard as u32, Name::greeting as u32);
-        let values = [c"one", c"two", c"three"].map(CStr::as_ptr);
-        fmu.ok(fmu.fmi2SetString([heard, greeting, heard].as_ptr(), 3, values.as_ptr()));
-        assert_eq!(texts(&fmu, [Name::heard, Name::greeting]), ["three", "two"], "the last one counts");
+        fmu.refused_with(&["heard is NULL"], |fmu| fmu.set_text(Name::heard as u32, null()));
+        fmu.refused_with(&["heard is not UTF-8"], |fmu| fmu.set_text(Name::heard as u32, c"G\xc3".as_ptr()));
     }
 }
 
 /// Checks that the strings of a call stay valid until the next call on this instance, regardless of other
 /// instances.
-#[test]
-fn how_long_texts_live() {
-    let [one, other] = [(); 2].map(|()| Importer::in_mode::<Talker>(CoSimulation, StepComplete));
-    say(&one, Name::heard, "the one");
+fn how_long_texts_live<F: Either>() {
+    let [one, other] = [(); 2].map(|()| F::in_mode::<Talker>(CoSimulation, StepComplete));
+    one.say(Name::heard as u32, "the one");
     let mut text = null();
-    one.ok(one.fmi2GetString(&(Name::reply as u32), 1, &mut text));
-    say(&other, Name::heard, "the other");
+    one.ok(one.get_text(Name::reply as u32, &mut text));
+    other.say(Name::heard as u32, "the other");
     texts(&other, [Name::reply]);
     // SAFETY: there was no call on this instance since.
     assert_eq!(unsafe { CStr::from_ptr(text) }, c"the one");
 }
 
-/// Checks that a text logged by a step is available after it.
-#[test]
-fn steps_with_texts() {
-    let fmu = Importer::in_mode::<Talker>(CoSimulation, StepComplete);
+/// Checks that Enumerations accept only their items, and that a step uses them and the texts.
+fn enumerations<F: Either>() {
+    let fmu = F::in_mode::<Talker>(CoSimulation, StepComplete);
     assert_eq!(texts(&fmu, [Name::said]), ["Hello"]);
     for (point, mood, expected) in [(0.0, 1, "Ping"), (1.0, 2, "Ping!"), (2.0, 7, "Ping!")] {
-        say(&fmu, Name::heard, "Ping");
-        fmu.ok(set_mood(&fmu, mood));
+        fmu.say(Name::heard as u32, "Ping");
+        fmu.ok(fmu.set_item(Name::mood as u32, mood));
+        assert_eq!([Name::mood, Name::own_mood].map(|name| fmu.item(name as u32)), [mood; 2]);
         fmu.step(point, 1.0);
         assert_eq!(texts(&fmu, [Name::said]), [expected]);
     }
-}
-
-/// Checks that Enumerations use the functions of Integers and accept only their items.
-#[test]
-fn enumerations() {
-    let fmu = Importer::in_mode::<Talker>(CoSimulation, Initialization);
-    for mood in [1, 2, 7] {
-        fmu.ok(set_mood(&fmu, mood));
-        assert_eq!((integer(&fmu, Name::mood), integer(&fmu, Name::own_mood)), (mood, mood));
-    }
     for mood in [0, 3, -1, i32::MAX] {
         fmu.refused_with(&["mood must be one of 1 (Calm), 2 (Excited), 7 (Sulking)"], |fmu| {
-            set_mood(fmu, mood)
+            fmu.set_item(Name::mood as u32, mood)
         });
     }
     fmu.refused_with(&["mood is of type Enumeration, not Real"], |fmu| {
-        fmu.fmi2GetReal(&(Name::mood as u32), 1, &mut 0.0)
+        fmu.try_get(&[Name::mood as u32], &mut [0.0])
     });
 }
 
-/// Checks a tunable parameter and a variable that depends on it, during the simulation.
-#[test]
-fn tunable_and_calculated_parameters() {
+fn booleans<F: Either>() {
+    let fmu = F::initialized_at::<Palette>(0.0);
+    for value in [1, 0] {
+        fmu.ok(fmu.set_boolean(Kind::boolean as u32, value));
+        assert_eq!(fmu.boolean(Kind::boolean as u32), value == 1);
+    }
+    fmu.refused_with(&["boolean must be 0 (false) or 1 (true), it is 2"], |fmu| {
+        fmu.set_boolean(Kind::boolean as u32, 2)
+    });
+}
+
+/// Checks a tunable parameter and a variable that depends on it, during the simulation; and that a
+/// calculation begins with the start value: different start values lead to different roots.
+fn tunable_and_calculated_variables<F: Either>() {
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, Event)] {
-        let fmu = Importer::in_mode::<Talker>(interface, mode);
+        let fmu = F::in_mode::<Talker>(interface, mode);
         for volume in [1.0, 10.0] {
             fmu.set(&[Name::volume as u32], &[volume]);
             let [decibels] = fmu.get([Name::decibels as u32]);
             assert!((decibels - 20.0 * (volume + 1e-3).log10()).abs() < 1e-12);
         }
-        say(&fmu, Name::greeting, "12345");
-        assert_eq!(integer(&fmu, Name::length), 5);
+        assert_eq!([Name::length, Name::answer].map(|name| fmu.integer(name as u32)), [5, 42]);
     }
-}
-
-/// Checks that the calculation begins with the start value: different start values lead to different roots.
-#[test]
-fn start_values_of_calculations() {
     for (start, root) in [(1.0, 3.0), (-0.1, -3.0)] {
-        let fmu = Importer::of::<Talker>(CoSimulation);
+        let fmu = F::in_mode::<Talker>(CoSimulation, Instantiated);
         fmu.set(&[Name::root as u32, Name::square as u32], &[start, 9.0]);
         fmu.initialize(0.0);
         assert!((fmu.get([Name::root as u32])[0] - root).abs() < 1e-12);
     }
 }
 
-#[test]
-fn constants_and_the_time() {
-    let fmu = Importer::in_mode::<Talker>(CoSimulation, StepComplete);
-    assert_eq!(integer(&fmu, Name::answer), 42);
+fn the_time<F: Either>() {
     let time = Name::time as u32;
+    let fmu = F::in_mode::<Talker>(CoSimulation, StepComplete);
     assert_eq!(fmu.get([time]), [0.0]);
     fmu.step(0.0, 0.5);
     assert_eq!(fmu.get([time]), [0.5]);
     fmu.refused("the time is not set like this", |fmu| fmu.try_set(&[time], &[1.0]));
-    let fmu = Importer::in_mode::<Talker>(ModelExchange, ContinuousTime);
-    fmu.ok(fmu.fmi2SetTime(-3.0));
+    let fmu = F::in_mode::<Talker>(ModelExchange, ContinuousTime);
+    fmu.ok(fmu.set_time(-3.0));
     assert_eq!(fmu.get([time]), [-3.0]);
+}
+
+/// Checks a user-defined type with only the required functions, and a value that is not finite.
+fn types_of_authors<F: Either>() {
+    let fmu = F::in_mode::<Grumbler>(CoSimulation, Instantiated);
+    let ambient = grumbler::Name::ambient as u32;
+    fmu.set(&[ambient], &[-273.25]);
+    fmu.initialize(0.0);
+    fmu.leave_event_mode();
+    assert_eq!(fmu.get([ambient]), [-273.25]);
+    fmu.set(&[ambient], &[4.5]);
+    assert_eq!(fmu.get([ambient, ambient]), [4.5; 2]);
+}
+
+#[test]
+fn in_both_versions() {
+    fn check<F: Either>() {
+        texts_in_and_out::<F>();
+        how_long_texts_live::<F>();
+        enumerations::<F>();
+        booleans::<F>();
+        tunable_and_calculated_variables::<F>();
+        the_time::<F>();
+        types_of_authors::<F>();
+    }
+    check::<Importer>();
+    check::<fmi3::Importer>();
+}
+
+/// Checks several strings in one call of FMI 2.0; the last value of a repeated variable counts.
+#[test]
+fn several_texts() {
+    let fmu = Importer::in_mode::<Talker>(CoSimulation, StepComplete);
+    let (heard, greeting) = (Name::heard as u32, Name::greeting as u32);
+    let values = [c"one", c"two", c"three"].map(CStr::as_ptr);
+    fmu.ok(fmu.fmi2SetString([heard, greeting, heard].as_ptr(), 3, values.as_ptr()));
+    assert_eq!(texts(&fmu, [Name::heard, Name::greeting]), ["three", "two"]);
+}
+
+/// Checks every getter with every variable: only the function of its type succeeds. An Enumeration is an
+/// Integer in FMI 2.0 and an Int64 in FMI 3.0.
+#[test]
+fn wrong_types() {
+    let (fmu, old) =
+        (fmi3::Importer::initialized_at::<Palette>(0.0), Importer::initialized_at::<Palette>(0.0));
+    let (mut number, mut text, mut bytes, mut size) = (0_u64, null(), null(), 0);
+    for (index, variable) in (0..).zip(Palette::TABLE) {
+        let (vr, number, base) = (reference(index), &raw mut number, variable.base().to_string());
+        let results = [
+            ("Real", fmu.fmi3GetFloat64(&vr, 1, number.cast(), 1)),
+            ("Float32", fmu.fmi3GetFloat32(&vr, 1, number.cast(), 1)),
+            ("Int8", fmu.fmi3GetInt8(&vr, 1, number.cast(), 1)),
+            ("UInt8", fmu.fmi3GetUInt8(&vr, 1, number.cast(), 1)),
+            ("Int16", fmu.fmi3GetInt16(&vr, 1, number.cast(), 1)),
+            ("UInt16", fmu.fmi3GetUInt16(&vr, 1, number.cast(), 1)),
+            ("Integer", fmu.fmi3GetInt32(&vr, 1, number.cast(), 1)),
+            ("UInt32", fmu.fmi3GetUInt32(&vr, 1, number.cast(), 1)),
+            ("Int64", fmu.fmi3GetInt64(&vr, 1, number.cast(), 1)),
+            ("UInt64", fmu.fmi3GetUInt64(&vr, 1, number, 1)),
+            ("Boolean", fmu.fmi3GetBoolean(&vr, 1, number.cast(), 1)),
+            ("String", fmu.fmi3GetString(&vr, 1, &mut text, 1)),
+            ("Binary", fmu.fmi3GetBinary(&vr, 1, &mut size, &mut bytes, 1)),
+        ];
+        for (of, status) in results {
+            let fits = of == base || of == "Int64" && base == "Enumeration";
+            assert_eq!(status == Status::Ok, fits, "{of}: {}", variable.name());
+        }
+        let results = [
+            ("Real", old.fmi2GetReal(&index, 1, number.cast())),
+            ("Integer", old.fmi2GetInteger(&index, 1, number.cast())),
+            ("Boolean", old.fmi2GetBoolean(&index, 1, number.cast())),
+            ("String", old.fmi2GetString(&index, 1, &mut text)),
+        ];
+        for (of, status) in results {
+            let fits = of == base || of == "Integer" && base == "Enumeration";
+            assert_eq!(status == Status::Ok, fits, "{of}: {}", variable.name());
+        }
+        if !variable.base().is_in_fmi2() {
+            assert_eq!(old.fmi2SetInteger(&index, 1, &1), Status::Error);
+        }
+    }
+}
+
+/// Checks that value references of FMI 3.0 begin with 1; every function rejects 0.
+#[test]
+fn value_references_count_from_1() {
+    let (fmu, mut value) = (fmi3::Importer::initialized_at::<Oscillator>(0.0), 0.0);
+    fmu.set(&[oscillator::Name::force as u32], &[7.0]);
+    fmu.ok(fmu.fmi3GetFloat64(&1, 1, &mut value, 1));
+    assert_eq!((value, Oscillator::TABLE[0].name()), (7.0, "force"));
+    let words = ["no variable with value reference 0"];
+    fmu.refused_with(&words, |fmu| fmu.fmi3GetFloat64(&0, 1, &mut value, 1));
+    fmu.refused_with(&words, |fmu| fmu.fmi3SetFloat64(&0, 1, &1.0, 1));
+    fmu.refused_with(&words, |fmu| fmu.fmi3SetInt8(&0, 1, &1, 1));
+    fmu.refused_with(&words, |fmu| fmu.fmi3GetOutputDerivatives(&0, 1, &1, &mut value, 1));
+    fmu.refused_with(&words, |fmu| fmu.fmi3GetDirectionalDerivative(&0, 1, &1, 1, &1.0, 1, &mut value, 1));
+}
+
+/// Checks that every model of FMI 3.0 has a time: in its table, or after all other variables.
+#[test]
+fn the_time_of_fmi3() {
+    fn check<M: Exported>() {
+        let (index, variable) = independent::<M>();
+        let in_table = M::TABLE.iter().position(|of| of.causality() == Causality::Independent);
+        assert_eq!(index as usize, in_table.unwrap_or(M::TABLE.len()));
+        assert_eq!((variable.name(), variable.causality()), ("time", Causality::Independent));
+        let fmu = fmi3::Importer::initialized_at::<M>(2.0);
+        assert_eq!(fmu.get([index]), [2.0]);
+        fmu.step(2.0, 0.5);
+        assert_eq!(fmu.get([index]), [2.5]);
+        fmu.refused("the time is no input", |fmu| fmu.try_set(&[index], &[1.0]));
+        fmu.refused("no variable", |fmu| fmu.try_set(&[M::TABLE.len() as u32 + 1], &[1.0]));
+    }
+    check::<Palette>();
+    check::<Counter>();
+    check::<Talker>();
+    // FMI 2.0 has no such variable.
+    let fmu = Importer::initialized_at::<Palette>(0.0);
+    fmu.refused("the time", |fmu| fmu.try_get(&[Palette::TABLE.len() as u32], &mut [0.0]));
+}
+
+/// Checks that a value that is not finite is not read.
+#[test]
+fn out_of_the_range_of_float32() {
+    let (fmu, mut value) = (fmi3::Importer::of::<Grumbler>(CoSimulation), f32::NAN);
+    fmu.ok(fmu.set_item(grumbler::Name::trouble as u32, Trouble::Heat as i32));
+    fmu.initialize(0.0);
+    let warmer = reference(grumbler::Name::warmer as u32);
+    fmu.ok(fmu.fmi3GetFloat32(&warmer, 1, &mut value, 1));
+    assert_eq!(value, 0.0);
+    fmu.step(0.0, 0.5);
+    fmu.take_log();
+    assert_eq!(fmu.fmi3GetFloat32(&warmer, 1, &mut value, 1), Status::Error);
+    assert!(fmu.take_log()[0].text.contains("warmer is out of the range of numbers"));
 }

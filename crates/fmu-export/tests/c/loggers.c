@@ -28,7 +28,7 @@ static void provoke(const char *guid, fmi2CallbackFunctions callbacks) {
     const unsigned vr = 99;
     const fmi2Real value = 0;
     fmi2Component c;
-    CHECK(!fmi2Instantiate("toy", fmi2CoSimulation, "{%n%s%d} #r0# 100%", "", &callbacks, 0, 1));
+    CHECK(!fmi2Instantiate("model", fmi2CoSimulation, "{%n%s%d} #r0# 100%", "", &callbacks, 0, 1));
     CHECK((c = fmi2Instantiate("a#b", fmi2CoSimulation, guid, "", &callbacks, 0, 1)));
     CHECK(fmi2SetDebugLogging(c, 1, 1, wishes) == fmi2Error);
     CHECK(fmi2SetDebugLogging(c, 1, 1, wishes + 1) == fmi2Error);

@@ -1,7 +1,7 @@
 /* Loads FMUs, uses them all at once and in both standards, frees everything in ever new order and unloads:
    reload ROUNDS LIBRARY...
    Prints the resident memory in KiB after a tenth of the rounds and at the end. */
-#include "fmu3.h"
+#include "fmu.h"
 #include <unistd.h>
 
 enum { LIBRARIES = 4, INSTANCES = 3, STEPS = 8, VARIABLES = 16, GUID_LENGTH = 64 };

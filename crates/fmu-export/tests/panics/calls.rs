@@ -1,7 +1,7 @@
-//! Every function that runs a model's code, with what breaks it.
+//! Every function that runs code of a model, with the fault that breaks it.
 
-use crate::toys::Faulty;
-use crate::toys::faulty::{Fault, Name, while_all_break};
+use crate::models::Faulty;
+use crate::models::faulty::{Fault, Name, while_all_break};
 use crate::{FAULT, TEXT, TRUTH, U, X, Y};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Status;
@@ -13,7 +13,7 @@ use std::ptr::{null, null_mut};
 /// A call that breaks an instance of this interface type with this fault, and its names without `fmi2` and `fmi3`.
 pub type Case<F> = (Interface, [&'static str; 2], Fault, fn(&F) -> Status);
 
-/// What both standards have.
+/// Calls that both FMI versions have.
 pub fn of_both<F: Either>() -> Vec<Case<F>> {
     const REALS: [&str; 2] = ["GetReal", "GetFloat64"];
     const INTEGERS: [&str; 2] = ["SetInteger", "SetInt32"];
@@ -33,6 +33,29 @@ pub fn of_both<F: Either>() -> Vec<Case<F>> {
         (CoSimulation, ["SetBoolean"; 2], Fault::Then, |fmu| fmu.set_boolean(TRUTH, 1)),
         (CoSimulation, ["SetString"; 2], Fault::Then, |fmu| fmu.set_text(TEXT, c"a".as_ptr())),
         (CoSimulation, ["DoStep"; 2], Fault::Step, |fmu| fmu.try_step(0.0, 0.1)),
+        (CoSimulation, ["GetInteger", "GetInt32"], Fault::Read, |fmu| fmu.get_integer(N, &mut 0)),
+        (CoSimulation, ["GetBoolean"; 2], Fault::Read, |fmu| fmu.get_boolean(TRUTH, &mut 0)),
+        (CoSimulation, ["GetString"; 2], Fault::ReadText, |fmu| fmu.get_text(TEXT, &mut null())),
+        (
+            CoSimulation,
+            ["GetRealOutputDerivatives", "GetOutputDerivatives"],
+            Fault::OutputDerivative,
+            |fmu| fmu.try_rate(Y, 1, &mut 0.0),
+        ),
+        (CoSimulation, ["GetDirectionalDerivative"; 2], Fault::Partial, |fmu| {
+            fmu.try_directional(&[Y], &[U], &[1.0], &mut [0.0])
+        }),
+        (ModelExchange, ["NewDiscreteStates", "UpdateDiscreteStates"], Fault::Event, |fmu| {
+            fmu.ok(fmu.enter_event_mode());
+            fmu.try_update().unwrap_err()
+        }),
+        (ModelExchange, ["CompletedIntegratorStep"; 2], Fault::StepCompleted, |fmu| {
+            fmu.try_completed_step().unwrap_err()
+        }),
+        (ModelExchange, ["GetEventIndicators"; 2], Fault::Indicators, |fmu| fmu.get_indicators(&mut 0.0, 1)),
+        (ModelExchange, ["GetNominalsOfContinuousStates"; 2], Fault::Nominals, |fmu| {
+            fmu.get_nominals(&mut 0.0, 1)
+        }),
         (ModelExchange, ["GetDerivatives", "GetContinuousStateDerivatives"], Fault::Read, |fmu| {
             fmu.get_derivatives(&mut 0.0, 1)
         }),
@@ -73,7 +96,7 @@ pub fn of_both<F: Either>() -> Vec<Case<F>> {
     ]
 }
 
-/// What a standard alone has, or calls in another way.
+/// Calls that only one FMI version has.
 pub trait Special: Either + Sized + 'static {
     const CALLS: &'static [Case<Self>];
 }
@@ -81,71 +104,20 @@ pub trait Special: Either + Sized + 'static {
 const N: u32 = Name::n as u32;
 
 impl Special for Importer {
-    const CALLS: &'static [Case<Self>] = &[
-        (CoSimulation, ["GetInteger", ""], Fault::Read, |fmu| fmu.fmi2GetInteger(&N, 1, &mut 0)),
-        (CoSimulation, ["GetBoolean", ""], Fault::Read, |fmu| fmu.fmi2GetBoolean(&TRUTH, 1, &mut 0)),
-        (CoSimulation, ["GetString", ""], Fault::ReadText, |fmu| fmu.fmi2GetString(&TEXT, 1, &mut null())),
-        (CoSimulation, ["SetRealInputDerivatives", ""], Fault::InputDerivative, |fmu| {
+    const CALLS: &'static [Case<Self>] =
+        &[(CoSimulation, ["SetRealInputDerivatives", ""], Fault::InputDerivative, |fmu| {
             fmu.fmi2SetRealInputDerivatives(&U, 1, &1, &1.0)
-        }),
-        (CoSimulation, ["GetRealOutputDerivatives", ""], Fault::OutputDerivative, |fmu| {
-            fmu.fmi2GetRealOutputDerivatives(&Y, 1, &1, &mut 0.0)
-        }),
-        (CoSimulation, ["GetDirectionalDerivative", ""], Fault::Partial, |fmu| {
-            fmu.fmi2GetDirectionalDerivative(&Y, 1, &U, 1, &1.0, &mut 0.0)
-        }),
-        (ModelExchange, ["NewDiscreteStates", ""], Fault::Event, |fmu| {
-            fmu.ok(fmu.fmi2EnterEventMode());
-            fmu.fmi2NewDiscreteStates(&mut Default::default())
-        }),
-        (ModelExchange, ["CompletedIntegratorStep", ""], Fault::StepCompleted, |fmu| {
-            fmu.fmi2CompletedIntegratorStep(1, &mut 0, &mut 0)
-        }),
-        (ModelExchange, ["GetEventIndicators", ""], Fault::Indicators, |fmu| {
-            fmu.fmi2GetEventIndicators(&mut 0.0, 1)
-        }),
-        (ModelExchange, ["GetNominalsOfContinuousStates", ""], Fault::Nominals, |fmu| {
-            fmu.fmi2GetNominalsOfContinuousStates(&mut 0.0, 1)
-        }),
-    ];
+        })];
 }
 
 impl Special for fmi3::Importer {
     const CALLS: &'static [Case<Self>] = &[
-        (CoSimulation, ["", "GetInt32"], Fault::Read, |fmu| fmu.fmi3GetInt32(&reference(N), 1, &mut 0, 1)),
-        (CoSimulation, ["", "GetBoolean"], Fault::Read, |fmu| {
-            fmu.fmi3GetBoolean(&reference(TRUTH), 1, &mut 0, 1)
-        }),
-        (CoSimulation, ["", "GetString"], Fault::ReadText, |fmu| {
-            fmu.fmi3GetString(&reference(TEXT), 1, &mut null(), 1)
-        }),
-        (CoSimulation, ["", "GetOutputDerivatives"], Fault::OutputDerivative, |fmu| {
-            fmu.fmi3GetOutputDerivatives(&reference(Y), 1, &1, &mut 0.0, 1)
-        }),
-        (CoSimulation, ["", "GetDirectionalDerivative"], Fault::Partial, |fmu| {
-            fmu.fmi3GetDirectionalDerivative(&reference(Y), 1, &reference(U), 1, &1.0, 1, &mut 0.0, 1)
-        }),
         (CoSimulation, ["", "GetAdjointDerivative"], Fault::Partial, |fmu| {
             fmu.fmi3GetAdjointDerivative(&reference(Y), 1, &reference(U), 1, &1.0, 1, &mut 0.0, 1)
         }),
-        // A variable stands for the indicator.
+        // The variable of the indicator.
         (ModelExchange, ["", "GetFloat64"], Fault::Indicators, |fmu| {
             fmu.try_get(&[indicator::<Faulty>(0)], &mut [0.0])
-        }),
-        (ModelExchange, ["", "UpdateDiscreteStates"], Fault::Event, |fmu| {
-            fmu.ok(fmu.fmi3EnterEventMode());
-            let (mut flags, mut next) = ([0; 5], 0.0);
-            let [again, terminate, nominals, states, defined] = &mut flags;
-            fmu.fmi3UpdateDiscreteStates(again, terminate, nominals, states, defined, &mut next)
-        }),
-        (ModelExchange, ["", "CompletedIntegratorStep"], Fault::StepCompleted, |fmu| {
-            fmu.fmi3CompletedIntegratorStep(1, &mut 0, &mut 0)
-        }),
-        (ModelExchange, ["", "GetEventIndicators"], Fault::Indicators, |fmu| {
-            fmu.fmi3GetEventIndicators(&mut 0.0, 1)
-        }),
-        (ModelExchange, ["", "GetNominalsOfContinuousStates"], Fault::Nominals, |fmu| {
-            fmu.fmi3GetNominalsOfContinuousStates(&mut 0.0, 1)
         }),
     ];
 }

@@ -1,6 +1,6 @@
 //! The model as a shared library, which is made into C sources for a test.
 
-#[path = "../toys/faulty.rs"]
+#[path = "../models/faulty.rs"]
 #[allow(dead_code, reason = "some of it is for tests in the same program")]
 mod faulty;
 

@@ -2,8 +2,8 @@
 //! other instances and its memory are safe.
 #![allow(missing_docs)]
 
-#[path = "../toys/mod.rs"]
-mod toys;
+#[path = "../models/mod.rs"]
+mod models;
 
 mod calls;
 
@@ -11,9 +11,9 @@ use calls::{Case, Special, of_both, set_fault};
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Status;
 use fmu_test_kit::{Arguments, Either, Importer, fmi3};
+use models::Faulty;
+use models::faulty::{Fault, Name, while_all_break};
 use std::ptr::null_mut;
-use toys::Faulty;
-use toys::faulty::{Fault, Name, while_all_break};
 
 const U: u32 = Name::u as u32;
 const Y: u32 = Name::y as u32;

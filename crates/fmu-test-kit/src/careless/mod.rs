@@ -14,7 +14,7 @@ mod call;
 mod standards;
 
 use crate::serialized::{fnv1a, sealed, time};
-use crate::{Arguments, Importer, Message};
+use crate::{Arguments, Importer, Message, Random};
 use arbitrary::{Result, Unstructured};
 use arguments::CallArguments;
 pub use call::has_handles;
@@ -60,6 +60,7 @@ fn session<F: Caller, M: Exported>(
         record,
         instances: [const { None }; 3],
         states: [[null_mut(); 3]; 3],
+        contents: Default::default(),
         saved: Vec::new(),
         variables: arguments::Variables::of::<M>(F::STANDARD),
         tally,
@@ -98,21 +99,11 @@ pub fn run_seeds(at_least: u64, models: &[(&str, RunBytes)]) -> Tally {
     tally
 }
 
-/// Returns pseudorandom bytes that are equal in every run (splitmix64).
+/// Returns pseudorandom bytes that are equal in every run.
 pub fn random_bytes(seed: u64, count: usize) -> Vec<u8> {
-    const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
-    let mix = |z: u64| {
-        let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    };
-    // Mixed start value: seeds that differ by a multiple of the step would give the same bytes with an
-    // offset.
-    let begin = mix(seed ^ STEP);
-    (1..=count.div_ceil(8) as u64)
-        .flat_map(|n| mix(begin.wrapping_add(n.wrapping_mul(STEP))).to_le_bytes())
-        .take(count)
-        .collect()
+    // Factor of splitmix64: consecutive seeds begin at distant states.
+    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    (0..count.div_ceil(8)).flat_map(|_| random.bits().to_le_bytes()).take(count).collect()
 }
 
 struct Session<'a, F, M> {
@@ -121,6 +112,8 @@ struct Session<'a, F, M> {
     instances: [Option<Slot<F>>; 3],
     /// Saved states of each instance.
     states: [[*mut c_void; 3]; 3],
+    /// The bytes of these states; empty if they are not known.
+    contents: [[Vec<u8>; 3]; 3],
     /// A serialized state, possibly damaged.
     saved: Vec<u8>,
     variables: arguments::Variables,
@@ -340,6 +333,8 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
                 let pointer = if u.ratio(1, 16)? { null_mut() } else { bytes.as_mut_ptr() };
                 let status = fmu.serialize_into(*state, pointer, size);
                 if status == Status::Ok {
+                    let content = &self.contents[index][which];
+                    assert!(content.is_empty() || *content == bytes, "another state is serialized");
                     self.saved = bytes;
                 }
                 (serialize, status)
@@ -362,10 +357,17 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         // Freeing through a NULL pointer is no error.
         let refused = status == Status::Error || function == free;
         assert!(!foreign || refused && !state.is_null(), "{function} takes another instance's state");
+        let content = &mut self.contents[index][which];
         if function == set && status == Status::Ok {
+            assert!(content.is_empty() || *content == fmu.bytes(), "another state is restored");
             slot.start_over();
         } else {
-            assert_eq!(before, fmu.bytes(), "changed by {function}, which answered {status:?}");
+            assert_eq!(before, fmu.bytes(), "changed by {function}, which returned {status:?}");
+            match status {
+                Status::Ok if function == get => *content = before,
+                Status::Ok if function == deserialize => content.clear(),
+                _ => {}
+            }
         }
         self.count(function, status);
         Ok(())

@@ -1,8 +1,7 @@
-//! Toy models that together show all that FMI 2.0 allows, and `Palette` and `Ticker` what FMI 3.0
+//! Test models that together show all that FMI 2.0 allows, and `Palette` and `Ticker` what FMI 3.0
 //! has more. Each is short, and complete.
-#![allow(dead_code, missing_docs, unused_imports, reason = "not every test uses every toy")]
+#![allow(dead_code, missing_docs, unused_imports, reason = "not every test uses every test model")]
 
-pub mod balance;
 #[path = "../../../cargo-fmu/models/ball/src/ball.rs"]
 pub mod ball;
 pub mod counter;
@@ -20,7 +19,6 @@ pub mod sum;
 pub mod talker;
 pub mod ticker;
 
-pub use balance::Balance;
 pub use ball::Ball;
 pub use counter::Counter;
 pub use faulty::Faulty;

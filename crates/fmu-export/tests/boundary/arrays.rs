@@ -1,7 +1,7 @@
-//! Arrays: one variable in FMI 3.0, a scalar for each element in FMI 2.0.
+//! Arrays: one variable in FMI 3.0, a scalar for each element in FMI 2.0; and values of every type of FMI 3.0.
 
-use crate::toys::Rod;
-use crate::toys::rod::{Name, PIECES};
+use crate::models::rod::{Name, PIECES};
+use crate::models::{Palette, Rod, Talker, palette, talker};
 use fmu_export::fmi3::{reference, types::*};
 use fmu_export::*;
 use fmu_test_kit::Either;
@@ -161,6 +161,7 @@ macro_rules! rack {
 
         #[test]
         fn numbers_of_every_type() {
+            let palette = Importer::initialized_at::<Palette>(0.0);
             let fmu = Importer::in_mode::<Rack>(Interface::CoSimulation, Mode::StepComplete);
             $({
                 let vr = reference(Rack::place(Shelf::$name) as u32);
@@ -169,7 +170,20 @@ macro_rules! rack {
                 fmu.ok(fmu.$get(&vr, 1, read.as_mut_ptr(), 2));
                 assert_eq!(read, values, stringify!($name));
                 fmu.refused_with(&["there are 2 values, the array has 1"], |fmu| fmu.$set(&vr, 1, values.as_ptr(), 1));
+                let vr = reference(palette::Name::$name as u32);
+                palette.ok(palette.$set(&vr, 1, &values[0], 1));
+                palette.ok(palette.$get(&vr, 1, &mut read[1], 1));
+                assert_eq!(read, [values[0]; 2], stringify!($name));
+                for count in [0, 2, usize::MAX] {
+                    palette.refused_with(&["there are 1 values, the array has"], |fmu| {
+                        fmu.$get(&vr, 1, read.as_mut_ptr(), count)
+                    });
+                    palette.refused("set", |fmu| fmu.$set(&vr, 1, read.as_ptr(), count));
+                }
             })+
+            let other = Importer::initialized_at::<Palette>(0.0);
+            other.restore(&palette.bytes());
+            assert_eq!(other.bytes(), palette.bytes());
             let other = Importer::in_mode::<Rack>(Interface::CoSimulation, Mode::StepComplete);
             other.restore(&fmu.bytes());
             assert_eq!(other.bytes(), fmu.bytes());
@@ -220,4 +234,42 @@ fn bytes_of_two() {
     fmu.refused_with(&["bytes[2]", "NULL"], |fmu| {
         fmu.fmi3SetBinary(&vr, 1, [0, 1].as_ptr(), [c"".as_ptr().cast(), null()].as_ptr(), 2)
     });
+}
+
+#[test]
+fn bytes() {
+    let (fmu, vr) = (Importer::initialized_at::<Palette>(0.0), reference(palette::Name::binary as u32));
+    let read = || {
+        let (mut size, mut value) = (usize::MAX, null());
+        fmu.ok(fmu.fmi3GetBinary(&vr, 1, &mut size, &mut value, 1));
+        // SAFETY: bytes of the FMU, valid until the next call.
+        unsafe { std::slice::from_raw_parts(value, size) }.to_vec()
+    };
+    assert!(read().is_empty());
+    fmu.ok(fmu.fmi3SetBinary(&vr, 1, &3, &[1, 0, 255].as_ptr(), 1));
+    assert_eq!(read(), [1, 0, 255]);
+    fmu.refused_with(&["binary must not have more than 16 bytes, it has 17"], |fmu| {
+        fmu.fmi3SetBinary(&vr, 1, &17, &[0; 17].as_ptr(), 1)
+    });
+    fmu.refused("no bytes", |fmu| fmu.fmi3SetBinary(&vr, 1, &3, &null(), 1));
+    fmu.refused("endless", |fmu| fmu.fmi3SetBinary(&vr, 1, &usize::MAX, &[0; 3].as_ptr(), 1));
+    fmu.ok(fmu.fmi3SetBinary(&vr, 1, &0, &null(), 1));
+    assert!(read().is_empty());
+}
+
+#[test]
+fn ranges() {
+    let fmu = Importer::of::<Palette>(Interface::CoSimulation);
+    let [port, shade, colour] = [palette::Name::uint16, palette::Name::shade, palette::Name::colour]
+        .map(|name| reference(name as u32));
+    let words = ["uint16 must be between 1024 and 65535, it is 80"];
+    fmu.refused_with(&words, |fmu| fmu.fmi3SetUInt16(&port, 1, &80, 1));
+    fmu.refused_with(&["shade must not be above 8, it is 8.5"], |fmu| fmu.fmi3SetFloat32(&shade, 1, &8.5, 1));
+    fmu.refused_with(&["must be a finite number"], |fmu| fmu.fmi3SetFloat32(&shade, 1, &f32::NAN, 1));
+    let mut item = 0;
+    fmu.ok(fmu.fmi3GetInt64(&colour, 1, &mut item, 1));
+    assert_eq!(item, i64::from(palette::Colour::Red.number()));
+    // An item is a 32-bit integer.
+    let (fmu, mood) = (Importer::of::<Talker>(Interface::CoSimulation), reference(talker::Name::mood as u32));
+    fmu.refused("beyond Int32", |fmu| fmu.fmi3SetInt64(&mood, 1, &(7 + (1 << 32)), 1));
 }

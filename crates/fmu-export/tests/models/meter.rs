@@ -1,4 +1,4 @@
-//! A model whose numbers live in every kind of place, and that steps at once if it can.
+//! A model whose numbers are in every kind of field, with a state that starts at rest, and with steps at once.
 
 use fmu_export::*;
 use std::ops::{Index, IndexMut};
@@ -30,7 +30,7 @@ impl IndexMut<usize> for Ring {
     }
 }
 
-/// Adds up its inputs. The level starts at one of them.
+/// Adds up its inputs. A level on a spring follows one of them.
 #[derive(Clone, Default)]
 pub struct Meter {
     plain: f64,
@@ -40,12 +40,16 @@ pub struct Meter {
     ring: Ring,
     counted: i32,
     level: f64,
+    stiffness: f64,
     has_started: bool,
     total: f64,
     steps_at_once: i32,
 }
 
-variables! { for Meter, memory in has_started, ring.begin, ring.values, counted, steps_at_once;
+const STIFFNESS: Type = Type::real("Stiffness", &units::ONE).min(0.5);
+
+variables! { for Meter, memory in has_started, ring.begin, ring.values, counted, steps_at_once,
+    wires[0].is_set, wires[1].is_set, boxed.is_set;
     /// In a field
     plain = input(&NUMBER) in plain;
     /// In an array, with a mark
@@ -66,10 +70,13 @@ variables! { for Meter, memory in has_started, ring.begin, ring.values, counted,
     marks = output(&INTEGER) by |meter| {
         10 * meter.counted + meter.wires.iter().chain([&*meter.boxed]).map(|wire| i32::from(wire.is_set)).sum::<i32>()
     };
-    /// Starts at the number in a field
-    level = output(&NUMBER).state().calculated().depends_on(plain) in level then |meter| { meter.has_started = true };
-    /// Its rate
-    der_level as "der(level)" = local(&NUMBER).derivative_of(level) by |_| 1.0;
+    /// Starts at rest: at the number in a field, divided by the stiffness
+    level = output(&NUMBER).state().calculated().depends_on(&[plain, stiffness]) in level
+        then |meter| { meter.has_started = true };
+    /// Rate of the level
+    der_level as "der(level)" = local(&NUMBER).derivative_of(level) by |meter| meter.plain - meter.stiffness * meter.level;
+    /// Stiffness of the spring that carries the level
+    stiffness = parameter(&STIFFNESS) in stiffness;
     /// Steps that were made at once
     steps_at_once = local(&INTEGER) by |meter| meter.steps_at_once;
 }
@@ -85,7 +92,7 @@ impl Model for Meter {
     const INFO: Info = Info { guid: "{meter}", ..info!("Meter", "meter") };
 
     fn new(_: &Setup) -> Result<Self, Error> {
-        Ok(Self { list: vec![0.0; 3], ..Self::default() })
+        Ok(Self { list: vec![0.0; 3], stiffness: 1.0, ..Self::default() })
     }
 
     fn calculate(&mut self, _: f64) {
@@ -94,7 +101,7 @@ impl Model for Meter {
 
     fn calculate_start(&mut self) {
         if !self.has_started {
-            self.level = self.plain;
+            self.level = (self.plain / self.stiffness).clamp(f64::MIN, f64::MAX);
         }
     }
 }
@@ -130,4 +137,27 @@ impl ModelExchange for Meter {
     }
 }
 
-offer!(Meter: CoSimulation + ModelExchange);
+impl Partials for Meter {
+    fn partial(&self, unknown: Name, known: Name) -> Option<f64> {
+        Some(match (unknown, known) {
+            (Name::level, Name::level) | (Name::der_level, Name::plain) => 1.0,
+            (Name::der_level, Name::level) => -self.stiffness,
+            (Name::der_level, Name::stiffness) => -self.level,
+            (Name::total | Name::sum, Name::level | Name::stiffness) => 0.0,
+            (Name::total | Name::sum, _) => 1.0,
+            _ => 0.0,
+        })
+    }
+
+    /// level = plain / stiffness, at rest.
+    fn initial_partial(&self, unknown: Name, known: Name) -> Option<f64> {
+        Some(match (unknown, known) {
+            (Name::total | Name::sum, _) => return self.partial(unknown, known),
+            (Name::level, Name::plain) => 1.0 / self.stiffness,
+            (Name::level, Name::stiffness) => -self.plain / (self.stiffness * self.stiffness),
+            _ => 0.0,
+        })
+    }
+}
+
+offer!(Meter: CoSimulation + ModelExchange + Partials);

@@ -1,0 +1,171 @@
+//! Runs of test models: equal inputs and steps give bit-identical results in both FMI versions. Input
+//! derivatives, start values and errors of the model take effect.
+
+use crate::INTERFACES;
+use crate::models::{oscillator::Name, sum::Name as Of, *};
+use fmu_export::Interface::{CoSimulation, ModelExchange};
+use fmu_export::Mode::*;
+use fmu_export::{Exported, Simulation};
+use fmu_test_kit::checks::inputs;
+use fmu_test_kit::{Either, Importer, fmi3, serialized};
+
+const FORCE: u32 = Name::force as u32;
+const STATES: [u32; 2] = [Name::position as u32, Name::velocity as u32];
+const U: u32 = Of::u as u32;
+const Y: u32 = Of::y as u32;
+const GAIN: u32 = Of::gain as u32;
+
+/// Returns the state without the byte for FMI version and interface type, the mode, and the checksum.
+fn content(fmu: &impl Either) -> Vec<u8> {
+    let bytes = fmu.bytes();
+    bytes[serialized::ENDED..bytes.len() - serialized::CHECKSUM].to_vec()
+}
+
+fn steps<F: Either, M: Exported>() -> Vec<Vec<u8>> {
+    let fmu = F::initialized_at::<M>(0.5);
+    let inputs = inputs::<M>();
+    let mut time = 0.5;
+    let step = |step: i32| {
+        let value = |place: &u32| 0.1 * (f64::from(step + *place as i32)).sin();
+        fmu.set(&inputs, &inputs.iter().map(value).collect::<Vec<_>>());
+        let size = 0.01 * f64::from(1 + step % 3);
+        fmu.step(time, size);
+        time += size;
+        content(&fmu)
+    };
+    (0..20).map(step).collect()
+}
+
+#[test]
+fn steps_in_both_versions() {
+    fn same<M: Exported>() {
+        assert_eq!(steps::<Importer, M>(), steps::<fmi3::Importer, M>());
+    }
+    same::<Oscillator>();
+    same::<Counter>();
+    same::<Talker>();
+    same::<Sum>();
+    same::<Ticker>();
+    same::<Palette>();
+}
+
+#[test]
+fn integration_in_both_versions() {
+    fn run<F: Either>() -> Vec<u8> {
+        let fmu = F::in_mode::<Oscillator>(ModelExchange, ContinuousTime);
+        let mut x = [0.1, 0.0];
+        for step in 0..50 {
+            fmu.ok(fmu.set_time(0.01 * f64::from(step)));
+            fmu.ok(fmu.set_states(x.as_ptr(), 2));
+            let rates = fmu.derivatives::<2>();
+            x = [0, 1].map(|place| x[place] + 0.01 * rates[place]);
+        }
+        content(&fmu)
+    }
+    assert_eq!(run::<Importer>(), run::<fmi3::Importer>());
+}
+
+/// Checks that the motion without damper and force is a cosine.
+#[test]
+fn free_oscillation() {
+    let mut fmu = Simulation::<Oscillator>::new().unwrap();
+    fmu.set("damped", false).unwrap().set("position", 0.1).unwrap().step_size(0.125);
+    for i in 0..80 {
+        let t = f64::from(i) * 0.125;
+        let x = fmu.run(t).unwrap().get("position").unwrap();
+        assert!((x - 0.1 * (5.0 * t).cos()).abs() < 1e-12, "{x} at {t}");
+    }
+}
+
+/// Checks that a slope applies only to the next step, and that higher orders have no effect.
+#[test]
+fn input_derivatives() {
+    let [once, never, rich] = [(); 3].map(|()| Importer::in_mode::<Oscillator>(CoSimulation, StepComplete));
+    once.set_rates([FORCE], [5.0]);
+    rich.set_rates([FORCE], [5.0]);
+    let orders = [2, 7, i32::MAX];
+    rich.ok(rich.fmi2SetRealInputDerivatives([FORCE; 3].as_ptr(), 3, orders.as_ptr(), [9.0; 3].as_ptr()));
+    [&once, &never, &rich].iter().for_each(|fmu| fmu.step(0.0, 0.1));
+    assert_eq!(once.get(STATES), rich.get(STATES));
+    assert!(once.get(STATES)[0] > 0.0 && never.get(STATES) == [0.0; 2]);
+    // The second step equals a step of an instance without slope.
+    let state = once.get(STATES);
+    once.step(0.1, 0.1);
+    let other = Importer::of::<Oscillator>(CoSimulation);
+    other.set(&STATES, &state);
+    other.initialize(0.1);
+    other.step(0.1, 0.1);
+    assert_eq!(once.get(STATES), other.get(STATES));
+}
+
+#[test]
+fn derivatives_of_the_initialization_are_used() {
+    let [with, without] = [true, false].map(|given| {
+        let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Initialization);
+        if given {
+            fmu.set_rates([FORCE], [2.0]);
+        }
+        fmu.ok(fmu.fmi2ExitInitializationMode());
+        fmu.step(0.0, 0.01);
+        fmu.get([STATES[0]])
+    });
+    assert!(with[0] > 0.0 && without[0] == 0.0);
+}
+
+/// Checks start values of states, their nominal values, which come from the types, and that a state set as a
+/// variable and a state set in the array of states have equal effects.
+#[test]
+fn states() {
+    fn check<F: Either>() {
+        for interface in INTERFACES {
+            let fmu = F::in_mode::<Oscillator>(interface, Instantiated);
+            fmu.set(&STATES, &[0.1, 0.2]);
+            fmu.initialize(0.0);
+            assert_eq!(fmu.get(STATES), [0.1, 0.2]);
+        }
+        let fmu = F::in_mode::<Oscillator>(ModelExchange, Instantiated);
+        let mut nominals = [f64::NAN; 2];
+        fmu.ok(fmu.get_nominals(nominals.as_mut_ptr(), 2));
+        assert_eq!(nominals, [0.1, 0.5]);
+        fmu.set(&STATES, &[0.1, 0.2]);
+        fmu.initialize(0.0);
+        fmu.enter_continuous_time();
+        assert_eq!(fmu.states(), [0.1, 0.2]);
+        fmu.ok(fmu.set_states([0.0, 0.25].as_ptr(), 2));
+        let by_array = (fmu.states::<2>(), fmu.derivatives::<2>());
+        fmu.ok(fmu.set_states([0.0; 2].as_ptr(), 2));
+        fmu.set(&STATES[1..], &[0.25]);
+        assert_eq!((fmu.states(), fmu.derivatives()), by_array);
+    }
+    check::<Importer>();
+    check::<fmi3::Importer>();
+}
+
+/// Checks that errors of the model reach the importer with their message, and the step can be repeated.
+#[test]
+fn errors_of_the_model() {
+    let fmu = Importer::of::<Sum>(CoSimulation);
+    fmu.ok(fmu.fmi2SetupExperiment(0, 0.0, -1.0, 0, 0.0));
+    let message = fmu.refused("start time", |fmu| fmu.fmi2EnterInitializationMode());
+    assert_eq!(message, "fmi2EnterInitializationMode: this model knows no time before 0");
+    fmu.initialize(0.0);
+    fmu.set(&[U], &[9.0]);
+    fmu.step(0.0, 1.0);
+    let message = fmu.refused("sum", |fmu| fmu.try_step(1.0, 1.0));
+    assert_eq!(message, "fmi2DoStep: the sum would be more than 10");
+    fmu.set(&[U], &[1.0]);
+    fmu.step(1.0, 1.0);
+    assert_eq!(fmu.get([Y]), [10.0]);
+}
+
+/// Checks that the range of a parameter's type is enforced; the range of an input or output is a hint.
+#[test]
+fn ranges() {
+    let fmu = Importer::of::<Sum>(CoSimulation);
+    for (value, word) in [(10.5, "above 10"), (-0.5, "below 0")] {
+        let message = fmu.refused("gain", |fmu| fmu.try_set(&[GAIN], &[value]));
+        assert!(message.contains("gain") && message.contains(word), "{message}");
+        fmu.set(&[U, Y], &[value, value]);
+    }
+    fmu.set(&[GAIN], &[10.0]);
+}

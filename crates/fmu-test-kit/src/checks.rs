@@ -1,0 +1,160 @@
+//! Checks of saved states and steps that hold for every FMU with both interface types.
+//! [`every_check!`](crate::every_check) defines the tests for a model.
+
+use crate::serialized::{MODE, sealed, time};
+use crate::{Either, Random};
+use fmu_export::Interface::{CoSimulation, ModelExchange};
+use fmu_export::Mode::{self, *};
+use fmu_export::{BaseType, Causality, Exported, Interface, Status, Variable};
+use std::ptr::null_mut;
+
+/// Defines a test of both FMI versions for each check of a model.
+#[macro_export]
+macro_rules! every_check {
+    ($model:ty) => {
+        $crate::every_check! { $model: random_contents_break_nothing steps_of_any_size }
+    };
+    ($model:ty: $($check:ident)*) => {
+        $(#[test] fn $check() {
+            $crate::checks::$check::<$crate::Importer, $model>();
+            $crate::checks::$check::<$crate::fmi3::Importer, $model>();
+        })*
+    };
+}
+
+/// Returns the indices of the variables that satisfy `wanted`.
+pub fn places<M: Exported>(wanted: impl Fn(&Variable<M>) -> bool) -> Vec<u32> {
+    (0..).zip(M::TABLE).filter(|(_, variable)| wanted(variable)).map(|(place, _)| place).collect()
+}
+
+fn is_real<M>(variable: &Variable<M>) -> bool {
+    variable.base() == BaseType::Real
+}
+
+/// Returns the Real inputs.
+pub fn inputs<M: Exported>() -> Vec<u32> {
+    places::<M>(|of| is_real(of) && of.causality() == Causality::Input)
+}
+
+/// Returns the Real outputs.
+pub(crate) fn outputs<M: Exported>() -> Vec<u32> {
+    places::<M>(|of| is_real(of) && of.causality() == Causality::Output)
+}
+
+/// Returns the Boolean parameters.
+pub(crate) fn boolean_parameters<M: Exported>() -> Vec<u32> {
+    places::<M>(|of| of.base() == BaseType::Boolean && of.causality() == Causality::Parameter)
+}
+
+/// Returns the start value of a Real parameter.
+pub(crate) fn start_of<M: Exported>(variable: &Variable<M>) -> Option<f64> {
+    use fmu_export::{Setup, Value};
+    if variable.causality() != Causality::Parameter {
+        return None;
+    }
+    match variable.value(&M::new(&Setup::new(CoSimulation)).ok()?) {
+        Some(Value::Real(value)) if is_real(variable) => Some(value),
+        _ => None,
+    }
+}
+
+/// Returns every interface type of the model with each of its modes that can be entered.
+pub fn modes_of_model<F: Either, M: Exported>() -> Vec<(Interface, Mode)> {
+    let has_events = M::CO_SIMULATION.is_some_and(|offer| offer.has_event_mode());
+    let offered = [(CoSimulation, M::CO_SIMULATION.is_some()), (ModelExchange, M::MODEL_EXCHANGE.is_some())];
+    let offered = offered.into_iter().filter(|(_, is_offered)| *is_offered);
+    let all =
+        offered.flat_map(|(interface, _)| F::modes_of(interface).iter().map(move |mode| (interface, *mode)));
+    all.filter(|pair| has_events || *pair != (CoSimulation, Event)).collect()
+}
+
+/// Compares time derivatives of order 1 with finite differences over short steps, each from the same saved
+/// state. `go_on` sets the inputs as a function of time.
+#[track_caller]
+pub fn output_derivatives_fit_steps<M: Exported>(
+    fmu: &dyn Either,
+    time: f64,
+    label: &str,
+    go_on: impl Fn(f64),
+) {
+    const H: f64 = 5e-5;
+    let moving =
+        places::<M>(|of| is_real(of) && matches!(of.causality(), Causality::Output | Causality::Local));
+    let found: Vec<_> = moving.iter().map(|place| fmu.rate(*place)).collect();
+    let state = fmu.save();
+    let y = [0.0, 1.0, 2.0, 3.0, 4.0].map(|steps| {
+        fmu.ok(fmu.set_state(state));
+        if steps > 0.0 {
+            fmu.step(time, H * steps);
+            go_on(H * steps);
+        }
+        fmu.read(&moving)
+    });
+    fmu.ok(fmu.set_state(state));
+    fmu.forget(state);
+    for (i, place) in moving.iter().enumerate() {
+        let expected =
+            (-25.0 * y[0][i] + 48.0 * y[1][i] - 36.0 * y[2][i] + 16.0 * y[3][i] - 3.0 * y[4][i]) / (12.0 * H);
+        // Tolerance for the rounding error of the difference and the truncation error of the series.
+        let tolerance = 1e-7 * (1.0 + y[0][i].abs() + expected.abs());
+        let name = M::TABLE[*place as usize].name();
+        assert!((found[i] - expected).abs() < tolerance, "{label}: {name}' is {expected}, not {}", found[i]);
+    }
+}
+
+/// Checks that no call is fatal after a damaged state that the FMU accepts. Miri, which is slow, tries fewer.
+pub fn random_contents_break_nothing<F: Either, M: Exported>() {
+    let accepted = survivors::<F, M>(11);
+    assert!(accepted > DAMAGED / 15, "only {accepted} of {DAMAGED} were accepted");
+}
+
+/// Number of damaged states that are tried.
+const DAMAGED: usize = if cfg!(miri) { 60 } else { 3_000 };
+
+/// Returns the number of damaged states that the FMU accepts.
+fn survivors<F: Either, M: Exported>(seed: u64) -> usize {
+    let fmu = F::in_mode::<M>(CoSimulation, StepComplete);
+    let original = fmu.bytes();
+    let (mut random, mut accepted) = (Random(seed), 0);
+    for _ in 0..DAMAGED {
+        let mut bytes = original.clone();
+        for _ in 0..=random.bits() % 3 {
+            // Writes numbers of any magnitude, aligned with values or not.
+            let at = MODE.end + random.bits() as usize % (bytes.len() - MODE.end - 16);
+            let word = random.bits() >> (random.bits() % 64);
+            let width = if random.between(0.0, 1.0) < 0.5 { 4 } else { 8 };
+            bytes[at..at + width].copy_from_slice(&word.to_le_bytes()[..width]);
+        }
+        let (bytes, mut state) = (sealed(bytes), null_mut());
+        if fmu.deserialize(bytes.as_ptr(), bytes.len(), &mut state) == Status::Ok {
+            accepted += 1;
+            fmu.ok(fmu.set_state(state));
+            fmu.forget(state);
+            let time = time(&fmu.bytes());
+            let all = places::<M>(is_real);
+            let mut statuses: Vec<_> = all.iter().map(|place| fmu.try_get(&[*place], &mut [0.0])).collect();
+            statuses.extend([fmu.try_step(time, 0.01), fmu.try_step(time + 0.01, 0.02)]);
+            assert!(!statuses.contains(&Status::Fatal), "{:?}\n{bytes:?}", fmu.take_log());
+        }
+        fmu.take_log();
+    }
+    fmu.restore(&original);
+    fmu.step(0.0, 0.01);
+    accepted
+}
+
+/// Checks that a step of any size returns quickly, because importers may take very long steps.
+pub fn steps_of_any_size<F: Either, M: Exported>() {
+    for step_size in [1e-300, 1e-9, 1.0, 1e9, 1e100, 1e300, 0.5 * f64::MAX] {
+        let (answer, answers) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let fmu = F::in_mode::<M>(CoSimulation, StepComplete);
+            let inputs = inputs::<M>();
+            fmu.set(&inputs, &vec![0.5; inputs.len()]);
+            let _ = answer.send((fmu.try_step(0.0, step_size), fmu.read(&places::<M>(is_real))));
+        });
+        let answer = answers.recv_timeout(std::time::Duration::from_secs(10));
+        let (status, _) = answer.unwrap_or_else(|_| panic!("a step of {step_size:e} s takes for ever"));
+        assert!(matches!(status, Status::Ok | Status::Error), "{step_size:e}: {status:?}");
+    }
+}
