@@ -3,14 +3,18 @@
 
 use crate::call_sequence::{CallSequence, Message, Numbered, Run, Step, Written};
 use crate::description::Description;
-use crate::finding::{Finding, Judge, status_name, step_name};
+use crate::finding::{Finding, Judge, Judges, status_name, step_name};
 use crate::rules::claim;
 use fmi_abi::Standard;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// A rule for a call, with what is wrong in a run.
 type Broken = (&'static str, Judge);
+
+fn rule(name: &'static str, judge: impl Judges) -> Broken {
+    (name, Arc::new(judge))
+}
 
 /// The findings in a run that came to its end.
 pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -> Vec<Finding> {
@@ -18,24 +22,18 @@ pub fn findings(description: &Description, sequence: &CallSequence, run: &Run) -
     walk(sequence, &mut all);
     let mut broken: Vec<Broken> = processes(&all, run).into_iter().collect();
     for numbered in &all {
-        if run.of(numbered.id).is_some() {
+        if let Some(outcome) = run.of(numbered.id) {
             broken.extend(call(numbered));
-            broken.extend(messages(description, numbered.id));
+            broken.extend(messages(description, numbered.id).filter(|_| !outcome.log.is_empty()));
             broken.extend(silence(sequence, numbered));
         }
     }
+    let mut names = HashSet::new();
     let found = broken.into_iter().filter_map(|(name, judge)| {
         let observed = judge(run)?;
         Some(claim(description.standard, name).finding(observed, sequence.clone(), judge))
     });
-    let mut names: Vec<String> = Vec::new();
-    found
-        .filter(|finding| {
-            let new = !names.contains(&finding.name);
-            names.push(finding.name.clone());
-            new || finding.topic() == "arrays"
-        })
-        .collect()
+    found.filter(|finding| names.insert(finding.name.clone()) || finding.topic() == "arrays").collect()
 }
 
 fn walk<'s>(sequence: &'s [Numbered], all: &mut Vec<&'s Numbered>) {
@@ -55,15 +53,14 @@ fn processes(all: &[&Numbered], run: &Run) -> Option<Broken> {
         return None;
     }
     let pairs = lives(all)?;
-    let judge: Judge = Arc::new(move |run| {
+    Some(rule("resources.processes", move |run| {
         let (count, first) = (run.left.len(), run.left.first()?);
         let freed = |(make, free): &(u32, u32)| run.of(*make).is_none() || run.of(*free).is_some();
         let processes = if count == 1 { "process is" } else { "processes are" };
         pairs.iter().all(freed).then(|| {
             format!("{count} {processes} left after all instances were freed; the first is called {first:?}")
         })
-    });
-    Some(("resources.processes", judge))
+    }))
 }
 
 /// The instantiations of a sequence, each with the call that frees the instance; none if an instance is not freed.
@@ -83,80 +80,81 @@ fn lives(all: &[&Numbered]) -> Option<Vec<(u32, u32)>> {
 /// Values that a call wrote, and its status.
 fn call(numbered: &Numbered) -> Vec<Broken> {
     let (id, name) = (numbered.id, step_name(&numbered.step));
-    let mut broken: Vec<Broken> = Vec::new();
-    for (rule, constant) in [("arrays.const", true), ("arrays.written-beyond", false)] {
+    let arrays = [("arrays.const", true), ("arrays.written-beyond", false)].map(|(of, constant)| {
         let name = name.clone();
-        let judge: Judge = Arc::new(move |run| {
+        rule(of, move |run| {
             let damage = run.of(id)?.damage.iter().find(|damage| damage.contains("const") == constant)?;
             Some(format!("{name} writes {damage}"))
-        });
-        broken.push((rule, judge));
-    }
-    if let Step::Call { function, .. } = &numbered.step {
-        let most = if function == "fmi2DoStep" { 5 } else { 4 };
-        let status: Judge = Arc::new(move |run| {
-            let status = run.status(id).filter(|status| !(0..=most).contains(status))?;
-            Some(format!("{name} returns {status}"))
-        });
-        broken.push(("functions.status", status));
-        if function.ends_with("GetString") && !numbered.forbidden {
-            let utf8: Judge = Arc::new(move |run| match run.written(id)? {
-                Written::Texts(texts) => {
-                    let bad = texts.iter().flatten().find(|text| std::str::from_utf8(text).is_err())?;
-                    Some(format!("the string {:?} is not UTF-8", String::from_utf8_lossy(bad)))
-                }
-                Written::Numbers(..) => None,
-            });
-            broken.push(("start_values.utf8", utf8));
-        }
+        })
+    });
+    let mut broken = Vec::from(arrays);
+    let Step::Call { function, .. } = &numbered.step else { return broken };
+    let most = if function == "fmi2DoStep" { 5 } else { 4 };
+    broken.push(rule("functions.status", move |run| {
+        let status = run.status(id).filter(|status| !(0..=most).contains(status))?;
+        Some(format!("{name} returns {status}"))
+    }));
+    if function.ends_with("GetString") && !numbered.forbidden {
+        broken.push(rule("start_values.utf8", move |run| {
+            let Written::Texts(texts) = run.written(id)? else { return None };
+            let bad = texts.iter().flatten().find(|text| std::str::from_utf8(text).is_err())?;
+            Some(format!("the string {:?} is not UTF-8", String::from_utf8_lossy(bad)))
+        }));
     }
     broken
 }
 
-/// The messages of a call.
-fn messages(description: &Description, id: u32) -> Vec<Broken> {
-    type Test = Box<dyn Fn(&Message) -> Option<String> + Send + Sync>;
-    let show = |text: &[u8]| format!("{:?}", String::from_utf8_lossy(text));
-    let (categories, fmi3) = (description.log_categories.clone(), description.standard == Standard::Fmi3);
-    let category: Test = Box::new(move |message| match &message.category {
-        None if categories.is_empty() => None,
-        None => Some("its category is NULL, and the model description has categories".to_owned()),
-        Some(category) if categories.iter().any(|known| known.as_bytes() == category.as_slice()) => None,
-        Some(category) if categories.is_empty() => {
-            Some(format!("its category is {}, and the model description has none", show(category)))
-        }
-        Some(category) => {
-            Some(format!("its category is {}, which is not in the model description", show(category)))
-        }
-    });
-    let text: Test = Box::new(move |message| match &message.text {
+fn show(text: &[u8]) -> String {
+    format!("{:?}", String::from_utf8_lossy(text))
+}
+
+/// Conversions of printf.
+const CONVERSIONS: [&str; 14] =
+    ["%s", "%d", "%i", "%u", "%g", "%f", "%e", "%x", "%lf", "%ld", "%lu", "%zu", "%.", "%p"];
+
+/// The rules for messages, with an error in a message of an FMU that has these categories.
+type MessageTest = fn(&Message, &[String], Standard) -> Option<String>;
+const MESSAGE_TESTS: [(&str, MessageTest); 4] = [
+    ("logs.category", |message, categories, _| {
+        let Some(category) = &message.category else {
+            let why = "its category is NULL, and the model description has categories";
+            return (!categories.is_empty()).then(|| why.to_owned());
+        };
+        let why = match categories {
+            [] => ", and the model description has none",
+            known if known.iter().any(|known| known.as_bytes() == category.as_slice()) => return None,
+            _ => ", which is not in the model description",
+        };
+        Some(format!("its category is {}{why}", show(category)))
+    }),
+    ("logs.text", |message, _, _| match &message.text {
         None => Some("the message is NULL".to_owned()),
         Some(text) if std::str::from_utf8(text).is_err() => Some(format!("{} is not UTF-8", show(text))),
         Some(_) => None,
-    });
-    let status: Test = Box::new(|message| {
+    }),
+    ("logs.status", |message, _, _| {
         (!(0..=5).contains(&message.status)).then(|| format!("its status is {}", message.status))
-    });
+    }),
     // In FMI 2.0 a message is a format of printf, and its arguments follow.
-    let format: Test = Box::new(move |message| {
-        let text = String::from_utf8_lossy(message.text.as_deref().filter(|_| fmi3)?).into_owned();
-        let conversions =
-            ["%s", "%d", "%i", "%u", "%g", "%f", "%e", "%x", "%lf", "%ld", "%lu", "%zu", "%.", "%p"];
-        let found = conversions.iter().find(|conversion| text.contains(**conversion))?;
+    ("logs.format", |message, _, standard| {
+        let text = message.text.as_deref().filter(|_| standard == Standard::Fmi3)?;
+        let text = String::from_utf8_lossy(text);
+        let found = CONVERSIONS.iter().find(|conversion| text.contains(**conversion))?;
         Some(format!("it contains {found}"))
-    });
-    let tests =
-        [("logs.category", category), ("logs.text", text), ("logs.status", status), ("logs.format", format)];
-    let judged = tests.into_iter().map(|(name, test)| {
-        let judge: Judge = Arc::new(move |run| {
+    }),
+];
+
+/// The messages of a call.
+fn messages(description: &Description, id: u32) -> impl Iterator<Item = Broken> {
+    MESSAGE_TESTS.into_iter().map(move |(name, test)| {
+        let (categories, standard) = (description.log_categories.clone(), description.standard);
+        rule(name, move |run| {
             run.of(id)?.log.iter().find_map(|message| {
-                let text = String::from_utf8_lossy(message.text.as_deref().unwrap_or_default()).into_owned();
-                Some(format!("message {text:?}: {}", test(message)?))
+                let text = show(message.text.as_deref().unwrap_or_default());
+                Some(format!("message {text}: {}", test(message, &categories, standard)?))
             })
-        });
-        (name, judge)
-    });
-    judged.collect()
+        })
+    })
 }
 
 /// A call that fails without a message, where logging is on.
@@ -169,10 +167,9 @@ fn silence(sequence: &CallSequence, numbered: &Numbered) -> Option<Broken> {
         return None;
     }
     let (id, name) = (numbered.id, step_name(&numbered.step));
-    let judge: Judge = Arc::new(move |run| {
+    Some(rule("logs.silent", move |run| {
         let outcome = run.of(id)?;
         let status = outcome.status.filter(|status| (2..=4).contains(status))?;
         outcome.log.is_empty().then(|| format!("{name} returns {} without a message", status_name(status)))
-    });
-    Some(("logs.silent", judge))
+    }))
 }

@@ -11,6 +11,13 @@ struct Accepted {
     reason: String,
 }
 
+impl Accepted {
+    /// Whether it accepts an observation of a finding.
+    fn fits(&self, finding: &Finding, observed: &str) -> bool {
+        self.name == finding.name && self.text.as_ref().is_none_or(|text| observed.contains(text.as_str()))
+    }
+}
+
 /// The accepted findings.
 #[derive(Default)]
 pub struct Baseline {
@@ -65,13 +72,9 @@ impl Baseline {
     pub fn of_finding(&self, finding: &Finding) -> Option<String> {
         let mut reasons: Vec<&str> = Vec::new();
         for observed in std::iter::once(&finding.observed).chain(&finding.more) {
-            let fits = |of: &&Accepted| {
-                of.name == finding.name
-                    && of.text.as_ref().is_none_or(|text| observed.contains(text.as_str()))
-            };
-            let reason = self.accepted.iter().find(fits)?.reason.as_str();
-            if !reasons.contains(&reason) {
-                reasons.push(reason);
+            let accepted = self.accepted.iter().find(|of| of.fits(finding, observed))?;
+            if !reasons.contains(&accepted.reason.as_str()) {
+                reasons.push(&accepted.reason);
             }
         }
         Some(reasons.join("; "))
@@ -85,11 +88,11 @@ impl Baseline {
     /// Names that nothing was found for.
     pub fn unused(&self, findings: &[Finding], unchecked: &[crate::Unchecked]) -> Vec<String> {
         let used = |of: &&Accepted| {
-            let fits =
-                |observed: &String| of.text.as_ref().is_none_or(|text| observed.contains(text.as_str()));
-            findings.iter().any(|finding| {
-                finding.name == of.name && std::iter::once(&finding.observed).chain(&finding.more).any(fits)
-            }) || unchecked.iter().any(|unchecked| unchecked.name == of.name)
+            unchecked.iter().any(|unchecked| unchecked.name == of.name)
+                || findings.iter().any(|finding| {
+                    let mut all = std::iter::once(&finding.observed).chain(&finding.more);
+                    all.any(|observed| of.fits(finding, observed))
+                })
         };
         self.accepted.iter().filter(|of| !used(of)).map(|of| of.name.clone()).collect()
     }

@@ -1,74 +1,68 @@
 //! Sequences of calls as data, and what came of them. A worker plays them, a shrinker shortens them, a printer writes them
 //! as programs.
 
-use fmi_abi::Interface;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// The kinds of numbers in arrays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[allow(missing_docs, reason = "names of types")]
-pub enum Kind {
-    F64,
-    F32,
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    /// `size_t`.
-    Size,
-    /// Pointers to texts or to bytes.
-    Pointer,
+macro_rules! kinds {
+    ($($kind:ident $of:ty, $c:literal;)+) => {
+        /// The kinds of numbers in arrays; `Pointer` points to strings or to bytes.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+        pub enum Kind { $($kind),+ }
+
+        impl Kind {
+            /// The bytes of one.
+            pub const fn size(self) -> usize {
+                match self { $(Self::$kind => size_of::<$of>()),+ }
+            }
+
+            /// The type in C.
+            pub const fn c_name(self) -> &'static str {
+                match self { $(Self::$kind => $c),+ }
+            }
+
+            /// The number behind bits.
+            #[allow(unreachable_patterns, reason = "floating-point numbers come first")]
+            pub fn number(self, bits: u64) -> f64 {
+                match self {
+                    Self::F64 => f64::from_bits(bits),
+                    Self::F32 => f64::from(f32::from_bits(bits as u32)),
+                    $(Self::$kind => bits as $of as f64),+
+                }
+            }
+
+            /// The bits of a number.
+            #[allow(unreachable_patterns, reason = "floating-point numbers come first")]
+            pub fn bits(self, number: f64) -> u64 {
+                match self {
+                    Self::F64 => number.to_bits(),
+                    Self::F32 => u64::from((number as f32).to_bits()),
+                    $(Self::$kind => number as $of as u64 & (u64::MAX >> (64 - 8 * size_of::<$of>()))),+
+                }
+            }
+        }
+    };
+}
+
+kinds! {
+    I8 i8, "int8_t";
+    U8 u8, "uint8_t";
+    I16 i16, "int16_t";
+    U16 u16, "uint16_t";
+    I32 i32, "int32_t";
+    U32 u32, "uint32_t";
+    I64 i64, "int64_t";
+    U64 u64, "uint64_t";
+    Size usize, "size_t";
+    Pointer usize, "void *";
+    F64 f64, "double";
+    F32 f32, "float";
 }
 
 impl Kind {
-    /// The bytes of one.
-    pub const fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::F32 | Self::I32 | Self::U32 => 4,
-            Self::F64 | Self::I64 | Self::U64 => 8,
-            Self::Size | Self::Pointer => size_of::<usize>(),
-        }
-    }
-
     /// Whether it is a floating-point number.
     pub const fn is_float(self) -> bool {
         matches!(self, Self::F64 | Self::F32)
-    }
-
-    /// The number behind bits.
-    pub fn number(self, bits: u64) -> f64 {
-        match self {
-            Self::F64 => f64::from_bits(bits),
-            Self::F32 => f64::from(f32::from_bits(bits as u32)),
-            Self::I8 => f64::from(bits as i8),
-            Self::I16 => f64::from(bits as i16),
-            Self::I32 => f64::from(bits as i32),
-            Self::I64 => bits as i64 as f64,
-            _ => bits as f64,
-        }
-    }
-
-    /// The bits of a number.
-    pub fn bits(self, number: f64) -> u64 {
-        match self {
-            Self::F64 => number.to_bits(),
-            Self::F32 => u64::from((number as f32).to_bits()),
-            Self::I8 => number as i8 as u8 as u64,
-            Self::I16 => number as i16 as u16 as u64,
-            Self::I32 => number as i32 as u32 as u64,
-            Self::I64 => number as i64 as u64,
-            Self::U8 => number as u8 as u64,
-            Self::U16 => number as u16 as u64,
-            Self::U32 => number as u32 as u64,
-            Self::U64 | Self::Size | Self::Pointer => number as u64,
-        }
     }
 }
 
@@ -141,15 +135,8 @@ pub enum Step {
     Make(usize, Make),
     /// Frees the instance.
     Free(usize),
-    /// Calls a function of an instance; of NULL without one.
-    Call {
-        /// The instance.
-        of: Option<usize>,
-        /// The function.
-        function: String,
-        /// Arguments after the instance.
-        args: Vec<Arg>,
-    },
+    /// Calls a function of an instance, or of NULL, with the arguments after the instance.
+    Call { of: Option<usize>, function: String, args: Vec<Arg> },
     /// Calls that need no instance: the version and the platform.
     Version(String),
     /// Repeats steps this many times, or until the time limit.
@@ -169,11 +156,9 @@ pub enum Step {
 /// A step with a number of its own, which it keeps when others are left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Numbered {
-    /// The number.
     pub id: u32,
     /// Whether the standard forbids the call: what it answers changes nothing of what is allowed after it.
     pub forbidden: bool,
-    /// The step.
     pub step: Step,
 }
 
@@ -183,7 +168,6 @@ pub type CallSequence = Vec<Numbered>;
 /// A message of the FMU.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Message {
-    /// Variables that the step concerns.
     pub status: i32,
     /// Its category, as bytes; `None` is NULL.
     pub category: Option<Vec<u8>>,
@@ -222,13 +206,11 @@ impl Written {
     /// The value at an index, formatted for people.
     pub fn show(&self, index: usize) -> String {
         match self {
-            Self::Numbers(kind, bits) => bits.get(index).map_or("nothing".to_owned(), |bits| {
-                if kind.is_float() {
-                    format!("{:?}", kind.number(*bits))
-                } else {
-                    format!("{}", kind.number(*bits))
-                }
-            }),
+            Self::Numbers(kind, bits) => match bits.get(index).map(|bits| kind.number(*bits)) {
+                Some(number) if kind.is_float() => format!("{number:?}"),
+                Some(number) => number.to_string(),
+                None => "nothing".to_owned(),
+            },
             Self::Texts(texts) => match texts.get(index) {
                 Some(Some(text)) => format!("{:?}", String::from_utf8_lossy(text)),
                 _ => "NULL".to_owned(),
@@ -256,7 +238,6 @@ impl Written {
 /// The result of one step.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
-    /// The step's number.
     pub id: u32,
     /// Status of the function; for an instantiation, 1 for an instance and 0 for NULL.
     pub status: Option<i32>,
@@ -281,9 +262,7 @@ pub struct Measured {
     pub memory: u64,
     /// Whether the C library counted them.
     pub exact: bool,
-    /// Threads.
     pub threads: usize,
-    /// Open files.
     pub files: usize,
     /// Settings of the process: rounding, locale, working directory, signal handlers.
     pub settings: Vec<String>,
@@ -325,14 +304,17 @@ pub struct Run {
 }
 
 impl Run {
-    /// The outcome of a step.
     pub fn of(&self, id: u32) -> Option<&Outcome> {
         self.outcomes.get(&id)
     }
 
-    /// Status of a step.
     pub fn status(&self, id: u32) -> Option<i32> {
         self.of(id)?.status
+    }
+
+    /// Whether a step returned OK or a warning.
+    pub fn succeeds(&self, id: u32) -> bool {
+        self.status(id).is_some_and(|status| status <= 1)
     }
 
     /// The first array that a step wrote.
@@ -348,7 +330,6 @@ pub struct Setting {
     pub fmi3: bool,
     /// The library of Co-Simulation and of Model Exchange.
     pub libraries: [Option<std::path::PathBuf>; 2],
-    /// Path of the resources.
     pub resources: std::path::PathBuf,
     /// Bytes of memory at most.
     pub memory: u64,
@@ -358,9 +339,4 @@ pub struct Setting {
     pub now: bool,
     /// Seconds of repetitions at most.
     pub repetitions: f64,
-}
-
-/// Whether an interface is Co-Simulation.
-pub fn steps_itself(interface: Interface) -> bool {
-    interface == Interface::CoSimulation
 }

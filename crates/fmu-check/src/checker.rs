@@ -1,31 +1,18 @@
 //! The shared part of all checks: runs call sequences, judges the results and keeps the findings.
 
 use crate::always;
-use crate::call_sequence::{CallSequence, End, Run, Setting};
+use crate::call_sequence::{CallSequence, End, Numbered, Run, Setting, Step};
 use crate::description::Description;
-use crate::finding::{Event, Finding, Judge, Severity, ending, event, step_name};
+use crate::finding::{Event, Finding, Judge, Judges, Severity, ending, event, step_name};
 use crate::legal::first_illegal;
 use crate::rules::{self, Claim};
-use crate::run::Workers;
+use crate::run::{Stop, Workers};
 use crate::shrink::shrink;
-use crate::writer::{Trajectory, Writer};
+use crate::writer::{READ, Read, Trajectory, Writer, difference, sample};
 use fmi_abi::{Interface, Standard};
 use std::collections::HashSet;
-use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
-
-/// The time for all checks is over.
-#[derive(Debug)]
-pub struct TimeOver;
-
-impl fmt::Display for TimeOver {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the time was over")
-    }
-}
-
-impl std::error::Error for TimeOver {}
 
 /// An interface or a topic that was not checked.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -38,13 +25,55 @@ pub struct Unchecked {
     pub allowed: bool,
 }
 
+/// Calls that stay in the shortest sequence of a topic: a comparison needs them on both sides, else there are other
+/// differences.
+const PINNED: &[(&str, &[&str])] = &[
+    ("states", STATES),
+    ("reset", STATES),
+    ("derivatives", &["SetReal", "SetFloat64", "SetContinuousStates"]),
+    ("results", STEPS),
+    ("life_cycle", STEPS),
+];
+#[rustfmt::skip]
+const STATES: &[&str] = &[
+    "Reset", "GetFMUState", "SetFMUState", "FreeFMUState", "SerializedFMUStateSize", "SerializeFMUState",
+    "DeserializeFMUState", "EnterInitializationMode",
+];
+const STEPS: &[&str] = &["SetTime", "DoStep", "CompletedIntegratorStep"];
+
+/// Findings that compare no calls.
+#[rustfmt::skip]
+const ALONE: [&str; 5] = [
+    "life_cycle.refused", "life_cycle.states-changed", "results.early-return", "results.early-unsaid", "start_values.inputs",
+];
+
+/// Chooses numbers that look random.
+pub struct Random(u64);
+
+impl Random {
+    /// The numbers that follow from a seed.
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
+    }
+
+    /// A number below this one.
+    pub fn below(&mut self, end: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 33) as usize % end
+    }
+}
+
+/// The step in which a run ended.
+fn at<'s>(sequence: &'s CallSequence, run: &Run) -> Option<&'s Numbered> {
+    run.at.and_then(|id| sequence.iter().find(|numbered| numbered.id == id))
+}
+
 /// An FMU under attack.
 pub struct Checker {
-    /// Model description of the FMU.
     pub description: Arc<Description>,
-    /// Path of the library.
+    /// Variables that most checks read.
+    pub readable: Vec<usize>,
     pub setting: Setting,
-    /// Play the sequences.
     pub workers: Workers,
     /// A simulation that goes well, by Co-Simulation and by Model Exchange.
     pub trajectories: Vec<Trajectory>,
@@ -104,6 +133,7 @@ impl Checker {
         deadline: Instant,
     ) -> Self {
         Self {
+            readable: sample(&description, READ),
             description: Arc::new(description),
             setting,
             workers,
@@ -120,9 +150,19 @@ impl Checker {
         }
     }
 
-    /// A writer of sequences.
-    pub fn writer(&self) -> Writer<'_> {
-        Writer::new(&self.description)
+    /// A writer of sequences that vary a simulation.
+    pub fn writer<'a>(&'a self, trajectory: &'a Trajectory) -> Writer<'a> {
+        Writer::new(&self.description, trajectory, &self.readable)
+    }
+
+    /// A sequence of one step.
+    pub fn step(&self, step: Step, forbidden: bool) -> CallSequence {
+        vec![Numbered { id: 0, forbidden, step }]
+    }
+
+    /// The call that returns the version, which loads the library.
+    pub fn version(&self) -> Step {
+        Step::Version(if self.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned())
     }
 
     /// The number of values or orders that are tried; fewer in a quick check.
@@ -163,18 +203,36 @@ impl Checker {
     /// Plays a sequence for so many seconds at most.
     pub fn play_for(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
         debug_assert_eq!(self.illegal(sequence), None);
-        let left = self.deadline.saturating_duration_since(Instant::now()).as_secs_f64();
-        if left <= 0.0 {
-            return Err(TimeOver.into());
+        if Instant::now() >= self.deadline {
+            return Err(Stop::TimeOver.into());
         }
-        *locked(&self.played) += 1;
         let run = {
             let _with_others = self.alone.read().unwrap_or_else(PoisonError::into_inner);
-            self.workers.play(&self.setting, sequence, limit.min(left.max(0.5)))?
+            self.play_until(sequence, limit)?
         };
+        // The machine may be busy, so a call that seems to hang is played again with nothing beside it and three times the
+        // time. A function that has not returned then is not tried again.
+        let name = |run: &Run| {
+            at(sequence, run).map_or(String::new(), |at| format!("{}{}", step_name(&at.step), at.forbidden))
+        };
+        if !matches!(run.end, End::Hang(_)) || locked(&self.hung).contains(&name(&run)) {
+            return Ok(run);
+        }
+        let _alone = self.alone.write().unwrap_or_else(PoisonError::into_inner);
+        let run = self.play_until(sequence, 3.0 * limit)?;
+        if matches!(run.end, End::Hang(_)) {
+            locked(&self.hung).insert(name(&run));
+        }
+        Ok(run)
+    }
+
+    /// Plays a sequence until the limit or the deadline.
+    fn play_until(&self, sequence: &CallSequence, limit: f64) -> anyhow::Result<Run> {
+        let left = self.deadline.saturating_duration_since(Instant::now()).as_secs_f64();
+        *locked(&self.played) += 1;
+        let run = self.workers.play(&self.setting, sequence, limit.min(left.max(0.5)))?;
         match run.end {
-            End::Hang(seconds) if seconds < limit => Err(TimeOver.into()),
-            End::Hang(_) => self.patiently(sequence, run, limit),
+            End::Hang(seconds) if seconds < limit => Err(Stop::TimeOver.into()),
             _ => Ok(run),
         }
     }
@@ -220,10 +278,10 @@ impl Checker {
     }
 
     /// Keeps the finding that a run breaks a rule. Whether it does.
-    pub fn keep(&self, name: &str, run: &Run, sequence: &CallSequence, judge: Judge) -> bool {
+    pub fn keep(&self, name: &str, run: &Run, sequence: &CallSequence, judge: impl Judges) -> bool {
         let observed = if run.end == End::Done { judge(run) } else { None };
-        let found =
-            observed.map(|observed| self.add(self.claim(name).finding(observed, sequence.clone(), judge)));
+        let found = observed
+            .map(|observed| self.add(self.claim(name).finding(observed, sequence.clone(), Arc::new(judge))));
         found.is_some()
     }
 
@@ -239,7 +297,7 @@ impl Checker {
 
     /// Plays a sequence that keeps to the standard but for forbidden calls, and judges: first how it ended, then what holds
     /// of every run, then `judge`.
-    pub fn judge(&self, name: &str, sequence: CallSequence, judge: Judge) -> anyhow::Result<Run> {
+    pub fn judge(&self, name: &str, sequence: CallSequence, judge: impl Judges) -> anyhow::Result<Run> {
         let hostile = sequence.iter().any(|numbered| numbered.forbidden);
         let limit = if hostile { self.limit.min(3.0) } else { self.limit };
         let run = self.play_for(&sequence, limit)?;
@@ -252,30 +310,23 @@ impl Checker {
         Ok(run)
     }
 
-    /// The run of a call sequence that seems to hang, played again with nothing beside it and three times the time: the machine
-    /// may be busy. A function that has not returned then is not tried again.
-    fn patiently(&self, sequence: &CallSequence, run: Run, limit: f64) -> anyhow::Result<Run> {
-        let name = |run: &Run| {
-            let at = run.at.and_then(|id| sequence.iter().find(|numbered| numbered.id == id));
-            at.map_or(String::new(), |at| format!("{}{}", step_name(&at.step), at.forbidden))
-        };
-        if locked(&self.hung).contains(&name(&run)) {
-            return Ok(run);
-        }
-        let left = self.deadline.saturating_duration_since(Instant::now()).as_secs_f64();
-        let run = {
-            let _alone = self.alone.write().unwrap_or_else(PoisonError::into_inner);
-            *locked(&self.played) += 1;
-            self.workers.play(&self.setting, sequence, (3.0 * limit).min(left.max(0.5)))?
-        };
-        match run.end {
-            End::Hang(seconds) if seconds < 3.0 * limit => Err(TimeOver.into()),
-            End::Hang(_) => {
-                locked(&self.hung).insert(name(&run));
-                Ok(run)
-            }
-            _ => Ok(run),
-        }
+    /// Plays a sequence and judges it by one rule.
+    pub fn check(&self, name: &str, sequence: CallSequence, judge: impl Judges) -> anyhow::Result<()> {
+        self.judge(name, sequence, judge).map(|_| ())
+    }
+
+    /// Judges whether reads that must be equal differ: the variable, its value and the other value.
+    pub fn differ(
+        &self,
+        one: Vec<Read>,
+        other: Vec<Read>,
+        tell: impl Fn(String, String, String) -> String + Send + Sync + 'static,
+    ) -> Box<dyn Judges> {
+        let description = self.description.clone();
+        Box::new(move |run| {
+            let (name, one, other) = difference(&description, run, &one, &other)?;
+            Some(tell(name, one, other))
+        })
     }
 
     /// A run that did not come to its end.
@@ -283,42 +334,36 @@ impl Checker {
         let Some(observed) = ending(run, sequence) else { return Ok(()) };
         let ends: Judge = {
             let (sequence, kind) = (sequence.clone(), std::mem::discriminant(&run.end));
-            let at = run
-                .at
-                .and_then(|id| sequence.iter().find(|numbered| numbered.id == id))
-                .map(|at| step_name(&at.step));
+            let place = |run: &Run, sequence: &CallSequence| at(sequence, run).map(|at| step_name(&at.step));
+            let at = place(run, &sequence);
             Arc::new(move |run: &Run| {
-                let here = run
-                    .at
-                    .and_then(|id| sequence.iter().find(|numbered| numbered.id == id))
-                    .map(|at| step_name(&at.step));
-                (std::mem::discriminant(&run.end) == kind && here == at).then(|| ending(run, &sequence))?
+                let same = std::mem::discriminant(&run.end) == kind && place(run, &sequence) == at;
+                same.then(|| ending(run, &sequence))?
             })
         };
-        let keep = |name: &str| {
-            self.add(self.claim(name).finding(observed.clone(), sequence.clone(), Arc::clone(&ends)));
+        let keep = |name: &str, observed: String| {
+            let mut ended = self.claim(name);
+            if hostile {
+                ended.severity = ended.severity.max(Severity::Fragile);
+            }
+            self.add(ended.finding(observed, sequence.clone(), Arc::clone(&ends)));
             Ok(())
         };
         // Whether memory beyond an array was touched: with room after it, it shows.
         if matches!(run.end, End::Crash(_)) && cfg!(unix) && !hostile {
             let soft = Setting { soft: true, ..self.setting.clone() };
             let again = self.workers.play(&soft, sequence, self.limit)?;
-            let wrote = again.outcomes.values().any(|outcome| !outcome.damage.is_empty());
-            let beyond = match again.end {
-                _ if wrote => Some(("arrays.written-beyond", "it writes beyond an array")),
-                End::Done => {
-                    Some(("arrays.read-beyond", "it reads beyond an array, or memory that was freed"))
-                }
-                _ => None,
-            };
-            if let Some((name, how)) = beyond {
-                self.add(self.claim(name).finding(format!("{observed}: {how}"), sequence.clone(), ends));
-                return Ok(());
+            if again.outcomes.values().any(|outcome| !outcome.damage.is_empty()) {
+                return keep("arrays.written-beyond", format!("{observed}: it writes beyond an array"));
+            }
+            if again.end == End::Done {
+                let how = "it reads beyond an array, or memory that was freed";
+                return keep("arrays.read-beyond", format!("{observed}: {how}"));
             }
         }
         let what = match run.end {
-            End::Unloadable(_) => return keep("package.unloadable"),
-            End::Flood(_) => return keep("resources.processes"),
+            End::Unloadable(_) => return keep("package.unloadable", observed),
+            End::Flood(_) => return keep("resources.processes", observed),
             End::Hang(_) => "hang",
             End::Exit(_) => "exit",
             _ => "crash",
@@ -329,12 +374,7 @@ impl Checker {
             Some((topic, _)) if !own && (!hostile || topic == "refusals") => topic,
             _ => rule,
         };
-        let mut ended = self.claim(&format!("{name}.{what}"));
-        if hostile {
-            ended.severity = ended.severity.max(Severity::Fragile);
-        }
-        self.add(ended.finding(observed, sequence.clone(), ends));
-        Ok(())
+        keep(&format!("{name}.{what}"), observed)
     }
 
     /// The result of a successful update of the discrete states.
@@ -372,34 +412,11 @@ impl Checker {
             "resources" => 15,
             _ => 400,
         };
-        // A comparison needs the same calls on both sides; without these calls there are other differences.
-        let ends = ["crash", "hang", "exit"].iter().any(|end| finding.name.ends_with(end));
-        let pinned: &[&str] = match finding.topic() {
-            _ if ends => &[],
-            "states" | "reset" => &[
-                "Reset",
-                "GetFMUState",
-                "SetFMUState",
-                "FreeFMUState",
-                "SerializedFMUStateSize",
-                "SerializeFMUState",
-                "DeserializeFMUState",
-                "EnterInitializationMode",
-            ],
-            "derivatives" => &["SetReal", "SetFloat64", "SetContinuousStates"],
-            "results" | "life_cycle" => &["SetTime", "DoStep", "CompletedIntegratorStep"],
-            _ => &[],
-        };
         // If nothing is compared, one call shows the finding.
-        let alone = [
-            "life_cycle.refused",
-            "life_cycle.states-changed",
-            "results.early-return",
-            "results.early-unsaid",
-            "start_values.inputs",
-        ]
-        .contains(&finding.name.as_str());
-        let pinned = if alone { &[] } else { pinned };
+        let alone = ALONE.contains(&finding.name.as_str());
+        let ends = ["crash", "hang", "exit"].iter().any(|end| finding.name.ends_with(end));
+        let pinned = PINNED.iter().find(|(topic, _)| *topic == finding.topic() && !ends && !alone);
+        let pinned = pinned.map_or(&[][..], |(_, calls)| calls);
         // A shorter sequence may show other numbers, but not another observation.
         let (same, mut observed) = (outline(&finding.observed), finding.observed.clone());
         let mut shows = |tried: &CallSequence| {

@@ -1,15 +1,15 @@
 //! Findings: severity, section of the standard, and the shortest call sequence that shows the finding.
 
-use crate::call_sequence::{CallSequence, End, Run, Step, Written};
-
+use crate::call_sequence::{CallSequence, End, Numbered, Run, Step, Written};
 use serde::Serialize;
 use std::sync::Arc;
 
 /// How bad it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// Good to know.
+    #[default]
     Note,
     /// The standard allows it, but importers fail.
     Fragile,
@@ -29,10 +29,15 @@ impl Severity {
 }
 
 /// Judges a run; returns a sentence that describes the violation.
-pub type Judge = Arc<dyn Fn(&Run) -> Option<String> + Send + Sync>;
+pub trait Judges: Fn(&Run) -> Option<String> + Send + Sync + 'static {}
+
+impl<T: Fn(&Run) -> Option<String> + Send + Sync + 'static> Judges for T {}
+
+/// A judge that findings share.
+pub type Judge = Arc<dyn Judges>;
 
 /// A finding.
-#[derive(Clone, Serialize)]
+#[derive(Clone, Default, Serialize)]
 pub struct Finding {
     /// Its name: the topic, a dot, what is wrong.
     pub name: String,
@@ -65,20 +70,8 @@ pub struct Finding {
 impl Finding {
     /// A finding without a call sequence.
     pub fn new(name: &str, severity: Severity, section: String, requirement: &str, observed: String) -> Self {
-        Self {
-            name: name.to_owned(),
-            severity,
-            section,
-            requirement: requirement.to_owned(),
-            observed,
-            more: Vec::new(),
-            sequence: Vec::new(),
-            c: String::new(),
-            judge: None,
-            fails: false,
-            accepted: None,
-            steps: (0, 0),
-        }
+        let (name, requirement) = (name.to_owned(), requirement.to_owned());
+        Self { name, severity, section, requirement, observed, ..Self::default() }
     }
 
     /// Its topic.
@@ -149,44 +142,47 @@ pub fn event(run: &Run, id: u32, fmi3: bool) -> Option<Event> {
     Some(Event { again, terminate, states_changed, next: defined.then_some(time) })
 }
 
-/// A sentence on a call that answered otherwise than OK.
+/// A sentence on the first of these calls that did not answer OK.
 pub fn refused(sequence: &CallSequence, run: &Run, ids: &[u32]) -> Option<String> {
-    let id = ids
-        .iter()
-        .find(|id| run.of(**id).is_some_and(|of| of.missing || of.status.is_some_and(|status| status > 1)))?;
-    refused_one(sequence, run, *id)
+    ids.iter().find_map(|id| refused_one(sequence, run, *id))
 }
 
 /// A sentence on this call, if it did not answer OK.
 pub fn refused_one(sequence: &CallSequence, run: &Run, id: u32) -> Option<String> {
     let outcome = run.of(id)?;
-    let name = sequence
-        .iter()
-        .find(|numbered| numbered.id == id)
-        .map(|numbered| (step_name(&numbered.step), &numbered.step));
-    let (name, step) = name?;
+    let step = &sequence.iter().find(|numbered| numbered.id == id)?.step;
+    let name = step_name(step);
     if outcome.missing {
         return Some(format!("{name} is not in the library"));
     }
     let status = outcome.status?;
-    let failed = if matches!(step, Step::Make(..)) { status == 0 } else { status > 1 };
+    let result = match step {
+        Step::Make(..) if status == 0 => "NULL".to_owned(),
+        Step::Call { .. } | Step::Free(_) if status > 1 => status_name(status),
+        _ => return None,
+    };
     let why = outcome.log.iter().rev().find_map(|message| message.text.as_ref());
     let why = why.map_or(String::new(), |text| format!(": {:?}", String::from_utf8_lossy(text)));
-    failed.then(|| {
-        let result = if matches!(step, Step::Make(..)) { "NULL".to_owned() } else { status_name(status) };
-        format!("{name} returns {result}{why}")
-    })
+    Some(format!("{name} returns {result}{why}"))
+}
+
+/// A sentence on the first failure in a sequence: of an instantiation, else of a call that returns more than `most`.
+pub fn refused_any(sequence: &CallSequence, run: &Run, most: i32) -> Option<String> {
+    let made = |numbered: &&Numbered| matches!(numbered.step, Step::Make(..));
+    let failed = |numbered: &&Numbered| {
+        matches!(numbered.step, Step::Call { .. })
+            && run
+                .of(numbered.id)
+                .is_some_and(|of| of.status.map_or(of.missing && most < 2, |status| status > most))
+    };
+    let one = |numbered: &Numbered| refused_one(sequence, run, numbered.id);
+    let of_makes = sequence.iter().filter(made).find_map(one);
+    of_makes.or_else(|| sequence.iter().filter(failed).find_map(one))
 }
 
 /// The name of a status.
 pub fn status_name(status: i32) -> String {
-    match status {
-        0 => "OK".to_owned(),
-        1 => "Warning".to_owned(),
-        2 => "Discard".to_owned(),
-        3 => "Error".to_owned(),
-        4 => "Fatal".to_owned(),
-        5 => "Pending".to_owned(),
-        other => other.to_string(),
-    }
+    let names = ["OK", "Warning", "Discard", "Error", "Fatal", "Pending"];
+    let name = usize::try_from(status).ok().and_then(|index| names.get(index));
+    name.map_or_else(|| status.to_string(), |name| (*name).to_owned())
 }

@@ -31,14 +31,16 @@ pub use report::Report;
 pub use worker::work_if_asked;
 
 use anyhow::Context as _;
-use checker::{Checker, TimeOver};
+use checker::Checker;
+use checks::Check;
 use description::Description;
 use fmi_abi::Interface;
+use run::Stop;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use trajectory::{NoTrajectory, find_trajectory};
 
@@ -164,13 +166,10 @@ pub fn command(fmu: &Path, options: &Options) -> ExitCode {
 }
 
 /// Findings outside of the arrays and logs that any call can show, or that prevent other checks.
+#[rustfmt::skip]
 const ALWAYS: [&str; 6] = [
-    "functions.status",
-    "package.unloadable",
-    "package.symbols",
-    "life_cycle.simulation",
-    "life_cycle.crash",
-    "life_cycle.hang",
+    "functions.status", "package.unloadable", "package.symbols",
+    "life_cycle.simulation", "life_cycle.crash", "life_cycle.hang",
 ];
 
 /// Finds a trajectory for each interface type that has a library.
@@ -184,7 +183,7 @@ fn simulate(checker: &mut Checker) -> anyhow::Result<()> {
             Err(error) if error.is::<NoTrajectory>() => {
                 checker.unchecked(INTERFACES[index], format!("no simulation succeeds: {error}"));
             }
-            Err(error) if error.is::<TimeOver>() || error.is::<run::OutOfMemory>() => {
+            Err(error) if error.is::<Stop>() && !worker::interrupted() => {
                 checker.unchecked(INTERFACES[index], error.to_string());
             }
             Err(error) => return Err(error),
@@ -214,8 +213,8 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
         Ok(text) => text.to_owned(),
         Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
     };
-    let description = Description::parse(text.trim_start_matches('\u{feff}'))
-        .map_err(|why| anyhow::anyhow!("{}: {why}", path.display()))?;
+    let text = text.trim_start_matches('\u{feff}');
+    let description = Description::parse(text).map_err(|why| anyhow::anyhow!("{}: {why}", path.display()))?;
     let wanted = |topic: &str| match options.only.is_empty() {
         true => !options.quick || !LONG.contains(&topic),
         false => options.only.iter().any(|only| only == topic),
@@ -249,7 +248,7 @@ pub fn check(path: &Path, options: &Options, progress: bool) -> anyhow::Result<R
     findings.sort_by(|one, other| other.severity.cmp(&one.severity).then_with(|| one.name.cmp(&other.name)));
     shorten(&checker, &mut findings, options, progress);
     if worker::interrupted() {
-        return Err(run::Interrupted.into());
+        return Err(Stop::Interrupted.into());
     }
     let mut report = Report::new(path, &checker, findings);
     report.seconds = begin.elapsed().as_secs_f64();
@@ -336,85 +335,81 @@ fn setting(
 /// A simulation as the standard has it fails: that is the finding.
 fn no_trajectory(checker: &Checker, sequence: call_sequence::CallSequence) -> anyhow::Result<()> {
     let copy = sequence.clone();
-    let judge: finding::Judge = std::sync::Arc::new(move |run| {
-        let ids: Vec<u32> = copy.iter().map(|numbered| numbered.id).collect();
-        let makes: Vec<u32> = copy
-            .iter()
-            .filter(|numbered| matches!(numbered.step, call_sequence::Step::Make(..)))
-            .map(|numbered| numbered.id)
-            .collect();
-        let rest: Vec<u32> = ids.into_iter().filter(|id| !makes.contains(id)).collect();
-        let of_makes = makes.iter().find_map(|id| finding::refused_one(&copy, run, *id));
-        of_makes.or_else(|| finding::refused(&copy, run, &rest))
+    checker.check("life_cycle.simulation", sequence, move |run| finding::refused_any(&copy, run, 1))
+}
+
+/// Handles all items, several at a time. After each, progress shows the line that `each` returns.
+fn in_parallel<T: Sync>(items: &[T], progress: bool, each: impl Fn(&T, usize) -> String + Sync) {
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from).min(8) {
+            scope.spawn(|| {
+                while let Some(item) = items.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let line = each(item, done.fetch_add(1, Ordering::Relaxed) + 1);
+                    if progress {
+                        eprint!("\r{line}");
+                        let _ = std::io::stderr().flush();
+                    }
+                }
+            });
+        }
     });
-    checker.judge("life_cycle.simulation", sequence, judge)?;
-    Ok(())
+    if progress {
+        eprint!("\r{:79}\r", "");
+    }
+}
+
+/// A check, for the simulations that it fits.
+fn attack_with(
+    checker: &Checker,
+    check: Check,
+    trajectory: Option<&writer::Trajectory>,
+) -> anyhow::Result<()> {
+    match (check, trajectory) {
+        (Check::Once(check), None) => check(checker),
+        (Check::Each(fits, check), Some(of)) if fits.fit(checker, of) => check(checker, of),
+        (Check::Malformed(rule, fits, write), Some(of)) if fits.fit(checker, of) => {
+            checks::hostile::all(checker, rule, write(checker, of)?)
+        }
+        _ => Ok(()),
+    }
 }
 
 /// All checks that are wanted, several at a time.
 fn attack(checker: &Checker, progress: bool, wanted: &(impl Fn(&str) -> bool + Sync)) -> anyhow::Result<()> {
-    let checks: Vec<_> = checks::ALL.iter().filter(|(topic, _)| wanted(topic)).collect();
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let of_checks = checks::ALL.iter().filter(|(topic, _)| wanted(topic));
+    let jobs: Vec<_> = of_checks
+        .flat_map(|(topic, check)| {
+            let each = checker.trajectories.iter().map(Some);
+            std::iter::once(None).chain(each).map(move |trajectory| (*topic, *check, trajectory))
+        })
+        .collect();
     let failure = Mutex::new(None);
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from).min(8) {
-            scope.spawn(|| {
-                while let Some((topic, check)) = checks.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    match check(checker) {
-                        Ok(()) => {}
-                        Err(error) if error.is::<TimeOver>() || error.is::<run::OutOfMemory>() => {
-                            checker.unchecked(topic, error.to_string())
-                        }
-                        Err(error) => {
-                            *failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(error);
-                        }
-                    }
-                    let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                    if progress {
-                        let left = checker.deadline.saturating_duration_since(Instant::now()).as_secs();
-                        eprint!(
-                            "\r{done} of {} checks, {} call sequences run, {left} s left: {topic:20}",
-                            checks.len(),
-                            checker.played()
-                        );
-                        let _ = std::io::stderr().flush();
-                    }
-                }
-            });
+    in_parallel(&jobs, progress, |(topic, check, trajectory), done| {
+        match attack_with(checker, *check, *trajectory) {
+            Ok(()) => {}
+            Err(error) if error.is::<Stop>() && !worker::interrupted() => {
+                checker.unchecked(topic, error.to_string());
+            }
+            Err(error) => *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error),
         }
+        let left = checker.deadline.saturating_duration_since(Instant::now()).as_secs();
+        let (all, played) = (jobs.len(), checker.played());
+        format!("{done} of {all} checks, {played} call sequences run, {left} s left: {topic:20}")
     });
-    if progress {
-        eprint!("\r{:79}\r", "");
-    }
-    match failure.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
-        Some(error) => Err(error),
-        None => Ok(()),
-    }
+    failure.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
 }
 
 fn shorten(checker: &Checker, findings: &mut [Finding], options: &Options, progress: bool) {
     let count = findings.len();
-    let next = AtomicUsize::new(0);
     let slots: Vec<Mutex<&mut Finding>> = findings.iter_mut().map(Mutex::new).collect();
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from).min(8) {
-            scope.spawn(|| {
-                while let Some(slot) = slots.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let mut finding = slot.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                    if !options.no_shrink {
-                        checker.shorten(&mut finding);
-                    }
-                    if progress {
-                        eprint!("\rthe shortest calls for {count} findings: {:40}", finding.name);
-                        let _ = std::io::stderr().flush();
-                    }
-                    // If the run fails, the finding has no program.
-                    let _ = checker.reproduce(&mut finding);
-                }
-            });
+    in_parallel(&slots, progress, |slot, _| {
+        let mut finding = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        if !options.no_shrink {
+            checker.shorten(&mut finding);
         }
+        // If the run fails, the finding has no program.
+        let _ = checker.reproduce(&mut finding);
+        format!("the shortest calls for {count} findings: {:40}", finding.name)
     });
-    if progress {
-        eprint!("\r{:79}\r", "");
-    }
 }

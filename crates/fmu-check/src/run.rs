@@ -36,29 +36,28 @@ struct Left {
     outside: bool,
 }
 
-/// This tool needs more memory than the FMU may use.
+/// Reasons for which a check cannot go on.
 #[derive(Debug)]
-pub struct OutOfMemory;
+pub enum Stop {
+    /// The time for all checks is over.
+    TimeOver,
+    /// This tool needs more memory than the FMU may use.
+    OutOfMemory,
+    /// The user has interrupted the check.
+    Interrupted,
+}
 
-impl std::fmt::Display for OutOfMemory {
+impl std::fmt::Display for Stop {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("fmu-check itself needs more than the memory of --memory")
+        f.write_str(match self {
+            Self::TimeOver => "the time was over",
+            Self::OutOfMemory => "fmu-check itself needs more than the memory of --memory",
+            Self::Interrupted => "interrupted",
+        })
     }
 }
 
-impl std::error::Error for OutOfMemory {}
-
-/// The user has interrupted the check.
-#[derive(Debug)]
-pub struct Interrupted;
-
-impl std::fmt::Display for Interrupted {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("interrupted")
-    }
-}
-
-impl std::error::Error for Interrupted {}
+impl std::error::Error for Stop {}
 
 /// The command that starts this program as a worker.
 fn worker(job: &Path, scratch: &Path, (phase, now): Situation) -> anyhow::Result<Command> {
@@ -121,7 +120,7 @@ impl Workers {
                 Ok(left)
             }
             // The library has ended the process that forks.
-            Err(_) if interrupted() => Err(Interrupted.into()),
+            Err(_) if interrupted() => Err(Stop::Interrupted.into()),
             Err(_) => Ok(Left { ended: Some(server.0.wait()?), ..Left::default() }),
         }
     }
@@ -154,7 +153,7 @@ impl Workers {
         };
         crate::worker::end_group(child.id());
         if interrupted() {
-            return Err(Interrupted.into());
+            return Err(Stop::Interrupted.into());
         }
         let [said, outcomes] = ["said", "outcomes"].map(|name| std::fs::read(at(name)).unwrap_or_default());
         Ok(Left { ended, said, outcomes, ..Left::default() })
@@ -182,7 +181,7 @@ impl Server {
         input.write_all(job.as_bytes())?;
         while !crate::worker::readable(output)? {
             if interrupted() {
-                return Err(Interrupted.into());
+                return Err(Stop::Interrupted.into());
             }
         }
         let mut output = std::io::BufReader::new(output);
@@ -234,7 +233,7 @@ fn read(
     if outside
         && ["memory allocation of", "no memory for an array"].iter().any(|text| run.said.contains(text))
     {
-        return Err(OutOfMemory.into());
+        return Err(Stop::OutOfMemory.into());
     }
     run.at = sequence.iter().map(|numbered| numbered.id).find(|id| !run.outcomes.contains_key(id));
     run.end = match ended {

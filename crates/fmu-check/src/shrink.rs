@@ -7,31 +7,21 @@ use std::collections::HashMap;
 
 /// Calls that belong together: they are left out together or not at all.
 fn units(sequence: &[Numbered]) -> Vec<Vec<u32>> {
-    let name = |numbered: &Numbered| match &numbered.step {
-        Step::Call { function, .. } => function.get(4..).unwrap_or_default().to_owned(),
-        _ => String::new(),
-    };
-    let mut units: Vec<Vec<u32>> = Vec::new();
-    let mut open = false;
+    let (mut units, mut open, mut before) = (Vec::<Vec<u32>>::new(), false, "");
     for numbered in sequence {
-        let function = name(numbered);
-        let goes_on = match function.as_str() {
+        let name = match &numbered.step {
+            Step::Call { function, .. } => function.get(4..).unwrap_or_default(),
+            _ => "",
+        };
+        let goes_on = match name {
             "NewDiscreteStates" | "UpdateDiscreteStates" => open,
-            "EnterContinuousTimeMode" | "EnterStepMode" => std::mem::replace(&mut open, false),
-            "EnterInitializationMode" | "SerializeFMUstate" | "SerializeFMUState" => {
-                units.last().is_some_and(|unit| {
-                    let last = unit.last().copied();
-                    sequence.iter().find(|other| Some(other.id) == last).is_some_and(|other| {
-                        ["SetupExperiment", "SerializedFMUstateSize", "SerializedFMUStateSize"]
-                            .contains(&name(other).as_str())
-                    })
-                })
-            }
+            "EnterContinuousTimeMode" | "EnterStepMode" => std::mem::take(&mut open),
+            "EnterInitializationMode" => before == "SetupExperiment",
+            "SerializeFMUstate" | "SerializeFMUState" => before.starts_with("SerializedFMU"),
             _ => false,
         };
-        if ["EnterEventMode", "ExitInitializationMode"].contains(&function.as_str()) {
-            open = true;
-        }
+        open |= ["EnterEventMode", "ExitInitializationMode"].contains(&name);
+        before = name;
         match units.last_mut() {
             Some(unit) if goes_on => unit.push(numbered.id),
             _ => units.push(vec![numbered.id]),
@@ -149,6 +139,7 @@ mod tests {
     use crate::description::Description;
     use crate::legal::first_illegal;
     use crate::values::Value;
+    use crate::writer::Part::{Ask, Begin, Free, Run};
     use crate::writer::{Point, Trajectory, Writer};
     use fmi_abi::Interface;
 
@@ -168,14 +159,7 @@ mod tests {
         Trajectory { interface: Interface::CoSimulation, updates: 0, points, end: 6.0 }
     }
 
-    fn played(writer: &mut Writer, of: usize, trajectory: &Trajectory) {
-        writer.begin(of, trajectory);
-        for point in &trajectory.points {
-            writer.point(of, trajectory, point);
-            writer.ask(of, trajectory.interface);
-        }
-        writer.free(of);
-    }
+    const WHOLE: &[crate::writer::Part] = &[Begin, Ask, Run(0), Free];
 
     fn names(sequence: &[Numbered]) -> Vec<String> {
         flat(sequence).into_iter().map(|numbered| crate::finding::step_name(&numbered.step)).collect()
@@ -188,8 +172,8 @@ mod tests {
     #[test]
     fn what_is_left_is_needed_and_legal() {
         let (description, trajectory) = (description(), trajectory());
-        let mut writer = Writer::new(&description);
-        played(&mut writer, 0, &trajectory);
+        let mut writer = Writer::new(&description, &trajectory, &[0]);
+        writer.play(0, WHOLE);
         let short =
             shrink(&description, &writer.sequence, &[], false, |tried| count(tried, "fmi2DoStep") >= 2);
         let calls = ["the instantiation", "fmi2SetupExperiment", "fmi2EnterInitializationMode"];
@@ -201,8 +185,8 @@ mod tests {
     #[test]
     fn nothing_is_left_out_that_is_pinned() {
         let (description, trajectory) = (description(), trajectory());
-        let mut writer = Writer::new(&description);
-        played(&mut writer, 0, &trajectory);
+        let mut writer = Writer::new(&description, &trajectory, &[0]);
+        writer.play(0, WHOLE);
         let short = shrink(&description, &writer.sequence, &["SetReal"], false, |_| true);
         assert_eq!((count(&short, "fmi2SetReal"), count(&short, "fmi2DoStep")), (6, 0));
     }
@@ -211,10 +195,10 @@ mod tests {
     #[test]
     fn compared_simulations_stay_alike() {
         let (description, trajectory) = (description(), trajectory());
-        let mut writer = Writer::new(&description);
-        played(&mut writer, 0, &trajectory);
-        let mut thread = Writer { next: writer.next, ..Writer::new(&description) };
-        played(&mut thread, 1, &trajectory);
+        let mut writer = Writer::new(&description, &trajectory, &[0]);
+        writer.play(0, WHOLE);
+        let mut thread = Writer { next: writer.next, ..Writer::new(&description, &trajectory, &[0]) };
+        thread.play(1, WHOLE);
         writer.next = thread.next;
         writer.add(Step::Parallel(vec![thread.sequence]));
         let parallel = |sequence: &CallSequence| {

@@ -5,7 +5,7 @@ use crate::checker::Checker;
 use crate::description::Description;
 use crate::finding::{Event, ending, refused, refused_one, step_name};
 use crate::values::input_values;
-use crate::writer::{Point, Trajectory, Writer};
+use crate::writer::{Part, Point, Trajectory, Writer};
 use fmi_abi::Interface;
 use std::time::{Duration, Instant};
 
@@ -77,11 +77,8 @@ fn in_steps(checker: &Checker, trajectory: Trajectory) -> anyhow::Result<Traject
         let sizes: Vec<f64> = (0..12).map(|number| if number < 4 { size } else { reach * size }).collect();
         let points = steps(description, description.start_time, &sizes, discrete);
         let trajectory = Trajectory { points, ..trajectory.clone() };
-        let mut writer = checker.writer();
-        let mut ids = writer.begin(0, &trajectory);
-        for point in &trajectory.points {
-            ids.extend(writer.point(0, &trajectory, point));
-        }
+        let mut writer = checker.writer(&trajectory);
+        let ids = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
         let begin = Instant::now();
         let run = checker.play(&writer.sequence)?;
         if reach > 1.0 && (run.end != End::Done || begin.elapsed() > LONG) {
@@ -129,17 +126,15 @@ fn made(run: &Run, writer: &Writer, make: u32) -> anyhow::Result<()> {
 fn initialized(checker: &Checker, trajectory: &mut Trajectory) -> anyhow::Result<Option<Event>> {
     for updates in 1..=UPDATES {
         trajectory.updates = updates;
-        let mut writer = checker.writer();
-        let make = writer.make(0, trajectory.interface);
-        let mut ids = vec![writer.enter(0), writer.call(0, "ExitInitializationMode", vec![])];
-        let updated = writer.update(0, updates);
-        ids.extend(&updated);
+        let mut writer = checker.writer(trajectory);
+        let parts = [Part::Make, Part::Enter, Part::Call("ExitInitializationMode"), Part::Update(updates)];
+        let ids = writer.play(0, &parts).ids;
         let run = checker.play(&writer.sequence)?;
-        made(&run, &writer, make)?;
-        if let Some(why) = refused(&writer.sequence, &run, &ids) {
+        made(&run, &writer, ids[0])?;
+        if let Some(why) = refused(&writer.sequence, &run, &ids[1..]) {
             return Err(NoTrajectory(why, writer.sequence).into());
         }
-        match updated.last().and_then(|id| checker.event(&run, *id)) {
+        match ids.last().and_then(|id| checker.event(&run, *id)) {
             Some(event) if event.again => {}
             event => return Ok(event),
         }
@@ -148,14 +143,8 @@ fn initialized(checker: &Checker, trajectory: &mut Trajectory) -> anyhow::Result
 }
 
 /// The event of the last update among these calls.
-fn last_event(checker: &Checker, run: &Run, writer: &Writer, ids: &[u32]) -> Option<Event> {
-    ids.iter().rev().find_map(|id| {
-        let named = |end: &str| {
-            let mut calls = writer.sequence.iter().filter(|numbered| numbered.id == *id);
-            calls.any(|numbered| step_name(&numbered.step).ends_with(end))
-        };
-        named("DiscreteStates").then(|| checker.event(run, *id)).flatten()
-    })
+fn last_event(checker: &Checker, run: &Run, ids: &[u32]) -> Option<Event> {
+    ids.iter().rev().find_map(|id| checker.event(run, *id))
 }
 
 /// Steps of Co-Simulation with Event Mode, in which the events are handled that steps report.
@@ -164,21 +153,18 @@ fn with_events(checker: &Checker, mut trajectory: Trajectory) -> anyhow::Result<
     let description = &checker.description;
     for mut point in steps(description, description.start_time, &[step_size(description); 12], false) {
         loop {
-            let mut writer = checker.writer();
-            let make = writer.begin(0, &trajectory)[0];
-            for other in &trajectory.points {
-                writer.point(0, &trajectory, other);
-            }
-            let ids = writer.point(0, &trajectory, &point);
+            let mut writer = checker.writer(&trajectory);
+            let before = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
+            let ids = writer.point(0, &point);
             let run = checker.play(&writer.sequence)?;
-            made(&run, &writer, make)?;
+            made(&run, &writer, before[0])?;
             if let Some(why) = refused(&writer.sequence, &run, &ids) {
                 let few = trajectory.points.len() < 3;
                 return if few { Err(NoTrajectory(why, writer.sequence).into()) } else { Ok(trajectory) };
             }
             let step = ids.iter().filter_map(|id| run.of(*id)).find(|of| of.written.len() == 4);
             let flag = |index: usize| step.is_some_and(|of| of.written[index].numbers() == [1.0]);
-            let again = last_event(checker, &run, &writer, &ids).is_some_and(|event| event.again);
+            let again = last_event(checker, &run, &ids).is_some_and(|event| event.again);
             if flag(1) || flag(2) {
                 return Ok(trajectory);
             }
@@ -210,18 +196,14 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
     let count = checker.description.states_count().unwrap_or(0);
     let indicators = checker.description.event_indicators.unwrap_or(0);
     loop {
-        let mut writer = checker.writer();
-        let mut ids = writer.begin(0, trajectory);
-        for other in &trajectory.points {
-            ids.extend(writer.point(0, trajectory, other));
-        }
-        let here = writer.point(0, trajectory, point);
+        let mut writer = checker.writer(trajectory);
+        let mut ids = writer.play(0, &[Part::Begin, Part::Points(usize::MAX)]).ids;
+        let here = writer.point(0, point);
         ids.extend(&here);
-        let asked = [
-            (count > 0).then(|| writer.vector(0, "GetContinuousStates", count)),
-            (count > 0).then(|| writer.derivatives(0, count)),
-            (indicators > 0).then(|| writer.vector(0, "GetEventIndicators", indicators)),
-        ];
+        let derivatives = writer.derivatives_name();
+        let asked =
+            [("GetContinuousStates", count), (derivatives, count), ("GetEventIndicators", indicators)]
+                .map(|(name, count)| (count > 0).then(|| writer.vector(0, name, count)));
         let run = checker.play(&writer.sequence)?;
         if let Some(why) = ending(&run, &writer.sequence) {
             return Err(NoTrajectory(why, writer.sequence).into());
@@ -237,7 +219,7 @@ fn reached(checker: &Checker, trajectory: &Trajectory, point: &mut Point) -> any
             let written = completed.and_then(|numbered| run.of(numbered.id)?.written.get(index));
             written.is_some_and(|of| of.numbers().first() == Some(&1.0))
         };
-        let event = last_event(checker, &run, &writer, &here).filter(|_| point.updates > 0);
+        let event = last_event(checker, &run, &here).filter(|_| point.updates > 0);
         let again = event.is_some_and(|event| event.again) && point.updates < UPDATES;
         if again || point.updates == 0 && flag(0) {
             point.updates += 1;

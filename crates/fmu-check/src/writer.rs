@@ -1,22 +1,18 @@
 //! Writes sequences: the calls of an importer that does what the standard says, with the numbers of this FMU.
 
-use crate::call_sequence::{Arg, CallSequence, Kind, Make, Numbered, Run, Step, Written, steps_itself};
+use crate::call_sequence::{Arg, CallSequence, Kind, Make, Numbered, Run, Step, Written};
 use crate::description::{Description, kind_of, type_name};
 use crate::finding::status_name;
 use crate::values::Value;
-use fmi_abi::{BaseType, Interface, Standard};
+use fmi_abi::calls::signatures;
+use fmi_abi::{Interface, Standard};
 
 /// A read: the number of the step, and the indices of the variables with the number of values of each.
 #[derive(Clone, Debug)]
 pub struct Read {
-    /// The step.
     pub id: u32,
-    /// The variables.
     pub of: Vec<(usize, usize)>,
 }
-
-/// The variables of a type, with how many values each has.
-type Group = (&'static str, Kind, Vec<(usize, usize)>);
 
 /// One point of a trajectory.
 #[derive(Clone, Debug, Default)]
@@ -27,7 +23,7 @@ pub struct Point {
     pub size: f64,
     /// Values that are set before the step.
     pub inputs: Vec<(usize, Value)>,
-    /// Model Exchange: what the states are set to.
+    /// Continuous states that are set in Model Exchange.
     pub states: Vec<f64>,
     /// Number of updates of the discrete states in an event at this point; 0 if there is no event.
     pub updates: usize,
@@ -36,20 +32,68 @@ pub struct Point {
 /// A simulation that goes well, as data.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
-    /// The interface type.
     pub interface: Interface,
     /// Updates of the discrete states after the initialization.
     pub updates: usize,
-    /// The points.
     pub points: Vec<Point>,
     /// The time at the end.
     pub end: f64,
 }
 
+impl Trajectory {
+    /// Whether steps of Co-Simulation advance the time.
+    pub fn is_stepped(&self) -> bool {
+        self.interface == Interface::CoSimulation
+    }
+}
+
+/// A part of a simulation.
+#[derive(Clone, Copy, Debug)]
+pub enum Part {
+    Make,
+    /// Enters Initialization Mode.
+    Enter,
+    /// Leaves it for the mode in which time advances.
+    Leave,
+    /// Instantiates and initializes.
+    Begin,
+    /// Goes through the first points of the trajectory, at most this many.
+    Points(usize),
+    /// Goes from this point to the end, and reads after each.
+    Run(usize),
+    /// Reads the variables.
+    Read,
+    /// Reads the variables and vectors.
+    Ask,
+    /// Calls a function without arguments.
+    Call(&'static str),
+    /// Updates the discrete states this many times.
+    Update(usize),
+    /// Saves the state in a slot.
+    Save(usize),
+    Restore(usize),
+    /// Frees the saved state.
+    Drop(usize),
+    /// Frees the instance.
+    Free,
+}
+
+/// Numbers of the calls that were written, and the reads.
+#[derive(Clone, Default)]
+pub struct Played {
+    /// Calls other than those that read.
+    pub ids: Vec<u32>,
+    /// Calls that read.
+    pub reads: Vec<Read>,
+}
+
 /// Writes a sequence.
 pub struct Writer<'a> {
-    /// Model description of the FMU.
     pub description: &'a Description,
+    /// The simulation that the sequence varies.
+    pub trajectory: &'a Trajectory,
+    /// The variables that are read.
+    pub readable: &'a [usize],
     /// The steps so far.
     pub sequence: CallSequence,
     /// The next number.
@@ -60,8 +104,8 @@ pub struct Writer<'a> {
 
 impl<'a> Writer<'a> {
     /// An empty sequence.
-    pub fn new(description: &'a Description) -> Self {
-        Self { description, sequence: Vec::new(), next: 0, forbidden: false }
+    pub fn new(description: &'a Description, trajectory: &'a Trajectory, readable: &'a [usize]) -> Self {
+        Self { description, trajectory, readable, sequence: Vec::new(), next: 0, forbidden: false }
     }
 
     /// Whether the standard is 3.0.
@@ -77,37 +121,81 @@ impl<'a> Writer<'a> {
         id
     }
 
+    /// Name of a function that is given without `fmi2` or `fmi3`. FMI 2.0 spells `FMUState` with another case.
+    fn named(&self, function: &str) -> String {
+        let mut all = signatures(self.description.standard).iter().map(|of| of.rule.name);
+        let name = all.find(|name| name[4..].eq_ignore_ascii_case(function));
+        name.map_or_else(|| function.to_owned(), str::to_owned)
+    }
+
     /// Adds a call of a function, named without `fmi2` or `fmi3`.
     pub fn call(&mut self, of: usize, function: &str, args: Vec<Arg>) -> u32 {
-        let function = format!("{}{function}", if self.fmi3() { "fmi3" } else { "fmi2" });
-        self.add(Step::Call { of: Some(of), function, args })
+        self.add(Step::Call { of: Some(of), function: self.named(function), args })
     }
 
     /// A call that the standard forbids, or whose arguments it forbids.
     pub fn forbidden(&mut self, of: Option<usize>, function: &str, args: Vec<Arg>) -> u32 {
-        let function = format!("{}{function}", if self.fmi3() { "fmi3" } else { "fmi2" });
         let before = std::mem::replace(&mut self.forbidden, true);
-        let id = self.add(Step::Call { of, function, args });
+        let id = self.add(Step::Call { of, function: self.named(function), args });
         self.forbidden = before;
         id
     }
 
+    /// Writes parts of a simulation.
+    pub fn play(&mut self, of: usize, parts: &[Part]) -> Played {
+        let mut played = Played::default();
+        let points = &self.trajectory.points;
+        for part in parts {
+            match *part {
+                Part::Make => played.ids.push(self.make(of)),
+                Part::Enter => played.ids.push(self.enter(of)),
+                Part::Leave => played.ids.extend(self.leave(of)),
+                Part::Begin => played.ids.extend(self.begin(of)),
+                Part::Points(most) => {
+                    played.ids.extend(points.iter().take(most).flat_map(|point| self.point(of, point)));
+                }
+                Part::Run(from) => {
+                    for point in &points[from..] {
+                        played.ids.extend(self.point(of, point));
+                        played.reads.extend(self.ask(of));
+                    }
+                }
+                Part::Read => played.reads.extend(self.read(of)),
+                Part::Ask => played.reads.extend(self.ask(of)),
+                Part::Call(function) => played.ids.push(self.call(of, function, vec![])),
+                Part::Update(times) => played.ids.extend(self.update(of, times)),
+                Part::Save(slot) => played.ids.push(self.call(of, "GetFMUState", vec![Arg::StateOut(slot)])),
+                Part::Restore(slot) => played.ids.push(self.call(of, "SetFMUState", vec![Arg::State(slot)])),
+                Part::Drop(slot) => played.ids.push(self.call(of, "FreeFMUState", vec![Arg::StateOut(slot)])),
+                Part::Free => played.ids.push(self.free(of)),
+            }
+        }
+        played
+    }
+
     /// How instances are made.
-    pub fn how(&self, interface: Interface) -> Make {
+    pub fn how(&self) -> Make {
+        let stepped = self.trajectory.is_stepped();
         Make {
-            co_simulation: steps_itself(interface),
+            co_simulation: stepped,
             name: Some("instance".to_owned()),
             token: Some(self.description.token.clone()),
             logging: true,
-            event_mode: steps_itself(interface) && self.description.event_mode(),
+            event_mode: stepped && self.description.event_mode(),
             early_return: false,
             resources: true,
         }
     }
 
     /// A new instance.
-    pub fn make(&mut self, of: usize, interface: Interface) -> u32 {
-        let how = self.how(interface);
+    pub fn make(&mut self, of: usize) -> u32 {
+        self.make_with(of, |_| {})
+    }
+
+    /// A new instance with other arguments.
+    pub fn make_with(&mut self, of: usize, change: impl FnOnce(&mut Make)) -> u32 {
+        let mut how = self.how();
+        change(&mut how);
         self.add(Step::Make(of, how))
     }
 
@@ -137,109 +225,95 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Sets another start time.
-    pub fn start_at(&mut self, time: f64) {
-        for numbered in &mut self.sequence {
-            if let Step::Call { function, args, .. } = &mut numbered.step
-                && ["SetupExperiment", "EnterInitializationMode"].contains(&&function[4..])
-                && let Some(start) = args.get_mut(2)
-            {
-                *start = Arg::real(time);
-            }
-        }
-    }
-
     /// Writes this many updates of the discrete states; returns their numbers.
     pub fn update(&mut self, of: usize, times: usize) -> Vec<u32> {
-        let flag = || Arg::Out(Kind::U8, 1);
-        (0..times)
-            .map(|_| {
-                if self.fmi3() {
-                    let args = vec![flag(), flag(), flag(), flag(), flag(), Arg::Out(Kind::F64, 1)];
-                    self.call(of, "UpdateDiscreteStates", args)
-                } else {
-                    // The five flags and the time of fmi2EventInfo, with the gap that C leaves between them.
-                    self.call(of, "NewDiscreteStates", vec![Arg::Out(Kind::U64, 4)])
-                }
-            })
-            .collect()
+        let (name, args) = match self.fmi3() {
+            true => {
+                let mut args = vec![Arg::Out(Kind::U8, 1); 5];
+                args.push(Arg::Out(Kind::F64, 1));
+                ("UpdateDiscreteStates", args)
+            }
+            // The five flags and the time of fmi2EventInfo, with the gap that C leaves between them.
+            false => ("NewDiscreteStates", vec![Arg::Out(Kind::U64, 4)]),
+        };
+        (0..times).map(|_| self.call(of, name, args.clone())).collect()
+    }
+
+    /// The event at a point: enters Event Mode, updates the discrete states and goes back.
+    pub fn event(&mut self, of: usize, updates: usize) -> Vec<u32> {
+        let mut ids = vec![self.call(of, "EnterEventMode", vec![])];
+        ids.extend(self.update(of, updates));
+        ids.push(self.resume(of));
+        ids
+    }
+
+    /// Goes from Event Mode back to the mode in which time advances.
+    fn resume(&mut self, of: usize) -> u32 {
+        let stepped = self.trajectory.is_stepped();
+        self.call(of, if stepped { "EnterStepMode" } else { "EnterContinuousTimeMode" }, vec![])
     }
 
     /// Leaves Initialization Mode, for the mode in which time goes on.
-    pub fn leave(&mut self, of: usize, trajectory: &Trajectory) -> Vec<u32> {
+    pub fn leave(&mut self, of: usize) -> Vec<u32> {
         let mut ids = vec![self.call(of, "ExitInitializationMode", vec![])];
-        if trajectory.interface == Interface::ModelExchange {
-            ids.extend(self.update(of, trajectory.updates));
-            ids.push(self.call(of, "EnterContinuousTimeMode", vec![]));
-        } else if self.description.event_mode() {
-            ids.extend(self.update(of, trajectory.updates));
-            ids.push(self.call(of, "EnterStepMode", vec![]));
+        if !self.trajectory.is_stepped() || self.description.event_mode() {
+            ids.extend(self.update(of, self.trajectory.updates));
+            ids.push(self.resume(of));
         }
         ids
     }
 
     /// Instantiates and initializes, up to the mode in which time advances.
-    pub fn begin(&mut self, of: usize, trajectory: &Trajectory) -> Vec<u32> {
-        let mut ids = vec![self.make(of, trajectory.interface), self.enter(of)];
-        ids.extend(self.leave(of, trajectory));
+    pub fn begin(&mut self, of: usize) -> Vec<u32> {
+        let mut ids = vec![self.make(of), self.enter(of)];
+        ids.extend(self.leave(of));
         ids
+    }
+
+    /// The positions of the variables of each type, in the order of the first of each.
+    fn by_type(&self, indices: &[usize]) -> Vec<(&'static str, Kind, Vec<usize>)> {
+        let standard = self.description.standard;
+        let mut groups: Vec<(&str, Kind, Vec<usize>)> = Vec::new();
+        for (position, index) in indices.iter().enumerate() {
+            let variable = &self.description.variables[*index];
+            let (Some(base), Some(_)) = (variable.base, variable.size) else { continue };
+            let name = type_name(standard, base);
+            match groups.iter_mut().find(|group| group.0 == name) {
+                Some(group) => group.2.push(position),
+                None => groups.push((name, kind_of(standard, base), vec![position])),
+            }
+        }
+        groups
+    }
+
+    /// Value reference of a variable.
+    fn reference(&self, index: usize) -> u64 {
+        u64::from(self.description.variables[index].reference)
     }
 
     /// Sets values: a call for each type.
     pub fn set(&mut self, of: usize, values: &[(usize, Value)]) -> Vec<u32> {
+        let indices: Vec<usize> = values.iter().map(|(index, _)| *index).collect();
         let mut ids = Vec::new();
-        let standard = self.description.standard;
-        let mut types: Vec<&str> = Vec::new();
-        for (index, _) in values {
-            if let Some(base) = self.description.variables[*index].base
-                && !types.contains(&type_name(standard, base))
-            {
-                types.push(type_name(standard, base));
-            }
-        }
-        for name in types {
-            let of_type = |index: usize| {
-                self.description.variables[index].base.is_some_and(|base| type_name(standard, base) == name)
-            };
-            let these: Vec<_> = values.iter().filter(|(index, _)| of_type(*index)).collect();
-            let references = these
-                .iter()
-                .map(|(index, _)| u64::from(self.description.variables[*index].reference))
-                .collect();
-            let count = these.len() as i64;
-            let kind =
-                kind_of(standard, self.description.variables[these[0].0].base.unwrap_or(BaseType::Real));
-            let mut args = vec![Arg::In(Kind::U32, references), Arg::Whole(count)];
-            let mut total = 0;
-            if kind == Kind::Pointer {
-                let texts: Vec<Vec<u8>> = these
-                    .iter()
-                    .flat_map(|(_, value)| match value {
-                        Value::Texts(texts) => texts.clone(),
-                        Value::Numbers(_) => Vec::new(),
-                    })
-                    .collect();
-                total = texts.len();
-                if name == "Binary" {
-                    args.push(Arg::In(Kind::Size, texts.iter().map(|blob| blob.len() as u64).collect()));
-                    args.push(Arg::Blobs(texts));
-                } else {
-                    args.push(Arg::Texts(texts.into_iter().map(Some).collect()));
+        for (name, kind, positions) in self.by_type(&indices) {
+            let references = positions.iter().map(|at| self.reference(indices[*at])).collect();
+            let (mut numbers, mut texts) = (Vec::new(), Vec::new());
+            for position in positions {
+                match &values[position].1 {
+                    Value::Numbers(all) => numbers.extend(all.iter().map(|number| kind.bits(*number))),
+                    Value::Texts(all) => texts.extend(all.iter().cloned()),
                 }
-            } else {
-                let numbers: Vec<u64> = these
-                    .iter()
-                    .flat_map(|(_, value)| match value {
-                        Value::Numbers(numbers) => numbers.iter().map(|number| kind.bits(*number)).collect(),
-                        Value::Texts(_) => Vec::new(),
-                    })
-                    .collect();
-                total += numbers.len();
-                args.push(Arg::In(kind, numbers));
             }
-            if self.fmi3() {
-                args.push(Arg::Whole(total as i64));
-            }
+            let total = numbers.len() + texts.len();
+            let values = match name {
+                "Binary" => {
+                    let sizes = texts.iter().map(|blob| blob.len() as u64).collect();
+                    vec![Arg::In(Kind::Size, sizes), Arg::Blobs(texts)]
+                }
+                "String" => vec![Arg::Texts(texts.into_iter().map(Some).collect())],
+                _ => vec![Arg::In(kind, numbers)],
+            };
+            let args = access(self.description.standard, references, values, total);
             ids.push(self.call(of, &format!("Set{name}"), args));
         }
         ids
@@ -247,90 +321,49 @@ impl<'a> Writer<'a> {
 
     /// Reads the variables at these indices: a call for each type.
     pub fn read_these(&mut self, of: usize, indices: &[usize]) -> Vec<Read> {
-        let standard = self.description.standard;
-        let mut groups: Vec<Group> = Vec::new();
-        for index in indices {
-            let variable = &self.description.variables[*index];
-            let (Some(base), Some(size)) = (variable.base, variable.size) else { continue };
-            let name = type_name(standard, base);
-            let at = groups.iter().position(|group| group.0 == name).unwrap_or_else(|| {
-                groups.push((name, kind_of(standard, base), Vec::new()));
-                groups.len() - 1
-            });
-            groups[at].2.push((*index, size));
-        }
         let mut reads = Vec::new();
-        for (name, kind, group) in groups {
-            let references = group
-                .iter()
-                .map(|(index, _)| u64::from(self.description.variables[*index].reference))
-                .collect();
+        for (name, kind, positions) in self.by_type(indices) {
+            let size = |index: usize| self.description.variables[index].size.unwrap_or(1);
+            let group: Vec<_> = positions.iter().map(|at| (indices[*at], size(indices[*at]))).collect();
+            let references = group.iter().map(|(index, _)| self.reference(*index)).collect();
             let total: usize = group.iter().map(|(_, size)| size).sum();
-            let mut args = vec![Arg::In(Kind::U32, references), Arg::Whole(group.len() as i64)];
-            if name == "Binary" {
-                args.push(Arg::Out(Kind::Size, total));
-            }
-            args.push(Arg::Out(kind, total));
-            if self.fmi3() {
-                args.push(Arg::Whole(total as i64));
-            }
-            let id = self.call(of, &format!("Get{name}"), args);
-            reads.push(Read { id, of: group });
+            let sizes = (name == "Binary").then_some(Arg::Out(Kind::Size, total));
+            let values = sizes.into_iter().chain([Arg::Out(kind, total)]);
+            let args = access(self.description.standard, references, values, total);
+            reads.push(Read { id: self.call(of, &format!("Get{name}"), args), of: group });
         }
         reads
     }
 
     /// Reads all variables.
     pub fn read(&mut self, of: usize) -> Vec<Read> {
-        let all = readable(self.description);
-        self.read_these(of, &all)
+        self.read_these(of, self.readable)
     }
 
     /// Goes on to the time of a point, in Model Exchange, or takes the step, in Co-Simulation.
-    pub fn point(&mut self, of: usize, trajectory: &Trajectory, point: &Point) -> Vec<u32> {
+    pub fn point(&mut self, of: usize, point: &Point) -> Vec<u32> {
         let mut ids = Vec::new();
-        match trajectory.interface {
-            Interface::CoSimulation => {
-                ids.extend(self.set(of, &point.inputs));
-                ids.push(self.step(of, point.time, point.size));
-                if point.updates > 0 {
-                    ids.push(self.call(of, "EnterEventMode", vec![]));
-                    ids.extend(self.update(of, point.updates));
-                    ids.push(self.call(of, "EnterStepMode", vec![]));
-                }
+        if self.trajectory.is_stepped() {
+            ids.extend(self.set(of, &point.inputs));
+            ids.push(self.step(of, point.time, point.size));
+        } else {
+            ids.push(self.call(of, "SetTime", vec![Arg::real(point.time)]));
+            if !point.states.is_empty() {
+                ids.push(self.set_states(of, &point.states));
             }
-            Interface::ModelExchange => {
-                ids.push(self.call(of, "SetTime", vec![Arg::real(point.time)]));
-                if !point.states.is_empty() {
-                    ids.push(self.set_states(of, &point.states));
-                }
-                ids.extend(self.set(of, &point.inputs));
-                let flag = || {
-                    Arg::Out(
-                        if self.description.standard == Standard::Fmi3 { Kind::U8 } else { Kind::I32 },
-                        1,
-                    )
-                };
-                let args = vec![Arg::Whole(0), flag(), flag()];
-                ids.push(self.call(of, "CompletedIntegratorStep", args));
-                if point.updates > 0 {
-                    ids.push(self.call(of, "EnterEventMode", vec![]));
-                    ids.extend(self.update(of, point.updates));
-                    ids.push(self.call(of, "EnterContinuousTimeMode", vec![]));
-                }
-            }
+            ids.extend(self.set(of, &point.inputs));
+            let flag = Arg::Out(if self.fmi3() { Kind::U8 } else { Kind::I32 }, 1);
+            ids.push(self.call(of, "CompletedIntegratorStep", vec![Arg::Whole(0), flag.clone(), flag]));
+        }
+        if point.updates > 0 {
+            ids.extend(self.event(of, point.updates));
         }
         ids
     }
 
     /// A step of Co-Simulation.
     pub fn step(&mut self, of: usize, time: f64, size: f64) -> u32 {
-        let mut args = vec![Arg::real(time), Arg::real(size), Arg::Whole(0)];
-        if self.fmi3() {
-            let flag = || Arg::Out(Kind::U8, 1);
-            args.extend([flag(), flag(), flag(), Arg::Out(Kind::F64, 1)]);
-        }
-        self.call(of, "DoStep", args)
+        self.call(of, "DoStep", step_args(self.description.standard, time, size))
     }
 
     /// Sets the continuous states.
@@ -344,77 +377,71 @@ impl<'a> Writer<'a> {
         self.call(of, function, vec![Arg::Out(Kind::F64, count), Arg::Whole(count as i64)])
     }
 
-    /// Reads the derivatives of the states.
-    pub fn derivatives(&mut self, of: usize, count: usize) -> u32 {
-        let name = if self.fmi3() { "GetContinuousStateDerivatives" } else { "GetDerivatives" };
-        self.vector(of, name, count)
+    /// Name of the function that returns the derivatives of the states.
+    pub fn derivatives_name(&self) -> &'static str {
+        if self.fmi3() { "GetContinuousStateDerivatives" } else { "GetDerivatives" }
     }
 
     /// Everything that can be asked: variables, and in Model Exchange the vectors.
-    pub fn ask(&mut self, of: usize, interface: Interface) -> Vec<Read> {
+    pub fn ask(&mut self, of: usize) -> Vec<Read> {
         let mut reads = self.read(of);
-        if interface == Interface::ModelExchange {
+        if !self.trajectory.is_stepped() {
             let states = self.description.states_count().unwrap_or(0);
-            if states > 0 {
-                reads.push(Read { id: self.vector(of, "GetContinuousStates", states), of: Vec::new() });
-                reads.push(Read { id: self.derivatives(of, states), of: Vec::new() });
-            }
-            if let Some(count) = self.description.event_indicators.filter(|count| *count > 0) {
-                reads.push(Read { id: self.vector(of, "GetEventIndicators", count), of: Vec::new() });
+            let indicators = self.description.event_indicators.unwrap_or(0);
+            let vectors = [
+                ("GetContinuousStates", states),
+                (self.derivatives_name(), states),
+                ("GetEventIndicators", indicators),
+            ];
+            for (name, count) in vectors.into_iter().filter(|(_, count)| *count > 0) {
+                reads.push(Read { id: self.vector(of, name, count), of: Vec::new() });
             }
         }
         reads
     }
 
-    fn state_name(&self, of_fmi2: &str, of_fmi3: &str) -> String {
-        if self.fmi3() { of_fmi3 } else { of_fmi2 }.to_owned()
-    }
-
-    /// Saves the state.
-    pub fn save(&mut self, of: usize, slot: usize) -> u32 {
-        let name = self.state_name("GetFMUstate", "GetFMUState");
-        self.call(of, &name, vec![Arg::StateOut(slot)])
-    }
-
-    /// Restores it.
-    pub fn restore(&mut self, of: usize, slot: usize) -> u32 {
-        let name = self.state_name("SetFMUstate", "SetFMUState");
-        self.call(of, &name, vec![Arg::State(slot)])
-    }
-
-    /// Frees it.
-    pub fn drop_state(&mut self, of: usize, slot: usize) -> u32 {
-        let name = self.state_name("FreeFMUstate", "FreeFMUState");
-        self.call(of, &name, vec![Arg::StateOut(slot)])
-    }
-
-    /// Serializes it: the size, the bytes.
+    /// Serializes a saved state: the size, the bytes.
     pub fn serialize(&mut self, of: usize, slot: usize) -> [u32; 2] {
-        let size = self.state_name("SerializedFMUstateSize", "SerializedFMUStateSize");
-        let bytes = self.state_name("SerializeFMUstate", "SerializeFMUState");
+        let bytes = vec![Arg::State(slot), Arg::SavedOut(slot), Arg::SavedSize(slot)];
         [
-            self.call(of, &size, vec![Arg::State(slot), Arg::SizeOut(slot)]),
-            self.call(of, &bytes, vec![Arg::State(slot), Arg::SavedOut(slot), Arg::SavedSize(slot)]),
+            self.call(of, "SerializedFMUStateSize", vec![Arg::State(slot), Arg::SizeOut(slot)]),
+            self.call(of, "SerializeFMUState", bytes),
         ]
     }
 
     /// Makes a state of the bytes.
     pub fn deserialize(&mut self, of: usize, bytes: usize, slot: usize) -> u32 {
-        let name = self.state_name("DeSerializeFMUstate", "DeserializeFMUState");
-        self.call(of, &name, vec![Arg::Saved(bytes), Arg::SavedSize(bytes), Arg::StateOut(slot)])
+        let args = vec![Arg::Saved(bytes), Arg::SavedSize(bytes), Arg::StateOut(slot)];
+        self.call(of, "DeserializeFMUState", args)
     }
+}
+
+/// The arguments of a getter or setter.
+pub fn access(
+    standard: Standard,
+    references: Vec<u64>,
+    values: impl IntoIterator<Item = Arg>,
+    total: usize,
+) -> Vec<Arg> {
+    let count = Arg::Whole(references.len() as i64);
+    let sizes = (standard == Standard::Fmi3).then_some(Arg::Whole(total as i64));
+    [Arg::In(Kind::U32, references), count].into_iter().chain(values).chain(sizes).collect()
+}
+
+/// The arguments of a step.
+pub fn step_args(standard: Standard, time: f64, size: f64) -> Vec<Arg> {
+    let mut args = vec![Arg::real(time), Arg::real(size), Arg::Whole(0)];
+    if standard == Standard::Fmi3 {
+        args.extend([Kind::U8, Kind::U8, Kind::U8, Kind::F64].map(|kind| Arg::Out(kind, 1)));
+    }
+    args
 }
 
 /// Variables that most checks read at most.
 pub const READ: usize = 1000;
 
-/// The variables that can be read at any time: no clocks, none whose size is not known. Of more than a thousand, inputs,
-/// outputs and derivatives come first, and others are taken at equal distances.
-pub fn readable(description: &Description) -> Vec<usize> {
-    sample(description, READ)
-}
-
-/// At most this many of the variables that can be read at any time.
+/// At most this many of the variables that can be read at any time: no clocks, none whose size is not known. Of more,
+/// inputs, outputs and derivatives come first, and others are taken at equal distances.
 pub fn sample(description: &Description, most: usize) -> Vec<usize> {
     let known = |index: &usize| {
         let variable = &description.variables[*index];
@@ -447,28 +474,25 @@ pub fn difference(
     one: &[Read],
     other: &[Read],
 ) -> Option<(String, String, String)> {
-    for (one, other) in one.iter().zip(other) {
-        let (Some(of_one), Some(of_other)) = (run.of(one.id), run.of(other.id)) else { continue };
+    one.iter().zip(other).find_map(|(one, other)| {
+        let (of_one, of_other) = (run.of(one.id)?, run.of(other.id)?);
         if of_one.status != of_other.status {
             let show =
                 |status: Option<i32>| format!("status {}", status.map_or("none".to_owned(), status_name));
             return Some(("a call".to_owned(), show(of_one.status), show(of_other.status)));
         }
         // After an error nothing is required of what was written.
-        if of_one.status.is_none_or(|status| status > 1) {
-            continue;
-        }
-        for (first, second) in of_one.written.iter().zip(&of_other.written) {
-            if let Some(index) = first.differ(second) {
-                return Some((name_at(description, one, index), first.show(index), second.show(index)));
-            }
-        }
-    }
-    None
+        let pairs = of_one.written.iter().zip(&of_other.written).filter(|_| run.succeeds(one.id));
+        let of_pair = |(first, second): (&Written, &Written)| {
+            let index = first.differ(second)?;
+            Some((name_at(description, one, index), first.show(index), second.show(index)))
+        };
+        pairs.into_iter().find_map(of_pair)
+    })
 }
 
 /// Whose value is at an index of what was read.
-pub fn name_at(description: &Description, read: &Read, index: usize) -> String {
+fn name_at(description: &Description, read: &Read, index: usize) -> String {
     let mut rest = index;
     for (variable, size) in &read.of {
         if rest < *size {
@@ -480,20 +504,22 @@ pub fn name_at(description: &Description, read: &Read, index: usize) -> String {
     format!("number {}", index + 1)
 }
 
+/// The values of the variables in what was read.
+pub fn values_of<'r>(run: &'r Run, reads: &'r [Read]) -> impl Iterator<Item = (usize, Written)> {
+    reads.iter().filter(|read| run.succeeds(read.id)).flat_map(move |read| {
+        let mut end = 0;
+        read.of.iter().filter_map(move |(index, size)| {
+            end += size;
+            Some((*index, run.written(read.id)?.part(end - size, *size)?))
+        })
+    })
+}
+
 /// The value of a variable in what was read.
 pub fn value_of(run: &Run, reads: &[Read], variable: usize) -> Option<Written> {
-    for read in reads {
-        let mut begin = 0;
-        for (index, size) in &read.of {
-            if *index == variable {
-                let outcome = run.of(read.id)?;
-                if outcome.status.is_none_or(|status| status > 1) {
-                    return None;
-                }
-                return outcome.written.first()?.part(begin, *size);
-            }
-            begin += size;
-        }
-    }
-    None
+    reads.iter().find_map(|read| {
+        let at = read.of.iter().position(|(index, _)| *index == variable)?;
+        let begin = read.of[..at].iter().map(|(_, size)| size).sum();
+        run.written(read.id).filter(|_| run.succeeds(read.id))?.part(begin, read.of[at].1)
+    })
 }

@@ -1,174 +1,126 @@
 //! Dependencies that the FMU shows are declared.
 
-use crate::call_sequence::Written;
+use super::derivatives::{amid, set_known};
 use crate::checker::Checker;
-use crate::finding::Judge;
+use crate::description::Unknown;
 use crate::values::{Value, near};
-use crate::writer::{Read, value_of};
-use fmi_abi::Interface;
+use crate::writer::Part::{Enter, Make};
+use crate::writer::{Read, Trajectory, Writer, value_of};
 use std::collections::HashSet;
-use std::sync::Arc;
 
 /// The unknowns that do not list a known, nor another name of it.
-fn undeclared(checker: &Checker, unknowns: &[crate::description::Unknown], known: usize) -> Vec<usize> {
+fn undeclared<'a>(
+    checker: &Checker,
+    unknowns: impl IntoIterator<Item = &'a Unknown>,
+    known: usize,
+) -> Vec<usize> {
     let aliases: HashSet<usize> = checker.description.aliases(known).collect();
-    unknowns
-        .iter()
-        .filter(|unknown| {
-            unknown
-                .dependencies
-                .as_ref()
-                .is_some_and(|list| !list.iter().any(|index| aliases.contains(index)))
-        })
-        .map(|unknown| unknown.variable)
-        .filter(|index| !aliases.contains(index))
-        .collect()
+    let silent = |unknown: &&Unknown| {
+        let lists = |list: &Vec<usize>| list.iter().any(|index| aliases.contains(index));
+        unknown.dependencies.as_ref().is_some_and(|list| !lists(list))
+    };
+    let silent = unknowns.into_iter().filter(silent).map(|unknown| unknown.variable);
+    silent.filter(|index| !aliases.contains(index)).collect()
 }
 
-fn judge(
+/// Reads the unknowns with a value of the known, with another one and with the first again: an unknown that changes and
+/// changes back depends on the known.
+fn moved(
     checker: &Checker,
+    rule: &str,
+    mut writer: Writer,
     known: usize,
+    value: &[f64],
     unknowns: Vec<usize>,
-    before: Vec<Read>,
-    after: Vec<Read>,
-    back: Vec<Read>,
-) -> Judge {
+    set: impl Fn(&mut Writer, &[f64]),
+) -> anyhow::Result<()> {
+    let variable = &checker.description.variables[known];
+    let other: Vec<f64> = value.iter().map(|value| near(variable, *value, 1.0 / 16.0)).collect();
+    let [before, after, back]: [Vec<Read>; 3] = [value, &other[..], value].map(|value| {
+        set(&mut writer, value);
+        writer.read_these(0, &unknowns)
+    });
     let description = checker.description.clone();
-    Arc::new(move |run| {
+    checker.check(rule, writer.sequence, move |run| {
         unknowns.iter().find_map(|unknown| {
-            let (one, other) = (value_of(run, &before, *unknown)?, value_of(run, &after, *unknown)?);
-            // The old value gives the old result, so the unknown depends on this known.
-            let again = value_of(run, &back, *unknown)?;
+            let [one, other, again] = [&before, &after, &back].map(|reads| value_of(run, reads, *unknown));
+            let (one, other, again) = (one?, other?, again?);
             let at = one.differ(&other)?;
-            let same = |one: &Written, other: &Written| one.differ(other).is_none();
-            same(&one, &again).then(|| {
-                let (name, of) = (&description.variables[*unknown].name, &description.variables[known].name);
-                format!(
-                    "{name} goes from {} to {} when {of} changes, and does not list it",
-                    one.show(at),
-                    other.show(at)
-                )
-            })
+            let (name, of) = (&description.variables[*unknown].name, &description.variables[known].name);
+            let (is, becomes) = (one.show(at), other.show(at));
+            let tell =
+                || format!("{name} goes from {is} to {becomes} when {of} changes, and does not list it");
+            one.differ(&again).is_none().then(tell)
         })
     })
 }
 
 /// Inputs and, in Model Exchange, states, moved one at a time.
-pub fn missing(checker: &Checker) -> anyhow::Result<()> {
+pub fn missing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
-    for trajectory in &checker.trajectories {
-        let listed = match trajectory.interface {
-            Interface::CoSimulation => description.outputs.clone(),
-            Interface::ModelExchange => {
-                description.outputs.iter().chain(&description.derivatives).cloned().collect()
-            }
-        };
-        let states =
-            if trajectory.interface == Interface::ModelExchange { description.states() } else { Vec::new() };
-        let scalar = states.len() == description.states_count().unwrap_or(0);
-        let inputs = (0..description.variables.len()).filter(|index| {
-            let variable = &description.variables[*index];
-            variable.causality == "input"
-                && variable.is_float()
-                && variable.variability == "continuous"
-                && !variable.once_per_instant
-                && !variable.clocked
-        });
-        let knowns: Vec<usize> =
-            inputs.chain(if scalar { states.clone() } else { Vec::new() }).take(checker.most(60)).collect();
-        let to = trajectory.points.len() / 2;
-        let mut writer = checker.writer();
-        writer.begin(0, trajectory);
-        for point in &trajectory.points[..to] {
-            writer.point(0, trajectory, point);
-        }
-        let read = writer.read_these(0, &knowns);
-        let now =
-            (!states.is_empty() && scalar).then(|| writer.vector(0, "GetContinuousStates", states.len()));
-        let now_run = checker.play(&writer.sequence)?;
-        let vector = now.and_then(|id| now_run.written(id)).map(|of| of.numbers()).unwrap_or_default();
-        for known in knowns {
-            let unknowns = undeclared(checker, &listed, known);
-            if unknowns.is_empty() {
-                continue;
-            }
-            let variable = &description.variables[known];
-            let Some(value) = value_of(&now_run, &read, known).map(|value| value.numbers()) else { continue };
-            let other: Vec<f64> = value.iter().map(|value| near(variable, *value, 1.0 / 16.0)).collect();
-            let mut writer = checker.writer();
-            writer.begin(0, trajectory);
-            for point in &trajectory.points[..to] {
-                writer.point(0, trajectory, point);
-            }
-            let set = |writer: &mut crate::writer::Writer, numbers: &[f64]| match states
-                .iter()
-                .position(|index| *index == known)
-            {
-                Some(at) => {
-                    let mut states = vector.clone();
-                    states[at] = numbers[0];
-                    writer.set_states(0, &states);
-                }
-                None => {
-                    writer.set(0, &[(known, Value::Numbers(numbers.to_vec()))]);
-                }
-            };
-            set(&mut writer, &value);
-            let before = writer.read_these(0, &unknowns);
-            set(&mut writer, &other);
-            let after = writer.read_these(0, &unknowns);
-            set(&mut writer, &value);
-            let back = writer.read_these(0, &unknowns);
-            checker.judge(
-                "dependencies.missing",
-                writer.sequence,
-                judge(checker, known, unknowns, before, after, back),
-            )?;
-        }
+    let stepped = trajectory.is_stepped();
+    let derivatives = if stepped { &[][..] } else { &description.derivatives };
+    let scalar = !stepped && description.states_count() == Some(description.states().len());
+    let states = if scalar { description.states() } else { Vec::new() };
+    let inputs = (0..description.variables.len()).filter(|index| {
+        let variable = &description.variables[*index];
+        variable.causality == "input"
+            && variable.is_float()
+            && variable.variability == "continuous"
+            && !variable.once_per_instant
+            && !variable.clocked
+    });
+    let knowns: Vec<usize> = inputs.chain(states.iter().copied()).take(checker.most(60)).collect();
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, &amid(trajectory));
+    let read = writer.read_these(0, &knowns);
+    let now = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
+    let run = checker.play(&writer.sequence)?;
+    let vector = now.and_then(|id| run.written(id)).map(|of| of.numbers()).unwrap_or_default();
+    for known in knowns {
+        let unknowns = undeclared(checker, description.outputs.iter().chain(derivatives), known);
+        let Some(value) = value_of(&run, &read, known).filter(|_| !unknowns.is_empty()) else { continue };
+        let mut writer = checker.writer(trajectory);
+        writer.play(0, &amid(trajectory));
+        moved(
+            checker,
+            "dependencies.missing",
+            writer,
+            known,
+            &value.numbers(),
+            unknowns,
+            |writer, numbers| {
+                set_known(writer, &states, &vector, known, numbers);
+            },
+        )?;
     }
     Ok(())
 }
 
 /// Parameters and inputs, moved one at a time in Initialization Mode.
-pub fn initial(checker: &Checker) -> anyhow::Result<()> {
+pub fn initial(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
-    for trajectory in &checker.trajectories {
-        let knowns: Vec<usize> = (0..description.variables.len())
-            .filter(|index| {
-                let variable = &description.variables[*index];
-                let known = variable.causality == "input"
-                    || variable.initial == "exact" && variable.variability != "constant";
-                known
-                    && variable.is_float()
-                    && variable.causality != "parameter"
-                    && !variable.starts().is_empty()
-                    && !variable.clocked
-            })
-            .take(checker.most(60))
-            .collect();
-        for known in knowns {
-            let unknowns = undeclared(checker, &description.initial_unknowns, known);
-            if unknowns.is_empty() {
-                continue;
-            }
-            let variable = &description.variables[known];
-            let value = variable.starts();
-            let other: Vec<f64> = value.iter().map(|value| near(variable, *value, 1.0 / 16.0)).collect();
-            let mut writer = checker.writer();
-            writer.make(0, trajectory.interface);
-            writer.enter(0);
-            writer.set(0, &[(known, Value::Numbers(value.clone()))]);
-            let before = writer.read_these(0, &unknowns);
-            writer.set(0, &[(known, Value::Numbers(other))]);
-            let after = writer.read_these(0, &unknowns);
-            writer.set(0, &[(known, Value::Numbers(value))]);
-            let back = writer.read_these(0, &unknowns);
-            checker.judge(
-                "dependencies.initial",
-                writer.sequence,
-                judge(checker, known, unknowns, before, after, back),
-            )?;
+    let knowns = (0..description.variables.len()).filter(|index| {
+        let variable = &description.variables[*index];
+        let known = variable.causality == "input"
+            || variable.initial == "exact" && variable.variability != "constant";
+        known
+            && variable.is_float()
+            && variable.causality != "parameter"
+            && !variable.starts().is_empty()
+            && !variable.clocked
+    });
+    for known in knowns.take(checker.most(60)) {
+        let unknowns = undeclared(checker, &description.initial_unknowns, known);
+        if unknowns.is_empty() {
+            continue;
         }
+        let mut writer = checker.writer(trajectory);
+        writer.play(0, &[Make, Enter]);
+        let value = description.variables[known].starts();
+        moved(checker, "dependencies.initial", writer, known, &value, unknowns, |writer, numbers| {
+            writer.set(0, &[(known, Value::Numbers(numbers.to_vec()))]);
+        })?;
     }
     Ok(())
 }

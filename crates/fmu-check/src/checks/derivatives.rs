@@ -3,9 +3,9 @@
 use crate::call_sequence::{Arg, Kind, Run};
 use crate::checker::Checker;
 use crate::description::Description;
-use crate::finding::Judge;
+use crate::finding::Judges;
 use crate::values::Value;
-use crate::writer::{Read, Trajectory, Writer, value_of};
+use crate::writer::{Part, Read, Trajectory, Writer, value_of};
 use fmi_abi::{BaseType, Interface};
 use std::sync::Arc;
 
@@ -48,7 +48,8 @@ fn knowns(description: &Description, interface: Interface) -> Vec<usize> {
     inputs.chain(states).filter(|index| continuous(description, *index)).collect()
 }
 
-fn derivative(
+/// Requests partial derivatives of unknowns with respect to knowns.
+pub fn derivative(
     writer: &mut Writer,
     function: &str,
     unknowns: &[u32],
@@ -56,107 +57,84 @@ fn derivative(
     seed: &[f64],
     results: usize,
 ) -> u32 {
-    let array = |references: &[u32]| Arg::In(Kind::U32, references.iter().map(|of| u64::from(*of)).collect());
-    let mut args = vec![
-        array(unknowns),
-        Arg::Whole(unknowns.len() as i64),
-        array(knowns),
-        Arg::Whole(knowns.len() as i64),
-        Arg::In(Kind::F64, seed.iter().map(|number| number.to_bits()).collect()),
-    ];
-    if writer.fmi3() {
-        args.push(Arg::Whole(seed.len() as i64));
+    let sizes = writer.fmi3();
+    let size = |size: usize| sizes.then_some(Arg::Whole(size as i64));
+    let mut args = Vec::new();
+    for references in [unknowns, knowns] {
+        args.push(Arg::In(Kind::U32, references.iter().map(|of| u64::from(*of)).collect()));
+        args.push(Arg::Whole(references.len() as i64));
     }
+    args.push(Arg::In(Kind::F64, seed.iter().map(|number| number.to_bits()).collect()));
+    args.extend(size(seed.len()));
     args.push(Arg::Out(Kind::F64, results));
-    if writer.fmi3() {
-        args.push(Arg::Whole(results as i64));
-    }
+    args.extend(size(results));
     writer.call(0, function, args)
 }
 
-/// The point of the trajectory at which partial derivatives are requested: near its middle and outside of events.
-fn amid(writer: &mut Writer, trajectory: &Trajectory) -> Vec<f64> {
-    let to = trajectory.points.len() / 2;
-    writer.begin(0, trajectory);
-    let mut states = Vec::new();
-    for point in &trajectory.points[..to] {
-        writer.point(0, trajectory, point);
-        if !point.states.is_empty() {
-            states.clone_from(&point.states);
-        }
-    }
-    states
+/// The calls up to the point at which partial derivatives are requested: near the middle and outside of events.
+pub fn amid(trajectory: &Trajectory) -> [Part; 2] {
+    [Part::Begin, Part::Points(trajectory.points.len() / 2)]
+}
+
+/// Whether directional and adjoint derivatives are declared.
+fn offers(checker: &Checker, interface: Interface) -> [bool; 2] {
+    let directional = ["providesDirectionalDerivative", "providesDirectionalDerivatives"];
+    [&directional[..], &["providesAdjointDerivatives"]].map(|names| checker.can(interface, names))
 }
 
 /// Checks directional derivatives against differences, adjoint derivatives against directional ones, and the derivative for
 /// a sum of seeds against the sum of derivatives.
-pub fn directional(checker: &Checker) -> anyhow::Result<()> {
-    for trajectory in &checker.trajectories {
-        let interface = trajectory.interface;
-        let has_directional =
-            checker.can(interface, &["providesDirectionalDerivative", "providesDirectionalDerivatives"]);
-        let has_adjoint = checker.can(interface, &["providesAdjointDerivatives"]);
-        let unknowns = unknowns(&checker.description, interface);
-        let mut knowns = knowns(&checker.description, interface);
-        knowns.truncate(checker.most(40));
-        if !has_directional && !has_adjoint || unknowns.is_empty() || knowns.is_empty() {
-            continue;
-        }
-        let mut writer = checker.writer();
-        amid(&mut writer, trajectory);
-        let before = writer.read(0);
-        let [outputs, inputs] = [&unknowns, &knowns].map(|indices| references(&checker.description, indices));
-        let mut request = |function: &str, seed: &[f64], count: usize| {
-            derivative(&mut writer, function, &outputs, &inputs, seed, count)
-        };
-        let unit = |index: usize, count: usize| -> Vec<f64> {
-            (0..count).map(|at| f64::from(u8::from(at == index))).collect()
-        };
-        let columns: Vec<u32> = (0..knowns.len() * usize::from(has_directional))
-            .map(|index| request("GetDirectionalDerivative", &unit(index, knowns.len()), unknowns.len()))
-            .collect();
-        let sum = has_directional
-            .then(|| request("GetDirectionalDerivative", &vec![1.0; knowns.len()], unknowns.len()));
-        let rows: Vec<u32> = (0..unknowns.len() * usize::from(has_adjoint))
-            .map(|index| request("GetAdjointDerivative", &unit(index, unknowns.len()), knowns.len()))
-            .collect();
-        let after = writer.read(0);
-
-        let sequence = writer.sequence.clone();
-        let model = checker.description.clone();
-        let is_unchanged: Judge = Arc::new(move |run| {
-            let (name, before, after) = crate::writer::difference(&model, run, &before, &after)?;
-            Some(format!("{name} was {before}, after derivatives were asked for it is {after}"))
-        });
-        let run = checker.judge("derivatives.changed", sequence.clone(), is_unchanged)?;
-        if run.end != crate::call_sequence::End::Done {
-            continue;
-        }
-        let [unknown_names, known_names] =
-            [&unknowns, &knowns].map(|indices| names(&checker.description, indices));
-        if let Some(sum) = sum {
-            let judge = is_linear(columns.clone(), sum, unknown_names.clone());
-            checker.keep("derivatives.linear", &run, &sequence, judge);
-        }
-        if has_directional && has_adjoint {
-            for (name, tolerance) in [("derivatives.adjoint", 1e-6), ("derivatives.adjoint-digits", 1e-11)] {
-                let names = [unknown_names.clone(), known_names.clone()];
-                let judge = is_transposed(columns.clone(), rows.clone(), names, tolerance);
-                if checker.keep(name, &run, &sequence, judge) {
-                    break;
-                }
-            }
-        }
-        if has_directional {
-            order(checker, trajectory, &outputs, &inputs)?;
-        }
-        differences(checker, trajectory, &unknowns, &knowns, has_directional)?;
+pub fn directional(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let [has_directional, has_adjoint] = offers(checker, trajectory.interface);
+    let unknowns = unknowns(&checker.description, trajectory.interface);
+    let mut knowns = knowns(&checker.description, trajectory.interface);
+    knowns.truncate(checker.most(40));
+    if !has_directional && !has_adjoint || unknowns.is_empty() || knowns.is_empty() {
+        return Ok(());
     }
-    Ok(())
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, &amid(trajectory));
+    let before = writer.read(0);
+    let [outputs, inputs] = [&unknowns, &knowns].map(|indices| references(&checker.description, indices));
+    let mut request = |function: &str, seed: &[f64], count: usize| {
+        derivative(&mut writer, function, &outputs, &inputs, seed, count)
+    };
+    let unit = |index: usize, count: usize| -> Vec<f64> {
+        (0..count).map(|at| f64::from(u8::from(at == index))).collect()
+    };
+    let columns: Vec<u32> = (0..knowns.len() * usize::from(has_directional))
+        .map(|index| request("GetDirectionalDerivative", &unit(index, knowns.len()), unknowns.len()))
+        .collect();
+    let sum = has_directional
+        .then(|| request("GetDirectionalDerivative", &vec![1.0; knowns.len()], unknowns.len()));
+    let rows: Vec<u32> = (0..unknowns.len() * usize::from(has_adjoint))
+        .map(|index| request("GetAdjointDerivative", &unit(index, unknowns.len()), knowns.len()))
+        .collect();
+    let after = writer.read(0);
+    let sequence = writer.sequence.clone();
+    let is_unchanged = checker.differ(before, after, |name, before, after| {
+        format!("{name} was {before}, after derivatives were asked for it is {after}")
+    });
+    let run = checker.judge("derivatives.changed", sequence.clone(), is_unchanged)?;
+    if run.end != crate::call_sequence::End::Done {
+        return Ok(());
+    }
+    let names = [&unknowns, &knowns].map(|indices| names(&checker.description, indices));
+    if let Some(sum) = sum {
+        let judge = is_linear(columns.clone(), sum, names[0].clone());
+        checker.keep("derivatives.linear", &run, &sequence, judge);
+        let rules = [("derivatives.adjoint", 1e-6), ("derivatives.adjoint-digits", 1e-11)];
+        rules.into_iter().filter(|_| has_adjoint).any(|(name, tolerance)| {
+            let judge = is_transposed(columns.clone(), rows.clone(), names.clone(), tolerance);
+            checker.keep(name, &run, &sequence, judge)
+        });
+        order(checker, trajectory, &outputs, &inputs)?;
+    }
+    differences(checker, trajectory, &unknowns, &knowns, has_directional)
 }
 
 /// Value references of variables.
-fn references(description: &Description, indices: &[usize]) -> Vec<u32> {
+pub fn references(description: &Description, indices: &[usize]) -> Vec<u32> {
     indices.iter().map(|index| description.variables[*index].reference).collect()
 }
 
@@ -171,8 +149,8 @@ fn numbers(run: &Run, id: u32) -> Option<Vec<f64>> {
 }
 
 /// Judges whether the derivatives for unit seeds add up to the derivative for a seed of ones.
-fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> Judge {
-    Arc::new(move |run| {
+fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> impl Judges {
+    move |run: &Run| {
         let columns: Vec<Vec<f64>> = columns.iter().map(|id| numbers(run, *id)).collect::<Option<_>>()?;
         let together = numbers(run, sum)?;
         (0..names.len()).find_map(|row| {
@@ -186,12 +164,12 @@ fn is_linear(columns: Vec<u32>, sum: u32, names: Vec<String>) -> Judge {
                 )
             })
         })
-    })
+    }
 }
 
 /// Judges whether the adjoint derivatives are the transposed directional derivatives.
-fn is_transposed(columns: Vec<u32>, rows: Vec<u32>, names: [Vec<String>; 2], tolerance: f64) -> Judge {
-    Arc::new(move |run| {
+fn is_transposed(columns: Vec<u32>, rows: Vec<u32>, names: [Vec<String>; 2], tolerance: f64) -> impl Judges {
+    move |run: &Run| {
         let matrix = |ids: &[u32]| ids.iter().map(|id| numbers(run, *id)).collect::<Option<Vec<_>>>();
         let (columns, rows) = (matrix(&columns)?, matrix(&rows)?);
         let [unknowns, knowns] = &names;
@@ -204,7 +182,7 @@ fn is_transposed(columns: Vec<u32>, rows: Vec<u32>, names: [Vec<String>; 2], tol
             }
         }
         None
-    })
+    }
 }
 
 /// Requests the derivatives again with unknowns and knowns in another order.
@@ -212,38 +190,33 @@ fn order(checker: &Checker, trajectory: &Trajectory, unknowns: &[u32], knowns: &
     let reversed = |list: &[u32]| list.iter().rev().copied().collect::<Vec<_>>();
     let seed: Vec<f64> = (1..=knowns.len()).map(|number| number as f64).collect();
     let back: Vec<f64> = seed.iter().rev().copied().collect();
-    let mut writer = checker.writer();
-    amid(&mut writer, trajectory);
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, &amid(trajectory));
     let name = "GetDirectionalDerivative";
     let one = derivative(&mut writer, name, unknowns, knowns, &seed, unknowns.len());
     let other = derivative(&mut writer, name, &reversed(unknowns), &reversed(knowns), &back, unknowns.len());
-    let judge: Judge = Arc::new(move |run| {
-        let numbers = |id: u32| run.written(id).filter(|_| run.status(id) == Some(0)).map(|of| of.numbers());
-        let (one, other) = (numbers(one)?, numbers(other)?);
+    checker.check("derivatives.order", writer.sequence, move |run| {
+        let (one, other) = (numbers(run, one)?, numbers(run, other)?);
         let scale = one.iter().fold(0.0_f64, |most, number| most.max(number.abs()));
         let off = |(one, other): (&f64, &f64)| (one - other).abs() > 1e-6 * scale;
         let at = one.iter().zip(other.iter().rev()).position(off)?;
-        let (is, reversed) = (one[at], other[other.len() - 1 - at]);
+        let (is, reversed, number) = (one[at], other[other.len() - 1 - at], at + 1);
         Some(format!(
-            "derivative {} is {is:?}, and {reversed:?} when variables are named in reverse order",
-            at + 1
+            "derivative {number} is {is:?}, and {reversed:?} when variables are named in reverse order"
         ))
-    });
-    checker.judge("derivatives.order", writer.sequence, judge)?;
-    Ok(())
+    })
 }
 
-/// Sets one known and reads what depends on it.
-fn moved(writer: &mut Writer, states: &[f64], trajectory: &Trajectory, known: usize, value: f64) {
-    let description = writer.description;
-    match description.states().iter().position(|index| *index == known) {
-        Some(at) if trajectory.interface == Interface::ModelExchange => {
-            let mut states = states.to_vec();
-            states[at] = value;
-            writer.set_states(0, &states);
+/// Sets one known: a state among those that are given, or an input.
+pub fn set_known(writer: &mut Writer, states: &[usize], vector: &[f64], known: usize, numbers: &[f64]) {
+    match states.iter().position(|index| *index == known) {
+        Some(at) => {
+            let mut vector = vector.to_vec();
+            vector[at] = numbers[0];
+            writer.set_states(0, &vector);
         }
-        _ => {
-            writer.set(0, &[(known, Value::Numbers(vec![value]))]);
+        None => {
+            writer.set(0, &[(known, Value::Numbers(numbers.to_vec()))]);
         }
     }
 }
@@ -257,18 +230,17 @@ fn differences(
     by_column: bool,
 ) -> anyhow::Result<()> {
     let description = &checker.description;
-    let count = description.states_count().unwrap_or(0);
-    if trajectory.interface == Interface::ModelExchange && description.states().len() != count {
+    let states = if trajectory.is_stepped() { Vec::new() } else { description.states() };
+    if !trajectory.is_stepped() && states.len() != description.states_count().unwrap_or(0) {
         return Ok(());
     }
     // The current values are the base of the differences.
-    let mut writer = checker.writer();
-    amid(&mut writer, trajectory);
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, &amid(trajectory));
     let read = writer.read_these(0, knowns);
-    let of_states = (trajectory.interface == Interface::ModelExchange && count > 0)
-        .then(|| writer.vector(0, "GetContinuousStates", count));
+    let of_states = (!states.is_empty()).then(|| writer.vector(0, "GetContinuousStates", states.len()));
     let run = checker.play(&writer.sequence)?;
-    let states = of_states.and_then(|id| run.written(id)).map(|of| of.numbers()).unwrap_or_default();
+    let vector = of_states.and_then(|id| run.written(id)).map(|of| of.numbers()).unwrap_or_default();
     for known in knowns {
         let variable = &description.variables[*known];
         let value = value_of(&run, &read, *known).and_then(|value| value.numbers().first().copied());
@@ -282,32 +254,30 @@ fn differences(
         if !inside(value - step) || !inside(value + step) {
             continue;
         }
-        let mut writer = checker.writer();
-        amid(&mut writer, trajectory);
+        let mut writer = checker.writer(trajectory);
+        writer.play(0, &amid(trajectory));
         let analytic = column(&mut writer, &references(description, unknowns), variable.reference, by_column);
-        let mut reads: Vec<Vec<Read>> = Vec::new();
-        for by in [step, -step, step / 2.0, -step / 2.0, 0.0] {
-            moved(&mut writer, &states, trajectory, *known, value + by);
-            reads.push(writer.read_these(0, unknowns));
-        }
+        let reads = [step, -step, step / 2.0, -step / 2.0, 0.0].map(|by| {
+            set_known(&mut writer, &states, &vector, *known, &[value + by]);
+            writer.read_these(0, unknowns)
+        });
         let differences = Arc::new(Differences {
-            // The standard does not define the derivative of a state with respect to itself.
             unknowns: unknowns.to_vec(),
+            // The standard does not define the derivative of a state with respect to itself.
             itself: description.aliases(*known).collect(),
             names: names(description, unknowns),
             known: variable.name.clone(),
-            is_stepped: trajectory.interface == Interface::CoSimulation,
+            is_stepped: trajectory.is_stepped(),
             step,
             analytic,
             reads,
         });
         let precise = Arc::clone(&differences);
         let sequence = writer.sequence.clone();
-        let judge: Judge = Arc::new(move |run| differences.judge(run, 1e-4));
+        let judge = move |run: &Run| differences.judge(run, 1e-4);
         let run = checker.judge("derivatives.directional", sequence.clone(), judge)?;
         if !checker.has("derivatives.directional") {
-            let judge: Judge = Arc::new(move |run| precise.judge(run, 2e-7));
-            checker.keep("derivatives.precision", &run, &sequence, judge);
+            checker.keep("derivatives.precision", &run, &sequence, move |run| precise.judge(run, 2e-7));
         }
     }
     Ok(())
@@ -335,7 +305,7 @@ struct Differences {
     /// The call that wrote the derivative of each unknown, and its index there.
     analytic: Vec<(u32, usize)>,
     /// The unknowns with the known at +step, -step, +step/2, -step/2 and 0.
-    reads: Vec<Vec<Read>>,
+    reads: [Vec<Read>; 5],
 }
 
 impl Differences {
@@ -344,7 +314,7 @@ impl Differences {
             if self.itself.contains(unknown) {
                 continue;
             }
-            let number = |reads: &Vec<Read>| {
+            let number = |reads: &Vec<Read>| -> Option<f64> {
                 let value = value_of(run, reads, *unknown)?.numbers().first().copied();
                 value.filter(|number| number.is_finite())
             };
@@ -377,69 +347,43 @@ impl Differences {
 }
 
 /// The vectors of states and derivatives are the values of their variables, in the order of the model structure.
-pub fn vectors(checker: &Checker) -> anyhow::Result<()> {
-    let Some(trajectory) =
-        checker.trajectories.iter().find(|trajectory| trajectory.interface == Interface::ModelExchange)
-    else {
-        return Ok(());
-    };
+pub fn vectors(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
     let count = description.states_count().unwrap_or(0);
-    if count == 0 || description.states().len() != description.derivatives.len() {
-        return Ok(());
-    }
-    let mut writer = checker.writer();
-    writer.begin(0, trajectory);
     let derivatives: Vec<usize> = description.derivatives.iter().map(|unknown| unknown.variable).collect();
     let states = description.states();
-    let mut asked = Vec::new();
-    let mut nominals = None;
+    if count == 0 || states.len() != derivatives.len() {
+        return Ok(());
+    }
+    let mut writer = checker.writer(trajectory);
+    writer.begin(0);
+    let derivatives_name = writer.derivatives_name();
+    let (mut asked, mut nominals) = (Vec::new(), None);
     for point in &trajectory.points {
-        writer.point(0, trajectory, point);
+        writer.point(0, point);
         nominals = Some(writer.vector(0, "GetNominalsOfContinuousStates", count));
-        asked.push([
-            (writer.vector(0, "GetContinuousStates", count), writer.read_these(0, &states), states.clone()),
-            (writer.derivatives(0, count), writer.read_these(0, &derivatives), derivatives.clone()),
-        ]);
+        for (name, indices) in [("GetContinuousStates", &states), (derivatives_name, &derivatives)] {
+            asked.push((writer.vector(0, name, count), writer.read_these(0, indices), indices.clone()));
+        }
     }
     let model = description.clone();
-    let judge: Judge = Arc::new(move |run| {
-        for (vector, reads, indices) in asked.iter().flatten() {
-            if run.status(*vector).is_none_or(|status| status > 1) {
-                continue;
-            }
+    let run = checker.judge("derivatives.vectors", writer.sequence.clone(), move |run| {
+        asked.iter().filter(|(vector, ..)| run.succeeds(*vector)).find_map(|(vector, reads, indices)| {
             let numbers = run.written(*vector)?.numbers();
-            let of_variables: Vec<f64> = indices
-                .iter()
-                .filter_map(|index| value_of(run, reads, *index))
-                .flat_map(|value| value.numbers())
-                .collect();
-            if of_variables.len() != numbers.len() {
-                return None;
-            }
-            if let Some(at) = numbers
-                .iter()
-                .zip(&of_variables)
-                .position(|(one, other)| one.to_bits() != other.to_bits() && one != other)
-            {
-                let name = model.variables[indices[at.min(indices.len() - 1)]].name.clone();
-                return Some(format!(
-                    "number {} of the vector is {:?}, {name} is {:?}",
-                    at + 1,
-                    numbers[at],
-                    of_variables[at]
-                ));
-            }
-        }
-        None
-    });
-    let run = checker.judge("derivatives.vectors", writer.sequence.clone(), judge)?;
-    let judge: Judge = Arc::new(move |run| {
-        let numbers =
-            run.written(nominals?).filter(|_| run.status(nominals.unwrap_or(0)) == Some(0))?.numbers();
+            let values = indices.iter().filter_map(|index| value_of(run, reads, *index));
+            let values: Vec<f64> = values.flat_map(|value| value.numbers()).collect();
+            let unlike = |(one, other): (&f64, &f64)| one.to_bits() != other.to_bits() && one != other;
+            let at = numbers.iter().zip(&values).position(unlike);
+            let at = at.filter(|_| numbers.len() == values.len())?;
+            let name = &model.variables[indices[at.min(indices.len() - 1)]].name;
+            let (one, other) = (numbers[at], values[at]);
+            Some(format!("number {} of the vector is {one:?}, {name} is {other:?}", at + 1))
+        })
+    })?;
+    checker.keep("derivatives.nominals", &run, &writer.sequence, move |run| {
+        let numbers = numbers(run, nominals?)?;
         let bad = numbers.iter().find(|number| !(**number > 0.0 && number.is_finite()))?;
         Some(format!("a nominal value is {bad:?}"))
     });
-    checker.keep("derivatives.nominals", &run, &writer.sequence, judge);
     Ok(())
 }

@@ -1,27 +1,22 @@
 //! Event Mode and early returns of FMI 3.0 in Co-Simulation.
 
-use crate::call_sequence::{Run, Step};
+use crate::call_sequence::Run;
 use crate::checker::Checker;
-use crate::finding::Judge;
 use crate::writer::{Read, Trajectory, Writer, value_of};
-use fmi_abi::Interface;
 use std::sync::Arc;
 
 /// Checks the outputs of steps over events in FMI 3.0: for importers that handle events, that allow early returns, or both.
-pub fn told(checker: &Checker) -> anyhow::Result<()> {
-    let trajectory =
-        checker.trajectories.iter().find(|trajectory| trajectory.interface == Interface::CoSimulation);
-    let (true, Some(trajectory)) = (checker.fmi3(), trajectory) else { return Ok(()) };
+pub fn told(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let time = checker.description.variables.iter().position(|variable| variable.causality == "independent");
-    let has_events = checker.can(Interface::CoSimulation, &["hasEventMode"]);
+    let has_events = checker.can(trajectory.interface, &["hasEventMode"]);
     for (event_mode, early_return) in [(true, true), (true, false), (false, true)] {
         if event_mode && !has_events || !event_mode && checker.description.event_mode() {
             continue;
         }
-        let mut writer = checker.writer();
-        let steps = Arc::new(play(checker, &mut writer, trajectory, time, event_mode, early_return)?);
+        let mut writer = checker.writer(trajectory);
+        let steps = Arc::new(play(checker, &mut writer, time, event_mode, early_return)?);
         let again = Arc::clone(&steps);
-        let judge: Judge = Arc::new(move |run| {
+        let run = checker.judge("results.early-return", writer.sequence.clone(), move |run| {
             again.iter().find_map(|step| {
                 let (event, early, reached) = ended(&again, run, step.id)?;
                 if early && !early_return {
@@ -37,9 +32,8 @@ pub fn told(checker: &Checker) -> anyhow::Result<()> {
                     format!("lastSuccessfulTime is {reached:?} of a step to {end:?}, and the time is {now:?}")
                 })
             })
-        });
-        let run = checker.judge("results.early-return", writer.sequence.clone(), judge)?;
-        let judge: Judge = Arc::new(move |run| {
+        })?;
+        checker.keep("results.early-unsaid", &run, &writer.sequence, move |run| {
             steps.iter().find_map(|step| {
                 let (event, early, reached) = ended(&steps, run, step.id)?;
                 let end = step.end;
@@ -49,7 +43,6 @@ pub fn told(checker: &Checker) -> anyhow::Result<()> {
                 })
             })
         });
-        checker.keep("results.early-unsaid", &run, &writer.sequence, judge);
     }
     Ok(())
 }
@@ -62,29 +55,33 @@ struct Stepped {
     event: Option<u32>,
 }
 
+/// The outputs eventHandlingNeeded, terminateSimulation, earlyReturn and lastSuccessfulTime of a step that succeeded.
+fn outputs(run: &Run, id: u32) -> Option<([bool; 3], f64)> {
+    let outcome = run.of(id).filter(|_| run.succeeds(id))?;
+    let reached = outcome.written.get(3)?.numbers()[0];
+    Some(([0, 1, 2].map(|index| outcome.written[index].numbers() == [1.0]), reached))
+}
+
 /// Runs the steps of the trajectory, which may end at events between its points.
 fn play(
     checker: &Checker,
     writer: &mut Writer<'_>,
-    trajectory: &Trajectory,
     time: Option<usize>,
     event_mode: bool,
     early_return: bool,
 ) -> anyhow::Result<Vec<Stepped>> {
-    let mut how = writer.how(Interface::CoSimulation);
-    (how.event_mode, how.early_return) = (event_mode, early_return);
-    writer.add(Step::Make(0, how));
+    writer.make_with(0, |how| (how.event_mode, how.early_return) = (event_mode, early_return));
     writer.enter(0);
     writer.call(0, "ExitInitializationMode", vec![]);
     let mut next = None;
     if event_mode {
         next = over_event(checker, writer)?;
-        writer.call(0, "EnterStepMode", vec![]);
     }
     let mut steps = Vec::new();
+    let points = &writer.trajectory.points;
     let (mut at, mut number) = (checker.description.start_time, 0);
-    while number < trajectory.points.len() && steps.len() < 30 {
-        let point = &trajectory.points[number];
+    while number < points.len() && steps.len() < 30 {
+        let point = &points[number];
         let end = point.time + point.size;
         // Section 4.2.1: the importer enters Event Mode at the next event time, or when the step requests it.
         let goal = next.filter(|next| !early_return && *next > at && *next < end).unwrap_or(end);
@@ -97,21 +94,16 @@ fn play(
         let values = writer.read_these(0, time.as_slice());
         let run = checker.play(&writer.sequence)?;
         steps.push(Stepped { id, values, end: goal, event: None });
-        let Some(outcome) = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1)) else {
-            break;
-        };
-        let flag = |index: usize| outcome.written[index].numbers() == [1.0];
-        let reached = outcome.written[3].numbers()[0];
+        let Some(([event, terminate, early], reached)) = outputs(&run, id) else { break };
         // A step that did not advance, without an event, would not advance again.
-        if flag(1) || !(reached > at || flag(0) && reached == at) || reached > goal + point.size {
+        if terminate || !(reached > at || event && reached == at) || reached > goal + point.size {
             break;
         }
-        at = if flag(2) { reached } else { goal };
-        if event_mode && (flag(0) || next.is_some_and(|next| at >= next)) {
+        at = if early { reached } else { goal };
+        if event_mode && (event || next.is_some_and(|next| at >= next)) {
             let event = writer.call(0, "EnterEventMode", vec![]);
             steps.iter_mut().rev().take(1).for_each(|step| step.event = Some(event));
             next = over_event(checker, writer)?;
-            writer.call(0, "EnterStepMode", vec![]);
         }
     }
     Ok(steps)
@@ -123,21 +115,22 @@ fn ended(steps: &[Stepped], run: &Run, id: u32) -> Option<(bool, bool, f64)> {
     let mut before = steps.iter().take_while(|step| step.id != id);
     let is_skipped =
         |step: &Stepped| run.of(step.id).is_some() && step.event.is_some_and(|event| run.of(event).is_none());
-    let outcome = run.of(id).filter(|of| of.status.is_some_and(|status| status <= 1))?;
-    let flag = |index: usize| outcome.written[index].numbers() == [1.0];
-    let reached = outcome.written.get(3)?.numbers()[0];
-    (!before.any(is_skipped)).then(|| (flag(0), flag(2), reached))
+    let ([event, _, early], reached) = outputs(run, id)?;
+    (!before.any(is_skipped)).then_some((event, early, reached))
 }
 
-/// Runs the updates to count how many the event needs; returns the next time event.
+/// Runs the updates to count how many the event needs, and goes back to Step Mode; returns the next time event.
 fn over_event(checker: &Checker, writer: &mut Writer<'_>) -> anyhow::Result<Option<f64>> {
+    let mut next = None;
     for _ in 0..10 {
         let ids = writer.update(0, 1);
         let run = checker.play(&writer.sequence)?;
-        match checker.event(&run, ids[0]) {
-            Some(event) if event.again => {}
-            other => return Ok(other.and_then(|event| event.next)),
+        let event = checker.event(&run, ids[0]);
+        if !event.is_some_and(|event| event.again) {
+            next = event.and_then(|event| event.next);
+            break;
         }
     }
-    Ok(None)
+    writer.call(0, "EnterStepMode", vec![]);
+    Ok(next)
 }

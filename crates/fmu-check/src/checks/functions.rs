@@ -1,62 +1,53 @@
 //! Functions, versions, an instance for the right token, and the calls that declared capabilities allow.
 
-use crate::call_sequence::{Arg, End, Kind, Setting, Step};
+use super::derivatives::{derivative, pair, references};
+use crate::call_sequence::{End, Run, Setting, Step};
 use crate::checker::Checker;
-use crate::finding::Judge;
-use crate::finding::refused_one;
+use crate::finding::refused;
+use crate::writer::{Part, Trajectory};
 use fmi_abi::calls::{fmi2, fmi3, signatures};
-use fmi_abi::{Interface, Standard};
+use fmi_abi::{Interface, Mode, Standard};
 use std::sync::Arc;
 
 /// Whether all that the library needs is found, also what is needed late.
 fn symbols(checker: &Checker) -> anyhow::Result<()> {
-    let mut writer = checker.writer();
-    writer.add(Step::Version(if checker.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned()));
+    let sequence = checker.step(checker.version(), false);
     let [late, now] = [false, true].map(|now| {
         let setting = Setting { now, ..checker.setting.clone() };
-        checker.workers.play(&setting, &writer.sequence, checker.limit)
+        checker.workers.play(&setting, &sequence, checker.limit)
     });
     if let (End::Done, End::Unloadable(why)) = (late?.end, now?.end) {
-        let nothing: Judge = Arc::new(|_| None);
-        checker.add(checker.claim("package.symbols").finding(why, writer.sequence, nothing));
+        checker.add(checker.claim("package.symbols").finding(
+            why,
+            sequence,
+            Arc::new(|_: &Run| -> Option<String> { None }),
+        ));
     }
     Ok(())
 }
 
 /// Whether every function that must be there is there.
 pub fn present(checker: &Checker) -> anyhow::Result<()> {
+    let modes: Vec<Mode> = (0..9).filter_map(|bit| Mode::from_number(1 << bit)).collect();
     let standard = checker.description.standard;
-    let indices = [(Interface::CoSimulation, 0), (Interface::ModelExchange, 1)];
-    let mut missing: Vec<String> = Vec::new();
-    for (interface, index) in indices {
+    let mut missing: Vec<&str> = Vec::new();
+    for (index, interface) in [Interface::CoSimulation, Interface::ModelExchange].into_iter().enumerate() {
         let Some(path) = &checker.setting.libraries[index] else { continue };
         let Some(symbols) = super::package::exported(path) else { continue };
-        let of_all: &[&str] = if standard == Standard::Fmi2 { fmi2::FREE } else { fmi3::FREE };
+        let of_all = if standard == Standard::Fmi2 { fmi2::FREE } else { fmi3::FREE };
         let wanted = of_all.iter().copied().filter(|name| match *name {
             "fmi3InstantiateModelExchange" => interface == Interface::ModelExchange,
             "fmi3InstantiateCoSimulation" => interface == Interface::CoSimulation,
-            "fmi3InstantiateScheduledExecution" => false,
-            _ => true,
+            name => name != "fmi3InstantiateScheduledExecution",
         });
-        let on_instances = signatures(standard).iter().filter_map(|signature| {
+        let on_instances = signatures(standard).iter().map(|signature| signature.rule).filter(|rule| {
             // fmi2CancelStep is of Co-Simulation, and allowed in no state of the table.
-            let needed = signature.rule.name == "fmi2CancelStep" && interface == Interface::CoSimulation
-                || [
-                    fmi_abi::Mode::Instantiated,
-                    fmi_abi::Mode::Initialization,
-                    fmi_abi::Mode::StepComplete,
-                    fmi_abi::Mode::Event,
-                    fmi_abi::Mode::ContinuousTime,
-                    fmi_abi::Mode::StepFailed,
-                    fmi_abi::Mode::Terminated,
-                ]
-                .into_iter()
-                .any(|mode| signature.rule.standard.contain(standard, interface, mode));
-            needed.then_some(signature.rule.name)
+            rule.name == "fmi2CancelStep" && interface == Interface::CoSimulation
+                || modes.iter().any(|mode| rule.standard.contain(standard, interface, *mode))
         });
-        for name in wanted.chain(on_instances) {
-            if !symbols.iter().any(|symbol| symbol == name) && !missing.iter().any(|known| known == name) {
-                missing.push(name.to_owned());
+        for name in wanted.chain(on_instances.map(|rule| rule.name)) {
+            if !symbols.iter().any(|symbol| symbol == name) && !missing.contains(&name) {
+                missing.push(name);
             }
         }
     }
@@ -65,103 +56,76 @@ pub fn present(checker: &Checker) -> anyhow::Result<()> {
         checker.add(checker.claim("functions.missing").of_files(observed));
     }
     symbols(checker)?;
-    version(checker)?;
-    for trajectory in &checker.trajectories {
-        capabilities(checker, trajectory.interface)?;
-    }
-    Ok(())
+    version(checker)
 }
 
 fn version(checker: &Checker) -> anyhow::Result<()> {
-    let mut writer = checker.writer();
+    let mut sequence = checker.step(checker.version(), false);
+    if !checker.fmi3() {
+        let mut platform = checker.step(Step::Version("fmi2GetTypesPlatform".to_owned()), false);
+        platform[0].id = 1;
+        sequence.extend(platform);
+    }
     let name = if checker.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" };
-    let version = writer.add(Step::Version(name.to_owned()));
-    let platform = (!checker.fmi3()).then(|| writer.add(Step::Version("fmi2GetTypesPlatform".to_owned())));
     let declared = checker.description.version.clone();
-    let judge: Judge = Arc::new(move |run| {
+    checker.check("functions.version", sequence, move |run| {
+        // NULL if there is no text; nothing if there is no function.
         let text = |id: u32| {
-            run.of(id)
-                .filter(|of| !of.missing)
-                .map(|of| of.text.clone().map(|text| String::from_utf8_lossy(&text).into_owned()))
+            let of = run.of(id).filter(|of| !of.missing)?;
+            let text = of.text.as_ref().map(|text| String::from_utf8_lossy(text).into_owned());
+            Some(text.unwrap_or_else(|| "NULL".to_owned()))
         };
-        if let Some(answer) = text(version) {
-            let good = answer.as_ref().is_some_and(|answer| {
-                *answer == declared || declared.starts_with("3.") && answer.starts_with("3.")
-            });
-            if !good {
-                let answer = answer.unwrap_or_else(|| "NULL".to_owned());
-                return Some(format!("{name} returns {answer}, and fmiVersion is {declared}"));
-            }
+        if let Some(answer) = text(0)
+            && answer != declared
+            && !(declared.starts_with("3.") && answer.starts_with("3."))
+        {
+            return Some(format!("{name} returns {answer}, and fmiVersion is {declared}"));
         }
-        let answer = text(platform?)?;
-        let answer = answer.unwrap_or_else(|| "NULL".to_owned());
+        let answer = text(1)?;
         (answer != "default").then(|| format!("fmi2GetTypesPlatform returns {answer}"))
-    });
-    checker.judge("functions.version", writer.sequence, judge)?;
-    Ok(())
+    })
 }
 
 /// Each declared function returns.
-fn capabilities(checker: &Checker, interface: Interface) -> anyhow::Result<()> {
-    let Some(trajectory) = checker.trajectories.iter().find(|trajectory| trajectory.interface == interface)
-    else {
-        return Ok(());
-    };
-    let mut asked: Vec<(&str, Vec<u32>, crate::writer::Writer)> = Vec::new();
+pub fn capabilities(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let (interface, mut asked) = (trajectory.interface, Vec::new());
     if checker.saves(interface) {
-        let mut writer = checker.writer();
-        writer.begin(0, trajectory);
-        let mut ids = vec![writer.save(0, 0), writer.restore(0, 0)];
+        let mut writer = checker.writer(trajectory);
+        let mut ids = writer.play(0, &[Part::Begin, Part::Save(0), Part::Restore(0)]).ids;
         if checker.serializes(interface) {
             ids.extend(writer.serialize(0, 0));
             ids.push(writer.deserialize(0, 0, 1));
         }
-        ids.push(writer.drop_state(0, 0));
-        asked.push(("canGetAndSetFMUstate and canSerializeFMUstate", ids, writer));
+        ids.extend(writer.play(0, &[Part::Drop(0)]).ids);
+        asked.push(("canGetAndSetFMUstate and canSerializeFMUstate", ids, writer.sequence));
     }
-    if let Some((unknown, known)) = super::derivatives::pair(&checker.description, interface) {
-        let reference = |index: usize| {
-            Arg::In(Kind::U32, vec![u64::from(checker.description.variables[index].reference)])
+    let pair = pair(&checker.description, interface);
+    for (name, flags, function) in [
+        (
+            "providesDirectionalDerivatives",
+            ["providesDirectionalDerivative", "providesDirectionalDerivatives"],
+            "GetDirectionalDerivative",
+        ),
+        ("providesAdjointDerivatives", ["providesAdjointDerivatives"; 2], "GetAdjointDerivative"),
+    ] {
+        let Some((unknown, known)) = pair.filter(|_| checker.can(interface, &flags)) else { continue };
+        let mut writer = checker.writer(trajectory);
+        let mut ids = writer.begin(0);
+        let size = |index: usize| checker.description.variables[index].size.unwrap_or(1);
+        let (seed, results) = match function {
+            "GetAdjointDerivative" => (size(unknown), size(known)),
+            _ => (size(known), size(unknown)),
         };
-        let sizes = |index: usize| checker.description.variables[index].size.unwrap_or(1);
-        for (names, function) in [
-            (["providesDirectionalDerivative", "providesDirectionalDerivatives"], "GetDirectionalDerivative"),
-            (["providesAdjointDerivatives", "providesAdjointDerivatives"], "GetAdjointDerivative"),
-        ] {
-            if !checker.can(interface, &names) {
-                continue;
-            }
-            let mut writer = checker.writer();
-            writer.begin(0, trajectory);
-            let (seeds, results) = if function.contains("Adjoint") {
-                (sizes(unknown), sizes(known))
-            } else {
-                (sizes(known), sizes(unknown))
-            };
-            let seed = Arg::In(Kind::F64, vec![1_f64.to_bits(); seeds]);
-            let mut args = vec![reference(unknown), Arg::Whole(1), reference(known), Arg::Whole(1), seed];
-            if checker.fmi3() {
-                args.push(Arg::Whole(seeds as i64));
-            }
-            args.push(Arg::Out(Kind::F64, results));
-            if checker.fmi3() {
-                args.push(Arg::Whole(results as i64));
-            }
-            let id = writer.call(0, function, args);
-            asked.push((names[1], vec![id], writer));
-        }
+        let [unknowns, knowns] = [unknown, known].map(|of| references(&checker.description, &[of]));
+        ids.push(derivative(&mut writer, function, &unknowns, &knowns, &vec![1.0; seed], results));
+        asked.push((name, ids, writer.sequence));
     }
-    for (flag, ids, writer) in asked {
-        let sequence = writer.sequence.clone();
-        let flag = flag.to_owned();
-        let judge: Judge = Arc::new(move |run| {
-            if run.end != End::Done {
-                return None;
-            }
-            let why = ids.iter().find_map(|id| refused_one(&sequence, run, *id))?;
+    for (flag, ids, sequence) in asked {
+        let copy = sequence.clone();
+        checker.check("functions.capability", sequence, move |run| {
+            let why = refused(&copy, run, &ids)?;
             Some(format!("declared by {flag}, but {why}"))
-        });
-        checker.judge("functions.capability", writer.sequence, judge)?;
+        })?;
     }
     Ok(())
 }

@@ -1,31 +1,26 @@
 //! Calls that importers should not make, but some do. A crash or a hang is fragile if the standard does not forbid it.
 
 use super::refusals::unknown_reference;
-use crate::call_sequence::{Arg, CallSequence, End, Kind, NOBODY, Step};
-use crate::checker::Checker;
+use crate::call_sequence::{Arg, CallSequence, End, Kind, Written};
+use crate::checker::{Checker, Random};
 use crate::description::{kind_of, type_name};
-use crate::finding::Judge;
 use crate::values::Value;
-use crate::writer::{Trajectory, Writer, readable};
+use crate::writer::{Part, Point, Trajectory, Writer, access};
 use fmi_abi::calls::{Signature, signatures};
-use fmi_abi::{Interface, Mode};
-use std::sync::Arc;
+use fmi_abi::{BaseType, Mode};
 
 /// Crashes after which further sequences would only repeat what is known.
 const CRASHES: usize = 40;
 /// Hangs after which it is not worth while to wait for more.
 const HANGS: usize = 2;
 
+type Sequences = anyhow::Result<Vec<CallSequence>>;
+
 /// Plays sequences until `CRASHES` of them have crashed or `HANGS` have hung.
-fn all(
-    checker: &Checker,
-    name: &str,
-    sequences: impl IntoIterator<Item = CallSequence>,
-) -> anyhow::Result<()> {
-    let nothing: Judge = Arc::new(|_| None);
+pub fn all(checker: &Checker, name: &str, sequences: Vec<CallSequence>) -> anyhow::Result<()> {
     let (mut crashes, mut hangs) = (0, 0);
     for sequence in sequences {
-        match checker.judge(name, sequence, Arc::clone(&nothing))?.end {
+        match checker.judge(name, sequence, |_| None)?.end {
             End::Hang(_) => hangs += 1,
             End::Done => {}
             _ => crashes += 1,
@@ -37,70 +32,72 @@ fn all(
     Ok(())
 }
 
-/// NULL for the instance that is to be freed, which is allowed.
-pub fn free_null(checker: &Checker) -> anyhow::Result<()> {
-    let mut writer = checker.writer();
+/// A sequence that is forbidden from the end of its legal parts on.
+fn after(
+    checker: &Checker,
+    trajectory: &Trajectory,
+    legal: &[Part],
+    write: impl FnOnce(&mut Writer),
+) -> CallSequence {
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, legal);
     writer.forbidden = true;
-    writer.add(Step::Free(NOBODY));
-    let nothing: Judge = Arc::new(|_| None);
-    checker.judge("life_cycle.free-null", writer.sequence, nothing)?;
-    Ok(())
+    write(&mut writer);
+    writer.sequence
 }
 
-/// Passes NULL as the instance, NULL for arrays, unknown references, and sizes that do not fit.
-pub fn calls(checker: &Checker) -> anyhow::Result<()> {
-    let standard = checker.description.standard;
-    for trajectory in &checker.trajectories {
-        let (mut of_null, mut nulls) = (Vec::new(), Vec::new());
-        for signature in signatures(standard) {
-            let name = &signature.rule.name[4..];
-            let mode = MODES
-                .into_iter()
-                .rev()
-                .find(|mode| signature.rule.standard.contain(standard, trajectory.interface, *mode));
-            let Some(mode) = mode else { continue };
-            if name.to_lowercase().contains("fmustate") && !checker.saves(trajectory.interface) {
-                continue;
-            }
-            let mut writer = checker.writer();
-            writer.forbidden(
-                None,
-                name,
-                signature.arguments.iter().map(|argument| harmless(argument.of)).collect(),
-            );
-            of_null.push(writer.sequence);
-            let pointers = signature.arguments.iter().filter(|argument| argument.of.starts_with('*')).count();
-            for null in 0..pointers {
-                let mut writer = checker.writer();
-                to_mode(&mut writer, trajectory, mode);
-                writer.forbidden(Some(0), name, with_null(checker, signature, null));
-                nulls.push(writer.sequence);
-            }
-        }
-        all(checker, "hostile.null-instance", of_null)?;
-        all(checker, "hostile.null", nulls)?;
-        references(checker, trajectory)?;
-        sizes(checker, trajectory)?;
-    }
-    Ok(())
+/// The functions that an instance has, without `fmi2` and `fmi3`, each with the calls up to the last mode that allows it.
+fn callable(
+    checker: &Checker,
+    trajectory: &Trajectory,
+) -> impl Iterator<Item = (&'static Signature, &'static str, &'static [Part])> {
+    const MODES: [(Mode, &[Part]); 5] = [
+        (Mode::ContinuousTime, &[Part::Begin]),
+        (Mode::Event, &[Part::Make, Part::Enter, Part::Call("ExitInitializationMode")]),
+        (Mode::StepComplete, &[Part::Begin]),
+        (Mode::Initialization, &[Part::Make, Part::Enter]),
+        (Mode::Instantiated, &[Part::Make]),
+    ];
+    let (standard, interface) = (checker.description.standard, trajectory.interface);
+    let saves = checker.saves(interface);
+    signatures(standard).iter().filter_map(move |signature| {
+        let allowed = |(mode, _): &&(Mode, _)| signature.rule.standard.contain(standard, interface, *mode);
+        let (_, parts) = MODES.iter().find(allowed)?;
+        let name = &signature.rule.name[4..];
+        (saves || !name.to_lowercase().contains("fmustate")).then_some((signature, name, *parts))
+    })
 }
 
-/// The modes in which functions are called.
-const MODES: [Mode; 5] =
-    [Mode::Instantiated, Mode::Initialization, Mode::StepComplete, Mode::Event, Mode::ContinuousTime];
+/// NULL for the instance, and zero or NULL for every argument.
+pub fn null_instances(checker: &Checker, trajectory: &Trajectory) -> Sequences {
+    let of_null = callable(checker, trajectory).map(|(signature, name, _)| {
+        let args = signature.arguments.iter().map(|argument| harmless(argument.of)).collect();
+        after(checker, trajectory, &[], |writer| {
+            writer.forbidden(None, name, args);
+        })
+    });
+    Ok(of_null.collect())
+}
+
+/// NULL for one array of a call.
+pub fn nulls(checker: &Checker, trajectory: &Trajectory) -> Sequences {
+    let of_array = callable(checker, trajectory).flat_map(|(signature, name, parts)| {
+        let arrays = signature.arguments.iter().filter(|argument| argument.of.starts_with('*')).count();
+        (0..arrays).map(move |null| {
+            let args = with_null(checker, signature, null);
+            after(checker, trajectory, parts, |writer| {
+                writer.call(0, name, args);
+            })
+        })
+    });
+    Ok(of_array.collect())
+}
 
 /// An argument of a type: zero, or NULL.
 fn harmless(of: &str) -> Arg {
-    match of {
-        "usize" | "fmi2ValueReference" | "fmi3ValueReference" => Arg::Whole(0),
-        of if of.starts_with('*')
-            || of.contains("state")
-            || of.contains("State")
-            || of.contains("String") =>
-        {
-            Arg::Null
-        }
-        of if of.contains("Real") || of.contains("Float64") => Arg::real(0.0),
+    match of.trim_start_matches("fmi2").trim_start_matches("fmi3") {
+        "Real" | "Float64" => Arg::real(0.0),
+        of if of.starts_with('*') || of.to_lowercase().contains("state") || of == "String" => Arg::Null,
         _ => Arg::Whole(0),
     }
 }
@@ -135,311 +132,217 @@ fn with_null(checker: &Checker, signature: &Signature, null: usize) -> Vec<Arg> 
     args.collect()
 }
 
-fn to_mode(writer: &mut Writer, trajectory: &Trajectory, mode: Mode) {
-    match mode {
-        Mode::Instantiated => {
-            writer.make(0, trajectory.interface);
-        }
-        Mode::Initialization => {
-            writer.make(0, trajectory.interface);
-            writer.enter(0);
-        }
-        Mode::Event => {
-            writer.make(0, trajectory.interface);
-            writer.enter(0);
-            writer.call(0, "ExitInitializationMode", vec![]);
-        }
-        _ => {
-            writer.begin(0, trajectory);
-        }
-    }
-}
-
-/// The types of FMI 2.0 and FMI 3.0 in the names of getters and setters, and their types in C.
-const FMI2_TYPES: &[(&str, Kind)] =
-    &[("Real", Kind::F64), ("Integer", Kind::I32), ("Boolean", Kind::I32), ("String", Kind::Pointer)];
-const FMI3_TYPES: &[(&str, Kind)] = &[
-    ("Float64", Kind::F64),
-    ("Float32", Kind::F32),
-    ("Int8", Kind::I8),
-    ("UInt8", Kind::U8),
-    ("Int16", Kind::I16),
-    ("UInt16", Kind::U16),
-    ("Int32", Kind::I32),
-    ("UInt32", Kind::U32),
-    ("Int64", Kind::I64),
-    ("UInt64", Kind::U64),
-    ("Boolean", Kind::U8),
-    ("String", Kind::Pointer),
-];
-
 /// Passes references that no variable has to all getters and setters.
-fn references(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+pub fn references(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let description = &checker.description;
-    let fmi3 = checker.fmi3();
-    let types = if fmi3 { FMI3_TYPES } else { FMI2_TYPES };
+    let standard = description.standard;
+    let mut types: Vec<(&str, Kind)> =
+        BaseType::ALL.iter().map(|base| (type_name(standard, *base), kind_of(standard, *base))).collect();
+    types.retain(|(name, _)| *name != "Binary");
+    types.sort_unstable_by_key(|(name, _)| *name);
+    types.dedup();
     let mut wrong = Vec::new();
     for reference in [unknown_reference(checker), u64::from(u32::MAX), 1 << 31, 1 << 20] {
         if description.variables.iter().any(|variable| u64::from(variable.reference) == reference) {
             continue;
         }
-        for (name, kind) in types {
+        for (name, kind) in &types {
             for get in [true, false] {
-                let mut writer = checker.writer();
-                writer.begin(0, trajectory);
                 let values = match (get, kind) {
                     (true, _) => Arg::Out(*kind, 1),
                     (false, Kind::Pointer) => Arg::Texts(vec![Some(b"text".to_vec())]),
                     (false, _) => Arg::In(*kind, vec![0]),
                 };
-                let mut args = vec![Arg::In(Kind::U32, vec![reference]), Arg::Whole(1), values];
-                if fmi3 {
-                    args.push(Arg::Whole(1));
-                }
-                writer.forbidden(Some(0), &format!("{}{name}", if get { "Get" } else { "Set" }), args);
-                wrong.push(writer.sequence);
+                wrong.push(after(checker, trajectory, &[Part::Begin], |writer| {
+                    let args = access(standard, vec![reference], [values], 1);
+                    writer.call(0, &format!("{}{name}", if get { "Get" } else { "Set" }), args);
+                }));
             }
         }
     }
-    all(checker, "hostile.references", wrong)
+    Ok(wrong)
 }
 
 /// Passes sizes that do not fit: for arrays of FMI 3.0, and in Model Exchange for the vectors of states.
-fn sizes(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+pub fn sizes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
     let description = &checker.description;
-    let fmi3 = checker.fmi3();
     let mut sizes = Vec::new();
-    for index in readable(description) {
-        let variable = &description.variables[index];
+    let values = |get: bool, kind: Kind, count: usize| match get {
+        true => Arg::Out(kind, count),
+        false => Arg::In(kind, vec![0; count]),
+    };
+    for index in checker.readable.iter().filter(|_| checker.fmi3()) {
+        let variable = &description.variables[*index];
         let (Some(base), Some(size)) = (variable.base, variable.size) else { continue };
         let (name, kind) = (type_name(description.standard, base), kind_of(description.standard, base));
-        if !fmi3 || kind == Kind::Pointer || sizes.len() > 60 {
+        if kind == Kind::Pointer || sizes.len() > 60 {
             continue;
         }
         for count in [0, size - 1, size + 1] {
-            for get in [true, false] {
-                let mut writer = checker.writer();
-                to_mode(&mut writer, trajectory, Mode::Initialization);
-                let values = if get { Arg::Out(kind, count) } else { Arg::In(kind, vec![0; count]) };
-                let reference = Arg::In(Kind::U32, vec![u64::from(variable.reference)]);
-                let args = vec![reference, Arg::Whole(1), values, Arg::Whole(count as i64)];
-                writer.forbidden(Some(0), &format!("{}{name}", if get { "Get" } else { "Set" }), args);
-                sizes.push(writer.sequence);
+            for (verb, get) in [("Get", true), ("Set", false)] {
+                sizes.push(after(checker, trajectory, &[Part::Make, Part::Enter], |writer| {
+                    let reference = vec![u64::from(variable.reference)];
+                    let args = access(description.standard, reference, [values(get, kind, count)], count);
+                    writer.call(0, &format!("{verb}{name}"), args);
+                }));
             }
         }
     }
-    if trajectory.interface == Interface::ModelExchange {
-        let states = description.states_count().unwrap_or(0);
-        for (function, right, get) in [
-            ("GetContinuousStates", states, true),
-            ("GetNominalsOfContinuousStates", states, true),
-            ("SetContinuousStates", states, false),
-            (if fmi3 { "GetContinuousStateDerivatives" } else { "GetDerivatives" }, states, true),
-            ("GetEventIndicators", description.event_indicators.unwrap_or(0), true),
-        ] {
-            for count in [right.saturating_sub(1), right + 1] {
-                if count == right {
-                    continue;
-                }
-                let mut writer = checker.writer();
-                writer.begin(0, trajectory);
-                let values =
-                    if get { Arg::Out(Kind::F64, count) } else { Arg::In(Kind::F64, vec![0; count]) };
-                writer.forbidden(Some(0), function, vec![values, Arg::Whole(count as i64)]);
-                sizes.push(writer.sequence);
-            }
+    let states = description.states_count().unwrap_or(0);
+    let vectors = [
+        ("GetContinuousStates", states),
+        ("GetNominalsOfContinuousStates", states),
+        ("SetContinuousStates", states),
+        (checker.writer(trajectory).derivatives_name(), states),
+        ("GetEventIndicators", description.event_indicators.unwrap_or(0)),
+    ];
+    for (function, right) in vectors.into_iter().filter(|_| !trajectory.is_stepped()) {
+        for count in [right.checked_sub(1), Some(right + 1)].into_iter().flatten() {
+            let args = vec![values(function.starts_with("Get"), Kind::F64, count), Arg::Whole(count as i64)];
+            sizes.push(after(checker, trajectory, &[Part::Begin], |writer| {
+                writer.call(0, function, args);
+            }));
         }
     }
-    all(checker, "hostile.sizes", sizes)
+    Ok(sizes)
 }
 
 /// Extreme values of a type that is not floating-point. A large count asks for much memory, which the machine may not have.
 fn extreme_values(name: &str, kind: Kind, size: usize) -> Vec<Value> {
-    let numbers = |numbers: &[f64]| -> Vec<Value> {
-        numbers.iter().map(|number| Value::Numbers(vec![*number; size])).collect()
-    };
-    match kind {
-        Kind::Pointer if name == "String" => {
-            [&b""[..], b"%s%n%s%n%s%n", b"\xff\xfe no UTF-8", &[b'x'; 100_000]]
-                .map(|text| Value::Texts(vec![text.to_vec(); size]))
-                .to_vec()
-        }
+    let numbers: &[f64] = match kind {
         Kind::Pointer => {
-            vec![Value::Texts(vec![Vec::new(); size]), Value::Texts(vec![vec![7; 100_000]; size])]
+            let texts = match name {
+                "String" => vec![
+                    Vec::new(),
+                    b"%s%n%s%n%s%n".to_vec(),
+                    b"\xff\xfe no UTF-8".to_vec(),
+                    vec![b'x'; 100_000],
+                ],
+                _ => vec![Vec::new(), vec![7; 100_000]],
+            };
+            return texts.into_iter().map(|text| Value::Texts(vec![text; size])).collect();
         }
-        kind if kind.is_float() => Vec::new(),
-        Kind::I8 | Kind::U8 => numbers(&[0.0, 127.0]),
-        Kind::I16 | Kind::U16 => numbers(&[0.0, 32767.0]),
-        Kind::U32 | Kind::U64 | Kind::Size => numbers(&[0.0, 4294967295.0]),
-        _ => numbers(&[0.0, -1.0, 2147483647.0, -2147483648.0]),
-    }
+        kind if kind.is_float() => &[],
+        Kind::I8 | Kind::U8 => &[0.0, 127.0],
+        Kind::I16 | Kind::U16 => &[0.0, 32767.0],
+        Kind::U32 | Kind::U64 | Kind::Size => &[0.0, 4294967295.0],
+        _ => &[0.0, -1.0, 2147483647.0, -2147483648.0],
+    };
+    numbers.iter().map(|number| Value::Numbers(vec![*number; size])).collect()
 }
 
 /// Sets NaN, infinite, extreme and malformed values of parameters and inputs.
-pub fn values(checker: &Checker) -> anyhow::Result<()> {
-    let description = &checker.description;
-    for trajectory in &checker.trajectories {
-        let mut sequences = Vec::new();
-        let settable: Vec<usize> = readable(description)
-            .into_iter()
-            .filter(|index| {
-                let variable = &description.variables[*index];
-                !variable.clocked
-                    && (variable.causality == "input"
-                        || variable.initial == "exact"
-                            && variable.variability != "constant"
-                            && variable.causality != "structuralParameter")
-            })
-            .collect();
-        let play = |writer: &mut Writer, inputs: &[(usize, Value)], parameters: &[(usize, Value)]| {
-            writer.make(0, trajectory.interface);
-            writer.enter(0);
-            writer.forbidden = true;
-            writer.set(0, parameters);
-            writer.set(0, inputs);
-            writer.leave(0, trajectory);
+pub fn values(checker: &Checker, trajectory: &Trajectory) -> Sequences {
+    let (description, mut sequences) = (&checker.description, Vec::new());
+    let mut settable = checker.readable.clone();
+    settable.retain(|index| {
+        let variable = &description.variables[*index];
+        let exact = variable.initial == "exact" && variable.variability != "constant";
+        !variable.clocked
+            && (variable.causality == "input" || exact && variable.causality != "structuralParameter")
+    });
+    let is_input = |index: usize| description.variables[index].causality == "input";
+    let size = |index: usize| description.variables[index].size.unwrap_or(1);
+    // Inputs are set again at every point.
+    let mut play = |values: Vec<(usize, Value)>, again: bool| {
+        sequences.push(after(checker, trajectory, &[Part::Make, Part::Enter], |writer| {
+            writer.set(0, &values);
+            writer.leave(0);
             for point in trajectory.points.iter().take(3) {
-                let point = crate::writer::Point { inputs: inputs.to_vec(), ..point.clone() };
-                writer.point(0, trajectory, &point);
-                writer.ask(0, trajectory.interface);
+                let inputs = if again { values.clone() } else { Vec::new() };
+                writer.point(0, &Point { inputs, ..point.clone() });
+                writer.ask(0);
             }
             writer.free(0);
-            writer.forbidden = false;
-        };
-        for number in [f64::NAN, f64::INFINITY, 1e308, -1e308, 5e-324, 0.0, -1.0, 1e9] {
-            for input in [true, false] {
-                let these = |want: bool| -> Vec<(usize, Value)> {
-                    let variables = settable.iter().map(|index| (*index, &description.variables[*index]));
-                    let chosen = variables.filter(|(_, variable)| {
-                        variable.is_float() && (variable.causality == "input") == want && want == input
-                    });
-                    let values = |size: Option<usize>| Value::Numbers(vec![number; size.unwrap_or(1)]);
-                    chosen.map(|(index, variable)| (index, values(variable.size))).collect()
-                };
-                let (inputs, parameters) = (these(true), these(false));
-                if inputs.is_empty() && parameters.is_empty() {
-                    continue;
-                }
-                let mut writer = checker.writer();
-                play(&mut writer, &inputs, &parameters);
-                sequences.push(writer.sequence);
+        }));
+    };
+    for number in [f64::NAN, f64::INFINITY, 1e308, -1e308, 5e-324, 0.0, -1.0, 1e9] {
+        for input in [true, false] {
+            let chosen = settable.iter().copied();
+            let chosen =
+                chosen.filter(|index| description.variables[*index].is_float() && is_input(*index) == input);
+            let values: Vec<_> =
+                chosen.map(|index| (index, Value::Numbers(vec![number; size(index)]))).collect();
+            if !values.is_empty() {
+                play(values, input);
             }
         }
-        for (index, base) in
-            settable.iter().filter_map(|index| Some((*index, description.variables[*index].base?)))
-        {
-            let size = description.variables[index].size.unwrap_or(1);
-            let kind = kind_of(description.standard, base);
-            let tries = extreme_values(type_name(description.standard, base), kind, size);
-            for value in tries {
-                let of = vec![(index, value)];
-                let mut writer = checker.writer();
-                let input = description.variables[index].causality == "input"
-                    && trajectory.interface == Interface::CoSimulation;
-                if input {
-                    play(&mut writer, &of, &[])
-                } else {
-                    play(&mut writer, &[], &of)
-                }
-                sequences.push(writer.sequence);
-            }
-        }
-        sequences.truncate(120);
-        all(checker, "hostile.values", sequences)?;
     }
-    Ok(())
+    for index in settable {
+        let Some(base) = description.variables[index].base else { continue };
+        let (name, kind) = (type_name(description.standard, base), kind_of(description.standard, base));
+        for value in extreme_values(name, kind, size(index)) {
+            play(vec![(index, value)], is_input(index) && trajectory.is_stepped());
+        }
+    }
+    sequences.truncate(120);
+    Ok(sequences)
 }
 
 /// Times and steps that are none, too great or too small.
-pub fn times(checker: &Checker) -> anyhow::Result<()> {
-    for trajectory in &checker.trajectories {
-        let mut sequences = Vec::new();
-        let start = checker.description.start_time;
-        let size = trajectory.points.first().map_or(1e-3, |point| point.size).max(1e-9);
-        for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, 1e12 * size, -size, 0.0, 5e-324] {
-            let mut writer = checker.writer();
-            writer.begin(0, trajectory);
-            writer.forbidden = true;
-            match trajectory.interface {
-                Interface::CoSimulation => {
-                    writer.step(0, start, number);
-                }
-                Interface::ModelExchange => {
-                    writer.call(0, "SetTime", vec![Arg::real(number)]);
-                    writer.ask(0, trajectory.interface);
-                    writer.call(0, "EnterEventMode", vec![]);
-                    writer.update(0, 1);
-                }
+pub fn times(checker: &Checker, trajectory: &Trajectory) -> Sequences {
+    let start = checker.description.start_time;
+    let size = trajectory.points.first().map_or(1e-3, |point| point.size).max(1e-9);
+    let mut sequences = Vec::new();
+    // Importers with a mistaken unit of time take steps of 2000 s.
+    let numbers = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, 1e12 * size, -size, 0.0, 5e-324, 2e3];
+    for number in numbers {
+        sequences.push(after(checker, trajectory, &[Part::Begin], |writer| {
+            if trajectory.is_stepped() {
+                writer.step(0, start, number);
+            } else {
+                writer.call(0, "SetTime", vec![Arg::real(number)]);
+                writer.play(0, &[Part::Ask, Part::Call("EnterEventMode"), Part::Update(1)]);
             }
-            writer.read(0);
-            writer.free(0);
-            sequences.push(writer.sequence);
-            let mut writer = checker.writer();
-            writer.make(0, trajectory.interface);
-            writer.forbidden = true;
+            writer.play(0, &[Part::Read, Part::Free]);
+        }));
+        sequences.push(after(checker, trajectory, &[Part::Make], |writer| {
             writer.enter_with(0, None, number, None);
-            writer.leave(0, trajectory);
-            if trajectory.interface == Interface::CoSimulation {
+            writer.leave(0);
+            if trajectory.is_stepped() {
                 writer.step(0, number, size);
             }
-            writer.read(0);
-            writer.free(0);
-            sequences.push(writer.sequence);
-        }
-        all(checker, "hostile.times", sequences)?;
+            writer.play(0, &[Part::Read, Part::Free]);
+        }));
     }
-    Ok(())
+    Ok(sequences)
 }
 
 /// Bytes that are no state, and some that almost are.
-pub fn bytes(checker: &Checker) -> anyhow::Result<()> {
-    for trajectory in
-        checker.trajectories.iter().filter(|trajectory| checker.serializes(trajectory.interface))
-    {
-        let mut writer = checker.writer();
-        writer.begin(0, trajectory);
-        writer.save(0, 0);
-        let [_, saved] = writer.serialize(0, 0);
-        let run = checker.play(&writer.sequence)?;
-        let Some(crate::call_sequence::Written::Numbers(_, bytes)) = run.written(saved) else { continue };
-        let mut tries: Vec<Vec<u64>> =
-            vec![Vec::new(), vec![0; 8], vec![0; bytes.len()], vec![255; bytes.len()]];
-        tries.push(bytes[..bytes.len() / 2].to_vec());
-        tries.push([bytes.clone(), bytes.clone()].concat());
-        let mut random = checker.seed | 1;
-        for _ in 0..20 {
-            let mut damaged = bytes.clone();
-            for _ in 0..3 {
-                random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-                if !damaged.is_empty() {
-                    let at = (random >> 33) as usize % damaged.len();
-                    damaged[at] = random >> 20 & 0xff;
-                }
-            }
-            tries.push(damaged);
+pub fn bytes(checker: &Checker, trajectory: &Trajectory) -> Sequences {
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, &[Part::Begin, Part::Save(0)]);
+    let [_, saved] = writer.serialize(0, 0);
+    let run = checker.play(&writer.sequence)?;
+    let Some(Written::Numbers(_, bytes)) = run.written(saved) else { return Ok(Vec::new()) };
+    let mut tries: Vec<Vec<u64>> = vec![
+        Vec::new(),
+        vec![0; 8],
+        vec![0; bytes.len()],
+        vec![255; bytes.len()],
+        bytes[..bytes.len() / 2].to_vec(),
+        [bytes.clone(), bytes.clone()].concat(),
+    ];
+    let mut random = Random::new(checker.seed);
+    for _ in 0..20 {
+        let mut damaged = bytes.clone();
+        for _ in 0..if damaged.is_empty() { 0 } else { 3 } {
+            let at = random.below(damaged.len());
+            damaged[at] = random.below(256) as u64;
         }
-        let name = if checker.fmi3() { "DeserializeFMUState" } else { "DeSerializeFMUstate" };
-        let set = if checker.fmi3() { "SetFMUState" } else { "SetFMUstate" };
-        let sequences: Vec<CallSequence> = tries
-            .into_iter()
-            .map(|bytes| {
-                let mut writer = checker.writer();
-                writer.begin(0, trajectory);
-                writer.forbidden = true;
-                let count = bytes.len() as i64;
-                writer.call(0, name, vec![Arg::In(Kind::U8, bytes), Arg::Whole(count), Arg::StateOut(1)]);
-                writer.call(0, set, vec![Arg::State(1)]);
-                writer.ask(0, trajectory.interface);
-                if trajectory.interface == Interface::CoSimulation
-                    && let Some(point) = trajectory.points.first()
-                {
-                    writer.step(0, point.time, point.size);
-                }
-                writer.free(0);
-                writer.sequence
-            })
-            .collect();
-        all(checker, "hostile.bytes", sequences)?;
+        tries.push(damaged);
     }
-    Ok(())
+    let sequence = |bytes: Vec<u64>| {
+        after(checker, trajectory, &[Part::Begin], |writer| {
+            let count = Arg::Whole(bytes.len() as i64);
+            let args = vec![Arg::In(Kind::U8, bytes), count, Arg::StateOut(1)];
+            writer.call(0, "DeserializeFMUState", args);
+            writer.play(0, &[Part::Restore(1), Part::Ask]);
+            if let Some(point) = trajectory.points.first().filter(|_| trajectory.is_stepped()) {
+                writer.step(0, point.time, point.size);
+            }
+            writer.free(0);
+        })
+    };
+    Ok(tries.into_iter().map(sequence).collect())
 }

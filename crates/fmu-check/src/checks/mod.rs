@@ -15,58 +15,95 @@ pub mod results;
 pub mod start_values;
 pub mod states;
 
+use crate::call_sequence::CallSequence;
 use crate::checker::Checker;
+use crate::writer::Trajectory;
+use Check::{Each, Malformed, Once};
+use Fits::{Always, Integrated, Saves, Serializes, Several, Stepped, Stepped3};
 
-/// A check: its topic and what it does.
-pub type Check = (&'static str, fn(&Checker) -> anyhow::Result<()>);
+/// What a check does.
+#[derive(Clone, Copy)]
+pub enum Check {
+    /// Runs once.
+    Once(fn(&Checker) -> anyhow::Result<()>),
+    /// Runs for each simulation that fits.
+    Each(Fits, fn(&Checker, &Trajectory) -> anyhow::Result<()>),
+    /// Plays the malformed call sequences of this rule for each simulation that fits.
+    Malformed(&'static str, Fits, fn(&Checker, &Trajectory) -> anyhow::Result<Vec<CallSequence>>),
+}
 
-/// All topics with the checks of the library.
-pub const ALL: &[Check] = &[
-    ("life_cycle", life_cycle::orders),
-    ("states", states::restore),
-    ("hostile", hostile::values),
-    ("resources", resources::cycles),
-    ("results", results::repeat),
-    ("functions", functions::present),
-    ("start_values", start_values::starts),
-    ("start_values", start_values::set),
-    ("states", states::serialized),
-    ("reset", reset::reset),
-    ("derivatives", derivatives::directional),
-    ("derivatives", derivatives::vectors),
-    ("dependencies", dependencies::missing),
-    ("dependencies", dependencies::initial),
-    ("refusals", refusals::change_nothing),
-    ("results", results::instances),
-    ("results", results::reading),
-    ("results", results::name),
-    ("results", early_returns::told),
-    ("results", results::threads),
-    ("results", results::cut),
-    ("results", results::time),
-    ("life_cycle", life_cycle::random),
-    ("life_cycle", life_cycle::events),
-    ("logs", logs::switches),
-    ("hostile", hostile::calls),
-    ("hostile", hostile::times),
-    ("hostile", hostile::bytes),
-];
+/// The simulations that a check or an order of calls fits.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Fits {
+    /// All of them.
+    Always,
+    /// Those of Co-Simulation.
+    Stepped,
+    /// Those of Co-Simulation in FMI 3.0.
+    Stepped3,
+    /// Those of Co-Simulation with Event Mode.
+    EventMode,
+    /// Those of Model Exchange.
+    Integrated,
+    /// Those of FMUs of which there may be several instances.
+    Several,
+    /// Those of FMUs that save states.
+    Saves,
+    /// Those of FMUs that serialize states.
+    Serializes,
+}
 
-/// The sources of the checks, whose rules are to be in the table.
-#[cfg(test)]
-pub const SOURCES: &[&str] = &[
-    include_str!("dependencies.rs"),
-    include_str!("derivatives.rs"),
-    include_str!("early_returns.rs"),
-    include_str!("functions.rs"),
-    include_str!("hostile.rs"),
-    include_str!("life_cycle.rs"),
-    include_str!("logs.rs"),
-    include_str!("package.rs"),
-    include_str!("refusals.rs"),
-    include_str!("reset.rs"),
-    include_str!("resources.rs"),
-    include_str!("results.rs"),
-    include_str!("start_values.rs"),
-    include_str!("states.rs"),
+impl Fits {
+    /// Whether a simulation fits.
+    pub fn fit(self, checker: &Checker, trajectory: &Trajectory) -> bool {
+        let (interface, stepped) = (trajectory.interface, trajectory.is_stepped());
+        match self {
+            Always => true,
+            Stepped => stepped,
+            Stepped3 => stepped && checker.fmi3(),
+            Fits::EventMode => stepped && checker.fmi3() && checker.can(interface, &["hasEventMode"]),
+            Integrated => !stepped,
+            Several => checker.several(interface),
+            Saves => checker.saves(interface),
+            Serializes => checker.serializes(interface),
+        }
+    }
+}
+
+/// All checks of the library with their topics.
+pub const ALL: &[(&str, Check)] = &[
+    ("life_cycle", Each(Always, life_cycle::orders)),
+    ("life_cycle", Once(life_cycle::free_null)),
+    ("states", Each(Saves, states::restore)),
+    ("hostile", Malformed("hostile.values", Always, hostile::values)),
+    ("resources", Each(Always, resources::cycles)),
+    ("results", Each(Always, results::repeat)),
+    ("functions", Once(functions::present)),
+    ("functions", Each(Always, functions::capabilities)),
+    ("start_values", Each(Always, start_values::starts)),
+    ("start_values", Each(Always, start_values::set)),
+    ("states", Each(Serializes, states::serialized)),
+    ("reset", Each(Always, reset::reset)),
+    ("derivatives", Each(Always, derivatives::directional)),
+    ("derivatives", Each(Integrated, derivatives::vectors)),
+    ("dependencies", Each(Always, dependencies::missing)),
+    ("dependencies", Each(Always, dependencies::initial)),
+    ("refusals", Each(Always, refusals::change_nothing)),
+    ("results", Each(Several, results::instances)),
+    ("results", Each(Always, results::reading)),
+    ("results", Each(Always, results::name)),
+    ("results", Each(Stepped3, early_returns::told)),
+    ("results", Each(Several, results::threads)),
+    ("results", Each(Stepped, results::cut)),
+    ("results", Each(Always, results::time)),
+    ("results", Each(Stepped3, results::last_successful)),
+    ("life_cycle", Each(Always, life_cycle::random)),
+    ("life_cycle", Each(Integrated, life_cycle::events)),
+    ("logs", Each(Always, logs::switches)),
+    ("hostile", Malformed("hostile.null-instance", Always, hostile::null_instances)),
+    ("hostile", Malformed("hostile.null", Always, hostile::nulls)),
+    ("hostile", Malformed("hostile.references", Always, hostile::references)),
+    ("hostile", Malformed("hostile.sizes", Always, hostile::sizes)),
+    ("hostile", Malformed("hostile.times", Always, hostile::times)),
+    ("hostile", Malformed("hostile.bytes", Serializes, hostile::bytes)),
 ];

@@ -26,7 +26,7 @@ pub fn unpack(path: &Path, directory: &Path, most: u64) -> anyhow::Result<Vec<Ob
     for index in 0..archive.len() {
         let name = entry(&mut archive, index, &mut names, &mut found)?;
         if crate::worker::interrupted() {
-            return Err(crate::run::Interrupted.into());
+            return Err(crate::run::Stop::Interrupted.into());
         }
         let Some(inside) = name else { continue };
         let mut entry =
@@ -156,22 +156,14 @@ pub fn look(directory: &Path, description: &Description) -> Vec<Observation> {
         if description.standard == Standard::Fmi3 && tuple.is_none() {
             tell("package.platforms", format!("binaries/{name}"));
         }
-        let (is_windows, is_mac) =
-            (name.contains("win") && !name.contains("darwin"), name.contains("darwin"));
-        let end = if is_windows {
-            ".dll"
-        } else if is_mac {
-            ".dylib"
-        } else {
-            ".so"
-        };
-        let standard_directory = tuple.is_some() || known.contains(&name.as_str());
+        let ends = [("darwin", ".dylib"), ("win", ".dll"), ("", ".so")];
+        let end = ends.into_iter().find(|(system, _)| name.contains(system)).map_or("", |(_, end)| end);
+        let of_fmi2 = known.contains(&name.as_str());
+        let standard_directory =
+            (tuple.is_some() || of_fmi2) && (description.standard == Standard::Fmi2) == of_fmi2;
         for offer in [&description.co_simulation, &description.model_exchange].into_iter().flatten() {
             let file = platform.path().join(format!("{}{end}", offer.identifier));
-            if !file.is_file()
-                && standard_directory
-                && (description.standard == Standard::Fmi2) == known.contains(&name.as_str())
-            {
+            if standard_directory && !file.is_file() {
                 let observed = format!("binaries/{name} has no {}{end}", offer.identifier);
                 tell("package.library", observed);
             }
@@ -183,6 +175,11 @@ pub fn look(directory: &Path, description: &Description) -> Vec<Observation> {
     found.dedup();
     found
 }
+
+/// How the names of the libraries of Linux, Windows and macOS begin.
+const OF_SYSTEM: &str = "libc.so libm.so libdl.so libpthread.so librt.so libgcc_s.so libstdc++.so ld-linux libutil.so \
+    kernel32 kernelbase ntdll msvcrt api-ms-win user32 advapi32 ws2_32 shell32 ole32 bcrypt shlwapi ucrtbase \
+    /usr/lib/ /system/library/";
 
 /// System requirements of a library.
 fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String)) {
@@ -211,36 +208,7 @@ fn needs(path: &Path, platform: &str, tell: &mut impl FnMut(&'static str, String
     let directory = path.parent().unwrap_or(path);
     let of_system = |library: &str| {
         let lower = library.to_lowercase();
-        let linux = [
-            "libc.so",
-            "libm.so",
-            "libdl.so",
-            "libpthread.so",
-            "librt.so",
-            "libgcc_s.so",
-            "libstdc++.so",
-            "ld-linux",
-            "libutil.so",
-        ];
-        let windows = [
-            "kernel32",
-            "kernelbase",
-            "ntdll",
-            "msvcrt",
-            "api-ms-win",
-            "user32",
-            "advapi32",
-            "ws2_32",
-            "shell32",
-            "ole32",
-            "bcrypt",
-            "shlwapi",
-            "ucrtbase",
-        ];
-        let mac = ["/usr/lib/", "/system/library/"];
-        linux.iter().chain(&windows).any(|known| lower.starts_with(known))
-            || mac.iter().any(|known| lower.starts_with(known))
-            || lower.is_empty()
+        OF_SYSTEM.split_whitespace().any(|known| lower.starts_with(known)) || lower.is_empty()
     };
     let foreign: Vec<&String> =
         libraries.iter().filter(|library| !of_system(library) && !directory.join(library).exists()).collect();
@@ -285,18 +253,12 @@ fn unlinked(bytes: &[u8]) -> object::Result<Vec<String>> {
 /// The newest version of glibc that it needs.
 fn glibc(bytes: &[u8], platform: &str, name: &str, tell: &mut impl FnMut(&'static str, String)) {
     let marker = b"GLIBC_2.";
-    let mut newest = (0, 0);
-    for index in
-        bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker).map(|(index, _)| index)
-    {
-        let digits = bytes[index + marker.len()..]
-            .iter()
-            .take_while(|byte| byte.is_ascii_digit())
-            .map(|byte| *byte as char);
-        let minor: u32 = digits.collect::<String>().parse().unwrap_or(0);
-        newest = newest.max((2, minor));
-    }
-    if newest >= (2, 29) {
-        tell("package.glibc", format!("binaries/{platform}/{name} needs glibc {}.{}", newest.0, newest.1));
+    let of_marker = bytes.windows(marker.len()).enumerate().filter(|(_, window)| window == marker);
+    let minors = of_marker.map(|(index, _)| {
+        let digits = bytes[index + marker.len()..].iter().take_while(|byte| byte.is_ascii_digit());
+        digits.map(|byte| char::from(*byte)).collect::<String>().parse::<u32>().unwrap_or(0)
+    });
+    if let Some(minor) = minors.max().filter(|minor| *minor >= 29) {
+        tell("package.glibc", format!("binaries/{platform}/{name} needs glibc 2.{minor}"));
     }
 }

@@ -3,26 +3,15 @@
 use crate::call_sequence::{Arg, Kind, Run};
 use crate::checker::Checker;
 use crate::description::{Variable, kind_of, type_name};
-use crate::finding::{Judge, status_name};
-use crate::values::near;
-use crate::writer::{Point, Read, Trajectory, Writer, difference, readable};
+use crate::finding::status_name;
+use crate::values::{near, other_values};
+use crate::writer::{Part, Played, Point, Read, Trajectory, Writer, access, difference, step_args};
 use fmi_abi::Interface;
 use std::sync::Arc;
 
-/// A call that ought to be rejected.
-struct Attack {
-    function: String,
-    args: Vec<Arg>,
-    what: String,
-    /// The rule that is broken if it is not.
-    accepted: Option<&'static str>,
-}
-
-impl Attack {
-    fn new(function: &str, args: Vec<Arg>, what: &str, accepted: Option<&'static str>) -> Self {
-        Self { function: function.to_owned(), args, what: what.to_owned(), accepted }
-    }
-}
+/// A call that ought to be rejected: the function, its arguments, what is wrong with them, and the rule that is broken if
+/// the call is accepted.
+type Attack = (String, Vec<Arg>, String, Option<&'static str>);
 
 const TOLERATED: Option<&str> = Some("refusals.tolerated");
 
@@ -35,10 +24,8 @@ pub fn unknown_reference(checker: &Checker) -> u64 {
 
 /// Values for a call that sets some.
 fn set(checker: &Checker, references: Vec<u64>, kind: Kind, bits: Vec<u64>) -> Vec<Arg> {
-    let (count, total) = (references.len() as i64, bits.len() as i64);
-    let mut args = vec![Arg::In(Kind::U32, references), Arg::Whole(count), Arg::In(kind, bits)];
-    args.extend(checker.fmi3().then_some(Arg::Whole(total)));
-    args
+    let total = bits.len();
+    access(checker.description.standard, references, [Arg::In(kind, bits)], total)
 }
 
 /// Values of variables that cannot be set, or together with one that cannot.
@@ -46,8 +33,8 @@ fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
     let description = &checker.description;
     let unknown = unknown_reference(checker);
     let (mut attacks, mut observed, mut inputs_tried) = (Vec::new(), Vec::new(), 0);
-    for index in readable(description) {
-        let variable = &description.variables[index];
+    for index in &checker.readable {
+        let variable = &description.variables[*index];
         let (Some(base), Some(1)) = (variable.base, variable.size) else { continue };
         let (name, kind) = (type_name(description.standard, base), kind_of(description.standard, base));
         if kind == Kind::Pointer {
@@ -59,39 +46,48 @@ fn of_variables(checker: &Checker, interface: Interface) -> Vec<Attack> {
             true => near(variable, start, 1.0 / 32.0),
             false => 1.0 - start.clamp(0.0, 1.0),
         });
+        let stepped = interface == Interface::CoSimulation;
+        let is = |causality: &str, variability: &str| {
+            variable.causality == causality && variable.variability == variability
+        };
         let input = variable.causality == "input"
             && !variable.clocked
-            && (interface == Interface::CoSimulation || variable.variability == "continuous");
-        let tunable = variable.causality == "parameter"
-            && variable.variability == "tunable"
-            && interface == Interface::CoSimulation;
-        if (input || tunable) && !observed.contains(&name) {
-            observed.push(name);
+            && (stepped || variable.variability == "continuous");
+        let mut once = |of: &'static str| {
+            !observed.contains(&of) && {
+                observed.push(of);
+                true
+            }
+        };
+        if (input || is("parameter", "tunable") && stepped) && once(name) {
             let what = format!("a value for {} and one for a reference that no variable has", variable.name);
             let args = set(checker, vec![reference, unknown], kind, vec![other; 2]);
-            attacks.push(Attack::new(&function, args, &what, None));
+            attacks.push((function.clone(), args, what, None));
         }
         if input && kind.is_float() && inputs_tried < 3 {
             inputs_tried += 1;
             attacks.extend(of_input(checker, variable, &function, kind, other));
         }
-        let fixed = variable.causality == "parameter" && variable.variability == "fixed";
-        let (once, rule, what) = if variable.variability == "constant" {
-            ("constant", "refusals.constant", format!("a value for the constant {}", variable.name))
+        let (of, rule, what) = if variable.variability == "constant" {
+            ("constant", Some("refusals.constant"), format!("a value for the constant {}", variable.name))
         } else if variable.causality == "output" && variable.initial == "calculated" {
-            ("output", "refusals.tolerated", format!("a value for the output {}", variable.name))
-        } else if fixed {
+            ("output", TOLERATED, format!("a value for the output {}", variable.name))
+        } else if is("parameter", "fixed") {
             let what = format!("a value for the fixed parameter {} after the initialization", variable.name);
-            (name_of_fixed(name), "refusals.tolerated", what)
+            let of = match name {
+                "Real" | "Float64" => "fixed",
+                "Integer" | "Int32" => "fixed whole",
+                _ => "fixed other",
+            };
+            (of, TOLERATED, what)
         } else {
             continue;
         };
-        if !observed.contains(&once) {
-            observed.push(once);
-            let first = input_of(checker, kind).filter(|_| once != "constant");
+        if once(of) {
+            let first = input_of(checker, kind).filter(|_| of != "constant");
             let references: Vec<u64> = first.into_iter().chain([reference]).collect();
             let bits = vec![other; references.len()];
-            attacks.push(Attack::new(&function, set(checker, references, kind, bits), &what, Some(rule)));
+            attacks.push((function, set(checker, references, kind, bits), what, rule));
         }
     }
     attacks
@@ -107,118 +103,105 @@ fn of_input(checker: &Checker, variable: &Variable, function: &str, kind: Kind, 
             && other.size == Some(1)
     });
     let second = another.map_or(reference, |other| u64::from(other.reference));
-    let nan = set(checker, vec![reference, second], kind, vec![other, kind.bits(f64::NAN)]);
-    let what = format!("a value for {} and NaN for a second", variable.name);
-    let mut attacks = vec![Attack::new(function, nan, &what, None)];
-    if let Some(max) = variable.max {
-        let bits = vec![other, kind.bits(max + 1.0 + max.abs())];
-        let what = format!("a value for {} beyond its max", variable.name);
-        attacks.push(Attack::new(function, set(checker, vec![second, reference], kind, bits), &what, None));
-    }
-    attacks
+    let beyond = variable.max.map(|max| ([second, reference], max + 1.0 + max.abs(), "beyond its max"));
+    let values = [([reference, second], f64::NAN, "and NaN for a second")].into_iter().chain(beyond);
+    let attack = |(references, number, what): ([u64; 2], f64, &str)| {
+        let args = set(checker, references.to_vec(), kind, vec![other, kind.bits(number)]);
+        (function.to_owned(), args, format!("a value for {} {what}", variable.name), None)
+    };
+    values.map(attack).collect()
 }
 
 /// Unknown references, calls of other modes, and bytes that are no state.
 fn of_calls(checker: &Checker, interface: Interface, time: f64) -> Vec<Attack> {
     let (unknown, fmi3) = (unknown_reference(checker), checker.fmi3());
-    let float = if fmi3 { "Float64" } else { "Real" };
-    let mut get = vec![Arg::In(Kind::U32, vec![unknown]), Arg::Whole(1), Arg::Out(Kind::F64, 1)];
-    get.extend(fmi3.then_some(Arg::Whole(1)));
+    let (get_float, set_float) = if fmi3 { ("GetFloat64", "SetFloat64") } else { ("GetReal", "SetReal") };
+    let get = access(checker.description.standard, vec![unknown], [Arg::Out(Kind::F64, 1)], 1);
     let set = set(checker, vec![unknown], Kind::F64, vec![0]);
     let experiment =
         vec![Arg::Whole(0), Arg::real(0.0), Arg::real(time + 7.0), Arg::Whole(0), Arg::real(0.0)];
     let (experiment, nothing) = if fmi3 { (vec![], experiment) } else { (experiment, vec![]) };
-    let (enter, exit) = ("EnterInitializationMode", "ExitInitializationMode");
-    let accepted = Some("refusals.accepted");
-    let mut attacks = vec![
-        Attack::new(&format!("Get{float}"), get, "the value of a reference that no variable has", accepted),
-        Attack::new(&format!("Set{float}"), set, "a value for a reference that no variable has", accepted),
-        Attack::new(exit, vec![], "leaving Initialization Mode, which it is not in", TOLERATED),
-        Attack::new(enter, nothing, "entering Initialization Mode amid the simulation", TOLERATED),
+    let bytes = Arg::In(Kind::U8, (0..64).map(|byte| byte * 37 % 256).collect());
+    let bytes = vec![bytes, Arg::Whole(64), Arg::StateOut(90)];
+    let (accepted, serializes) = (Some("refusals.accepted"), checker.serializes(interface));
+    let enter = "EnterInitializationMode";
+    let attacks = [
+        (true, get_float, get, "the value of a reference that no variable has", accepted),
+        (true, set_float, set, "a value for a reference that no variable has", accepted),
+        (
+            true,
+            "ExitInitializationMode",
+            vec![],
+            "leaving Initialization Mode, which it is not in",
+            TOLERATED,
+        ),
+        (true, enter, nothing, "entering Initialization Mode amid the simulation", TOLERATED),
+        (!fmi3, "SetupExperiment", experiment, "another experiment amid the simulation", TOLERATED),
+        (serializes, "DeserializeFMUState", bytes, "bytes that are no state", TOLERATED),
     ];
-    if !fmi3 {
-        let what = "another experiment amid the simulation";
-        attacks.push(Attack::new("SetupExperiment", experiment, what, TOLERATED));
-    }
-    if checker.serializes(interface) {
-        let name = if fmi3 { "DeserializeFMUState" } else { "DeSerializeFMUstate" };
-        let bytes = Arg::In(Kind::U8, (0..64).map(|byte| byte * 37 % 256).collect());
-        let args = vec![bytes, Arg::Whole(64), Arg::StateOut(90)];
-        attacks.push(Attack::new(name, args, "bytes that are no state", TOLERATED));
-    }
-    attacks
+    let wanted = attacks.into_iter().filter(|(wanted, ..)| *wanted);
+    wanted.map(|(_, name, args, what, rule)| (name.to_owned(), args, what.to_owned(), rule)).collect()
 }
 
 /// Steps that are impossible, and derivatives of inputs that are none.
 fn of_steps(checker: &Checker, time: f64, size: f64) -> Vec<Attack> {
-    let mut attacks: Vec<Attack> = [
+    let step = |(time, size, what): (f64, f64, &str)| {
+        let args = step_args(checker.description.standard, time, size);
+        ("DoStep".to_owned(), args, what.to_owned(), TOLERATED)
+    };
+    let steps = [
         (time, 0.0, "a step of no size"),
         (time, -size, "a step back"),
         (time, f64::NAN, "a step of NaN"),
         (time + 10.0 * size, size, "a step from a time that is not reached yet"),
         (f64::NAN, size, "a step from NaN"),
-    ]
-    .into_iter()
-    .map(|(time, size, what)| {
-        let mut args = vec![Arg::real(time), Arg::real(size), Arg::Whole(0)];
-        if checker.fmi3() {
-            args.extend([(); 3].map(|()| Arg::Out(Kind::U8, 1)));
-            args.push(Arg::Out(Kind::F64, 1));
-        }
-        Attack::new("DoStep", args, what, TOLERATED)
-    })
-    .collect();
+    ];
     let input = input_of(checker, Kind::F64)
         .filter(|_| !checker.fmi3() && checker.can(Interface::CoSimulation, &["canInterpolateInputs"]));
-    if let Some(input) = input {
-        let unknown = unknown_reference(checker);
-        for (references, orders, what) in [
-            ([input, unknown], [1, 1], "a derivative of an input and of a reference that no variable has"),
-            ([input, input], [1, 0], "a derivative of order 1 and one of order 0"),
-        ] {
+    let derivatives = input.into_iter().flat_map(|input| {
+        [
+            (
+                unknown_reference(checker),
+                1,
+                "a derivative of an input and of a reference that no variable has",
+            ),
+            (input, 0, "a derivative of order 1 and one of order 0"),
+        ]
+        .map(|(second, order, what)| {
             let args = vec![
-                Arg::In(Kind::U32, references.to_vec()),
+                Arg::In(Kind::U32, vec![input, second]),
                 Arg::Whole(2),
-                Arg::In(Kind::I32, orders.to_vec()),
+                Arg::In(Kind::I32, vec![1, order]),
                 Arg::In(Kind::F64, vec![3_f64.to_bits(); 2]),
             ];
-            attacks.push(Attack::new("SetRealInputDerivatives", args, what, None));
-        }
-    }
-    attacks
+            ("SetRealInputDerivatives".to_owned(), args, what.to_owned(), None)
+        })
+    });
+    steps.map(step).into_iter().chain(derivatives).collect()
 }
 
 /// Times and states that are impossible in Model Exchange.
 fn of_integration(states: &[f64]) -> Vec<Attack> {
     let mode = "entering Continuous-Time Mode, which it is in";
     let mut attacks = vec![
-        Attack::new("SetTime", vec![Arg::real(f64::NAN)], "a time of NaN", None),
-        Attack::new("EnterContinuousTimeMode", vec![], mode, TOLERATED),
+        ("SetTime", vec![Arg::real(f64::NAN)], "a time of NaN", None),
+        ("EnterContinuousTimeMode", vec![], mode, TOLERATED),
     ];
-    if !states.is_empty() {
+    if let Some(last) = states.len().checked_sub(1) {
         let other: Vec<u64> = states.iter().map(|state| (state + 0.125).to_bits()).collect();
-        let mut bad = other.clone();
-        if let Some(last) = bad.last_mut() {
-            *last = f64::NAN.to_bits();
-        }
+        let bad = [&other[..last], &[f64::NAN.to_bits()]].concat();
         let more = [other, vec![0]].concat();
         for (states, what, rule) in
             [(more, "one state too many", TOLERATED), (bad, "states one of which is NaN", None)]
         {
             let count = Arg::Whole(states.len() as i64);
-            let args = vec![Arg::In(Kind::F64, states), count];
-            attacks.push(Attack::new("SetContinuousStates", args, what, rule));
+            attacks.push(("SetContinuousStates", vec![Arg::In(Kind::F64, states), count], what, rule));
         }
     }
     attacks
-}
-
-fn name_of_fixed(name: &'static str) -> &'static str {
-    match name {
-        "Real" | "Float64" => "fixed",
-        "Integer" | "Int32" => "fixed whole",
-        _ => "fixed other",
-    }
+        .into_iter()
+        .map(|(name, args, what, rule)| (name.to_owned(), args, what.to_owned(), rule))
+        .collect()
 }
 
 /// An input of this type, which a call changes before it comes to the value that it cannot set.
@@ -233,84 +216,85 @@ fn input_of(checker: &Checker, kind: Kind) -> Option<u64> {
     of.map(|variable| u64::from(variable.reference))
 }
 
-/// The numbers of what was read at once and later, and of the calls.
-#[derive(Default)]
-struct Played {
-    at_once: Vec<Read>,
-    later: Vec<Read>,
-    calls: Vec<u32>,
-    attack: Option<u32>,
-}
-
-/// A trajectory, with an attack or without.
-fn play(writer: &mut Writer, of: usize, trajectory: &Trajectory, attack: Option<&Attack>) -> Played {
-    let mut played = Played::default();
+/// A trajectory, with an attack in its middle or without: the attack, the reads after it, and the rest.
+fn play(writer: &mut Writer, of: usize, attack: Option<&Attack>) -> (Option<u32>, Vec<Read>, Played) {
+    let trajectory = writer.trajectory;
     let to = trajectory.points.len() / 2;
-    writer.begin(of, trajectory);
-    for point in &trajectory.points[..to] {
-        writer.point(of, trajectory, point);
-    }
-    played.attack = attack.map(|attack| writer.forbidden(Some(of), &attack.function, attack.args.clone()));
-    played.at_once = writer.ask(of, trajectory.interface);
+    writer.play(of, &[Part::Begin, Part::Points(to)]);
+    let attack = attack.map(|(function, args, ..)| writer.forbidden(Some(of), function, args.clone()));
+    let at_once = writer.ask(of);
+    let mut later = Played::default();
     for (number, point) in trajectory.points[to..].iter().enumerate() {
         // A value that was set has most effect where no other is set.
         let inputs = if number < 2 { Vec::new() } else { point.inputs.clone() };
-        played.calls.extend(writer.point(of, trajectory, &Point { inputs, ..point.clone() }));
-        played.later.extend(writer.ask(of, trajectory.interface));
+        later.ids.extend(writer.point(of, &Point { inputs, ..point.clone() }));
+        later.reads.extend(writer.ask(of));
     }
     writer.free(of);
-    played
+    (attack, at_once, later)
 }
 
 /// Each attack amid a trajectory; the simulation continues as it does without the attack.
-pub fn change_nothing(checker: &Checker) -> anyhow::Result<()> {
-    for trajectory in &checker.trajectories {
-        let interface = trajectory.interface;
-        let to = trajectory.points.len() / 2;
-        let Some(here) = trajectory.points.get(to) else { continue };
-        let before = trajectory.points[..to].last();
-        let mut attacks = of_variables(checker, interface);
-        match interface {
-            Interface::CoSimulation => {
-                attacks.extend(of_calls(checker, interface, here.time));
-                attacks.extend(of_steps(checker, here.time, here.size));
-            }
-            Interface::ModelExchange => {
-                attacks.extend(of_calls(checker, interface, before.unwrap_or(here).time));
-                attacks.extend(of_integration(before.map_or(&[], |point| &point.states)));
-            }
-        }
-        for attack in attacks {
-            attacked(checker, trajectory, attack)?;
-        }
+pub fn change_nothing(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let interface = trajectory.interface;
+    let to = trajectory.points.len() / 2;
+    let Some(here) = trajectory.points.get(to) else { return Ok(()) };
+    let before = trajectory.points[..to].last();
+    let mut attacks = of_variables(checker, interface);
+    if trajectory.is_stepped() {
+        attacks.extend(of_calls(checker, interface, here.time));
+        attacks.extend(of_steps(checker, here.time, here.size));
+    } else {
+        attacks.extend(of_calls(checker, interface, before.unwrap_or(here).time));
+        attacks.extend(of_integration(before.map_or(&[], |point| &point.states)));
     }
-    Ok(())
+    attacks.into_iter().try_for_each(|attack| attacked(checker, trajectory, attack))?;
+    after_end(checker, trajectory)
+}
+
+/// A value for an input after the end, where neither version of the standard allows it.
+fn after_end(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let description = &checker.description;
+    let is_input = |index: &&usize| {
+        let variable = &description.variables[**index];
+        variable.causality == "input" && !variable.clocked && !variable.start.is_empty()
+    };
+    let input = checker.readable.iter().find(is_input);
+    let Some((index, value)) = input.and_then(|index| Some((*index, other_values(description, *index)?)))
+    else {
+        return Ok(());
+    };
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, &[Part::Begin, Part::Points(2), Part::Call("Terminate")]);
+    writer.forbidden = true;
+    let ids = writer.set(0, &[(index, value)]);
+    let name = description.variables[index].name.clone();
+    checker.check("refusals.tolerated", writer.sequence, move |run| {
+        let accepted = ids.iter().all(|id| run.succeeds(*id));
+        accepted.then(|| format!("a value for the input {name} is accepted after Terminate"))
+    })
 }
 
 /// An attack is rejected and changes nothing.
 fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyhow::Result<()> {
-    let mut writer = checker.writer();
-    let alone = play(&mut writer, 0, trajectory, None);
-    let beside = play(&mut writer, 1, trajectory, Some(&attack));
-    let Some(id) = beside.attack else { return Ok(()) };
-    let Attack { function, what, accepted, .. } = attack;
+    let mut writer = checker.writer(trajectory);
+    let (_, alone_at_once, alone) = play(&mut writer, 0, None);
+    let (Some(id), at_once, later) = play(&mut writer, 1, Some(&attack)) else { return Ok(()) };
+    let (function, _, what, accepted) = attack;
     let call = format!("{function} with {what} returns");
     let named = call.clone();
     let description = checker.description.clone();
     let changed = Arc::new(move |run: &Run, rejected: i32| -> Option<String> {
         let status = run.status(id).filter(|status| *status == rejected)?;
         // After an error an instance may reject everything.
-        let rejects =
-            |reads: &[Read]| reads.iter().any(|read| run.status(read.id).is_none_or(|status| status > 1));
-        if rejects(&beside.at_once) {
+        let rejects = |reads: &[Read]| !reads.iter().all(|read| run.succeeds(read.id));
+        if rejects(&at_once) {
             return None;
         }
-        let fails = |id: &u32| run.status(*id).is_none_or(|status| status > 1);
-        let ends = rejects(&beside.later) || beside.calls.iter().any(fails);
-        let (variable, was, is) =
-            difference(&description, run, &alone.at_once, &beside.at_once).or_else(|| {
-                if ends { None } else { difference(&description, run, &alone.later, &beside.later) }
-            })?;
+        let ends = rejects(&later.reads) || !later.ids.iter().all(|id| run.succeeds(*id));
+        let at_once = difference(&description, run, &alone_at_once, &at_once);
+        let later = || difference(&description, run, &alone.reads, &later.reads).filter(|_| !ends);
+        let (variable, was, is) = at_once.or_else(later)?;
         Some(format!("{named} {}, and {variable} is {is} after it instead of {was}", status_name(status)))
     });
     // In FMI 2.0 a step that is discarded may have gone part of the way.
@@ -319,17 +303,15 @@ fn attacked(checker: &Checker, trajectory: &Trajectory, attack: Attack) -> anyho
         false => Some("refusals.changed").filter(|_| function != "DoStep"),
     };
     let error = Arc::clone(&changed);
-    let run =
-        checker.judge("refusals.changed", writer.sequence.clone(), Arc::new(move |run| error(run, 3)))?;
+    let run = checker.judge("refusals.changed", writer.sequence.clone(), move |run| error(run, 3))?;
     if let Some(rule) = discarded {
-        checker.keep(rule, &run, &writer.sequence, Arc::new(move |run| changed(run, 2)));
+        checker.keep(rule, &run, &writer.sequence, move |run| changed(run, 2));
     }
     if let Some(rule) = accepted {
-        let judge: Judge = Arc::new(move |run| {
-            let status = run.status(id).filter(|status| *status <= 1)?;
+        checker.keep(rule, &run, &writer.sequence, move |run| {
+            let status = run.status(id).filter(|_| run.succeeds(id))?;
             Some(format!("{call} {}", status_name(status)))
         });
-        checker.keep(rule, &run, &writer.sequence, judge);
     }
     Ok(())
 }

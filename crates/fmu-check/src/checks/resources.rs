@@ -1,120 +1,79 @@
 //! Resources that remain after many simulations, and settings of the process.
 
-use crate::call_sequence::{End, Numbered, Step};
+use crate::call_sequence::{End, Measured, Run, Step};
 use crate::checker::Checker;
-use crate::finding::Judge;
+use crate::finding::refused;
 use crate::values::Value;
-use crate::writer::{Trajectory, Writer};
+use crate::writer::Part::{Ask, Begin, Call, Drop, Enter, Free, Leave, Make, Points, Restore, Save};
+use crate::writer::{Part, Trajectory, Writer};
 use fmi_abi::BaseType;
-use std::sync::Arc;
 
 /// Simulations, states and calls again and again.
-pub fn cycles(checker: &Checker) -> anyhow::Result<()> {
-    for trajectory in &checker.trajectories {
-        let whole = |writer: &mut Writer| {
-            writer.begin(0, trajectory);
-            for point in trajectory.points.iter().take(3) {
-                writer.point(0, trajectory, point);
+pub fn cycles(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let measured = |what: &'static str, before: &[Part], cycle: &dyn Fn(&mut Writer)| {
+        let mut writer = checker.writer(trajectory);
+        writer.play(0, before);
+        measured(checker, writer, what, cycle)
+    };
+    measured("instances made, run and freed", &[], &|writer| {
+        writer.play(0, &[Begin, Points(3), Ask, Call("Terminate"), Free]);
+    })?;
+    let variables = checker.description.variables.iter().enumerate();
+    let texts: Vec<(usize, Value)> = variables
+        .filter(|(_, of)| of.base == Some(BaseType::String) && of.size == Some(1) && !of.clocked)
+        .filter(|(_, of)| of.causality == "input" || of.causality == "parameter" && of.initial == "exact")
+        .filter_map(|(index, of)| Some((index, Value::Texts(vec![of.start.first()?.clone().into_bytes()]))))
+        .collect();
+    if !texts.is_empty() {
+        measured("texts set", &[Make], &|writer| {
+            writer.set(0, &texts);
+        })?;
+    }
+    measured("resets", &[Make], &|writer| {
+        writer.play(0, &[Enter, Leave, Points(2), Ask, Call("Reset")]);
+    })?;
+    if checker.saves(trajectory.interface) {
+        measured("states saved and freed", &[Begin, Points(2)], &|writer| {
+            writer.play(0, &[Save(0), Save(0), Restore(0)]);
+            if checker.serializes(trajectory.interface) {
+                writer.serialize(0, 0);
+                writer.deserialize(0, 0, 1);
+                writer.play(0, &[Restore(1), Drop(1)]);
             }
-            writer.ask(0, trajectory.interface);
-            writer.call(0, "Terminate", vec![]);
-            writer.free(0);
-        };
-        measured(checker, "instances made, run and freed", |_| {}, whole)?;
-        let variables = checker.description.variables.iter().enumerate();
-        let texts: Vec<(usize, Value)> = variables
-            .filter(|(_, of)| of.base == Some(BaseType::String) && of.size == Some(1) && !of.clocked)
-            .filter(|(_, of)| of.causality == "input" || of.causality == "parameter" && of.initial == "exact")
-            .filter_map(|(index, of)| {
-                Some((index, Value::Texts(vec![of.start.first()?.clone().into_bytes()])))
-            })
-            .collect();
-        if !texts.is_empty() {
-            let make = |writer: &mut Writer| {
-                writer.make(0, trajectory.interface);
-            };
-            let set = |writer: &mut Writer| {
-                writer.set(0, &texts);
-            };
-            measured(checker, "texts set", make, set)?;
-        }
-        measured(
-            checker,
-            "resets",
-            |writer| {
-                writer.make(0, trajectory.interface);
-            },
-            |writer| {
-                writer.enter(0);
-                writer.leave(0, trajectory);
-                for point in trajectory.points.iter().take(2) {
-                    writer.point(0, trajectory, point);
-                }
-                writer.ask(0, trajectory.interface);
-                writer.call(0, "Reset", vec![]);
-            },
-        )?;
-        if checker.saves(trajectory.interface) {
-            measured(
-                checker,
-                "states saved and freed",
-                |writer| states_before(writer, trajectory),
-                |writer| {
-                    states(checker, writer, trajectory);
-                },
-            )?;
-        }
-        settings(checker, trajectory)?;
+            writer.play(0, &[Ask, Drop(0)]);
+        })?;
     }
-    Ok(())
+    settings(checker, trajectory)
 }
 
-fn states_before(writer: &mut Writer, trajectory: &Trajectory) {
-    writer.begin(0, trajectory);
-    for point in trajectory.points.iter().take(2) {
-        writer.point(0, trajectory, point);
-    }
-}
-
-fn states(checker: &Checker, writer: &mut Writer, trajectory: &Trajectory) {
-    writer.save(0, 0);
-    writer.save(0, 0);
-    writer.restore(0, 0);
-    if checker.serializes(trajectory.interface) {
-        writer.serialize(0, 0);
-        writer.deserialize(0, 0, 1);
-        writer.restore(0, 1);
-        writer.drop_state(0, 1);
-    }
-    writer.ask(0, trajectory.interface);
-    writer.drop_state(0, 0);
-}
-
+/// Plays a cycle many times, and judges the resources that remain.
 fn measured(
     checker: &Checker,
+    mut writer: Writer,
     what: &'static str,
-    before: impl Fn(&mut Writer),
-    cycle: impl Fn(&mut Writer),
+    cycle: &dyn Fn(&mut Writer),
 ) -> anyhow::Result<()> {
-    let mut writer = checker.writer();
-    before(&mut writer);
-    let mut steps: Vec<Numbered> = Vec::new();
     let begin = writer.sequence.len();
     cycle(&mut writer);
-    steps.extend(writer.sequence.drain(begin..));
-    let repeat = |times: usize| Step::Repeat(times, steps.clone());
-    let warm = writer.add(repeat(200));
+    let steps = writer.sequence.split_off(begin);
+    let warm = writer.add(Step::Repeat(200, steps.clone()));
     let first = writer.add(Step::Measure);
-    let times = writer.add(repeat(10_000));
+    let many = writer.add(Step::Repeat(10_000, steps.clone()));
     let last = writer.add(Step::Measure);
-    let last_of_cycle: Vec<u32> = steps.iter().map(|numbered| numbered.id).collect();
-    let done = move |run: &crate::call_sequence::Run| {
-        let (one, two) = (run.of(warm)?.measured.as_ref()?.times, run.of(times)?.measured.as_ref()?.times);
-        (one >= 50 && two >= 50).then_some(two)
+    let sequence = writer.sequence;
+    let run = checker.play_for(&sequence, checker.setting.repetitions * 3.0 + checker.limit)?;
+    if run.end != End::Done {
+        return checker.check("resources.cycles", sequence, |_| None);
+    }
+    checker.keep_always(&sequence, &run);
+    // The resources before and after enough cycles, and the number of these.
+    let done = move |run: &Run| -> Option<(Measured, Measured, usize)> {
+        let measured = |id| run.of(id)?.measured.clone();
+        let (before, times) = (measured(warm)?.times, measured(many)?.times);
+        (before >= 50 && times >= 50).then_some((measured(first)?, measured(last)?, times))
     };
-    let memory: Judge = Arc::new(move |run| {
-        let times = done(run)?;
-        let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
+    checker.keep("resources.memory", &run, &sequence, move |run| {
+        let (one, two, times) = done(run)?;
         let grown = two.memory.saturating_sub(one.memory);
         // Where the C library counts, a block is 32 bytes at least, and a few may stay for itself; elsewhere pages are all that can be observed.
         let enough = if one.exact { 16 * times as u64 + 4096 } else { 64 * times as u64 + (4 << 20) };
@@ -122,63 +81,40 @@ fn measured(
             format!("{grown} bytes are left after {times} {what}: {} for each", grown / times as u64)
         })
     });
-    let sequence = writer.sequence.clone();
-    let limit = checker.setting.repetitions * 3.0 + checker.limit;
-    let run = checker.play_for(&sequence, limit)?;
-    if run.end != crate::call_sequence::End::Done {
-        let nothing: Judge = Arc::new(|_| None);
-        checker.judge("resources.cycles", sequence, nothing)?;
-        return Ok(());
-    }
-    checker.keep_always(&sequence, &run);
-    checker.keep("resources.memory", &run, &sequence, memory);
-    let threads: Judge = Arc::new(move |run| {
-        let times = done(run)?;
-        let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
-        (two.threads > one.threads + 2)
-            .then(|| format!("{} threads are left after {times} {what}", two.threads - one.threads))
+    checker.keep("resources.threads", &run, &sequence, move |run| {
+        let (one, two, times) = done(run)?;
+        let more = two.threads.checked_sub(one.threads).filter(|more| *more > 2)?;
+        Some(format!("{more} threads are left after {times} {what}"))
     });
-    checker.keep("resources.threads", &run, &sequence, threads);
-    let files: Judge = Arc::new(move |run| {
-        let times = done(run)?;
-        let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
-        (two.files > one.files + 2)
-            .then(|| format!("{} files are left open after {times} {what}", two.files - one.files))
+    checker.keep("resources.files", &run, &sequence, move |run| {
+        let (one, two, times) = done(run)?;
+        let more = two.files.checked_sub(one.files).filter(|more| *more > 2)?;
+        Some(format!("{more} files are left open after {times} {what}"))
     });
-    checker.keep("resources.files", &run, &sequence, files);
-    let inner = steps.clone();
-    let again: Judge = Arc::new(move |run| {
-        let times = run.of(times)?.measured.as_ref()?.times;
-        let why = crate::finding::refused(&inner, run, &last_of_cycle[1..])
-            .or_else(|| crate::finding::refused_one(&inner, run, last_of_cycle[0]))?;
+    let ids: Vec<u32> = steps.iter().map(|numbered| numbered.id).collect();
+    checker.keep("resources.cycles", &run, &sequence, move |run| {
+        let times = run.of(many)?.measured.as_ref()?.times;
+        let why = refused(&steps, run, &ids)?;
         (times > 1).then(|| format!("after {} {what}: {why}", times - 1))
     });
-    checker.keep("resources.cycles", &run, &sequence, again);
     Ok(())
 }
 
 /// Rounding, locale, directory, signals: as before.
 fn settings(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let mut writer = checker.writer();
-    // The library is loaded with the first call.
-    writer.add(Step::Version(if checker.fmi3() { "fmi3GetVersion" } else { "fmi2GetVersion" }.to_owned()));
+    let mut writer = checker.writer(trajectory);
+    writer.add(checker.version());
     let first = writer.add(Step::Measure);
-    writer.begin(0, trajectory);
-    for point in &trajectory.points {
-        writer.point(0, trajectory, point);
-    }
-    writer.ask(0, trajectory.interface);
+    writer.play(0, &[Begin, Points(usize::MAX), Ask]);
     let last = writer.add(Step::Measure);
-    let judge: Judge = Arc::new(move |run| {
+    let run = checker.judge("resources.settings", writer.sequence.clone(), move |run| {
         let (one, two) = (run.of(first)?.measured.as_ref()?, run.of(last)?.measured.as_ref()?);
         let (was, is) = one.settings.iter().zip(&two.settings).find(|(was, is)| was != is)?;
         Some(format!("{was} has become {is}"))
-    });
-    let run = checker.judge("resources.settings", writer.sequence.clone(), judge)?;
-    let judge: Judge = Arc::new(move |run| {
+    })?;
+    checker.keep("logs.printed", &run, &writer.sequence, |run| {
         let line = run.said.lines().find(|line| !line.trim().is_empty())?;
         (run.end == End::Done).then(|| format!("{:?}", line.chars().take(80).collect::<String>()))
     });
-    checker.keep("logs.printed", &run, &writer.sequence, judge);
     Ok(())
 }

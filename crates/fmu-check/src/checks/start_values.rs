@@ -1,69 +1,61 @@
 //! Start values are what the description says; what is set is what is read; values are of their types and within their
 //! ranges.
 
-use crate::call_sequence::Written;
+use crate::call_sequence::{Run, Written};
 use crate::checker::Checker;
 use crate::description::Variable;
-use crate::finding::Judge;
 use crate::values::{Value, is_read, other_values};
 use crate::worker::FILL;
-use crate::writer::{Trajectory, Writer, readable, sample, value_of};
-use fmi_abi::{BaseType, Interface};
+use crate::writer::Part::{Begin, Enter, Free, Leave, Make, Points};
+use crate::writer::{Part, Read, Trajectory, Writer, sample, value_of, values_of};
+use fmi_abi::BaseType;
 use std::sync::Arc;
 
 /// The values of the variables in Initialization Mode, before anything is set.
-pub fn starts(checker: &Checker) -> anyhow::Result<()> {
-    for trajectory in &checker.trajectories {
-        let description = &checker.description;
-        let mut writer = checker.writer();
-        writer.make(0, trajectory.interface);
-        writer.enter(0);
-        let reads = writer.read_these(0, &sample(description, 10_000));
-        let all = reads.clone();
-        let model = Arc::clone(&checker.description);
-        let judge: Judge = Arc::new(move |run| {
-            for (index, _) in all.iter().flat_map(|read| read.of.iter().copied()) {
-                let variable = &model.variables[index];
-                let fixed = variable.initial == "exact" || variable.causality == "input";
-                let (true, Some(base)) =
-                    (fixed && !variable.start.is_empty() && !variable.clocked, variable.base)
-                else {
-                    continue;
-                };
+pub fn starts(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let model = Arc::clone(&checker.description);
+    // FMI 2.0 has no values before Initialization Mode. In FMI 3.0 they are the start values (section 2.3.2).
+    let situations = [&[Make, Enter][..], &[Make]];
+    for parts in situations.into_iter().take(if checker.fmi3() { 2 } else { 1 }) {
+        let (model, mut writer) = (Arc::clone(&model), checker.writer(trajectory));
+        writer.play(0, parts);
+        let reads = writer.read_these(0, &sample(&model, 10_000));
+        checker.check("start_values.start", writer.sequence, move |run| {
+            values_of(run, &reads).find_map(|(index, value)| {
                 // A parameter may be the start of a state that has the same reference: a start value for each is not known.
-                let Some(value) = value_of(run, &all, index) else { continue };
-                let wrong = match &value {
-                    Written::Texts(texts) if base == BaseType::String => texts
-                        .iter()
-                        .zip(&variable.start)
-                        .any(|(text, start)| text.as_deref() != Some(start.as_bytes())),
-                    Written::Texts(_) => false,
-                    Written::Numbers(kind, bits) => {
-                        let starts = variable.starts();
-                        starts.len() == bits.len()
-                            && bits.iter().zip(&starts).any(|(bits, start)| {
-                                let (is, must) = (kind.number(*bits), kind.number(kind.bits(*start)));
-                                // The text may have fewer digits than the number.
-                                (is - must).abs() > 1e-9 * must.abs() || is.is_nan() != must.is_nan()
-                            })
-                    }
-                };
-                if wrong {
-                    return Some(format!(
-                        "{} starts with {}, the description says {}",
-                        variable.name,
-                        value.show(0),
-                        variable.start.join(" ")
-                    ));
-                }
-            }
-            None
-        });
-        checker.judge("start_values.start", writer.sequence.clone(), judge)?;
-        values(checker, trajectory)?;
-        constants(checker, trajectory)?;
+                let variable =
+                    Some(&model.variables[index]).filter(|variable| !is_start(variable, &value))?;
+                let (name, starts) = (&variable.name, variable.start.join(" "));
+                Some(format!("{name} starts with {}, the description says {starts}", value.show(0)))
+            })
+        })?;
     }
-    Ok(())
+    values(checker, trajectory)?;
+    constants(checker, trajectory)
+}
+
+/// Whether a value is the start value, for variables that must have it.
+fn is_start(variable: &Variable, value: &Written) -> bool {
+    let fixed = variable.initial == "exact" || variable.causality == "input";
+    if !fixed || variable.start.is_empty() || variable.clocked || variable.base.is_none() {
+        return true;
+    }
+    match value {
+        Written::Texts(texts) => {
+            let mut pairs = texts.iter().zip(&variable.start);
+            variable.base != Some(BaseType::String)
+                || pairs.all(|(text, start)| text.as_deref() == Some(start.as_bytes()))
+        }
+        Written::Numbers(kind, bits) => {
+            let starts = variable.starts();
+            let wrong = |(bits, start): (&u64, &f64)| {
+                let (is, must) = (kind.number(*bits), kind.number(kind.bits(*start)));
+                // The text may have fewer digits than the number.
+                (is - must).abs() > 1e-9 * must.abs() || is.is_nan() != must.is_nan()
+            };
+            starts.len() != bits.len() || !bits.iter().zip(&starts).any(wrong)
+        }
+    }
 }
 
 /// Tests a value of a variable; returns a description of the error.
@@ -100,231 +92,164 @@ const VALUE_TESTS: [(&str, ValueTest); 5] = [
 ];
 
 /// Each value that is read along the trajectory is written, valid for its type and within its range.
-fn values(checker: &Checker, trajectory: &crate::writer::Trajectory) -> anyhow::Result<()> {
-    let mut writer = checker.writer();
-    writer.begin(0, trajectory);
-    let mut reads = vec![writer.read(0)];
+fn values(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let mut writer = checker.writer(trajectory);
+    writer.begin(0);
+    let mut reads = writer.read(0);
     for point in &trajectory.points {
-        writer.point(0, trajectory, point);
-        reads.push(writer.read(0));
+        writer.point(0, point);
+        reads.extend(writer.read(0));
     }
-    let model = Arc::clone(&checker.description);
     let run = checker.play(&writer.sequence)?;
     checker.keep_always(&writer.sequence, &run);
     for (name, test) in VALUE_TESTS {
-        let (model, reads) = (Arc::clone(&model), reads.clone());
-        let judge: Judge = Arc::new(move |run| {
-            for reads in &reads {
-                for (index, _) in reads.iter().flat_map(|read| read.of.iter().copied()) {
-                    let variable = &model.variables[index];
-                    if variable.clocked {
-                        continue;
-                    }
-                    if let Some(value) = value_of(run, reads, index)
-                        && let Some(why) = test(variable, &value)
-                    {
-                        return Some(format!("{} {why}", variable.name));
-                    }
-                }
-            }
-            None
+        let (model, reads) = (Arc::clone(&checker.description), reads.clone());
+        checker.keep(name, &run, &writer.sequence, move |run| {
+            values_of(run, &reads).find_map(|(index, value)| {
+                let variable = Some(&model.variables[index]).filter(|variable| !variable.clocked)?;
+                Some(format!("{} {}", variable.name, test(variable, &value)?))
+            })
         });
-        checker.keep(name, &run, &writer.sequence, judge);
     }
     Ok(())
 }
 
 /// Constants and fixed parameters do not change while time goes on.
-fn constants(checker: &Checker, trajectory: &crate::writer::Trajectory) -> anyhow::Result<()> {
-    let description = &checker.description;
-    let fixed: Vec<usize> = readable(description)
-        .into_iter()
-        .filter(|index| {
-            let variable = &description.variables[*index];
-            let tunable = description.variables.iter().any(|other| {
-                other.variability == "tunable" || other.causality == "input" && other.variability == "fixed"
-            });
-            variable.variability == "constant"
-                || !tunable && variable.variability == "fixed" && variable.causality != "input"
-                || variable.causality == "parameter"
-        })
-        .collect();
+fn constants(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    let variables = &checker.description.variables;
+    let tunable = variables.iter().any(|other| {
+        other.variability == "tunable" || other.causality == "input" && other.variability == "fixed"
+    });
+    let mut fixed = checker.readable.clone();
+    fixed.retain(|index| {
+        let variable = &variables[*index];
+        variable.variability == "constant"
+            || !tunable && variable.variability == "fixed" && variable.causality != "input"
+            || variable.causality == "parameter"
+    });
     if fixed.is_empty() || trajectory.points.is_empty() {
         return Ok(());
     }
-    let mut writer = checker.writer();
-    writer.begin(0, trajectory);
+    let mut writer = checker.writer(trajectory);
+    writer.begin(0);
     let first = writer.read_these(0, &fixed);
-    for point in &trajectory.points {
-        writer.point(0, trajectory, point);
-    }
+    writer.play(0, &[Points(usize::MAX)]);
     let last = writer.read_these(0, &fixed);
-    let description = description.clone();
-    let judge: Judge = Arc::new(move |run| {
-        let (name, before, after) = crate::writer::difference(&description, run, &first, &last)?;
-        Some(format!("{name} was {before} and has become {after}"))
-    });
-    checker.judge("start_values.fixed", writer.sequence, judge)?;
-    Ok(())
+    let differ = checker
+        .differ(first, last, |name, before, after| format!("{name} was {before} and has become {after}"));
+    checker.check("start_values.fixed", writer.sequence, differ)
 }
 
 /// Values that are set are read back: before and in Initialization Mode, during the simulation and after it.
-pub fn set(checker: &Checker) -> anyhow::Result<()> {
+pub fn set(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
     let description = &checker.description;
-    for trajectory in &checker.trajectories {
-        let indices: Vec<usize> = readable(description)
-            .into_iter()
-            .filter(|index| {
-                let variable = &description.variables[*index];
-                let settable = variable.causality == "input"
-                    || variable.initial == "exact" && variable.variability != "constant";
-                settable
-                    && !variable.clocked
-                    && !variable.start.is_empty()
-                    && description.aliases(*index).count() == 1
-            })
-            .collect();
-        let near: Vec<(usize, Value)> = indices
-            .iter()
-            .filter(|index| description.variables[**index].is_float())
-            .filter_map(|index| Some((*index, other_values(description, *index)?)))
-            .collect();
+    let variable = |index: &usize| &description.variables[*index];
+    let mut indices = checker.readable.clone();
+    indices.retain(|index| {
+        let of = variable(index);
+        let settable = of.causality == "input" || of.initial == "exact" && of.variability != "constant";
+        settable && !of.clocked && !of.start.is_empty() && description.aliases(*index).count() == 1
+    });
+    let with_other = |index: &usize| Some((*index, other_values(description, *index)?));
+    let (floats, others): (Vec<usize>, Vec<usize>) =
+        indices.iter().partition(|index| variable(index).is_float());
+    let near: Vec<(usize, Value)> = floats.iter().filter_map(with_other).collect();
+    // Together what every model takes; alone what it may refuse.
+    let alone = others.iter().take(checker.most(40)).flat_map(|index| {
+        // Longer than buffers are.
+        let long = Value::Texts(vec![b"long ".repeat(100); variable(index).start.len()]);
+        let long = (variable(index).base == Some(BaseType::String)).then_some((*index, long));
+        with_other(index).into_iter().chain(long).map(|value| vec![value])
+    });
+    if !near.is_empty() {
         when(checker, trajectory, &near)?;
-        // Together what every model takes; alone what it may refuse.
-        let alone = indices
-            .iter()
-            .filter(|index| !description.variables[**index].is_float())
-            .take(checker.most(40))
-            .flat_map(|index| {
-                // Longer than buffers are.
-                let long =
-                    Value::Texts(vec![b"long ".repeat(100); description.variables[*index].start.len()]);
-                let long = (description.variables[*index].base == Some(BaseType::String)).then_some(long);
-                other_values(description, *index).into_iter().chain(long).map(|value| vec![(*index, value)])
-            });
-        for values in std::iter::once(near).filter(|near| !near.is_empty()).chain(alone) {
-            for within in [true, false] {
-                let mut writer = checker.writer();
-                writer.make(0, trajectory.interface);
-                if within {
-                    writer.enter(0);
-                }
-                let sets = writer.set(0, &values);
-                if !within {
-                    writer.enter(0);
-                }
-                what_was_set(checker, writer, values.clone(), sets)?;
-            }
-        }
-        // At a communication point, where event modes are not needed for it.
-        for index in indices.into_iter().take(checker.most(400)) {
-            let variable = &description.variables[index];
-            let late = match trajectory.interface {
-                Interface::CoSimulation => variable.causality == "input" || variable.variability == "tunable",
-                Interface::ModelExchange => variable.causality == "input" && variable.is_float(),
-            };
-            let late = late && (variable.is_float() || variable.variability != "discrete");
-            if let Some(value) =
-                other_values(description, index).filter(|_| late && !variable.once_per_instant)
-            {
-                let values = vec![(index, value)];
-                let mut writer = checker.writer();
-                writer.begin(0, trajectory);
-                for point in trajectory.points.iter().take(2) {
-                    writer.point(0, trajectory, point);
-                }
-                let sets = writer.set(0, &values);
-                what_was_set(checker, writer, values, sets)?;
-            }
-        }
-        inputs(checker, trajectory)?;
     }
-    Ok(())
+    for values in std::iter::once(near.clone()).filter(|near| !near.is_empty()).chain(alone) {
+        for (before, after) in [(&[Make, Enter][..], &[][..]), (&[Make][..], &[Enter][..])] {
+            what_was_set(checker, trajectory, before, values.clone(), after)?;
+        }
+    }
+    // At a communication point, where event modes are not needed for it.
+    for index in indices.iter().take(checker.most(400)) {
+        let of = variable(index);
+        let late = of.causality == "input" || of.variability == "tunable" && trajectory.is_stepped();
+        let late = late && (of.is_float() || of.variability != "discrete" && trajectory.is_stepped());
+        if let Some(value) = with_other(index).filter(|_| late && !of.once_per_instant) {
+            what_was_set(checker, trajectory, &[Begin, Points(2)], vec![value], &[])?;
+        }
+    }
+    inputs(checker, trajectory)
 }
 
 /// Start values count, whether they are set before Initialization Mode or in it, and whatever is read in between.
 fn when(checker: &Checker, trajectory: &Trajectory, values: &[(usize, Value)]) -> anyhow::Result<()> {
-    if values.is_empty() {
-        return Ok(());
-    }
-    let mut writer = checker.writer();
-    let (mut sets, mut reads) = (Vec::new(), [Vec::new(), Vec::new()]);
-    for (of, reads) in reads.iter_mut().enumerate() {
-        writer.make(of, trajectory.interface);
-        if of == 1 {
-            writer.enter(of);
-            writer.read(of);
-        }
-        sets.extend(writer.set(of, values));
-        if of == 0 {
-            writer.enter(of);
-        }
-        reads.extend(writer.read(of));
-        writer.leave(of, trajectory);
-        reads.extend(writer.ask(of, trajectory.interface));
-        writer.free(of);
-    }
-    let [before, within] = reads;
-    let description = checker.description.clone();
-    let judge: Judge = Arc::new(move |run| {
-        if sets.iter().any(|id| run.status(*id).is_none_or(|status| status > 1)) {
-            return None;
-        }
-        let (name, one, other) = crate::writer::difference(&description, run, &before, &within)?;
-        Some(format!(
-            "{name} is {one} with values set before Initialization Mode, {other} with those set in it"
-        ))
+    let mut writer = checker.writer(trajectory);
+    let mut sets = Vec::new();
+    let [before, within] =
+        [(&[Make][..], &[Enter][..]), (&[Make, Enter, Part::Read][..], &[][..])].map(|(before, after)| {
+            writer.play(0, before);
+            sets.extend(writer.set(0, values));
+            writer.play(0, after);
+            writer.play(0, &[Part::Read, Leave, Part::Ask, Free]).reads
+        });
+    let differ = checker.differ(before, within, |name, one, other| {
+        format!("{name} is {one} with values set before Initialization Mode, {other} with those set in it")
     });
-    checker.judge("start_values.when", writer.sequence, judge)?;
-    Ok(())
+    checker.check("start_values.when", writer.sequence, move |run| {
+        let good = sets.iter().all(|id| run.succeeds(*id));
+        if good { differ(run) } else { None }
+    })
+}
+
+/// Values that were set by calls and read by others: the first that was not read as it was set.
+fn lost(
+    checker: &Checker,
+    ids: Vec<u32>,
+    reads: Vec<Read>,
+    values: Vec<(usize, Value)>,
+    has: &'static str,
+) -> impl Fn(&Run) -> Option<String> + use<> {
+    let description = checker.description.clone();
+    move |run| {
+        let good = ids.iter().all(|id| run.succeeds(*id));
+        values.iter().filter(|_| good).find_map(|(index, value)| {
+            let read = value_of(run, &reads, *index).filter(|read| !is_read(read, value))?;
+            let name = &description.variables[*index].name;
+            Some(format!("{name} was set to {} and {has} {}", value.show(), read.show(0)))
+        })
+    }
 }
 
 fn what_was_set(
     checker: &Checker,
-    mut writer: Writer<'_>,
+    trajectory: &Trajectory,
+    before: &[Part],
     values: Vec<(usize, Value)>,
-    sets: Vec<u32>,
+    after: &[Part],
 ) -> anyhow::Result<()> {
-    let indices: Vec<usize> = values.iter().map(|(index, _)| *index).collect();
-    let reads = writer.read_these(0, &indices);
-    let description = checker.description.clone();
-    let judge: Judge = Arc::new(move |run| {
-        if sets.iter().any(|id| run.status(*id).is_none_or(|status| status > 1)) {
-            return None;
-        }
-        values.iter().find_map(|(index, value)| {
-            let read = value_of(run, &reads, *index).filter(|read| !is_read(read, value))?;
-            let name = &description.variables[*index].name;
-            Some(format!("{name} was set to {} and reads {}", value.show(), read.show(0)))
-        })
-    });
-    checker.judge("start_values.set", writer.sequence, judge)?;
-    Ok(())
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, before);
+    let sets = writer.set(0, &values);
+    writer.play(0, after);
+    let reads = read_again(&mut writer, &values);
+    checker.check("start_values.set", writer.sequence, lost(checker, sets, reads, values, "reads"))
+}
+
+/// Reads the variables that were set.
+fn read_again(writer: &mut Writer, values: &[(usize, Value)]) -> Vec<Read> {
+    writer.read_these(0, &values.iter().map(|(index, _)| *index).collect::<Vec<_>>())
 }
 
 /// Inputs keep their values through steps and events.
 fn inputs(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let mut writer = checker.writer();
-    writer.begin(0, trajectory);
-    let mut asked = Vec::new();
+    let mut writer = checker.writer(trajectory);
+    writer.begin(0);
+    let mut judges = Vec::new();
     for point in &trajectory.points {
-        let ids = writer.point(0, trajectory, point);
-        let indices: Vec<usize> = point.inputs.iter().map(|(index, _)| *index).collect();
-        asked.push((ids, writer.read_these(0, &indices), point.inputs.clone()));
+        let ids = writer.point(0, point);
+        let reads = read_again(&mut writer, &point.inputs);
+        judges.push(lost(checker, ids, reads, point.inputs.clone(), "has become"));
     }
-    let description = checker.description.clone();
-    let judge: Judge = Arc::new(move |run| {
-        asked.iter().find_map(|(ids, reads, inputs)| {
-            if ids.iter().any(|id| run.status(*id).is_none_or(|status| status > 1)) {
-                return None;
-            }
-            inputs.iter().find_map(|(index, value)| {
-                let read = value_of(run, reads, *index).filter(|read| !is_read(read, value))?;
-                let name = &description.variables[*index].name;
-                Some(format!("{name} was set to {} and has become {}", value.show(), read.show(0)))
-            })
-        })
-    });
-    checker.judge("start_values.inputs", writer.sequence, judge)?;
-    Ok(())
+    checker
+        .check("start_values.inputs", writer.sequence, move |run| judges.iter().find_map(|judge| judge(run)))
 }

@@ -3,10 +3,9 @@
 
 use crate::call_sequence::{Step, Written};
 use crate::checker::Checker;
-use crate::finding::Judge;
-use crate::finding::refused;
-use crate::writer::{Read, Trajectory, Writer, difference};
-use std::sync::Arc;
+use crate::finding::{Judges, refused};
+use crate::writer::Part::{Ask, Begin, Call, Drop, Enter, Free, Leave, Make, Points, Restore, Run, Save};
+use crate::writer::{Read, Trajectory};
 
 /// The points at which states are saved: the first, one in the middle, one near the end.
 fn indices(trajectory: &Trajectory) -> Vec<usize> {
@@ -18,211 +17,127 @@ fn indices(trajectory: &Trajectory) -> Vec<usize> {
     indices
 }
 
-/// Continues from a point of the trajectory to its end and reads after each point.
-fn rest(writer: &mut Writer, of: usize, trajectory: &Trajectory, from: usize) -> (Vec<u32>, Vec<Read>) {
-    let (mut ids, mut reads) = (Vec::new(), Vec::new());
-    for point in &trajectory.points[from..] {
-        ids.extend(writer.point(of, trajectory, point));
-        reads.extend(writer.ask(of, trajectory.interface));
-    }
-    (ids, reads)
-}
-
-fn up_to(writer: &mut Writer, of: usize, trajectory: &Trajectory, to: usize) {
-    writer.begin(of, trajectory);
-    for point in &trajectory.points[..to] {
-        writer.point(of, trajectory, point);
-    }
-}
-
-fn same(checker: &Checker, what: &'static str, one: Vec<Read>, other: Vec<Read>) -> Judge {
-    let description = checker.description.clone();
-    Arc::new(move |run| {
-        let (name, before, after) = difference(&description, run, &one, &other)?;
-        Some(format!("{name} was {before}, {what} it is {after}"))
-    })
+fn same(checker: &Checker, what: &'static str, one: Vec<Read>, other: Vec<Read>) -> Box<dyn Judges> {
+    checker
+        .differ(one, other, move |name, before, after| format!("{name} was {before}, {what} it is {after}"))
 }
 
 /// Saved, gone on, restored, gone on: the same; twice; and saving changes nothing.
-pub fn restore(checker: &Checker) -> anyhow::Result<()> {
-    for trajectory in checker.trajectories.iter().filter(|trajectory| checker.saves(trajectory.interface)) {
-        for index in indices(trajectory) {
-            let mut writer = checker.writer();
-            up_to(&mut writer, 0, trajectory, index);
-            let before = writer.ask(0, trajectory.interface);
-            writer.save(0, 0);
-            let after = writer.ask(0, trajectory.interface);
-            let (_, first) = rest(&mut writer, 0, trajectory, index);
-            writer.restore(0, 0);
-            let at_once = writer.ask(0, trajectory.interface);
-            let (_, second) = rest(&mut writer, 0, trajectory, index);
-            writer.restore(0, 0);
-            let (_, third) = rest(&mut writer, 0, trajectory, index);
-            let sequence = writer.sequence;
-            let run = checker.judge(
-                "states.changed-by-saving",
-                sequence.clone(),
-                same(checker, "after the state was saved", before.clone(), after),
-            )?;
-            let judges = [
-                ("states.restore-values", same(checker, "after the state was restored", before, at_once)),
-                ("states.restore", same(checker, "from the restored state", first.clone(), second)),
-                ("states.twice", same(checker, "from the state restored a second time", first, third)),
-            ];
-            for (name, judge) in judges {
-                if checker.keep(name, &run, &sequence, judge) {
-                    break;
-                }
-            }
-        }
-        modes(checker, trajectory)?;
-        reused(checker, trajectory)?;
-        free_null(checker, trajectory)?;
+pub fn restore(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    for index in indices(trajectory) {
+        let mut writer = checker.writer(trajectory);
+        let before = writer.play(0, &[Begin, Points(index), Ask]).reads;
+        let after = writer.play(0, &[Save(0), Ask]).reads;
+        let first = writer.play(0, &[Run(index)]).reads;
+        let at_once = writer.play(0, &[Restore(0), Ask]).reads;
+        let second = writer.play(0, &[Run(index)]).reads;
+        let third = writer.play(0, &[Restore(0), Run(index)]).reads;
+        let sequence = writer.sequence;
+        let saving = same(checker, "after the state was saved", before.clone(), after);
+        let run = checker.judge("states.changed-by-saving", sequence.clone(), saving)?;
+        let judges = [
+            ("states.restore-values", same(checker, "after the state was restored", before, at_once)),
+            ("states.restore", same(checker, "from the restored state", first.clone(), second)),
+            ("states.twice", same(checker, "from the state restored a second time", first, third)),
+        ];
+        judges.into_iter().any(|(name, judge)| checker.keep(name, &run, &sequence, judge));
     }
-    Ok(())
+    modes(checker, trajectory)?;
+    reused(checker, trajectory)?;
+    free_null(checker, trajectory)
 }
 
 /// A state of one mode, restored in another.
 fn modes(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let mut writer = checker.writer();
-    writer.make(0, trajectory.interface);
-    writer.save(0, 0);
-    writer.enter(0);
-    writer.save(0, 1);
-    writer.leave(0, trajectory);
-    let (_, first) = rest(&mut writer, 0, trajectory, 0);
-    writer.call(0, "Terminate", vec![]);
+    let mut writer = checker.writer(trajectory);
+    let first = writer.play(0, &[Make, Save(0), Enter, Save(1), Leave, Run(0), Call("Terminate")]).reads;
     // Back to the initialization, then to the beginning.
-    let back = writer.restore(0, 1);
-    let mut ids = writer.leave(0, trajectory);
-    let (more, second) = rest(&mut writer, 0, trajectory, 0);
-    ids.extend(more);
-    let again = writer.restore(0, 0);
-    writer.enter(0);
-    writer.leave(0, trajectory);
-    let (more, third) = rest(&mut writer, 0, trajectory, 0);
-    ids.extend(more);
-    ids.extend([back, again]);
-    let (sequence, one) = (
-        writer.sequence.clone(),
-        same(checker, "from the state of Initialization Mode", first.clone(), second),
-    );
-    let two = same(checker, "from the state of the new instance", first, third);
-    let judge: Judge =
-        Arc::new(move |run| refused(&sequence, run, &ids).or_else(|| one(run)).or_else(|| two(run)));
-    checker.judge("states.modes", writer.sequence, judge)?;
-    Ok(())
+    let back = writer.play(0, &[Restore(1), Leave, Run(0)]);
+    let again = writer.play(0, &[Restore(0), Enter, Leave, Run(0)]);
+    let one = same(checker, "from the state of Initialization Mode", first.clone(), back.reads);
+    let two = same(checker, "from the state of the new instance", first, again.reads);
+    let (sequence, ids) = (writer.sequence.clone(), [back.ids, again.ids].concat());
+    checker.check("states.modes", writer.sequence, move |run| {
+        refused(&sequence, run, &ids).or_else(|| one(run)).or_else(|| two(run))
+    })
 }
 
 /// A handle that is used for another state, and two states side by side.
 fn reused(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let count = trajectory.points.len();
-    if count < 3 {
+    if trajectory.points.len() < 3 {
         return Ok(());
     }
-    let mut writer = checker.writer();
-    up_to(&mut writer, 0, trajectory, 1);
-    writer.save(0, 0);
-    writer.save(0, 1);
-    writer.point(0, trajectory, &trajectory.points[1]);
-    let values = writer.ask(0, trajectory.interface);
-    writer.save(0, 1);
-    let (_, first) = rest(&mut writer, 0, trajectory, 2);
-    writer.restore(0, 0);
-    writer.restore(0, 1);
-    let again = writer.ask(0, trajectory.interface);
-    let (_, second) = rest(&mut writer, 0, trajectory, 2);
-    writer.restore(0, 0);
-    writer.point(0, trajectory, &trajectory.points[1]);
-    let from_first = writer.ask(0, trajectory.interface);
-    writer.drop_state(0, 0);
-    writer.drop_state(0, 1);
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, &[Begin, Points(1), Save(0), Save(1)]);
+    writer.point(0, &trajectory.points[1]);
+    let values = writer.ask(0);
+    let first = writer.play(0, &[Save(1), Run(2)]).reads;
+    let again = writer.play(0, &[Restore(0), Restore(1), Ask]).reads;
+    let second = writer.play(0, &[Run(2), Restore(0)]).reads;
+    writer.point(0, &trajectory.points[1]);
+    let from_first = writer.play(0, &[Ask, Drop(0), Drop(1)]).reads;
     let judges = [
         same(checker, "from the state in a used handle", values.clone(), again),
         same(checker, "from the state in a used handle", first, second),
         same(checker, "from the other state", values, from_first),
     ];
-    let judge: Judge = Arc::new(move |run| judges.iter().find_map(|judge| judge(run)));
-    checker.judge("states.several", writer.sequence, judge)?;
-    Ok(())
+    checker.check("states.several", writer.sequence, move |run| judges.iter().find_map(|judge| judge(run)))
 }
 
 /// NULL is ignored, and a freed state leaves NULL.
 fn free_null(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let mut writer = checker.writer();
-    writer.begin(0, trajectory);
-    writer.save(0, 0);
-    let freed = writer.drop_state(0, 0);
-    let nothing = writer.drop_state(0, 1);
-    let judge: Judge = Arc::new(move |run| {
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, &[Begin, Save(0)]);
+    let ids = writer.play(0, &[Drop(0), Drop(1)]).ids;
+    checker.check("states.free", writer.sequence, move |run| {
+        let (freed, nothing) = (ids[0], ids[1]);
         if run.status(nothing).is_some_and(|status| status > 1) {
             return Some("freeing a state that is NULL is refused".to_owned());
         }
         let left = run.status(freed) == Some(0) && run.written(freed)?.numbers() != [0.0];
         left.then(|| "the handle of a freed state is not NULL".to_owned())
-    });
-    checker.judge("states.free", writer.sequence, judge)?;
-    Ok(())
+    })
 }
 
 /// Deserializes a state in the same instance, in a new one and in a fresh process.
-pub fn serialized(checker: &Checker) -> anyhow::Result<()> {
-    for trajectory in
-        checker.trajectories.iter().filter(|trajectory| checker.serializes(trajectory.interface))
-    {
-        for index in indices(trajectory) {
-            for fresh in [false, true] {
-                let mut writer = checker.writer();
-                up_to(&mut writer, 0, trajectory, index);
-                let before = writer.ask(0, trajectory.interface);
-                writer.save(0, 0);
-                let [size, bytes] = writer.serialize(0, 0);
-                let (_, first) = rest(&mut writer, 0, trajectory, index);
-                if fresh {
-                    writer.add(Step::FreshProcess);
-                } else {
-                    writer.drop_state(0, 0);
-                    writer.free(0);
-                }
-                // States may be set in two situations that importers use: after instantiation and after initialization.
-                if index == 0 && fresh {
-                    writer.make(1, trajectory.interface);
-                } else {
-                    writer.begin(1, trajectory);
-                }
-                let read = writer.deserialize(1, 0, 1);
-                let set = writer.restore(1, 1);
-                let at_once = writer.ask(1, trajectory.interface);
-                let (_, second) = rest(&mut writer, 1, trajectory, index);
-                let sequence = writer.sequence.clone();
-                let name = if fresh { "states.fresh-process" } else { "states.serialized" };
-                let one = same(checker, "from the bytes", before, at_once);
-                let two = same(checker, "from the bytes", first, second);
-                let judge: Judge = Arc::new(move |run| {
-                    if run.status(bytes).is_none_or(|status| status > 1)
-                        || run.status(size).is_none_or(|status| status > 1)
-                    {
-                        return None;
-                    }
-                    refused(&sequence, run, &[read, set]).or_else(|| one(run)).or_else(|| two(run))
-                });
-                checker.judge(name, writer.sequence, judge)?;
-            }
+pub fn serialized(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
+    for (index, fresh) in indices(trajectory).into_iter().flat_map(|index| [(index, false), (index, true)]) {
+        let mut writer = checker.writer(trajectory);
+        let before = writer.play(0, &[Begin, Points(index), Ask, Save(0)]).reads;
+        let [size, bytes] = writer.serialize(0, 0);
+        let first = writer.play(0, &[Run(index)]).reads;
+        if fresh {
+            writer.add(Step::FreshProcess);
+        } else {
+            writer.play(0, &[Drop(0), Free]);
         }
-        again(checker, trajectory)?;
+        // States may be set in two situations that importers use: after instantiation and after initialization.
+        writer.play(1, &[if index == 0 && fresh { Make } else { Begin }]);
+        let read = writer.deserialize(1, 0, 1);
+        let set = writer.play(1, &[Restore(1), Ask]);
+        let second = writer.play(1, &[Run(index)]).reads;
+        let sequence = writer.sequence.clone();
+        let name = if fresh { "states.fresh-process" } else { "states.serialized" };
+        let one = same(checker, "from the bytes", before, set.reads);
+        let two = same(checker, "from the bytes", first, second);
+        checker.check(name, writer.sequence, move |run| {
+            if ![bytes, size].iter().all(|id| run.succeeds(*id)) {
+                return None;
+            }
+            refused(&sequence, run, &[read, set.ids[0]]).or_else(|| one(run)).or_else(|| two(run))
+        })?;
     }
-    Ok(())
+    again(checker, trajectory)
 }
 
 /// Serializing twice gives the same bytes, and serializing what was read gives them, too.
 fn again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
-    let mut writer = checker.writer();
-    up_to(&mut writer, 0, trajectory, trajectory.points.len() / 2);
-    writer.save(0, 0);
+    let mut writer = checker.writer(trajectory);
+    writer.play(0, &[Begin, Points(trajectory.points.len() / 2), Save(0)]);
     let [_, first] = writer.serialize(0, 0);
     writer.deserialize(0, 0, 1);
     let [_, second] = writer.serialize(0, 1);
-    let judge: Judge = Arc::new(move |run| {
+    checker.check("states.bytes", writer.sequence, move |run| {
         let (one, two) = (run.written(first)?, run.written(second)?);
         match (one, two) {
             (Written::Numbers(_, one), Written::Numbers(_, two)) if one.len() != two.len() => {
@@ -230,7 +145,5 @@ fn again(checker: &Checker, trajectory: &Trajectory) -> anyhow::Result<()> {
             }
             _ => one.differ(two).map(|index| format!("byte {index} of {} differs", one.numbers().len())),
         }
-    });
-    checker.judge("states.bytes", writer.sequence, judge)?;
-    Ok(())
+    })
 }

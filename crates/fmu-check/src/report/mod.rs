@@ -61,10 +61,7 @@ impl Report {
             sequences: checker.played(),
             seconds: 0.0,
             seed: checker.seed,
-            variables: [
-                checker.description.variables.len(),
-                crate::writer::readable(&checker.description).len(),
-            ],
+            variables: [checker.description.variables.len(), checker.readable.len()],
             unreached: checker.take_unchecked(),
             findings,
         }
@@ -130,22 +127,16 @@ impl Report {
 
     /// Formats the report for a terminal.
     pub fn terminal(&self, colours: bool) -> String {
-        let mut text = String::new();
-        let _ = writeln!(text, "{} ({}, {}): {}", self.fmu, self.standard, self.offers(), self.summary());
+        let mut text = format!("{} ({}, {}): {}\n", self.fmu, self.standard, self.offers(), self.summary());
         for finding in &self.findings {
-            let (on, off) = match (colours, finding.severity) {
-                (false, _) => ("", ""),
-                (true, Severity::Violation) => ("\u{1b}[31m", "\u{1b}[0m"),
-                (true, Severity::Fragile) => ("\u{1b}[33m", "\u{1b}[0m"),
-                (true, Severity::Note) => ("\u{1b}[36m", "\u{1b}[0m"),
+            let on = match finding.severity {
+                Severity::Violation => "\u{1b}[31m",
+                Severity::Fragile => "\u{1b}[33m",
+                Severity::Note => "\u{1b}[36m",
             };
-            let _ = writeln!(
-                text,
-                "{on}{:9}{off} {:26} {}",
-                finding.severity.name(),
-                finding.name,
-                short(&finding.observed, 160)
-            );
+            let (on, off) = if colours { (on, "\u{1b}[0m") } else { ("", "") };
+            let (severity, observed) = (finding.severity.name(), short(&finding.observed, 160));
+            let _ = writeln!(text, "{on}{severity:9}{off} {:26} {observed}", finding.name);
             let more = match finding.more.len() {
                 0 => String::new(),
                 count => format!("; and {count} more"),
@@ -163,9 +154,8 @@ impl Report {
             let allowed = if *allowed { " (allowed)" } else { "" };
             let _ = writeln!(text, "not checked{allowed}: {name}: {why}");
         }
-        let _ =
-            writeln!(text, "{} call sequences, {:.1} s, seed {}", self.sequences, self.seconds, self.seed);
-        text
+        let Self { sequences, seconds, seed, .. } = self;
+        text + &format!("{sequences} call sequences, {seconds:.1} s, seed {seed}\n")
     }
 
     /// Formats the report as JSON.
@@ -179,62 +169,44 @@ impl Report {
     /// Formats the report as JUnit: one test for each finding, which fails if the finding fails the check.
     pub fn junit(&self) -> String {
         let escape = |text: &str| {
-            let printable =
-                text.chars().filter(|letter| !letter.is_control() || *letter == '\n').collect::<String>();
-            printable.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+            let printable = |letter: &char| !letter.is_control() || *letter == '\n';
+            page::escape(&text.chars().filter(printable).collect::<String>())
         };
-        let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
+        let case = |class: &str, name: &str, body: &str| {
+            format!("  <testcase classname=\"fmu-check{class}\" name=\"{name}\">{body}</testcase>\n")
+        };
+        let of_unchecked = |Unchecked { name, why, allowed }: &Unchecked| {
+            let kind = if *allowed { "skipped" } else { "error" };
+            case("", name, &format!("<{kind} message=\"not checked: {}\"/>", escape(why)))
+        };
+        let of_finding = |finding: &Finding| {
+            let Finding { observed, section, requirement, .. } = finding;
+            let body = format!("{observed}\n{section}: {requirement}\n{}", finding.more.join("\n"));
+            let accepted = finding.accepted.as_ref().map(|reason| format!("\nAccepted: {reason}"));
+            let (severity, body) = (finding.severity.name(), escape(&(body + &accepted.unwrap_or_default())));
+            let body = match finding.fails {
+                false => format!("<system-out>{severity}: {body}</system-out>"),
+                true => {
+                    format!("<failure type=\"{severity}\" message=\"{}\">{body}</failure>", escape(observed))
+                }
+            };
+            case(&format!(".{}", finding.topic()), &finding.name, &format!("\n    {body}\n  "))
+        };
+        let mut cases: Vec<String> = self.unreached.iter().map(of_unchecked).collect();
+        cases.extend(self.findings.iter().map(of_finding));
+        if self.findings.is_empty() {
+            cases.push(case("", "no findings", ""));
+        }
         let failures = self.findings.iter().filter(|finding| finding.fails).count();
         let skipped = self.unreached.iter().filter(|unchecked| unchecked.allowed).count();
-        let _ = writeln!(
-            text,
-            "<testsuite name=\"{}\" tests=\"{}\" failures=\"{failures}\" errors=\"{}\" skipped=\"{skipped}\" time=\"{:.3}\">",
-            escape(&format!("fmu-check {}", self.model)),
-            self.findings.len().max(1) + self.unreached.len(),
-            self.unreached.len() - skipped,
-            self.seconds
-        );
-        if self.findings.is_empty() {
-            let _ = writeln!(text, "  <testcase classname=\"fmu-check\" name=\"no findings\"/>");
-        }
-        for Unchecked { name, why, allowed } in &self.unreached {
-            let (kind, why) = (if *allowed { "skipped" } else { "error" }, escape(why));
-            let _ = writeln!(
-                text,
-                "  <testcase classname=\"fmu-check\" name=\"{name}\"><{kind} message=\"not checked: {why}\"/></testcase>"
-            );
-        }
-        for finding in &self.findings {
-            let _ = writeln!(
-                text,
-                "  <testcase classname=\"fmu-check.{}\" name=\"{}\">",
-                finding.topic(),
-                finding.name
-            );
-            let body = escape(&format!(
-                "{}\n{}: {}\n{}",
-                finding.observed,
-                finding.section,
-                finding.requirement,
-                finding.more.join("\n")
-            ));
-            let (severity, observed) = (finding.severity.name(), escape(&finding.observed));
-            if !finding.fails {
-                let reason = finding
-                    .accepted
-                    .as_ref()
-                    .map_or(String::new(), |reason| escape(&format!("\nAccepted: {reason}")));
-                let _ = writeln!(text, "    <system-out>{severity}: {body}{reason}</system-out>");
-            } else {
-                let _ = writeln!(
-                    text,
-                    "    <failure type=\"{severity}\" message=\"{observed}\">{body}</failure>"
-                );
-            }
-            let _ = writeln!(text, "  </testcase>");
-        }
-        text.push_str("</testsuite>\n");
-        text
+        let (errors, model) = (self.unreached.len() - skipped, escape(&self.model));
+        format!(
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuite name=\"fmu-check {model}\" tests=\"{}\" \
+             failures=\"{failures}\" errors=\"{errors}\" skipped=\"{skipped}\" time=\"{:.3}\">\n{}</testsuite>\n",
+            cases.len(),
+            self.seconds,
+            cases.concat()
+        )
     }
 
     /// Writes all of it to a directory.

@@ -4,7 +4,8 @@ use super::Report;
 use crate::finding::Severity;
 use std::fmt::Write as _;
 
-fn escape(text: &str) -> String {
+/// A string in XML and HTML.
+pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

@@ -1,11 +1,11 @@
 //! A sequence as a program in C.
 
 use super::evidence::{Evidence, Measure, Proof};
-use super::{Names, head, library, phases};
 use crate::call_sequence::{Arg, CallSequence, Kind, Make, NOBODY, Numbered, Setting, Step};
 use crate::description::Description;
 use crate::finding::Finding;
 use fmi_abi::calls::signature;
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 /// The program.
@@ -16,285 +16,282 @@ pub fn program(
     setting: &Setting,
     description: &Description,
 ) -> String {
-    let mut text = String::from("/*\n");
-    for line in head(finding, description) {
-        let _ = writeln!(text, " * {line}");
-    }
-    text.push_str(
-        " * cc repro.c -o repro -ldl -lpthread && ./repro FOLDER_OF_THE_UNPACKED_FMU\n *\n \
-         * Exit status: 1 if the finding shows, 0 if it does not, 3 if that cannot be told.\n */\n",
-    );
-    text.push_str(include_str!("prelude.c"));
-    let names = Names::of(sequence);
-    for index in names.instances.iter().filter(|index| **index != NOBODY) {
-        let _ = writeln!(text, "static void *c{index};");
-    }
-    for slot in &names.states {
-        let _ = writeln!(text, "static void *s{slot};");
-    }
-    for slot in &names.bytes {
-        let _ = writeln!(text, "static size_t *n{slot};\nstatic char *b{slot};");
-    }
-    text.push_str(
-        "static char resources[5000];\nstatic __attribute__((unused)) Callbacks callbacks = {say2, calloc, free, NULL, NULL};\n\n",
-    );
-    let mut writer = Writer { fmi3: setting.fmi3, evidence, description, next: 0, threads: String::new() };
-    let mut bodies = String::new();
-    let parts = phases(sequence);
-    for (number, part) in parts.iter().enumerate() {
-        let mut body = String::new();
-        writer.steps(part, &mut body, "    ");
-        let _ = write!(bodies, "static void phase{number}(void) {{\n{body}}}\n\n");
-    }
-    text.push_str(&writer.threads);
-    text.push_str(&bodies);
-    let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
-    let _ = writeln!(text, "static void (*const phases[])(void) = {{{}}};", list.join(", "));
-    let _ = writeln!(text, "static const char library_name[] = \"{}\";", library(setting, sequence));
-    let format = if setting.fmi3 { "%s/resources/" } else { "file://%s/resources" };
-    let _ = writeln!(text, "static const char resources_format[] = \"{format}\";");
+    let mut writer = Writer {
+        fmi3: setting.fmi3,
+        evidence,
+        description,
+        next: 0,
+        threads: String::new(),
+        instances: BTreeSet::new(),
+        states: BTreeSet::new(),
+        bytes: BTreeSet::new(),
+    };
+    // The parts of the sequence, a process for each.
+    let parts = sequence.split(|numbered| numbered.step == Step::FreshProcess).enumerate();
+    let parts: Vec<String> = parts
+        .map(|(number, part)| {
+            format!("static void phase{number}(void) {{\n{}}}\n\n", writer.block(part, "    "))
+        })
+        .collect();
+    let Writer { threads, instances, states, bytes, .. } = &writer;
+    let each = |slots: &BTreeSet<usize>, write: &dyn Fn(&usize) -> String| {
+        slots.iter().map(write).collect::<String>()
+    };
+    let declared = each(instances, &|index| format!("static void *c{index};\n"))
+        + &each(states, &|slot| format!("static void *s{slot};\n"))
+        + &each(bytes, &|slot| format!("static size_t *n{slot};\nstatic char *b{slot};\n"));
     // Serialized bytes are passed on to the next process in files.
-    let each =
-        |write: &dyn Fn(usize) -> String| names.bytes.iter().map(|slot| write(*slot)).collect::<String>();
-    let load = each(&|slot| {
+    let load = each(bytes, &|slot| {
         format!("    b{slot} = guarded(NULL, 1 << 24);\n    n{slot} = passed_on({slot}, b{slot});\n")
     });
-    let save = each(&|slot| format!("    pass_on({slot}, b{slot}, *n{slot});\n"));
-    let _ = write!(text, "\nstatic void load(void) {{\n{load}}}\n\n");
-    let _ = write!(text, "static void save(void) {{\n{save}}}\n\n");
-    text.push_str(&shows(evidence));
-    text.push_str(include_str!("main.c"));
-    text
+    let save = each(bytes, &|slot| format!("    pass_on({slot}, b{slot}, *n{slot});\n"));
+    let list: Vec<String> = (0..parts.len()).map(|number| format!("phase{number}")).collect();
+    format!(
+        "/*\n{} * cc repro.c -o repro -ldl -lpthread && ./repro FOLDER_OF_THE_UNPACKED_FMU\n *\n \
+         * Exit status: 1 if the finding shows, 0 if it does not, 3 if that cannot be told.\n */\n\
+         #define FMI {}\n{}{declared}\n{threads}{}static void (*const phases[])(void) = {{{}}};\n\
+         static const char library_name[] = \"{}\";\n\nstatic void load(void) {{\n{load}}}\n\n\
+         static void save(void) {{\n{save}}}\n\n{}{}",
+        head(finding, description),
+        if setting.fmi3 { 3 } else { 2 },
+        include_str!("prelude.c"),
+        parts.concat(),
+        list.join(", "),
+        library(setting, sequence),
+        shows(evidence),
+        include_str!("main.c")
+    )
+}
+
+/// The lines of the comment at the top of a program.
+fn head(finding: &Finding, description: &Description) -> String {
+    let section = if finding.section.is_empty() { "not in the standard" } else { &finding.section };
+    let lines = [
+        format!("{}: {} ({}, {section})", description.model_name, finding.name, finding.severity.name()),
+        String::new(),
+        format!("Rule: {}", finding.requirement),
+        format!("Observed: {}", finding.observed),
+        String::new(),
+    ];
+    let plain = |line: &String| line.replace("*/", "* /").replace(['\n', '\r'], " ").replace('\\', "/");
+    lines.iter().map(|line| format!(" * {}\n", plain(line))).collect()
+}
+
+/// The library below the directory of the unpacked FMU.
+fn library(setting: &Setting, sequence: &CallSequence) -> String {
+    let model_exchange =
+        sequence.iter().any(|numbered| matches!(&numbered.step, Step::Make(_, make) if !make.co_simulation));
+    let index = usize::from(model_exchange || setting.libraries[0].is_none());
+    let path = setting.libraries[index].clone().unwrap_or_default();
+    let directory = setting.resources.parent().unwrap_or(&setting.resources);
+    path.strip_prefix(directory).unwrap_or(&path).to_string_lossy().replace('\\', "/")
 }
 
 /// The function that tells whether the results of the calls are those of the finding.
 fn shows(evidence: &Evidence) -> String {
-    let (kind, expression) = match evidence {
-        Evidence::None => ("NONE", "false".to_owned()),
-        Evidence::End => ("END", "false".to_owned()),
-        Evidence::Left => ("LEFT", "false".to_owned()),
-        Evidence::Printed => ("RESULTS", "*result(\"printed\", 0) != 0".to_owned()),
-        Evidence::Damage => ("RESULTS", "damaged()".to_owned()),
-        Evidence::Differ(proofs) => {
-            let of = |index: usize| proofs.get(index).map_or(0, |proof| proof.id);
-            ("RESULTS", format!("strcmp(result(\"r\", {}), result(\"r\", {})) != 0", of(0), of(1)))
-        }
-        Evidence::AnyDiffer(pairs) => {
+    let results = match evidence {
+        Evidence::None | Evidence::End | Evidence::Left => None,
+        Evidence::Printed => Some("*result(\"printed\", 0) != 0".to_owned()),
+        Evidence::Damage => Some("damaged()".to_owned()),
+        Evidence::Differ(pairs) => {
             let list: Vec<String> = pairs.iter().map(|[one, other]| format!("{{{one}, {other}}}")).collect();
-            let list = list.join(", ");
-            ("RESULTS", format!("any_differ((const int[][2]){{{list}}}, {})", pairs.len()))
+            Some(format!("any_differ((const int[][2]){{{}}}, {})", list.join(", "), pairs.len()))
         }
         Evidence::Same(proofs) => {
             let same = |Proof { id, observed, .. }: &Proof| {
                 format!("strcmp(result(\"r\", {id}), {}) == 0", literal(observed.as_bytes()))
             };
-            ("RESULTS", proofs.iter().map(same).collect::<Vec<_>>().join("\n        && "))
+            Some(proofs.iter().map(same).collect::<Vec<_>>().join("\n        && "))
         }
         Evidence::Grown(Measure::Settings, first, last, _) => {
-            let settings = |id: &u32| format!("strchr(result(\"r\", {id}), ';')");
-            ("RESULTS", format!("strcmp({}, {}) != 0", settings(first), settings(last)))
+            let [first, last] = [first, last].map(|id| format!("strchr(result(\"r\", {id}), ';')"));
+            Some(format!("strcmp({first}, {last}) != 0"))
         }
         Evidence::Grown(measure, first, last, most) => {
             let index = *measure as usize;
-            ("RESULTS", format!("measured({last}, {index}) - measured({first}, {index}) > {most}"))
+            Some(format!("measured({last}, {index}) - measured({first}, {index}) > {most}"))
         }
     };
-    format!("#define EVIDENCE {kind}\n\nstatic bool shows(void) {{\n    return {expression};\n}}\n\n")
+    let kind = match evidence {
+        Evidence::None => "NONE",
+        Evidence::End => "END",
+        Evidence::Left => "LEFT",
+        _ => "RESULTS",
+    };
+    let results = results.unwrap_or_else(|| "false".to_owned());
+    format!("#define EVIDENCE {kind}\n\nstatic bool shows(void) {{\n    return {results};\n}}\n\n")
 }
 
+/// Writes the calls, and notes the names that they need.
 struct Writer<'a> {
     fmi3: bool,
     evidence: &'a Evidence,
     description: &'a Description,
     next: usize,
     threads: String,
+    instances: BTreeSet<usize>,
+    states: BTreeSet<usize>,
+    bytes: BTreeSet<usize>,
 }
 
 impl Writer<'_> {
-    fn steps(&mut self, sequence: &[Numbered], text: &mut String, indent: &str) {
-        for Numbered { id, step, .. } in sequence {
-            let matters = match self.evidence {
-                Evidence::Differ(proofs) | Evidence::Same(proofs) => {
-                    proofs.iter().find(|proof| proof.id == *id).map(|proof| proof.matters)
-                }
-                Evidence::AnyDiffer(pairs) => {
-                    pairs.iter().any(|pair| pair.contains(id)).then_some([true, true, false])
-                }
-                _ => None,
-            };
-            match step {
-                Step::Make(index, make) => self.make(*id, *index, make, matters, text, indent),
-                Step::Call { of, function, args } => {
-                    self.call(*id, *of, function, args, matters, text, indent)
-                }
-                Step::Version(name) => {
-                    let _ = writeln!(
-                        text,
-                        "{indent}{{\n{indent}    const char *version = ((const char *(*)(void))function(\"{name}\"))();\n\
-                         {indent}    print(\"{name}: %s\\n\", version);\n\
-                         {indent}    FILE *file = results(\"r\", {id}, \"w\"); put_texts(file, &version, 1); fclose(file);\n{indent}}}"
-                    );
-                }
-                other => self.around(*id, other, text, indent),
-            }
+    /// The next number.
+    fn number(&mut self) -> usize {
+        self.next += 1;
+        self.next - 1
+    }
+
+    /// The steps in C.
+    fn block(&mut self, sequence: &[Numbered], indent: &str) -> String {
+        let lines = sequence.iter().map(|numbered| self.step(numbered)).collect::<String>();
+        lines.lines().fold(String::new(), |text, line| text + indent + line + "\n")
+    }
+
+    /// Parts of the results of a call that matter.
+    fn matters(&self, id: u32) -> Option<[bool; 2]> {
+        match self.evidence {
+            Evidence::Same(proofs) => proofs.iter().find(|proof| proof.id == id).map(|proof| proof.matters),
+            Evidence::Differ(pairs) => pairs.iter().any(|pair| pair.contains(&id)).then_some([true, false]),
+            _ => None,
         }
     }
 
-    /// A step that is no call of the FMU.
-    fn around(&mut self, id: u32, step: &Step, text: &mut String, indent: &str) {
-        let _ = match step {
+    fn step(&mut self, Numbered { id, step, .. }: &Numbered) -> String {
+        match step {
+            Step::Make(index, make) => self.make(*id, *index, make),
+            Step::Call { of, function, args } => self.call(*id, *of, function, args),
+            Step::Version(name) => format!("version({id}, \"{name}\");\n"),
             Step::Free(index) => {
                 let name = if self.fmi3 { "fmi3FreeInstance" } else { "fmi2FreeInstance" };
                 let instance = if *index == NOBODY { "NULL".to_owned() } else { format!("c{index}") };
-                writeln!(text, "{indent}((void (*)(void *))function(\"{name}\"))({instance});")
+                format!("((void (*)(void *))function(\"{name}\"))({instance});\n")
             }
-            Step::Measure => writeln!(text, "{indent}measure({id});"),
-            Step::Unload => writeln!(text, "{indent}dlclose(library);\n{indent}open_library();"),
-            Step::Quit => writeln!(text, "{indent}exit(0);"),
+            Step::Measure => format!("measure({id});\n"),
+            Step::Unload => "dlclose(library);\nopen_library();\n".to_owned(),
+            Step::Quit => "exit(0);\n".to_owned(),
             Step::Repeat(times, steps) => {
-                let mut body = String::new();
-                self.steps(steps, &mut body, &format!("{indent}    "));
-                let counter = self.next;
-                self.next += 1;
-                writeln!(
-                    text,
-                    "{indent}quiet = true;\n{indent}for (long i{counter} = 0; i{counter} < {times}; i{counter}++) {{\n{body}{indent}}}\n\
-                     {indent}quiet = false;"
+                let (body, i) = (self.block(steps, "    "), self.number());
+                format!(
+                    "quiet = true;\nfor (long i{i} = 0; i{i} < {times}; i{i}++) {{\n{body}}}\nquiet = false;\n"
                 )
             }
             Step::Parallel(sequences) => {
-                let mut joins = String::new();
+                let (mut text, mut joins) = (String::new(), String::new());
                 for sequence in sequences {
-                    let number = self.next;
-                    self.next += 1;
-                    let mut body = String::new();
-                    self.steps(sequence, &mut body, "    ");
+                    let (body, number) = (self.block(sequence, "    "), self.number());
                     let _ = write!(
                         self.threads,
                         "static void *thread{number}(void *nothing) {{\n{body}    return nothing;\n}}\n\n"
                     );
                     let _ = writeln!(
                         text,
-                        "{indent}pthread_t t{number};\n{indent}pthread_create(&t{number}, NULL, thread{number}, NULL);"
+                        "pthread_t t{number};\npthread_create(&t{number}, NULL, thread{number}, NULL);"
                     );
-                    let _ = writeln!(joins, "{indent}pthread_join(t{number}, NULL);");
+                    let _ = writeln!(joins, "pthread_join(t{number}, NULL);");
                 }
-                text.push_str(&joins);
-                Ok(())
+                text + &joins
             }
-            _ => Ok(()),
-        };
-    }
-
-    fn make(
-        &self,
-        id: u32,
-        index: usize,
-        make: &Make,
-        matters: Option<[bool; 3]>,
-        text: &mut String,
-        indent: &str,
-    ) {
-        let of = |text: &Option<String>| {
-            text.as_ref().map_or("NULL".to_owned(), |text| {
-                format!("guarded({}, {})", literal(text.as_bytes()), text.len() + 1)
-            })
-        };
-        let (name, token) = (of(&make.name), of(&make.token));
-        let resources = if make.resources { "guarded(resources, strlen(resources) + 1)" } else { "NULL" };
-        let logging = u8::from(make.logging);
-        let made = match (self.fmi3, make.co_simulation) {
-            (false, co_simulation) => format!(
-                "((void *(*)(const char *, int, const char *, const char *, const Callbacks *, int, int))function(\"fmi2Instantiate\"))\
-                 ({name}, {}, {token}, {resources}, &callbacks, 0, {logging})",
-                u8::from(co_simulation)
-            ),
-            (true, false) => format!(
-                "((void *(*)(const char *, const char *, const char *, bool, bool, void *, void *))function(\"fmi3InstantiateModelExchange\"))\
-                 ({name}, {token}, {resources}, false, {logging}, NULL, (void *)say3)"
-            ),
-            (true, true) => format!(
-                "((void *(*)(const char *, const char *, const char *, bool, bool, bool, bool, const uint32_t *, size_t, void *, void *, void *))\
-                 function(\"fmi3InstantiateCoSimulation\"))({name}, {token}, {resources}, false, {logging}, {}, {}, NULL, 0, NULL, (void *)say3, NULL)",
-                u8::from(make.event_mode),
-                u8::from(make.early_return)
-            ),
-        };
-        let _ = writeln!(
-            text,
-            "{indent}{{ size_t before = arrays; *said = 0; c{index} = {made}; release(before); }}\n{indent}print(\"instance {index}: %s\\n\", c{index} ? \"made\" : \"NULL\");"
-        );
-        if let Some([_, _, log]) = matters {
-            let log = if log { "said" } else { "\"\"" };
-            let _ = writeln!(
-                text,
-                "{indent}{{ FILE *file = results(\"r\", {id}, \"w\"); fprintf(file, \"%d;%s\", c{index} != NULL, {log}); fclose(file); }}"
-            );
+            Step::FreshProcess => String::new(),
         }
     }
 
-    #[allow(clippy::too_many_arguments, reason = "the parts of a step")]
-    fn call(
-        &mut self,
-        id: u32,
-        of: Option<usize>,
-        name: &str,
-        args: &[Arg],
-        matters: Option<[bool; 3]>,
-        text: &mut String,
-        indent: &str,
-    ) {
-        let Some(signature) = signature(name) else { return };
-        let inner = format!("{indent}    ");
+    fn make(&mut self, id: u32, index: usize, make: &Make) -> String {
+        self.instances.insert(index);
+        let of =
+            |text: &Option<String>| text.as_ref().map_or("NULL".to_owned(), |text| literal(text.as_bytes()));
+        let (name, token) = (of(&make.name), of(&make.token));
+        let flags = [make.co_simulation, make.resources, make.logging, make.event_mode, make.early_return];
+        let flags = flags.map(|flag| flag.to_string()).join(", ");
+        let made = format!("c{index} = make({index}, {name}, {token}, {flags});\n");
+        let [_, log] = self.matters(id).unwrap_or_default();
+        let log = if log { "said" } else { "\"\"" };
+        let result = format!("{{ FILE *file = begin({id}, c{index} != NULL); end(file, {log}); }}\n");
+        made + if self.matters(id).is_some() { result.as_str() } else { "" }
+    }
+
+    fn call(&mut self, id: u32, of: Option<usize>, name: &str, args: &[Arg]) -> String {
+        let Some(signature) = signature(name) else { return String::new() };
+        self.instances.extend(of);
         let mut parts = Parts::default();
+        let (mut types, mut passed) = (String::new(), String::new());
         for (arg, argument) in args.iter().zip(signature.arguments) {
-            parts.types.push(type_of(argument.of));
-            parts.add(arg, name, self.next);
-            self.next += 1;
+            let _ = write!(types, ", {}", type_of(argument.of));
+            let _ = write!(passed, ", {}", self.argument(&mut parts, arg, name));
         }
         let instance = of.map_or("NULL".to_owned(), |index| format!("c{index}"));
-        let list = |parts: &[String]| parts.iter().map(|part| format!(", {part}")).collect::<String>();
-        let types: Vec<String> = parts.types.iter().map(|of| (*of).to_owned()).collect();
+        let guard = of.map_or(String::new(), |index| format!("if (c{index}) "));
         let comment =
             comment(args, self.description).map_or(String::new(), |names| format!(" /* {names} */"));
-        let lines = |parts: &[String]| {
-            parts.iter().fold(String::new(), |mut lines, part| {
-                let _ = writeln!(lines, "{inner}{part}");
-                lines
-            })
-        };
-        let mut after = lines(&parts.after);
-        if let Some([_, written, log]) = matters {
-            let _ = writeln!(after, "{inner}FILE *file = results(\"r\", {id}, \"w\");");
-            let _ = writeln!(after, "{inner}fprintf(file, \"%d;\", status);");
-            after.push_str(&lines(if written { &parts.proofs } else { &[] }));
-            let _ = writeln!(
-                after,
-                "{inner}fprintf(file, \"%s\", {}); fclose(file);",
-                if log { "said" } else { "\"\"" }
-            );
+        let mut after = parts.after;
+        if let Some([written, log]) = self.matters(id) {
+            after.push(format!("FILE *file = begin({id}, status);"));
+            after.extend(parts.proofs.into_iter().filter(|_| written));
+            after.push(format!("end(file, {});", if log { "said" } else { "\"\"" }));
         }
         if *self.evidence == Evidence::Damage {
-            after.push_str(&lines(&parts.checks));
+            after.extend(parts.checks);
         }
-        let guard = of.map_or(String::new(), |index| format!("if (c{index}) "));
-        let _ = write!(
-            text,
-            "{indent}{guard}{{{comment}\n{inner}size_t before = arrays;\n{}{inner}*said = 0;\n\
-             {inner}int status = ((int (*)(void *{}))function(\"{name}\"))({instance}{});\n\
-             {inner}print(\"{name}: %d\", status);\n{after}{inner}print(\"\\n\"); release(before);\n{indent}}}\n",
-            lines(&parts.before),
-            list(&types),
-            list(&parts.passed)
-        );
+        let lines = |lines: Vec<String>| lines.iter().map(|line| format!("    {line}\n")).collect::<String>();
+        format!(
+            "{guard}{{{comment}\n    size_t before = arrays;\n{}    *said = 0;\n\
+             \x20   int status = ((int (*)(void *{types}))function(\"{name}\"))({instance}{passed});\n\
+             \x20   print(\"{name}: %d\", status);\n{}    print(\"\\n\"); release(before);\n}}\n",
+            lines(parts.before),
+            lines(after)
+        )
+    }
+
+    /// The value that is passed for an argument, with the lines that it needs.
+    fn argument(&mut self, parts: &mut Parts, arg: &Arg, name: &str) -> String {
+        let number = self.number();
+        let string = |text: &Vec<u8>, end: usize| format!("guarded({}, {})", literal(text), text.len() + end);
+        match arg {
+            Arg::State(slot) | Arg::StateOut(slot) => self.states.extend([*slot]),
+            Arg::Saved(slot) | Arg::SavedSize(slot) | Arg::SizeOut(slot) | Arg::SavedOut(slot) => {
+                self.bytes.extend([*slot]);
+            }
+            _ => {}
+        }
+        match arg {
+            Arg::Real(bits) => number_of(Kind::F64, *bits),
+            Arg::Whole(number) => number.to_string(),
+            Arg::Null => "NULL".to_owned(),
+            Arg::Misaligned => "(char *)guarded(NULL, 64) + 1".to_owned(),
+            Arg::In(kind, bits) => {
+                parts.array(number, kind.c_name(), bits.iter().map(|bits| number_of(*kind, *bits)))
+            }
+            Arg::Texts(texts) => {
+                let of =
+                    |text: &Option<Vec<u8>>| text.as_ref().map_or("NULL".to_owned(), |text| string(text, 1));
+                parts.array(number, "void *", texts.iter().map(of))
+            }
+            Arg::Blobs(blobs) => parts.array(number, "void *", blobs.iter().map(|blob| string(blob, 0))),
+            Arg::Out(kind, count) => parts.out(name, *kind, *count, number),
+            Arg::State(slot) => format!("s{slot}"),
+            Arg::StateOut(slot) => {
+                parts.proofs.push(format!("fprintf(file, \"%d,;\", s{slot} != NULL);"));
+                format!("&s{slot}")
+            }
+            Arg::Saved(slot) => format!("guarded(b{slot}, *n{slot})"),
+            Arg::SavedSize(slot) => format!("*n{slot}"),
+            Arg::SizeOut(slot) => {
+                parts.after.push(format!("print(\" -> %zu bytes\", *n{slot});"));
+                parts.proofs.push(format!("put_words(file, n{slot}, 1, 8);"));
+                format!("n{slot}")
+            }
+            Arg::SavedOut(slot) => {
+                parts.before.push(format!("void *a{number} = guarded(NULL, *n{slot});"));
+                parts.after.push(format!("memcpy(b{slot}, a{number}, *n{slot});"));
+                parts.proofs.push(format!("put_words(file, a{number}, *n{slot}, 1);"));
+                format!("a{number}")
+            }
+        }
     }
 }
 
 /// The lines of a call.
 #[derive(Default)]
 struct Parts {
-    types: Vec<&'static str>,
-    passed: Vec<String>,
     before: Vec<String>,
     after: Vec<String>,
     /// Lines that keep the results.
@@ -304,65 +301,24 @@ struct Parts {
 }
 
 impl Parts {
-    fn add(&mut self, arg: &Arg, name: &str, number: usize) {
-        let passed = match arg {
-            Arg::Real(bits) => number_of(Kind::F64, *bits),
-            Arg::Whole(number) => number.to_string(),
-            Arg::Null => "NULL".to_owned(),
-            Arg::Misaligned => "(char *)guarded(NULL, 64) + 1".to_owned(),
-            Arg::In(kind, bits) => {
-                let list: Vec<String> = bits.iter().map(|bits| number_of(*kind, *bits)).collect();
-                self.array(number, c_name(*kind), &list)
-            }
-            Arg::Texts(texts) => {
-                let string = |text: &Vec<u8>| format!("guarded({}, {})", literal(text), text.len() + 1);
-                let list: Vec<String> =
-                    texts.iter().map(|text| text.as_ref().map_or("NULL".to_owned(), string)).collect();
-                self.array(number, "void *", &list)
-            }
-            Arg::Blobs(blobs) => {
-                let list: Vec<String> =
-                    blobs.iter().map(|blob| format!("guarded({}, {})", literal(blob), blob.len())).collect();
-                self.array(number, "void *", &list)
-            }
-            Arg::Out(kind, count) => self.out(name, *kind, *count, number),
-            Arg::State(slot) => format!("s{slot}"),
-            Arg::StateOut(slot) => {
-                self.proofs.push(format!("fprintf(file, \"%d,;\", s{slot} != NULL);"));
-                format!("&s{slot}")
-            }
-            Arg::Saved(slot) => format!("guarded(b{slot}, *n{slot})"),
-            Arg::SavedSize(slot) => format!("*n{slot}"),
-            Arg::SizeOut(slot) => {
-                self.after.push(format!("print(\" -> %zu bytes\", *n{slot});"));
-                self.proofs.push(format!("put_words(file, n{slot}, 1, 8);"));
-                format!("n{slot}")
-            }
-            Arg::SavedOut(slot) => {
-                self.before.push(format!("void *a{number} = guarded(NULL, *n{slot});"));
-                self.after.push(format!("memcpy(b{slot}, a{number}, *n{slot});"));
-                self.proofs.push(format!("put_words(file, a{number}, *n{slot}, 1);"));
-                format!("a{number}")
-            }
-        };
-        self.passed.push(passed);
-    }
-
     /// An array for reading.
-    fn array(&mut self, number: usize, of: &str, list: &[String]) -> String {
+    fn array(&mut self, number: usize, of: &str, list: impl Iterator<Item = String>) -> String {
+        let list: Vec<String> = list.collect();
         let (count, list) = (list.len(), if list.is_empty() { "0".to_owned() } else { list.join(", ") });
-        self.before.push(format!(
-            "{of} v{number}[] = {{{list}}}; void *a{number} = guarded(v{number}, {count} * sizeof *v{number});"
-        ));
-        self.checks.push(format!("look_at(a{number}, v{number}, {count} * sizeof *v{number});"));
+        let size = format!("{count} * sizeof *v{number}");
+        self.before
+            .push(format!("{of} v{number}[] = {{{list}}}; void *a{number} = guarded(v{number}, {size});"));
+        self.checks.push(format!("look_at(a{number}, v{number}, {size});"));
         format!("a{number}")
     }
 
     /// An array that is written.
     fn out(&mut self, name: &str, kind: Kind, count: usize, number: usize) -> String {
-        let (c, width) = (c_name(kind), kind.size());
+        let (c, width) = (kind.c_name(), kind.size());
         self.before.push(format!("void *a{number} = guarded(NULL, {count} * sizeof({c}));"));
+        self.checks.push(format!("look_at(a{number}, NULL, 0);"));
         let letter = match kind {
+            Kind::Pointer => 's',
             kind if kind.is_float() => 'f',
             Kind::I8 | Kind::I16 | Kind::I32 | Kind::I64 => 'i',
             _ => 'u',
@@ -371,17 +327,16 @@ impl Parts {
             // fmi2EventInfo has five flags, then the time.
             let time = format!("show((char *)a{number} + 24, 1, 'f', 8);");
             self.after.push(format!("print(\" ->\"); show(a{number}, 5, 'i', 4); {time}"));
-        } else if kind == Kind::Pointer && name != "fmi3GetBinary" {
-            self.after
-                .push(format!("print(\" ->\"); if (status < 2) show(a{number}, {count}, 's', {width});"));
-            self.proofs.push(format!("if (status < 2) put_texts(file, a{number}, {count});"));
         } else if name != "fmi3GetBinary" {
-            self.after.push(format!("print(\" ->\"); show(a{number}, {count}, '{letter}', {width});"));
+            let guard = if letter == 's' { "if (status < 2) " } else { "" };
+            self.after.push(format!("print(\" ->\"); {guard}show(a{number}, {count}, '{letter}', {width});"));
         }
-        if kind != Kind::Pointer && name != "fmi3GetBinary" {
-            self.proofs.push(format!("put_words(file, a{number}, {count}, {width});"));
+        if name != "fmi3GetBinary" {
+            self.proofs.push(match letter {
+                's' => format!("if (status < 2) put_texts(file, a{number}, {count});"),
+                _ => format!("put_words(file, a{number}, {count}, {width});"),
+            });
         }
-        self.checks.push(format!("look_at(a{number}, NULL, 0);"));
         format!("a{number}")
     }
 }
@@ -410,23 +365,6 @@ fn type_of(of: &str) -> &'static str {
     }
 }
 
-fn c_name(kind: Kind) -> &'static str {
-    match kind {
-        Kind::F64 => "double",
-        Kind::F32 => "float",
-        Kind::I8 => "int8_t",
-        Kind::U8 => "uint8_t",
-        Kind::I16 => "int16_t",
-        Kind::U16 => "uint16_t",
-        Kind::I32 => "int32_t",
-        Kind::U32 => "uint32_t",
-        Kind::I64 => "int64_t",
-        Kind::U64 => "uint64_t",
-        Kind::Size => "size_t",
-        Kind::Pointer => "void *",
-    }
-}
-
 fn number_of(kind: Kind, bits: u64) -> String {
     let number = kind.number(bits);
     match kind {
@@ -443,19 +381,13 @@ fn number_of(kind: Kind, bits: u64) -> String {
 
 /// A string in C; long ones are cut off.
 fn literal(bytes: &[u8]) -> String {
-    let mut text = String::from("\"");
-    for byte in bytes.iter().take(4000) {
-        match byte {
-            b'"' | b'\\' => {
-                text.push('\\');
-                text.push(char::from(*byte));
-            }
-            b' '..=b'~' if *byte != b'?' => text.push(char::from(*byte)),
-            other => {
-                let _ = write!(text, "\\{other:03o}");
-            }
-        }
-    }
-    text.push('"');
-    text
+    let text = bytes.iter().take(4000).fold(String::new(), |mut text, byte| {
+        let _ = match byte {
+            b'"' | b'\\' => write!(text, "\\{}", char::from(*byte)),
+            b' '..=b'~' if *byte != b'?' => write!(text, "{}", char::from(*byte)),
+            other => write!(text, "\\{other:03o}"),
+        };
+        text
+    });
+    format!("\"{text}\"")
 }

@@ -19,10 +19,8 @@ pub enum Evidence {
     Printed,
     /// Something was written before an array or to one that is for reading.
     Damage,
-    /// The results of two calls differ.
-    Differ(Vec<Proof>),
     /// The results of any of these pairs of calls differ.
-    AnyDiffer(Vec<[u32; 2]>),
+    Differ(Vec<[u32; 2]>),
     /// The results of these calls are those that were observed.
     Same(Vec<Proof>),
     /// Bytes, threads or files between two measurements grow by more than a number, or settings change.
@@ -34,7 +32,6 @@ const REPETITIONS: usize = 500;
 
 /// The quantity of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs, reason = "names of quantities")]
 pub enum Measure {
     Memory,
     Threads,
@@ -45,10 +42,9 @@ pub enum Measure {
 /// A call whose results matter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proof {
-    /// The number of the step.
     pub id: u32,
-    /// Whether its status matters, the values that it wrote, its messages.
-    pub matters: [bool; 3],
+    /// Whether the values that it wrote matter, and its messages.
+    pub matters: [bool; 2],
     /// The results that were observed.
     pub observed: String,
 }
@@ -75,7 +71,7 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     }
     let pairs = pairs(&finding.sequence);
     if !pairs.is_empty() {
-        return Evidence::AnyDiffer(pairs);
+        return Evidence::Differ(pairs);
     }
     let needed = needed(judge, run);
     let measured = |of: &&Outcome| of.measured.as_ref().is_some_and(|measured| measured.times == 0);
@@ -88,7 +84,9 @@ pub fn evidence(finding: &Finding, run: &Run) -> Evidence {
     let proofs: Vec<Proof> = ids.iter().map(|id| proof(judge, &needed, *id)).collect();
     let calls: Vec<_> = proofs.iter().filter_map(|proof| function(&finding.sequence, proof.id)).collect();
     match &calls[..] {
-        [one, other] if one == other && proofs[0].observed != proofs[1].observed => Evidence::Differ(proofs),
+        [one, other] if one == other && proofs[0].observed != proofs[1].observed => {
+            Evidence::Differ(vec![[proofs[0].id, proofs[1].id]])
+        }
         [] => Evidence::None,
         _ => Evidence::Same(proofs),
     }
@@ -140,7 +138,6 @@ fn proof(judge: &Judge, run: &Run, id: u32) -> Proof {
         judge(&changed).is_none()
     };
     let matters = [
-        true,
         without(&|of| of.written.clear()) || run.of(id).is_some_and(|of| of.text.is_some()),
         without(&|of| of.log.clear())
             || run.of(id).is_some_and(|of| of.log.is_empty() && of.status > Some(1)),
@@ -156,10 +153,10 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 /// The results as the programs write them.
-fn shown(outcome: &Outcome, [status, written, log]: [bool; 3]) -> String {
+fn shown(outcome: &Outcome, [written, log]: [bool; 2]) -> String {
     let mut text = String::new();
     let or_null = |bytes: &Option<Vec<u8>>| bytes.as_ref().map_or("-".to_owned(), |bytes| hex(bytes));
-    if let Some(number) = outcome.status.filter(|_| status) {
+    if let Some(number) = outcome.status {
         let _ = write!(text, "{number};");
     }
     for array in outcome.written.iter().filter(|_| written) {
@@ -209,14 +206,14 @@ fn grown(finding: &Finding, needed: &Run) -> Evidence {
         .and_then(|(id, _)| needed.of(*id)?.measured.as_ref())
         .map_or(0, |of| of.times.min(REPETITIONS) as u64);
     let measures: Vec<u32> = ids.iter().filter(|(_, repeated)| !repeated).map(|(id, _)| *id).collect();
-    let (&[first, last], Some((_, what))) = (&measures[..], finding.name.split_once('.')) else {
-        return Evidence::None;
-    };
-    match what {
-        "memory" => Evidence::Grown(Measure::Memory, first, last, 16 * times + 4096),
-        "threads" => Evidence::Grown(Measure::Threads, first, last, 2),
-        "files" => Evidence::Grown(Measure::Files, first, last, 2),
-        "settings" => Evidence::Grown(Measure::Settings, first, last, 0),
+    let known = [
+        ("resources.memory", Measure::Memory, 16 * times + 4096),
+        ("resources.threads", Measure::Threads, 2),
+        ("resources.files", Measure::Files, 2),
+        ("resources.settings", Measure::Settings, 0),
+    ];
+    match (&measures[..], known.into_iter().find(|(name, ..)| *name == finding.name)) {
+        (&[first, last], Some((_, measure, most))) => Evidence::Grown(measure, first, last, most),
         _ => Evidence::None,
     }
 }
@@ -276,9 +273,7 @@ mod tests {
             let (one, other) = (run.written(1)?, run.written(3)?);
             one.differ(other).map(|_| "they differ".to_owned())
         });
-        let Evidence::Differ(proofs) = evidence(&finding(judge), &run()) else { panic!("two calls") };
-        assert_eq!(proofs.iter().map(|proof| proof.id).collect::<Vec<_>>(), [1, 3]);
-        assert_eq!(proofs[0].observed, "0;3ff0000000000000,;");
+        assert_eq!(evidence(&finding(judge), &run()), Evidence::Differ(vec![[1, 3]]));
     }
 
     #[test]

@@ -63,7 +63,7 @@ int main(int count, char **arguments) {
     bool found;
     if (!full) { perror("the folder of the unpacked FMU"); return 3; }
     at_once = EVIDENCE == END;
-    snprintf(resources, sizeof resources, resources_format, full);
+    snprintf(resources, sizeof resources, FMI == 3 ? "%s/resources/" : "file://%s/resources", full);
     snprintf(library_path, sizeof library_path, "%s/%s", full, library_name);
     if (count > 3) { folder = arguments[3]; phase(atoi(arguments[2])); }
     if (!mkdtemp(temporary)) { perror("mkdtemp"); return 3; }

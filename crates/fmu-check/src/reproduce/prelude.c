@@ -180,6 +180,53 @@ static __attribute__((unused)) void say3(void *environment, int status, const ch
     print("    log: status %d, category %s: %s\n", status, category ? category : "NULL", text ? text : "NULL");
 }
 
+static char resources[5000];
+static __attribute__((unused)) Callbacks callbacks = {say2, calloc, free, NULL, NULL};
+
+static void *copy(const char *text) { return text ? guarded(text, strlen(text) + 1) : NULL; }
+
+/* Instantiates. */
+static __attribute__((unused)) void *make(int index, const char *name, const char *token, bool co_simulation, bool in_resources, bool logging, bool events, bool early) {
+    size_t before = arrays;
+    void *made;
+    const char *where = in_resources ? copy(resources) : NULL;
+    name = copy(name);
+    token = copy(token);
+    *said = 0;
+    (void)events; (void)early;
+#if FMI == 2
+    made = ((void *(*)(const char *, int, const char *, const char *, const Callbacks *, int, int))function("fmi2Instantiate"))(name, co_simulation, token, where, &callbacks, 0, logging);
+#else
+    if (co_simulation)
+        made = ((void *(*)(const char *, const char *, const char *, bool, bool, bool, bool, const uint32_t *, size_t, void *, void *, void *))function("fmi3InstantiateCoSimulation"))(name, token, where, false, logging, events, early, NULL, 0, NULL, (void *)say3, NULL);
+    else
+        made = ((void *(*)(const char *, const char *, const char *, bool, bool, void *, void *))function("fmi3InstantiateModelExchange"))(name, token, where, false, logging, NULL, (void *)say3);
+#endif
+    release(before);
+    print("instance %d: %s\n", index, made ? "made" : "NULL");
+    return made;
+}
+
+/* The results of a call: its status, the values that it wrote, its messages. */
+static __attribute__((unused)) FILE *begin(int number, int status) {
+    FILE *file = results("r", number, "w");
+    fprintf(file, "%d;", status);
+    return file;
+}
+
+static __attribute__((unused)) void end(FILE *file, const char *log) {
+    fputs(log, file);
+    fclose(file);
+}
+
+static __attribute__((unused)) void version(int number, const char *name) {
+    const char *text = ((const char *(*)(void))function(name))();
+    FILE *file = results("r", number, "w");
+    print("%s: %s\n", name, text);
+    put_texts(file, &text, 1);
+    fclose(file);
+}
+
 /* Shows numbers that a call wrote; f is for floating-point, the width is in bytes. */
 static __attribute__((unused)) void show(const void *array, size_t count, char kind, size_t width) {
     size_t i;
@@ -189,13 +236,10 @@ static __attribute__((unused)) void show(const void *array, size_t count, char k
         else if (kind == 'f') { float f; memcpy(&f, at, 4); print(" %.9g", (double)f); }
         else if (kind == 's') { const char *s; memcpy(&s, at, sizeof s); print(" \"%s\"", s ? s : "NULL"); }
         else {
-            uint64_t word = 0;
+            uint64_t word = 0, sign = UINT64_C(1) << (8 * width - 1);
             memcpy(&word, at, width);
             if (kind == 'u') print(" %llu", (unsigned long long)word);
-            else if (width == 1) print(" %d", (int8_t)word);
-            else if (width == 2) print(" %d", (int16_t)word);
-            else if (width == 4) print(" %d", (int32_t)word);
-            else print(" %lld", (long long)word);
+            else print(" %lld", (long long)((word ^ sign) - sign));
         }
     }
 }

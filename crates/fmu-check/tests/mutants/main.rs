@@ -323,6 +323,10 @@ mutants! {
     2 output_stale "results" "results.reading";
     2 unload_crashes "life_cycle" "life_cycle.unload.crash";
     3 exit_hangs "life_cycle" "life_cycle.unload.hang";
+    3 early_read_wrong "start_values" "start_values.start";
+    2 set_after_end "refusals" "refusals.tolerated";
+    3 set_after_end_crashes "refusals" "refusals.crash";
+    2 long_step_hangs "hostile" "hostile.times.hang";
 }
 
 #[test]
@@ -559,6 +563,33 @@ fn a_quick_check_is_quick() {
     let names: Vec<_> = unchecked.map(|of| (of["name"].clone(), of["allowed"].clone())).collect();
     assert_eq!(names, [("resources".into(), true.into()), ("hostile".into(), true.into())]);
     assert_eq!(report["status"], 0);
+}
+
+/// A check of 100,000 variables ends in the time of --time, with little memory.
+#[cfg(target_os = "linux")]
+#[test]
+fn many_variables_take_little_time_and_memory() {
+    let directory = TempDir::new().expect("a directory");
+    let path = fmu(directory.path(), 2, &library(2, ""), |text| {
+        let alias = |index| {
+            let name = format!("name=\"y{index}\" valueReference=\"9\" variability=\"continuous\"");
+            format!("<ScalarVariable {name}><Real/></ScalarVariable>\n")
+        };
+        let aliases: String = (0..100_000).map(alias).collect();
+        text.replace("</ModelVariables>", &(aliases + "</ModelVariables>"))
+    });
+    let begin = std::time::Instant::now();
+    let mut command = Command::new("sh");
+    // 1 GB of address space.
+    command.args(["-c", "ulimit -v 1000000 && exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_fmu-check")]);
+    let output = command.arg(&path).args(["--json", "--time", "7", "--no-shrink"]).output().expect("runs");
+    assert!(begin.elapsed().as_secs() < 20);
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
+    assert_eq!(report["variables"], serde_json::json!([100_013, 1000]));
+    assert_eq!(report["interfaces"].as_array().map(Vec::len), Some(2));
+    let names = report["findings"].as_array().expect("a list").iter().map(|finding| &finding["name"]);
+    assert!(names.clone().all(|name| name == "package.glibc"), "{:?}", names.collect::<Vec<_>>());
 }
 
 /// An FMU that is larger than it may be is not unpacked.

@@ -35,7 +35,7 @@
     X(step_overshoots) X(step_adds) X(lossy_when_late) X(step_prints) X(start_in_mode_ignored) X(event_again_now)      \
     X(name_gone) X(forks) X(daemon_left) X(forks_without_end) X(duplicates_itself) X(kills_group) X(kills_parent)       \
     X(kills_all) X(stops_parent) X(unload_crashes) X(exit_hangs) X(make_hangs) X(stop_ignored) X(order_ignored)    \
-    X(pool_of_eight) X(output_stale)                                                                                                      
+    X(pool_of_eight) X(output_stale) X(early_read_wrong) X(set_after_end) X(set_after_end_crashes) X(long_step_hangs)
 #define NUMBER(name) M_##name,
 #define NAME(name) #name,
 enum { M_none, FAULTS(NUMBER) M_all };
@@ -188,7 +188,7 @@ static double get(Model *m, uint32_t vr, bool *known) {
     if (IS(address_in_result)) y += (double)((uintptr_t)m >> 12 & 0xfff) * 1e-9;
     *known = true;
     switch (vr) {
-    case MASS: return s->mass;
+    case MASS: return IS(early_read_wrong) && s->mode == INSTANTIATED ? 0 : s->mass;
     case SPRING: return s->spring;
     case DAMPER: return s->damper;
     case FORCE: return s->force;
@@ -233,8 +233,9 @@ static int get_reals(void *c, const uint32_t *vr, size_t n, double *value) {
 }
 
 static int set_reals(void *c, const uint32_t *vr, size_t n, const double *value) {
-    ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS)
+    ALLOW(INSTANTIATED | INITIALIZATION | STEP | EVENT | CONTINUOUS | (IS(set_after_end) || IS(set_after_end_crashes) ? TERMINATED : 0))
     size_t i;
+    if (IS(set_after_end_crashes) && m->s.mode == TERMINATED) abort();
     if (n && (!vr || !value)) return no(m, "an array is NULL");
     for (i = 0; i < n; i++) {
         if (IS(half_set) && vr[i] == FORCE) m->s.force = value[i];
@@ -334,6 +335,7 @@ static void integrate(Model *m, double end) {
 static int step(void *c, double point, double size) {
     ALLOW(STEP)
     if (IS(endless_step) && !(size < 1e9)) for (;;) usleep(1000);
+    if (IS(long_step_hangs) && size > 1e3 && size < 1e4) for (;;) usleep(1000);
     if (IS(step_refused_halfway) && !(size > 0)) m->s.x += 0.01;
     if (!isfinite(point) || !isfinite(size) || !(size > 0) || size > 1e4) return no(m, "no such step");
     if (fabs(point - m->s.time) > 1e-9 * (1 + fabs(point))) return no(m, "another time");
