@@ -26,8 +26,11 @@ const ORDERS: &[&[Part]] = &[
     &[Make, RESET, Enter, RESET, RESET, Enter, Leave, RESET, Enter, Leave, Points(2), Free],
 ];
 
+/// Writes an order of other calls.
+type Order = fn(&mut Writer, &Trajectory);
+
 /// Orders of other calls, and the simulations that they fit.
-const OTHER_ORDERS: &[(Fits, fn(&mut Writer, &Trajectory))] = &[
+const OTHER_ORDERS: &[(Fits, Order)] = &[
     (Several, many),
     (Always, long_name),
     (Stepped, up_to_the_stop),
