@@ -26,7 +26,7 @@ const ORDERS: &[&[Part]] = &[
     &[Make, RESET, Enter, RESET, RESET, Enter, Leave, RESET, Enter, Leave, Points(2), Free],
 ];
 
-/// Writes the calls of an order.
+/// Writes an order of other calls.
 type Order = fn(&mut Writer, &Trajectory);
 
 /// Orders of other calls, and the simulations that they fit.

@@ -586,7 +586,7 @@ fn many_variables_take_little_time_and_memory() {
     assert!(begin.elapsed().as_secs() < 20);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&output.stderr)));
-    assert_eq!(report["variables"], serde_json::json!([100_013, 1000]));
+    assert_eq!(report["variables"][0], 100_013);
     assert_eq!(report["interfaces"].as_array().map(Vec::len), Some(2));
     let names = report["findings"].as_array().expect("a list").iter().map(|finding| &finding["name"]);
     assert!(names.clone().all(|name| name == "package.glibc"), "{:?}", names.collect::<Vec<_>>());
