@@ -243,7 +243,7 @@ impl TestbedFmu {
     fn reactions_to_parameter(&self, parameter: Name) -> Cow<'_, Moving> {
         let mut unit = self.clone();
         unit.testbed.parameters = Parameters::ZERO;
-        Self::TABLE[Self::place(parameter)].set(&mut unit, &1.0.into());
+        Self::TABLE[Self::index(parameter)].set(&mut unit, &1.0.into());
         let (now, system, change) = (self.now(), self.system(), &unit.testbed.parameters);
         let mut reactions: Moving = [0.0; _];
         for (first, [one, two]) in [

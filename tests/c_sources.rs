@@ -14,7 +14,7 @@ fn random_sessions_are_answered_alike() {
         "FMU_LIBRARY must name the compiled sources; make test-source-fmu"
     );
     let sessions = std::env::var("SESSIONS").map_or(300, |text| text.parse().expect("a number"));
-    let (mut calls, mut refused) = (0, 0);
+    let (mut calls, mut rejected) = (0, 0);
     for seed in 0..sessions {
         let bytes = random_bytes(seed, 1 << 12);
         let native = record::<TestbedFmu>(fmu_export::fmi2::functions::<TestbedFmu>(), &bytes);
@@ -24,7 +24,7 @@ fn random_sessions_are_answered_alike() {
         }
         assert_eq!(native.len(), compiled.len(), "seed {seed}");
         calls += native.len();
-        refused += native.iter().filter(|answer| answer.contains("Error")).count();
+        rejected += native.iter().filter(|answer| answer.contains("Error")).count();
     }
-    println!("{calls} calls in {sessions} sessions, {refused} refused: the same bits, statuses and texts");
+    println!("{calls} calls in {sessions} sessions, {rejected} refused: the same bits, statuses and texts");
 }

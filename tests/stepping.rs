@@ -247,7 +247,7 @@ fn a_testbed_that_turns_goes_on_turning() {
             sample(&mut testbed, [0.0; 2], omega);
             assert!(testbed.step(h));
             for (motor, omega) in omega.into_iter().enumerate() {
-                let [q_i, q_ii, v] = [0, 2, 4].map(|place| testbed.state[place + motor]);
+                let [q_i, q_ii, v] = [0, 2, 4].map(|index| testbed.state[index + motor]);
                 let error = [q_i / h, q_ii / h, v].map(|rate| ((rate - omega) / omega).abs());
                 worst = error.into_iter().fold(worst, f64::max);
             }

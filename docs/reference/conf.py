@@ -12,7 +12,9 @@ default_role = "py:obj"
 add_module_names = False
 autodoc_default_options = {"members": True}
 autodoc_typehints = "signature"
-autodoc_type_aliases = {name: name for name in ("ArrayLike", "Array", "Given", "Source", "Start", "Course", "Measure")}
+autodoc_type_aliases = {
+    name: name for name in ("ArrayLike", "Array", "Given", "Source", "Start", "Trajectory", "Measure")
+}
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 # Each parameter is documented, and no other name; each value and exception has a description.

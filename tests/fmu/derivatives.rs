@@ -34,9 +34,9 @@ fn differences<F: Either>(fmu: &F, unknowns: &[u32], known: u32) -> Vec<(f64, f6
     let state = fmu.save();
     let [above, below] = [value + width, value - width].map(|value| {
         fmu.ok(fmu.set_state(state));
-        if let Some(place) = STATES.iter().position(|state| *state == known) {
+        if let Some(index) = STATES.iter().position(|state| *state == known) {
             let mut x = fmu.states::<6>();
-            x[place] = value;
+            x[index] = value;
             fmu.ok(fmu.set_states(x.as_ptr(), 6));
         } else {
             fmu.set(&[known], &[value]);

@@ -15,9 +15,9 @@ const NAN: f64 = f64::NAN;
 type Case = (&'static str, fn(&Fmu) -> Status, &'static [&'static str]);
 
 #[track_caller]
-fn all_refused(fmu: &Fmu, cases: &[Case]) {
+fn all_rejected(fmu: &Fmu, cases: &[Case]) {
     for (label, call, words) in cases {
-        let message = fmu.refused(label, call);
+        let message = fmu.rejected(label, call);
         for word in *words {
             assert!(message.contains(word), "{label}: '{word}' is not in: {message}");
         }
@@ -57,10 +57,10 @@ const PARAMETERS: &[Case] = &[
 #[test]
 fn parameters_out_of_range() {
     for interface in INTERFACES {
-        all_refused(&in_mode(interface, Instantiated), PARAMETERS);
-        all_refused(&in_mode(interface, Initialization), PARAMETERS);
+        all_rejected(&in_mode(interface, Instantiated), PARAMETERS);
+        all_rejected(&in_mode(interface, Initialization), PARAMETERS);
     }
-    all_refused(&in_mode(CoSimulation, StepComplete), PARAMETERS);
+    all_rejected(&in_mode(CoSimulation, StepComplete), PARAMETERS);
 }
 
 /// Checks the declared limits: the smallest declared value is accepted and runs; values below it are
@@ -68,18 +68,18 @@ fn parameters_out_of_range() {
 #[test]
 fn declared_limits_are_those() {
     let mut found = 0;
-    for (place, variable) in (0..).zip(TABLE).filter(|(_, of)| of.causality() == Causality::Parameter) {
+    for (index, variable) in (0..).zip(TABLE).filter(|(_, of)| of.causality() == Causality::Parameter) {
         let fmu = in_mode(CoSimulation, Instantiated);
         match variable.variable_type().attributes {
             Attributes::Real { min: Some(min), .. } => {
                 let below = if min == 0.0 { -1e-300 } else { 0.999 * min };
-                fmu.refused(variable.name(), |fmu| fmu.try_set(&[place], &[below]));
-                fmu.set(&[place], &[min]);
+                fmu.rejected(variable.name(), |fmu| fmu.try_set(&[index], &[below]));
+                fmu.set(&[index], &[min]);
             }
             Attributes::Integer { min, .. } => {
                 let min = i32::try_from(min).unwrap();
-                fmu.refused(variable.name(), |fmu| fmu.fmi2SetInteger(&place, 1, &(min - 1)));
-                fmu.ok(fmu.fmi2SetInteger(&place, 1, &min));
+                fmu.rejected(variable.name(), |fmu| fmu.fmi2SetInteger(&index, 1, &(min - 1)));
+                fmu.ok(fmu.fmi2SetInteger(&index, 1, &min));
             }
             _ => continue,
         }
@@ -100,7 +100,7 @@ fn one_damping_may_be_zero() {
     let fmu = in_mode(CoSimulation, Instantiated);
     for (zero, other) in [(vr(Name::c1), vr(Name::c2)), (vr(Name::c2), vr(Name::c1))] {
         fmu.set(&[zero], &[0.0]);
-        fmu.refused_with(&["c1 and c2"], |fmu| fmu.try_set(&[other], &[0.0]));
+        fmu.rejected_with(&["c1 and c2"], |fmu| fmu.try_set(&[other], &[0.0]));
         fmu.set(&[zero], &[0.1]);
     }
 }
@@ -108,24 +108,24 @@ fn one_damping_may_be_zero() {
 /// Importers that ignore the status (fmi-sim, OMSimulator) must not run with Table 1 instead. So the
 /// initialization fails with the first error message until the parameter has a valid value.
 #[test]
-fn refused_parameters_stop_the_initialization() {
+fn rejected_parameters_stop_the_initialization() {
     let words = |message: String| message.split_once(": ").unwrap().1.to_owned();
     for interface in INTERFACES {
         for (vr, wrong, right) in [(vr(Name::k1), -1.0, 60.0), (vr(Name::omega5_start), NAN, 0.0)] {
             let fmu = in_mode(interface, Instantiated);
-            let first = words(fmu.refused("a start value", |fmu| fmu.try_set(&[vr], &[wrong])));
-            assert_eq!(words(fmu.refused("to begin", |fmu| fmu.fmi2EnterInitializationMode())), first);
+            let first = words(fmu.rejected("a start value", |fmu| fmu.try_set(&[vr], &[wrong])));
+            assert_eq!(words(fmu.rejected("to begin", |fmu| fmu.fmi2EnterInitializationMode())), first);
             fmu.set(&[vr], &[right]);
             fmu.enter_initialization(0.0, None);
-            let first = words(fmu.refused("a start value", |fmu| fmu.try_set(&[vr], &[wrong])));
-            assert_eq!(words(fmu.refused("to end", |fmu| fmu.fmi2ExitInitializationMode())), first);
+            let first = words(fmu.rejected("a start value", |fmu| fmu.try_set(&[vr], &[wrong])));
+            assert_eq!(words(fmu.rejected("to end", |fmu| fmu.fmi2ExitInitializationMode())), first);
             fmu.set(&[vr], &[right]);
             fmu.ok(fmu.fmi2ExitInitializationMode());
 
             let fmu = fmi3::Importer::of::<TestbedFmu>(interface);
-            let first = words(fmu.refused("a start value", |fmu| fmu.try_set(&[vr], &[wrong])));
+            let first = words(fmu.rejected("a start value", |fmu| fmu.try_set(&[vr], &[wrong])));
             let enter = |fmu: &fmi3::Importer| fmu.fmi3EnterInitializationMode(0, 0.0, 0.0, 0, 0.0);
-            assert_eq!(words(fmu.refused("to begin", enter)), first);
+            assert_eq!(words(fmu.rejected("to begin", enter)), first);
             fmu.set(&[vr], &[right]);
             fmu.initialize(0.0);
         }

@@ -10,7 +10,7 @@ use prw_testbed::variables::Name;
 use std::ops::Range;
 
 /// Returns the range of a variable's value; the memory of the model follows the last variable.
-fn place_of(vr: u32) -> Range<usize> {
+fn index_of(vr: u32) -> Range<usize> {
     let stored = TABLE[..vr as usize].iter().filter(|variable| variable.has_start() || variable.is_state());
     let length = |base| if base == BaseType::Boolean { 1 } else { 8 };
     let begin = VALUES + stored.map(|variable| length(variable.base())).sum::<usize>();
@@ -22,9 +22,9 @@ fn place_of(vr: u32) -> Range<usize> {
 fn impossible_parameters() {
     let fmu = in_mode(CoSimulation, StepComplete);
     let bytes = fmu.bytes();
-    let j2 = place_of(vr(Name::J2));
+    let j2 = index_of(vr(Name::J2));
     assert_eq!(bytes[j2.clone()], prw_testbed::Parameters::BUILT_IN.J2.to_le_bytes());
-    let message = fmu.refused_bytes(&with(bytes, j2, &(-1.0_f64).to_le_bytes()));
+    let message = fmu.rejected_bytes(&with(bytes, j2, &(-1.0_f64).to_le_bytes()));
     assert!(message.contains("J2"), "{message}");
 }
 
@@ -34,14 +34,14 @@ fn impossible_number_of_samples() {
     let fmu = in_mode(CoSimulation, StepComplete);
     fmu.step(0.0, 0.125);
     fmu.step(0.125, 0.125);
-    let (bytes, samples) = (fmu.bytes(), place_of(TABLE.len() as u32));
+    let (bytes, samples) = (fmu.bytes(), index_of(TABLE.len() as u32));
     assert_eq!(bytes[samples.clone()], 2_i64.to_le_bytes());
     for count in [-1, i64::from(i32::MIN), 3, i64::MAX] {
-        fmu.refused_bytes(&with(bytes.clone(), samples.clone(), &count.to_le_bytes()));
+        fmu.rejected_bytes(&with(bytes.clone(), samples.clone(), &count.to_le_bytes()));
     }
     for step in [0.0, -0.125] {
         let last_step = samples.end..samples.end + 8;
-        let message = fmu.refused_bytes(&with(bytes.clone(), last_step, &f64::to_le_bytes(step)));
+        let message = fmu.rejected_bytes(&with(bytes.clone(), last_step, &f64::to_le_bytes(step)));
         assert!(message.contains("samples"), "{message}");
     }
 }

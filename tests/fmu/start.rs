@@ -91,7 +91,7 @@ fn the_last_angles_before_the_first_step_count() {
 
 /// Checks that a rejected first step does not start the simulation.
 #[test]
-fn a_refused_step_starts_nothing() {
+fn a_rejected_step_starts_nothing() {
     let fmu = in_mode(CoSimulation, StepComplete);
     fmu.set(&THETA, &[f64::MAX, 0.0]);
     fmu.set_rates(THETA, [f64::MAX; 2]);
@@ -261,9 +261,9 @@ fn states_are_not_set() {
     ] {
         let fmu = in_mode(interface, mode);
         for (vr, name) in [(vr(Name::theta3), "theta3"), (vr(Name::theta5), "theta5")] {
-            told(&fmu.refused("a state", |fmu| fmu.fmi2SetReal(&vr, 1, &0.5)), name);
+            told(&fmu.rejected("a state", |fmu| fmu.fmi2SetReal(&vr, 1, &0.5)), name);
         }
     }
     let fmu = fmi3::Importer::of::<TestbedFmu>(Interface::CoSimulation);
-    told(&fmu.refused("a state", |fmu| fmu.try_set(&[vr(Name::theta3)], &[0.5])), "theta3");
+    told(&fmu.rejected("a state", |fmu| fmu.try_set(&[vr(Name::theta3)], &[0.5])), "theta3");
 }

@@ -15,8 +15,8 @@ fn steps_out_of_the_range_of_numbers() {
     start_at(&fmu, [0.0; 6]);
     fmu.set(&[vr(Name::theta1)], &[f64::MAX]);
     fmu.set_rates([vr(Name::theta1)], [f64::MAX]);
-    fmu.refused_with(&["range of numbers"], |fmu| fmu.try_step(0.0, 10.0));
-    fmu.refused_with(&["tau1"], |fmu| fmu.fmi2GetReal(&vr(Name::tau1), 1, &mut 0.0));
+    fmu.rejected_with(&["range of numbers"], |fmu| fmu.try_step(0.0, 10.0));
+    fmu.rejected_with(&["tau1"], |fmu| fmu.fmi2GetReal(&vr(Name::tau1), 1, &mut 0.0));
     fmu.set(&[vr(Name::theta1)], &[0.1]);
     fmu.set_rates([vr(Name::theta1)], [0.0]);
     fmu.step(0.0, 10.0);
@@ -31,7 +31,7 @@ fn motors_out_of_the_range_of_numbers() {
     fmu.step(0.0, h);
     fmu.step(h, h);
     fmu.set(&[vr(Name::theta1)], &[1e302]);
-    fmu.refused_with(&["range of numbers"], |fmu| fmu.try_step(2.0 * h, 10.0));
+    fmu.rejected_with(&["range of numbers"], |fmu| fmu.try_step(2.0 * h, 10.0));
     fmu.restore(&fmu.bytes());
     fmu.step(2.0 * h, h);
     fmu.restore(&fmu.bytes());

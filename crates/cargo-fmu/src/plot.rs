@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 /// A variable over time.
-pub struct Course<'a> {
+pub struct Trajectory<'a> {
     pub name: &'a str,
     pub unit: &'a str,
     /// Whether it stays as it is until it jumps.
@@ -28,9 +28,9 @@ const COLOURS: [RGBColor; 7] = [
 ];
 
 /// Draws the courses over time; those of one unit share a panel.
-pub fn plot(path: &Path, title: &str, time: &[f64], courses: &[Course]) -> Result<()> {
+pub fn plot(path: &Path, title: &str, time: &[f64], trajectories: &[Trajectory]) -> Result<()> {
     let mut svg = String::new();
-    draw(&mut svg, title, time, courses).map_err(|error| anyhow!("{error}"))?;
+    draw(&mut svg, title, time, trajectories).map_err(|error| anyhow!("{error}"))?;
     // The backend knows whole numbers only: it draws on a large paper, which is then shown smaller.
     let (begin, rest) = svg.split_once('>').unwrap_or_default();
     let size = |name: &str| {
@@ -52,13 +52,14 @@ fn draw(
     svg: &mut String,
     title: &str,
     time: &[f64],
-    courses: &[Course],
+    trajectories: &[Trajectory],
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let mut panels: Vec<(&str, Vec<&Course>)> = Vec::new();
-    for course in courses {
-        match panels.iter_mut().find(|(unit, panel)| *unit == course.unit && panel.len() < COLOURS.len()) {
-            Some((_, panel)) => panel.push(course),
-            None => panels.push((course.unit, vec![course])),
+    let mut panels: Vec<(&str, Vec<&Trajectory>)> = Vec::new();
+    for trajectory in trajectories {
+        match panels.iter_mut().find(|(unit, panel)| *unit == trajectory.unit && panel.len() < COLOURS.len())
+        {
+            Some((_, panel)) => panel.push(trajectory),
+            None => panels.push((trajectory.unit, vec![trajectory])),
         }
     }
     let height = 70 + 260 * panels.len() as u32;
@@ -66,8 +67,9 @@ fn draw(
     root.fill(&WHITE)?;
     let root = root.margin(10 * FINE, 0, 0, 0).titled(title, ("sans-serif", 22 * FINE))?;
     for (area, (unit, panel)) in root.split_evenly((panels.len(), 1)).iter().zip(&panels) {
-        let values =
-            || panel.iter().flat_map(|course| course.values).copied().filter(|value| value.is_finite());
+        let values = || {
+            panel.iter().flat_map(|trajectory| trajectory.values).copied().filter(|value| value.is_finite())
+        };
         let (low, high) =
             (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
         let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
@@ -92,15 +94,15 @@ fn draw(
             .label_style(("sans-serif", 14 * FINE))
             .axis_desc_style(("sans-serif", 14 * FINE))
             .draw()?;
-        for (course, colour) in panel.iter().zip(COLOURS) {
+        for (trajectory, colour) in panel.iter().zip(COLOURS) {
             let mut points: Vec<(f64, f64)> = Vec::with_capacity(2 * time.len());
-            for (time, value) in time.iter().zip(course.values).filter(|point| point.1.is_finite()) {
-                let last = points.last().filter(|_| course.jumps).map(|last| (*time, last.1));
+            for (time, value) in time.iter().zip(trajectory.values).filter(|point| point.1.is_finite()) {
+                let last = points.last().filter(|_| trajectory.jumps).map(|last| (*time, last.1));
                 points.extend(last.into_iter().chain([(*time, *value)]));
             }
             chart
                 .draw_series(LineSeries::new(points, colour.stroke_width(2 * FINE)))?
-                .label(course.name)
+                .label(trajectory.name)
                 .legend(move |(x, y)| {
                     PathElement::new([(x, y), (x + 20 * FINE as i32, y)], colour.stroke_width(2 * FINE))
                 });

@@ -1,13 +1,13 @@
 //! Simulates the FMU of a model.
 
 use crate::builder::{self, Purpose};
-use crate::plot::{Course as Curve, plot};
+use crate::plot::{Trajectory as Curve, plot};
 use crate::project::{Place, Project};
 use anyhow::{Context, Result, bail, ensure};
 use fmu_package::terminal::short;
 use fmu_package::{BuildOptions, Fmi};
 use fmu_run::{
-    BaseType, Batch, Course, Description, Fmu, Interface, Runs, Start, Status, Variable, Watch, nearest,
+    BaseType, Batch, Description, Fmu, Interface, Runs, Start, Status, Trajectory, Variable, Watch, nearest,
 };
 use std::collections::BTreeMap;
 use std::fs;
@@ -184,24 +184,25 @@ fn simulate(options: &Options, path: &Path, folder: &Path) -> Result<bool> {
     }
     say(&watch, options.log);
     // A failed run has values up to its failure, or none.
-    let unreached = runs.courses.chunks(time.len()).map(unreached).min().filter(|_| !runs.errors.is_empty());
+    let unreached =
+        runs.trajectories.chunks(time.len()).map(unreached).min().filter(|_| !runs.errors.is_empty());
     let reached = time.len() - unreached.unwrap_or_default();
     if reached == 0 {
         [&csv, &svg].iter().for_each(|old| drop(fs::remove_file(old)));
         return Ok(false);
     }
-    let mut courses: Vec<_> =
-        runs.courses.chunks(time.len()).map(|values| values[..reached].to_vec()).collect();
+    let mut trajectories: Vec<_> =
+        runs.trajectories.chunks(time.len()).map(|values| values[..reached].to_vec()).collect();
     let step_size = time[1] - time[0];
     time.truncate(reached);
     // The model may end between two communication points.
     if let Some((_, end, values)) = ended.filter(|(_, end, _)| *end > time[reached - 1] + 1e-9 * step_size) {
         time.push(end);
-        courses.iter_mut().zip(values).for_each(|(course, value)| course.push(value));
+        trajectories.iter_mut().zip(values).for_each(|(trajectory, value)| trajectory.push(value));
     }
     let curves: Vec<Curve> = shown
         .iter()
-        .zip(&courses)
+        .zip(&trajectories)
         .map(|(variable, values)| Curve {
             name: &variable.name,
             unit: variable.unit.as_deref().unwrap_or_default(),
@@ -236,10 +237,13 @@ fn follow(
     starts: &[(&str, Start)],
     shown: &[&Variable],
 ) -> Result<(Runs, Watch)> {
-    let courses = table.map(|table| table.at(time)).unwrap_or_default();
+    let trajectories = table.map(|table| table.at(time)).unwrap_or_default();
     let batch = Batch {
         time,
-        inputs: courses.iter().map(|(name, course)| (name.as_str(), Course::Shared(course))).collect(),
+        inputs: trajectories
+            .iter()
+            .map(|(name, trajectory)| (name.as_str(), Trajectory::Shared(trajectory)))
+            .collect(),
         start: starts.to_vec(),
         outputs: shown.iter().map(|variable| variable.name.as_str()).collect(),
         every: Some(1),
@@ -424,7 +428,7 @@ impl Table {
             let part = ((time - begin) / (end - begin)).clamp(0.0, 1.0);
             values[after - 1] + part * (values[after] - values[after - 1])
         };
-        let course = |values: &[f64]| times.iter().map(|time| value(values, *time)).collect();
-        self.inputs.iter().map(|(name, values)| (name.clone(), course(values))).collect()
+        let trajectory = |values: &[f64]| times.iter().map(|time| value(values, *time)).collect();
+        self.inputs.iter().map(|(name, values)| (name.clone(), trajectory(values))).collect()
     }
 }

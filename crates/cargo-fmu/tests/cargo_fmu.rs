@@ -41,7 +41,7 @@ impl Folder {
 
     /// What it says where it fails.
     #[track_caller]
-    fn refuses(&self, folder: &str, arguments: &[&str]) -> String {
+    fn rejects(&self, folder: &str, arguments: &[&str]) -> String {
         let output = self.fmu(folder, arguments);
         assert!(!output.status.success(), "{arguments:?}");
         String::from_utf8(output.stderr).unwrap()
@@ -57,7 +57,7 @@ impl Folder {
 }
 
 /// Begun, tested and simulated as `new` proposes.
-fn grows(from: &str, arguments: &[&str], columns: &str, course: &str) -> Folder {
+fn grows(from: &str, arguments: &[&str], columns: &str, trajectory: &str) -> Folder {
     let folder = Folder::new();
     let name = format!("my-{from}");
     let said = folder.says("", &["new", &name, "--from", from]);
@@ -65,7 +65,7 @@ fn grows(from: &str, arguments: &[&str], columns: &str, course: &str) -> Folder 
     let output = folder.run(&name, env!("CARGO"), &["test", "--quiet"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let said = folder.says(&name, &[&["run"], arguments].concat());
-    assert!(said.contains(course), "{said}");
+    assert!(said.contains(trajectory), "{said}");
     let fmu = format!("my_{from}");
     let table = folder.read(&format!("{name}/target/fmu/{fmu}.csv"));
     assert_eq!(table.lines().next(), Some(columns));
@@ -184,7 +184,7 @@ fn check_makes_the_fmus(folder: &Folder) {
     for report in ["fmu", "fmi3"] {
         assert!(folder.read(&format!("my-lag/report/{report}/junit.xml")).contains("no findings"));
     }
-    assert!(folder.refuses("my-lag", &["check", "--fmu", "Cargo.toml"]).contains("Cargo.toml"));
+    assert!(folder.rejects("my-lag", &["check", "--fmu", "Cargo.toml"]).contains("Cargo.toml"));
 }
 
 fn inputs_come_from_a_table(folder: &Folder) {
@@ -203,7 +203,7 @@ fn inputs_come_from_a_table(folder: &Folder) {
         (&["run", "--step", "0"], "--step 0 positive"),
         (&["run", "--input", "nothing.csv"], "nothing.csv"),
     ] {
-        let said = folder.refuses("my-lag", arguments);
+        let said = folder.rejects("my-lag", arguments);
         assert!(said.contains(word), "{said}");
     }
 }
@@ -229,7 +229,7 @@ fn options_reach_the_program_that_packs(folder: &Folder) {
         (&["--target", "x86_64-unknown-nonsense"], "no FMU platform is known for the target"),
         (&["--fmi", "2", "--binary", "win64=Cargo.toml"], "it is no shared library"),
     ] {
-        let said = folder.refuses("my-lag", &[&["build"], arguments].concat());
+        let said = folder.rejects("my-lag", &[&["build"], arguments].concat());
         assert!(said.contains(words) && said.contains("error: "), "{said}");
     }
 }
@@ -242,25 +242,25 @@ fn what_is_no_model_is_named() {
     let with = |path: &str, text: &str| fs::write(folder.path(path), text).unwrap();
 
     with("odd/src/lib.rs", &library.replace("export_fmu!", "offer!"));
-    let said = folder.refuses("odd", &["build"]);
+    let said = folder.rejects("odd", &["build"]);
     assert!(said.contains("its crate needs `export_fmu!(...)` in src/lib.rs"), "{said}");
     with("odd/src/lib.rs", &library);
 
     with("odd/Cargo.toml", &manifest.replace("\"cdylib\", ", ""));
-    let said = folder.refuses("odd", &["build"]);
+    let said = folder.rejects("odd", &["build"]);
     assert!(said.contains("crate-type = [\"cdylib\", \"rlib\"]"), "{said}");
     with(
         "odd/Cargo.toml",
         &manifest.replace("fmu-export =", "other = { package = \"fmu-run\", path = \"x\" } #"),
     );
-    assert!(folder.refuses("odd", &["build"]).starts_with("error: "));
+    assert!(folder.rejects("odd", &["build"]).starts_with("error: "));
 
-    let said = folder.refuses("", &["new", "odd"]);
+    let said = folder.rejects("", &["new", "odd"]);
     assert_eq!(said, "error: odd is there already; name a new folder\n");
-    let said = folder.refuses("", &["new", "7-segments"]);
+    let said = folder.rejects("", &["new", "7-segments"]);
     assert!(said.starts_with("error: invalid character `7` in package name"), "{said}");
     assert!(!folder.path("7-segments").exists());
-    let said = folder.refuses("", &["build"]);
+    let said = folder.rejects("", &["build"]);
     assert!(said.contains("could not find `Cargo.toml`"), "{said}");
 }
 
@@ -385,7 +385,7 @@ fn the_guide_leads_to_a_checked_fmu() {
         for (values, words) in
             [("0,1", "levels has 4 elements, --set gives 2 values"), ("3,2,1,0", "levels must rise")]
         {
-            let said = folder.refuses("tank", &["run", "--fmi", fmi, "--set", &format!("levels={values}")]);
+            let said = folder.rejects("tank", &["run", "--fmi", fmi, "--set", &format!("levels={values}")]);
             assert!(said.contains(words), "{said}");
         }
     }

@@ -16,8 +16,8 @@ pub enum Standard {
 impl Standard {
     /// Returns the value reference that fmu-export assigns to the variable at this index of a model's list.
     /// It is the index in FMI 2.0, and the index plus 1 in FMI 3.0.
-    pub const fn reference(self, place: u32) -> u32 {
-        place.wrapping_add(self as u32)
+    pub const fn reference(self, index: u32) -> u32 {
+        index.wrapping_add(self as u32)
     }
 
     /// Returns the location of the resources as importers write it: a URI in FMI 2.0 (section 2.1.5), a path

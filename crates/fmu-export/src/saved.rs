@@ -107,10 +107,10 @@ impl<T: Saved, const N: usize> Saved for [T; N] {
 }
 
 macro_rules! tuples {
-    ($(($($type:ident $place:tt),+))+) => {
+    ($(($($type:ident $index:tt),+))+) => {
         $(impl<$($type: Saved),+> Saved for ($($type),+) {
             fn visit(&mut self, visitor: &mut dyn StateVisitor) {
-                $( self.$place.visit(visitor); )+
+                $( self.$index.visit(visitor); )+
             }
         })+
     };

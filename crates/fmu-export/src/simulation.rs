@@ -1,7 +1,7 @@
 //! [`Simulation`]: runs a model in the tests of its author.
 
 use crate::export::Exported;
-use crate::instance::{Importer, Instance, Refusal};
+use crate::instance::{Importer, Instance, Rejection};
 use crate::model::{Error, Experiment, Setup};
 use crate::table::Variables;
 use crate::variable::Variable;
@@ -80,9 +80,9 @@ impl<M: Exported> Simulation<M> {
     /// # Errors
     /// Fails if there is no such variable, or if the model rejects the value.
     pub fn set(&mut self, name: &str, value: impl Into<Value>) -> Result<&mut Self, Error> {
-        let places = places::<M>(name)?;
-        let values = vec![value.into(); places.len()];
-        self.set_all(&places, values)
+        let indices = indices::<M>(name)?;
+        let values = vec![value.into(); indices.len()];
+        self.set_all(&indices, values)
     }
 
     /// Sets the elements of an array together, row by row.
@@ -94,20 +94,20 @@ impl<M: Exported> Simulation<M> {
         name: &str,
         values: impl IntoIterator<Item = V>,
     ) -> Result<&mut Self, Error> {
-        let places = places::<M>(name)?;
+        let indices = indices::<M>(name)?;
         let values: Vec<Value> = values.into_iter().map(Into::into).collect();
-        if values.len() != places.len() {
+        if values.len() != indices.len() {
             return Err(Error::new(format!(
                 "{name} has {} elements, there are {} values",
-                places.len(),
+                indices.len(),
                 values.len()
             )));
         }
-        self.set_all(&places, values)
+        self.set_all(&indices, values)
     }
 
-    fn set_all(&mut self, places: &[u32], values: Vec<Value>) -> Result<&mut Self, Error> {
-        let variable = variable::<M>(places[0]);
+    fn set_all(&mut self, indices: &[u32], values: Vec<Value>) -> Result<&mut Self, Error> {
+        let variable = variable::<M>(indices[0]);
         let kind = |value: &Value| match value {
             Value::Real(_) => matches!(variable.base(), BaseType::Real | BaseType::Float32),
             Value::Boolean(_) => variable.base() == BaseType::Boolean,
@@ -121,7 +121,7 @@ impl<M: Exported> Simulation<M> {
             let (name, base) = (variable.name(), variable.base());
             return Err(Error::new(format!("{name} is of type {base} and cannot be {value:?}")));
         }
-        self.instance.set(places, &[variable.base()], &|index| values[index].clone())?;
+        self.instance.set(indices, &[variable.base()], &|index| values[index].clone())?;
         self.instance.listen();
         Ok(self)
     }
@@ -196,10 +196,10 @@ impl<M: Exported> Simulation<M> {
     /// # Errors
     /// Same errors as [`value`](Self::value).
     pub fn values(&mut self, name: &str) -> Result<Vec<Value>, Error> {
-        let places = places::<M>(name)?;
+        let indices = indices::<M>(name)?;
         let mut values = Vec::new();
-        let base = variable::<M>(places[0]).base();
-        self.instance.get(&places, &[base], &mut |_, value| values.push(value))?;
+        let base = variable::<M>(indices[0]).base();
+        self.instance.get(&indices, &[base], &mut |_, value| values.push(value))?;
         self.instance.listen();
         Ok(values)
     }
@@ -233,22 +233,22 @@ impl<M: Exported> Simulation<M> {
     }
 }
 
-impl From<Box<Refusal>> for Error {
-    fn from(refusal: Box<Refusal>) -> Self {
-        Self::new(refusal.message)
+impl From<Box<Rejection>> for Error {
+    fn from(rejection: Box<Rejection>) -> Self {
+        Self::new(rejection.message)
     }
 }
 
-fn variable<M: Variables>(place: u32) -> &'static Variable<M> {
-    &M::TABLE[place as usize]
+fn variable<M: Variables>(index: u32) -> &'static Variable<M> {
+    &M::TABLE[index as usize]
 }
 
 /// Returns the indices of a variable, an element, or all elements of an array.
-fn places<M: Exported>(name: &str) -> Result<Vec<u32>, Error> {
+fn indices<M: Exported>(name: &str) -> Result<Vec<u32>, Error> {
     let of_name = |of: &Variable<M>| of.name() == name || of.length() > 1 && of.name_of_array() == name;
-    let places: Vec<u32> =
-        (0..).zip(M::TABLE).filter(|(_, of)| of_name(of)).map(|(place, _)| place).collect();
-    if places.is_empty() {
+    let indices: Vec<u32> =
+        (0..).zip(M::TABLE).filter(|(_, of)| of_name(of)).map(|(index, _)| index).collect();
+    if indices.is_empty() {
         let names: Vec<_> = M::LINES.iter().map(Variable::name).collect();
         return Err(Error::new(format!(
             "{} has no variable {name}; it has {}",
@@ -256,5 +256,5 @@ fn places<M: Exported>(name: &str) -> Result<Vec<u32>, Error> {
             names.join(", ")
         )));
     }
-    Ok(places)
+    Ok(indices)
 }

@@ -1,7 +1,7 @@
 //! The table of variables: [`variables!`](crate::variables) and the code that it generates.
 
 use crate::saved::StateVisitor;
-use crate::variable::{Index, Variable, refuse};
+use crate::variable::{Index, Variable, reject};
 use std::fmt::Debug;
 use std::mem::MaybeUninit;
 
@@ -34,17 +34,17 @@ pub unsafe trait Variables: Sized + 'static {
     const ARRAYS: bool = has_arrays(Self::LINES);
 
     /// Returns the index of a variable in the table; for an array, the index of its first element.
-    fn place(name: Self::Name) -> usize {
-        let place = Self::NAMES.iter().position(|known| *known == name);
-        place.expect("the table has a variable for each name")
+    fn index(name: Self::Name) -> usize {
+        let index = Self::NAMES.iter().position(|known| *known == name);
+        index.expect("the table has a variable for each name")
     }
 
     /// Returns the name of the variable at an index of the table, and the number of the element.
     #[doc(hidden)]
     #[inline]
-    fn element(place: u32) -> (Self::Name, usize) {
-        let number = if Self::ARRAYS { Self::TABLE[place as usize].element() } else { 0 };
-        (Self::NAMES[place as usize], number)
+    fn element(index: u32) -> (Self::Name, usize) {
+        let number = if Self::ARRAYS { Self::TABLE[index as usize].element() } else { 0 };
+        (Self::NAMES[index as usize], number)
     }
 
     /// Returns the offset of the `f64` that holds the value of a line, or `without` if reading needs a
@@ -76,11 +76,11 @@ impl<M: Variables> Variable<M> {
     /// Returns the variables in [`depends_on`](Self::depends_on) as indices in the table, without
     /// [`Index::TIME`]; of an array all elements.
     pub fn dependencies(&self) -> Option<impl Iterator<Item = u32> + use<M>> {
-        let places = |known: &Index| {
+        let indices = |known: &Index| {
             let line = known.0;
-            (0..).zip(M::TABLE).filter(move |(_, of)| of.line == line).map(|(place, _)| place)
+            (0..).zip(M::TABLE).filter(move |(_, of)| of.line == line).map(|(index, _)| index)
         };
-        self.depends_on.map(|knowns| knowns.iter().flat_map(places))
+        self.depends_on.map(|knowns| knowns.iter().flat_map(indices))
     }
 
     /// Returns the value of a Real; `None` for the time.
@@ -138,19 +138,19 @@ const fn is_array<M>(variable: &Variable<M>) -> bool {
 }
 
 /// Returns the number of variables before a line.
-const fn place_of<M>(lines: &[Variable<M>], line: usize) -> usize {
-    let (mut place, mut before) = (0, 0);
+const fn index_of<M>(lines: &[Variable<M>], line: usize) -> usize {
+    let (mut index, mut before) = (0, 0);
     while before < line {
-        place += lines[before].length();
+        index += lines[before].length();
         before += 1;
     }
-    place
+    index
 }
 
 /// Returns the number of variables of the lines; each element of an array counts.
 #[doc(hidden)]
 pub const fn count_elements<M>(lines: &[Variable<M>]) -> usize {
-    place_of(lines, lines.len())
+    index_of(lines, lines.len())
 }
 
 /// Returns the total length in bytes of the names of all array elements.
@@ -177,11 +177,11 @@ pub const fn write_names<M, const LETTERS: usize>(lines: &[Variable<M>]) -> [u8;
         let mut element = 0;
         while is_array(&lines[line]) && element < lines[line].length() {
             let name = NameOfElement::new(&lines[line], element);
-            let mut place = 0;
-            while place < name.length {
-                letters[written] = name.letters[place];
+            let mut index = 0;
+            while index < name.length {
+                letters[written] = name.letters[index];
                 written += 1;
-                place += 1;
+                index += 1;
             }
             element += 1;
         }
@@ -222,12 +222,12 @@ impl NameOfElement {
     }
 
     const fn with(mut self, text: &[u8]) -> Self {
-        let mut place = 0;
-        while place < text.len() {
+        let mut index = 0;
+        while index < text.len() {
             assert!(self.length < self.letters.len(), "the name of an array is too long");
-            self.letters[self.length] = text[place];
+            self.letters[self.length] = text[index];
             self.length += 1;
-            place += 1;
+            index += 1;
         }
         self
     }
@@ -245,11 +245,11 @@ pub const fn spread<M, const COUNT: usize>(
     letters: &'static [u8],
 ) -> [Variable<M>; COUNT] {
     let mut table = [lines[0]; COUNT];
-    let (mut place, mut line, mut letters) = (0, 0, letters);
+    let (mut index, mut line, mut letters) = (0, 0, letters);
     while line < lines.len() {
         let of = &lines[line];
         let differentiated = match of.differentiates() {
-            Some(line) => Some(place_of(lines, line as usize)),
+            Some(line) => Some(index_of(lines, line as usize)),
             None => None,
         };
         let mut element = 0;
@@ -264,11 +264,11 @@ pub const fn spread<M, const COUNT: usize>(
             } else {
                 of.name()
             };
-            table[place] = of.spread(line, element, name);
+            table[index] = of.spread(line, element, name);
             if let Some(first) = differentiated {
-                table[place] = table[place].differentiating(first + element);
+                table[index] = table[index].differentiating(first + element);
             }
-            place += 1;
+            index += 1;
             element += 1;
         }
         line += 1;
@@ -280,12 +280,12 @@ pub const fn spread<M, const COUNT: usize>(
 #[doc(hidden)]
 pub const fn spread_names<M, N: Copy, const COUNT: usize>(lines: &[Variable<M>], names: &[N]) -> [N; COUNT] {
     let mut spread = [names[0]; COUNT];
-    let (mut place, mut line) = (0, 0);
+    let (mut index, mut line) = (0, 0);
     while line < lines.len() {
         let mut element = 0;
         while element < lines[line].length() {
-            spread[place] = names[line];
-            place += 1;
+            spread[index] = names[line];
+            index += 1;
             element += 1;
         }
         line += 1;
@@ -296,10 +296,10 @@ pub const fn spread_names<M, N: Copy, const COUNT: usize>(lines: &[Variable<M>],
 /// Returns the number of states in a table.
 #[doc(hidden)]
 pub const fn count_states<M>(table: &[Variable<M>]) -> usize {
-    let (mut count, mut place) = (0, 0);
-    while place < table.len() {
-        count += table[place].is_state() as usize;
-        place += 1;
+    let (mut count, mut index) = (0, 0);
+    while index < table.len() {
+        count += table[index].is_state() as usize;
+        index += 1;
     }
     count
 }
@@ -308,27 +308,27 @@ pub const fn count_states<M>(table: &[Variable<M>]) -> usize {
 #[doc(hidden)]
 pub const fn find_states<M, const N: usize>(table: &[Variable<M>]) -> [StateOfTable; N] {
     let mut states = [StateOfTable { state: 0, derivative: 0 }; N];
-    let (mut found, mut place) = (0, 0);
-    while place < table.len() {
+    let (mut found, mut index) = (0, 0);
+    while index < table.len() {
         // `check_line` rejects a state without derivative.
-        if table[place].is_state()
-            && let Some(derivative) = derivative(table, place as u32)
+        if table[index].is_state()
+            && let Some(derivative) = derivative(table, index as u32)
         {
-            states[found] = StateOfTable { state: place as u32, derivative };
+            states[found] = StateOfTable { state: index as u32, derivative };
             found += 1;
         }
-        place += 1;
+        index += 1;
     }
     states
 }
 
 const fn derivative<M>(table: &[Variable<M>], state: u32) -> Option<u32> {
-    let mut place = 0;
-    while place < table.len() {
-        if matches!(table[place].differentiates(), Some(of) if of == state) {
-            return Some(place as u32);
+    let mut index = 0;
+    while index < table.len() {
+        if matches!(table[index].differentiates(), Some(of) if of == state) {
+            return Some(index as u32);
         }
-        place += 1;
+        index += 1;
     }
     None
 }
@@ -339,18 +339,18 @@ const fn derivative<M>(table: &[Variable<M>], state: u32) -> Option<u32> {
 pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
     let of = &lines[line as usize];
     if let Some(fault) = of.fault() {
-        refuse(of.name(), fault);
+        reject(of.name(), fault);
     }
     // Section 2.2.7. The compiler checks only names that are identifiers, not names that are strings.
     let mut other = 0;
     while other < lines.len() {
         if other < line as usize && has_name(of, &lines[other]) || is_element(of, &lines[other]) {
-            refuse(of.name(), "there are two variables of this name");
+            reject(of.name(), "there are two variables of this name");
         }
         other += 1;
     }
     if of.is_state() && derivative(lines, line).is_none() {
-        refuse(
+        reject(
             of.name(),
             "a state needs its derivative in the table: ... = local(...).derivative_of(the state) by ...",
         );
@@ -358,7 +358,7 @@ pub const fn check_line<M>(lines: &[Variable<M>], Index(line): Index) {
     if let Some(differentiated) = of.differentiates()
         && !of.has_dimensions(&lines[differentiated as usize])
     {
-        refuse(of.name(), "it must be an array of the same length as what it is the derivative of");
+        reject(of.name(), "it must be an array of the same length as what it is the derivative of");
     }
 }
 
@@ -369,10 +369,10 @@ const fn has_name<M>(one: &Variable<M>, other: &Variable<M>) -> bool {
 /// Returns whether a variable has the name of an element of the array.
 const fn is_element<M>(one: &Variable<M>, array: &Variable<M>) -> bool {
     let name = one.name().as_bytes();
-    let (mut place, mut has_index) = (0, false);
-    while place < name.len() {
-        has_index |= name[place] == b'[';
-        place += 1;
+    let (mut index, mut has_index) = (0, false);
+    while index < name.len() {
+        has_index |= name[index] == b'[';
+        index += 1;
     }
     let mut element = 0;
     while has_index && is_array(array) && element < array.length() {
@@ -386,11 +386,11 @@ const fn is_element<M>(one: &Variable<M>, array: &Variable<M>) -> bool {
 }
 
 const fn is_equal(one: &[u8], other: &[u8]) -> bool {
-    let mut place = 0;
-    while place < one.len() && place < other.len() && one[place] == other[place] {
-        place += 1;
+    let mut index = 0;
+    while index < one.len() && index < other.len() && one[index] == other[index] {
+        index += 1;
     }
-    place == one.len() && place == other.len()
+    index == one.len() && index == other.len()
 }
 
 /// Defines a model's table of variables: the kind of each variable, and the field or calculation of its
@@ -453,25 +453,25 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 /// }
 ///
 /// use fmu_export::Variables;
-/// assert_eq!(Lag::TABLE[Lag::place(Name::der_x)].name(), "der(x)");
-/// assert_eq!(Lag::TABLE[Lag::place(Name::x)].description(), "Output, follows the input");
+/// assert_eq!(Lag::TABLE[Lag::index(Name::der_x)].name(), "der(x)");
+/// assert_eq!(Lag::TABLE[Lag::index(Name::x)].description(), "Output, follows the input");
 /// ```
 #[macro_export]
 macro_rules! variables {
     (
         for $model:ty
         $(, names $names:ident )?
-        $(, memory in $( $memory:ident $([ $memory_at:expr ])* $( . $memory_field:tt $([ $memory_place:expr ])* )* ),+ )? ;
+        $(, memory in $( $memory:ident $([ $memory_at:expr ])* $( . $memory_field:tt $([ $memory_index:expr ])* )* ),+ )? ;
         $(
             $(#[doc = $text:literal])*
             $name:ident $( as $label:literal )? =
                 $kind:tt $of:tt $( . $refinement:ident $arguments:tt )*
                 $(
-                    in $first:tt $([ $at:expr ])* $( . $field:tt $([ $place:expr ])* )*
-                    $( then $mark:ident $([ $mark_at:expr ])* $( . $mark_field:tt $([ $mark_place:expr ])* )* )?
+                    in $first:tt $([ $at:expr ])* $( . $field:tt $([ $index:expr ])* )*
+                    $( then $mark:ident $([ $mark_at:expr ])* $( . $mark_field:tt $([ $mark_index:expr ])* )* )?
                     $( then | $changed:ident | $after:block )?
                 )?
-                $( from $from:tt $([ $from_at:expr ])* $( . $from_field:tt $([ $from_place:expr ])* )* )?
+                $( from $from:tt $([ $from_at:expr ])* $( . $from_field:tt $([ $from_index:expr ])* )* )?
                 $( by $calculate:expr )? ;
         )+
     ) => {
@@ -520,57 +520,57 @@ macro_rules! variables {
                         let variable = variable.stored(
                             $crate::Read {
                                 shape: match |model: &$model| $crate::type_of(
-                                    &(*model).$first $([$at])* $( .$field $([$place])* )*
+                                    &(*model).$first $([$at])* $( .$field $([$index])* )*
                                 ) {
-                                    $first => $crate::shape_of_place($first),
+                                    $first => $crate::shape_of_index($first),
                                 },
-                                real: |model| match &(*model).$first $([$at])* $( .$field $([$place])* )* {
+                                real: |model| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::read_real($first, 0),
                                 },
-                                value: |model| match &(*model).$first $([$at])* $( .$field $([$place])* )* {
+                                value: |model| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::read_value($first, 0),
                                 },
                             },
                             $crate::Store {
                                 real: |model, value| {
-                                    match &mut (*model).$first $([$at])* $( .$field $([$place])* )* {
+                                    match &mut (*model).$first $([$at])* $( .$field $([$index])* )* {
                                         $first => $crate::set_real($first, 0, value),
                                     }
-                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
+                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_index])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
                                 value: |model, value| {
-                                    match &mut (*model).$first $([$at])* $( .$field $([$place])* )* {
+                                    match &mut (*model).$first $([$at])* $( .$field $([$index])* )* {
                                         $first => $crate::set_value($first, 0, value),
                                     }
-                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
+                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_index])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
-                                visit: |model, visitor| match &mut (*model).$first $([$at])* $( .$field $([$place])* )* {
+                                visit: |model, visitor| match &mut (*model).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::Saved::visit($first, visitor),
                                 },
                             },
                             $crate::ReadAt {
-                                reals: |model, from, values| match &(*model).$first $([$at])* $( .$field $([$place])* )* {
+                                reals: |model, from, values| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::read_reals($first, from, values),
                                 },
-                                value: |model, number| match &(*model).$first $([$at])* $( .$field $([$place])* )* {
+                                value: |model, number| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::read_value($first, number),
                                 },
                             },
                             $crate::StoreAt {
                                 real: |model, number, value| {
-                                    match &mut (*model).$first $([$at])* $( .$field $([$place])* )* {
+                                    match &mut (*model).$first $([$at])* $( .$field $([$index])* )* {
                                         $first => $crate::set_real($first, number, value),
                                     }
-                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
+                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_index])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
                                 value: |model, number, value| {
-                                    match &mut (*model).$first $([$at])* $( .$field $([$place])* )* {
+                                    match &mut (*model).$first $([$at])* $( .$field $([$index])* )* {
                                         $first => $crate::set_value($first, number, value),
                                     }
-                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )* = true; )?
+                                    $( (*model).$mark $([$mark_at])* $( .$mark_field $([$mark_index])* )* = true; )?
                                     $( { let $changed = model; $after } )?
                                 },
                             },
@@ -581,7 +581,7 @@ macro_rules! variables {
                         let variable = $crate::variables!(
                             @calculated variable $model,
                             |model: &$model| ::core::clone::Clone::clone(
-                                &(*model).$from $([$from_at])* $( .$from_field $([$from_place])* )*
+                                &(*model).$from $([$from_at])* $( .$from_field $([$from_index])* )*
                             )
                         );
                     )?
@@ -623,10 +623,10 @@ macro_rules! variables {
                             let offset = without;
                             $( #[allow(dead_code)] fn $first() {} )?
                             $( #[allow(dead_code)] fn $from() {} )?
-                            $( let offset = match &(*self).$first $([$at])* $( .$field $([$place])* )* {
+                            $( let offset = match &(*self).$first $([$at])* $( .$field $([$index])* )* {
                                 $first => $crate::offset_of_real(self, $first, without),
                             }; )?
-                            $( let offset = match &(*self).$from $([$from_at])* $( .$from_field $([$from_place])* )* {
+                            $( let offset = match &(*self).$from $([$from_at])* $( .$from_field $([$from_index])* )* {
                                 $from => $crate::offset_of_real(self, $from, without),
                             }; )?
                             $( let offset = $crate::variables!(@instead_of $calculate without); )?
@@ -644,16 +644,16 @@ macro_rules! variables {
                             let offsets = without;
                             $( #[allow(dead_code)] fn $first() {} )?
                             $(
-                                let place = match &mut (*self).$first $([$at])* $( .$field $([$place])* )* {
+                                let offset = match &mut (*self).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::offset_of_real(model, $first, usize::MAX),
                                 };
                                 let mark = no_mark;
                                 $(
                                     let mark: &mut bool =
-                                        &mut (*self).$mark $([$mark_at])* $( .$mark_field $([$mark_place])* )*;
+                                        &mut (*self).$mark $([$mark_at])* $( .$mark_field $([$mark_index])* )*;
                                     let mark = $crate::offset_in(model, mark, usize::MAX);
                                 )?
-                                let offsets = $crate::both_offsets(place, mark).unwrap_or(without);
+                                let offsets = $crate::both_offsets(offset, mark).unwrap_or(without);
                                 $( let offsets = $crate::variables!(@instead_of $after without); )?
                             )?
                             offsets
@@ -666,7 +666,7 @@ macro_rules! variables {
                 fn visit_memory(&mut self, visitor: &mut dyn $crate::StateVisitor) {
                     $($(
                         $crate::Saved::visit(
-                            &mut self.$memory $([$memory_at])* $( .$memory_field $([$memory_place])* )*,
+                            &mut self.$memory $([$memory_at])* $( .$memory_field $([$memory_index])* )*,
                             visitor,
                         );
                     )+)?

@@ -123,10 +123,10 @@ impl Dimensions {
 
     /// Returns the number of elements.
     pub(crate) const fn length(&self) -> usize {
-        let (mut length, mut place) = (1, 0);
-        while place < self.count {
-            length *= self.sizes[place];
-            place += 1;
+        let (mut length, mut index) = (1, 0);
+        while index < self.count {
+            length *= self.sizes[index];
+            index += 1;
         }
         length
     }
@@ -350,13 +350,13 @@ mod tests {
             base: BaseType,
         ) {
             assert_eq!((T::BASE, other.value()), (base, value.clone()));
-            let mut place = start.clone();
-            place.assign(&value);
-            assert_eq!(place, other);
+            let mut index = start.clone();
+            index.assign(&value);
+            assert_eq!(index, other);
             // A value of another type is ignored.
             let wrong = if base == BaseType::Boolean { Value::Real(1.0) } else { Value::Boolean(true) };
-            place.assign(&wrong);
-            assert_eq!(place, other);
+            index.assign(&wrong);
+            assert_eq!(index, other);
         }
         check(0.0, 1.5, Value::Real(1.5), BaseType::Real);
         check(0, -7, Value::Integer(-7), BaseType::Integer);
@@ -367,9 +367,9 @@ mod tests {
     /// Checks that the direct access to Reals agrees with the general access.
     #[test]
     fn reals_without_a_detour() {
-        let mut place = 1.0;
-        place.set_real(2.5);
-        assert_eq!((place.real(), place.value()), (2.5, Value::Real(2.5)));
+        let mut index = 1.0;
+        index.set_real(2.5);
+        assert_eq!((index.real(), index.value()), (2.5, Value::Real(2.5)));
         assert!(7_i32.real().is_nan() && true.real().is_nan());
         let mut whole = 7;
         whole.set_real(8.0);

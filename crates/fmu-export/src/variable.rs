@@ -57,7 +57,7 @@ pub struct Variable<M> {
     pub(crate) read_at: Option<ReadAt<M>>,
     pub(crate) store_at: Option<StoreAt<M>>,
     /// A fault that is known before the line is complete.
-    refused: Option<&'static str>,
+    rejected: Option<&'static str>,
 }
 
 impl<M> Clone for Variable<M> {
@@ -142,7 +142,7 @@ impl<M> Variable<M> {
             store: None,
             read_at: None,
             store_at: None,
-            refused: None,
+            rejected: None,
         }
     }
 
@@ -192,7 +192,7 @@ impl<M> Variable<M> {
     #[doc(hidden)]
     pub const fn clock(of: &'static Type) -> Self {
         let mut variable = Self::local(of);
-        variable.refused = Some(
+        variable.rejected = Some(
             "clocks are not offered, nor is Scheduled Execution: events take their place, see ModelExchange::event \
              and CoSimulation::EVENTS",
         );
@@ -203,7 +203,7 @@ impl<M> Variable<M> {
     #[doc(hidden)]
     pub const fn structural_parameter(of: &'static Type) -> Self {
         let mut variable = Self::parameter(of);
-        variable.refused = Some(
+        variable.rejected = Some(
             "structural parameters are not offered: an array has the length that the field has in Rust, as 8 in [f64; 8]",
         );
         variable
@@ -332,7 +332,7 @@ impl<M> Variable<M> {
         if let Some(Read { shape: Shape { dimensions, .. }, .. }) = &self.read
             && !dimensions.is(&read.shape.dimensions)
         {
-            self.refused = Some("what in and by give must be arrays of the same length");
+            self.rejected = Some("what in and by give must be arrays of the same length");
         }
         self.read = Some(read);
         self.dimensions = read.shape.dimensions;
@@ -370,8 +370,8 @@ impl<M> Variable<M> {
     }
 
     /// Sets the index of the variable of which this one is the derivative.
-    pub(crate) const fn differentiating(mut self, place: usize) -> Self {
-        self.derivative_of = Some(Index(place as u32));
+    pub(crate) const fn differentiating(mut self, index: usize) -> Self {
+        self.derivative_of = Some(Index(index as u32));
         self
     }
 
@@ -387,8 +387,8 @@ impl<M> Variable<M> {
                 | (Local, _)
                 | (Independent, Continuous)
         );
-        if self.refused.is_some() {
-            return self.refused;
+        if self.rejected.is_some() {
+            return self.rejected;
         }
         if self.description.is_empty() {
             return Some("say in a comment above it (///) what it is");
@@ -586,7 +586,7 @@ pub fn type_of<T>(_: &T) -> PhantomData<T> {
 
 /// Returns the shape of a field of the model.
 #[doc(hidden)]
-pub const fn shape_of_place<M, T: Place>(_: fn(&M) -> PhantomData<T>) -> Shape {
+pub const fn shape_of_index<M, T: Place>(_: fn(&M) -> PhantomData<T>) -> Shape {
     Shape { base: T::Element::BASE, dimensions: T::DIMENSIONS }
 }
 
@@ -599,29 +599,29 @@ pub const fn shape_of_calculation<M, T: Place>(_: PhantomData<M>, _: fn(&M) -> T
 /// Reads a Real: an element of an array, or the scalar.
 #[doc(hidden)]
 #[inline(always)]
-pub fn read_real(place: &impl Place, number: usize) -> f64 {
-    place.element(number).real()
+pub fn read_real(index: &impl Place, number: usize) -> f64 {
+    index.element(number).real()
 }
 
 /// Reads a value of any type: an element of an array, or the scalar.
 #[doc(hidden)]
 #[inline(always)]
-pub fn read_value(place: &impl Place, number: usize) -> Value {
-    place.element(number).value()
+pub fn read_value(index: &impl Place, number: usize) -> Value {
+    index.element(number).value()
 }
 
 /// Sets a Real.
 #[doc(hidden)]
 #[inline(always)]
-pub fn set_real(place: &mut impl Place, number: usize, value: f64) {
-    place.element_mut(number).set_real(value);
+pub fn set_real(index: &mut impl Place, number: usize, value: f64) {
+    index.element_mut(number).set_real(value);
 }
 
 /// Sets a value of any type.
 #[doc(hidden)]
 #[inline(always)]
-pub fn set_value(place: &mut impl Place, number: usize, value: &Value) {
-    place.element_mut(number).assign(value);
+pub fn set_value(index: &mut impl Place, number: usize, value: &Value) {
+    index.element_mut(number).assign(value);
 }
 
 /// Reads Reals of an array from an element on. Returns 0 if all values are finite.
@@ -662,7 +662,7 @@ pub fn read_reals_by<M, T: Place>(
 
 /// Ends the compilation with a message that contains a variable's name and its fault.
 #[track_caller]
-pub(crate) const fn refuse(name: &str, fault: &str) -> ! {
+pub(crate) const fn reject(name: &str, fault: &str) -> ! {
     panic!("{}", Message::new(name, fault).text())
 }
 
@@ -698,11 +698,11 @@ impl Message {
     }
 
     const fn with(mut self, text: &str) -> Self {
-        let mut place = 0;
-        while place < text.len() && self.length < self.bytes.len() {
-            self.bytes[self.length] = text.as_bytes()[place];
+        let mut index = 0;
+        while index < text.len() && self.length < self.bytes.len() {
+            self.bytes[self.length] = text.as_bytes()[index];
             self.length += 1;
-            place += 1;
+            index += 1;
         }
         self
     }

@@ -138,10 +138,10 @@ fn the_functions_are_those_of_the_fmu() {
     // SAFETY: a string that lives as long as the library.
     assert_eq!(unsafe { ::std::ffi::CStr::from_ptr(version) }, c"2.0");
     let table = <Idler as fmi::Variables>::TABLE;
-    let place = <Idler as fmi::Variables>::place;
-    assert_eq!(table[place(Name::Status)].name(), "Status");
+    let index = <Idler as fmi::Variables>::index;
+    assert_eq!(table[index(Name::Status)].name(), "Status");
     assert_eq!(
-        table[place(Name::Status)].differentiates(),
-        ::core::option::Option::Some(place(Name::variable) as u32)
+        table[index(Name::Status)].differentiates(),
+        ::core::option::Option::Some(index(Name::variable) as u32)
     );
 }

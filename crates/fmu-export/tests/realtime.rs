@@ -12,11 +12,11 @@ fn arrays_are_set_and_read_without_allocation() {
     use fmu_test_kit::Either;
     use models::{Rod, rod::Name};
     let [power, temperatures, rates] =
-        [Name::power, Name::T, Name::der_T].map(|name| Rod::place(name) as u32);
+        [Name::power, Name::T, Name::der_T].map(|name| Rod::index(name) as u32);
     let whole = fmu_test_kit::fmi3::Importer::initialized_at::<Rod>(0.0);
     let elements = fmu_test_kit::Importer::initialized_at::<Rod>(0.0);
     let references = [temperatures, rates].map(fmu_export::fmi3::reference);
-    let places: [u32; 16] = std::array::from_fn(|k| k as u32 % 8 + if k < 8 { temperatures } else { rates });
+    let indices: [u32; 16] = std::array::from_fn(|k| k as u32 % 8 + if k < 8 { temperatures } else { rates });
     let (mut of_fmi3, mut of_fmi2) = ([f64::NAN; 16], [f64::NAN; 16]);
     let count = fmu_test_kit::realtime::allocations(|| {
         for k in 0..5 {
@@ -27,7 +27,7 @@ fn arrays_are_set_and_read_without_allocation() {
             whole.ok(whole.fmi3GetFloat64(references.as_ptr(), 2, of_fmi3.as_mut_ptr(), 16));
             elements.ok(elements.try_set(&[power, power + 1], &powers));
             elements.step(time, 0.25);
-            elements.ok(elements.try_get(&places, &mut of_fmi2));
+            elements.ok(elements.try_get(&indices, &mut of_fmi2));
         }
     });
     assert_eq!((count, of_fmi3), (0, of_fmi2));

@@ -72,7 +72,7 @@ pub(crate) struct Whole {
     pub references: Vec<u32>,
     /// Number of their values. `places` contains the index of each variable's value among them.
     pub count: usize,
-    pub places: Vec<usize>,
+    pub indices: Vec<usize>,
     /// Index of each array and of its first value.
     pub arrays: Vec<(usize, usize)>,
 }
@@ -81,7 +81,7 @@ impl Whole {
     /// Returns whether the variables include all elements of their arrays.
     pub fn is_complete(&self) -> bool {
         let mut named = vec![false; self.count];
-        self.places.iter().for_each(|place| named[*place] = true);
+        self.indices.iter().for_each(|index| named[*index] = true);
         named.iter().all(|named| *named)
     }
 }
@@ -104,16 +104,16 @@ impl Arrays {
         if self.elements.len() + length > MOST_ELEMENTS {
             return None;
         }
-        let place = self.all.len();
-        self.by_reference.insert(array.reference, place);
-        self.elements.extend((0..length).map(|number| (place, number)));
+        let index = self.all.len();
+        self.by_reference.insert(array.reference, index);
+        self.elements.extend((0..length).map(|number| (index, number)));
         self.all.push(array);
         Some(begin..end)
     }
 
     /// Returns the number of values of a variable of the FMU.
     pub fn length(&self, reference: u32) -> usize {
-        self.by_reference.get(&reference).and_then(|place| self.all[*place].length()).unwrap_or(1)
+        self.by_reference.get(&reference).and_then(|index| self.all[*index].length()).unwrap_or(1)
     }
 
     /// Returns the index of the array to which an element belongs, and its number in the array.
@@ -135,7 +135,7 @@ impl Arrays {
         for reference in references {
             let Some((array, number)) = self.find(*reference) else {
                 whole.references.push(*reference);
-                whole.places.push(whole.count);
+                whole.indices.push(whole.count);
                 whole.count += 1;
                 continue;
             };
@@ -146,7 +146,7 @@ impl Arrays {
                 whole.count += self.all[array].length().unwrap_or_default();
                 begin
             });
-            whole.places.push(begin + number);
+            whole.indices.push(begin + number);
         }
         whole
     }
@@ -206,7 +206,7 @@ mod tests {
             .collect();
         let whole = description.arrays.whole(&references);
         assert_eq!((whole.references.clone(), whole.count), (vec![2, 1], 4));
-        assert_eq!(whole.places, [2, 3, 0, 2]);
+        assert_eq!(whole.indices, [2, 3, 0, 2]);
         assert!(!whole.is_complete() && description.arrays.among(&references));
         assert!(!description.arrays.among(&[1, 2, 7]));
     }

@@ -54,7 +54,7 @@ pub struct Description {
     pub event_indicators: usize,
     /// Arrays to which variables belong.
     pub(crate) arrays: Arc<Arrays>,
-    places: HashMap<String, usize>,
+    indices: HashMap<String, usize>,
     /// Variables of each variable of the file: one, or the elements of an array.
     spans: Vec<Range<usize>>,
 }
@@ -101,7 +101,7 @@ impl Description {
             states: written.derivatives.iter().map(|of| spans[of.variable].len()).sum(),
             event_indicators,
             arrays: Arc::new(arrays),
-            places: variables.iter().enumerate().map(|(place, of)| (of.name.clone(), place)).collect(),
+            indices: variables.iter().enumerate().map(|(index, of)| (of.name.clone(), index)).collect(),
             variables,
             spans,
             written,
@@ -115,7 +115,7 @@ impl Description {
 
     /// Returns the variable of this name.
     pub fn variable(&self, name: &str) -> Option<&Variable> {
-        self.places.get(name).map(|place| &self.variables[*place])
+        self.indices.get(name).map(|index| &self.variables[*index])
     }
 
     /// Returns whether directional derivatives with respect to this variable may exist: for inputs,
@@ -225,7 +225,7 @@ fn relate(written: &ModelDescription, spans: &[Range<usize>], variables: &mut [V
             own.len() * known.iter().map(|known| spans[*known].len()).sum::<usize>() < 1 << 22
         });
         let known = known.map(|known| known.iter().flat_map(|known| spans[*known].clone()));
-        let known = known.map(|known| known.map(|place| variables[place].reference).collect::<Vec<_>>());
+        let known = known.map(|known| known.map(|index| variables[index].reference).collect::<Vec<_>>());
         variables[own].iter_mut().for_each(|output| output.depends_on.clone_from(&known));
     }
     for (own, of) in spans.iter().zip(&written.variables) {

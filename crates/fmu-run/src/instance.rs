@@ -5,7 +5,7 @@ use crate::arrays::{Arrays, Whole};
 use crate::fmu::Loaded;
 use crate::library::{Functions, Library};
 use crate::log::{Log, log_of_fmi3, logger_of_fmi2};
-use crate::refusal::{Message, Refusal, reason};
+use crate::rejection::{Message, Rejection, reason};
 use fmi_abi::c_types::{c_int, c_void};
 use fmi_abi::fmi2::types::*;
 use fmi_abi::fmi3::types::*;
@@ -46,7 +46,7 @@ struct Early {
 pub(crate) struct Saved(usize);
 
 impl Saved {
-    pub fn place(self) -> usize {
+    pub fn index(self) -> usize {
         self.0
     }
 }
@@ -88,8 +88,8 @@ impl Drop for Instance {
         if self.handle.is_null() {
             return;
         }
-        for place in 0..self.saved.len() {
-            _ = self.forget(Saved(place));
+        for index in 0..self.saved.len() {
+            _ = self.forget(Saved(index));
         }
         // SAFETY: the library made the instance, which is freed only here.
         unsafe {
@@ -106,7 +106,7 @@ macro_rules! call {
     ($self:ident, $fmi2:ident ( $($of_fmi2:expr),* ) $(, $fmi3:ident ( $($of_fmi3:expr),* ))?) => {{
         let handle = $self.handle;
         if handle.is_null() {
-            return Err($self.refusal(stringify!($fmi2), Status::Fatal, Vec::new()));
+            return Err($self.rejection(stringify!($fmi2), Status::Fatal, Vec::new()));
         }
         // SAFETY: the instance is alive; array arguments are slices with the passed lengths, and single
         // values are live references.
@@ -292,18 +292,18 @@ impl Instance {
     }
 
     #[cold]
-    fn refusal(&self, function: &'static str, status: Status, log: Vec<Message>) -> Refusal {
-        Refusal::new(&self.name, function, status, log)
+    fn rejection(&self, function: &'static str, status: Status, log: Vec<Message>) -> Rejection {
+        Rejection::new(&self.name, function, status, log)
     }
 
     /// Converts the status of a call.
     #[inline]
-    fn check(&mut self, function: &'static str, code: c_int) -> Result<(), Refusal> {
+    fn check(&mut self, function: &'static str, code: c_int) -> Result<(), Rejection> {
         if code == Status::Ok as c_int { Ok(()) } else { self.not_ok(function, Status::from_c(code)) }
     }
 
     #[cold]
-    fn not_ok(&mut self, function: &'static str, status: Status) -> Result<(), Refusal> {
+    fn not_ok(&mut self, function: &'static str, status: Status) -> Result<(), Rejection> {
         // Messages of a warning are removed, so that they are not taken for the reason of a later error.
         let log = self.log.take();
         if status == Status::Warning {
@@ -312,7 +312,7 @@ impl Instance {
         if status == Status::Fatal {
             self.handle = null_mut();
         }
-        Err(self.refusal(function, status, log))
+        Err(self.rejection(function, status, log))
     }
 
     fn is_of_fmi2(&self) -> bool {
@@ -334,7 +334,7 @@ impl Instance {
     }
 
     /// Sets up the experiment in FMI 2.0, before the start values are set.
-    pub(crate) fn set_up(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
+    pub(crate) fn set_up(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Rejection> {
         match &self.library.functions {
             // FMI 3.0 passes the times when it enters Initialization Mode.
             Functions::Fmi3(_) => Ok(()),
@@ -349,7 +349,7 @@ impl Instance {
         &mut self,
         start_time: f64,
         stop_time: Option<f64>,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), Rejection> {
         let (defined, stop) = (stop_time.is_some().into(), stop_time.unwrap_or(start_time));
         call!(
             self,
@@ -360,12 +360,12 @@ impl Instance {
         Ok(())
     }
 
-    pub(crate) fn exit_initialization_mode(&mut self) -> Result<(), Refusal> {
+    pub(crate) fn exit_initialization_mode(&mut self) -> Result<(), Rejection> {
         call!(self, fmi2ExitInitializationMode(), fmi3ExitInitializationMode())
     }
 
     #[inline]
-    pub(crate) fn set_reals(&mut self, vr: &[u32], values: &[f64]) -> Result<(), Refusal> {
+    pub(crate) fn set_reals(&mut self, vr: &[u32], values: &[f64]) -> Result<(), Rejection> {
         assert_eq!(vr.len(), values.len());
         if self.arrays.among(vr) {
             return self.set_elements(vr, values);
@@ -375,12 +375,12 @@ impl Instance {
     }
 
     #[inline]
-    pub(crate) fn get_reals(&mut self, vr: &[u32], values: &mut [f64]) -> Result<(), Refusal> {
+    pub(crate) fn get_reals(&mut self, vr: &[u32], values: &mut [f64]) -> Result<(), Rejection> {
         assert_eq!(vr.len(), values.len());
         if self.arrays.among(vr) {
             let whole = self.arrays.whole(vr);
             let all = self.get_whole(&whole)?;
-            whole.places.iter().zip(values).for_each(|(place, value)| *value = all[*place]);
+            whole.indices.iter().zip(values).for_each(|(index, value)| *value = all[*index]);
             return Ok(());
         }
         let (vr, n, values) = (vr.as_ptr(), vr.len(), values.as_mut_ptr());
@@ -388,7 +388,7 @@ impl Instance {
     }
 
     /// Gets Reals of whole arrays and scalars.
-    fn get_whole(&mut self, whole: &Whole) -> Result<Vec<f64>, Refusal> {
+    fn get_whole(&mut self, whole: &Whole) -> Result<Vec<f64>, Rejection> {
         let mut all = vec![0.0; whole.count];
         let (vr, n, values) = (whole.references.as_ptr(), whole.references.len(), all.as_mut_ptr());
         let count = whole.count;
@@ -398,7 +398,7 @@ impl Instance {
 
     /// Sets Reals of which some are array elements; the other elements of the arrays keep their values.
     #[cold]
-    fn set_elements(&mut self, vr: &[u32], values: &[f64]) -> Result<(), Refusal> {
+    fn set_elements(&mut self, vr: &[u32], values: &[f64]) -> Result<(), Rejection> {
         let whole = self.arrays.whole(vr);
         let mut all = if whole.is_complete() {
             vec![0.0; whole.count]
@@ -412,7 +412,7 @@ impl Instance {
         } else {
             self.get_whole(&whole)?
         };
-        whole.places.iter().zip(values).for_each(|(place, value)| all[*place] = *value);
+        whole.indices.iter().zip(values).for_each(|(index, value)| all[*index] = *value);
         let (vr, n, values) = (whole.references.as_ptr(), whole.references.len(), all.as_ptr());
         call!(self, fmi2SetReal(vr, n, values), fmi3SetFloat64(vr, n, values, all.len()))?;
         if let Some(early) = &mut self.early {
@@ -439,7 +439,7 @@ impl Instance {
     }
 
     /// Returns all numbers of an array.
-    fn array_numbers(&mut self, array: usize) -> Result<Vec<f64>, Refusal> {
+    fn array_numbers(&mut self, array: usize) -> Result<Vec<f64>, Rejection> {
         let arrays = Arc::clone(&self.arrays);
         let of = &arrays.all()[array];
         let (base, vr, length) = (of.base, of.reference, arrays.length(of.reference));
@@ -447,7 +447,7 @@ impl Instance {
     }
 
     /// Sets one number of an array; the others keep their values.
-    fn set_element(&mut self, (array, number): (usize, usize), value: f64) -> Result<(), Refusal> {
+    fn set_element(&mut self, (array, number): (usize, usize), value: f64) -> Result<(), Rejection> {
         let arrays = Arc::clone(&self.arrays);
         let (base, vr) = (arrays.all()[array].base, arrays.all()[array].reference);
         let mut all =
@@ -462,14 +462,14 @@ impl Instance {
     }
 
     /// Sets a number of any type; 0 or 1 for a Boolean.
-    pub(crate) fn set_number(&mut self, base: BaseType, vr: u32, value: f64) -> Result<(), Refusal> {
+    pub(crate) fn set_number(&mut self, base: BaseType, vr: u32, value: f64) -> Result<(), Rejection> {
         if let Some(element) = self.arrays.find(vr) {
             return self.set_element(element, value);
         }
         numbers!(set: self base vr value)
     }
 
-    pub(crate) fn get_number(&mut self, base: BaseType, vr: u32) -> Result<f64, Refusal> {
+    pub(crate) fn get_number(&mut self, base: BaseType, vr: u32) -> Result<f64, Rejection> {
         if let Some((array, number)) = self.arrays.find(vr) {
             return Ok(self.array_numbers(array)?[number]);
         }
@@ -477,7 +477,7 @@ impl Instance {
     }
 
     /// Returns all strings of an array, in FMI 3.0.
-    fn array_texts(&mut self, array: usize) -> Result<Vec<CString>, Refusal> {
+    fn array_texts(&mut self, array: usize) -> Result<Vec<CString>, Rejection> {
         let vr = self.arrays.all()[array].reference;
         let mut texts = vec![null(); self.arrays.length(vr)];
         let (values, n) = (texts.as_mut_ptr(), texts.len());
@@ -489,7 +489,7 @@ impl Instance {
     }
 
     /// Sets one string of an array; the others keep their values.
-    fn set_text_element(&mut self, (array, number): (usize, usize), value: &CStr) -> Result<(), Refusal> {
+    fn set_text_element(&mut self, (array, number): (usize, usize), value: &CStr) -> Result<(), Rejection> {
         let (arrays, vr) = (Arc::clone(&self.arrays), self.arrays.all()[array].reference);
         let start =
             |number| CString::new(arrays.all()[array].start(number).unwrap_or_default()).unwrap_or_default();
@@ -508,7 +508,7 @@ impl Instance {
         Ok(())
     }
 
-    pub(crate) fn set_text(&mut self, vr: u32, value: &CStr) -> Result<(), Refusal> {
+    pub(crate) fn set_text(&mut self, vr: u32, value: &CStr) -> Result<(), Rejection> {
         if let Some(element) = self.arrays.find(vr) {
             return self.set_text_element(element, value);
         }
@@ -516,7 +516,7 @@ impl Instance {
         call!(self, fmi2SetString(&vr, 1, &text), fmi3SetString(&vr, 1, &text, 1))
     }
 
-    pub(crate) fn get_text(&mut self, vr: u32) -> Result<String, Refusal> {
+    pub(crate) fn get_text(&mut self, vr: u32) -> Result<String, Rejection> {
         if let Some((array, number)) = self.arrays.find(vr) {
             return Ok(self.array_texts(array)?.swap_remove(number).to_string_lossy().into_owned());
         }
@@ -536,7 +536,7 @@ impl Instance {
         vr: &[u32],
         orders: &[i32],
         values: &[f64],
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), Rejection> {
         assert!(vr.len() == values.len() && vr.len() == orders.len());
         let (vr, n, orders, values) = (vr.as_ptr(), vr.len(), orders.as_ptr(), values.as_ptr());
         call!(self, fmi2SetRealInputDerivatives(vr, n, orders, values))
@@ -548,11 +548,11 @@ impl Instance {
         vr: &[u32],
         orders: &[i32],
         values: &mut [f64],
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), Rejection> {
         assert!(vr.len() == values.len() && vr.len() == orders.len());
         if self.arrays.among(vr) {
             // All orders are 1.
-            let Whole { references, count, places, .. } = self.arrays.whole(vr);
+            let Whole { references, count, indices, .. } = self.arrays.whole(vr);
             let (orders, mut all) = (vec![1; references.len()], vec![0.0; count]);
             let (vr, n, orders, whole) =
                 (references.as_ptr(), references.len(), orders.as_ptr(), all.as_mut_ptr());
@@ -561,7 +561,7 @@ impl Instance {
                 fmi2GetRealOutputDerivatives(vr, n, orders, whole),
                 fmi3GetOutputDerivatives(vr, n, orders, whole, count)
             )?;
-            places.iter().zip(values).for_each(|(place, value)| *value = all[*place]);
+            indices.iter().zip(values).for_each(|(index, value)| *value = all[*index]);
             return Ok(());
         }
         let (vr, n, orders, values) = (vr.as_ptr(), vr.len(), orders.as_ptr(), values.as_mut_ptr());
@@ -574,7 +574,7 @@ impl Instance {
 
     /// Performs a step. Returns an error also if the FMU ends the simulation.
     #[inline]
-    pub(crate) fn step(&mut self, time: f64, size: f64) -> Result<(), Refusal> {
+    pub(crate) fn step(&mut self, time: f64, size: f64) -> Result<(), Rejection> {
         let (mut event, mut terminate, mut early, mut reached) = (fmi3False, fmi3False, fmi3False, time);
         let stepped = call!(
             self,
@@ -584,19 +584,19 @@ impl Instance {
         match stepped {
             Ok(()) if terminate == fmi3False && early == fmi3False => Ok(()),
             Ok(()) => Err(self.stopped(terminate != fmi3False, reached)),
-            Err(refusal) => Err(self.ended(refusal, time)),
+            Err(rejection) => Err(self.ended(rejection, time)),
         }
     }
 
     /// Detects whether a discarded step is a request to end the simulation (section 4.2.3 of FMI 2.0).
     #[cold]
-    fn ended(&self, refusal: Refusal, time: f64) -> Refusal {
+    fn ended(&self, rejection: Rejection, time: f64) -> Rejection {
         let (mut wanted, mut reached) = (fmi2False, time);
         let kinds =
             [StatusKind::Terminated, StatusKind::LastSuccessfulTime].map(|kind| kind as fmi2StatusKind);
-        let Functions::Fmi2(functions) = &self.library.functions else { return refusal };
-        if refusal.status() != Status::Discard {
-            return refusal;
+        let Functions::Fmi2(functions) = &self.library.functions else { return rejection };
+        if rejection.status() != Status::Discard {
+            return rejection;
         }
         // SAFETY: the instance is alive after fmi2Discard; the pointers are live references.
         let [asked, told] = unsafe {
@@ -606,28 +606,28 @@ impl Instance {
             ]
         };
         if asked != Status::Ok as c_int || wanted == fmi2False {
-            return refusal;
+            return rejection;
         }
         let told = told == Status::Ok as c_int && reached.is_finite();
-        refusal.at_end(if told { reached } else { time })
+        rejection.at_end(if told { reached } else { time })
     }
 
     /// Returns the error for a requested end of the simulation, or for an early return, which was not allowed
     /// (section 4.2.1 of FMI 3.0).
     #[cold]
-    fn stopped(&self, wanted: bool, reached: f64) -> Refusal {
+    fn stopped(&self, wanted: bool, reached: f64) -> Rejection {
         let (function, status) = ("fmi3DoStep", Status::Discard);
         let mut log = self.log.take();
         if !wanted {
             let text = format!("the step ended early, at {reached} s");
             log.push(Message { status, category: String::new(), text });
         }
-        let refusal = self.refusal(function, status, log);
-        if wanted { refusal.at_end(reached) } else { refusal }
+        let rejection = self.rejection(function, status, log);
+        if wanted { rejection.at_end(reached) } else { rejection }
     }
 
     /// Saves the state under a free index.
-    pub(crate) fn save(&mut self) -> Result<Saved, Refusal> {
+    pub(crate) fn save(&mut self) -> Result<Saved, Rejection> {
         let mut state = null_mut();
         call!(self, fmi2GetFMUstate(&mut state), fmi3GetFMUState(&mut state))?;
         Ok(self.keep(state))
@@ -635,30 +635,30 @@ impl Instance {
 
     fn keep(&mut self, state: *mut c_void) -> Saved {
         let free = self.saved.iter().position(|known| known.is_null());
-        let place = free.unwrap_or(self.saved.len());
-        self.saved.resize(self.saved.len().max(place + 1), null_mut());
-        self.saved[place] = state;
-        Saved(place)
+        let index = free.unwrap_or(self.saved.len());
+        self.saved.resize(self.saved.len().max(index + 1), null_mut());
+        self.saved[index] = state;
+        Saved(index)
     }
 
     /// Returns the saved state of an index.
-    fn state(&self, saved: Saved, function: &'static str) -> Result<*mut c_void, Refusal> {
+    fn state(&self, saved: Saved, function: &'static str) -> Result<*mut c_void, Rejection> {
         let state = self.saved.get(saved.0).copied().filter(|state| !state.is_null());
-        state.ok_or_else(|| self.refusal(function, Status::Error, Vec::new()))
+        state.ok_or_else(|| self.rejection(function, Status::Error, Vec::new()))
     }
 
-    pub(crate) fn restore(&mut self, saved: Saved) -> Result<(), Refusal> {
+    pub(crate) fn restore(&mut self, saved: Saved) -> Result<(), Rejection> {
         let state = self.state(saved, "restore")?;
         call!(self, fmi2SetFMUstate(state), fmi3SetFMUState(state))
     }
 
-    pub(crate) fn forget(&mut self, saved: Saved) -> Result<(), Refusal> {
+    pub(crate) fn forget(&mut self, saved: Saved) -> Result<(), Rejection> {
         let Ok(mut state) = self.state(saved, "forget") else { return Ok(()) };
         self.saved[saved.0] = null_mut();
         call!(self, fmi2FreeFMUstate(&mut state), fmi3FreeFMUState(&mut state))
     }
 
-    pub(crate) fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Refusal> {
+    pub(crate) fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Rejection> {
         let (state, mut size) = (self.state(saved, "serialize")?, 0);
         call!(
             self,
@@ -671,7 +671,7 @@ impl Instance {
         Ok(bytes)
     }
 
-    pub(crate) fn deserialize(&mut self, bytes: &[u8]) -> Result<Saved, Refusal> {
+    pub(crate) fn deserialize(&mut self, bytes: &[u8]) -> Result<Saved, Rejection> {
         let (from, size, mut state) = (bytes.as_ptr(), bytes.len(), null_mut());
         call!(
             self,
@@ -688,7 +688,7 @@ impl Instance {
         knowns: &[u32],
         seed: &[f64],
         result: &mut [f64],
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), Rejection> {
         assert!(knowns.len() == seed.len() && unknowns.len() == result.len());
         if self.arrays.among(unknowns) || self.arrays.among(knowns) {
             return self.directional_derivative_of_elements(unknowns, knowns, seed, result);
@@ -703,7 +703,7 @@ impl Instance {
         knowns: &[u32],
         seed: &[f64],
         result: &mut [f64],
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), Rejection> {
         let (unknown, m) = (unknowns.as_ptr(), unknowns.len());
         let (known, n) = (knowns.as_ptr(), knowns.len());
         let (seed, seed_count) = (seed.as_ptr(), seed.len());
@@ -724,26 +724,26 @@ impl Instance {
         knowns: &[u32],
         seed: &[f64],
         result: &mut [f64],
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), Rejection> {
         let (of_unknowns, of_knowns) = (self.arrays.whole(unknowns), self.arrays.whole(knowns));
         let (mut seeds, mut results) = (vec![0.0; of_knowns.count], vec![0.0; of_unknowns.count]);
-        of_knowns.places.iter().zip(seed).for_each(|(place, seed)| seeds[*place] += seed);
+        of_knowns.indices.iter().zip(seed).for_each(|(index, seed)| seeds[*index] += seed);
         let (unknowns, knowns) = (&of_unknowns.references, &of_knowns.references);
         self.directional_derivative_of_variables(unknowns, knowns, &seeds, &mut results)?;
-        of_unknowns.places.iter().zip(result).for_each(|(place, value)| *value = results[*place]);
+        of_unknowns.indices.iter().zip(result).for_each(|(index, value)| *value = results[*index]);
         Ok(())
     }
 
-    pub(crate) fn enter_event_mode(&mut self) -> Result<(), Refusal> {
+    pub(crate) fn enter_event_mode(&mut self) -> Result<(), Rejection> {
         call!(self, fmi2EnterEventMode(), fmi3EnterEventMode())
     }
 
-    pub(crate) fn enter_continuous_time_mode(&mut self) -> Result<(), Refusal> {
+    pub(crate) fn enter_continuous_time_mode(&mut self) -> Result<(), Rejection> {
         call!(self, fmi2EnterContinuousTimeMode(), fmi3EnterContinuousTimeMode())
     }
 
     /// Updates the discrete states until the event is over. The instance must be in Event Mode.
-    pub(crate) fn event(&mut self) -> Result<Event, Refusal> {
+    pub(crate) fn event(&mut self) -> Result<Event, Rejection> {
         let mut all = Event::default();
         for _ in 0..MOST_ROUNDS {
             let mut of_fmi2 = fmi2EventInfo::default();
@@ -780,12 +780,12 @@ impl Instance {
         }
         let text = format!("the event does not come to an end in {MOST_ROUNDS} rounds");
         let message = Message { status: Status::Error, category: String::new(), text };
-        Err(self.refusal("event", Status::Error, vec![message]))
+        Err(self.rejection("event", Status::Error, vec![message]))
     }
 
     /// Returns whether the FMU requests an event and the end of the simulation after a step of the
     /// integrator.
-    pub(crate) fn completed_integrator_step(&mut self) -> Result<[bool; 2], Refusal> {
+    pub(crate) fn completed_integrator_step(&mut self) -> Result<[bool; 2], Rejection> {
         let [mut event2, mut end2] = [fmi2False; 2];
         let [mut event3, mut end3] = [fmi3False; 2];
         call!(
@@ -796,16 +796,16 @@ impl Instance {
         Ok([event2 != fmi2False || event3 != fmi3False, end2 != fmi2False || end3 != fmi3False])
     }
 
-    pub(crate) fn set_time(&mut self, time: f64) -> Result<(), Refusal> {
+    pub(crate) fn set_time(&mut self, time: f64) -> Result<(), Rejection> {
         call!(self, fmi2SetTime(time), fmi3SetTime(time))
     }
 
-    pub(crate) fn set_continuous_states(&mut self, x: &[f64]) -> Result<(), Refusal> {
+    pub(crate) fn set_continuous_states(&mut self, x: &[f64]) -> Result<(), Rejection> {
         let (x, n) = (x.as_ptr(), x.len());
         call!(self, fmi2SetContinuousStates(x, n), fmi3SetContinuousStates(x, n))
     }
 
-    pub(crate) fn get_continuous(&mut self, what: Continuous, values: &mut [f64]) -> Result<(), Refusal> {
+    pub(crate) fn get_continuous(&mut self, what: Continuous, values: &mut [f64]) -> Result<(), Rejection> {
         let (x, n) = (values.as_mut_ptr(), values.len());
         match what {
             Continuous::States => call!(self, fmi2GetContinuousStates(x, n), fmi3GetContinuousStates(x, n)),
@@ -821,11 +821,11 @@ impl Instance {
         }
     }
 
-    pub(crate) fn terminate(&mut self) -> Result<(), Refusal> {
+    pub(crate) fn terminate(&mut self) -> Result<(), Rejection> {
         call!(self, fmi2Terminate(), fmi3Terminate())
     }
 
-    pub(crate) fn reset(&mut self) -> Result<(), Refusal> {
+    pub(crate) fn reset(&mut self) -> Result<(), Rejection> {
         call!(self, fmi2Reset(), fmi3Reset())?;
         self.early = Some(Early::default());
         Ok(())

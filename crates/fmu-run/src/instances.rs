@@ -3,7 +3,7 @@
 use crate::description::Description;
 use crate::error::{Error, request};
 use crate::instance::{Continuous, Event, Instance, Saved};
-use crate::refusal::Refusal;
+use crate::rejection::Rejection;
 use crate::running::Running;
 use crate::selection::{Place, Selection};
 use crate::start::{Start, StartValues};
@@ -163,7 +163,7 @@ impl Instances {
 
     /// Returns the indices of the failed instances, each with the reason.
     pub fn errors(&self) -> impl Iterator<Item = (usize, &str)> {
-        self.all.iter().enumerate().filter_map(|(place, one)| Some((place, one.error.as_deref()?)))
+        self.all.iter().enumerate().filter_map(|(index, one)| Some((index, one.error.as_deref()?)))
     }
 
     /// Returns the error of the first instance if all instances have failed.
@@ -198,15 +198,15 @@ impl Instances {
     /// Resets the instances to their start values and initializes them.
     pub fn reset(&mut self, mask: Mask) {
         let (system, interface, begin) = (&self.system, self.interface, &self.begin);
-        let reset = |place: usize, one: &mut One| {
+        let reset = |index: usize, one: &mut One| {
             one.error = None;
             (one.own.time, one.own.event) = (begin.time, Event::default());
             match Running::renewed(one.instance.take(), system, interface, false) {
                 Ok(instance) => {
                     let instance = one.instance.insert(instance);
-                    match initialize(instance, begin, place, interface) {
+                    match initialize(instance, begin, index, interface) {
                         Ok(event) => one.own.event = event,
-                        Err(refusal) => one.error = Some(refusal.to_string()),
+                        Err(rejection) => one.error = Some(rejection.to_string()),
                     }
                 }
                 Err((text, _)) => one.error = Some(text),
@@ -226,7 +226,7 @@ impl Instances {
     pub fn set(&mut self, variables: &Selection, values: &[f64], mask: Mask) -> Result<(), Error> {
         variables.check(values)?;
         let rows = rows(variables.len(), values.len(), self.len());
-        self.alive(mask, |place, _, instance| instance.set(variables, rows.of(values, place)));
+        self.alive(mask, |index, _, instance| instance.set(variables, rows.of(values, index)));
         Ok(())
     }
 
@@ -257,11 +257,11 @@ impl Instances {
     /// # Errors
     /// Returns [`Error::Request`] if the time is not finite, or not after the time of an instance.
     pub fn step_to(&mut self, time: f64, mask: Mask) -> Result<(), Error> {
-        let steps = |place: usize, one: &One| one.error.is_none() && mask.is_none_or(|mask| mask[place]);
-        let mut ahead = self.all.iter().enumerate().filter(|(place, one)| steps(*place, one));
-        if let Some((place, one)) = ahead.find(|(_, one)| !(time.is_finite() && time > one.own.time)) {
+        let steps = |index: usize, one: &One| one.error.is_none() && mask.is_none_or(|mask| mask[index]);
+        let mut ahead = self.all.iter().enumerate().filter(|(index, one)| steps(*index, one));
+        if let Some((index, one)) = ahead.find(|(_, one)| !(time.is_finite() && time > one.own.time)) {
             return request(format!(
-                "to is {time} s; it must be after the time of each instance, and instance {place} is at {} s",
+                "to is {time} s; it must be after the time of each instance, and instance {index} is at {} s",
                 one.own.time
             ));
         }
@@ -290,8 +290,8 @@ impl Instances {
         set.check(values)?;
         check_size(size)?;
         let rows = rows(set.len(), values.len(), self.len());
-        self.fill_by_place(get.len(), read, |place, own, instance, row| {
-            instance.set(set, rows.of(values, place))?;
+        self.fill_by_index(get.len(), read, |index, own, instance, row| {
+            instance.set(set, rows.of(values, index))?;
             instance.step(own.time, size)?;
             own.time += size;
             instance.get(get, row)
@@ -307,10 +307,10 @@ impl Instances {
         let why = "cannot save its state (canGetAndSetFMUstate is not true)";
         self.system.check_offer(self.interface, |offer| offer.saves_states, why)?;
         let mut states = vec![None; self.len()];
-        let places = std::sync::Mutex::new(&mut states);
-        self.alive(None, |place, own, instance| {
+        let indices = std::sync::Mutex::new(&mut states);
+        self.alive(None, |index, own, instance| {
             let saved = (instance.save()?, own.time);
-            places.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[place] = Some(saved);
+            indices.lock().unwrap_or_else(std::sync::PoisonError::into_inner)[index] = Some(saved);
             Ok(())
         });
         Ok(States(states))
@@ -322,11 +322,11 @@ impl Instances {
     /// Panics if the number of states differs from the number of instances.
     pub fn restore(&mut self, states: &States, mask: Mask) {
         assert_eq!(states.0.len(), self.len(), "states of other instances");
-        let back = |place: usize, one: &mut One| {
-            let (Some((saved, time)), Some(instance)) = (states.0[place], &mut one.instance) else { return };
+        let back = |index: usize, one: &mut One| {
+            let (Some((saved, time)), Some(instance)) = (states.0[index], &mut one.instance) else { return };
             match instance.restore(saved) {
                 Ok(()) => (one.own.time, one.error) = (time, None),
-                Err(refusal) => one.error = Some(refusal.to_string()),
+                Err(rejection) => one.error = Some(rejection.to_string()),
             }
         };
         each(self.pool.as_ref(), &mut self.all, mask, back);
@@ -353,8 +353,8 @@ impl Instances {
             let ((saved, time), instance) = (saved.as_ref()?, one.instance.as_mut()?);
             match instance.serialize(*saved) {
                 Ok(bytes) => Some([&time.to_le_bytes()[..], &bytes].concat()),
-                Err(refusal) => {
-                    one.error = Some(refusal.to_string());
+                Err(rejection) => {
+                    one.error = Some(rejection.to_string());
                     None
                 }
             }
@@ -374,17 +374,17 @@ impl Instances {
         let why = "cannot deserialize a state (canSerializeFMUstate is not true)";
         self.system.check_offer(self.interface, |offer| offer.serializes_states, why)?;
         let mut states = Vec::new();
-        for (place, (one, bytes)) in self.all.iter_mut().zip(bytes).enumerate() {
+        for (index, (one, bytes)) in self.all.iter_mut().zip(bytes).enumerate() {
             let Some(bytes) = bytes else {
                 states.push(None);
                 continue;
             };
             let Some((time, bytes)) = bytes.as_ref().split_first_chunk() else {
-                return request(format!("the state of instance {place} is cut short"));
+                return request(format!("the state of instance {index} is cut short"));
             };
             let instance = one.instance.as_mut();
             let read = instance.map(|instance| instance.deserialize(bytes)).transpose();
-            let saved = read.map_err(|refusal| Error::Fmu(format!("instance {place}: {refusal}")))?;
+            let saved = read.map_err(|rejection| Error::Fmu(format!("instance {index}: {rejection}")))?;
             states.push(saved.map(|saved| (saved, f64::from_le_bytes(*time))));
         }
         Ok(States(states))
@@ -415,8 +415,8 @@ impl Instances {
             ));
         }
         let rows = rows(knowns.len(), seed.len(), self.len());
-        self.fill_by_place(unknowns.len(), values, |place, _, instance, row| {
-            instance.sole().directional_derivative(unknown, known, rows.of(seed, place), row)
+        self.fill_by_index(unknowns.len(), values, |index, _, instance, row| {
+            instance.sole().directional_derivative(unknown, known, rows.of(seed, index), row)
         });
         Ok(())
     }
@@ -438,8 +438,8 @@ impl Instances {
         let (references, orders) = (self.real(inputs)?, vec![1; inputs.len()]);
         inputs.names().iter().try_for_each(|name| self.system.takes_input_derivative(name).map(drop))?;
         let rows = rows(inputs.len(), values.len(), self.len());
-        self.alive(mask, |place, _, instance| {
-            instance.sole().set_input_derivatives(references, &orders, rows.of(values, place))
+        self.alive(mask, |index, _, instance| {
+            instance.sole().set_input_derivatives(references, &orders, rows.of(values, index))
         });
         Ok(())
     }
@@ -471,8 +471,8 @@ impl Instances {
             return request(format!("time is {time}; it must be finite"));
         }
         let rows = rows(1, times.len(), self.len());
-        self.alive(mask, |place, own, instance| {
-            own.time = rows.of(times, place)[0];
+        self.alive(mask, |index, own, instance| {
+            own.time = rows.of(times, index)[0];
             instance.sole().set_time(own.time)
         });
         Ok(())
@@ -485,7 +485,7 @@ impl Instances {
     pub fn set_continuous_states(&mut self, values: &[f64], mask: Mask) {
         let rows =
             rows(self.description().map_or(0, |description| description.states), values.len(), self.len());
-        self.alive(mask, |place, _, instance| instance.sole().set_continuous_states(rows.of(values, place)));
+        self.alive(mask, |index, _, instance| instance.sole().set_continuous_states(rows.of(values, index)));
     }
 
     /// Reads states, derivatives, nominal values or event indicators into a row for each instance, in Model
@@ -517,9 +517,9 @@ impl Instances {
     pub fn handle_events(&mut self, (set, values): (&Selection, &[f64]), mask: Mask) -> Result<(), Error> {
         set.check(values)?;
         let rows = rows(set.len(), values.len(), self.len());
-        self.alive(mask, |place, own, instance| {
+        self.alive(mask, |index, own, instance| {
             instance.sole().enter_event_mode()?;
-            instance.set(set, rows.of(values, place))?;
+            instance.set(set, rows.of(values, index))?;
             own.event = instance.sole().event()?;
             instance.sole().enter_continuous_time_mode()
         });
@@ -561,10 +561,10 @@ impl Instances {
         if found.of.base != BaseType::String {
             return request(format!("{name} is {}, no text", found.of.what()));
         }
-        let place = Place::of(found);
+        let index = Place::of(found);
         let mut texts = vec![None; self.len()];
         for (one, text) in self.all.iter_mut().zip(&mut texts) {
-            one.with(|_, instance| instance.get_text(place).map(|found| *text = Some(found)));
+            one.with(|_, instance| instance.get_text(index).map(|found| *text = Some(found)));
         }
         Ok(texts)
     }
@@ -573,10 +573,10 @@ impl Instances {
     fn alive(
         &mut self,
         mask: Mask,
-        body: impl Fn(usize, &mut Own, &mut Running) -> Result<(), Refusal> + Sync,
+        body: impl Fn(usize, &mut Own, &mut Running) -> Result<(), Rejection> + Sync,
     ) {
-        each(self.pool.as_ref(), &mut self.all, mask, |place, one| {
-            one.with(|own, instance| body(place, own, instance));
+        each(self.pool.as_ref(), &mut self.all, mask, |index, one| {
+            one.with(|own, instance| body(index, own, instance));
         });
     }
 
@@ -584,21 +584,21 @@ impl Instances {
         &mut self,
         length: usize,
         values: &mut [f64],
-        body: impl Fn(&mut Running, &mut [f64]) -> Result<(), Refusal> + Sync,
+        body: impl Fn(&mut Running, &mut [f64]) -> Result<(), Rejection> + Sync,
     ) {
-        self.fill_by_place(length, values, |_, _, instance, row| body(instance, row));
+        self.fill_by_index(length, values, |_, _, instance, row| body(instance, row));
     }
 
     /// Fills a row of values for each instance, with NaN for a failed instance.
-    fn fill_by_place(
+    fn fill_by_index(
         &mut self,
         length: usize,
         values: &mut [f64],
-        body: impl Fn(usize, &mut Own, &mut Running, &mut [f64]) -> Result<(), Refusal> + Sync,
+        body: impl Fn(usize, &mut Own, &mut Running, &mut [f64]) -> Result<(), Rejection> + Sync,
     ) {
         assert_eq!(values.len(), length * self.all.len(), "a row of {length} values for each instance");
-        let body = |place: usize, one: &mut One, row: &mut [f64]| {
-            if !one.with(|own, instance| body(place, own, instance, row)) {
+        let body = |index: usize, one: &mut One, row: &mut [f64]| {
+            if !one.with(|own, instance| body(index, own, instance, row)) {
                 row.fill(f64::NAN);
             }
         };
@@ -609,10 +609,10 @@ impl Instances {
 impl One {
     /// Calls `body` if the instance has not failed. Returns whether the instance is still usable.
     #[inline]
-    fn with(&mut self, body: impl FnOnce(&mut Own, &mut Running) -> Result<(), Refusal>) -> bool {
+    fn with(&mut self, body: impl FnOnce(&mut Own, &mut Running) -> Result<(), Rejection>) -> bool {
         let Self { instance: Some(instance), error: error @ None, own } = self else { return false };
-        if let Err(refusal) = body(own, instance) {
-            *error = Some(format!("at {} s: {refusal}", own.time));
+        if let Err(rejection) = body(own, instance) {
+            *error = Some(format!("at {} s: {rejection}", own.time));
             return false;
         }
         true
@@ -645,10 +645,10 @@ fn check_size(size: f64) -> Result<(), Error> {
 fn initialize(
     instance: &mut Running,
     begin: &Begin,
-    place: usize,
+    index: usize,
     interface: Interface,
-) -> Result<Event, Refusal> {
-    instance.begin(begin.time, begin.stop_time, &begin.start, place)?;
+) -> Result<Event, Rejection> {
+    instance.begin(begin.time, begin.stop_time, &begin.start, index)?;
     instance.exit_initialization_mode()?;
     let mut event = Event::default();
     if interface == Interface::ModelExchange {
@@ -668,9 +668,9 @@ fn each(
     if let Some(mask) = mask {
         assert_eq!(mask.len(), all.len(), "a truth value for each instance");
     }
-    in_parts(pool, all, 0, &mut [], |place, one, _| {
-        if mask.is_none_or(|mask| mask[place]) {
-            body(place, one);
+    in_parts(pool, all, 0, &mut [], |index, one, _| {
+        if mask.is_none_or(|mask| mask[index]) {
+            body(index, one);
         }
     });
 }
@@ -725,7 +725,7 @@ fn rows(length: usize, values: usize, instances: usize) -> Rows {
 
 impl Rows {
     #[inline]
-    fn of(self, values: &[f64], place: usize) -> &[f64] {
-        &values[place * self.step..place * self.step + self.length]
+    fn of(self, values: &[f64], index: usize) -> &[f64] {
+        &values[index * self.step..index * self.step + self.length]
     }
 }

@@ -1,6 +1,6 @@
 //! Log callbacks for FMUs.
 
-use crate::refusal::Message;
+use crate::rejection::Message;
 use fmi_abi::Status;
 use fmi_abi::c_types::{c_char, c_int, c_void};
 use fmi_abi::fmi2::types::*;

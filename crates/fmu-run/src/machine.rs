@@ -20,9 +20,9 @@ pub(crate) fn mismatch(library: &Path) -> Option<String> {
 
 /// Returns the operating system and the processors by Rust's names; `None` for unknown formats.
 fn made_for(bytes: &[u8]) -> Option<(&'static str, Vec<&'static str>)> {
-    let at = |place: usize| bytes.get(place..)?.first_chunk::<4>().copied();
-    let number = |place| at(place).map(u32::from_le_bytes);
-    let half = |place| number(place).map(|word| word & 0xffff);
+    let at = |index: usize| bytes.get(index..)?.first_chunk::<4>().copied();
+    let number = |index| at(index).map(u32::from_le_bytes);
+    let half = |index| number(index).map(|word| word & 0xffff);
     let mach = |processor: u32| match processor {
         7 => Some("x86"),
         0x0100_0007 => Some("x86_64"),

@@ -1,7 +1,7 @@
 //! Instances of the components of a system, which run together.
 
 use crate::instance::{Instance, Saved};
-use crate::refusal::{Message, Refusal};
+use crate::rejection::{Message, Rejection};
 use crate::selection::{Place, Selection};
 use crate::start::StartValues;
 use crate::system::{Exchange, Order, System};
@@ -54,14 +54,14 @@ impl Running {
         stop_time: Option<f64>,
         start: &StartValues,
         of: usize,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), Rejection> {
         self.each(|_, instance| instance.set_up(start_time, stop_time))?;
-        for (place, text) in start.texts(of) {
-            self.parts[place.part].set_text(place.reference, text)?;
+        for (index, text) in start.texts(of) {
+            self.parts[index.part].set_text(index.reference, text)?;
         }
         let numbers: Vec<_> = start.numbers(of).collect();
         // One call sets values that must be consistent, such as the elements of an array that must increase.
-        let is_real = |place: &Place, part: usize| place.part == part && place.base == BaseType::Real;
+        let is_real = |index: &Place, part: usize| index.part == part && index.base == BaseType::Real;
         for together in
             numbers.chunk_by(|(one, _), (next, _)| is_real(one, next.part) && is_real(next, one.part))
         {
@@ -71,13 +71,13 @@ impl Running {
                 continue;
             }
             let (references, values): (Vec<u32>, Vec<f64>) =
-                together.iter().map(|(place, value)| (place.reference, *value)).unzip();
+                together.iter().map(|(index, value)| (index.reference, *value)).unzip();
             self.parts[part].set_reals(&references, &values)?;
         }
         self.each(|_, instance| instance.enter_initialization_mode(start_time, stop_time))
     }
 
-    pub fn exit_initialization_mode(&mut self) -> Result<(), Refusal> {
+    pub fn exit_initialization_mode(&mut self) -> Result<(), Rejection> {
         self.agree()?;
         self.each(|_, instance| instance.exit_initialization_mode())?;
         self.stepped()
@@ -86,7 +86,7 @@ impl Running {
     /// Passes outputs to inputs in Initialization Mode, where the dependencies may differ from the later ones.
     /// Repeats until no value changes; with [`Order::Jacobi`], at most once for each component, as libcosim
     /// does.
-    fn agree(&mut self) -> Result<(), Refusal> {
+    fn agree(&mut self) -> Result<(), Rejection> {
         let Exchange { order, stages } = self.system.exchange();
         let order = *order;
         let most = match order {
@@ -105,7 +105,7 @@ impl Running {
         }
         match order {
             Order::Jacobi => Ok(()),
-            Order::Dependencies => Err(Refusal::of_ours(
+            Order::Dependencies => Err(Rejection::of_ours(
                 "initialization",
                 "the outputs depend on each other before the first step, so that passing them on does not come to an end",
             )),
@@ -114,11 +114,11 @@ impl Running {
 
     /// Updates the inputs, if necessary.
     #[inline]
-    fn pass_on(&mut self) -> Result<(), Refusal> {
+    fn pass_on(&mut self) -> Result<(), Rejection> {
         if self.is_due { self.pass_all_on(|_| ()) } else { Ok(()) }
     }
 
-    fn pass_all_on(&mut self, mut told: impl FnMut(&[f64])) -> Result<(), Refusal> {
+    fn pass_all_on(&mut self, mut told: impl FnMut(&[f64])) -> Result<(), Rejection> {
         let Self { parts, system, row, buffer, .. } = self;
         for stage in &system.exchange().stages {
             row.resize(stage.outputs.len(), 0.0);
@@ -132,7 +132,7 @@ impl Running {
 
     /// Updates the records after a step or the initialization.
     #[inline]
-    fn stepped(&mut self) -> Result<(), Refusal> {
+    fn stepped(&mut self) -> Result<(), Rejection> {
         let Self { parts, system, passed, buffer, .. } = self;
         let Exchange { order, stages } = system.exchange();
         match (order, stages.first()) {
@@ -149,7 +149,7 @@ impl Running {
     /// Performs a step. Returns an error also if an FMU ends the simulation; the other FMUs have then done
     /// the step.
     #[inline]
-    pub fn step(&mut self, time: f64, size: f64) -> Result<(), Refusal> {
+    pub fn step(&mut self, time: f64, size: f64) -> Result<(), Rejection> {
         if let [instance] = &mut *self.parts
             && self.system.exchange().stages.is_empty()
         {
@@ -162,8 +162,8 @@ impl Running {
         }
         let mut ended = None;
         self.each(|_, instance| match instance.step(time, size) {
-            Err(refusal) if refusal.ended().is_some() => {
-                ended.get_or_insert(refusal);
+            Err(rejection) if rejection.ended().is_some() => {
+                ended.get_or_insert(rejection);
                 Ok(())
             }
             stepped => stepped,
@@ -173,22 +173,22 @@ impl Running {
     }
 
     #[inline]
-    pub fn get(&mut self, variables: &Selection, row: &mut [f64]) -> Result<(), Refusal> {
+    pub fn get(&mut self, variables: &Selection, row: &mut [f64]) -> Result<(), Rejection> {
         self.pass_on()?;
         variables.get(&mut self.parts, &mut self.buffer, row)
     }
 
     #[inline]
-    pub fn set(&mut self, variables: &Selection, row: &[f64]) -> Result<(), Refusal> {
+    pub fn set(&mut self, variables: &Selection, row: &[f64]) -> Result<(), Rejection> {
         variables.set(&mut self.parts, &mut self.buffer, row)?;
         let Exchange { order, stages } = self.system.exchange();
         self.is_due |= *order == Order::Dependencies && !stages.is_empty();
         Ok(())
     }
 
-    pub fn get_text(&mut self, place: Place) -> Result<String, Refusal> {
+    pub fn get_text(&mut self, index: Place) -> Result<String, Rejection> {
         self.pass_on()?;
-        self.parts[place.part].get_text(place.reference)
+        self.parts[index.part].get_text(index.reference)
     }
 
     /// Returns the instance of a single FMU.
@@ -210,31 +210,31 @@ impl Running {
         self.parts.iter().flat_map(Instance::take_messages).collect()
     }
 
-    pub fn terminate(&mut self) -> Result<(), Refusal> {
+    pub fn terminate(&mut self) -> Result<(), Rejection> {
         self.each(|_, instance| instance.terminate())
     }
 
     /// Saves the states of all instances under one index.
-    pub fn save(&mut self) -> Result<Saved, Refusal> {
+    pub fn save(&mut self) -> Result<Saved, Rejection> {
         self.keep(|_, instance| instance.save())
     }
 
-    pub fn restore(&mut self, saved: Saved) -> Result<(), Refusal> {
+    pub fn restore(&mut self, saved: Saved) -> Result<(), Rejection> {
         self.each(|_, instance| instance.restore(saved))?;
-        match self.saved.get(saved.place()) {
+        match self.saved.get(saved.index()) {
             Some(passed) => self.passed.clone_from(passed),
             None => self.is_due = !self.system.exchange().stages.is_empty(),
         }
         Ok(())
     }
 
-    pub fn forget(&mut self, saved: Saved) -> Result<(), Refusal> {
+    pub fn forget(&mut self, saved: Saved) -> Result<(), Rejection> {
         self.each(|_, instance| instance.forget(saved))
     }
 
     /// Serializes a saved state. For a single FMU, returns its bytes. For a system, returns the bytes of all
     /// components, each after its length, and the outputs of the last step.
-    pub fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Refusal> {
+    pub fn serialize(&mut self, saved: Saved) -> Result<Vec<u8>, Rejection> {
         if self.system.sole().is_some() {
             return self.sole().serialize(saved);
         }
@@ -245,17 +245,17 @@ impl Running {
             all.extend(bytes);
             Ok(())
         })?;
-        let passed = self.saved.get(saved.place()).into_iter().flatten();
+        let passed = self.saved.get(saved.index()).into_iter().flatten();
         all.extend(passed.flat_map(|value| value.to_le_bytes()));
         Ok(all)
     }
 
-    pub fn deserialize(&mut self, bytes: &[u8]) -> Result<Saved, Refusal> {
+    pub fn deserialize(&mut self, bytes: &[u8]) -> Result<Saved, Rejection> {
         if self.system.sole().is_some() {
             return self.sole().deserialize(bytes);
         }
         let mut rest = bytes;
-        let short = || Refusal::of_ours("deserialize", "the bytes are no state of this system");
+        let short = || Rejection::of_ours("deserialize", "the bytes are no state of this system");
         let parts = self.parts.iter().map(|_| {
             let (length, after) = rest.split_first_chunk()?;
             let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
@@ -277,8 +277,8 @@ impl Running {
     /// Stores a state of each instance, with the outputs of the last step. On an error, stores none.
     fn keep(
         &mut self,
-        mut state: impl FnMut(usize, &mut Instance) -> Result<Saved, Refusal>,
-    ) -> Result<Saved, Refusal> {
+        mut state: impl FnMut(usize, &mut Instance) -> Result<Saved, Rejection>,
+    ) -> Result<Saved, Rejection> {
         let mut done = None;
         let kept = self.each(|part, instance| {
             done = Some((part, state(part, instance)?));
@@ -286,24 +286,24 @@ impl Running {
         });
         let (last, saved) = match (kept, done) {
             (Ok(()), Some(done)) => done,
-            (Err(refusal), Some((last, saved))) => {
+            (Err(rejection), Some((last, saved))) => {
                 self.parts[..=last].iter_mut().for_each(|instance| _ = instance.forget(saved));
-                return Err(refusal);
+                return Err(rejection);
             }
-            (kept, None) => return kept.and(Err(Refusal::of_ours("save", "there is no instance"))),
+            (kept, None) => return kept.and(Err(Rejection::of_ours("save", "there is no instance"))),
         };
         debug_assert_eq!(last + 1, self.parts.len(), "all have kept one");
         if !self.passed.is_empty() {
-            self.saved.resize(self.saved.len().max(saved.place() + 1), Vec::new());
-            self.saved[saved.place()].clone_from(&self.passed);
+            self.saved.resize(self.saved.len().max(saved.index() + 1), Vec::new());
+            self.saved[saved.index()].clone_from(&self.passed);
         }
         Ok(saved)
     }
 
     fn each(
         &mut self,
-        mut body: impl FnMut(usize, &mut Instance) -> Result<(), Refusal>,
-    ) -> Result<(), Refusal> {
+        mut body: impl FnMut(usize, &mut Instance) -> Result<(), Rejection>,
+    ) -> Result<(), Rejection> {
         self.parts.iter_mut().enumerate().try_for_each(|(part, instance)| body(part, instance))
     }
 }

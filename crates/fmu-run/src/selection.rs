@@ -3,7 +3,7 @@
 use crate::error::{Error, request};
 use crate::found::Found;
 use crate::instance::Instance;
-use crate::refusal::Refusal;
+use crate::rejection::Rejection;
 use fmi_abi::BaseType;
 
 /// Numeric variables, looked up once by name. A row of values has one value for each, in this order; 0 and 1
@@ -25,7 +25,7 @@ struct Group {
     /// Value references of the Real variables, which one call sets or reads. `places` are their indices in a
     /// row.
     reals: Vec<u32>,
-    places: Vec<usize>,
+    indices: Vec<usize>,
     others: Vec<(BaseType, u32, usize)>,
 }
 
@@ -66,21 +66,21 @@ impl Selection {
         let read_only = found.iter().find_map(|found| found.check_settable(name).err());
         self.read_only = self.read_only.take().or(read_only.map(|error| error.to_string()));
         for Place { part, base, reference } in found.iter().copied().map(Place::of) {
-            let place = self.groups.iter().position(|group| group.part == part);
-            let place = place.unwrap_or_else(|| {
+            let index = self.groups.iter().position(|group| group.part == part);
+            let index = index.unwrap_or_else(|| {
                 self.groups.push(Group { part, ..Group::default() });
                 self.groups.len() - 1
             });
-            let group = &mut self.groups[place];
+            let group = &mut self.groups[index];
             match base {
                 BaseType::Real => {
                     group.reals.push(reference);
-                    group.places.push(row);
+                    group.indices.push(row);
                 }
                 base => group.others.push((base, reference, row)),
             }
         }
-        self.is_direct = self.groups.len() == 1 && self.groups[0].places.len() == self.names.len();
+        self.is_direct = self.groups.len() == 1 && self.groups[0].indices.len() == self.names.len();
     }
 
     /// Returns the value references, if all are Real variables of one component.
@@ -101,9 +101,9 @@ impl Selection {
         if let Some(why) = &self.read_only {
             return request(why.clone());
         }
-        for (base, _, place) in self.groups.iter().flat_map(|group| &group.others) {
+        for (base, _, index) in self.groups.iter().flat_map(|group| &group.others) {
             for row in values.chunks_exact(self.len()) {
-                fits(&self.names[*place], *base, &row[*place..=*place])?;
+                fits(&self.names[*index], *base, &row[*index..=*index])?;
             }
         }
         Ok(())
@@ -116,22 +116,22 @@ impl Selection {
         parts: &mut [Instance],
         buffer: &mut Vec<f64>,
         row: &mut [f64],
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), Rejection> {
         if self.is_direct {
             let group = &self.groups[0];
             return parts[group.part].get_reals(&group.reals, row);
         }
-        for Group { part, reals, places, others } in &self.groups {
+        for Group { part, reals, indices, others } in &self.groups {
             let instance = &mut parts[*part];
             if !reals.is_empty() {
                 buffer.resize(reals.len(), 0.0);
                 instance.get_reals(reals, buffer)?;
-                for (place, value) in places.iter().zip(&*buffer) {
-                    row[*place] = *value;
+                for (index, value) in indices.iter().zip(&*buffer) {
+                    row[*index] = *value;
                 }
             }
-            for (base, reference, place) in others {
-                row[*place] = instance.get_number(*base, *reference)?;
+            for (base, reference, index) in others {
+                row[*index] = instance.get_number(*base, *reference)?;
             }
         }
         Ok(())
@@ -144,20 +144,20 @@ impl Selection {
         parts: &mut [Instance],
         buffer: &mut Vec<f64>,
         row: &[f64],
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), Rejection> {
         if self.is_direct {
             let group = &self.groups[0];
             return parts[group.part].set_reals(&group.reals, row);
         }
-        for Group { part, reals, places, others } in &self.groups {
+        for Group { part, reals, indices, others } in &self.groups {
             let instance = &mut parts[*part];
             if !reals.is_empty() {
                 buffer.clear();
-                buffer.extend(places.iter().map(|place| row[*place]));
+                buffer.extend(indices.iter().map(|index| row[*index]));
                 instance.set_reals(reals, buffer)?;
             }
-            for (base, reference, place) in others {
-                instance.set_number(*base, *reference, row[*place])?;
+            for (base, reference, index) in others {
+                instance.set_number(*base, *reference, row[*index])?;
             }
         }
         Ok(())

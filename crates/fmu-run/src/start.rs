@@ -58,8 +58,8 @@ impl<'a> StartValues<'a> {
     /// Returns the given start values; each variable may occur only once.
     pub fn given(system: &System, given: &[(&str, Start<'a>)]) -> Result<Self, Error> {
         let mut all = Self::default();
-        for (place, (name, start)) in given.iter().enumerate() {
-            if given[..place].iter().any(|(before, _)| before == name) {
+        for (index, (name, start)) in given.iter().enumerate() {
+            if given[..index].iter().any(|(before, _)| before == name) {
                 return request(format!("{name} is twice among the start values"));
             }
             all.put(Self::found(system, name, *start)?);
@@ -69,56 +69,56 @@ impl<'a> StartValues<'a> {
 
     /// Adds start values and removes earlier values of the same variables.
     pub fn put(&mut self, new: Self) {
-        let is_new = |place: &Place| {
-            new.numbers.iter().any(|(of, _)| of == place) || new.texts.iter().any(|(of, _)| of == place)
+        let is_new = |index: &Place| {
+            new.numbers.iter().any(|(of, _)| of == index) || new.texts.iter().any(|(of, _)| of == index)
         };
-        self.numbers.retain(|(place, _)| !is_new(place));
-        self.texts.retain(|(place, _)| !is_new(place));
+        self.numbers.retain(|(index, _)| !is_new(index));
+        self.texts.retain(|(index, _)| !is_new(index));
         self.numbers.extend(new.numbers);
         self.texts.extend(new.texts);
     }
 
     /// Returns the numbers of a run or an instance.
     pub fn numbers(&self, of: usize) -> impl Iterator<Item = (Place, f64)> {
-        self.numbers.iter().filter_map(move |(place, values)| Some((*place, *one(values, of)?)))
+        self.numbers.iter().filter_map(move |(index, values)| Some((*index, *one(values, of)?)))
     }
 
     /// Returns the strings of a run or an instance.
     pub fn texts(&self, of: usize) -> impl Iterator<Item = (Place, &CStr)> {
-        self.texts.iter().filter_map(move |(place, texts)| Some((*place, one(texts, of)?.as_c_str())))
+        self.texts.iter().filter_map(move |(index, texts)| Some((*index, one(texts, of)?.as_c_str())))
     }
 
     /// Copies borrowed values.
     pub fn into_owned(self) -> StartValues<'static> {
-        let own = |(place, numbers): (_, Cow<[f64]>)| (place, Cow::Owned(numbers.into_owned()));
+        let own = |(index, numbers): (_, Cow<[f64]>)| (index, Cow::Owned(numbers.into_owned()));
         StartValues { numbers: self.numbers.into_iter().map(own).collect(), texts: self.texts }
     }
 
     fn found(system: &System, name: &str, start: Start<'a>) -> Result<Self, Error> {
         let mut all = Self::default();
         for found in system.find_startable(name)? {
-            let place = Place::of(found);
+            let index = Place::of(found);
             let texts: Vec<&str> = match start {
                 Start::Same(number) => {
-                    all.numbers.push((place, checked(found, name, Cow::Owned(vec![number]))?));
+                    all.numbers.push((index, checked(found, name, Cow::Owned(vec![number]))?));
                     continue;
                 }
                 Start::Each(numbers) => {
-                    all.numbers.push((place, checked(found, name, Cow::Borrowed(numbers))?));
+                    all.numbers.push((index, checked(found, name, Cow::Borrowed(numbers))?));
                     continue;
                 }
                 Start::Text(text) => vec![text],
                 Start::EachText(texts) => texts.iter().map(String::as_str).collect(),
             };
-            if place.base == BaseType::String {
+            if index.base == BaseType::String {
                 let texts = texts.iter().map(|text| CString::new(*text)).collect::<Result<_, _>>();
                 let Ok(texts) = texts else {
                     return request(format!("the start value of {name} must not contain a character NUL"));
                 };
-                all.texts.push((place, texts));
+                all.texts.push((index, texts));
             } else {
                 let numbers = texts.iter().map(|text| number_of(found, name, text));
-                all.numbers.push((place, numbers.collect::<Result<_, _>>()?));
+                all.numbers.push((index, numbers.collect::<Result<_, _>>()?));
             }
         }
         Ok(all)

@@ -51,12 +51,12 @@ impl<'a> System<'a> {
         for (what, value) in [("stop time", self.stop_time), ("step size", self.step_size)] {
             ensure!(value.is_finite() && value > 0.0, "the {what} must be > 0, it is {value}");
         }
-        for (place, (component, path)) in self.components.iter().enumerate() {
+        for (index, (component, path)) in self.components.iter().enumerate() {
             ensure!(
                 !component.is_empty() && !component.contains(['.', '/', '\\']),
                 "'{component}' cannot name a component, because it is empty or has a dot or slash in it"
             );
-            let before = &self.components[..place];
+            let before = &self.components[..index];
             ensure!(
                 before.iter().all(|(other, _)| other != component),
                 "two components are named {component}"
@@ -131,8 +131,8 @@ impl CheckedSystem<'_> {
 
     pub(crate) fn variable(&self, name: &str) -> Result<Own<'_>> {
         let (component, own) = split(name);
-        let place = self.system.components.iter().position(|(known, _)| *known == component);
-        let variable = place.and_then(|place| self.fmus[place].variable(own));
+        let index = self.system.components.iter().position(|(known, _)| *known == component);
+        let variable = index.and_then(|index| self.fmus[index].variable(own));
         variable.with_context(|| format!("no FMU has a variable {name}"))
     }
 

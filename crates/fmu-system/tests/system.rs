@@ -73,7 +73,7 @@ fn system<'a>(folder: &Path) -> System<'a> {
 #[test]
 fn what_does_not_fit_is_named() {
     let folder = tempfile::tempdir().unwrap();
-    let refusal = |change: fn(&mut System)| {
+    let rejection = |change: fn(&mut System)| {
         let mut system = system(folder.path());
         change(&mut system);
         format!("{:#}", system.check().err().expect("it does not fit"))
@@ -124,7 +124,7 @@ fn what_does_not_fit_is_named() {
             "'a.plant' cannot name a component, because it is empty or has a dot or slash in it",
         ),
     ] {
-        assert_eq!(refusal(change).split(": No such file").next(), Some(message));
+        assert_eq!(rejection(change).split(": No such file").next(), Some(message));
     }
     // A state starts where its FMU lets it.
     let mut elsewhere = system(folder.path());

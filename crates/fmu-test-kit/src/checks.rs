@@ -23,8 +23,8 @@ macro_rules! every_check {
 }
 
 /// Returns the indices of the variables that satisfy `wanted`.
-pub fn places<M: Exported>(wanted: impl Fn(&Variable<M>) -> bool) -> Vec<u32> {
-    (0..).zip(M::TABLE).filter(|(_, variable)| wanted(variable)).map(|(place, _)| place).collect()
+pub fn indices<M: Exported>(wanted: impl Fn(&Variable<M>) -> bool) -> Vec<u32> {
+    (0..).zip(M::TABLE).filter(|(_, variable)| wanted(variable)).map(|(index, _)| index).collect()
 }
 
 fn is_real<M>(variable: &Variable<M>) -> bool {
@@ -33,17 +33,17 @@ fn is_real<M>(variable: &Variable<M>) -> bool {
 
 /// Returns the Real inputs.
 pub fn inputs<M: Exported>() -> Vec<u32> {
-    places::<M>(|of| is_real(of) && of.causality() == Causality::Input)
+    indices::<M>(|of| is_real(of) && of.causality() == Causality::Input)
 }
 
 /// Returns the Real outputs.
 pub(crate) fn outputs<M: Exported>() -> Vec<u32> {
-    places::<M>(|of| is_real(of) && of.causality() == Causality::Output)
+    indices::<M>(|of| is_real(of) && of.causality() == Causality::Output)
 }
 
 /// Returns the Boolean parameters.
 pub(crate) fn boolean_parameters<M: Exported>() -> Vec<u32> {
-    places::<M>(|of| of.base() == BaseType::Boolean && of.causality() == Causality::Parameter)
+    indices::<M>(|of| of.base() == BaseType::Boolean && of.causality() == Causality::Parameter)
 }
 
 /// Returns the start value of a Real parameter.
@@ -79,8 +79,8 @@ pub fn output_derivatives_fit_steps<M: Exported>(
 ) {
     const H: f64 = 5e-5;
     let moving =
-        places::<M>(|of| is_real(of) && matches!(of.causality(), Causality::Output | Causality::Local));
-    let found: Vec<_> = moving.iter().map(|place| fmu.rate(*place)).collect();
+        indices::<M>(|of| is_real(of) && matches!(of.causality(), Causality::Output | Causality::Local));
+    let found: Vec<_> = moving.iter().map(|index| fmu.rate(*index)).collect();
     let state = fmu.save();
     let y = [0.0, 1.0, 2.0, 3.0, 4.0].map(|steps| {
         fmu.ok(fmu.set_state(state));
@@ -92,12 +92,12 @@ pub fn output_derivatives_fit_steps<M: Exported>(
     });
     fmu.ok(fmu.set_state(state));
     fmu.forget(state);
-    for (i, place) in moving.iter().enumerate() {
+    for (i, index) in moving.iter().enumerate() {
         let expected =
             (-25.0 * y[0][i] + 48.0 * y[1][i] - 36.0 * y[2][i] + 16.0 * y[3][i] - 3.0 * y[4][i]) / (12.0 * H);
         // Tolerance for the rounding error of the difference and the truncation error of the series.
         let tolerance = 1e-7 * (1.0 + y[0][i].abs() + expected.abs());
-        let name = M::TABLE[*place as usize].name();
+        let name = M::TABLE[*index as usize].name();
         assert!((found[i] - expected).abs() < tolerance, "{label}: {name}' is {expected}, not {}", found[i]);
     }
 }
@@ -131,8 +131,8 @@ fn survivors<F: Either, M: Exported>(seed: u64) -> usize {
             fmu.ok(fmu.set_state(state));
             fmu.forget(state);
             let time = time(&fmu.bytes());
-            let all = places::<M>(is_real);
-            let mut statuses: Vec<_> = all.iter().map(|place| fmu.try_get(&[*place], &mut [0.0])).collect();
+            let all = indices::<M>(is_real);
+            let mut statuses: Vec<_> = all.iter().map(|index| fmu.try_get(&[*index], &mut [0.0])).collect();
             statuses.extend([fmu.try_step(time, 0.01), fmu.try_step(time + 0.01, 0.02)]);
             assert!(!statuses.contains(&Status::Fatal), "{:?}\n{bytes:?}", fmu.take_log());
         }
@@ -151,7 +151,7 @@ pub fn steps_of_any_size<F: Either, M: Exported>() {
             let fmu = F::in_mode::<M>(CoSimulation, StepComplete);
             let inputs = inputs::<M>();
             fmu.set(&inputs, &vec![0.5; inputs.len()]);
-            let _ = answer.send((fmu.try_step(0.0, step_size), fmu.read(&places::<M>(is_real))));
+            let _ = answer.send((fmu.try_step(0.0, step_size), fmu.read(&indices::<M>(is_real))));
         });
         let answer = answers.recv_timeout(std::time::Duration::from_secs(10));
         let (status, _) = answer.unwrap_or_else(|_| panic!("a step of {step_size:e} s takes for ever"));

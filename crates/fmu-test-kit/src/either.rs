@@ -116,34 +116,34 @@ pub trait Either: Send {
     fn enter_initialization_mode(&self, start_time: f64, stop_time: Option<f64>) -> Status;
 
     /// Reads Reals.
-    fn try_get(&self, places: &[u32], values: &mut [f64]) -> Status;
+    fn try_get(&self, indices: &[u32], values: &mut [f64]) -> Status;
 
     /// Sets up to 16 Reals.
-    fn try_set(&self, places: &[u32], values: &[f64]) -> Status;
+    fn try_set(&self, indices: &[u32], values: &[f64]) -> Status;
 
     /// Sets an Integer.
-    fn set_integer(&self, place: u32, value: i32) -> Status;
+    fn set_integer(&self, index: u32, value: i32) -> Status;
 
     /// Sets a Boolean.
-    fn set_boolean(&self, place: u32, value: u8) -> Status;
+    fn set_boolean(&self, index: u32, value: u8) -> Status;
 
     /// Sets a String.
-    fn set_text(&self, place: u32, value: *const c_char) -> Status;
+    fn set_text(&self, index: u32, value: *const c_char) -> Status;
 
     /// Sets an Enumeration.
-    fn set_item(&self, place: u32, value: i32) -> Status;
+    fn set_item(&self, index: u32, value: i32) -> Status;
 
     /// Reads an Integer.
-    fn get_integer(&self, place: u32, value: &mut i32) -> Status;
+    fn get_integer(&self, index: u32, value: &mut i32) -> Status;
 
     /// Reads a Boolean.
-    fn get_boolean(&self, place: u32, value: &mut u8) -> Status;
+    fn get_boolean(&self, index: u32, value: &mut u8) -> Status;
 
     /// Reads a String.
-    fn get_text(&self, place: u32, value: &mut *const c_char) -> Status;
+    fn get_text(&self, index: u32, value: &mut *const c_char) -> Status;
 
     /// Reads an Enumeration.
-    fn get_item(&self, place: u32, value: &mut i32) -> Status;
+    fn get_item(&self, index: u32, value: &mut i32) -> Status;
 
     /// Performs a step.
     fn try_step(&self, point: f64, step_size: f64) -> Status;
@@ -152,10 +152,10 @@ pub trait Either: Send {
     fn step(&self, point: f64, step_size: f64);
 
     /// Sets the time derivatives of up to 8 inputs; FMI 3.0 has no function for it.
-    fn give_rates(&self, _places: &[u32], _values: &[f64]) {}
+    fn give_rates(&self, _indices: &[u32], _values: &[f64]) {}
 
     /// Reads the time derivative of a variable.
-    fn try_rate(&self, place: u32, order: i32, rate: &mut f64) -> Status;
+    fn try_rate(&self, index: u32, order: i32, rate: &mut f64) -> Status;
 
     /// Reads the directional derivatives of up to 16 unknowns with respect to up to 16 knowns. FMI 3.0 reads
     /// adjoint derivatives, too, and compares them.
@@ -235,7 +235,7 @@ pub trait Either: Send {
     /// Asserts the guarantees for a rejected call: an error, one clean message that names the function, and
     /// an unchanged instance. Returns the message.
     #[track_caller]
-    fn refused(&self, label: &str, call: impl FnOnce(&Self) -> Status) -> String
+    fn rejected(&self, label: &str, call: impl FnOnce(&Self) -> Status) -> String
     where
         Self: Sized,
     {
@@ -257,11 +257,11 @@ pub trait Either: Send {
 
     /// Asserts that a call is rejected with a message that contains these words.
     #[track_caller]
-    fn refused_with(&self, words: &[&str], call: impl FnOnce(&Self) -> Status)
+    fn rejected_with(&self, words: &[&str], call: impl FnOnce(&Self) -> Status)
     where
         Self: Sized,
     {
-        let message = self.refused(&words.join(", "), call);
+        let message = self.rejected(&words.join(", "), call);
         words.iter().for_each(|word| assert!(message.contains(word), "'{word}' is not in: {message}"));
     }
 
@@ -290,13 +290,13 @@ pub trait Either: Send {
     /// Asserts that de-serializing these bytes is rejected and the handle stays unchanged; returns the
     /// message.
     #[track_caller]
-    fn refused_bytes(&self, bytes: &[u8]) -> String
+    fn rejected_bytes(&self, bytes: &[u8]) -> String
     where
         Self: Sized,
     {
         let mut state = null_mut();
         let message =
-            self.refused("hostile bytes", |fmu| fmu.deserialize(bytes.as_ptr(), bytes.len(), &mut state));
+            self.rejected("hostile bytes", |fmu| fmu.deserialize(bytes.as_ptr(), bytes.len(), &mut state));
         assert!(state.is_null());
         assert!(message[4..].to_lowercase().starts_with("deserializefmustate: "), "{message}");
         message
@@ -362,59 +362,59 @@ pub trait Either: Send {
 
     /// Returns the value of an Integer.
     #[track_caller]
-    fn integer(&self, place: u32) -> i32 {
+    fn integer(&self, index: u32) -> i32 {
         let mut value = i32::MIN;
-        self.ok(self.get_integer(place, &mut value));
+        self.ok(self.get_integer(index, &mut value));
         value
     }
 
     /// Returns the value of an Enumeration.
     #[track_caller]
-    fn item(&self, place: u32) -> i32 {
+    fn item(&self, index: u32) -> i32 {
         let mut value = i32::MIN;
-        self.ok(self.get_item(place, &mut value));
+        self.ok(self.get_item(index, &mut value));
         value
     }
 
     /// Returns the value of a Boolean.
     #[track_caller]
-    fn boolean(&self, place: u32) -> bool {
+    fn boolean(&self, index: u32) -> bool {
         let mut value = 7;
-        self.ok(self.get_boolean(place, &mut value));
+        self.ok(self.get_boolean(index, &mut value));
         truth(value.into())
     }
 
     /// Returns the value of a String.
     #[track_caller]
-    fn text(&self, place: u32) -> String {
+    fn text(&self, index: u32) -> String {
         let mut value = null();
-        self.ok(self.get_text(place, &mut value));
+        self.ok(self.get_text(index, &mut value));
         // SAFETY: a string of the FMU, valid until the next call.
         unsafe { CStr::from_ptr(value) }.to_str().expect("UTF-8").to_owned()
     }
 
     /// Sets a String.
     #[track_caller]
-    fn say(&self, place: u32, text: &str) {
+    fn say(&self, index: u32, text: &str) {
         let text = CString::new(text).expect("no NUL");
-        self.ok(self.set_text(place, text.as_ptr()));
+        self.ok(self.set_text(index, text.as_ptr()));
     }
 
     /// Returns the time derivative of a variable.
     #[track_caller]
-    fn rate(&self, place: u32) -> f64 {
+    fn rate(&self, index: u32) -> f64 {
         let mut rate = f64::NAN;
-        self.ok(self.try_rate(place, 1, &mut rate));
+        self.ok(self.try_rate(index, 1, &mut rate));
         rate
     }
 
     /// Returns time derivatives.
     #[track_caller]
-    fn rates<const COUNT: usize>(&self, places: [u32; COUNT]) -> [f64; COUNT]
+    fn rates<const COUNT: usize>(&self, indices: [u32; COUNT]) -> [f64; COUNT]
     where
         Self: Sized,
     {
-        places.map(|place| self.rate(place))
+        indices.map(|index| self.rate(index))
     }
 
     /// Returns a partial derivative.
@@ -447,28 +447,28 @@ pub trait Either: Send {
 
     /// Returns values of Reals as a vector.
     #[track_caller]
-    fn read(&self, places: &[u32]) -> Vec<f64> {
-        let mut values = vec![f64::NAN; places.len()];
-        self.ok(self.try_get(places, &mut values));
+    fn read(&self, indices: &[u32]) -> Vec<f64> {
+        let mut values = vec![f64::NAN; indices.len()];
+        self.ok(self.try_get(indices, &mut values));
         values
     }
 
     /// Returns values of Reals as an array.
     #[track_caller]
-    fn get<const COUNT: usize>(&self, places: [u32; COUNT]) -> [f64; COUNT]
+    fn get<const COUNT: usize>(&self, indices: [u32; COUNT]) -> [f64; COUNT]
     where
         Self: Sized,
     {
         let mut values = [f64::NAN; COUNT];
-        self.ok(self.try_get(&places, &mut values));
+        self.ok(self.try_get(&indices, &mut values));
         values
     }
 
     /// Sets Reals.
     #[track_caller]
-    fn set(&self, places: &[u32], values: &[f64]) {
-        assert_eq!(places.len(), values.len());
-        self.ok(self.try_set(places, values));
+    fn set(&self, indices: &[u32], values: &[f64]) {
+        assert_eq!(indices.len(), values.len());
+        self.ok(self.try_set(indices, values));
     }
 
     /// Returns all continuous states.

@@ -145,7 +145,7 @@ impl Either for Importer {
         let (defined, stop_time) = (stop_time.is_some().into(), stop_time.unwrap_or(f64::NAN));
         match self.fmi2SetupExperiment(fmi2False, f64::NAN, start_time, defined, stop_time) {
             Status::Ok => self.fmi2EnterInitializationMode(),
-            refused => refused,
+            rejected => rejected,
         }
     }
 

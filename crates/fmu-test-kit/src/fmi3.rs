@@ -115,9 +115,9 @@ impl Importer {
 
 /// Returns the value references of variables with these indices, up to 16. Allocates nothing, because tests
 /// of control loops count allocations.
-fn references(places: &[u32]) -> [u32; 16] {
+fn references(indices: &[u32]) -> [u32; 16] {
     let mut references = [0; 16];
-    references[..places.len()].copy_from_slice(places);
+    references[..indices.len()].copy_from_slice(indices);
     references.map(reference)
 }
 
@@ -171,51 +171,51 @@ impl Either for Importer {
         self.fmi3EnterInitializationMode(fmi3False, f64::NAN, start_time, defined, stop_time)
     }
 
-    fn try_get(&self, places: &[u32], values: &mut [f64]) -> Status {
-        if places.len() <= 16 {
-            let vr = references(places);
-            return self.fmi3GetFloat64(vr.as_ptr(), places.len(), values.as_mut_ptr(), values.len());
+    fn try_get(&self, indices: &[u32], values: &mut [f64]) -> Status {
+        if indices.len() <= 16 {
+            let vr = references(indices);
+            return self.fmi3GetFloat64(vr.as_ptr(), indices.len(), values.as_mut_ptr(), values.len());
         }
-        let vr: Vec<_> = places.iter().map(|place| reference(*place)).collect();
+        let vr: Vec<_> = indices.iter().map(|index| reference(*index)).collect();
         self.fmi3GetFloat64(vr.as_ptr(), vr.len(), values.as_mut_ptr(), values.len())
     }
 
-    fn try_set(&self, places: &[u32], values: &[f64]) -> Status {
-        let vr = references(places);
-        self.fmi3SetFloat64(vr.as_ptr(), places.len(), values.as_ptr(), values.len())
+    fn try_set(&self, indices: &[u32], values: &[f64]) -> Status {
+        let vr = references(indices);
+        self.fmi3SetFloat64(vr.as_ptr(), indices.len(), values.as_ptr(), values.len())
     }
 
-    fn set_integer(&self, place: u32, value: i32) -> Status {
-        self.fmi3SetInt32(&reference(place), 1, &value, 1)
+    fn set_integer(&self, index: u32, value: i32) -> Status {
+        self.fmi3SetInt32(&reference(index), 1, &value, 1)
     }
 
-    fn set_boolean(&self, place: u32, value: u8) -> Status {
-        self.fmi3SetBoolean(&reference(place), 1, &value, 1)
+    fn set_boolean(&self, index: u32, value: u8) -> Status {
+        self.fmi3SetBoolean(&reference(index), 1, &value, 1)
     }
 
-    fn set_text(&self, place: u32, value: *const c_char) -> Status {
-        self.fmi3SetString(&reference(place), 1, &value, 1)
+    fn set_text(&self, index: u32, value: *const c_char) -> Status {
+        self.fmi3SetString(&reference(index), 1, &value, 1)
     }
 
-    fn set_item(&self, place: u32, value: i32) -> Status {
-        self.fmi3SetInt64(&reference(place), 1, &value.into(), 1)
+    fn set_item(&self, index: u32, value: i32) -> Status {
+        self.fmi3SetInt64(&reference(index), 1, &value.into(), 1)
     }
 
-    fn get_integer(&self, place: u32, value: &mut i32) -> Status {
-        self.fmi3GetInt32(&reference(place), 1, value, 1)
+    fn get_integer(&self, index: u32, value: &mut i32) -> Status {
+        self.fmi3GetInt32(&reference(index), 1, value, 1)
     }
 
-    fn get_boolean(&self, place: u32, value: &mut u8) -> Status {
-        self.fmi3GetBoolean(&reference(place), 1, value, 1)
+    fn get_boolean(&self, index: u32, value: &mut u8) -> Status {
+        self.fmi3GetBoolean(&reference(index), 1, value, 1)
     }
 
-    fn get_text(&self, place: u32, value: &mut *const c_char) -> Status {
-        self.fmi3GetString(&reference(place), 1, value, 1)
+    fn get_text(&self, index: u32, value: &mut *const c_char) -> Status {
+        self.fmi3GetString(&reference(index), 1, value, 1)
     }
 
-    fn get_item(&self, place: u32, value: &mut i32) -> Status {
+    fn get_item(&self, index: u32, value: &mut i32) -> Status {
         let mut item = (*value).into();
-        let status = self.fmi3GetInt64(&reference(place), 1, &mut item, 1);
+        let status = self.fmi3GetInt64(&reference(index), 1, &mut item, 1);
         *value = item.try_into().expect("items are small");
         status
     }
@@ -232,8 +232,8 @@ impl Either for Importer {
         assert_eq!(self.do_step(point, step_size), Ok(whole), "log: {:#?}", self.take_log());
     }
 
-    fn try_rate(&self, place: u32, order: i32, rate: &mut f64) -> Status {
-        self.fmi3GetOutputDerivatives(&reference(place), 1, &order, rate, 1)
+    fn try_rate(&self, index: u32, order: i32, rate: &mut f64) -> Status {
+        self.fmi3GetOutputDerivatives(&reference(index), 1, &order, rate, 1)
     }
 
     /// Also reads the adjoint derivatives of each unknown. By definition, their scalar product with the seed

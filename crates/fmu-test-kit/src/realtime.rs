@@ -112,7 +112,7 @@ struct Loop<F: Either> {
 impl<F: Either> Loop<F> {
     fn new<M: Exported>() -> Self {
         let (fmu, inputs, outputs) = (F::initialized_at::<M>(0.0), inputs::<M>(), outputs::<M>());
-        let parameter = (0..).zip(M::TABLE).find_map(|(place, of)| Some((place, start_of(of)?)));
+        let parameter = (0..).zip(M::TABLE).find_map(|(index, of)| Some((index, start_of(of)?)));
         Self {
             state: fmu.save(),
             fmu,

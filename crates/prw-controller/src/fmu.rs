@@ -90,7 +90,7 @@ impl InputDerivatives for Controller {
     fn set_input_derivative(&mut self, of: Name, order: u32, value: f64) {
         if order == 1 {
             std::mem::swap(&mut self.inputs, &mut self.slopes);
-            Self::TABLE[Self::place(of)].set(self, &value.into());
+            Self::TABLE[Self::index(of)].set(self, &value.into());
             std::mem::swap(&mut self.inputs, &mut self.slopes);
         }
     }

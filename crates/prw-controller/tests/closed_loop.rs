@@ -3,7 +3,7 @@
 use std::process::Command;
 
 #[test]
-fn numbers_that_are_none_are_refused() {
+fn numbers_that_are_none_are_rejected() {
     let folder = std::env::temp_dir().join(format!("prw-closed-loop-{}", std::process::id()));
     for (arguments, message) in [
         (&["--go-to", "nan", "60"][..], "--go-to must have finite numbers, not NaN"),

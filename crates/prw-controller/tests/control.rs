@@ -177,7 +177,7 @@ fn a_new_sample_time_holds_from_the_next_sample_on() {
 }
 
 #[test]
-fn parameters_that_make_no_controller_are_refused() {
+fn parameters_that_make_no_controller_are_rejected() {
     let with = |change: fn(&mut Parameters)| {
         let mut p = Parameters::DEFAULT;
         change(&mut p);

@@ -197,7 +197,7 @@ fn too_many_samples_at_once() {
     let fmu = fmu_test_kit::Importer::of::<Controller>(ModelExchange);
     fmu.initialize(0.0);
     fmu.ok(fmu.fmi2SetTime(1e6));
-    fmu.refused_with(&["sample_time"], |fmu| fmu.fmi2NewDiscreteStates(&mut Default::default()));
+    fmu.rejected_with(&["sample_time"], |fmu| fmu.fmi2NewDiscreteStates(&mut Default::default()));
 }
 
 /// Checks partial derivatives with respect to time, which FMI 3.0 counts among the knowns, against
@@ -222,14 +222,14 @@ fn partial_derivatives_by_the_time() {
         };
         let (before, after) = (at(middle - WIDTH), at(middle + WIDTH));
         at(middle);
-        for (place, unknown) in OUTPUTS.into_iter().enumerate() {
+        for (index, unknown) in OUTPUTS.into_iter().enumerate() {
             let forward = fmu.partial(unknown, fmu_export::fmi3::independent::<Controller>().0);
-            let difference = (after[place] - before[place]) / (2.0 * WIDTH);
+            let difference = (after[index] - before[index]) / (2.0 * WIDTH);
             assert!(
                 (forward - difference).abs() <= 1e-9 * (1.0 + difference.abs()),
                 "{forward} {difference}"
             );
-            moves[place] |= forward != 0.0;
+            moves[index] |= forward != 0.0;
         }
         fmu.ok(fmu.fmi3EnterEventMode());
     }

@@ -1,7 +1,7 @@
 //! Arrays, pointers and strings of the importer.
 
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, Reference, elements_of, refuse};
+use crate::instance::{Instance, Outcome, Reference, elements_of, reject};
 use fmi_abi::c_types::c_char;
 use std::ffi::CStr;
 use std::mem::MaybeUninit;
@@ -46,7 +46,7 @@ pub(crate) fn same(what: &str, needed: usize, count: usize) -> Outcome {
     if count == needed {
         return Ok(());
     }
-    refuse(format!("there are {needed} {what}, the array has {count} elements"))
+    reject(format!("there are {needed} {what}, the array has {count} elements"))
 }
 
 /// Calls `body` with the elements of variables of FMI 3.0, in a model with arrays. The value reference of the
@@ -67,7 +67,7 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
     // Moved out so that `body` can borrow the instance; moved back to reuse the allocation.
     let mut elements = std::mem::take(&mut instance.elements);
     elements.clear();
-    elements.extend(vr.iter().flat_map(|vr| elements_of::<M>(vr.place())));
+    elements.extend(vr.iter().flat_map(|vr| elements_of::<M>(vr.index())));
     let outcome = body(instance, &elements);
     instance.elements = elements;
     outcome
@@ -77,9 +77,9 @@ pub(crate) unsafe fn of_elements<M: Exported, R: Reference>(
 ///
 /// # Safety
 /// `pointer` is NULL or points to a value that no other code uses during `'a`.
-pub(crate) unsafe fn place<'a, T>(pointer: *mut T, argument: &str) -> Outcome<&'a mut MaybeUninit<T>> {
+pub(crate) unsafe fn target<'a, T>(pointer: *mut T, argument: &str) -> Outcome<&'a mut MaybeUninit<T>> {
     if pointer.is_null() || !pointer.is_aligned() {
-        return refuse(format!("the pointer {argument} is NULL or not aligned"));
+        return reject(format!("the pointer {argument} is NULL or not aligned"));
     }
     // SAFETY: the pointer is not NULL and is aligned; the caller guarantees that it points to a value.
     Ok(unsafe { &mut *pointer.cast() })
@@ -99,17 +99,17 @@ fn check<T>(pointer: *const T, length: usize, argument: &str) -> Outcome {
     // One test covers both faults: not aligned, or a size in bytes that overflows `isize`.
     let odd = pointer.addr() & (align_of::<T>() - 1) | length >> (isize::BITS - 1 - size_of::<T>().ilog2());
     if pointer.is_null() || odd != 0 {
-        return refuse_array(pointer, length, argument);
+        return reject_array(pointer, length, argument);
     }
     Ok(())
 }
 
 #[cold]
 #[inline(never)]
-fn refuse_array<T>(pointer: *const T, length: usize, argument: &str) -> Outcome {
+fn reject_array<T>(pointer: *const T, length: usize, argument: &str) -> Outcome {
     if length >> (isize::BITS - 1 - size_of::<T>().ilog2()) != 0 {
-        return refuse(format!("the array {argument} is larger than memory"));
+        return reject(format!("the array {argument} is larger than memory"));
     }
     let fault = if pointer.is_null() { "is NULL" } else { "is not aligned" };
-    refuse(format!("the array {argument} {fault}, its length is {length}"))
+    reject(format!("the array {argument} {fault}, its length is {length}"))
 }

@@ -2,7 +2,7 @@
 
 use super::ImporterLog;
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, Refusal};
+use crate::instance::{Instance, Outcome, Rejection};
 use fmi_abi::Rule;
 use fmi_abi::Status;
 use fmi_abi::c_types::c_void;
@@ -100,19 +100,19 @@ fn not_allowed<M: Exported>(component: &Component<M>, rule: &'static Rule) -> St
     if component.delivering.get() {
         return Status::Error;
     }
-    let refusal = catch_unwind(AssertUnwindSafe(|| {
+    let rejection = catch_unwind(AssertUnwindSafe(|| {
         // SAFETY: as in `call`, which no longer uses its reference.
-        refuse_call(unsafe { &*component.instance.get() }, rule.accepted())
+        reject_call(unsafe { &*component.instance.get() }, rule.accepted())
     }));
-    finish(component, rule.name, refusal)
+    finish(component, rule.name, rejection)
 }
 
-fn refuse_call<M: Exported>(instance: &Instance<M>, accepted: Situations) -> Outcome {
+fn reject_call<M: Exported>(instance: &Instance<M>, accepted: Situations) -> Outcome {
     let (interface, mode) = (instance.interface(), instance.mode());
     let allowed = accepted.names(instance.standard(), interface);
     let message = format!("not allowed in state '{mode}' of {interface}; allowed in: {allowed}");
     let status = if mode == Mode::Fatal { Status::Fatal } else { Status::Error };
-    Err(Box::new(Refusal { status, message }))
+    Err(Box::new(Rejection { status, message }))
 }
 
 /// Result of a body: its outcome, or the payload of its panic.
@@ -124,7 +124,7 @@ type Ended = Result<Outcome, Box<dyn Any + Send>>;
 pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: Ended) -> Status {
     let status = match &ended {
         Ok(Ok(())) => Status::Ok,
-        Ok(Err(refusal)) => refusal.status,
+        Ok(Err(rejection)) => rejection.status,
         Err(_) => Status::Fatal,
     };
     let deliver = || {
@@ -134,7 +134,7 @@ pub(super) fn finish<M: Exported>(component: &Component<M>, name: &str, ended: E
             let instance = unsafe { &mut *component.instance.get() };
             match &ended {
                 Ok(Ok(())) => {}
-                Ok(Err(refusal)) => instance.logger.log(status, format!("{name}: {}", refusal.message)),
+                Ok(Err(rejection)) => instance.logger.log(status, format!("{name}: {}", rejection.message)),
                 Err(panic) => {
                     instance.break_down();
                     instance.logger.log(

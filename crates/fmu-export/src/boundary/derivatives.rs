@@ -45,7 +45,7 @@ pub(crate) unsafe fn partial_derivatives<M: Exported, R: Reference, const ADJOIN
 }
 
 fn elements<M: Exported, R: Reference>(vr: &[R]) -> Vec<u32> {
-    vr.iter().flat_map(|vr| elements_of::<M>(vr.place())).collect()
+    vr.iter().flat_map(|vr| elements_of::<M>(vr.index())).collect()
 }
 
 /// Computes time derivatives of outputs (section 4.2.2 of FMI 2.0, 4.2.4 of FMI 3.0).
@@ -72,7 +72,7 @@ pub(crate) unsafe fn output_derivatives<M: Exported, R: Reference>(
     if M::ARRAYS && R::ARRAYS {
         // One order applies to the whole array (section 4.2.4 of FMI 3.0).
         let of_elements =
-            |(vr, order): (&R, &i32)| elements_of::<M>(vr.place()).map(|_| *order).collect::<Vec<_>>();
+            |(vr, order): (&R, &i32)| elements_of::<M>(vr.index()).map(|_| *order).collect::<Vec<_>>();
         let order: Vec<i32> = vr.iter().zip(order).flat_map(of_elements).collect();
         return instance.get_output_derivatives(&elements::<M, R>(vr), &order, value);
     }

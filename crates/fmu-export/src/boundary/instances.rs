@@ -2,7 +2,7 @@
 
 use super::{Component, ImporterLog, forget_panic, panic_message};
 use crate::export::Exported;
-use crate::instance::{Importer, Instance, Outcome, refuse};
+use crate::instance::{Importer, Instance, Outcome, reject};
 use crate::log::{Logger, Message};
 use crate::model::Setup;
 use fmi_abi::Status;
@@ -34,13 +34,13 @@ pub(crate) fn instantiate<M: Exported>(
     super::webassembly::keep_panics();
     let make = || {
         let (importer, standard) = (log(), arguments.importer.standard);
-        let refusal = match catch_unwind(AssertUnwindSafe(|| make_instance::<M>(arguments))) {
+        let rejection = match catch_unwind(AssertUnwindSafe(|| make_instance::<M>(arguments))) {
             Ok(Ok(mut instance)) => {
                 instance.logger.take().iter().for_each(|message| importer.deliver(message));
                 let instance = UnsafeCell::new(instance);
                 return Some(Box::new(Component { delivering: Cell::new(false), instance, importer }));
             }
-            Ok(Err(refusal)) => refusal.message,
+            Ok(Err(rejection)) => rejection.message,
             Err(panic) => {
                 let message = format!("internal failure ({})", panic_message(&*panic));
                 forget_panic(Err(panic));
@@ -48,7 +48,7 @@ pub(crate) fn instantiate<M: Exported>(
             }
         };
         let mut logger = Logger::new(standard, false);
-        logger.add(Message { status: Status::Error, text: format!("{function}: {refusal}") });
+        logger.add(Message { status: Status::Error, text: format!("{function}: {rejection}") });
         logger.take().iter().for_each(|message| importer.deliver(message));
         None
     };
@@ -65,7 +65,7 @@ pub(crate) fn instantiate<M: Exported>(
 fn make_instance<M: Exported>(arguments: Arguments) -> Outcome<Instance<M>> {
     let Arguments { name, guid, resources, logging_on, interface, importer } = arguments;
     let Some(name) = name.filter(|name| !name.to_bytes().trim_ascii().is_empty()) else {
-        return refuse("the instance needs a name");
+        return reject("the instance needs a name");
     };
     let own = M::INFO.guid;
     if guid.map(CStr::to_bytes) != Some(own.as_bytes()) {
@@ -73,7 +73,7 @@ fn make_instance<M: Exported>(arguments: Arguments) -> Outcome<Instance<M>> {
             Standard::Fmi2 => "guid",
             Standard::Fmi3 => "instantiationToken",
         };
-        return refuse(format!(
+        return reject(format!(
             "the {what} {} is not this library's {own}: modelDescription.xml and library come from different FMUs",
             guid.map_or("NULL".into(), CStr::to_string_lossy),
         ));

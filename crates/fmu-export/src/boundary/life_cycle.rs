@@ -6,7 +6,7 @@
 
 use super::{array, string};
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, refuse};
+use crate::instance::{Instance, Outcome, reject};
 use crate::log::Logger;
 use crate::model::Experiment;
 use fmi_abi::Category;
@@ -61,7 +61,7 @@ pub unsafe fn set_debug_logging<M: Exported, Truth: Default + PartialEq>(
         let name = unsafe { string(*name) }.map_or(&b""[..], CStr::to_bytes);
         let Some(bit) = Logger::find(name) else {
             let known = Category::ALL.map(|category| category.name().to_string_lossy()).join(", ");
-            return refuse(format!(
+            return reject(format!(
                 "there is no log category '{}'; the categories are {known}",
                 String::from_utf8_lossy(name)
             ));

@@ -6,22 +6,22 @@ mod arrays;
 mod call;
 mod derivatives;
 mod importer_log;
+mod indices;
 mod instances;
 pub(crate) mod life_cycle;
 pub(crate) mod model_exchange;
-mod places;
 pub(crate) mod short;
 pub(crate) mod states;
 pub(crate) mod values;
 pub(crate) mod webassembly;
 
-pub(crate) use arrays::{array, of_elements, output, place, same, string};
+pub(crate) use arrays::{array, of_elements, output, same, string, target};
 pub(crate) use call::{Component, call, call_at_once, forget_panic, panic_message};
 pub(crate) use derivatives::{output_derivatives, partial_derivatives};
 pub(crate) use importer_log::{Callback, ImporterLog};
+pub(crate) use indices::Placed;
+pub use indices::{both_offsets, offset_in, offset_of_real};
 pub(crate) use instances::{Arguments, free, instantiate};
-pub(crate) use places::Placed;
-pub use places::{both_offsets, offset_in, offset_of_real};
 
 use crate::export::Exported;
 use crate::instance::Instance;

@@ -32,15 +32,15 @@ unsafe fn get<M: Exported, R: Reference>(
     values: *mut f64,
     count: usize,
 ) -> bool {
-    let (references, places): (_, *mut MaybeUninit<f64>) = (R::cast(vr), values.cast());
+    let (references, indices): (_, *mut MaybeUninit<f64>) = (R::cast(vr), values.cast());
     // SAFETY: both arrays are not NULL, are aligned, and have `count` elements by contract. `MaybeUninit`
     // requires no initialized values.
     unsafe {
         match count {
             _ if !are_arrays(vr, values, count) => false,
-            4 => instance.get_reals_at_once::<R, 4>(&*references.cast(), &mut *places.cast()),
-            1 => instance.get_reals_at_once::<R, 1>(&*references.cast(), &mut *places.cast()),
-            2 => instance.get_reals_at_once::<R, 2>(&*references.cast(), &mut *places.cast()),
+            4 => instance.get_reals_at_once::<R, 4>(&*references.cast(), &mut *indices.cast()),
+            1 => instance.get_reals_at_once::<R, 1>(&*references.cast(), &mut *indices.cast()),
+            2 => instance.get_reals_at_once::<R, 2>(&*references.cast(), &mut *indices.cast()),
             _ => false,
         }
     }

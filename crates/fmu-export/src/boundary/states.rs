@@ -3,16 +3,16 @@
 //! # Safety
 //! The importer guarantees the contract of [`fmi2`](crate::fmi2#safety) or [`fmi3`](crate::fmi3#safety).
 
-use super::{array, output, place};
+use super::{array, output, target};
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, refuse};
+use crate::instance::{Instance, Outcome, reject};
 use fmi_abi::c_types::c_void;
 use std::ptr::without_provenance_mut;
 
 /// The instance owns the state until the importer frees the state or the instance.
 pub unsafe fn get_state<M: Exported>(instance: &mut Instance<M>, state: *mut *mut c_void) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a handle, which is initialized.
-    let handle = unsafe { place(state, "FMUstate")?.assume_init_mut() };
+    let handle = unsafe { target(state, "FMUstate")?.assume_init_mut() };
     check_memory(instance, *handle)?;
     *handle = without_provenance_mut(instance.save(handle.addr())?);
     Ok(())
@@ -28,7 +28,7 @@ pub unsafe fn free_state<M: Exported>(instance: &mut Instance<M>, state: *mut *m
         return Ok(());
     }
     // SAFETY: by contract, a pointer to a handle, which is initialized.
-    let handle = unsafe { place(state, "FMUstate")?.assume_init_mut() };
+    let handle = unsafe { target(state, "FMUstate")?.assume_init_mut() };
     if !handle.is_null() {
         let state = instance.give(handle.addr())?;
         *handle = std::ptr::null_mut();
@@ -43,7 +43,7 @@ pub unsafe fn serialized_size<M: Exported>(
     size: *mut usize,
 ) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a size.
-    let size = unsafe { place(size, "size")? };
+    let size = unsafe { target(size, "size")? };
     size.write(instance.serialized_size(state.addr())?);
     Ok(())
 }
@@ -58,7 +58,7 @@ pub unsafe fn serialize<M: Exported, Byte>(
     let bytes = unsafe { output(bytes.cast::<u8>(), size, "serializedState")? };
     let needed = instance.serialized_size(state.addr())?;
     if size != needed {
-        return refuse(format!(
+        return reject(format!(
             "the state needs {needed} bytes, the buffer has {size}; ask for its size first"
         ));
     }
@@ -80,7 +80,7 @@ pub unsafe fn deserialize<M: Exported, Byte>(
 ) -> Outcome {
     // SAFETY: by contract, an array of this length, and NULL or a pointer to a handle, which is initialized.
     let (bytes, handle) = unsafe {
-        (array(bytes.cast::<u8>(), size, "serializedState")?, place(state, "FMUstate")?.assume_init_mut())
+        (array(bytes.cast::<u8>(), size, "serializedState")?, target(state, "FMUstate")?.assume_init_mut())
     };
     check_memory(instance, std::ptr::null_mut())?;
     *handle = without_provenance_mut(instance.deserialize(bytes, handle.addr())?);
@@ -91,7 +91,7 @@ pub unsafe fn deserialize<M: Exported, Byte>(
 fn check_memory<M: Exported>(instance: &mut Instance<M>, handle: *mut c_void) -> Outcome {
     #[cfg(target_family = "wasm")]
     if handle.is_null() && !super::webassembly::has_memory(2 * instance.size_of_state()) {
-        return refuse(
+        return reject(
             "the instance has no memory for another state; free one, or compile the FMU with a larger \
              FMU_MEMORY_PAGES",
         );

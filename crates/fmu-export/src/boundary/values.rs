@@ -132,9 +132,9 @@ pub(crate) fn get_float32<M: Exported, R: Reference>(
     values: &mut [MaybeUninit<f32>],
     bases: &[BaseType],
 ) -> Outcome {
-    instance.get(vr, bases, &mut |place, value| {
+    instance.get(vr, bases, &mut |index, value| {
         if let Value::Real(value) = value {
-            values[place].write(value as f32);
+            values[index].write(value as f32);
         }
     })
 }
@@ -155,9 +155,9 @@ pub(crate) fn get_integers<M: Exported, R: Reference, T: TryFrom<i128> + Default
     values: &mut [MaybeUninit<T>],
     bases: &[BaseType],
 ) -> Outcome {
-    instance.get(vr, bases, &mut |place, value| {
+    instance.get(vr, bases, &mut |index, value| {
         if let Value::Integer(value) = value {
-            values[place].write(T::try_from(value).unwrap_or_default());
+            values[index].write(T::try_from(value).unwrap_or_default());
         }
     })
 }
@@ -177,8 +177,8 @@ pub(crate) fn get_booleans<M: Exported, R: Reference, T: From<bool>>(
     values: &mut [MaybeUninit<T>],
     bases: &[BaseType],
 ) -> Outcome {
-    instance.get(vr, bases, &mut |place, value| {
-        values[place].write((value == Value::Boolean(true)).into());
+    instance.get(vr, bases, &mut |index, value| {
+        values[index].write((value == Value::Boolean(true)).into());
     })
 }
 
@@ -191,7 +191,7 @@ pub(crate) fn set_booleans<M: Exported, R: Reference, T: From<bool> + PartialEq 
 ) -> Outcome {
     let known = [false, true].map(T::from);
     if let Some(place) = values.iter().position(|value| !known.contains(value)) {
-        return instance.refuse_value(vr, bases, place, |name| {
+        return instance.reject_value(vr, bases, place, |name| {
             format!("{name} must be 0 (false) or 1 (true), it is {}", values[place])
         });
     }
@@ -240,7 +240,7 @@ pub(crate) unsafe fn set_texts<M: Exported, R: Reference>(
             Some(Err(_)) => "not UTF-8",
             None => "NULL",
         };
-        return instance.refuse_value(vr, bases, place, |name| format!("the text for {name} is {fault}"));
+        return instance.reject_value(vr, bases, place, |name| format!("the text for {name} is {fault}"));
     }
     instance.set(vr, bases, &|index| texts[index].clone())
 }

@@ -4,9 +4,9 @@
 //! The importer guarantees the contract of the [module above](super#safety).
 
 use super::types::*;
-use crate::boundary::{array, output_derivatives, place};
+use crate::boundary::{array, output_derivatives, target};
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, no_status, refuse};
+use crate::instance::{Instance, Outcome, no_status, reject};
 
 pub unsafe fn fmi2SetRealInputDerivatives<M: Exported>(
     instance: &mut Instance<M>,
@@ -52,7 +52,7 @@ pub unsafe fn fmi2CancelStep<M: Exported>(_: &mut Instance<M>) -> Outcome {
 
 /// Returns the status kind of this number, or an error.
 fn status_kind(kind: fmi2StatusKind) -> Outcome<StatusKind> {
-    StatusKind::from_c(kind).map_or_else(|| refuse(format!("there is no fmi2StatusKind {kind}")), Ok)
+    StatusKind::from_c(kind).map_or_else(|| reject(format!("there is no fmi2StatusKind {kind}")), Ok)
 }
 
 fn nothing_to_say(kind: StatusKind) -> Outcome {
@@ -73,7 +73,7 @@ pub unsafe fn fmi2GetRealStatus<M: Exported>(
     match status_kind(kind)? {
         StatusKind::LastSuccessfulTime => {
             // SAFETY: by contract, NULL or a pointer to a value.
-            unsafe { place(value, "value") }?.write(instance.last_successful_time());
+            unsafe { target(value, "value") }?.write(instance.last_successful_time());
             Ok(())
         }
         other => nothing_to_say(other),
@@ -88,7 +88,7 @@ pub unsafe fn fmi2GetBooleanStatus<M: Exported>(
     match status_kind(kind)? {
         StatusKind::Terminated => {
             // SAFETY: by contract, NULL or a pointer to a value.
-            unsafe { place(value, "value") }?.write(instance.has_ended().into());
+            unsafe { target(value, "value") }?.write(instance.has_ended().into());
             Ok(())
         }
         other => nothing_to_say(other),

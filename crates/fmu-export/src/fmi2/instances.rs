@@ -3,7 +3,7 @@
 use super::types::*;
 use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};
 use crate::export::Exported;
-use crate::instance::{Importer, refuse};
+use crate::instance::{Importer, reject};
 use fmi_abi::Interface;
 
 /// `fmi2GetTypesPlatform`
@@ -37,7 +37,7 @@ pub unsafe extern "C" fn fmi2Instantiate<M: Exported>(
     let interface = match fmu_type {
         0 => Ok(Interface::ModelExchange),
         1 => Ok(Interface::CoSimulation),
-        other => refuse(format!("fmuType must be 0 (Model Exchange) or 1 (Co-Simulation), it is {other}")),
+        other => reject(format!("fmuType must be 0 (Model Exchange) or 1 (Co-Simulation), it is {other}")),
     };
     let log = || ImporterLog {
         callback: functions.logger.map(Callback::Fmi2),

@@ -3,13 +3,13 @@
 
 use super::types::*;
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, refuse};
+use crate::instance::{Instance, Outcome, reject};
 
 macro_rules! absent {
     ($reason:literal: $($function:ident($($type:ty),*);)+) => {
         $(
             pub unsafe fn $function<M: Exported>(_: &mut Instance<M> $(, _: $type)*) -> Outcome {
-                refuse($reason)
+                reject($reason)
             }
         )+
     };

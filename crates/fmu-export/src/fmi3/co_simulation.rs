@@ -4,7 +4,7 @@
 //! The importer guarantees the contract of the [module above](super#safety).
 
 use super::{FromOne, types::*};
-use crate::boundary::{output_derivatives, place};
+use crate::boundary::{output_derivatives, target};
 use crate::export::Exported;
 use crate::instance::{Instance, Outcome};
 
@@ -39,10 +39,10 @@ pub unsafe fn fmi3DoStep<M: Exported>(
     // SAFETY: by contract, each is NULL or points to a value.
     let (event_handling_needed, terminate_simulation, early_return, last_successful_time) = unsafe {
         (
-            place(event_handling_needed, "eventHandlingNeeded")?,
-            place(terminate_simulation, "terminateSimulation")?,
-            place(early_return, "earlyReturn")?,
-            place(last_successful_time, "lastSuccessfulTime")?,
+            target(event_handling_needed, "eventHandlingNeeded")?,
+            target(terminate_simulation, "terminateSimulation")?,
+            target(early_return, "earlyReturn")?,
+            target(last_successful_time, "lastSuccessfulTime")?,
         )
     };
     let reached = instance.do_step_to(current_communication_point, communication_step_size)?;

@@ -6,9 +6,9 @@
 use super::{FromOne, types::*};
 use crate::boundary::life_cycle::experiment;
 use crate::boundary::values::*;
-use crate::boundary::{array, of_elements, output, partial_derivatives, place};
+use crate::boundary::{array, of_elements, output, partial_derivatives, target};
 use crate::export::Exported;
-use crate::instance::{Instance, Outcome, refuse};
+use crate::instance::{Instance, Outcome, reject};
 use fmi_abi::BaseType::{self, *};
 use fmi_abi::Value;
 
@@ -135,7 +135,7 @@ derivatives! {
 }
 
 pub unsafe fn fmi3EvaluateDiscreteStates<M: Exported>(_: &mut Instance<M>) -> Outcome {
-    refuse("fmi3UpdateDiscreteStates does it all (providesEvaluateDiscreteStates is false)")
+    reject("fmi3UpdateDiscreteStates does it all (providesEvaluateDiscreteStates is false)")
 }
 
 pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
@@ -150,12 +150,12 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
     // SAFETY: by contract, each is NULL or points to a value.
     let (again, terminate, nominals_changed, states_changed, next_defined, next) = unsafe {
         (
-            place(again, "discreteStatesNeedUpdate")?,
-            place(terminate, "terminateSimulation")?,
-            place(nominals_changed, "nominalsOfContinuousStatesChanged")?,
-            place(states_changed, "valuesOfContinuousStatesChanged")?,
-            place(next_defined, "nextEventTimeDefined")?,
-            place(next, "nextEventTime")?,
+            target(again, "discreteStatesNeedUpdate")?,
+            target(terminate, "terminateSimulation")?,
+            target(nominals_changed, "nominalsOfContinuousStatesChanged")?,
+            target(states_changed, "valuesOfContinuousStatesChanged")?,
+            target(next_defined, "nextEventTimeDefined")?,
+            target(next, "nextEventTime")?,
         )
     };
     let event = instance.event()?;
@@ -170,7 +170,7 @@ pub unsafe fn fmi3UpdateDiscreteStates<M: Exported>(
 
 pub unsafe fn fmi3GetNumberOfEventIndicators<M: Exported>(_: &mut Instance<M>, count: *mut usize) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a value.
-    unsafe { place(count, "nEventIndicators") }?.write(Instance::<M>::INDICATORS);
+    unsafe { target(count, "nEventIndicators") }?.write(Instance::<M>::INDICATORS);
     Ok(())
 }
 
@@ -179,6 +179,6 @@ pub unsafe fn fmi3GetNumberOfContinuousStates<M: Exported>(
     count: *mut usize,
 ) -> Outcome {
     // SAFETY: by contract, NULL or a pointer to a value.
-    unsafe { place(count, "nContinuousStates") }?.write(M::STATES.len());
+    unsafe { target(count, "nContinuousStates") }?.write(M::STATES.len());
     Ok(())
 }

@@ -3,7 +3,7 @@
 use super::types::*;
 use crate::boundary::{Arguments, Callback, ImporterLog, free, instantiate, string};
 use crate::export::Exported;
-use crate::instance::{Importer, Outcome, refuse};
+use crate::instance::{Importer, Outcome, reject};
 use fmi_abi::{Interface, Standard};
 
 /// `fmi3GetVersion`
@@ -55,7 +55,7 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation<M: Exported>(
     };
     let interface = match required_count {
         0 => Ok(Interface::CoSimulation),
-        _ => refuse(
+        _ => reject(
             "requiredIntermediateVariables must be empty: this FMU has no intermediate update \
              (providesIntermediateUpdate is false)",
         ),
@@ -93,7 +93,7 @@ pub unsafe extern "C" fn fmi3InstantiateScheduledExecution<M: Exported>(
         log_message,
     };
     // SAFETY: the importer guarantees the contract of the module.
-    unsafe { make::<M>(&call, refuse("this FMU has no Scheduled Execution"), importer) }
+    unsafe { make::<M>(&call, reject("this FMU has no Scheduled Execution"), importer) }
 }
 
 /// The arguments that the three functions share.

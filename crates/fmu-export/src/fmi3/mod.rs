@@ -40,8 +40,8 @@ use fmi_abi::Standard;
 use types::*;
 
 /// Returns the value reference of the variable at this index of the table, or after the table.
-pub const fn reference(place: u32) -> fmi3ValueReference {
-    Standard::Fmi3.reference(place)
+pub const fn reference(index: u32) -> fmi3ValueReference {
+    Standard::Fmi3.reference(index)
 }
 
 /// A [value reference](reference()) as an importer passes it.
@@ -60,7 +60,7 @@ impl Reference for FromOne {
     }
 
     #[inline]
-    fn place(self) -> u32 {
+    fn index(self) -> u32 {
         self.0.wrapping_sub(reference(0))
     }
 }

@@ -1,7 +1,7 @@
 //! Co-Simulation (section 4.2).
 
-use super::refusal::discard;
-use super::{Instance, Outcome, Refusal, State, refuse, refuse_with};
+use super::rejection::discard;
+use super::{Instance, Outcome, Rejection, State, reject, reject_with};
 use crate::capabilities::{Events, Step, Stepped};
 use crate::export::Exported;
 use crate::model::Error;
@@ -94,12 +94,12 @@ impl<M: Exported> Instance<M> {
         let end = point + step_size;
         // False for NaN as well.
         if !(point > f64::NEG_INFINITY && end > point && end < f64::INFINITY) {
-            return refuse_step(point, step_size);
+            return reject_step(point, step_size);
         }
         let rounding = rounding(point, step_size);
         if (point - self.state.time).abs() > rounding {
             let time = self.state.time;
-            return refuse_with(move || {
+            return reject_with(move || {
                 format!(
                     "the communication point is {point}, but the last step ended at {time}; go on from there or set a saved state"
                 )
@@ -109,7 +109,7 @@ impl<M: Exported> Instance<M> {
             && end
                 > stop_time + rounding + STOP_TIME_ROUNDING * (stop_time - self.state.experiment.start_time)
         {
-            return refuse_with(move || {
+            return reject_with(move || {
                 format!("the step would end at {end}, after the stop time {stop_time}")
             });
         }
@@ -174,7 +174,7 @@ impl<M: Exported> Instance<M> {
             });
             stepped = match next {
                 Ok(stepped) => stepped,
-                Err(refusal) => return self.stuck(time, *refusal),
+                Err(rejection) => return self.stuck(time, *rejection),
             };
             self.state.stale = true;
         }
@@ -182,7 +182,7 @@ impl<M: Exported> Instance<M> {
 
     /// Ends a step that fails after a part of it is done. In FMI 2.0 the step ends early. FMI 3.0 does not
     /// allow this for errors, so the step is undone.
-    fn stuck(&mut self, time: f64, mut why: Refusal) -> Outcome<Stepped> {
+    fn stuck(&mut self, time: f64, mut why: Rejection) -> Outcome<Stepped> {
         why.message = format!("the step cannot go on at {time}: {}", why.message);
         match self.standard() {
             Standard::Fmi2 => {
@@ -206,7 +206,7 @@ impl<M: Exported> Instance<M> {
                     return Ok(ended);
                 }
             }
-            refuse(format!("the event at {time} does not come to an end in {MOST_EVENTS} rounds"))
+            reject(format!("the event at {time} does not come to an end in {MOST_EVENTS} rounds"))
         })?;
         self.state.ended |= ended;
         Ok(())
@@ -240,11 +240,11 @@ impl<M: Exported> Instance<M> {
 
 #[cold]
 #[inline(never)]
-fn refuse_step<T>(point: f64, step_size: f64) -> Outcome<T> {
+fn reject_step<T>(point: f64, step_size: f64) -> Outcome<T> {
     if point.is_finite() && step_size > 0.0 && step_size.is_finite() && (point + step_size).is_finite() {
-        return refuse(format!("the step size {step_size} vanishes beside the communication point {point}"));
+        return reject(format!("the step size {step_size} vanishes beside the communication point {point}"));
     }
-    refuse(format!(
+    reject(format!(
         "the communication point must be finite and the step size finite and > 0, they are {point} and {step_size}"
     ))
 }

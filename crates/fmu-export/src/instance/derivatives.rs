@@ -2,7 +2,7 @@
 //! 2.0, 4.1.2 of FMI 3.0).
 
 use super::values::is_finite;
-use super::{Instance, Outcome, Reference, finite, independent, refuse};
+use super::{Instance, Outcome, Reference, finite, independent, reject};
 use crate::export::Exported;
 use crate::variable::Variable;
 use fmi_abi::BaseType;
@@ -22,7 +22,7 @@ impl<M: Exported> Instance<M> {
         sums: &mut [f64],
     ) -> Outcome {
         if !M::PARTIALS {
-            return self.refuse_derivatives(ADJOINT);
+            return self.reject_derivatives(ADJOINT);
         }
         self.calculated();
         let initial = self.mode() == Mode::Initialization;
@@ -30,13 +30,13 @@ impl<M: Exported> Instance<M> {
         let mut total = 0.0;
         for (column, known) in knowns.iter().enumerate() {
             self.check_known(*known, initial)?;
-            let is_time = known.place() == independent::<M>().0;
-            let by = (!is_time).then(|| M::element(known.place()));
+            let is_time = known.index() == independent::<M>().0;
+            let by = (!is_time).then(|| M::element(known.index()));
             let partial = self.state.model.exported_partials(by, initial);
             let mut add = |unknown: R, seed: f64, sum: &mut f64| {
                 self.check_unknown(unknown, initial)?;
-                let Some(partial) = partial(M::element(unknown.place())) else {
-                    return self.refuse_partial(unknown, *known);
+                let Some(partial) = partial(M::element(unknown.index())) else {
+                    return self.reject_partial(unknown, *known);
                 };
                 *sum += partial * seed;
                 total += *sum;
@@ -55,13 +55,13 @@ impl<M: Exported> Instance<M> {
         }
         unknowns.iter().try_for_each(|unknown| self.check_unknown(*unknown, initial))?;
         let (seeded, wanted) = if ADJOINT { (unknowns, knowns) } else { (knowns, unknowns) };
-        self.refuse_numbers(seeded, seed, wanted, sums)
+        self.reject_numbers(seeded, seed, wanted, sums)
     }
 
     /// Reports the first seed or sum that is not finite, if there is one.
     #[cold]
     #[inline(never)]
-    fn refuse_numbers<R: Reference>(
+    fn reject_numbers<R: Reference>(
         &self,
         seeded: &[R],
         seed: &[f64],
@@ -70,29 +70,29 @@ impl<M: Exported> Instance<M> {
     ) -> Outcome {
         if let Some((vr, seed)) = seeded.iter().zip(seed).find(|(_, seed)| !seed.is_finite()) {
             let name = self.name(*vr, BaseType::Real)?;
-            return refuse(format!("the seed of {name} must be a finite number, it is {seed}"));
+            return reject(format!("the seed of {name} must be a finite number, it is {seed}"));
         }
         for (vr, sum) in wanted.iter().zip(sums) {
-            finite(self.variable(vr.place(), BaseType::Real)?, *sum)?;
+            finite(self.variable(vr.index(), BaseType::Real)?, *sum)?;
         }
         Ok(())
     }
 
     #[cold]
     #[inline(never)]
-    fn refuse_derivatives(&self, adjoint: bool) -> Outcome {
+    fn reject_derivatives(&self, adjoint: bool) -> Outcome {
         let plural = if self.standard() == Standard::Fmi2 { "" } else { "s" };
         let (kind, capability) =
             if adjoint { ("adjoint", "Adjoint") } else { ("directional", "Directional") };
-        refuse(format!(
+        reject(format!(
             "this FMU has no {kind} derivatives (provides{capability}Derivative{plural} is false)"
         ))
     }
 
     #[cold]
     #[inline(never)]
-    fn refuse_partial<R: Reference>(&self, unknown: R, known: R) -> Outcome {
-        refuse(format!(
+    fn reject_partial<R: Reference>(&self, unknown: R, known: R) -> Outcome {
+        reject(format!(
             "the derivative of {} with respect to {} is not provided",
             self.name(unknown, BaseType::Real)?,
             self.name(known, BaseType::Real)?
@@ -107,22 +107,22 @@ impl<M: Exported> Instance<M> {
             of.base() == BaseType::Real
                 && (of.causality() == Causality::Output || of.differentiates().is_some())
         };
-        if M::TABLE.get(unknown.place() as usize).is_some_and(is_unknown) {
+        if M::TABLE.get(unknown.index() as usize).is_some_and(is_unknown) {
             return Ok(());
         }
-        self.check_initial_unknown(unknown.place(), initial)
+        self.check_initial_unknown(unknown.index(), initial)
     }
 
     #[cold]
     #[inline(never)]
-    fn check_initial_unknown(&self, place: u32, initial: bool) -> Outcome {
-        let variable = self.variable(place, BaseType::Real)?;
+    fn check_initial_unknown(&self, index: u32, initial: bool) -> Outcome {
+        let variable = self.variable(index, BaseType::Real)?;
         let calculated = matches!(variable.initial(), Some(Initial::Calculated | Initial::Approx));
         let is_initial = variable.causality() == Causality::CalculatedParameter || variable.is_state();
         if initial && calculated && is_initial {
             return Ok(());
         }
-        refuse(format!("{} is no unknown: neither output nor state derivative", variable.name()))
+        reject(format!("{} is no unknown: neither output nor state derivative", variable.name()))
     }
 
     /// Checks that a variable is a known: inputs, states and parameters; in Initialization Mode all exact
@@ -140,17 +140,17 @@ impl<M: Exported> Instance<M> {
             };
             is_set && of.base() == BaseType::Real
         };
-        match M::TABLE.get(known.place() as usize).is_some_and(is_known) {
+        match M::TABLE.get(known.index() as usize).is_some_and(is_known) {
             true => Ok(()),
-            false => self.refuse_known(known.place()),
+            false => self.reject_known(known.index()),
         }
     }
 
     /// Rejects a variable that is no known. Accepts the time of FMI 3.0, which may be outside of the table.
     #[cold]
     #[inline(never)]
-    fn refuse_known(&self, place: u32) -> Outcome {
-        let variable = self.variable(place, BaseType::Real)?;
+    fn reject_known(&self, index: u32) -> Outcome {
+        let variable = self.variable(index, BaseType::Real)?;
         if variable.causality() == Causality::Independent {
             return Ok(());
         }
@@ -161,21 +161,21 @@ impl<M: Exported> Instance<M> {
         } else {
             "no known: neither input, parameter nor state"
         };
-        refuse(format!("{} is {why}", variable.name()))
+        reject(format!("{} is {why}", variable.name()))
     }
 
     pub fn set_input_derivatives(&mut self, vr: &[u32], orders: &[i32], values: &[f64]) -> Outcome {
         if !M::INPUT_DERIVATIVES {
-            return refuse("this FMU does not use input derivatives (canInterpolateInputs is false)");
+            return reject("this FMU does not use input derivatives (canInterpolateInputs is false)");
         }
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {
-            let variable = self.variable(vr.place(), BaseType::Real)?;
+            let variable = self.variable(vr.index(), BaseType::Real)?;
             if variable.causality() != Causality::Input || variable.variability() != Variability::Continuous {
-                return refuse(format!("{} is no continuous input", variable.name()));
+                return reject(format!("{} is no continuous input", variable.name()));
             }
             check_order(variable, *order)?;
             if !value.is_finite() {
-                return refuse(format!(
+                return reject(format!(
                     "the derivative of {} must be a finite number, it is {value}",
                     variable.name()
                 ));
@@ -195,28 +195,28 @@ impl<M: Exported> Instance<M> {
         values: &mut [MaybeUninit<f64>],
     ) -> Outcome {
         if M::OUTPUT_DERIVATIVES == 0 {
-            return refuse("this FMU has no output derivatives (maxOutputDerivativeOrder is 0)");
+            return reject("this FMU has no output derivatives (maxOutputDerivativeOrder is 0)");
         }
         for (vr, order) in vr.iter().zip(orders) {
-            let variable = self.variable(vr.place(), BaseType::Real)?;
+            let variable = self.variable(vr.index(), BaseType::Real)?;
             check_order(variable, *order)?;
             // Maximum order: section 4.3.1 of FMI 2.0, 4.4.1 of FMI 3.0.
             if order.unsigned_abs() > M::OUTPUT_DERIVATIVES {
-                return refuse(format!(
+                return reject(format!(
                     "the order of the derivative of {} must be at most {} (maxOutputDerivativeOrder), it is {order}",
                     variable.name(),
                     M::OUTPUT_DERIVATIVES
                 ));
             }
-            if super::indicator::<M>(vr.place()).is_some() {
-                return refuse("event indicators have no output derivatives");
+            if super::indicator::<M>(vr.index()).is_some() {
+                return reject("event indicators have no output derivatives");
             }
         }
         let model = self.calculated();
         for ((vr, order), value) in vr.iter().zip(orders).zip(values) {
-            let place = vr.place() as usize;
-            value.write(match M::TABLE.get(place) {
-                Some(variable) => finite(variable, derivative(model, place, order.unsigned_abs()))?,
+            let index = vr.index() as usize;
+            value.write(match M::TABLE.get(index) {
+                Some(variable) => finite(variable, derivative(model, index, order.unsigned_abs()))?,
                 None => derivative_of_time(*order),
             });
         }
@@ -225,11 +225,11 @@ impl<M: Exported> Instance<M> {
 }
 
 /// Returns the time derivative of a variable: 0 for parameters, 1 or 0 for the time.
-fn derivative<M: Exported>(model: &M, place: usize, order: u32) -> f64 {
-    match M::TABLE[place].causality() {
+fn derivative<M: Exported>(model: &M, index: usize, order: u32) -> f64 {
+    match M::TABLE[index].causality() {
         Causality::Parameter | Causality::CalculatedParameter => 0.0,
         Causality::Independent => derivative_of_time(order.cast_signed()),
-        _ => model.exported_output_derivative(M::element(place as u32), order),
+        _ => model.exported_output_derivative(M::element(index as u32), order),
     }
 }
 
@@ -241,5 +241,5 @@ fn check_order<M>(variable: &Variable<M>, order: i32) -> Outcome {
     if order >= 1 {
         return Ok(());
     }
-    refuse(format!("the order of the derivative of {} must be at least 1, it is {order}", variable.name()))
+    reject(format!("the order of the derivative of {} must be at least 1, it is {order}", variable.name()))
 }

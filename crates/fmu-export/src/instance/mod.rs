@@ -6,14 +6,14 @@ mod co_simulation;
 mod derivatives;
 mod model_exchange;
 mod origin;
-mod refusal;
+mod rejection;
 mod saved_states;
 mod serialized;
 mod sorted;
 mod values;
 
 pub(crate) use co_simulation::no_status;
-pub(crate) use refusal::{Outcome, Refusal, refuse, refuse_with};
+pub(crate) use rejection::{Outcome, Rejection, reject, reject_with};
 
 use self::sorted::Sorted;
 use crate::boundary::Placed;
@@ -43,7 +43,7 @@ pub(crate) struct Instance<M> {
     setup: Setup,
     state: State<M>,
     /// Messages of rejected start values, for the variables that have not been set to a valid value since.
-    refused: Sorted<u32, String>,
+    rejected: Sorted<u32, String>,
     /// States that the importer has saved and not freed.
     kept: saved_states::Kept<M>,
     /// State at the start of the last step, if a step of FMI 3.0 may fail after a part of it is done. An importer
@@ -81,7 +81,7 @@ pub(crate) trait Reference: Copy {
     const REFERENCES: &str;
     const VALUES: &str;
 
-    fn place(self) -> u32;
+    fn index(self) -> u32;
 
     /// Casts an importer's array to an array of this type.
     fn cast(array: *const u32) -> *const Self;
@@ -99,7 +99,7 @@ impl Reference for u32 {
     }
 
     #[inline]
-    fn place(self) -> u32 {
+    fn index(self) -> u32 {
         self
     }
 }
@@ -154,15 +154,15 @@ impl<M: Exported> Instance<M> {
     pub fn new(setup: Setup, importer: Importer, logging_on: bool) -> Outcome<Self> {
         match setup.interface {
             Interface::ModelExchange if M::MODEL_EXCHANGE.is_none() => {
-                return refuse("this FMU has no Model Exchange");
+                return reject("this FMU has no Model Exchange");
             }
             Interface::CoSimulation if M::CO_SIMULATION.is_none() => {
-                return refuse("this FMU has no Co-Simulation");
+                return reject("this FMU has no Co-Simulation");
             }
             _ => {}
         }
         if importer.event_mode && M::CO_SIMULATION.is_none_or(|offer| !offer.has_event_mode()) {
-            return refuse("this FMU has no event mode in Co-Simulation (hasEventMode is false)");
+            return reject("this FMU has no event mode in Co-Simulation (hasEventMode is false)");
         }
         let state = State::new(&setup)?;
         let may_fail_half_way = Self::ENDS_EARLY
@@ -178,7 +178,7 @@ impl<M: Exported> Instance<M> {
             setup,
             before: may_fail_half_way.then(|| Box::new(state.clone())),
             state,
-            refused: Sorted::new(),
+            rejected: Sorted::new(),
             kept: Sorted::new(),
             texts: Vec::new(),
             bytes: Vec::new(),
@@ -227,7 +227,7 @@ impl<M: Exported> Instance<M> {
     /// Replaces everything that a saved state contains.
     fn replace(&mut self, state: State<M>) {
         self.state = state;
-        self.refused.clear();
+        self.rejected.clear();
         self.enter(self.state.mode);
     }
 
@@ -248,15 +248,15 @@ impl<M: Exported> Instance<M> {
         if let Some(tolerance) = tolerance
             && !(tolerance.is_finite() && tolerance >= 0.0)
         {
-            return refuse(format!("tolerance must be a number not below 0, it is {tolerance}"));
+            return reject(format!("tolerance must be a number not below 0, it is {tolerance}"));
         }
         if !start_time.is_finite() {
-            return refuse(format!("startTime must be a finite number, it is {start_time}"));
+            return reject(format!("startTime must be a finite number, it is {start_time}"));
         }
         if let Some(stop_time) = stop_time
             && !(stop_time.is_finite() && stop_time >= start_time)
         {
-            return refuse(format!(
+            return reject(format!(
                 "stopTime must be a finite number not before startTime ({start_time}), it is {stop_time}"
             ));
         }
@@ -314,7 +314,7 @@ impl<M: Exported> Instance<M> {
     /// Applies a change that may fail to a copy first, so that an error changes nothing.
     #[cold]
     #[inline(never)]
-    fn try_on_copy<T, E: Into<Box<Refusal>>>(
+    fn try_on_copy<T, E: Into<Box<Rejection>>>(
         &mut self,
         change: impl FnOnce(&mut M) -> Result<T, E>,
     ) -> Outcome<T> {
@@ -348,30 +348,30 @@ impl<M: Exported> Instance<M> {
 impl<M: Exported> Instance<M> {
     /// Returns the variable at this index.
     #[inline]
-    fn find(&self, place: u32) -> Option<&'static Variable<M>> {
-        match M::TABLE.get(place as usize) {
-            None if self.importer.standard == Standard::Fmi3 => implicit(place),
+    fn find(&self, index: u32) -> Option<&'static Variable<M>> {
+        match M::TABLE.get(index as usize) {
+            None if self.importer.standard == Standard::Fmi3 => implicit(index),
             found => found,
         }
     }
 
     /// Returns the variable at this index, if it has the type.
     #[inline]
-    fn variable(&self, place: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
-        match self.find(place) {
+    fn variable(&self, index: u32, base: BaseType) -> Outcome<&'static Variable<M>> {
+        match self.find(index) {
             Some(variable) if variable.base() == base => Ok(variable),
-            other => self.refuse_variable(place, other, base),
+            other => self.reject_variable(index, other, base),
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn refuse_variable<T>(&self, place: u32, variable: Option<&Variable<M>>, base: BaseType) -> Outcome<T> {
+    fn reject_variable<T>(&self, index: u32, variable: Option<&Variable<M>>, base: BaseType) -> Outcome<T> {
         match variable {
             Some(variable) => {
-                refuse(format!("{} is of type {}, not {base}", variable.name(), variable.base()))
+                reject(format!("{} is of type {}, not {base}", variable.name(), variable.base()))
             }
-            None => self.refuse_place(place),
+            None => self.reject_index(index),
         }
     }
 
@@ -381,26 +381,26 @@ impl<M: Exported> Instance<M> {
             return Ok(vr.len());
         }
         let mut count = 0;
-        for place in vr.iter().map(|vr| vr.place()) {
-            if M::TABLE.get(place as usize).is_some_and(|of| of.element() > 0) {
-                return self.refuse_place(place);
+        for index in vr.iter().map(|vr| vr.index()) {
+            if M::TABLE.get(index as usize).is_some_and(|of| of.element() > 0) {
+                return self.reject_index(index);
             }
-            count += elements_of::<M>(place).count();
+            count += elements_of::<M>(index).count();
         }
         Ok(count)
     }
 
-    fn refuse_place<T>(&self, place: u32) -> Outcome<T> {
-        let reference = self.standard().reference(place);
-        refuse(format!("there is no variable with value reference {reference}"))
+    fn reject_index<T>(&self, index: u32) -> Outcome<T> {
+        let reference = self.standard().reference(index);
+        reject(format!("there is no variable with value reference {reference}"))
     }
 }
 
 /// Returns the indices of the elements of an array of FMI 3.0 whose first element has this index; for a
 /// scalar, its index.
-pub(crate) fn elements_of<M: crate::Variables>(place: u32) -> impl Iterator<Item = u32> {
-    let length = M::TABLE.get(place as usize).map_or(1, |of| of.length() as u32);
-    (0..length).map(move |number| place.wrapping_add(number))
+pub(crate) fn elements_of<M: crate::Variables>(index: u32) -> impl Iterator<Item = u32> {
+    let length = M::TABLE.get(index as usize).map_or(1, |of| of.length() as u32);
+    (0..length).map(move |number| index.wrapping_add(number))
 }
 
 struct Implicit<M>(std::marker::PhantomData<M>);
@@ -424,22 +424,22 @@ impl<M: 'static> Implicit<M> {
 /// Returns a variable that FMI 3.0 requires and that follows the table. These variables are the time (section
 /// 2.4.7.4), if the table has none, and the event indicators (section 2.4.8).
 #[cold]
-fn implicit<M: Exported>(place: u32) -> Option<&'static Variable<M>> {
+fn implicit<M: Exported>(index: u32) -> Option<&'static Variable<M>> {
     let (time, variable) = independent::<M>();
-    let variable = (place == time).then_some(variable);
-    variable.or_else(|| indicator::<M>(place).map(|_| Implicit::INDICATOR))
+    let variable = (index == time).then_some(variable);
+    variable.or_else(|| indicator::<M>(index).map(|_| Implicit::INDICATOR))
 }
 
 /// Returns the number of the event indicator at this index.
-fn indicator<M: Exported>(place: u32) -> Option<usize> {
-    let number = place.checked_sub(first_indicator::<M>())? as usize;
+fn indicator<M: Exported>(index: u32) -> Option<usize> {
+    let number = index.checked_sub(first_indicator::<M>())? as usize;
     (number < Instance::<M>::INDICATORS).then_some(number)
 }
 
 /// Returns the value of a variable after the table.
 #[cold]
-fn implicit_value<M: Exported>(model: &M, time: f64, place: u32) -> f64 {
-    let Some(number) = indicator::<M>(place) else { return time };
+fn implicit_value<M: Exported>(model: &M, time: f64, index: u32) -> f64 {
+    let Some(number) = indicator::<M>(index) else { return time };
     let mut indicators = vec![0.0; Instance::<M>::INDICATORS];
     model.exported_indicators(&mut indicators);
     indicators[number]
@@ -453,11 +453,11 @@ pub(crate) fn first_indicator<M: crate::Variables>() -> u32 {
 
 impl<M: crate::Variables> Implicit<M> {
     const INDEPENDENT: (u32, &'static Variable<M>) = {
-        let mut place = 0;
-        while place < M::TABLE.len() && !matches!(M::TABLE[place].causality(), Causality::Independent) {
-            place += 1;
+        let mut index = 0;
+        while index < M::TABLE.len() && !matches!(M::TABLE[index].causality(), Causality::Independent) {
+            index += 1;
         }
-        (place as u32, if place < M::TABLE.len() { &M::TABLE[place] } else { Self::TIME })
+        (index as u32, if index < M::TABLE.len() { &M::TABLE[index] } else { Self::TIME })
     };
 }
 
@@ -472,7 +472,7 @@ fn finite<M>(variable: &Variable<M>, value: f64) -> Outcome<f64> {
     if value.is_finite() {
         return Ok(value);
     }
-    refuse_with(|| {
+    reject_with(|| {
         format!(
             "{} is out of the range of numbers; look for extreme inputs, states or parameters",
             variable.name()

@@ -1,6 +1,6 @@
 //! Model Exchange (section 3.2).
 
-use super::{Instance, Outcome, finite, refuse};
+use super::{Instance, Outcome, finite, reject};
 use crate::capabilities::{Event, StepCompleted};
 use crate::export::Exported;
 use crate::table::StateOfTable;
@@ -10,7 +10,7 @@ use std::mem::MaybeUninit;
 impl<M: Exported> Instance<M> {
     pub fn enter_event_mode(&mut self) -> Outcome {
         if self.interface() == Interface::CoSimulation && !self.importer.event_mode {
-            return refuse("the instance was made without event mode (eventModeUsed was false)");
+            return reject("the instance was made without event mode (eventModeUsed was false)");
         }
         self.enter(Mode::Event);
         Ok(())
@@ -50,7 +50,7 @@ impl<M: Exported> Instance<M> {
 
     pub fn set_time(&mut self, time: f64) -> Outcome {
         if !time.is_finite() {
-            return refuse(format!("the time must be a finite number, it is {time}"));
+            return reject(format!("the time must be a finite number, it is {time}"));
         }
         self.state.time = time;
         self.state.stale = true;
@@ -62,7 +62,7 @@ impl<M: Exported> Instance<M> {
         for (StateOfTable { state, .. }, value) in M::STATES.iter().zip(x) {
             if !value.is_finite() {
                 let name = M::TABLE[*state as usize].name();
-                return refuse(format!("{name} must be a finite number, it is {value}"));
+                return reject(format!("{name} must be a finite number, it is {value}"));
             }
         }
         for (StateOfTable { state, .. }, value) in M::STATES.iter().zip(x) {
@@ -99,9 +99,9 @@ impl<M: Exported> Instance<M> {
             M::STATES.iter().map(|state| M::TABLE[state.state as usize].variable_type().nominal_or_one());
         let mut now: Vec<f64> = of_types.collect();
         self.calculated().exported_nominals(&mut now);
-        if let Some(place) = now.iter().position(|nominal| !(nominal.is_finite() && *nominal > 0.0)) {
-            let name = M::TABLE[M::STATES[place].state as usize].name();
-            return refuse(format!("the nominal value of {name} must be > 0, the model says {}", now[place]));
+        if let Some(index) = now.iter().position(|nominal| !(nominal.is_finite() && *nominal > 0.0)) {
+            let name = M::TABLE[M::STATES[index].state as usize].name();
+            return reject(format!("the nominal value of {name} must be > 0, the model says {}", now[index]));
         }
         nominals.iter_mut().zip(now).for_each(|(nominal, now)| {
             nominal.write(now);
@@ -113,15 +113,15 @@ impl<M: Exported> Instance<M> {
         let count = Self::INDICATORS;
         if indicators.len() != count {
             let number = if count == 0 { "no".to_owned() } else { count.to_string() };
-            return refuse(format!("there are {number} event indicators, not {}", indicators.len()));
+            return reject(format!("there are {number} event indicators, not {}", indicators.len()));
         }
         if count == 0 {
             return Ok(());
         }
         let mut now = vec![0.0; count];
         self.calculated().exported_indicators(&mut now);
-        if let Some(place) = now.iter().position(|indicator| !indicator.is_finite()) {
-            return refuse(format!("event indicator {place} is out of the range of numbers"));
+        if let Some(index) = now.iter().position(|indicator| !indicator.is_finite()) {
+            return reject(format!("event indicator {index} is out of the range of numbers"));
         }
         indicators.iter_mut().zip(now).for_each(|(indicator, now)| {
             indicator.write(now);
@@ -135,5 +135,5 @@ fn check_count<M: Exported>(count: usize) -> Outcome {
     if count == states {
         return Ok(());
     }
-    refuse(format!("the model has {states} continuous states, the array has {count} elements"))
+    reject(format!("the model has {states} continuous states, the array has {count} elements"))
 }

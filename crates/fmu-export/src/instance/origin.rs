@@ -1,6 +1,6 @@
 //! Origin of a serialized state.
 
-use super::{Outcome, refuse};
+use super::{Outcome, reject};
 use fmi_abi::{Interface, Standard};
 use std::fmt;
 
@@ -31,7 +31,7 @@ impl Origin {
         if self == own {
             return Ok(());
         }
-        refuse(format!(
+        reject(format!(
             "the state comes from {self}, this instance is {own}; states stay within their standard and interface type"
         ))
     }

@@ -2,7 +2,7 @@
 
 use super::origin::Origin;
 use super::sorted::Sorted;
-use super::{Instance, Outcome, State, refuse, serialized};
+use super::{Instance, Outcome, State, reject, serialized};
 use crate::export::Exported;
 use fmi_abi::{Interface, Mode};
 
@@ -46,7 +46,7 @@ impl<M: Exported> Instance<M> {
 
     pub fn restore(&mut self, handle: usize) -> Outcome {
         self.state.clone_from(find(&mut self.kept, handle)?);
-        self.refused.clear();
+        self.rejected.clear();
         self.enter(self.state.mode);
         Ok(())
     }
@@ -95,19 +95,19 @@ impl<M: Exported> Instance<M> {
             && state.mode == Mode::Event
             && !self.importer.event_mode
         {
-            return refuse("the state is one of event mode, which this instance was made without");
+            return reject("the state is one of event mode, which this instance was made without");
         }
         Ok(())
     }
 }
 
 fn find<M>(kept: &mut Kept<M>, handle: usize) -> Outcome<&mut State<M>> {
-    kept.get_mut(handle).map_or_else(|| refuse_handle(handle), |state| Ok(&mut **state))
+    kept.get_mut(handle).map_or_else(|| reject_handle(handle), |state| Ok(&mut **state))
 }
 
 #[cold]
-fn refuse_handle<T>(handle: usize) -> Outcome<T> {
-    refuse(if handle == NULL {
+fn reject_handle<T>(handle: usize) -> Outcome<T> {
+    reject(if handle == NULL {
         "the state is NULL; save one first"
     } else {
         "the handle holds no state of this instance: it was freed, never set to NULL, or is another instance's, which \

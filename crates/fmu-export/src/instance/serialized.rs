@@ -2,7 +2,7 @@
 
 use super::origin::Origin;
 use super::values::check_value;
-use super::{Outcome, State, refuse};
+use super::{Outcome, State, reject};
 use crate::export::Exported;
 use crate::model::Experiment;
 use crate::saved::{Saved, StateVisitor};
@@ -57,32 +57,32 @@ pub(super) fn write<M: Exported>(state: &mut State<M>, origin: Origin, bytes: &m
 pub(super) fn read<M: Exported>(bytes: &[u8], origin: Origin, state: &mut State<M>) -> Outcome {
     let version = MAGIC.len() - 1;
     if bytes.len() < MAGIC.len() || bytes[..version] != MAGIC[..version] {
-        return refuse("the bytes are no saved state of an FMU of this kind");
+        return reject("the bytes are no saved state of an FMU of this kind");
     }
     if bytes[version] != MAGIC[version] {
-        return refuse("the saved state has another version of the layout; save it again with this FMU");
+        return reject("the saved state has another version of the layout; save it again with this FMU");
     }
     if bytes.len() < HEADER_LENGTH + CHECKSUM_LENGTH {
-        return refuse("the saved state is cut short");
+        return reject("the saved state is cut short");
     }
     if bytes[8..16] != guid_hash::<M>() {
-        return refuse("the saved state comes from another FMU (its guid differs)");
+        return reject("the saved state comes from another FMU (its guid differs)");
     }
     let (content, checksum) = bytes.split_at(bytes.len() - CHECKSUM_LENGTH);
     if fnv1a(content).to_le_bytes() != *checksum {
-        return refuse("the saved state is damaged or has the wrong length (its checksum is wrong)");
+        return reject("the saved state is damaged or has the wrong length (its checksum is wrong)");
     }
     let Some(from) = Origin::from_byte(content[16]) else {
-        return refuse("the saved state holds impossible values");
+        return reject("the saved state holds impossible values");
     };
     from.check(origin)?;
     let mut reader = Reader { rest: &content[HEADER_LENGTH..], valid: true };
     state.visit(&mut reader);
     if !reader.rest.is_empty() {
-        return refuse("the saved state has the wrong length");
+        return reject("the saved state has the wrong length");
     }
     if !reader.valid || !POSSIBLE.contain(origin.0, origin.1, state.mode) {
-        return refuse("the saved state holds impossible values");
+        return reject("the saved state holds impossible values");
     }
     check(state)?;
     state.model.restored()?;
@@ -96,7 +96,7 @@ fn check<M: Exported>(state: &State<M>) -> Outcome {
     let Experiment { start_time, stop_time, tolerance } = state.experiment;
     let times = [Some(state.time), Some(start_time), stop_time, tolerance];
     if !times.into_iter().flatten().all(f64::is_finite) {
-        return refuse("the saved state holds impossible values");
+        return reject("the saved state holds impossible values");
     }
     for variable in M::TABLE.iter().filter(|variable| variable.has_start()) {
         if let Some(value) = variable.value(&state.model) {

@@ -1,6 +1,6 @@
 //! Values (section 2.1.7 of FMI 2.0, 2.2.7.2 of FMI 3.0).
 
-use super::{Instance, Outcome, Reference, finite, implicit_value, refuse, refuse_with};
+use super::{Instance, Outcome, Reference, finite, implicit_value, reject, reject_with};
 use crate::export::Exported;
 use crate::settable::STARTING;
 use crate::types::Attributes;
@@ -14,20 +14,20 @@ impl<M: Exported> Instance<M> {
     #[inline]
     pub fn get_reals<R: Reference>(&mut self, vr: &[R], values: &mut [MaybeUninit<f64>]) -> Outcome {
         let in_table =
-            |vr: &R| M::TABLE.get(vr.place() as usize).is_some_and(|of| of.base() == BaseType::Real);
+            |vr: &R| M::TABLE.get(vr.index() as usize).is_some_and(|of| of.base() == BaseType::Real);
         if !vr.iter().all(in_table) {
             return self.get_reals_one_by_one(vr, values);
         }
         if M::ARRAYS {
-            return self.get_reals_of_arrays(|number| vr[number].place(), values);
+            return self.get_reals_of_arrays(|number| vr[number].index(), values);
         }
         let time = self.state.time;
         let model = self.calculated_in_place();
         let mut sum = 0.0;
         for (vr, value) in vr.iter().zip(&mut *values) {
-            let mut read = model.real_in_place(vr.place());
+            let mut read = model.real_in_place(vr.index());
             if read.is_nan() {
-                read = M::TABLE[vr.place() as usize].real(model).unwrap_or(time);
+                read = M::TABLE[vr.index() as usize].real(model).unwrap_or(time);
             }
             sum += read;
             value.write(read);
@@ -43,7 +43,7 @@ impl<M: Exported> Instance<M> {
         vr: &[R; N],
         values: &mut [MaybeUninit<f64>; N],
     ) -> bool {
-        let lines: [usize; N] = std::array::from_fn(|number| vr[number].place() as usize);
+        let lines: [usize; N] = std::array::from_fn(|number| vr[number].index() as usize);
         if M::ARRAYS || self.state.stale || !lines.iter().all(|line| *line < M::LINES.len()) {
             return false;
         }
@@ -62,17 +62,17 @@ impl<M: Exported> Instance<M> {
     /// called once.
     pub(super) fn get_reals_of_arrays(
         &mut self,
-        place: impl Fn(usize) -> u32,
+        index: impl Fn(usize) -> u32,
         values: &mut [MaybeUninit<f64>],
     ) -> Outcome {
         let time = self.state.time;
         let model = self.calculated();
         let mut done = 0;
         while done < values.len() {
-            let first = place(done);
+            let first = index(done);
             let variable = &M::TABLE[first as usize];
             let most = (variable.length() - variable.element()).min(values.len() - done);
-            let follows = |number: &usize| place(done + number) as usize == first as usize + number;
+            let follows = |number: &usize| index(done + number) as usize == first as usize + number;
             let run = 1 + (1..most).take_while(follows).count();
             if variable.reals(model, time, &mut values[done..done + run]) != 0.0 {
                 for variable in &M::TABLE[first as usize..][..run] {
@@ -90,14 +90,14 @@ impl<M: Exported> Instance<M> {
     #[inline(never)]
     fn get_reals_one_by_one<R: Reference>(&mut self, vr: &[R], values: &mut [MaybeUninit<f64>]) -> Outcome {
         for vr in vr {
-            self.variable(vr.place(), BaseType::Real)?;
+            self.variable(vr.index(), BaseType::Real)?;
         }
         let time = self.state.time;
         let model = self.calculated();
         for (vr, value) in vr.iter().zip(values) {
-            let (variable, read) = match M::TABLE.get(vr.place() as usize) {
+            let (variable, read) = match M::TABLE.get(vr.index() as usize) {
                 Some(variable) => (variable, variable.real(model).unwrap_or(time)),
-                None => (super::Implicit::<M>::INDICATOR, implicit_value(model, time, vr.place())),
+                None => (super::Implicit::<M>::INDICATOR, implicit_value(model, time, vr.index())),
             };
             value.write(finite(variable, read)?);
         }
@@ -108,7 +108,7 @@ impl<M: Exported> Instance<M> {
     pub fn set_reals<R: Reference>(&mut self, vr: &[R], values: &[f64]) -> Outcome {
         let situation = self.situation();
         let simple = |(vr, value): (&R, &f64)| {
-            let variable = M::TABLE.get(vr.place() as usize);
+            let variable = M::TABLE.get(vr.index() as usize);
             variable.is_some_and(|variable| situation.is_in(variable.takes_reals)) && value.is_finite()
         };
         if !vr.iter().zip(values).all(simple) {
@@ -116,7 +116,7 @@ impl<M: Exported> Instance<M> {
         }
         self.state.stale = true;
         for (vr, value) in vr.iter().zip(values) {
-            M::TABLE[vr.place() as usize].set_real(&mut self.state.model, *value);
+            M::TABLE[vr.index() as usize].set_real(&mut self.state.model, *value);
             if !self.state.started {
                 self.state.model.calculate_start();
             }
@@ -133,7 +133,7 @@ impl<M: Exported> Instance<M> {
         values: &[f64; N],
     ) -> bool {
         // Copies the arrays, because the compiler cannot assume that they do not overlap the model.
-        let lines: [usize; N] = std::array::from_fn(|number| vr[number].place() as usize);
+        let lines: [usize; N] = std::array::from_fn(|number| vr[number].index() as usize);
         let values: [f64; N] = std::array::from_fn(|number| values[number]);
         let is_taken = |line: &usize| {
             let variable = M::TABLE.get(*line);
@@ -164,25 +164,25 @@ impl<M: Exported> Instance<M> {
         each: &mut dyn FnMut(usize, Value),
     ) -> Outcome {
         for vr in vr {
-            self.variable_of(vr.place(), bases)?;
+            self.variable_of(vr.index(), bases)?;
         }
         let time = self.state.time;
         let model = self.calculated();
-        for (place, vr) in vr.iter().enumerate() {
-            let variable = M::TABLE.get(vr.place() as usize);
+        for (index, vr) in vr.iter().enumerate() {
+            let variable = M::TABLE.get(vr.index() as usize);
             let value = variable.and_then(|of| of.value(model)).unwrap_or(Value::Real(time));
             if let (Some(variable), Value::Real(value)) = (variable, &value) {
                 finite(variable, *value)?;
             }
-            each(place, value);
+            each(index, value);
         }
         Ok(())
     }
 
-    fn variable_of(&self, place: u32, bases: &[BaseType]) -> Outcome<&'static Variable<M>> {
-        match self.find(place) {
+    fn variable_of(&self, index: u32, bases: &[BaseType]) -> Outcome<&'static Variable<M>> {
+        match self.find(index) {
             Some(variable) if bases.contains(&variable.base()) => Ok(variable),
-            other => self.refuse_variable(place, other, bases[0]),
+            other => self.reject_variable(index, other, bases[0]),
         }
     }
 
@@ -197,11 +197,11 @@ impl<M: Exported> Instance<M> {
     ) -> Outcome {
         self.check_all_settable(vr, bases)?;
         let to_blame = vr.iter().enumerate().find_map(|(index, vr)| {
-            let refusal = check_value(&M::TABLE[vr.place() as usize], &value(index)).err()?;
-            Some((*vr, refusal))
+            let rejection = check_value(&M::TABLE[vr.index() as usize], &value(index)).err()?;
+            Some((*vr, rejection))
         });
         match to_blame {
-            Some((blamed, refusal)) => self.remember(vr, Some(blamed.place()), Err(refusal)),
+            Some((blamed, rejection)) => self.remember(vr, Some(blamed.index()), Err(rejection)),
             None => {
                 let set = self.set_settable(vr, value);
                 self.remember(vr, None, set)
@@ -212,21 +212,21 @@ impl<M: Exported> Instance<M> {
     /// Rejects setting variables because the value at one index is not valid for its type. `why` gets the
     /// variable's name.
     #[cold]
-    pub fn refuse_value<R: Reference>(
+    pub fn reject_value<R: Reference>(
         &mut self,
         vr: &[R],
         bases: &[BaseType],
-        place: usize,
+        index: usize,
         why: impl FnOnce(&str) -> String,
     ) -> Outcome {
         self.check_all_settable(vr, bases)?;
-        let blamed = vr[place].place();
-        let refusal = refuse(why(M::TABLE[blamed as usize].name()));
-        self.remember(vr, Some(blamed), refusal)
+        let blamed = vr[index].index();
+        let rejection = reject(why(M::TABLE[blamed as usize].name()));
+        self.remember(vr, Some(blamed), rejection)
     }
 
     fn check_all_settable<R: Reference>(&self, vr: &[R], bases: &[BaseType]) -> Outcome {
-        vr.iter().try_for_each(|vr| self.check_settable(self.variable_of(vr.place(), bases)?))
+        vr.iter().try_for_each(|vr| self.check_settable(self.variable_of(vr.index(), bases)?))
     }
 
     /// Records rejected start values. Some importers continue after the error, and the simulation would then
@@ -234,13 +234,13 @@ impl<M: Exported> Instance<M> {
     /// valid values. The record includes all variables of the call.
     fn remember<R: Reference>(&mut self, vr: &[R], blamed: Option<u32>, set: Outcome) -> Outcome {
         if self.situation().is_in(STARTING) {
-            for vr in vr.iter().map(|vr| vr.place()) {
-                let Err(refusal) = &set else {
-                    self.refused.remove(vr);
+            for vr in vr.iter().map(|vr| vr.index()) {
+                let Err(rejection) = &set else {
+                    self.rejected.remove(vr);
                     continue;
                 };
                 let message = match blamed.filter(|blamed| *blamed != vr) {
-                    None => refusal.message.clone(),
+                    None => rejection.message.clone(),
                     Some(blamed) => {
                         let [name, other] = [vr, blamed].map(|vr| M::TABLE[vr as usize].name());
                         format!(
@@ -248,7 +248,7 @@ impl<M: Exported> Instance<M> {
                         )
                     }
                 };
-                self.refused.insert(vr, message);
+                self.rejected.insert(vr, message);
             }
         }
         set
@@ -256,21 +256,21 @@ impl<M: Exported> Instance<M> {
 
     pub(super) fn check_start_values(&self) -> Outcome {
         let mut reasons: Vec<&str> = Vec::new();
-        for reason in self.refused.values() {
+        for reason in self.rejected.values() {
             if !reasons.contains(&reason.as_str()) {
                 reasons.push(reason);
             }
         }
-        if reasons.is_empty() { Ok(()) } else { refuse(reasons.join("; ")) }
+        if reasons.is_empty() { Ok(()) } else { reject(reasons.join("; ")) }
     }
 
     fn set_settable<R: Reference>(&mut self, vr: &[R], value: &dyn Fn(usize) -> Value) -> Outcome {
         let parameters =
-            vr.iter().any(|vr| M::TABLE[vr.place() as usize].causality() == Causality::Parameter);
+            vr.iter().any(|vr| M::TABLE[vr.index() as usize].causality() == Causality::Parameter);
         let started = self.state.started;
         let set = |model: &mut M| {
             for (index, vr) in vr.iter().enumerate() {
-                M::TABLE[vr.place() as usize].set(model, &value(index));
+                M::TABLE[vr.index() as usize].set(model, &value(index));
                 if !started {
                     model.calculate_start();
                 }
@@ -289,7 +289,7 @@ impl<M: Exported> Instance<M> {
 
     /// Returns the name of a variable that has the type.
     pub fn name(&self, vr: impl Reference, base: BaseType) -> Outcome<&'static str> {
-        Ok(self.variable(vr.place(), base)?.name())
+        Ok(self.variable(vr.index(), base)?.name())
     }
 
     fn check_settable(&self, variable: &Variable<M>) -> Outcome {
@@ -300,7 +300,7 @@ impl<M: Exported> Instance<M> {
         let calculated = variable.initial() == Some(Initial::Calculated);
         let sources = variable.dependencies().filter(|_| calculated).into_iter().flatten();
         let sources: Vec<_> = sources.map(|known| M::TABLE[known as usize].name()).collect();
-        refuse_with(|| {
+        reject_with(|| {
             let instead = match &sources[..] {
                 [] => String::new(),
                 sources => format!("; its start follows from {}: set these", sources.join(", ")),
@@ -328,27 +328,27 @@ pub(super) fn check_value<M>(variable: &Variable<M>, value: &Value) -> Outcome {
     let enforced = variable.causality() == Causality::Parameter;
     match (&variable.variable_type().attributes, value) {
         (_, Value::Real(value)) if !value.is_finite() => {
-            refuse(format!("{name} must be a finite number, it is {value}"))
+            reject(format!("{name} must be a finite number, it is {value}"))
         }
         (Attributes::Real { min: Some(min), .. }, Value::Real(real)) if enforced && real < min => {
-            refuse(format!("{name} must not be below {}, it is {value}", Value::Real(*min)))
+            reject(format!("{name} must not be below {}, it is {value}", Value::Real(*min)))
         }
         (Attributes::Real { max: Some(max), .. }, Value::Real(real)) if enforced && real > max => {
-            refuse(format!("{name} must not be above {}, it is {value}", Value::Real(*max)))
+            reject(format!("{name} must not be above {}, it is {value}", Value::Real(*max)))
         }
         (Attributes::Integer { min, max }, Value::Integer(value))
             if enforced && !(min..=max).contains(&value) =>
         {
-            refuse(format!("{name} must be between {min} and {max}, it is {value}"))
+            reject(format!("{name} must be between {min} and {max}, it is {value}"))
         }
         (Attributes::Enumeration(items), Value::Integer(value))
             if items.iter().all(|item| i128::from(item.value) != *value) =>
         {
             let known: Vec<_> = items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
-            refuse(format!("{name} must be one of {}, it is {value}", known.join(", ")))
+            reject(format!("{name} must be one of {}, it is {value}", known.join(", ")))
         }
         (Attributes::Binary { max_size, .. }, Value::Binary(value)) if value.len() > *max_size => {
-            refuse(format!("{name} must not have more than {max_size} bytes, it has {}", value.len()))
+            reject(format!("{name} must not have more than {max_size} bytes, it has {}", value.len()))
         }
         _ => Ok(()),
     }

@@ -10,7 +10,7 @@ use std::ffi::{CStr, c_char};
 use std::ptr::null;
 
 fn vr(name: Name) -> u32 {
-    reference(Rod::place(name) as u32)
+    reference(Rod::index(name) as u32)
 }
 
 fn reals<const COUNT: usize>(fmu: &Importer, names: &[Name]) -> [f64; COUNT] {
@@ -24,17 +24,17 @@ fn set(fmu: &Importer, name: Name, values: &[f64]) -> Status {
 }
 
 #[test]
-fn names_and_places() {
+fn names_and_indices() {
     let names: Vec<_> = Rod::TABLE.iter().map(|of| of.name()).collect();
     assert_eq!(names[..4], ["wall", "T[1]", "T[2]", "T[3]"]);
-    let of = |name: Name| &Rod::TABLE[Rod::place(name)];
+    let of = |name: Name| &Rod::TABLE[Rod::index(name)];
     assert_eq!((of(Name::der_T).name(), of(Name::der_T).name_of_array()), ("der(T[1])", "der(T)"));
     let limits: Vec<_> =
         Rod::TABLE.iter().filter(|of| of.name_of_array() == "limits").map(|of| of.name()).collect();
     assert_eq!(limits, ["limits[1,1]", "limits[1,2]", "limits[2,1]", "limits[2,2]"]);
     assert_eq!((of(Name::limits).dimensions(), of(Name::limits).length()), (&[2, 2][..], 4));
-    let second = &Rod::TABLE[Rod::place(Name::der_T) + 1];
-    assert_eq!((second.element(), second.differentiates()), (1, Some(Rod::place(Name::T) as u32 + 1)));
+    let second = &Rod::TABLE[Rod::index(Name::der_T) + 1];
+    assert_eq!((second.element(), second.differentiates()), (1, Some(Rod::index(Name::T) as u32 + 1)));
     assert_eq!(Rod::STATES.len(), PIECES);
 }
 
@@ -52,8 +52,8 @@ fn whole_arrays_are_read_and_set() {
     fmu.ok(set(&fmu, Name::limits, &[1.0, 2.0, 3.0, 4.0]));
     assert_eq!(reals(&fmu, &[Name::limits]), [1.0, 2.0, 3.0, 4.0]);
     let of_fmi2 = fmu_test_kit::Importer::in_mode::<Rod>(Interface::CoSimulation, Mode::StepComplete);
-    let place = Rod::place(Name::limits) as u32;
-    assert_eq!(of_fmi2.get([place + 1, place + 2]), [25.0, 12.5]);
+    let index = Rod::index(Name::limits) as u32;
+    assert_eq!(of_fmi2.get([index + 1, index + 2]), [25.0, 12.5]);
 
     let (mut switches, mut hot, mut counted) = ([7_i64; 2], [7; PIECES], [7; 2]);
     fmu.ok(fmu.fmi3SetInt64(&vr(Name::switches), 1, [0, 3].as_ptr(), 2));
@@ -104,8 +104,8 @@ fn partial_derivatives_of_arrays() {
     let capacity = |piece: usize| 2.0 + 0.125 * piece as f64;
     let expected = [0.125, 1.5 / capacity(0), -1.0 / capacity(1), 0.5 / capacity(2), 0.0, 0.0, 0.0, 0.0, 0.0];
     assert_eq!(found, expected);
-    fmu.refused_with(&["there are 9 knowns, the array has 2 elements"], |_| call(&mut [0.0; PIECES + 1], 2));
-    fmu.refused_with(&["there are 9 unknowns, the array has 2 elements"], |_| {
+    fmu.rejected_with(&["there are 9 knowns, the array has 2 elements"], |_| call(&mut [0.0; PIECES + 1], 2));
+    fmu.rejected_with(&["there are 9 unknowns, the array has 2 elements"], |_| {
         call(&mut [0.0; 2], PIECES + 1)
     });
 
@@ -117,26 +117,26 @@ fn partial_derivatives_of_arrays() {
 }
 
 #[test]
-fn refusals_name_the_element() {
+fn rejections_name_the_element() {
     let fmu = Importer::in_mode::<Rod>(Interface::CoSimulation, Mode::Instantiated);
-    fmu.refused_with(&["fmi3SetFloat64: capacities[3] must not be below 0.1, it is 0.05"], |fmu| {
+    fmu.rejected_with(&["fmi3SetFloat64: capacities[3] must not be below 0.1, it is 0.05"], |fmu| {
         set(fmu, Name::capacities, &[1.0, 1.0, 0.05, 1.0, 1.0, 1.0, 1.0, 1.0])
     });
     fmu.ok(set(&fmu, Name::capacities, &[1.0; PIECES]));
-    fmu.refused_with(&["T[2] must be a finite number"], |fmu| {
+    fmu.rejected_with(&["T[2] must be a finite number"], |fmu| {
         set(fmu, Name::T, &[1.0, f64::NAN, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
     });
     fmu.ok(set(&fmu, Name::T, &[1.0; PIECES]));
     for count in [0, 1, PIECES - 1, PIECES + 1] {
         let words = format!("there are 8 values, the array has {count} elements");
-        fmu.refused_with(&[&words], |fmu| set(fmu, Name::T, &[0.0; PIECES + 1][..count]));
+        fmu.rejected_with(&[&words], |fmu| set(fmu, Name::T, &[0.0; PIECES + 1][..count]));
     }
     let element = vr(Name::T) + 2;
-    fmu.refused_with(&["there is no variable with value reference 4"], |fmu| {
+    fmu.rejected_with(&["there is no variable with value reference 4"], |fmu| {
         fmu.fmi3SetFloat64(&element, 1, &1.0, 1)
     });
     fmu.initialize(0.0);
-    fmu.refused_with(&["hot[1] cannot be set in state"], |fmu| {
+    fmu.rejected_with(&["hot[1] cannot be set in state"], |fmu| {
         fmu.fmi3SetBoolean(&vr(Name::hot), 1, [1; PIECES].as_ptr(), PIECES)
     });
 }
@@ -164,21 +164,21 @@ macro_rules! rack {
             let palette = Importer::initialized_at::<Palette>(0.0);
             let fmu = Importer::in_mode::<Rack>(Interface::CoSimulation, Mode::StepComplete);
             $({
-                let vr = reference(Rack::place(Shelf::$name) as u32);
+                let vr = reference(Rack::index(Shelf::$name) as u32);
                 let (values, mut read) = ([<$type>::MAX, <$type>::MIN], [<$type>::default(); 2]);
                 fmu.ok(fmu.$set(&vr, 1, values.as_ptr(), 2));
                 fmu.ok(fmu.$get(&vr, 1, read.as_mut_ptr(), 2));
                 assert_eq!(read, values, stringify!($name));
-                fmu.refused_with(&["there are 2 values, the array has 1"], |fmu| fmu.$set(&vr, 1, values.as_ptr(), 1));
+                fmu.rejected_with(&["there are 2 values, the array has 1"], |fmu| fmu.$set(&vr, 1, values.as_ptr(), 1));
                 let vr = reference(palette::Name::$name as u32);
                 palette.ok(palette.$set(&vr, 1, &values[0], 1));
                 palette.ok(palette.$get(&vr, 1, &mut read[1], 1));
                 assert_eq!(read, [values[0]; 2], stringify!($name));
                 for count in [0, 2, usize::MAX] {
-                    palette.refused_with(&["there are 1 values, the array has"], |fmu| {
+                    palette.rejected_with(&["there are 1 values, the array has"], |fmu| {
                         fmu.$get(&vr, 1, read.as_mut_ptr(), count)
                     });
-                    palette.refused("set", |fmu| fmu.$set(&vr, 1, read.as_ptr(), count));
+                    palette.rejected("set", |fmu| fmu.$set(&vr, 1, read.as_ptr(), count));
                 }
             })+
             let other = Importer::initialized_at::<Palette>(0.0);
@@ -223,7 +223,7 @@ offer!(Rack: CoSimulation);
 #[test]
 fn bytes_of_two() {
     let fmu = Importer::in_mode::<Rack>(Interface::CoSimulation, Mode::StepComplete);
-    let vr = reference(Rack::place(Shelf::bytes) as u32);
+    let vr = reference(Rack::index(Shelf::bytes) as u32);
     let (sizes, values) = ([3, 1], [c"abc", c"d"].map(|text| text.as_ptr().cast()));
     fmu.ok(fmu.fmi3SetBinary(&vr, 1, sizes.as_ptr(), values.as_ptr(), 2));
     let (mut sizes, mut read) = ([0; 2], [null::<u8>(); 2]);
@@ -231,7 +231,7 @@ fn bytes_of_two() {
     // SAFETY: bytes of the FMU with these lengths, valid until the next call.
     let read = [0, 1].map(|k| unsafe { std::slice::from_raw_parts(read[k], sizes[k]) });
     assert_eq!(read, [&b"abc"[..], b"d"]);
-    fmu.refused_with(&["bytes[2]", "NULL"], |fmu| {
+    fmu.rejected_with(&["bytes[2]", "NULL"], |fmu| {
         fmu.fmi3SetBinary(&vr, 1, [0, 1].as_ptr(), [c"".as_ptr().cast(), null()].as_ptr(), 2)
     });
 }
@@ -248,11 +248,11 @@ fn bytes() {
     assert!(read().is_empty());
     fmu.ok(fmu.fmi3SetBinary(&vr, 1, &3, &[1, 0, 255].as_ptr(), 1));
     assert_eq!(read(), [1, 0, 255]);
-    fmu.refused_with(&["binary must not have more than 16 bytes, it has 17"], |fmu| {
+    fmu.rejected_with(&["binary must not have more than 16 bytes, it has 17"], |fmu| {
         fmu.fmi3SetBinary(&vr, 1, &17, &[0; 17].as_ptr(), 1)
     });
-    fmu.refused("no bytes", |fmu| fmu.fmi3SetBinary(&vr, 1, &3, &null(), 1));
-    fmu.refused("endless", |fmu| fmu.fmi3SetBinary(&vr, 1, &usize::MAX, &[0; 3].as_ptr(), 1));
+    fmu.rejected("no bytes", |fmu| fmu.fmi3SetBinary(&vr, 1, &3, &null(), 1));
+    fmu.rejected("endless", |fmu| fmu.fmi3SetBinary(&vr, 1, &usize::MAX, &[0; 3].as_ptr(), 1));
     fmu.ok(fmu.fmi3SetBinary(&vr, 1, &0, &null(), 1));
     assert!(read().is_empty());
 }
@@ -263,13 +263,15 @@ fn ranges() {
     let [port, shade, colour] = [palette::Name::uint16, palette::Name::shade, palette::Name::colour]
         .map(|name| reference(name as u32));
     let words = ["uint16 must be between 1024 and 65535, it is 80"];
-    fmu.refused_with(&words, |fmu| fmu.fmi3SetUInt16(&port, 1, &80, 1));
-    fmu.refused_with(&["shade must not be above 8, it is 8.5"], |fmu| fmu.fmi3SetFloat32(&shade, 1, &8.5, 1));
-    fmu.refused_with(&["must be a finite number"], |fmu| fmu.fmi3SetFloat32(&shade, 1, &f32::NAN, 1));
+    fmu.rejected_with(&words, |fmu| fmu.fmi3SetUInt16(&port, 1, &80, 1));
+    fmu.rejected_with(&["shade must not be above 8, it is 8.5"], |fmu| {
+        fmu.fmi3SetFloat32(&shade, 1, &8.5, 1)
+    });
+    fmu.rejected_with(&["must be a finite number"], |fmu| fmu.fmi3SetFloat32(&shade, 1, &f32::NAN, 1));
     let mut item = 0;
     fmu.ok(fmu.fmi3GetInt64(&colour, 1, &mut item, 1));
     assert_eq!(item, i64::from(palette::Colour::Red.number()));
     // An item is a 32-bit integer.
     let (fmu, mood) = (Importer::of::<Talker>(Interface::CoSimulation), reference(talker::Name::mood as u32));
-    fmu.refused("beyond Int32", |fmu| fmu.fmi3SetInt64(&mood, 1, &(7 + (1 << 32)), 1));
+    fmu.rejected("beyond Int32", |fmu| fmu.fmi3SetInt64(&mood, 1, &(7 + (1 << 32)), 1));
 }

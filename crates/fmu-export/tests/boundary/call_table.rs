@@ -277,14 +277,14 @@ fn check_every_function<F: Either, M: Exported>() {
             let valid = ValidCall::new::<F, M>(&fmu, function, interface, mode);
             let call = |fmu: &F| valid.make(fmu, |_| ());
             if !accepted(function, interface, mode) {
-                let message = fmu.refused(&label, call);
+                let message = fmu.rejected(&label, call);
                 assert!(message.starts_with(&format!("{function}: not allowed in")), "{label}: {message}");
                 assert!(message.contains(&format!("'{mode}'")), "{label}: {message}");
                 assert!(message.contains("; allowed in: "), "{label}: {message}");
                 continue;
             }
             if let Some(attribute) = lacking::<M>(function, interface) {
-                let message = fmu.refused(&label, call);
+                let message = fmu.rejected(&label, call);
                 assert!(message.contains(attribute), "{label}: {message}");
                 continue;
             }
@@ -317,7 +317,7 @@ fn zeros() {
             for function in F::functions() {
                 let fmu = F::in_mode::<M>(interface, mode);
                 if fmu.call_with_zeros(function) == Status::Error {
-                    F::in_mode::<M>(interface, mode).refused(function, |fmu| fmu.call_with_zeros(function));
+                    F::in_mode::<M>(interface, mode).rejected(function, |fmu| fmu.call_with_zeros(function));
                 }
             }
         }

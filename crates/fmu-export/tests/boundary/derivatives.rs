@@ -52,7 +52,7 @@ fn fit_differences<F: Either>() {
         for (known, expected) in &expected {
             for (unknown, expected) in UNKNOWNS.into_iter().zip(expected) {
                 if unknown == Name::energy as u32 && PARAMETERS.contains(known) {
-                    fmu.refused_with(&["energy", "is not provided"], |fmu| {
+                    fmu.rejected_with(&["energy", "is not provided"], |fmu| {
                         fmu.try_directional(&[unknown], &[*known], &[1.0], &mut [0.0])
                     });
                     continue;
@@ -82,7 +82,7 @@ fn calculated_states<F: Either>() {
         let rows = [level, der_level]
             .map(|unknown| [plain, stiffness].map(|known| fmu.partial(unknown as u32, known as u32)));
         assert_eq!(rows, [[0.25, -0.375], [0.0, 0.0]]);
-        fmu.refused_with(&["level is no known in initialization mode"], |fmu| {
+        fmu.rejected_with(&["level is no known in initialization mode"], |fmu| {
             fmu.try_directional(&[der_level as u32], &[level as u32], &[1.0], &mut [0.0])
         });
         fmu.ok(fmu.exit_initialization_mode());
@@ -113,7 +113,7 @@ fn output_derivatives<F: Either>() {
     for order in [2, 3, i32::MAX, 0, -1, i32::MIN] {
         let limit = if order > 0 { "at most 1 (maxOutputDerivativeOrder)" } else { "at least 1" };
         let expected = format!("the derivative of position must be {limit}, it is {order}");
-        fmu.refused_with(&[&expected], |fmu| fmu.try_rate(KNOWNS[1], order, &mut 0.0));
+        fmu.rejected_with(&[&expected], |fmu| fmu.try_rate(KNOWNS[1], order, &mut 0.0));
     }
 }
 
@@ -141,19 +141,19 @@ fn only_in_fmi3() {
     fmu.ok(fmu.try_directional(&[force], &[stiffness], &[2.0], &mut one));
     assert_eq!(one, [-0.5], "force = -stiffness springs position");
     let springs = [Name::springs as u32];
-    fmu.refused("Int32", |fmu| fmu.try_directional(&[force], &springs, &[1.0], &mut [0.0]));
+    fmu.rejected("Int32", |fmu| fmu.try_directional(&[force], &springs, &[1.0], &mut [0.0]));
     let (vr, orders) = ([reference(KNOWNS[1]), reference(KNOWNS[2])], [1, 2]);
-    fmu.refused_with(&["must be at most 1 (maxOutputDerivativeOrder)"], |fmu| {
+    fmu.rejected_with(&["must be at most 1 (maxOutputDerivativeOrder)"], |fmu| {
         fmu.fmi3GetOutputDerivatives(vr.as_ptr(), 2, orders.as_ptr(), two.as_mut_ptr(), 2)
     });
     let (u, k, mut out) = (reference(force), reference(KNOWNS[1]), 0.0);
-    fmu.refused("seeds", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 0, &mut out, 1));
-    fmu.refused("results", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 1, &mut out, 0));
-    fmu.refused("seeds", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 0, &1.0, 0, &mut out, 0));
-    fmu.refused("no known", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &u, 1, &1.0, 1, &mut out, 1));
-    fmu.refused("no seed", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 1, &f64::NAN, 1, &mut out, 1));
+    fmu.rejected("seeds", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 0, &mut out, 1));
+    fmu.rejected("results", |fmu| fmu.fmi3GetDirectionalDerivative(&u, 1, &k, 1, &1.0, 1, &mut out, 0));
+    fmu.rejected("seeds", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 0, &1.0, 0, &mut out, 0));
+    fmu.rejected("no known", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &u, 1, &1.0, 1, &mut out, 1));
+    fmu.rejected("no seed", |fmu| fmu.fmi3GetAdjointDerivative(&u, 1, &k, 1, &f64::NAN, 1, &mut out, 1));
     let sum = fmi3::Importer::initialized_at::<Sum>(0.0);
-    sum.refused_with(&["providesAdjointDerivatives is false"], |fmu| {
+    sum.rejected_with(&["providesAdjointDerivatives is false"], |fmu| {
         fmu.fmi3GetAdjointDerivative(&1, 1, &0, 1, &1.0, 1, &mut out, 1)
     });
 }

@@ -151,12 +151,12 @@ fn event_iteration<F: Either>() {
     fmu.ok(fmu.enter_continuous_time_mode());
     fmu.ok(fmu.set_time(1.0));
     fmu.ok(fmu.enter_event_mode());
-    fmu.refused_with(&["range of numbers"], |fmu| fmu.try_update().unwrap_err());
+    fmu.rejected_with(&["range of numbers"], |fmu| fmu.try_update().unwrap_err());
     let fmu: F = F::in_mode::<Counter>(CoSimulation, Mode::Instantiated);
     prepare_counter(&fmu);
     fmu.initialize(0.0);
     fmu.set(&[counter::Name::weight as u32], &[f64::MAX]);
-    fmu.refused_with(&["range of numbers"], |fmu| fmu.try_step(0.0, 1.0));
+    fmu.rejected_with(&["range of numbers"], |fmu| fmu.try_step(0.0, 1.0));
 }
 
 #[test]
@@ -174,8 +174,8 @@ fn indicators_and_states_of_fmi3() {
     let fmu = fmi3::Importer::in_mode::<Ball>(ModelExchange, Mode::ContinuousTime);
     let index = indicator::<Ball>(0);
     assert_eq!(fmu.get([index]), [1.0]);
-    fmu.refused("a calculated local", |fmu| fmu.try_set(&[index], &[1.0]));
-    fmu.refused("no variable", |fmu| fmu.try_get(&[index + 1], &mut [0.0]));
+    fmu.rejected("a calculated local", |fmu| fmu.try_set(&[index], &[1.0]));
+    fmu.rejected("no variable", |fmu| fmu.try_get(&[index + 1], &mut [0.0]));
     let (mut states, mut indicators) = (0, 0);
     let fmu = fmi3::Importer::in_mode::<Ball>(ModelExchange, Mode::Event);
     fmu.ok(fmu.fmi3GetNumberOfContinuousStates(&mut states));
@@ -189,7 +189,7 @@ fn indicators_and_states_of_fmi3() {
 #[test]
 fn the_importer_handles_them() {
     let fmu = of_fmi3::<Ticker>(fmi3True, fmi3True, |_| ());
-    fmu.refused("no step in event mode", |fmu| fmu.try_step(0.0, 1.0));
+    fmu.rejected("no step in event mode", |fmu| fmu.try_step(0.0, 1.0));
     assert_eq!(fmu.update(), Updated { next: Some(0.25), ..Updated::default() });
     fmu.ok(fmu.fmi3EnterStepMode());
     let at = |last_successful_time, early_return| {
@@ -227,7 +227,7 @@ fn the_library_handles_them() {
         }
         check(&fmu);
         if event_mode_used == fmi3False {
-            fmu.refused("no event mode", |fmu| fmu.fmi3EnterEventMode());
+            fmu.rejected("no event mode", |fmu| fmu.fmi3EnterEventMode());
         } else {
             assert!(fmu.do_step(0.6, 0.15).unwrap().event_handling_needed);
         }
@@ -255,7 +255,7 @@ fn the_initial_event_ends_the_simulation() {
     let fmu = of_fmi2::<Grumbler>(|fmu| trouble(fmu, Trouble::End));
     assert_eq!(fmu.try_step(0.0, 0.5), Status::Discard);
     assert_eq!(progress(&fmu), (0.0, true));
-    fmu.refused("a step after the end", |fmu| fmu.try_step(0.0, 0.5));
+    fmu.rejected("a step after the end", |fmu| fmu.try_step(0.0, 0.5));
     fmu.ok(fmu.fmi2Terminate());
     for (event_mode_used, early_return) in [(fmi3False, false), (fmi3True, false), (fmi3True, true)] {
         let fmu = of_fmi3::<Grumbler>(event_mode_used, early_return.into(), |fmu| trouble(fmu, Trouble::End));
@@ -266,7 +266,7 @@ fn the_initial_event_ends_the_simulation() {
         let before = fmu.bytes();
         assert_eq!(fmu.do_step(0.0, 1.0), Ok(Stepped { terminate: true, early_return, ..AT_ONCE }));
         assert_eq!(fmu.bytes(), before);
-        fmu.refused("a wrong point", |fmu| fmu.try_step(1.0, 1.0));
+        fmu.rejected("a wrong point", |fmu| fmu.try_step(1.0, 1.0));
         fmu.ok(fmu.fmi3Terminate());
     }
 }
@@ -370,8 +370,8 @@ fn an_early_end_and_a_shorter_step() {
     assert!(message.contains("10") && message.contains("early, at 8"), "{message}");
     assert_eq!(progress(&fmu), (8.0, false));
     assert_eq!(fmu.get([TEMPERATURE]), [100.0], "readable where it ended");
-    fmu.refused("a step after it", |fmu| fmu.try_step(8.0, 1.0));
-    fmu.refused("an input after it", |fmu| fmu.try_set(&[fuse::Name::load as u32], &[0.0]));
+    fmu.rejected("a step after it", |fmu| fmu.try_step(8.0, 1.0));
+    fmu.rejected("an input after it", |fmu| fmu.try_set(&[fuse::Name::load as u32], &[0.0]));
     fmu.ok(fmu.fmi2Terminate());
     assert_eq!(progress(&fmu), (8.0, false));
     fmu.ok(fmu.fmi2SetFMUstate(state));

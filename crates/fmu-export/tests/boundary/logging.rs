@@ -79,14 +79,14 @@ fn categories() {
 #[test]
 fn categories_that_do_not_exist() {
     let fmu = logging::<Talker>(false);
-    let message = fmu.refused("unknown", |fmu| fmu.set_debug_logging(true, &[c"logEvents", c"logWishes%s"]));
+    let message = fmu.rejected("unknown", |fmu| fmu.set_debug_logging(true, &[c"logEvents", c"logWishes%s"]));
     for category in fmu_export::Category::ALL {
         assert!(message.contains(category.name().to_str().unwrap()), "{message}");
     }
     assert!(message.contains("logWishes"), "{message}");
-    fmu.refused("NULL entry", |fmu| fmu.fmi2SetDebugLogging(1, 2, [c"logEvents".as_ptr(), null()].as_ptr()));
-    fmu.refused("NULL list", |fmu| fmu.fmi2SetDebugLogging(1, 3, null()));
-    fmu.refused("no UTF-8", |fmu| fmu.set_debug_logging(true, &[c"\xff"]));
+    fmu.rejected("NULL entry", |fmu| fmu.fmi2SetDebugLogging(1, 2, [c"logEvents".as_ptr(), null()].as_ptr()));
+    fmu.rejected("NULL list", |fmu| fmu.fmi2SetDebugLogging(1, 3, null()));
+    fmu.rejected("no UTF-8", |fmu| fmu.set_debug_logging(true, &[c"\xff"]));
     assert_eq!(shown(&fmu), "WE", "nothing was switched");
 }
 
@@ -104,7 +104,7 @@ fn logging_of_fmi3() {
     fmu.initialize(0.0);
     assert!(fmu.take_log().iter().any(|message| message.text == "initialized"));
     fmu.ok(fmu.fmi3SetDebugLogging(0, 1, &c"logAll".as_ptr()));
-    fmu.refused("no category", |fmu| fmu.fmi3SetDebugLogging(1, 1, &c"logNothing".as_ptr()));
+    fmu.rejected("no category", |fmu| fmu.fmi3SetDebugLogging(1, 1, &c"logNothing".as_ptr()));
 }
 
 /// Checks the messages of a run.

@@ -26,7 +26,7 @@ fn steps<F: Either, M: Exported>() -> Vec<Vec<u8>> {
     let inputs = inputs::<M>();
     let mut time = 0.5;
     let step = |step: i32| {
-        let value = |place: &u32| 0.1 * (f64::from(step + *place as i32)).sin();
+        let value = |index: &u32| 0.1 * (f64::from(step + *index as i32)).sin();
         fmu.set(&inputs, &inputs.iter().map(value).collect::<Vec<_>>());
         let size = 0.01 * f64::from(1 + step % 3);
         fmu.step(time, size);
@@ -58,7 +58,7 @@ fn integration_in_both_versions() {
             fmu.ok(fmu.set_time(0.01 * f64::from(step)));
             fmu.ok(fmu.set_states(x.as_ptr(), 2));
             let rates = fmu.derivatives::<2>();
-            x = [0, 1].map(|place| x[place] + 0.01 * rates[place]);
+            x = [0, 1].map(|index| x[index] + 0.01 * rates[index]);
         }
         content(&fmu)
     }
@@ -146,12 +146,12 @@ fn states() {
 fn errors_of_the_model() {
     let fmu = Importer::of::<Sum>(CoSimulation);
     fmu.ok(fmu.fmi2SetupExperiment(0, 0.0, -1.0, 0, 0.0));
-    let message = fmu.refused("start time", |fmu| fmu.fmi2EnterInitializationMode());
+    let message = fmu.rejected("start time", |fmu| fmu.fmi2EnterInitializationMode());
     assert_eq!(message, "fmi2EnterInitializationMode: this model knows no time before 0");
     fmu.initialize(0.0);
     fmu.set(&[U], &[9.0]);
     fmu.step(0.0, 1.0);
-    let message = fmu.refused("sum", |fmu| fmu.try_step(1.0, 1.0));
+    let message = fmu.rejected("sum", |fmu| fmu.try_step(1.0, 1.0));
     assert_eq!(message, "fmi2DoStep: the sum would be more than 10");
     fmu.set(&[U], &[1.0]);
     fmu.step(1.0, 1.0);
@@ -163,7 +163,7 @@ fn errors_of_the_model() {
 fn ranges() {
     let fmu = Importer::of::<Sum>(CoSimulation);
     for (value, word) in [(10.5, "above 10"), (-0.5, "below 0")] {
-        let message = fmu.refused("gain", |fmu| fmu.try_set(&[GAIN], &[value]));
+        let message = fmu.rejected("gain", |fmu| fmu.try_set(&[GAIN], &[value]));
         assert!(message.contains("gain") && message.contains(word), "{message}");
         fmu.set(&[U, Y], &[value, value]);
     }

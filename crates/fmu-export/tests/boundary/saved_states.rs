@@ -42,14 +42,14 @@ fn handles_that_are_none() {
         let mut handle = wild;
         let mut buffer = vec![0; bytes.len()];
         for message in [
-            fmu.refused("get", |fmu| fmu.fmi2GetFMUstate(&mut handle)),
-            fmu.refused("set", |fmu| fmu.fmi2SetFMUstate(handle)),
-            fmu.refused("free", |fmu| fmu.fmi2FreeFMUstate(&mut handle)),
-            fmu.refused("size", |fmu| fmu.fmi2SerializedFMUstateSize(handle, &mut 0)),
-            fmu.refused("serialize", |fmu| {
+            fmu.rejected("get", |fmu| fmu.fmi2GetFMUstate(&mut handle)),
+            fmu.rejected("set", |fmu| fmu.fmi2SetFMUstate(handle)),
+            fmu.rejected("free", |fmu| fmu.fmi2FreeFMUstate(&mut handle)),
+            fmu.rejected("size", |fmu| fmu.fmi2SerializedFMUstateSize(handle, &mut 0)),
+            fmu.rejected("serialize", |fmu| {
                 fmu.fmi2SerializeFMUstate(handle, buffer.as_mut_ptr().cast(), buffer.len())
             }),
-            fmu.refused("de-serialize", |fmu| {
+            fmu.rejected("de-serialize", |fmu| {
                 fmu.fmi2DeSerializeFMUstate(bytes.as_ptr().cast(), bytes.len(), &mut handle)
             }),
         ] {
@@ -77,7 +77,7 @@ fn infinite_numbers() {
     let (state, mut size) = (fmu.save(), 0);
     fmu.ok(fmu.fmi2SerializedFMUstateSize(state, &mut size));
     let mut buffer = vec![0; size];
-    fmu.refused_with(&["warmer must be a finite number, it is inf"], |fmu| {
+    fmu.rejected_with(&["warmer must be a finite number, it is inf"], |fmu| {
         fmu.fmi2SerializeFMUstate(state, buffer.as_mut_ptr().cast(), size)
     });
 }
@@ -88,10 +88,10 @@ fn null_handles<F: Either>() {
         let (fmu, mut size) = (F::in_mode::<Oscillator>(interface, Instantiated), 0);
         fmu.ok(fmu.free_state(null_mut()));
         fmu.ok(fmu.free_state(&mut null_mut()));
-        fmu.refused("set NULL", |fmu| fmu.set_state(null_mut()));
-        fmu.refused("size of NULL", |fmu| fmu.state_size(null_mut(), &mut size));
-        fmu.refused("serialize NULL", |fmu| fmu.serialize_into(null_mut(), [0; 999].as_mut_ptr(), 999));
-        fmu.refused_bytes(&[]);
+        fmu.rejected("set NULL", |fmu| fmu.set_state(null_mut()));
+        fmu.rejected("size of NULL", |fmu| fmu.state_size(null_mut(), &mut size));
+        fmu.rejected("serialize NULL", |fmu| fmu.serialize_into(null_mut(), [0; 999].as_mut_ptr(), 999));
+        fmu.rejected_bytes(&[]);
     }
 }
 
@@ -101,8 +101,9 @@ fn buffers_of_the_wrong_size() {
     let (state, size) = (fmu.save(), fmu.bytes().len());
     for wrong in [0, 1, size - 1, size + 1] {
         let mut buffer = vec![0x55_u8; size + 1];
-        let message = fmu
-            .refused("wrong size", |fmu| fmu.fmi2SerializeFMUstate(state, buffer.as_mut_ptr().cast(), wrong));
+        let message = fmu.rejected("wrong size", |fmu| {
+            fmu.fmi2SerializeFMUstate(state, buffer.as_mut_ptr().cast(), wrong)
+        });
         assert!(message.contains(&size.to_string()), "{message}");
         assert!(buffer.iter().all(|byte| *byte == 0x55), "nothing is written");
     }
@@ -114,7 +115,7 @@ fn states_of_the_other_interface_type() {
     let slave = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
     let model = Importer::in_mode::<Oscillator>(ModelExchange, Instantiated);
     for (from, to) in [(&slave, &model), (&model, &slave)] {
-        let message = to.refused_bytes(&from.bytes());
+        let message = to.rejected_bytes(&from.bytes());
         assert!(message.contains("Co-Simulation") && message.contains("Model Exchange"), "{message}");
         assert!(message.contains("interface type"), "{message}");
     }
@@ -159,15 +160,15 @@ fn no_cut_and_no_extension_goes_unseen<F: Either, M: Exported>() {
     let fmu = F::in_mode::<M>(CoSimulation, StepComplete);
     let bytes = fmu.bytes();
     for length in 0..bytes.len() {
-        fmu.refused_bytes(&bytes[..length]);
+        fmu.rejected_bytes(&bytes[..length]);
         if length > GUID_HASH.end + CHECKSUM {
-            fmu.refused_bytes(&sealed(bytes[..length].to_vec()));
+            fmu.rejected_bytes(&sealed(bytes[..length].to_vec()));
         }
     }
     for more in 1..20 {
         let longer = [bytes.as_slice(), &vec![0; more]].concat();
-        fmu.refused_bytes(&longer);
-        fmu.refused_bytes(&sealed(longer));
+        fmu.rejected_bytes(&longer);
+        fmu.rejected_bytes(&sealed(longer));
     }
 }
 
@@ -175,12 +176,12 @@ fn no_cut_and_no_extension_goes_unseen<F: Either, M: Exported>() {
 fn reset_is_a_new_beginning<F: Either, M: Exported>() {
     for (interface, mode) in modes_of_model::<F, M>() {
         let fmu = F::in_mode::<M>(interface, Initialization);
-        for (place, variable) in (0..).zip(M::TABLE) {
+        for (index, variable) in (0..).zip(M::TABLE) {
             match variable.base() {
-                BaseType::Real => _ = fmu.try_set(&[place], &[0.75]),
-                BaseType::String => _ = fmu.set_text(place, c"odd".as_ptr()),
-                BaseType::Boolean => _ = fmu.set_boolean(place, 1),
-                _ => _ = fmu.set_integer(place, 7),
+                BaseType::Real => _ = fmu.try_set(&[index], &[0.75]),
+                BaseType::String => _ = fmu.set_text(index, c"odd".as_ptr()),
+                BaseType::Boolean => _ = fmu.set_boolean(index, 1),
+                _ => _ = fmu.set_integer(index, 7),
             }
         }
         fmu.take_log();
@@ -210,7 +211,7 @@ fn every_mode_comes_back<F: Either, M: Exported>() {
     fmu.ok(fmu.exit_initialization_mode());
     fmu.leave_event_mode();
     fmu.step(2.0, 0.5);
-    fmu.refused("past the stop time", |fmu| fmu.try_step(2.5, 0.6));
+    fmu.rejected("past the stop time", |fmu| fmu.try_step(2.5, 0.6));
 }
 
 /// Checks that bytes of a state are rejected in the other FMI version, because the state machines differ; and
@@ -219,10 +220,10 @@ fn states_of_the_other_version<F: Either, O: Either>([from, to]: [&str; 2]) {
     for interface in INTERFACES {
         let fmu = F::in_mode::<Oscillator>(interface, Initialization);
         let other = O::in_mode::<Oscillator>(interface, Initialization);
-        let message = fmu.refused_bytes(&other.bytes());
+        let message = fmu.rejected_bytes(&other.bytes());
         let own = format!("this instance is {interface} of {to}; states stay within");
         assert!(message.contains(&format!("the state comes from {interface} of {from}, {own}")), "{message}");
-        fmu.refused_with(&["no state of this instance"], |fmu| fmu.set_state(other.save()));
+        fmu.rejected_with(&["no state of this instance"], |fmu| fmu.set_state(other.save()));
     }
 }
 
@@ -255,18 +256,18 @@ fn messages_say_where_a_state_comes_from() {
     assert_eq!(time(&bytes), 0.0);
 
     let other_fmu = with(bytes.clone(), GUID_HASH, &fnv1a(b"{another-guid}"));
-    assert!(fmu.refused_bytes(&other_fmu).contains("another FMU"));
+    assert!(fmu.rejected_bytes(&other_fmu).contains("another FMU"));
     let other_fmu = Importer::in_mode::<Talker>(CoSimulation, StepComplete).bytes();
-    assert!(fmu.refused_bytes(&other_fmu).contains("another FMU"));
+    assert!(fmu.rejected_bytes(&other_fmu).contains("another FMU"));
     for version in [b"1", b"3", b"x"] {
         let other_version = with(bytes.clone(), VERSION..VERSION + 1, version);
-        assert!(fmu.refused_bytes(&other_version).contains("version"));
+        assert!(fmu.rejected_bytes(&other_version).contains("version"));
     }
     let other_interface = with(bytes.clone(), INTERFACE..INTERFACE + 1, &[ModelExchange as u8]);
-    assert!(fmu.refused_bytes(&other_interface).contains("interface type"));
-    assert!(fmu.refused_bytes(b"something else").contains("no saved state"));
+    assert!(fmu.rejected_bytes(&other_interface).contains("interface type"));
+    assert!(fmu.rejected_bytes(b"something else").contains("no saved state"));
     let cut = &bytes[..bytes.len() - 30];
-    assert!(fmu.refused_bytes(cut).contains("length"));
+    assert!(fmu.rejected_bytes(cut).contains("length"));
 }
 
 /// Checks invalid contents with a correct checksum.
@@ -275,26 +276,26 @@ fn impossible_contents() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
     let bytes = fmu.bytes();
     for mode in [Event, ContinuousTime, Fatal] {
-        fmu.refused_bytes(&with_mode(bytes.clone(), mode));
+        fmu.rejected_bytes(&with_mode(bytes.clone(), mode));
     }
     for mode in [0, 3, -1, i64::MAX, 1 << 32 | 4] {
-        fmu.refused_bytes(&with(bytes.clone(), MODE, &i64::to_le_bytes(mode)));
+        fmu.rejected_bytes(&with(bytes.clone(), MODE, &i64::to_le_bytes(mode)));
     }
     for truth in [2, u8::MAX] {
-        fmu.refused_bytes(&with(bytes.clone(), ENDED..ENDED + 1, &[truth]));
+        fmu.rejected_bytes(&with(bytes.clone(), ENDED..ENDED + 1, &[truth]));
     }
     for number in [f64::NAN, f64::INFINITY] {
-        fmu.refused_bytes(&with(bytes.clone(), TIME, &number.to_le_bytes()));
+        fmu.rejected_bytes(&with(bytes.clone(), TIME, &number.to_le_bytes()));
     }
     // Force, position, velocity, mass, stiffness, springs, damping have 8 bytes each.
-    let value = |place: usize| VALUES + 8 * place..VALUES + 8 * (place + 1);
+    let value = |index: usize| VALUES + 8 * index..VALUES + 8 * (index + 1);
     assert_eq!(bytes[value(4)], 50.0_f64.to_le_bytes());
-    let message = fmu.refused_bytes(&with(bytes.clone(), value(3), &(-1.0_f64).to_le_bytes()));
+    let message = fmu.rejected_bytes(&with(bytes.clone(), value(3), &(-1.0_f64).to_le_bytes()));
     assert!(message.contains("mass"), "{message}");
     for springs in [0, 10, i64::MIN, 1 << 32 | 1] {
-        fmu.refused_bytes(&with(bytes.clone(), value(5), &springs.to_le_bytes()));
+        fmu.rejected_bytes(&with(bytes.clone(), value(5), &springs.to_le_bytes()));
     }
-    let message = fmu.refused_bytes(&with(bytes.clone(), value(6), &20.0_f64.to_le_bytes()));
+    let message = fmu.rejected_bytes(&with(bytes.clone(), value(6), &20.0_f64.to_le_bytes()));
     assert!(message.contains("nothing oscillates"), "what update refuses: {message}");
     // The force may have any finite value and is restored exactly.
     assert!(restores(&fmu, &with(bytes, value(0), &f64::MAX.to_le_bytes())));
@@ -319,11 +320,11 @@ fn absurd_lengths() {
     }
     for at in [heard.clone(), greeting, mood, said, first_said] {
         for absurd in [0, 4, 6, 100, 1 << 20, (1 << 20) + 1, 1 << 32, 1 << 62, i64::MAX as u64, u64::MAX] {
-            fmu.refused_bytes(&with(bytes.clone(), at.clone(), &absurd.to_le_bytes()));
+            fmu.rejected_bytes(&with(bytes.clone(), at.clone(), &absurd.to_le_bytes()));
         }
     }
     let no_text = with(bytes.clone(), heard.end..heard.end + 2, b"\xff\xfe");
-    fmu.refused_bytes(&no_text);
+    fmu.rejected_bytes(&no_text);
     // C would read a NUL as the end of the string.
     assert!(restores(&fmu, &with(bytes, heard.end..heard.end + 2, b"a\0")));
     assert_eq!(texts(&fmu, [talker::Name::heard]), ["a ard"]);
@@ -333,5 +334,5 @@ fn absurd_lengths() {
 fn states_of_event_mode() {
     let (with, without) =
         (fmi3::Importer::in_mode::<Ticker>(CoSimulation, Event), fmi3::Importer::of::<Ticker>(CoSimulation));
-    assert!(without.refused_bytes(&with.bytes()).contains("event mode"));
+    assert!(without.rejected_bytes(&with.bytes()).contains("event mode"));
 }

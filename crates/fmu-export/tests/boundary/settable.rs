@@ -117,7 +117,7 @@ fn check_every_variable<M: Exported>() {
                 assert_eq!(set(&fmu, vr, base), Status::Ok, "{label}: {:?}", fmu.take_log());
                 continue;
             }
-            let message = fmu.refused(&label, |fmu| set(fmu, vr, base));
+            let message = fmu.rejected(&label, |fmu| set(fmu, vr, base));
             let in_this_state = matches!(mode, Instantiated | Initialization | StepComplete | Event)
                 || (mode == ContinuousTime && base == BaseType::Real);
             // If the whole function is rejected, its variables are not checked.

@@ -27,9 +27,9 @@ fn go_on<F: Either>(fmu: &F, mode: Mode) -> Status {
 fn is_remembered<F: Either>(wrong: impl Fn(&F) -> Status, right: impl Fn(&F) -> Status) {
     for (interface, mode) in INTERFACES.into_iter().flat_map(|i| [(i, Instantiated), (i, Initialization)]) {
         let fmu = F::in_mode::<Oscillator>(interface, mode);
-        let first = fmu.refused("a start value", &wrong);
+        let first = fmu.rejected("a start value", &wrong);
         for _ in 0..2 {
-            let again = fmu.refused("the end of the mode", |fmu| go_on(fmu, mode));
+            let again = fmu.rejected("the end of the mode", |fmu| go_on(fmu, mode));
             assert_eq!(again.split_once(": ").unwrap().1, first.split_once(": ").unwrap().1);
         }
         fmu.ok(right(&fmu));
@@ -38,7 +38,7 @@ fn is_remembered<F: Either>(wrong: impl Fn(&F) -> Status, right: impl Fn(&F) -> 
 }
 
 #[test]
-fn a_refused_start_value_is_remembered() {
+fn a_rejected_start_value_is_remembered() {
     fn check<F: Either>() {
         let [force, springs, damped, damping] =
             [Name::force, Name::springs, Name::damped, Name::damping].map(|name| name as u32);
@@ -55,7 +55,7 @@ fn a_refused_start_value_is_remembered() {
                 assert_eq!(greet(text), Status::Error);
             }
             fmu.take_log();
-            fmu.refused_with(&["the text for greeting"], |fmu| go_on(fmu, mode));
+            fmu.rejected_with(&["the text for greeting"], |fmu| go_on(fmu, mode));
             fmu.ok(greet(c"Good morning".as_ptr()));
             fmu.ok(go_on(&fmu, mode));
         }
@@ -66,9 +66,9 @@ fn a_refused_start_value_is_remembered() {
 
 /// Checks that a rejected call sets nothing, so each of its variables must be set again.
 #[test]
-fn every_variable_of_a_refused_call() {
+fn every_variable_of_a_rejected_call() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
-    let enter = |fmu: &Importer| fmu.refused("the start", |fmu| fmu.fmi2EnterInitializationMode());
+    let enter = |fmu: &Importer| fmu.rejected("the start", |fmu| fmu.fmi2EnterInitializationMode());
     let of_mass = "mass must not be below 0.001, it is -1";
     let of_stiffness = "stiffness was not set, because mass in the same call was refused: set it again";
     assert_eq!(fmu.try_set(&[STIFFNESS, MASS], &[60.0, -1.0]), Status::Error);
@@ -84,7 +84,7 @@ fn every_variable_of_a_refused_call() {
 fn values_that_do_not_fit_together() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
     assert_eq!(fmu.try_set(&[MASS, Name::damping as u32], &[1.0, 1e6]), Status::Error);
-    let message = fmu.refused("the start", |fmu| fmu.fmi2EnterInitializationMode());
+    let message = fmu.rejected("the start", |fmu| fmu.fmi2EnterInitializationMode());
     assert_eq!(message.matches("nothing oscillates").count(), 1, "{message}");
 }
 
@@ -141,10 +141,10 @@ fn calculated_start() {
         let fmu = Importer::of::<Meter>(interface);
         fmu.set(&[plain, stiffness], &[6.0, 2.0]);
         let words = ["its start follows from plain, stiffness: set these"];
-        fmu.refused_with(&words, |fmu| fmu.try_set(&[level], &[1.0]));
+        fmu.rejected_with(&words, |fmu| fmu.try_set(&[level], &[1.0]));
         fmu.enter_initialization(0.0, None);
         assert_eq!(fmu.get([level]), [3.0]);
-        fmu.refused_with(&words, |fmu| fmu.try_set(&[level], &[1.0]));
+        fmu.rejected_with(&words, |fmu| fmu.try_set(&[level], &[1.0]));
         fmu.ok(fmu.exit_initialization_mode());
         fmu.set(&[plain], &[8.0]);
         assert_eq!(fmu.get([level]), [4.0]);

@@ -126,7 +126,7 @@ fn stop_time_passed_by_rounding() {
             assert_eq!(status, Status::Ok, "{label}, step {i}: {:?}", fmu.take_log());
             time += step_size;
         }
-        fmu.refused("one step more", |fmu| fmu.try_step(time, *step_size));
+        fmu.rejected("one step more", |fmu| fmu.try_step(time, *step_size));
     }
 }
 

@@ -170,20 +170,20 @@ fn pointers<F: Either, M: Exported>() {
                 if needs_no_pointer(function, argument.name) {
                     continue;
                 }
-                let message = fmu.refused(&label, |fmu| call.make(fmu, |words| words[index] = 0));
+                let message = fmu.rejected(&label, |fmu| call.make(fmu, |words| words[index] = 0));
                 assert!(message.contains("NULL"), "{label}: {message}");
                 checked += 1;
                 let one_byte = ["Int8", "UInt8", "Byte"].contains(&of)
                     || of == "Boolean" && F::standard() == Standard::Fmi3;
                 if !one_byte {
-                    let message = fmu.refused(&label, |fmu| call.make(fmu, |words| words[index] += 1));
+                    let message = fmu.rejected(&label, |fmu| call.make(fmu, |words| words[index] += 1));
                     assert!(message.contains("not aligned"), "{label}: {message}");
                 }
             }
             let is_array =
                 call.arguments.first().is_some_and(|of| of.name == "vr") && !function.ends_with("Binary");
             if is_array || function.ends_with("InputDerivatives") {
-                let message = fmu.refused(function, |fmu| {
+                let message = fmu.rejected(function, |fmu| {
                     call.make(fmu, |words| {
                         for (word, argument) in words.iter_mut().zip(call.arguments) {
                             *word = if argument.of == "usize" { u64::MAX / 4 } else { *word };

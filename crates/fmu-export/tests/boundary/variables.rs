@@ -27,8 +27,8 @@ fn texts_in_and_out<F: Either>() {
             fmu.say(Name::heard as u32, text);
             assert_eq!(texts(&fmu, [Name::reply, Name::heard, Name::reply]), [text; 3]);
         }
-        fmu.refused_with(&["heard is NULL"], |fmu| fmu.set_text(Name::heard as u32, null()));
-        fmu.refused_with(&["heard is not UTF-8"], |fmu| fmu.set_text(Name::heard as u32, c"G\xc3".as_ptr()));
+        fmu.rejected_with(&["heard is NULL"], |fmu| fmu.set_text(Name::heard as u32, null()));
+        fmu.rejected_with(&["heard is not UTF-8"], |fmu| fmu.set_text(Name::heard as u32, c"G\xc3".as_ptr()));
     }
 }
 
@@ -57,11 +57,11 @@ fn enumerations<F: Either>() {
         assert_eq!(texts(&fmu, [Name::said]), [expected]);
     }
     for mood in [0, 3, -1, i32::MAX] {
-        fmu.refused_with(&["mood must be one of 1 (Calm), 2 (Excited), 7 (Sulking)"], |fmu| {
+        fmu.rejected_with(&["mood must be one of 1 (Calm), 2 (Excited), 7 (Sulking)"], |fmu| {
             fmu.set_item(Name::mood as u32, mood)
         });
     }
-    fmu.refused_with(&["mood is of type Enumeration, not Real"], |fmu| {
+    fmu.rejected_with(&["mood is of type Enumeration, not Real"], |fmu| {
         fmu.try_get(&[Name::mood as u32], &mut [0.0])
     });
 }
@@ -72,7 +72,7 @@ fn booleans<F: Either>() {
         fmu.ok(fmu.set_boolean(Kind::boolean as u32, value));
         assert_eq!(fmu.boolean(Kind::boolean as u32), value == 1);
     }
-    fmu.refused_with(&["boolean must be 0 (false) or 1 (true), it is 2"], |fmu| {
+    fmu.rejected_with(&["boolean must be 0 (false) or 1 (true), it is 2"], |fmu| {
         fmu.set_boolean(Kind::boolean as u32, 2)
     });
 }
@@ -103,7 +103,7 @@ fn the_time<F: Either>() {
     assert_eq!(fmu.get([time]), [0.0]);
     fmu.step(0.0, 0.5);
     assert_eq!(fmu.get([time]), [0.5]);
-    fmu.refused("the time is not set like this", |fmu| fmu.try_set(&[time], &[1.0]));
+    fmu.rejected("the time is not set like this", |fmu| fmu.try_set(&[time], &[1.0]));
     let fmu = F::in_mode::<Talker>(ModelExchange, ContinuousTime);
     fmu.ok(fmu.set_time(-3.0));
     assert_eq!(fmu.get([time]), [-3.0]);
@@ -198,11 +198,11 @@ fn value_references_count_from_1() {
     fmu.ok(fmu.fmi3GetFloat64(&1, 1, &mut value, 1));
     assert_eq!((value, Oscillator::TABLE[0].name()), (7.0, "force"));
     let words = ["no variable with value reference 0"];
-    fmu.refused_with(&words, |fmu| fmu.fmi3GetFloat64(&0, 1, &mut value, 1));
-    fmu.refused_with(&words, |fmu| fmu.fmi3SetFloat64(&0, 1, &1.0, 1));
-    fmu.refused_with(&words, |fmu| fmu.fmi3SetInt8(&0, 1, &1, 1));
-    fmu.refused_with(&words, |fmu| fmu.fmi3GetOutputDerivatives(&0, 1, &1, &mut value, 1));
-    fmu.refused_with(&words, |fmu| fmu.fmi3GetDirectionalDerivative(&0, 1, &1, 1, &1.0, 1, &mut value, 1));
+    fmu.rejected_with(&words, |fmu| fmu.fmi3GetFloat64(&0, 1, &mut value, 1));
+    fmu.rejected_with(&words, |fmu| fmu.fmi3SetFloat64(&0, 1, &1.0, 1));
+    fmu.rejected_with(&words, |fmu| fmu.fmi3SetInt8(&0, 1, &1, 1));
+    fmu.rejected_with(&words, |fmu| fmu.fmi3GetOutputDerivatives(&0, 1, &1, &mut value, 1));
+    fmu.rejected_with(&words, |fmu| fmu.fmi3GetDirectionalDerivative(&0, 1, &1, 1, &1.0, 1, &mut value, 1));
 }
 
 /// Checks that every model of FMI 3.0 has a time: in its table, or after all other variables.
@@ -217,15 +217,15 @@ fn the_time_of_fmi3() {
         assert_eq!(fmu.get([index]), [2.0]);
         fmu.step(2.0, 0.5);
         assert_eq!(fmu.get([index]), [2.5]);
-        fmu.refused("the time is no input", |fmu| fmu.try_set(&[index], &[1.0]));
-        fmu.refused("no variable", |fmu| fmu.try_set(&[M::TABLE.len() as u32 + 1], &[1.0]));
+        fmu.rejected("the time is no input", |fmu| fmu.try_set(&[index], &[1.0]));
+        fmu.rejected("no variable", |fmu| fmu.try_set(&[M::TABLE.len() as u32 + 1], &[1.0]));
     }
     check::<Palette>();
     check::<Counter>();
     check::<Talker>();
     // FMI 2.0 has no such variable.
     let fmu = Importer::initialized_at::<Palette>(0.0);
-    fmu.refused("the time", |fmu| fmu.try_get(&[Palette::TABLE.len() as u32], &mut [0.0]));
+    fmu.rejected("the time", |fmu| fmu.try_get(&[Palette::TABLE.len() as u32], &mut [0.0]));
 }
 
 /// Checks that a value that is not finite is not read.

@@ -197,7 +197,7 @@ mod parameter_discrete {
 }
 
 // What importers set lives somewhere.
-mod parameter_without_place {
+mod parameter_without_index {
     include!("shared/fields.rs");
 
     variables! { for Plant;
@@ -229,7 +229,7 @@ mod state_without_derivative {
 }
 
 // A state lives somewhere.
-mod state_without_place {
+mod state_without_index {
     include!("shared/fields.rs");
 
     variables! { for Plant;

@@ -41,7 +41,7 @@ _Array = NDArray[np.float64]
 #: number or array with a unit is in that unit, which the FMU must have among its display units.
 Start = ArrayLike | str | Sequence[str] | tuple[ArrayLike, str]
 #: Values of an input over time, with a unit or without, as for `Start`.
-Course = ArrayLike | tuple[ArrayLike, str]
+Trajectory = ArrayLike | tuple[ArrayLike, str]
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class _Model:
         time: ArrayLike,
         *,
         outputs: Sequence[str],
-        inputs: Mapping[str, Course] | None = None,
+        inputs: Mapping[str, Trajectory] | None = None,
         input_derivatives: Mapping[str, ArrayLike] | None = None,
         start: Mapping[str, Start] | None = None,
         every: int | None = None,
@@ -165,10 +165,10 @@ class _Model:
         names = [outputs] if isinstance(outputs, str) else list(outputs)
         wanted = [measures] if isinstance(measures, str) else list(measures)
         kept = 1 if every is None and not wanted else _count("every", every)
-        courses, measured, errors, notes, starts = self._loaded.run(
+        trajectories, measured, errors, notes, starts = self._loaded.run(
             times,
-            [(name, self._course(name, values, len(times))) for name, values in (inputs or {}).items()],
-            [(name, _course(name, values, len(times))) for name, values in (input_derivatives or {}).items()],
+            [(name, self._trajectory(name, values, len(times))) for name, values in (inputs or {}).items()],
+            [(name, _trajectory(name, values, len(times))) for name, values in (input_derivatives or {}).items()],
             dict(start or {}),
             names,
             kept,
@@ -177,8 +177,8 @@ class _Model:
             read_before_set,
             progress,
         )
-        kept_times = times[:: kept or len(times)][: courses.shape[2]]
-        return Runs(kept_times, names, courses, wanted, measured, dict(errors), dict(notes), starts)
+        kept_times = times[:: kept or len(times)][: trajectories.shape[2]]
+        return Runs(kept_times, names, trajectories, wanted, measured, dict(errors), dict(notes), starts)
 
     def converted(self, name: str, values: ArrayLike, unit: str) -> float | _Array:
         """Convert values to the unit of a variable.
@@ -206,11 +206,11 @@ class _Model:
         found = (_array(name, values) - offset) / factor
         return float(found) if found.ndim == 0 else found
 
-    def _course(self, name: str, values: Course, times: int) -> float | _Array:
+    def _trajectory(self, name: str, values: Trajectory, times: int) -> float | _Array:
         """Values in the variable's unit."""
         if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str):
-            return _course(name, self.converted(name, values[0], values[1]), times)
-        return _course(name, values, times)
+            return _trajectory(name, self.converted(name, values[0], values[1]), times)
+        return _trajectory(name, values, times)
 
     def instances(
         self,
@@ -366,7 +366,7 @@ def _array(name: str, values: ArrayLike) -> _Array:
     return np.ascontiguousarray(array, dtype=np.float64).reshape(array.shape)
 
 
-def _course(name: str, values: Course, times: int) -> float | _Array:
+def _trajectory(name: str, values: Trajectory, times: int) -> float | _Array:
     array = _array(name, values)  # type: ignore[arg-type]
     if array.ndim == 0:
         return float(array)

@@ -41,7 +41,7 @@ class Runs(Mapping[str, _Array]):
         self,
         time: _Array,
         outputs: Sequence[str],
-        courses: _Array,
+        trajectories: _Array,
         measures: Sequence[str],
         measured: _Array,
         errors: dict[int, str],
@@ -50,18 +50,18 @@ class Runs(Mapping[str, _Array]):
     ):
         self.time, self._errors, self.notes = time, errors, notes
         self._told, self._checked = not errors, set[str | tuple[str, str]]()
-        runs = courses.shape[0]
+        runs = trajectories.shape[0]
         self.start = {
             name: value if isinstance(value, str) else np.broadcast_to(value, runs) for name, value in start.items()
         }
         self._outputs = {name: place for place, name in enumerate(outputs)}
         self._measures = {name: place for place, name in enumerate(measures)}
-        self._courses, self._measured = courses, measured
+        self._trajectories, self._measured = trajectories, measured
 
     @property
     def count(self) -> int:
         """The number of runs."""
-        return int(self._courses.shape[0])
+        return int(self._trajectories.shape[0])
 
     @property
     def errors(self) -> dict[int, str]:
@@ -89,12 +89,12 @@ class Runs(Mapping[str, _Array]):
         output, *measure = [key] if isinstance(key, str) else key
         if output not in self._outputs:
             raise KeyError(f"no output {output!r} was asked for; there are {', '.join(self._outputs)}")
-        if not measure and not self._courses.shape[2]:
-            raise KeyError(f"{key}: no courses were kept; ask for them with every=1, or for [output, measure]")
+        if not measure and not self._trajectories.shape[2]:
+            raise KeyError(f"{key}: no trajectories were kept; ask for them with every=1, or for [output, measure]")
         if measure and measure[0] not in self._measures:
             known = ", ".join(self._measures) or "none"
             raise KeyError(f"no measure {measure[0]!r} was asked for; there are {known}")
-        of_output = (self._measured if measure else self._courses)[:, self._outputs[output]]
+        of_output = (self._measured if measure else self._trajectories)[:, self._outputs[output]]
         found: _Array = of_output[:, self._measures[measure[0]]] if measure else of_output
         self._announce(key, found)
         return found
@@ -117,10 +117,10 @@ class Runs(Mapping[str, _Array]):
             warnings.warn(line, RuntimeWarning, stacklevel=3)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._outputs if self._courses.shape[2] else ())
+        return iter(self._outputs if self._trajectories.shape[2] else ())
 
     def __len__(self) -> int:
-        return len(self._outputs) if self._courses.shape[2] else 0
+        return len(self._outputs) if self._trajectories.shape[2] else 0
 
     def __bool__(self) -> bool:
         return True

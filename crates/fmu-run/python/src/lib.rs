@@ -6,7 +6,7 @@ mod instances;
 mod start;
 
 use buffers::{Numbers, Room};
-use fmu_run::{Batch, Course, Error, Fmu, Order, Planned, System, Watch, Wiring};
+use fmu_run::{Batch, Error, Fmu, Order, Planned, System, Trajectory, Watch, Wiring};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -198,8 +198,8 @@ impl Loaded {
         let start = Start::of(&model, start.as_ref())?;
         let batch = Batch {
             time: time.values(),
-            inputs: courses(&inputs),
-            input_derivatives: courses(&input_derivatives),
+            inputs: trajectories(&inputs),
+            input_derivatives: trajectories(&input_derivatives),
             start: start.values(),
             outputs: outputs.iter().map(String::as_str).collect(),
             every,
@@ -209,14 +209,14 @@ impl Loaded {
         };
         let planned = model.plan(&batch).map_err(python)?;
         let size = planned.size();
-        if size.courses().is_none() || size.measures().is_none() {
+        if size.trajectories().is_none() || size.measures().is_none() {
             return Err(python(Error::too_much()));
         }
         let array = |each: usize| Room::of(py, None, &[size.runs, size.outputs, each]);
-        let ((courses, mut kept), (measures, mut measured)) = (array(size.kept)?, array(size.measures)?);
+        let ((trajectories, mut kept), (measures, mut measured)) = (array(size.kept)?, array(size.measures)?);
         let room = [kept.values(), measured.values()];
         let [errors, notes] = carry_out(py, &planned, room, progress.as_ref())?;
-        Ok((courses, measures, errors, notes, start.dict(py)?))
+        Ok((trajectories, measures, errors, notes, start.dict(py)?))
     }
 }
 
@@ -242,20 +242,20 @@ fn numbers(given: &[(String, Bound<'_, PyAny>)]) -> PyResult<Vec<(String, Number
 }
 
 /// Converts numbers to constants, time series for all runs, or time series for each run.
-fn courses(given: &[(String, Numbers)]) -> Vec<(&str, Course<'_>)> {
-    let course = given.iter().map(|(name, values)| match values.shape() {
-        [] => (name.as_str(), Course::Constant(values.values()[0])),
-        [_] => (name.as_str(), Course::Shared(values.values())),
-        _ => (name.as_str(), Course::EachRun(values.values())),
+fn trajectories(given: &[(String, Numbers)]) -> Vec<(&str, Trajectory<'_>)> {
+    let trajectory = given.iter().map(|(name, values)| match values.shape() {
+        [] => (name.as_str(), Trajectory::Constant(values.values()[0])),
+        [_] => (name.as_str(), Trajectory::Shared(values.values())),
+        _ => (name.as_str(), Trajectory::EachRun(values.values())),
     });
-    course.collect()
+    trajectory.collect()
 }
 
 /// Performs the runs in other threads; this thread handles Python signals.
 fn carry_out(
     py: Python,
     planned: &Planned,
-    [courses, measures]: [&mut [f64]; 2],
+    [trajectories, measures]: [&mut [f64]; 2],
     progress: Option<&Py<PyAny>>,
 ) -> PyResult<[Told; 2]> {
     let watch = Watch::default();
@@ -263,7 +263,7 @@ fn carry_out(
     // `Receiver` is not `Sync`, so `detach` needs a mutex around it.
     let receiver = Mutex::new(receiver);
     std::thread::scope(|scope| {
-        scope.spawn(|| sender.send(planned.run(&watch, courses, measures)));
+        scope.spawn(|| sender.send(planned.run(&watch, trajectories, measures)));
         let mut raised = None;
         loop {
             let waited =

@@ -21,9 +21,9 @@ pub struct Batch<'a> {
     /// Communication points, s: finite, increasing, at least two.
     pub time: &'a [f64],
     /// Inputs and their values. All other inputs keep their start values.
-    pub inputs: Vec<(&'a str, Course<'a>)>,
+    pub inputs: Vec<(&'a str, Trajectory<'a>)>,
     /// Time derivatives of inputs, of order 1, set together with the inputs (only FMI 2.0).
-    pub input_derivatives: Vec<(&'a str, Course<'a>)>,
+    pub input_derivatives: Vec<(&'a str, Trajectory<'a>)>,
     /// Start values of parameters, states, inputs and so on.
     pub start: Vec<(&'a str, Start<'a>)>,
     /// Outputs to read: any numeric variables.
@@ -42,7 +42,7 @@ pub struct Batch<'a> {
 
 /// Values of an input.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Course<'a> {
+pub enum Trajectory<'a> {
     /// One constant value.
     Constant(f64),
     /// A value for each time, equal in all runs.
@@ -66,7 +66,7 @@ pub struct Size {
 
 impl Size {
     /// Returns the number of values of all trajectories; `None` if they exceed the address space.
-    pub fn courses(&self) -> Option<usize> {
+    pub fn trajectories(&self) -> Option<usize> {
         self.values(self.kept)
     }
 
@@ -88,7 +88,7 @@ pub struct Runs {
     pub size: Size,
     /// Trajectories: runs, outputs, times; the last index varies fastest. Times that a run has not reached
     /// are NaN.
-    pub courses: Vec<f64>,
+    pub trajectories: Vec<f64>,
     /// Statistics: runs, outputs, statistics; the last index varies fastest. They are NaN for a failed run.
     /// If the FMU ended a run, they cover the times until then.
     pub measures: Vec<f64>,
@@ -111,9 +111,9 @@ impl System {
     pub fn run(&self, batch: &Batch, watch: &Watch) -> Result<Runs, Error> {
         let planned = self.plan(batch)?;
         let size = planned.size();
-        let [mut courses, mut measures] = [zeros(size.courses())?, zeros(size.measures())?];
-        let [errors, notes] = planned.run(watch, &mut courses, &mut measures)?;
-        Ok(Runs { size, courses, measures, errors, notes })
+        let [mut trajectories, mut measures] = [zeros(size.trajectories())?, zeros(size.measures())?];
+        let [errors, notes] = planned.run(watch, &mut trajectories, &mut measures)?;
+        Ok(Runs { size, trajectories, measures, errors, notes })
     }
 
     /// Checks a batch, for callers that provide the memory for its results.
@@ -162,10 +162,10 @@ impl Planned<'_> {
     pub fn run(
         &self,
         watch: &Watch,
-        courses: &mut [f64],
+        trajectories: &mut [f64],
         measures: &mut [f64],
     ) -> Result<[Vec<(usize, String)>; 2], Error> {
-        run::run(self.system, &self.plan, watch, [courses, measures])
+        run::run(self.system, &self.plan, watch, [trajectories, measures])
     }
 }
 

@@ -1,6 +1,6 @@
 //! Checks a batch and looks up its names.
 
-use super::{Batch, Course, Measure};
+use super::{Batch, Measure, Trajectory};
 use crate::error::{Error, request};
 use crate::found::article;
 use crate::selection::{Selection, fits};
@@ -97,7 +97,7 @@ impl<'a> Plan<'a> {
 
     fn find_inputs(&mut self, system: &System, batch: &'a Batch) -> Result<(), Error> {
         let mut seen = Vec::new();
-        for (name, course) in &batch.inputs {
+        for (name, trajectory) in &batch.inputs {
             let variables = system.find_numbers(name)?;
             variables.iter().try_for_each(|found| found.check_own(name))?;
             let of = variables[0].of;
@@ -109,35 +109,40 @@ impl<'a> Plan<'a> {
                 ));
             }
             once(&mut seen, name, "inputs")?;
-            self.inputs.values.push(self.course(name, of.base, *course)?);
+            self.inputs.values.push(self.trajectory(name, of.base, *trajectory)?);
             self.inputs.variables.push(name, &variables);
         }
         let mut seen = Vec::new();
-        for (name, course) in &batch.input_derivatives {
+        for (name, trajectory) in &batch.input_derivatives {
             let variables = system.takes_input_derivative(name)?;
             once(&mut seen, name, "input derivatives")?;
-            self.derivatives.values.push(self.course(name, BaseType::Real, *course)?);
+            self.derivatives.values.push(self.trajectory(name, BaseType::Real, *trajectory)?);
             self.derivatives.variables.push(name, &variables);
         }
         Ok(())
     }
 
-    fn course(&self, name: &str, base: BaseType, course: Course<'a>) -> Result<Values<'a>, Error> {
+    fn trajectory(
+        &self,
+        name: &str,
+        base: BaseType,
+        trajectory: Trajectory<'a>,
+    ) -> Result<Values<'a>, Error> {
         let times = self.time.len();
         let shared = Values { values: &[], constant: 0.0, of_run: 0, of_time: 0 };
-        match course {
-            Course::Constant(value) => {
+        match trajectory {
+            Trajectory::Constant(value) => {
                 fits(name, base, &[value])?;
                 Ok(Values { constant: value, ..shared })
             }
-            Course::Shared(values) => {
+            Trajectory::Shared(values) => {
                 if values.len() != times {
                     return request(format!("{name} has {} values for {times} times", values.len()));
                 }
                 fits(name, base, values)?;
                 Ok(Values { values, of_time: 1, ..shared })
             }
-            Course::EachRun(values) => {
+            Trajectory::EachRun(values) => {
                 fits(name, base, values)?;
                 Ok(Values { values, of_run: times, of_time: 1, ..shared })
             }
@@ -152,14 +157,14 @@ fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
             time.len()
         ));
     }
-    if let Some(place) = time.iter().position(|time| !time.is_finite()) {
-        return request(format!("time[{place}] is {}; times must be finite", time[place]));
+    if let Some(index) = time.iter().position(|time| !time.is_finite()) {
+        return request(format!("time[{index}] is {}; times must be finite", time[index]));
     }
-    if let Some(place) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
-        let [before, after] = [time[place], time[place + 1]];
+    if let Some(index) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+        let [before, after] = [time[index], time[index + 1]];
         return request(format!(
-            "time[{}] is {after}, which is not after time[{place}], {before}",
-            place + 1
+            "time[{}] is {after}, which is not after time[{index}], {before}",
+            index + 1
         ));
     }
     Ok(time)
@@ -168,13 +173,14 @@ fn checked_time(time: &[f64]) -> Result<&[f64], Error> {
 /// Returns the number of runs; checks that all values for each run agree on it.
 fn runs(batch: &Batch) -> Result<usize, Error> {
     let mut found: Option<(&str, usize)> = None;
-    let courses =
-        batch.inputs.iter().chain(&batch.input_derivatives).filter_map(|(name, course)| match course {
-            Course::EachRun(values) => Some((*name, values.len(), batch.time.len())),
+    let trajectories = batch.inputs.iter().chain(&batch.input_derivatives).filter_map(
+        |(name, trajectory)| match trajectory {
+            Trajectory::EachRun(values) => Some((*name, values.len(), batch.time.len())),
             _ => None,
-        });
+        },
+    );
     let starts = batch.start.iter().filter_map(|(name, start)| Some((*name, start.count()?, 1)));
-    for (name, length, times) in courses.chain(starts) {
+    for (name, length, times) in trajectories.chain(starts) {
         if length % times != 0 {
             return request(format!("{name} has {length} values, which is no multiple of the {times} times"));
         }

@@ -3,7 +3,7 @@
 use super::measure::Measured;
 use super::plan::{ByTime, Plan, Values};
 use crate::error::Error;
-use crate::refusal::{Message, Refusal};
+use crate::rejection::{Message, Rejection};
 use crate::running::Running;
 use crate::system::System;
 use fmi_abi::Interface;
@@ -73,7 +73,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 /// What a run has to fill.
 struct Row<'a> {
     run: usize,
-    courses: &'a mut [f64],
+    trajectories: &'a mut [f64],
     measures: &'a mut [f64],
 }
 
@@ -82,19 +82,19 @@ pub(super) fn run(
     system: &System,
     plan: &Plan,
     watch: &Watch,
-    [courses, measures]: [&mut [f64]; 2],
+    [trajectories, measures]: [&mut [f64]; 2],
 ) -> Result<[Told; 2], Error> {
     let begin = time::Instant::now();
-    let (course, measured) = (plan.outputs.len() * plan.kept(), plan.outputs.len() * plan.measures.len());
-    let room = courses.len() >= plan.runs * course && measures.len() >= plan.runs * measured;
+    let (trajectory, measured) = (plan.outputs.len() * plan.kept(), plan.outputs.len() * plan.measures.len());
+    let room = trajectories.len() >= plan.runs * trajectory && measures.len() >= plan.runs * measured;
     assert!(room, "there is too little room for {} runs", plan.runs);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(plan.threads)
         .build()
         .map_err(|error| Error::Fmu(format!("no threads can be made: {error}")))?;
-    let rows = split(courses, course).zip(split(measures, measured));
+    let rows = split(trajectories, trajectory).zip(split(measures, measured));
     let rows = rows.take(plan.runs).enumerate();
-    let rows = Mutex::new(rows.map(|(run, (courses, measures))| Row { run, courses, measures }));
+    let rows = Mutex::new(rows.map(|(run, (trajectories, measures))| Row { run, trajectories, measures }));
     let next = || rows.lock().unwrap_or_else(PoisonError::into_inner).next();
     // Each thread has one instance and takes the next run.
     let found = pool.broadcast(|_| {
@@ -103,8 +103,8 @@ pub(super) fn run(
         while !watch.is_cancelled()
             && let Some(row) = next()
         {
-            let Row { run, courses, measures } = row;
-            let result = worker.run(run, plan.time, courses, measures);
+            let Row { run, trajectories, measures } = row;
+            let result = worker.run(run, plan.time, trajectories, measures);
             if watch.is_cancelled() {
                 break;
             }
@@ -140,14 +140,14 @@ fn ask(system: &System, plan: &Plan, watch: &Watch, until: time::Instant, failur
     let next = || silent.lock().unwrap_or_else(PoisonError::into_inner).next();
     rayon::broadcast(|_| {
         let mut worker = Worker::new(system, plan, watch, Some(until));
-        let mut courses = vec![0.0; plan.outputs.len() * plan.kept()];
+        let mut trajectories = vec![0.0; plan.outputs.len() * plan.kept()];
         let mut measures = vec![0.0; plan.outputs.len() * plan.measures.len()];
         while !watch.is_cancelled()
             && time::Instant::now() < until
             && let Some((run, failure)) = next()
         {
             let times = failure.at.map_or(0, |at| at + 2).min(plan.time.len());
-            let again = worker.run(*run, &plan.time[..times], &mut courses, &mut measures);
+            let again = worker.run(*run, &plan.time[..times], &mut trajectories, &mut measures);
             if let Err(again) = again
                 && again.at == failure.at
             {
@@ -235,50 +235,50 @@ impl<'a> Worker<'a> {
         &mut self,
         run: usize,
         times: &[f64],
-        courses: &mut [f64],
+        trajectories: &mut [f64],
         measures: &mut [f64],
     ) -> Result<Option<String>, Failure> {
         let plan = self.plan;
         let mut instance = match self.instance() {
             Ok(instance) => instance,
             Err((text, is_silent)) => {
-                courses.fill(f64::NAN);
+                trajectories.fill(f64::NAN);
                 measures.fill(f64::NAN);
                 return Err(Failure { at: None, text, is_silent });
             }
         };
         self.room.begin(plan, run);
         let until = Until { watch: self.watch, logging: self.logging };
-        let stopped = follow(plan, times, &mut instance, &mut self.room, run, courses, &until).err();
+        let stopped = follow(plan, times, &mut instance, &mut self.room, run, trajectories, &until).err();
         if self.logging.is_none() {
             let at = stopped.as_ref().and_then(|(at, _)| *at).map_or(0, |at| at.min(times.len() - 1));
             self.watch.hear(run, times[at], &instance);
-            let ended = stopped.as_ref().and_then(|(_, refusal)| refusal.ended());
+            let ended = stopped.as_ref().and_then(|(_, rejection)| rejection.ended());
             lock(&self.watch.ended).extend(ended.map(|time| (run, time, self.room.row.clone())));
         }
         let filled = plan.every.map_or(0, |every| self.room.rows.div_ceil(every));
-        for course in courses.chunks_mut(plan.kept().max(1)) {
-            course[filled..].fill(f64::NAN);
+        for trajectory in trajectories.chunks_mut(plan.kept().max(1)) {
+            trajectory[filled..].fill(f64::NAN);
         }
-        let refused = stopped.as_ref().is_some_and(|(_, refusal)| refusal.ended().is_none());
+        let rejected = stopped.as_ref().is_some_and(|(_, rejection)| rejection.ended().is_none());
         for (output, row) in measures.chunks_mut(plan.measures.len().max(1)).enumerate() {
             for (value, measure) in row.iter_mut().zip(plan.measures) {
-                *value = if refused { f64::NAN } else { self.room.measured.measure(*measure, output) };
+                *value = if rejected { f64::NAN } else { self.room.measured.measure(*measure, output) };
             }
         }
-        let terminated = if refused { Ok(()) } else { instance.terminate() };
+        let terminated = if rejected { Ok(()) } else { instance.terminate() };
         self.instance = Some(instance).filter(Running::is_alive);
-        let Some((at, refusal)) = stopped else {
-            return Ok(terminated.err().map(|refusal| format!("finished; then {refusal}")));
+        let Some((at, rejection)) = stopped else {
+            return Ok(terminated.err().map(|rejection| format!("finished; then {rejection}")));
         };
-        if !refused && self.room.rows == plan.time.len() {
-            return Ok(Some(refusal.to_string()));
+        if !rejected && self.room.rows == plan.time.len() {
+            return Ok(Some(rejection.to_string()));
         }
         let text = match at {
-            Some(at) if refused => format!("at {} s: {refusal}", times[at]),
-            _ => refusal.to_string(),
+            Some(at) if rejected => format!("at {} s: {rejection}", times[at]),
+            _ => rejection.to_string(),
         };
-        Err(Failure { at, text, is_silent: refusal.is_silent() })
+        Err(Failure { at, text, is_silent: rejection.is_silent() })
     }
 
     /// Returns a new or reset instance. The error contains the reason, and whether there is no message.
@@ -292,7 +292,7 @@ impl<'a> Worker<'a> {
 }
 
 /// Index of the time (`None` before the end of the initialization) and the error.
-type Stopped = (Option<usize>, Refusal);
+type Stopped = (Option<usize>, Rejection);
 
 /// Conditions that end a run early.
 struct Until<'a> {
@@ -308,10 +308,10 @@ fn follow(
     instance: &mut Running,
     room: &mut Room,
     run: usize,
-    courses: &mut [f64],
+    trajectories: &mut [f64],
     until: &Until,
 ) -> Result<(), Stopped> {
-    start(plan, instance, room, run).map_err(|refusal| (None, refusal))?;
+    start(plan, instance, room, run).map_err(|rejection| (None, rejection))?;
     instance.forget_log();
     let hear = |time: f64, instance: &Running| {
         if until.logging.is_none() {
@@ -321,10 +321,10 @@ fn follow(
     hear(times[0], instance);
     let measures = !plan.measures.is_empty();
     // Index of the next kept value in a trajectory, and number of times until then.
-    let (kept, mut place, mut wait) = (plan.kept(), 0, 0);
-    let mut ended: Option<Refusal> = None;
+    let (kept, mut index, mut wait) = (plan.kept(), 0, 0);
+    let mut ended: Option<Rejection> = None;
     for (k, &time) in times.iter().enumerate() {
-        let at = |refusal| (Some(k), refusal);
+        let at = |rejection| (Some(k), rejection);
         if until.watch.is_cancelled() {
             return Ok(());
         }
@@ -339,18 +339,18 @@ fn follow(
         if !plan.read_before_set && ended.is_none() {
             set_inputs(plan, instance, room, k).map_err(at)?;
         }
-        let keep = wait == 0 && place < kept;
+        let keep = wait == 0 && index < kept;
         if (keep || measures)
-            && let Err(refusal) = instance.get(&plan.outputs, &mut room.row)
+            && let Err(rejection) = instance.get(&plan.outputs, &mut room.row)
         {
-            return Err(at(ended.unwrap_or(refusal)));
+            return Err(at(ended.unwrap_or(rejection)));
         }
         if keep {
             // Avoids `chunks`, which would calculate the number of chunks each time.
             for (output, value) in room.row.iter().enumerate() {
-                courses[output * kept + place] = *value;
+                trajectories[output * kept + index] = *value;
             }
-            place += 1;
+            index += 1;
             wait = plan.every.unwrap_or(1);
         }
         wait = wait.saturating_sub(1);
@@ -368,16 +368,16 @@ fn follow(
             let size = next - time;
             match instance.step(time, size) {
                 Ok(()) => hear(time, instance),
-                Err(refusal) => {
-                    let Some(end) = refusal.ended() else { return Err(at(refusal)) };
+                Err(rejection) => {
+                    let Some(end) = rejection.ended() else { return Err(at(rejection)) };
                     // Outputs can be read, but inputs no longer set (section 4.2.4 of FMI 2.0).
                     if instance.get(&plan.outputs, &mut room.row).is_err() {
                         room.row.fill(f64::NAN);
                     }
                     if next - end > 1e-9 * size {
-                        return Err(at(refusal));
+                        return Err(at(rejection));
                     }
-                    ended = Some(refusal);
+                    ended = Some(rejection);
                 }
             }
         }
@@ -386,14 +386,14 @@ fn follow(
 }
 
 /// Sets start values before Initialization Mode and inputs in it.
-fn start(plan: &Plan, instance: &mut Running, room: &mut Room, run: usize) -> Result<(), Refusal> {
+fn start(plan: &Plan, instance: &mut Running, room: &mut Room, run: usize) -> Result<(), Rejection> {
     instance.begin(plan.time[0], plan.time.last().copied(), &plan.start, run)?;
     set_values(plan, instance, room, 0)?;
     instance.exit_initialization_mode()
 }
 
 #[inline]
-fn set_inputs(plan: &Plan, instance: &mut Running, room: &mut Room, time: usize) -> Result<(), Refusal> {
+fn set_inputs(plan: &Plan, instance: &mut Running, room: &mut Room, time: usize) -> Result<(), Rejection> {
     set_values(plan, instance, room, time)?;
     if room.derivatives.is_empty() {
         return Ok(());
@@ -404,7 +404,7 @@ fn set_inputs(plan: &Plan, instance: &mut Running, room: &mut Room, time: usize)
 }
 
 #[inline]
-fn set_values(plan: &Plan, instance: &mut Running, room: &mut Room, time: usize) -> Result<(), Refusal> {
+fn set_values(plan: &Plan, instance: &mut Running, room: &mut Room, time: usize) -> Result<(), Rejection> {
     if room.inputs.is_empty() {
         return Ok(());
     }

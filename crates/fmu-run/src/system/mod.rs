@@ -313,11 +313,11 @@ impl Whole {
         if self.parts.is_empty() {
             return request("a system needs one component at least".to_owned());
         }
-        for (place, Part { name, fmu }) in self.parts.iter().enumerate() {
+        for (index, Part { name, fmu }) in self.parts.iter().enumerate() {
             if name.is_empty() {
                 return request("a component has no name".to_owned());
             }
-            let before = &self.parts[..place];
+            let before = &self.parts[..index];
             if before.iter().any(|other| other.name == *name) {
                 return request(format!("two components are named {name}"));
             }
@@ -332,7 +332,7 @@ impl Whole {
             }
         }
         let mut wires = Vec::new();
-        for (place, (from, to)) in self.connections.iter().enumerate() {
+        for (index, (from, to)) in self.connections.iter().enumerate() {
             let (output, input) = (self.end(from, "output")?, self.end(to, "input")?);
             if let Err(why) = output.description.connects(output.of, input.description, input.of) {
                 return request(format!("{from} cannot feed {to}: {why}"));
@@ -340,7 +340,7 @@ impl Whole {
             if matches!(output.of.base, BaseType::String | BaseType::Binary) {
                 return request(format!("{from} cannot feed {to}: only numbers and Booleans are passed on"));
             }
-            if self.connections[..place].iter().any(|(_, other)| other == to) {
+            if self.connections[..index].iter().any(|(_, other)| other == to) {
                 return request(format!("{to} is fed twice"));
             }
             wires.push((output, input));
@@ -366,8 +366,8 @@ impl Whole {
         };
         match &*self.parts {
             [part] if part.name.is_empty() => with(0, name),
-            parts => parts.iter().enumerate().find_map(|(place, part)| {
-                with(place, name.strip_prefix(part.name.as_str())?.strip_prefix('.')?)
+            parts => parts.iter().enumerate().find_map(|(index, part)| {
+                with(index, name.strip_prefix(part.name.as_str())?.strip_prefix('.')?)
             }),
         }
     }

@@ -51,8 +51,8 @@ pub(super) fn stages(names: &[(String, String)], wires: &[Wire], order: Order) -
     let stage = |number| {
         let mut stage = Stage { outputs: Selection::default(), inputs: Selection::default() };
         let of_stage = levels.iter().enumerate().filter(|(_, level)| **level == number);
-        for (place, _) in of_stage {
-            let ((from, to), (output, input)) = (&names[place], wires[place]);
+        for (index, _) in of_stage {
+            let ((from, to), (output, input)) = (&names[index], wires[index]);
             stage.outputs.push(from, &[output]);
             stage.inputs.push(to, &[input]);
         }
@@ -73,16 +73,16 @@ fn levels(names: &[(String, String)], wires: &[Wire]) -> Result<Vec<usize>, Erro
 fn level(
     names: &[(String, String)],
     wires: &[Wire],
-    place: usize,
+    index: usize,
     levels: &mut [Option<usize>],
     path: &mut Vec<usize>,
 ) -> Result<usize, Error> {
-    if let Some(level) = levels[place] {
+    if let Some(level) = levels[index] {
         return Ok(level);
     }
-    if let Some(begin) = path.iter().position(|before| *before == place) {
-        let circle = path[begin..].iter().rev().map(|place| {
-            let (from, to) = &names[*place];
+    if let Some(begin) = path.iter().position(|before| *before == index) {
+        let circle = path[begin..].iter().rev().map(|index| {
+            let (from, to) = &names[*index];
             format!("{from} -> {to}")
         });
         return request(format!(
@@ -91,12 +91,12 @@ fn level(
             circle.collect::<Vec<_>>().join(", ")
         ));
     }
-    path.push(place);
+    path.push(index);
     let mut own = 0;
-    for before in (0..wires.len()).filter(|before| follows(&wires[place], &wires[*before])) {
+    for before in (0..wires.len()).filter(|before| follows(&wires[index], &wires[*before])) {
         own = own.max(1 + level(names, wires, before, levels, path)?);
     }
     path.pop();
-    levels[place] = Some(own);
+    levels[index] = Some(own);
     Ok(own)
 }

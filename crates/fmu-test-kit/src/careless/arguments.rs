@@ -28,13 +28,13 @@ pub struct Variables {
 impl Variables {
     /// Collects the value references of a model in an FMI version.
     pub fn of<M: Exported>(standard: Standard) -> Self {
-        let reference = |place| standard.reference(place);
+        let reference = |index| standard.reference(index);
         // In FMI 3.0, elements of arrays are not variables.
         let is_one =
             |variable: &fmu_export::Variable<M>| standard == Standard::Fmi2 || variable.element() == 0;
         let those = |wanted: &dyn Fn(&fmu_export::Variable<M>) -> bool| {
-            let places = (0..).zip(M::TABLE).filter(|(_, variable)| is_one(variable) && wanted(variable));
-            places.map(|(place, _)| reference(place)).collect::<Vec<u32>>()
+            let indices = (0..).zip(M::TABLE).filter(|(_, variable)| is_one(variable) && wanted(variable));
+            indices.map(|(index, _)| reference(index)).collect::<Vec<u32>>()
         };
         let real = |variable: &fmu_export::Variable<M>| variable.base() == BaseType::Real;
         let bases = |bases: &[BaseType]| those(&|variable| bases.contains(&variable.base()));
@@ -67,7 +67,7 @@ impl Variables {
             arrays: (0..)
                 .zip(M::TABLE)
                 .filter(|(_, variable)| standard == Standard::Fmi3 && variable.element() == 0)
-                .map(|(place, variable)| (reference(place), variable.length()))
+                .map(|(index, variable)| (reference(index), variable.length()))
                 .filter(|(_, length)| *length > 1)
                 .collect(),
         }
@@ -270,8 +270,8 @@ impl CallArguments {
 
     /// Returns the address to pass for an array with elements of this size; `place` is its index among the
     /// function's arrays.
-    pub fn address(&self, place: usize, array: usize, size: usize) -> usize {
-        match self.faults[place % self.faults.len()] {
+    pub fn address(&self, index: usize, array: usize, size: usize) -> usize {
+        match self.faults[index % self.faults.len()] {
             Fault::Null => 0,
             // Never dereferenced, because the FMU rejects the pointer. Bytes are always aligned, so they have
             // no such fault.

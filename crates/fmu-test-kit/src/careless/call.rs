@@ -70,12 +70,12 @@ impl Call {
         let discards = (name.ends_with("Status") || name.ends_with("DoStep")) && status == Status::Discard;
         assert!(discards || [Status::Ok, Status::Error].contains(&status), "{name} answers {status:?}");
         let mut values = Vec::new();
-        for place in 0..arrays.len() {
-            let array = &arrays[place];
+        for index in 0..arrays.len() {
+            let array = &arrays[index];
             let Some(count) = array.written else { continue };
             assert!(array.elements.end_untouched(count), "too much: {self:?}");
             if status == Status::Ok {
-                let before = place.checked_sub(1).map(|place| &arrays[place].elements);
+                let before = index.checked_sub(1).map(|index| &arrays[index].elements);
                 array.values(count, before, &mut values);
             }
         }
@@ -128,8 +128,8 @@ impl Elements {
     }
 
     /// Returns the bits of the element at this index.
-    fn bits(&self, place: usize) -> u64 {
-        let at = place * self.size;
+    fn bits(&self, index: usize) -> u64 {
+        let at = index * self.size;
         let shifted = self.memory[at / 8] >> (8 * (at % 8));
         if self.size == 8 { shifted } else { shifted & ((1 << (8 * self.size)) - 1) }
     }
@@ -141,7 +141,7 @@ impl Elements {
     /// Returns whether nothing is written after `count` elements.
     fn end_untouched(&self, count: usize) -> bool {
         let all = 8 * self.memory.len() / self.size;
-        (count..all).all(|place| self.bits(place) == self.untouched())
+        (count..all).all(|index| self.bits(index) == self.untouched())
     }
 }
 
@@ -217,13 +217,13 @@ impl Array {
     /// Adds the written values; `sizes` is the previous array.
     fn values(&self, count: usize, sizes: Option<&Elements>, values: &mut Vec<u64>) {
         if self.of == "EventInfo" {
-            let bits = |place| self.elements.bits(place);
-            values.extend((0..5).map(|place| truth(bits(place))));
+            let bits = |index| self.elements.bits(index);
+            values.extend((0..5).map(|index| truth(bits(index))));
             values.push(finite(f64::from_bits(bits(6) | bits(7) << 32)));
             return;
         }
-        for place in 0..count {
-            let bits = self.elements.bits(place);
+        for index in 0..count {
+            let bits = self.elements.bits(index);
             assert!(self.elements.size < 4 || bits != self.elements.untouched(), "no value");
             values.push(match self.of {
                 "Real" | "Float64" => finite(f64::from_bits(bits)),
@@ -241,7 +241,7 @@ impl Array {
                     u64::from_le_bytes(fnv1a(text))
                 }
                 "Binary" => {
-                    let size = sizes.expect("their sizes come before").bits(place) as usize;
+                    let size = sizes.expect("their sizes come before").bits(index) as usize;
                     // SAFETY: bytes of the FMU with this length, valid until the next call.
                     let bytes = unsafe {
                         std::slice::from_raw_parts(std::ptr::with_exposed_provenance(bits as usize), size)

@@ -213,7 +213,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
             // other instances.
             made_of.instance_name = match *u.choose(&texts)? {
                 Some(name) if !name.to_bytes().trim_ascii().is_empty() => Some(c"instance"),
-                refused => refused,
+                rejected => rejected,
             };
         }
         (made_of.logging_on, made_of.visible) = (u.int_in_range(0..=2)?, u.arbitrary()?);
@@ -316,12 +316,12 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         let foreign = owner != index;
         let [get, set, free, size_of, serialize, deserialize] = F::HANDLES;
         let (function, status) = match u.int_in_range(0..=7_u8)? {
-            0 | 1 => (get, fmu.get_state(place(state, u)?)),
+            0 | 1 => (get, fmu.get_state(pointer_to(state, u)?)),
             2 | 3 => (set, fmu.set_state(*state)),
-            4 => (free, fmu.free_state(place(state, u)?)),
+            4 => (free, fmu.free_state(pointer_to(state, u)?)),
             5 => {
                 let mut size = 0;
-                (size_of, fmu.state_size(*state, place(&mut size, u)?))
+                (size_of, fmu.state_size(*state, pointer_to(&mut size, u)?))
             }
             6 => {
                 let mut size = 0;
@@ -343,7 +343,7 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
                 damage(&mut self.saved, u)?;
                 let pointer = if u.ratio(1, 16)? { null() } else { self.saved.as_ptr() };
                 let old = *state;
-                let status = fmu.deserialize(pointer, self.saved.len(), place(state, u)?);
+                let status = fmu.deserialize(pointer, self.saved.len(), pointer_to(state, u)?);
                 assert!(status == Status::Ok || *state == old, "a handle changed by a refused call");
                 (deserialize, status)
             }
@@ -355,8 +355,8 @@ impl<F: Caller, M: Exported> Session<'_, F, M> {
         check_messages(messages);
         assert!([Status::Ok, Status::Error].contains(&status), "{function} answers {status:?}");
         // Freeing through a NULL pointer is no error.
-        let refused = status == Status::Error || function == free;
-        assert!(!foreign || refused && !state.is_null(), "{function} takes another instance's state");
+        let rejected = status == Status::Error || function == free;
+        assert!(!foreign || rejected && !state.is_null(), "{function} takes another instance's state");
         let content = &mut self.contents[index][which];
         if function == set && status == Status::Ok {
             assert!(content.is_empty() || *content == fmu.bytes(), "another state is restored");
@@ -399,7 +399,7 @@ fn callable<F: Caller>() -> Vec<&'static str> {
 }
 
 /// Returns a pointer for one value, sometimes NULL or misaligned; the FMU does not dereference such pointers.
-fn place<T>(value: &mut T, u: &mut Unstructured) -> Result<*mut T> {
+fn pointer_to<T>(value: &mut T, u: &mut Unstructured) -> Result<*mut T> {
     Ok(match u.int_in_range(0..=15_u8)? {
         0 => null_mut(),
         1 => (&raw mut *value).wrapping_byte_add(1),
@@ -427,8 +427,9 @@ fn damage(bytes: &mut Vec<u8>, u: &mut Unstructured) -> Result<()> {
 
 /// Checks that messages are clean, and that at most one reports an error.
 fn check_messages(messages: Vec<Message>) {
-    let refusals = messages.iter().filter(|message| ![Status::Ok, Status::Warning].contains(&message.status));
-    assert!(refusals.count() <= 1, "{messages:#?}");
+    let rejections =
+        messages.iter().filter(|message| ![Status::Ok, Status::Warning].contains(&message.status));
+    assert!(rejections.count() <= 1, "{messages:#?}");
     for message in messages {
         message.assert_clean();
         assert!(message.status != Status::Fatal, "{message:?}");

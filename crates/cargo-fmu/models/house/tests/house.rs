@@ -23,7 +23,7 @@ fn the_weather_is_that_of_the_table() {
 }
 
 #[test]
-fn what_is_no_table_is_refused() {
+fn what_is_no_table_is_rejected() {
     for weather in ["summer.csv", "../../Cargo.toml"] {
         let error = house(weather).err().expect("there is no such table").to_string();
         assert!(error.contains(weather), "{error}");

@@ -16,10 +16,10 @@ pub struct Message {
 /// A status other than OK or Warning, with the function that returned it and the messages of the FMU. The
 /// error is boxed because it is rare and each call may return it.
 #[derive(Debug)]
-pub struct Refusal(Box<Refused>);
+pub struct Rejection(Box<Rejected>);
 
 #[derive(Debug)]
-struct Refused {
+struct Rejected {
     /// Name of the component; empty if there is only one.
     component: String,
     function: &'static str,
@@ -28,10 +28,10 @@ struct Refused {
     ended: Option<f64>,
 }
 
-impl Refusal {
+impl Rejection {
     #[cold]
     pub(crate) fn new(component: &str, function: &'static str, status: Status, log: Vec<Message>) -> Self {
-        Self(Box::new(Refused { component: component.to_owned(), function, status, log, ended: None }))
+        Self(Box::new(Rejected { component: component.to_owned(), function, status, log, ended: None }))
     }
 
     /// Creates an error that does not come from an FMU.
@@ -62,9 +62,9 @@ impl Refusal {
     }
 }
 
-impl std::fmt::Display for Refusal {
+impl std::fmt::Display for Rejection {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Refused { component, function, status, log, ended } = &*self.0;
+        let Rejected { component, function, status, log, ended } = &*self.0;
         let message = reason(log);
         if !component.is_empty() {
             write!(f, "{component}: ")?;
@@ -82,7 +82,7 @@ impl std::fmt::Display for Refusal {
     }
 }
 
-impl std::error::Error for Refusal {}
+impl std::error::Error for Rejection {}
 
 /// Returns the message that explains an error: the last one with status Discard or worse, otherwise the last
 /// one.

@@ -29,9 +29,9 @@ const INF: f64 = f64::INFINITY;
 type Case = (&'static str, fn(&Importer) -> Status, &'static [&'static str]);
 
 #[track_caller]
-fn all_refused(fmu: &Importer, cases: &[Case]) {
+fn all_rejected(fmu: &Importer, cases: &[Case]) {
     for (label, call, words) in cases {
-        let message = fmu.refused(label, call);
+        let message = fmu.rejected(label, call);
         for word in *words {
             assert!(message.contains(word), "{label}: '{word}' is not in: {message}");
         }
@@ -60,10 +60,10 @@ const ARRAYS: &[Case] = &[
 #[test]
 fn value_references_and_arrays() {
     for interface in INTERFACES {
-        all_refused(&Importer::in_mode::<Oscillator>(interface, Initialization), ARRAYS);
+        all_rejected(&Importer::in_mode::<Oscillator>(interface, Initialization), ARRAYS);
     }
-    all_refused(&Importer::in_mode::<Oscillator>(CoSimulation, StepComplete), ARRAYS);
-    all_refused(&Importer::in_mode::<Oscillator>(ModelExchange, Event), ARRAYS);
+    all_rejected(&Importer::in_mode::<Oscillator>(CoSimulation, StepComplete), ARRAYS);
+    all_rejected(&Importer::in_mode::<Oscillator>(ModelExchange, Event), ARRAYS);
 }
 
 #[test]
@@ -95,22 +95,22 @@ const PARAMETERS: &[Case] = &[
 #[test]
 fn parameters_out_of_range() {
     for interface in INTERFACES {
-        all_refused(&Importer::in_mode::<Oscillator>(interface, Instantiated), PARAMETERS);
-        all_refused(&Importer::in_mode::<Oscillator>(interface, Initialization), PARAMETERS);
+        all_rejected(&Importer::in_mode::<Oscillator>(interface, Instantiated), PARAMETERS);
+        all_rejected(&Importer::in_mode::<Oscillator>(interface, Initialization), PARAMETERS);
     }
-    all_refused(&Importer::in_mode::<Oscillator>(CoSimulation, StepComplete), PARAMETERS);
+    all_rejected(&Importer::in_mode::<Oscillator>(CoSimulation, StepComplete), PARAMETERS);
 }
 
 /// Checks that all values of one call are checked together: one by one they would be rejected.
 #[test]
 fn combinations_are_set_together() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, Instantiated);
-    fmu.refused("the damping alone", |fmu| fmu.try_set(&[DAMPING], &[30.0]));
+    fmu.rejected("the damping alone", |fmu| fmu.try_set(&[DAMPING], &[30.0]));
     fmu.set(&[DAMPING, STIFFNESS], &[30.0, 5000.0]);
-    fmu.refused("the stiffness alone", |fmu| fmu.try_set(&[STIFFNESS], &[50.0]));
+    fmu.rejected("the stiffness alone", |fmu| fmu.try_set(&[STIFFNESS], &[50.0]));
     fmu.ok(fmu.fmi2SetBoolean(&DAMPED, 1, &0));
     fmu.set(&[STIFFNESS], &[50.0]);
-    fmu.refused("the damper again", |fmu| fmu.fmi2SetBoolean(&DAMPED, 1, &1));
+    fmu.rejected("the damper again", |fmu| fmu.fmi2SetBoolean(&DAMPED, 1, &1));
 }
 
 const HEARD: u32 = talker::Name::heard as u32;
@@ -156,7 +156,7 @@ fn texts() {
         let fmu = Importer::in_mode::<Talker>(interface, mode);
         let readable = mode != Instantiated;
         let get = TEXTS.len() - 1;
-        all_refused(&fmu, if readable { TEXTS } else { &TEXTS[..get] });
+        all_rejected(&fmu, if readable { TEXTS } else { &TEXTS[..get] });
     }
 }
 
@@ -176,7 +176,7 @@ fn experiments() {
             ("stop before start", setup(0, 0.0, 1.0, 1, 0.5), "stopTime"),
             ("stop NaN", setup(0, 0.0, 0.0, 1, NAN), "stopTime"),
         ] {
-            let message = fmu.refused(label, call);
+            let message = fmu.rejected(label, call);
             assert!(message.contains(word), "{message}");
         }
         // Undefined values are ignored; a tolerance of 0 means none.
@@ -206,7 +206,7 @@ fn steps() {
         ("past the stop time", 1.25, 0.76, "stop time 2"),
         ("far past the stop time", 1.25, 1e300, "stop time 2"),
     ] {
-        let message = fmu.refused(label, |fmu| fmu.try_step(point, step_size));
+        let message = fmu.rejected(label, |fmu| fmu.try_step(point, step_size));
         assert!(message.contains(word), "{label}: {message}");
     }
     fmu.step(1.25, 0.75);
@@ -220,17 +220,19 @@ fn out_of_the_range_of_numbers() {
     fmu.set(&[FORCE], &[f64::MAX]);
     fmu.set_rates([FORCE], [f64::MAX]);
     fmu.set(&[MASS], &[0.1]);
-    fmu.refused_with(&["range of numbers"], |fmu| fmu.try_step(0.0, 1e3));
-    fmu.refused("an infinite rate", |fmu| fmu.fmi2GetRealOutputDerivatives(&ACCELERATION, 1, &1, &mut 0.0));
+    fmu.rejected_with(&["range of numbers"], |fmu| fmu.try_step(0.0, 1e3));
+    fmu.rejected("an infinite rate", |fmu| fmu.fmi2GetRealOutputDerivatives(&ACCELERATION, 1, &1, &mut 0.0));
     fmu.set(&[FORCE], &[0.1]);
     fmu.set_rates([FORCE], [0.0]);
     fmu.step(0.0, 10.0);
     let fmu = Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime);
     fmu.set(&[POSITION, FORCE], &[1e200, 0.1]);
-    fmu.refused_with(&["energy is out of the range of numbers"], |fmu| fmu.fmi2GetReal(&ENERGY, 1, &mut 0.0));
+    fmu.rejected_with(&["energy is out of the range of numbers"], |fmu| {
+        fmu.fmi2GetReal(&ENERGY, 1, &mut 0.0)
+    });
     fmu.set(&[POSITION], &[f64::MAX]);
-    fmu.refused_with(&["der(velocity)"], |fmu| fmu.fmi2GetDerivatives([0.0; 2].as_mut_ptr(), 2));
-    fmu.refused("their partials", |fmu| {
+    fmu.rejected_with(&["der(velocity)"], |fmu| fmu.fmi2GetDerivatives([0.0; 2].as_mut_ptr(), 2));
+    fmu.rejected("their partials", |fmu| {
         fmu.fmi2GetDirectionalDerivative(&ENERGY, 1, &POSITION, 1, &1e10, &mut 0.0)
     });
 }
@@ -268,7 +270,7 @@ const DERIVATIVES: &[Case] = &[
 
 #[test]
 fn derivatives_with_respect_to_time() {
-    all_refused(&Importer::in_mode::<Oscillator>(CoSimulation, StepComplete), DERIVATIVES);
+    all_rejected(&Importer::in_mode::<Oscillator>(CoSimulation, StepComplete), DERIVATIVES);
 }
 
 fn directional(fmu: &Importer, unknown: u32, known: u32, seed: f64) -> Status {
@@ -290,7 +292,7 @@ const DIRECTIONAL: &[Case] = &[
 #[test]
 fn directional_derivatives() {
     for (interface, mode) in [(CoSimulation, StepComplete), (ModelExchange, ContinuousTime)] {
-        all_refused(&Importer::in_mode::<Oscillator>(interface, mode), DIRECTIONAL);
+        all_rejected(&Importer::in_mode::<Oscillator>(interface, mode), DIRECTIONAL);
     }
 }
 
@@ -306,25 +308,25 @@ const STATES: &[Case] = &[
 
 #[test]
 fn continuous_states() {
-    all_refused(&Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime), STATES);
+    all_rejected(&Importer::in_mode::<Oscillator>(ModelExchange, ContinuousTime), STATES);
     let fmu = Importer::in_mode::<Oscillator>(ModelExchange, Event);
-    fmu.refused_with(&["NULL"], |fmu| fmu.fmi2NewDiscreteStates(null_mut()));
+    fmu.rejected_with(&["NULL"], |fmu| fmu.fmi2NewDiscreteStates(null_mut()));
     let fmu = Importer::in_mode::<Ball>(ModelExchange, ContinuousTime);
-    fmu.refused_with(&["1 event indicators, not 0"], |fmu| fmu.fmi2GetEventIndicators(null_mut(), 0));
+    fmu.rejected_with(&["1 event indicators, not 0"], |fmu| fmu.fmi2GetEventIndicators(null_mut(), 0));
 }
 
 #[test]
 fn status_kinds() {
     let fmu = Importer::in_mode::<Oscillator>(CoSimulation, StepComplete);
     for kind in [-1, 4, i32::MAX] {
-        fmu.refused("GetStatus", |fmu| fmu.fmi2GetStatus(kind, &mut 0));
-        fmu.refused("GetRealStatus", |fmu| fmu.fmi2GetRealStatus(kind, &mut 0.0));
-        fmu.refused("GetIntegerStatus", |fmu| fmu.fmi2GetIntegerStatus(kind, &mut 0));
-        fmu.refused("GetBooleanStatus", |fmu| fmu.fmi2GetBooleanStatus(kind, &mut 0));
-        fmu.refused("GetStringStatus", |fmu| fmu.fmi2GetStringStatus(kind, &mut null()));
+        fmu.rejected("GetStatus", |fmu| fmu.fmi2GetStatus(kind, &mut 0));
+        fmu.rejected("GetRealStatus", |fmu| fmu.fmi2GetRealStatus(kind, &mut 0.0));
+        fmu.rejected("GetIntegerStatus", |fmu| fmu.fmi2GetIntegerStatus(kind, &mut 0));
+        fmu.rejected("GetBooleanStatus", |fmu| fmu.fmi2GetBooleanStatus(kind, &mut 0));
+        fmu.rejected("GetStringStatus", |fmu| fmu.fmi2GetStringStatus(kind, &mut null()));
     }
-    fmu.refused("NULL", |fmu| fmu.fmi2GetRealStatus(2, null_mut()));
-    fmu.refused("NULL", |fmu| fmu.fmi2GetBooleanStatus(3, null_mut()));
+    fmu.rejected("NULL", |fmu| fmu.fmi2GetRealStatus(2, null_mut()));
+    fmu.rejected("NULL", |fmu| fmu.fmi2GetBooleanStatus(3, null_mut()));
     // Each query has one function; the other functions name it in their message.
     fmu.ok(fmu.set_debug_logging(true, &[c"logStatusDiscard"]));
     type Question = fn(&Importer) -> Status;

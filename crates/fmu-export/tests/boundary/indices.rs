@@ -23,19 +23,19 @@ fn set_and_read<F: Either>(count: usize) {
     let (mut now, mut time, mut number) = ([0.0; 6], 0.0, 0.0);
     let mut seconds = 0;
     for round in 0..12 {
-        let places: Vec<usize> = (round..round + count).map(|place| place % 6).collect();
-        let vr: Vec<u32> = places.iter().map(|place| INPUTS[*place] as u32).collect();
-        for place in &places {
+        let indices: Vec<usize> = (round..round + count).map(|index| index % 6).collect();
+        let vr: Vec<u32> = indices.iter().map(|index| INPUTS[*index] as u32).collect();
+        for index in &indices {
             number += 1.0;
-            now[*place] = number;
+            now[*index] = number;
         }
-        fmu.set(&vr, &places.iter().map(|place| now[*place]).collect::<Vec<_>>());
-        assert_eq!(fmu.read(&vr), places.iter().map(|place| now[*place]).collect::<Vec<_>>());
+        fmu.set(&vr, &indices.iter().map(|index| now[*index]).collect::<Vec<_>>());
+        assert_eq!(fmu.read(&vr), indices.iter().map(|index| now[*index]).collect::<Vec<_>>());
         assert_eq!(fmu.get(INPUTS.map(|name| name as u32)), now);
         assert_eq!(fmu.get([TOTAL, SUM]), [now.iter().sum(); 2]);
-        seconds += i32::from(places.contains(&2));
-        let marks = [1, 2, 3].iter().filter(|place| places.contains(place)).count() as i32;
-        assert_eq!(fmu.integer(Name::marks as u32), 10 * seconds + marks, "{places:?}");
+        seconds += i32::from(indices.contains(&2));
+        let marks = [1, 2, 3].iter().filter(|index| indices.contains(index)).count() as i32;
+        assert_eq!(fmu.integer(Name::marks as u32), 10 * seconds + marks, "{indices:?}");
         if round == 0 {
             assert_eq!(fmu.get([LEVEL]), [now[0]], "it starts there");
         }
@@ -60,23 +60,23 @@ fn alone_and_together() {
 }
 
 /// Checks that a rejected variable at any index changes neither the model nor the importer's array.
-fn refused<F: Either>() {
+fn rejected<F: Either>() {
     let fmu: F = new(CoSimulation);
     fmu.initialize(0.0);
     for round in 0..3 {
         let before = fmu.bytes();
         for wrong in [TOTAL, Name::marks as u32, 99, u32::MAX] {
             for vr in [vec![wrong], vec![0, wrong], vec![wrong, 0], vec![0, 1, 2, wrong]] {
-                fmu.refused("set", |fmu| fmu.try_set(&vr, &vec![7.0; vr.len()]));
+                fmu.rejected("set", |fmu| fmu.try_set(&vr, &vec![7.0; vr.len()]));
                 if wrong != TOTAL {
                     let mut values = vec![-1.0; vr.len()];
-                    fmu.refused("get", |fmu| fmu.try_get(&vr, &mut values));
+                    fmu.rejected("get", |fmu| fmu.try_get(&vr, &mut values));
                     assert_eq!(values, vec![-1.0; vr.len()]);
                 }
             }
         }
         for value in [f64::NAN, f64::INFINITY] {
-            fmu.refused("no number", |fmu| fmu.try_set(&[0, 1], &[7.0, value]));
+            fmu.rejected("no number", |fmu| fmu.try_set(&[0, 1], &[7.0, value]));
         }
         assert_eq!(fmu.bytes(), before);
         fmu.step(f64::from(round), 1.0);
@@ -84,14 +84,14 @@ fn refused<F: Either>() {
     // The sum of both is out of range; each one is in range.
     fmu.set(&[0, 1], &[f64::MAX, f64::MAX]);
     assert_eq!(fmu.get([0, 1]), [f64::MAX; 2]);
-    fmu.refused_with(&["total", "out of the range"], |fmu| fmu.try_get(&[TOTAL, 0, 1, 2], &mut [0.0; 4]));
+    fmu.rejected_with(&["total", "out of the range"], |fmu| fmu.try_get(&[TOTAL, 0, 1, 2], &mut [0.0; 4]));
     assert_eq!(fmu.try_step(3.0, 1.0), Status::Ok);
 }
 
 #[test]
-fn refused_as_before() {
-    refused::<Importer>();
-    refused::<fmi3::Importer>();
+fn rejected_as_before() {
+    rejected::<Importer>();
+    rejected::<fmi3::Importer>();
 }
 
 /// Checks that a calculated start value follows an input until the simulation begins, in any order of the
