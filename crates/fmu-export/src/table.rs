@@ -522,7 +522,7 @@ macro_rules! variables {
                                 shape: match |model: &$model| $crate::type_of(
                                     &(*model).$first $([$at])* $( .$field $([$index])* )*
                                 ) {
-                                    $first => $crate::shape_of_index($first),
+                                    $first => $crate::shape_of_field($first),
                                 },
                                 real: |model| match &(*model).$first $([$at])* $( .$field $([$index])* )* {
                                     $first => $crate::read_real($first, 0),

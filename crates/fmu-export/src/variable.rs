@@ -586,7 +586,7 @@ pub fn type_of<T>(_: &T) -> PhantomData<T> {
 
 /// Returns the shape of a field of the model.
 #[doc(hidden)]
-pub const fn shape_of_index<M, T: Place>(_: fn(&M) -> PhantomData<T>) -> Shape {
+pub const fn shape_of_field<M, T: Place>(_: fn(&M) -> PhantomData<T>) -> Shape {
     Shape { base: T::Element::BASE, dimensions: T::DIMENSIONS }
 }
 
@@ -599,29 +599,29 @@ pub const fn shape_of_calculation<M, T: Place>(_: PhantomData<M>, _: fn(&M) -> T
 /// Reads a Real: an element of an array, or the scalar.
 #[doc(hidden)]
 #[inline(always)]
-pub fn read_real(index: &impl Place, number: usize) -> f64 {
-    index.element(number).real()
+pub fn read_real(field: &impl Place, number: usize) -> f64 {
+    field.element(number).real()
 }
 
 /// Reads a value of any type: an element of an array, or the scalar.
 #[doc(hidden)]
 #[inline(always)]
-pub fn read_value(index: &impl Place, number: usize) -> Value {
-    index.element(number).value()
+pub fn read_value(field: &impl Place, number: usize) -> Value {
+    field.element(number).value()
 }
 
 /// Sets a Real.
 #[doc(hidden)]
 #[inline(always)]
-pub fn set_real(index: &mut impl Place, number: usize, value: f64) {
-    index.element_mut(number).set_real(value);
+pub fn set_real(field: &mut impl Place, number: usize, value: f64) {
+    field.element_mut(number).set_real(value);
 }
 
 /// Sets a value of any type.
 #[doc(hidden)]
 #[inline(always)]
-pub fn set_value(index: &mut impl Place, number: usize, value: &Value) {
-    index.element_mut(number).assign(value);
+pub fn set_value(field: &mut impl Place, number: usize, value: &Value) {
+    field.element_mut(number).assign(value);
 }
 
 /// Reads Reals of an array from an element on. Returns 0 if all values are finite.

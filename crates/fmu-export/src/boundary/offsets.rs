@@ -56,11 +56,11 @@ impl<M: Variables> Placed<M> {
     pub fn set_in_place(&mut self, line: u32, value: f64) {
         let without = const { both_offsets(offset_of!(Self, nowhere), offset_of!(Self, is_missed)).unwrap() };
         let offsets = self.model.offsets_to_set(Index(line), offset_of!(Self, no_mark), without);
-        let [index, mark] = [offsets as u32, (offsets >> 32) as u32].map(|offset| offset as usize);
+        let [value_offset, mark] = [offsets as u32, (offsets >> 32) as u32].map(|offset| offset as usize);
         // SAFETY: by the contract of `Variables`, the offsets of an `f64` and a `bool` in the model;
         // otherwise offsets of fields of `Self`.
         unsafe {
-            (&raw mut *self).byte_add(index).cast::<f64>().write(value);
+            (&raw mut *self).byte_add(value_offset).cast::<f64>().write(value);
             (&raw mut *self).byte_add(mark).cast::<bool>().write(true);
         }
     }
@@ -91,23 +91,23 @@ impl<M> DerefMut for Placed<M> {
 /// Returns the offset of a field in the model, if it is an `f64` inside the model.
 #[doc(hidden)]
 #[inline(always)]
-pub fn offset_of_real<M>(model: *const M, index: &impl Place, otherwise: usize) -> usize {
-    index.as_real().map_or(otherwise, |real| offset_in(model, real, otherwise))
+pub fn offset_of_real<M>(model: *const M, field: &impl Place, otherwise: usize) -> usize {
+    field.as_real().map_or(otherwise, |real| offset_in(model, real, otherwise))
 }
 
 /// Returns both offsets as one number, because two numbers would produce two tables. Returns `None` if one of
 /// them is missing (`usize::MAX`) or too large.
 #[doc(hidden)]
 #[inline(always)]
-pub const fn both_offsets(index: usize, mark: usize) -> Option<u64> {
+pub const fn both_offsets(value: usize, mark: usize) -> Option<u64> {
     let largest = u32::MAX as usize;
-    if index < largest && mark < largest { Some(index as u64 | (mark as u64) << 32) } else { None }
+    if value < largest && mark < largest { Some(value as u64 | (mark as u64) << 32) } else { None }
 }
 
 /// Returns the offset of a reference in the model; `otherwise` if it points outside of the model.
 #[doc(hidden)]
 #[inline(always)]
-pub fn offset_in<M, T>(model: *const M, index: *const T, otherwise: usize) -> usize {
-    let offset = index.addr().wrapping_sub(model.addr());
+pub fn offset_in<M, T>(model: *const M, field: *const T, otherwise: usize) -> usize {
+    let offset = field.addr().wrapping_sub(model.addr());
     if offset < size_of::<M>() { offset } else { otherwise }
 }
