@@ -22,7 +22,7 @@ from tools.validation import masters, runs
 
 
 def tools(*arguments):
-    command = [sys.executable, "-m", "tools", "closed-loop", *arguments]
+    command = [sys.executable, "dev/tools", "closed-loop", *arguments]
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 

@@ -8,8 +8,8 @@ import pytest
 from built import ROOT
 from test_readmes import FILES
 
-#: Pages that do not follow these rules yet.
-NOT_COVERED = {"crates/cargo-fmu/README.md", "crates/fmu-check/README.md", "crates/fmu-check/RULES.md"}
+#: Generated from the rules of fmu-check, whose names contain such words.
+NOT_COVERED = {"crates/fmu-check/RULES.md"}
 COVERED = [name for name in FILES if name.endswith(".md") and name not in NOT_COVERED]
 #: Patterns of words and phrases, each with its replacement.
 PLAINER = {

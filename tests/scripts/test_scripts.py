@@ -106,7 +106,7 @@ def test_figures_are_written(fmu: Path, tmp_path: Path, monkeypatch: pytest.Monk
         (tmp_path / path).mkdir(parents=True)
     assert run_command("tools", "", [figures], ["figures", "--fmu", str(fmu), "--out", "out", "--commit"]) == 0
     written = {path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file() and "out" not in path.parts}
-    assert len(written) == 10 and all((ROOT / path).is_file() for path in written)
+    assert len(written) == 9 and all((ROOT / path).is_file() for path in written)
     shown = figures.VISIT.read_bytes()
     visit.film(fmu, figures.VISIT)
     assert figures.VISIT.read_bytes() == shown
