@@ -202,8 +202,10 @@ fn caught(
 fn reproduced(out: &Path, name: &str, unpacked: &Path, fault: &str) {
     let program = out.join("repro");
     let source = out.join(format!("{name}.c"));
+    // Only a hang is waited for.
+    let patience = if name.ends_with("hang") { "-DPATIENCE=5" } else { "-DPATIENCE=60" };
     let compiled = Command::new("cc")
-        .args(["-w", "-DPATIENCE=5", "-o"])
+        .args(["-w", patience, "-o"])
         .arg(&program)
         .arg(source)
         .args(["-ldl", "-lpthread"])
