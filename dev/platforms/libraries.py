@@ -137,6 +137,12 @@ def wheel(target: Target, out: Path) -> Path:
     if "linux" in target.triple:
         command += ["--compatibility", f"manylinux_{GLIBC.replace('.', '_')}"]
     name = "_native.dll" if target is WINDOWS else "fmu_run._native.abi3.so"
+    if target is WINDOWS:
+        # maturin 1.16 lists PyInit_fmu_run._native, which does not exist, in this file. `link` lists the function that does.
+        listed = target_directory() / "maturin" / "fmu_run._native.def"
+        listed.parent.mkdir(exist_ok=True)
+        listed.unlink(missing_ok=True)
+        listed.symlink_to(os.devnull)
     run(*command, *link(target, name, ["PyInit__native"]), environment=environment(target), directory=PACKAGE)
     (path,) = out.glob(f"fmu_run-*{target.wheel}*.whl")
     return path
