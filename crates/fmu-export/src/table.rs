@@ -431,7 +431,7 @@ const fn is_equal(one: &[u8], other: &[u8]) -> bool {
 ///
 /// The macro implements [`Variables`] for the model. It also defines an enum with the names of the lines, for
 /// [`Partials`](crate::Partials) and other capabilities. The enum is called `Name`, or as given after
-/// `names`, for example if a module has two models. [`Variables::place`] returns the index of a name in the
+/// `names`, for example if a module has two models. [`Variables::index`] returns the index of a name in the
 /// table.
 ///
 /// ```
