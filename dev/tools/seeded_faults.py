@@ -1,6 +1,6 @@
 """Puts faults into the sources, one at a time, and runs the tests with each. A fault that no test finds has escaped.
 
-    python tools/seeded_faults.py [--only TEXT] [--check] [LIST.toml ...]
+    python dev/tools/seeded_faults.py [--only TEXT] [--check] [LIST.toml ...]
 
 The lists are in tests/faults. The faults go into a copy of the sources in target/faults. Run all lists before and after
 tests are deleted or merged. The faults of fmu-check's tests are in crates/fmu-check/tests/mutants and run with `make test`.
