@@ -59,9 +59,11 @@ def read(path: Path) -> list[Fault]:
 
 
 def copy_sources() -> None:
-    """Copies the files that git tracks to COPY. Files that have not changed keep their times, for cargo."""
+    """Makes COPY equal to the files that git tracks. Files that have not changed keep their times, for cargo."""
     command = ["git", "ls-files", "-z"]
     names = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
+    for path in [path for path in COPY.rglob("*") if path.is_file() and str(path.relative_to(COPY)) not in names]:
+        path.unlink()
     for name in filter(None, names):
         source, target = ROOT / name, COPY / name
         if source.is_file() and not (target.is_file() and target.read_bytes() == source.read_bytes()):
