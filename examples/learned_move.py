@@ -95,7 +95,7 @@ def main(count: int = 1024, rounds: int = ROUNDS, fresh: int = 1000) -> tuple[Fi
     learned = policy(learn(count, rounds)[None])
     print(f"learned in {perf_counter() - begun:.0f} s, from {count * rounds:,} moves")
     picture, left, envs = Figure(figsize=(8, 3.6), layout="constrained"), {}, wrists(fresh, fresh)
-    trajectories, shares = picture.subplots(1, 2)
+    courses, shares = picture.subplots(1, 2)
     for name, duration, (rates, gains), colour in (
         ("quintic", MOVE, (shaped(1, MOVE)[None], still), "#D55E00"),
         ("ZV", MOVE, (shaped(2, MOVE)[None], still), "#CC79A7"),
@@ -108,10 +108,8 @@ def main(count: int = 1024, rounds: int = ROUNDS, fresh: int = 1000) -> tuple[Fi
         print(f"{name:<11} in {duration:.2f} s: {middle:.2f} deg left, 95 % below {most:.2f}, at most {worst:.2f}")
         shares.semilogx(left[name], np.linspace(0, 100, fresh), color=colour, label=f"{name} ({duration:.2f} s)")
         band = np.percentile(pitch, [2.5, 97.5], axis=1)
-        trajectories.fill_between(STEP * np.arange(len(pitch)), *band, color=colour, linewidth=0)
-    trajectories.set(
-        xlabel="time (s)", ylabel="pitch (deg), 95 % of the wrists", xlim=(0.07, MOVE + AFTER), ylim=(12, 27)
-    )
+        courses.fill_between(STEP * np.arange(len(pitch)), *band, color=colour, linewidth=0)
+    courses.set(xlabel="time (s)", ylabel="pitch (deg), 95 % of the wrists", xlim=(0.07, MOVE + AFTER), ylim=(12, 27))
     shares.set(xlabel="vibration left, peak to peak (deg)", ylabel="wrists with less (%)", ylim=(0, 100))
     picture.legend(*shares.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
     return picture, left

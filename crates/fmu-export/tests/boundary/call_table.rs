@@ -8,6 +8,7 @@ use fmu_export::Mode::{self, *};
 use fmu_export::{Exported, Standard, Status};
 use fmu_test_kit::checks::modes_of_model;
 use fmu_test_kit::serialized::{MODE, with_mode};
+use fmu_test_kit::Random;
 use fmu_test_kit::{Either, Importer, fmi3};
 
 /// Columns of the table in section 3.2.3: start/end, instantiated, Initialization Mode, Event Mode,
@@ -307,6 +308,41 @@ fn every_function_in_every_state() {
     check_every_function::<fmi3::Importer, Ticker>();
     check_every_function::<fmi3::Importer, Palette>();
     check_every_function::<fmi3::Importer, Talker>();
+}
+
+/// Makes random calls: the rules always hold, and no call is ever fatal.
+#[test]
+fn random_walks() {
+    walk::<Importer, Oscillator>(CoSimulation);
+    walk::<Importer, Oscillator>(ModelExchange);
+    walk::<Importer, Counter>(CoSimulation);
+    walk::<Importer, Talker>(CoSimulation);
+    walk::<fmi3::Importer, Oscillator>(CoSimulation);
+    walk::<fmi3::Importer, Oscillator>(ModelExchange);
+}
+
+fn walk<F: Either, M: Exported>(interface: Interface) {
+    let fmu = F::in_mode::<M>(interface, Instantiated);
+    let (mut random, mut mode) = (Random(13), Instantiated);
+    let mut visits = std::collections::BTreeMap::new();
+    for _ in 0..20_000 {
+        let function = F::functions()[random.bits() as usize % F::functions().len()];
+        // Resets are rare, because most other calls need an initialized instance.
+        if matches!(&function[4..], "Reset" | "Terminate") && random.bits() % 8 > 0 {
+            continue;
+        }
+        let status = ValidCall::new::<F, M>(&fmu, function, interface, mode).make(&fmu, |_| ());
+        let log = fmu.take_log();
+        if lacking::<M>(function, interface).is_some() || !accepted(function, interface, mode) {
+            assert_eq!(status, Status::Error, "{function} in state '{mode}' of {interface}: {log:?}");
+        } else {
+            assert!(matches!(status, Status::Ok | Status::Discard), "{function}: {log:?}");
+            mode = next::<M>(function, interface, mode);
+        }
+        *visits.entry(mode.to_string()).or_insert(0) += 1;
+    }
+    let modes = if interface == CoSimulation { 4 } else { 5 };
+    assert!(visits.len() == modes && visits.values().all(|calls| *calls > 100), "{visits:?}");
 }
 
 /// Checks that NULL and zeros as arguments do no harm in any state, and without an instance.
