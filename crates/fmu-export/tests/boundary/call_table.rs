@@ -6,9 +6,9 @@ use crate::valid_calls::ValidCall;
 use fmu_export::Interface::{self, CoSimulation, ModelExchange};
 use fmu_export::Mode::{self, *};
 use fmu_export::{Exported, Standard, Status};
+use fmu_test_kit::Random;
 use fmu_test_kit::checks::modes_of_model;
 use fmu_test_kit::serialized::{MODE, with_mode};
-use fmu_test_kit::Random;
 use fmu_test_kit::{Either, Importer, fmi3};
 
 /// Columns of the table in section 3.2.3: start/end, instantiated, Initialization Mode, Event Mode,
